@@ -1,0 +1,63 @@
+# Best next-viewpoint recommendation: meshes to tables.
+#
+#   snakemake --cores 2                                                  the paper
+#   snakemake --cores 2 --config experiment=quick                        the same graph, small
+#   snakemake --cores 2 tables                                           one stage
+#   snakemake --cores 2 results/paper/evaluation/mug/el00/fold3/proposed.csv   one file
+
+from snakemake.utils import min_version
+
+min_version("9.0")
+
+
+include: "workflow/rules/common.smk"
+
+
+localrules:
+    all,
+    renders,
+    estimators,
+    estimates,
+    lookups,
+    evaluation,
+    tables,
+    figures,
+
+
+
+
+include: "workflow/rules/render.smk"
+include: "workflow/rules/estimate.smk"
+include: "workflow/rules/recommend.smk"
+include: "workflow/rules/read.smk"
+
+
+onstart:
+    Path(LAST_ERROR).unlink(missing_ok=True)
+    banner(
+        f"nbv: experiment {CONFIG['experiment']}, data set {CONFIG['dataset']['source']}, "
+        f"{len(UNITS)} units of {CONFIG['n_folds']} folds",
+        f"results: {RESULTS}/    logs: {RESULTS}/logs/",
+    )
+
+
+onsuccess:
+    banner(
+        "nbv: finished",
+        f"results: {RESULTS}/    read first: {RESULTS}/report.html",
+    )
+
+
+onerror:
+    banner(
+        "nbv: stopped",
+        *last_error(),
+        "what was finished is kept; the same command goes on from there",
+        f"logs: {RESULTS}/logs/",
+    )
+
+
+rule all:
+    input:
+        rules.evaluation.input,
+    default_target: True

@@ -1,0 +1,52 @@
+"""Angles on the circle, in degrees. Every function works elementwise and broadcasts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Angles = NDArray[np.float64]
+
+
+def wrap_deg(angle_deg: ArrayLike) -> Angles:
+    """Return the same directions in [0, 360)."""
+    wrapped = np.mod(np.asarray(angle_deg, dtype=np.float64), 360.0)
+    # np.mod(-1e-17, 360) rounds up to 360 itself, which is outside the half-open range.
+    return np.where(wrapped >= 360.0, 0.0, wrapped)
+
+
+def signed_difference_deg(a_deg: ArrayLike, b_deg: ArrayLike) -> Angles:
+    """Return the turn from b to a, the shorter way round, in [-180, 180)."""
+    difference = np.asarray(a_deg, dtype=np.float64) - np.asarray(b_deg, dtype=np.float64)
+    return wrap_deg(difference + 180.0) - 180.0
+
+
+def circular_distance_deg(a_deg: ArrayLike, b_deg: ArrayLike) -> Angles:
+    """Return the angle between two directions, in [0, 180] (Eq. 9, its cases put right)."""
+    return np.abs(signed_difference_deg(a_deg, b_deg))
+
+
+def travel_deg(delta_deg: ArrayLike) -> Angles:
+    """Return how far the camera goes for a rotation delta, the shorter way, in [0, 180]."""
+    return circular_distance_deg(delta_deg, 0.0)
+
+
+def midpoint_deg(first_deg: ArrayLike, second_deg: ArrayLike) -> Angles:
+    """Return the circular mean of two directions, in [0, 360).
+
+    Antipodal directions have no mean; the first is returned for them.
+    """
+    turn = signed_difference_deg(second_deg, first_deg)
+    antipodal = turn == -180.0
+    return wrap_deg(np.asarray(first_deg, dtype=np.float64) + np.where(antipodal, 0.0, turn / 2))
+
+
+def direction_deg(cos: ArrayLike, sin: ArrayLike) -> Angles:
+    """Return the direction of the vector (cos, sin), in [0, 360)."""
+    return wrap_deg(np.degrees(np.arctan2(np.asarray(sin), np.asarray(cos))))
+
+
+def nearest_bin(angle_deg: ArrayLike, n_bins: int) -> NDArray[np.intp]:
+    """Return the bin of each angle: bin k of width w = 360/n_bins covers [kw - w/2, kw + w/2)."""
+    width = 360.0 / n_bins
+    return (np.floor(wrap_deg(angle_deg) / width + 0.5)).astype(np.intp) % n_bins

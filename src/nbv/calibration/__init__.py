@@ -1,0 +1,1 @@
+"""From an estimator's held-out errors to densities on the torus of estimate and viewpoint."""

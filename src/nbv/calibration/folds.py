@@ -1,0 +1,119 @@
+"""Which object is trained on, calibrated with and tested on, in each fold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nbv.errors import UserError
+
+Role = Literal["train", "calibration", "test"]
+ROLES: tuple[Role, ...] = ("train", "calibration", "test")
+
+
+def make_splits(
+    object_ids: Sequence[str],
+    n_folds: int,
+    calibration_fraction: float,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """Divide objects into folds; each object is tested in exactly one.
+
+    Of a fold's remaining objects, `calibration_fraction` (at least one, and at least one is left
+    to train on) calibrate and the others train.
+
+    Parameters
+    ----------
+    object_ids : sequence of str, distinct
+    n_folds : int, 2 or more
+    calibration_fraction : float in (0, 1)
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    DataFrame
+        Columns ``object_id, fold, role``; folds count from 1; within a fold the objects stand in
+        the order given.
+
+    Raises
+    ------
+    UserError
+        Where there are too few objects for that many folds.
+    """
+    n_objects = len(object_ids)
+    if n_objects < max(n_folds, 3):
+        raise UserError(
+            f"n_folds={n_folds}: {n_objects} objects cannot be divided into folds that train, "
+            f"calibrate and test; use at least {max(n_folds, 3)} objects or fewer folds"
+        )
+    fold_of = np.empty(n_objects, dtype=int)
+    fold_of[rng.permutation(n_objects)] = np.arange(n_objects) % n_folds + 1
+    rows = []
+    for fold in range(1, n_folds + 1):
+        roles = np.where(fold_of == fold, "test", "train").astype(object)
+        rest = np.flatnonzero(fold_of != fold)
+        n_calibration = int(np.clip(round(calibration_fraction * len(rest)), 1, len(rest) - 1))
+        roles[rng.choice(rest, n_calibration, replace=False)] = "calibration"
+        rows.append(pd.DataFrame({"object_id": object_ids, "fold": fold, "role": roles}))
+    return pd.concat(rows, ignore_index=True)
+
+
+class Chosen(NamedTuple):
+    """Objects of one role in one fold, and where they stand among all objects."""
+
+    ids: list[str]
+    rows: NDArray[np.intp]
+
+
+def read_splits(path: str | Path) -> pd.DataFrame:
+    """Read `splits/<category>.csv`.
+
+    Raises
+    ------
+    UserError
+        Where columns are missing or a role is unknown.
+    """
+    splits = pd.read_csv(path, dtype={"object_id": str})
+    if list(splits.columns) != ["object_id", "fold", "role"]:
+        raise UserError(f"{path}: the columns must be object_id, fold, role")
+    unknown = set(splits["role"]) - set(ROLES)
+    if unknown:
+        raise UserError(f"{path}: role {sorted(unknown)[0]!r} is none of {', '.join(ROLES)}")
+    return splits
+
+
+def objects_with_role(splits: pd.DataFrame, fold: int, role: Role) -> Chosen:
+    """Return the objects of one role in one fold, after asserting that no object has two roles.
+
+    Raises
+    ------
+    UserError
+        Where the fold is absent or an object has more than one role in it.
+    """
+    of_fold = splits[splits["fold"] == fold]
+    if of_fold.empty:
+        raise UserError(f"fold {fold} is not in the splits: they have {splits['fold'].nunique()}")
+    repeated = of_fold.loc[of_fold["object_id"].duplicated(), "object_id"]
+    if len(repeated):
+        raise UserError(f"fold {fold} gives object {repeated.iloc[0]!r} more than one role")
+    rows = np.flatnonzero((of_fold["role"] == role).to_numpy())
+    return Chosen([str(name) for name in of_fold["object_id"].iloc[rows]], rows)
+
+
+def assert_role(splits: pd.DataFrame, fold: int, role: Role, object_ids: Iterable[str]) -> None:
+    """Raise UserError where an object that was read has another role in this fold, naming it.
+
+    This holds what is read to the splits: no object may be trained on and calibrated or tested
+    with, wherever its file came from.
+    """
+    strangers = sorted(set(object_ids) - set(objects_with_role(splits, fold, role).ids))
+    if strangers:
+        raise UserError(
+            f"object {strangers[0]!r} is no {role} object of fold {fold}: estimates and splits are "
+            "of different runs; make the estimates again"
+        )

@@ -1,0 +1,30 @@
+"""The one exception that is the user's to mend, and the help it gives."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class UserError(Exception):
+    """A mistake in the input: one line that names the file, key or value, and what to do."""
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """Say what was probably meant by a misspelt name.
+
+    Parameters
+    ----------
+    name : str
+        What the user wrote.
+    valid : iterable of str
+        What could have been written.
+
+    Returns
+    -------
+    str
+        ``"did you mean 'x'?"`` where a valid name is close, else ``"choose from: a, b, c"``.
+    """
+    choices = sorted(valid)
+    close = difflib.get_close_matches(name, choices, n=1, cutoff=0.6)
+    return f"did you mean {close[0]!r}?" if close else f"choose from: {', '.join(choices)}"

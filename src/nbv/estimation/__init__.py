@@ -1,0 +1,1 @@
+"""Pose from one depth image. Torch is imported in this package alone."""

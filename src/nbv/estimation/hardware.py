@@ -1,0 +1,86 @@
+"""Which device computes, in which precision, on how many threads."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+
+from nbv.errors import UserError, nearest
+
+DEVICES = ("auto", "cpu", "cuda", "mps")
+PRECISIONS = ("auto", "bfloat16", "float32")
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """Where and how a network runs."""
+
+    device: torch.device
+    dtype: torch.dtype
+
+    @contextlib.contextmanager
+    def autocast(self) -> Iterator[None]:
+        """Compute in `dtype` inside the block."""
+        enabled = self.dtype == torch.bfloat16
+        with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=enabled):
+            yield
+
+    def __str__(self) -> str:
+        return f"{self.device.type}, {str(self.dtype).removeprefix('torch.')}"
+
+
+def _bfloat16_is_native(device: str) -> bool:
+    if device == "cuda":
+        return torch.cuda.is_bf16_supported(including_emulation=False)
+    if device == "cpu":
+        with contextlib.suppress(OSError):
+            flags = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+            return "avx512_bf16" in flags or "amx_bf16" in flags
+    return False
+
+
+def choose_hardware(device: str = "auto", precision: str = "auto") -> Hardware:
+    """Resolve the settings ``estimator.device`` and ``estimator.precision``.
+
+    ``auto`` takes CUDA, then Apple's MPS, then the CPU; and bfloat16 only where the chosen device
+    has it natively (elsewhere it is emulated and slower than float32).
+
+    Raises
+    ------
+    UserError
+        For an unknown name or a device that this machine lacks.
+    """
+    if device not in DEVICES:
+        raise UserError(f"estimator.device={device}: {nearest(device, DEVICES)}")
+    if precision not in PRECISIONS:
+        raise UserError(f"estimator.precision={precision}: {nearest(precision, PRECISIONS)}")
+    present = {
+        "cuda": torch.cuda.is_available(),
+        "mps": torch.backends.mps.is_available(),
+        "cpu": True,
+    }
+    if device == "auto":
+        device = next(name for name, there in present.items() if there)
+    elif not present[device]:
+        raise UserError(f"estimator.device={device}: this machine has none; use device=auto")
+    if precision == "auto":
+        precision = "bfloat16" if _bfloat16_is_native(device) else "float32"
+    return Hardware(torch.device(device), getattr(torch, precision))
+
+
+def use_one_thread() -> None:
+    """Make torch compute on one thread and deterministically.
+
+    Two jobs of two threads each on two cores ran 5 to 13 times slower than two of one, and the
+    result of a sum depends on the number of threads.
+    """
+    torch.set_num_threads(1)
+    if torch.get_num_threads() != 1:
+        raise RuntimeError(f"torch runs {torch.get_num_threads()} threads, not 1")
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
+    torch.use_deterministic_algorithms(True, warn_only=True)

@@ -1,0 +1,138 @@
+"""Training one estimator."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from nbv.estimation.hardware import Hardware
+from nbv.estimation.images import direction_targets, to_input
+from nbv.estimation.networks import build_network
+from nbv.estimation.weights import Estimator
+
+log = logging.getLogger(__name__)
+
+PROGRESS_SECONDS = 5.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Says how far a training has come, every few seconds."""
+
+    n_epochs: int
+    n_images: int
+    started: float
+
+    def report(self, epoch: int, seen: int, loss: float) -> None:
+        """Log epoch, loss, speed and the time left."""
+        elapsed = time.perf_counter() - self.started
+        done = epoch * self.n_images + seen
+        rate = done / max(elapsed, 1e-9)
+        left = (self.n_epochs * self.n_images - done) / max(rate, 1e-9)
+        log.info(
+            "epoch %d/%d, %3.0f %%: loss %.4f, %.0f images/s, %.0f s left",
+            epoch + 1,
+            self.n_epochs,
+            100 * seen / self.n_images,
+            loss,
+            rate,
+            left,
+        )
+
+
+def train_estimator(
+    depth: NDArray[np.uint8],
+    rows: NDArray[np.intp],
+    object_ids: Sequence[str],
+    settings: Mapping[str, Any],
+    hardware: Hardware,
+    seed: int,
+) -> Estimator:
+    """Train an estimator on some objects of a depth file.
+
+    Parameters
+    ----------
+    depth : ndarray (n_objects, n_views, side, side) uint8
+        All objects of a category, memory-mapped or not.
+    rows : ndarray of int
+        Which of them to train on.
+    object_ids : sequence of str
+        Their names, kept with the weights.
+    settings, hardware, seed
+        As in `train_regressor`.
+    """
+    network = train_regressor(depth[rows], settings, hardware, seed)
+    return Estimator(network, settings, depth.shape[-1], object_ids)
+
+
+def train_regressor(
+    codes: NDArray[np.uint8],
+    settings: Mapping[str, Any],
+    hardware: Hardware,
+    seed: int,
+) -> nn.Module:
+    """Train a regressor of (cos, sin) on squared error with AdamW and a one-cycle schedule.
+
+    Parameters
+    ----------
+    codes : ndarray (n_objects, n_views, side, side) uint8
+        Training images; view k of n has the azimuth 360 k / n.
+    settings : mapping
+        ``kind, channels, hidden, epochs, batch_size, learning_rate, weight_decay``.
+    hardware : Hardware
+    seed : int
+        Of the weights and of the order of the images: the same seed on the same machine gives the
+        same bits.
+
+    Returns
+    -------
+    torch.nn.Module
+        In evaluation mode, on the hardware's device.
+    """
+    n_objects, n_views, side, _ = codes.shape
+    torch.manual_seed(seed)
+    network = build_network(settings, side).to(hardware.device)
+    images = to_input(codes, hardware)
+    targets = direction_targets(n_objects, n_views).to(hardware.device)
+    n_images, batch_size, n_epochs = len(images), settings["batch_size"], settings["epochs"]
+    batches = max(n_images // batch_size, 1)
+    optimiser = torch.optim.AdamW(
+        network.parameters(), lr=settings["learning_rate"], weight_decay=settings["weight_decay"]
+    )
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, max_lr=settings["learning_rate"], total_steps=n_epochs * batches
+    )
+    order = torch.Generator().manual_seed(seed)
+    log.info("training on %d images of %d objects (%s)", n_images, n_objects, hardware)
+    progress = Progress(n_epochs, n_images, time.perf_counter())
+    reported = progress.started
+    network.train()
+    for epoch in range(n_epochs):
+        permutation = torch.randperm(n_images, generator=order).to(hardware.device)
+        running = torch.zeros((), device=hardware.device)
+        for batch in range(batches):
+            chosen = permutation[batch * batch_size : (batch + 1) * batch_size]
+            optimiser.zero_grad(set_to_none=True)
+            with hardware.autocast():
+                output = network(images[chosen])
+            loss = nn.functional.mse_loss(output.float(), targets[chosen])
+            loss.backward()
+            optimiser.step()
+            schedule.step()
+            running += loss.detach()
+            now = time.perf_counter()
+            if now - reported > PROGRESS_SECONDS:
+                progress.report(
+                    epoch, len(chosen) + batch * batch_size, float(running) / (batch + 1)
+                )
+                reported = now
+        progress.report(epoch, n_images, float(running) / batches)
+    return network.eval()

@@ -1,0 +1,81 @@
+"""Estimators on disk: safetensors, never pickle, with what they were trained on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import safetensors
+import safetensors.torch
+from torch import nn
+
+from nbv.errors import UserError
+from nbv.estimation.hardware import Hardware
+from nbv.estimation.networks import build_network
+from nbv.files import replacing
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """A trained network and its history.
+
+    Attributes
+    ----------
+    network : torch.nn.Module
+        In evaluation mode.
+    settings : mapping
+        The estimator's settings as it was trained with them.
+    image_side : int
+        Pixels.
+    trained_on : sequence of str
+        The objects it has seen.
+    """
+
+    network: nn.Module
+    settings: Mapping[str, Any]
+    image_side: int
+    trained_on: Sequence[str]
+
+
+def save_estimator(path: str | Path, estimator: Estimator, hardware: Hardware) -> None:
+    """Write weights and history to a `.safetensors` file."""
+    history = {
+        "settings": dict(estimator.settings),
+        "image_side": estimator.image_side,
+        "trained_on": list(estimator.trained_on),
+        "hardware": str(hardware),
+    }
+    tensors = {
+        name: tensor.detach().cpu().contiguous()
+        for name, tensor in estimator.network.state_dict().items()
+    }
+    metadata = {"nbv": json.dumps(history, sort_keys=True)}
+    with replacing(path) as temporary:
+        safetensors.torch.save_file(tensors, temporary, metadata=metadata)
+
+
+def load_estimator(path: str | Path, hardware: Hardware) -> Estimator:
+    """Read what `save_estimator` wrote.
+
+    Raises
+    ------
+    UserError
+        Where the file is no estimator of this project.
+    """
+    try:
+        with safetensors.safe_open(path, framework="pt") as stored:
+            history = json.loads((stored.metadata() or {})["nbv"])
+        tensors = safetensors.torch.load_file(path)
+    except (safetensors.SafetensorError, KeyError) as error:
+        raise UserError(f"{path}: not an estimator of nbv; train it again ({error})") from error
+    network = build_network(history["settings"], history["image_side"])
+    network.load_state_dict(tensors)
+    return Estimator(
+        network.to(hardware.device).eval(),
+        history["settings"],
+        history["image_side"],
+        history["trained_on"],
+    )

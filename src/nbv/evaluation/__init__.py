@@ -1,0 +1,1 @@
+"""Reading the results: metrics, tables, claims, figures and the report."""

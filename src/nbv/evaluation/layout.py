@@ -1,0 +1,280 @@
+"""Tables as people read them: Markdown and LaTeX twins, laid out as in the paper.
+
+Each cell reads ``ours [published]``, the best method of a row in bold. A last column gives the
+paired difference to the reference method with its interval, so that a gap can be told from noise
+without another table.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from nbv.evaluation import published
+from nbv.evaluation.settings import method_label
+from nbv.evaluation.tables import Table
+from nbv.files import write_csv, write_text
+
+_METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}
+_MINUS = "\u2212"
+
+
+@dataclass(frozen=True)
+class _Cell:
+    text: str
+    best: bool = False
+
+
+@dataclass(frozen=True)
+class _Grid:
+    header: tuple[str, ...]
+    rows: tuple[tuple[_Cell, ...], ...]
+
+
+def save_table(table: Table, stem: str | Path) -> list[Path]:
+    """Write ``<stem>.csv`` (tidy), ``<stem>.md`` and ``<stem>.tex``; return the three paths."""
+    stem = Path(stem)
+    paths = [stem.with_name(f"{stem.name}{suffix}") for suffix in (".csv", ".md", ".tex")]
+    write_csv(paths[0], table.cells)
+    write_text(paths[1], to_markdown(table))
+    write_text(paths[2], to_latex(table))
+    return paths
+
+
+def to_markdown(table: Table) -> str:
+    """Return the table as a heading, a pipe table and its notes as a list."""
+    grid = _grid(table)
+    lines = [f"## {heading(table)}", "", _pipe_row(grid.header)]
+    lines.append(_pipe_row(["---"] + ["---:"] * (len(grid.header) - 1)))
+    for row in grid.rows:
+        lines.append(_pipe_row([f"**{cell.text}**" if cell.best else cell.text for cell in row]))
+    lines += ["", *(f"- {note}" for note in _notes(table))]
+    return "\n".join(lines) + "\n"
+
+
+def to_latex(table: Table) -> str:
+    r"""Return the table as a ``table`` environment; needs ``\usepackage{booktabs}``."""
+    grid = _grid(table)
+    lines = [
+        "% needs \\usepackage{booktabs}",
+        "\\begin{table}",
+        "\\centering",
+        f"\\caption{{{escape_latex(table.title)}}}",
+        f"\\label{{tab:{table.name}}}",
+        "\\small",
+        f"\\begin{{tabular}}{{l{'r' * (len(grid.header) - 1)}}}",
+        "\\toprule",
+        _latex_row([escape_latex(text) for text in grid.header]),
+        "\\midrule",
+    ]
+    for row in grid.rows:
+        texts = [(escape_latex(cell.text), cell.best) for cell in row]
+        lines.append(_latex_row([f"\\textbf{{{t}}}" if best else t for t, best in texts]))
+    lines += ["\\bottomrule", "\\end{tabular}", "", "\\footnotesize\\raggedright"]
+    lines += [f"{escape_latex(note)}\\par" for note in _notes(table)]
+    return "\n".join([*lines, "\\end{table}"]) + "\n"
+
+
+def heading(table: Table) -> str:
+    """Return the table's number and title."""
+    return f"Table {table.name.removeprefix('table')}: {table.title}"
+
+
+_LATEX_CHARACTERS = {
+    "\\": "\\textbackslash{}",
+    "&": "\\&",
+    "%": "\\%",
+    "$": "\\$",
+    "#": "\\#",
+    "_": "\\_",
+    "{": "\\{",
+    "}": "\\}",
+    "~": "\\textasciitilde{}",
+    "^": "\\textasciicircum{}",
+    "°": "$^\\circ$",
+    "σ": "$\\sigma$",
+    "δ": "$\\delta$",
+    "τ": "$\\tau$",
+    _MINUS: "$-$",
+    "–": "--",
+    "…": "\\dots{}",
+}
+
+
+def escape_latex(text: str) -> str:
+    """Return the text with LaTeX's special characters, degree signs and Greek made safe."""
+    return "".join(_LATEX_CHARACTERS.get(character, character) for character in text)
+
+
+def number(value: float, decimals: int = 2) -> str:
+    """Return a number with a true minus sign; an en dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    text = f"{value:.{decimals}f}"
+    return text.replace("-", _MINUS) if float(text) != 0 else text.lstrip("-")
+
+
+def _notes(table: Table) -> list[str]:
+    cells = table.cells
+    objects = cells["n_objects"].max()
+    images = cells["n_images"].max()
+    counts = (
+        f"{int(objects)} test objects and {int(images):,} initial views"
+        if table.name not in ("table1", "table3")
+        else "Test objects by row: "
+        + ", ".join(
+            f"{label} {int(part['n_objects'].max())}"
+            for label, part in cells.groupby("row_label", sort=False)
+        )
+    )
+    shown = [] if table.name == "table6" else [f"{counts}."]
+    if cells["published"].notna().any() and table.name != "table6":
+        shown.insert(0, "Ours [published]; the best of each row in bold.")
+    elif table.name != "table6":
+        shown.insert(0, "The best of each row in bold; the paper prints no such figures.")
+    return [*shown, *table.notes]
+
+
+def _grid(table: Table) -> _Grid:
+    if table.name == "table6":
+        return _example_grid(table)
+    if table.name == "table7":
+        return _fold_grid(table)
+    return _comparison_grid(table)
+
+
+def _comparison_grid(table: Table) -> _Grid:
+    """Rows by methods, then the difference of the subject to the reference (Tables 1 to 5)."""
+    cells, settings = table.cells, table.settings
+    methods = list(dict.fromkeys(cells["method"]))
+    degrees = "°" if cells["metric"].iloc[0] == "mae" else ""
+    gap = f"{method_label(settings.subject)} {_MINUS} {method_label(settings.reference)}"
+    shows_gap = {settings.subject, settings.reference} <= set(methods)
+    rows = []
+    for label, part in cells.groupby("row_label", sort=False):
+        row = [_Cell(str(label))]
+        row += _method_cells(part, methods, degrees)
+        if shows_gap:
+            row.append(_Cell(_gap_text(part[part["method"] == settings.subject].iloc[0])))
+        rows.append(tuple(row))
+    header = [table.row_header, *map(method_label, methods)] + ([gap] if shows_gap else [])
+    return _Grid(tuple(header), tuple(rows))
+
+
+def _fold_grid(table: Table) -> _Grid:
+    """Folds by (method, metric), as the paper's Table 7."""
+    cells = table.cells
+    methods = list(dict.fromkeys(cells["method"]))
+    rows = []
+    for label, part in cells.groupby("row_label", sort=False):
+        by_metric = {
+            metric: _method_cells(part[part["metric"] == metric], methods, degrees)
+            for metric, degrees in (("mae", "°"), ("pauc", ""))
+        }
+        row = [_Cell(str(label))]
+        for position in range(len(methods)):
+            row += [by_metric["mae"][position], by_metric["pauc"][position]]
+        rows.append(tuple(row))
+    header = [table.row_header]
+    for method in methods:
+        header += [f"{method_label(method)} {label}" for label in _METRIC_LABELS.values()]
+    return _Grid(tuple(header), tuple(rows))
+
+
+def _example_grid(table: Table) -> _Grid:
+    """Ours and the published example in paired rows: they are different objects (Table 6)."""
+    cells = table.cells
+    methods = list(dict.fromkeys(cells["method"]))
+    rows = []
+    for label, part in cells.groupby("row_label", sort=False):
+        errors = part[part["metric"] == "error"].set_index("method")
+        estimates = part[part["metric"] == "estimate"].set_index("method")
+        for column, suffix in (("value", ""), ("published", ", published")):
+            if errors[column].isna().all():
+                continue
+            lowest = errors[column].round(1).min()
+            row = [_Cell(f"{label}{suffix}")]
+            for method in methods:
+                estimate, error = estimates[column].get(method), errors[column].get(method)
+                if estimate is None or error is None or not np.isfinite(error):
+                    row.append(_Cell("–"))
+                    continue
+                text = f"{number(estimate, 1)}° ({number(error, 1)}°)"
+                row.append(_Cell(text, bool(round(error, 1) == lowest)))
+            rows.append(tuple(row))
+    return _Grid((table.row_header, *map(method_label, methods)), tuple(rows))
+
+
+def _method_cells(part: pd.DataFrame, methods: Sequence[str], degrees: str) -> list[_Cell]:
+    """Return ``ours [published]`` per method; the best, as printed, is marked."""
+    values = part.set_index("method")["value"].round(2)
+    is_sigma = (part["row"] == published.SIGMA_ROW).all()
+    lower = is_sigma or (part["metric"] == "mae").all()
+    best = values.min() if lower else values.max()
+    cells = []
+    for method in methods:
+        row = part[part["method"] == method]
+        if row.empty or not np.isfinite(values[method]):
+            cells.append(_Cell("–"))
+            continue
+        text = f"{number(values[method])}{degrees}"
+        printed = float(row["published"].iloc[0])
+        if np.isfinite(printed):
+            text += f" [{number(printed)}{degrees}]"
+        cells.append(_Cell(text, bool(values[method] == best)))
+    return cells
+
+
+def _gap_text(cell: pd.Series) -> str:
+    return (
+        f"{number(cell['difference'])} "
+        f"({number(cell['difference_low'])} to {number(cell['difference_high'])})"
+    )
+
+
+def _pipe_row(texts: Sequence[str]) -> str:
+    return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"
+
+
+def _latex_row(texts: Sequence[str]) -> str:
+    return " & ".join(texts) + " \\\\"
+
+
+def markdown_to_html(markdown: str, inline: Callable[[str], str]) -> str:
+    """Return the HTML of what `to_markdown` writes, below its heading.
+
+    Parameters
+    ----------
+    markdown : str
+        A pipe table followed by a list of notes; the heading is left to the caller.
+    inline : callable
+        Escapes text for HTML.
+    """
+    lines = [line for line in markdown.splitlines() if line and not line.startswith("#")]
+    rows = [_split_pipes(line) for line in lines if line.startswith("|")]
+    notes = [line.removeprefix("- ") for line in lines if line.startswith("- ")]
+    head = "".join(f'<th scope="col">{inline(text)}</th>' for text in rows[0])
+    body = []
+    for row in rows[2:]:
+        cells = [f'<th scope="row">{inline(row[0])}</th>']
+        for text in row[1:]:
+            bold = text.startswith("**") and text.endswith("**")
+            shown = inline(text.strip("*"))
+            cells.append(f"<td><strong>{shown}</strong></td>" if bold else f"<td>{shown}</td>")
+        body.append(f"<tr>{''.join(cells)}</tr>")
+    items = "".join(f"<li>{inline(note)}</li>" for note in notes)
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead>'
+        f"<tbody>{''.join(body)}</tbody></table></div>"
+        + (f'<ul class="notes">{items}</ul>' if items else "")
+    )
+
+
+def _split_pipes(line: str) -> list[str]:
+    cells = re.split(r"(?<!\\)\|", line.strip().strip("|"))
+    return [cell.strip().replace("\\|", "|") for cell in cells]

@@ -1,0 +1,127 @@
+"""Choosing a second view, looking again and fusing: one row of results for every test image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.angles import circular_distance_deg
+from nbv.calibration.pairs import Estimates
+from nbv.errors import UserError, nearest
+from nbv.recommendation.criteria import CRITERIA
+from nbv.recommendation.fusion import FUSIONS, Rotations, second_look
+from nbv.recommendation.lookup import LookupTable
+
+COLUMNS = (
+    "object_id",
+    "initial_deg",
+    "initial_estimate_deg",
+    "delta_deg",
+    "next_estimate_deg",
+    "pose_estimate_deg",
+    "error_deg",
+)
+
+
+def _random(estimate_deg: NDArray[np.float64], rng: np.random.Generator) -> Rotations:
+    """A view other than the first, all equally likely."""
+    n_views = estimate_deg.shape[1]
+    return rng.integers(1, n_views, estimate_deg.shape) * (360 // n_views)
+
+
+def _opposite(estimate_deg: NDArray[np.float64], rng: np.random.Generator) -> Rotations:
+    return np.full(estimate_deg.shape, 180, dtype=np.int64)
+
+
+BASELINES: dict[str, Callable[[NDArray[np.float64], np.random.Generator], Rotations]] = {
+    "random": _random,
+    "opposite": _opposite,
+}
+SINGLE = "none"
+
+
+def needs_lookup(rotation: str) -> bool:
+    """Say whether a method's ``rotation`` is recommended by a lookup table.
+
+    Raises
+    ------
+    UserError
+        Where it is neither a baseline nor a criterion.
+    """
+    if rotation == SINGLE or rotation in BASELINES:
+        return False
+    if rotation in CRITERIA:
+        return True
+    known = [SINGLE, *BASELINES, *CRITERIA]
+    raise UserError(f"methods: rotation {rotation!r} is unknown: {nearest(rotation, known)}")
+
+
+def evaluate_method(
+    method: Mapping[str, Any],
+    test: Estimates,
+    rng: np.random.Generator | None = None,
+    lookup: LookupTable | None = None,
+) -> pd.DataFrame:
+    """Evaluate one method on every view of every test object.
+
+    Parameters
+    ----------
+    method : mapping
+        ``rotation``: ``none`` (one view alone), a name in `BASELINES`, or a criterion; ``fusion``:
+        a name in `nbv.recommendation.fusion.FUSIONS`.
+    test : Estimates
+        360 / n_views must be a whole number of degrees.
+    rng : numpy.random.Generator, optional
+        Where the rotation is drawn.
+    lookup : LookupTable, optional
+        Where the rotation is a criterion.
+
+    Returns
+    -------
+    DataFrame
+        Columns `COLUMNS`; ``delta_deg`` and ``next_estimate_deg`` are absent for ``none``.
+    """
+    first = test.estimate_deg
+    rotation = method["rotation"]
+    if rotation == SINGLE:
+        return results_frame(test, None, None, first)
+    if needs_lookup(rotation):
+        if lookup is None:
+            raise ValueError(f"rotation {rotation!r} needs a lookup table")
+        delta = lookup.recommend(first)
+    else:
+        delta = BASELINES[rotation](first, rng or np.random.default_rng())
+    second = second_look(first, delta)
+    return results_frame(test, delta, second, FUSIONS[method["fusion"]](first, second, delta))
+
+
+def results_frame(
+    test: Estimates,
+    delta_deg: Rotations | None,
+    next_estimate_deg: ArrayLike | None,
+    pose_estimate_deg: NDArray[np.float64],
+) -> pd.DataFrame:
+    """Return the rows of `evaluation/.../<method>.csv`."""
+    n_objects, n_views = test.estimate_deg.shape
+    # Rounded before the error is taken, so that the columns of a row agree with each other.
+    pose = np.round(pose_estimate_deg, 4) % 360.0
+    frame = pd.DataFrame(
+        {
+            "object_id": np.repeat(np.asarray(test.object_ids, dtype=object), n_views),
+            "initial_deg": np.tile(test.azimuth_deg.astype(int), n_objects),
+            "initial_estimate_deg": test.estimate_deg.ravel(),
+            "delta_deg": pd.array([pd.NA] * (n_objects * n_views), dtype="Int64")
+            if delta_deg is None
+            else delta_deg.ravel(),
+            "next_estimate_deg": np.nan
+            if next_estimate_deg is None
+            else np.ravel(next_estimate_deg),
+            "pose_estimate_deg": pose.ravel(),
+            "error_deg": circular_distance_deg(pose, test.azimuth_deg).ravel(),
+        }
+    )
+    return frame[list(COLUMNS)]

@@ -1,0 +1,169 @@
+"""Reading a results tree: which files a unit has, and what they hold.
+
+A *unit* is one category at one elevation: what a row of Tables 1 to 4 is made of.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nbv.errors import UserError
+from nbv.files import read_arrays
+
+Unit = tuple[str, int]
+"""A category and an elevation in degrees."""
+
+EVALUATION_COLUMNS = (
+    "object_id",
+    "initial_deg",
+    "initial_estimate_deg",
+    "delta_deg",
+    "next_estimate_deg",
+    "pose_estimate_deg",
+    "error_deg",
+)
+
+
+def unit_dir(root: str | Path, stage: str, category: str, elevation_deg: int) -> Path:
+    """Return the directory of one stage's files for a unit."""
+    return Path(root) / stage / category / f"el{elevation_deg:02d}"
+
+
+def evaluation_path(
+    root: str | Path, category: str, elevation_deg: int, fold: int, method: str
+) -> Path:
+    """Return where one method's errors of one fold (counted from 1) are."""
+    return unit_dir(root, "evaluation", category, elevation_deg) / f"fold{fold}" / f"{method}.csv"
+
+
+def lookup_path(
+    root: str | Path, category: str, elevation_deg: int, fold: int, criterion: str
+) -> Path:
+    """Return where one criterion's lookup table of one fold (counted from 1) is."""
+    return unit_dir(root, "lookup", category, elevation_deg) / f"fold{fold}" / f"{criterion}.npz"
+
+
+def depth_path(root: str | Path, category: str, elevation_deg: int) -> Path:
+    """Return where the depth images of a unit are."""
+    return Path(root) / "depth" / category / f"el{elevation_deg:02d}.npy"
+
+
+def splits_path(root: str | Path, category: str) -> Path:
+    """Return where the folds of a category are written."""
+    return Path(root) / "splits" / f"{category}.csv"
+
+
+def load_unit(
+    root: str | Path, category: str, elevation_deg: int, n_folds: int, methods: Sequence[str]
+) -> pd.DataFrame:
+    """Read every method's errors of one category and elevation.
+
+    Parameters
+    ----------
+    root : path
+        ``results/<experiment>``.
+    category : str
+        Object category.
+    elevation_deg : int
+        Elevation in degrees.
+    n_folds : int
+        Folds 1 to n_folds are read.
+    methods : sequence of str
+        Methods, in the order in which tables show them.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``method, fold`` and `EVALUATION_COLUMNS`; one row per method, test object and initial
+        viewpoint. `method` is categorical, its categories in the order given.
+
+    Raises
+    ------
+    UserError
+        If a file is missing, empty, or lacks a column.
+    """
+    parts = []
+    for method in methods:
+        for fold in range(1, n_folds + 1):
+            path = evaluation_path(root, category, elevation_deg, fold, method)
+            frame = _read_csv(path, EVALUATION_COLUMNS)
+            parts.append(frame.assign(method=method, fold=fold))
+    unit = pd.concat(parts, ignore_index=True)
+    unit["method"] = pd.Categorical(unit["method"], categories=list(methods), ordered=True)
+    return unit[["method", "fold", *EVALUATION_COLUMNS]]
+
+
+def load_evaluations(
+    root: str | Path, units: Iterable[Unit], n_folds: int, methods: Sequence[str]
+) -> dict[Unit, pd.DataFrame]:
+    """Read several units with `load_unit`, in the order given."""
+    return {
+        (category, elevation): load_unit(root, category, elevation, n_folds, methods)
+        for category, elevation in units
+    }
+
+
+def discover_units(root: str | Path) -> list[Unit]:
+    """Return the units that have evaluation files under `root`, sorted."""
+    found = []
+    for directory in Path(root).glob("evaluation/*/el*"):
+        elevation = re.fullmatch(r"el(\d+)", directory.name)
+        if elevation and directory.is_dir():
+            found.append((directory.parent.name, int(elevation.group(1))))
+    return sorted(found)
+
+
+def load_object_ids(root: str | Path, category: str) -> tuple[str, ...]:
+    """Return the category's objects in the order of the depth images."""
+    splits = _read_csv(splits_path(root, category), ("object_id", "fold", "role"))
+    first = splits[splits["fold"] == splits["fold"].min()]
+    return tuple(first["object_id"])
+
+
+def load_depth(root: str | Path, category: str, elevation_deg: int) -> NDArray[np.uint8]:
+    """Map a unit's depth codes into memory: (n_objects, n_viewpoints, side, side) uint8.
+
+    0 is background; nearer is a larger code. The file is read as far as it is indexed.
+    """
+    path = depth_path(root, category, elevation_deg)
+    if not path.is_file():
+        raise _missing(path)
+    images: NDArray[np.uint8] = np.load(path, mmap_mode="r")
+    return images
+
+
+def load_lookup(
+    root: str | Path, category: str, elevation_deg: int, fold: int, criterion: str
+) -> Mapping[str, NDArray[Any]]:
+    """Read the arrays of one lookup table."""
+    path = lookup_path(root, category, elevation_deg, fold, criterion)
+    if not path.is_file():
+        raise _missing(path)
+    return read_arrays(path)
+
+
+def _read_csv(path: Path, columns: Sequence[str]) -> pd.DataFrame:
+    if not path.is_file():
+        raise _missing(path)
+    try:
+        # Identifiers such as 00217 are names: read as numbers they would match nothing else.
+        frame = pd.read_csv(path, dtype={"object_id": str})
+    except pd.errors.EmptyDataError:
+        frame = pd.DataFrame()
+    absent = [name for name in columns if name not in frame.columns]
+    if absent:
+        raise UserError(f"{path}: no column {absent[0]!r}; delete the file and run the stage again")
+    if frame.empty:
+        raise UserError(f"{path}: holds no rows; delete the file and run the stage again")
+    return frame
+
+
+def _missing(path: Path) -> UserError:
+    return UserError(f"{path} does not exist; run the workflow's target that makes it first")

@@ -1,0 +1,311 @@
+"""The paper's Tables 1 to 7 from our results, tidy: one row per cell.
+
+Columns of `Table.cells`: ``table, row, row_label, method, metric, value, sigma, published,
+ci_low, ci_high, difference, difference_low, difference_high, n_objects, n_images``.
+
+``value`` is in degrees (``mae``, ``estimate``, ``error``) or percent (``pauc``), pooled over the
+images of all folds; ``sigma`` is the sample standard deviation of the cell's figure per fold;
+``ci_*`` its 95 % interval over objects; ``difference*`` the paired difference to the reference
+method (Opposite, unless set otherwise).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nbv.errors import UserError, nearest
+from nbv.evaluation import paired, published
+from nbv.evaluation.examples import choose_example, example_row
+from nbv.evaluation.paired import PairedErrors, Resampler, pair_methods
+from nbv.evaluation.results import Unit
+from nbv.evaluation.settings import (
+    ReadingSettings,
+    category_label,
+    focus_category,
+    focus_unit,
+    method_label,
+    reference_units,
+)
+
+CELL_COLUMNS = (
+    "table",
+    "row",
+    "row_label",
+    "method",
+    "metric",
+    "value",
+    "sigma",
+    "published",
+    "ci_low",
+    "ci_high",
+    "difference",
+    "difference_low",
+    "difference_high",
+    "n_objects",
+    "n_images",
+)
+
+Evaluations = Mapping[Unit, pd.DataFrame]
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table: its cells (see the module's docstring), and the words around them."""
+
+    name: str
+    title: str
+    row_header: str
+    cells: pd.DataFrame
+    notes: tuple[str, ...]
+    settings: ReadingSettings
+
+
+def build_table(
+    name: str, evaluations: Evaluations, settings: ReadingSettings | None = None
+) -> Table:
+    """Build one of the paper's tables from whatever of it was run.
+
+    Parameters
+    ----------
+    name : str
+        ``table1`` to ``table7``.
+    evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
+        Frames of `results.load_unit`. Tables have rows for what is present only.
+    settings : ReadingSettings, optional
+        Defaults are the paper's.
+
+    Raises
+    ------
+    UserError
+        If there is no such table, or nothing was evaluated.
+    """
+    if name not in _BUILDERS:
+        raise UserError(f"no table {name!r}; {nearest(name, _BUILDERS)}")
+    chosen = settings or ReadingSettings()
+    if not evaluations:
+        raise UserError(f"{name}: no evaluated category and elevation; run the workflow first")
+    return _BUILDERS[name](name, evaluations, chosen)
+
+
+def _cell(name: str, row: str, row_label: str, **rest: Any) -> dict[str, Any]:
+    return dict.fromkeys(CELL_COLUMNS, np.nan) | {
+        "table": name,
+        "row": row,
+        "row_label": row_label,
+        **rest,
+    }
+
+
+def _table(
+    name: str,
+    title: str,
+    row_header: str,
+    cells: Iterable[dict[str, Any]],
+    notes: tuple[str, ...],
+    settings: ReadingSettings,
+) -> Table:
+    frame = pd.DataFrame(list(cells), columns=list(CELL_COLUMNS))
+    return Table(name, title, row_header, frame, notes, settings)
+
+
+def _cells(
+    name: str,
+    row: str,
+    row_label: str,
+    metric: str,
+    sample: PairedErrors,
+    resampler: Resampler,
+    settings: ReadingSettings,
+    comparable: bool,
+) -> list[dict[str, Any]]:
+    """Return one row's cells: a statistic of each method on the same images."""
+    methods = [method for method in settings.methods if method in sample.errors_deg]
+    estimates = {m: paired.estimate(metric, sample, m, resampler) for m in methods}
+    cells = []
+    for method, found in estimates.items():
+        interval = found.interval()
+        cell = _cell(
+            name,
+            row,
+            row_label,
+            method=method,
+            metric=metric,
+            value=interval.value,
+            sigma=paired.fold_sigma(metric, sample, method),
+            ci_low=interval.low,
+            ci_high=interval.high,
+            n_objects=sample.n_objects,
+            n_images=sample.n_images,
+        )
+        printed = published.published_value(name, metric, row, method) if comparable else None
+        cell["published"] = np.nan if printed is None else printed
+        if settings.reference in estimates and method != settings.reference:
+            gap = found.minus(estimates[settings.reference])
+            cell |= {
+                "difference": gap.value,
+                "difference_low": gap.low,
+                "difference_high": gap.high,
+            }
+        cells.append(cell)
+    return cells
+
+
+def _by_category(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+    metric = "mae" if name == "table1" else "pauc"
+    units = reference_units(evaluations, settings)
+    elevation = units[0][1]
+    resampler = Resampler(settings.seed, settings.n_resamples)
+    cells = []
+    for unit in units:
+        sample = pair_methods(evaluations[unit], unit[0])
+        label = category_label(unit[0])
+        cells += _cells(name, unit[0], label, metric, sample, resampler, settings, elevation == 0)
+    title = f"{_METRIC_TITLES[metric]} by category at elevation {elevation}°"
+    return _table(name, title, "Category", cells, _notes(name, settings), settings)
+
+
+def _by_elevation(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+    metric = "mae" if name == "table2" else "pauc"
+    category = focus_category(evaluations, settings)
+    resampler = Resampler(settings.seed, settings.n_resamples)
+    cells = []
+    for elevation in sorted(elevation for name_, elevation in evaluations if name_ == category):
+        sample = pair_methods(evaluations[category, elevation], category)
+        cells += _cells(
+            name,
+            str(elevation),
+            f"{elevation}°",
+            metric,
+            sample,
+            resampler,
+            settings,
+            category == published.FOCUS_CATEGORY,
+        )
+    title = f"{_METRIC_TITLES[metric]} of {category_label(category)} by elevation"
+    return _table(name, title, "Elevation", cells, _notes(name, settings), settings)
+
+
+def _by_group(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+    category, elevation = focus_unit(evaluations, settings)
+    resampler = Resampler(settings.seed, settings.n_resamples)
+    everything = pair_methods(evaluations[category, elevation], category)
+    groups = paired.viewpoint_group(everything.initial_deg)
+    cells = []
+    for group, (start, stop) in paired.VIEWPOINT_GROUPS.items():
+        mask = groups == group
+        if not mask.any():
+            continue
+        span = f"{start}–359°, 0–{stop - 1}°" if start > stop else f"{start}–{stop - 1}°"
+        cells += _cells(
+            name,
+            str(group),
+            f"{group} ({span})",
+            "mae",
+            everything.select(mask),
+            resampler,
+            settings,
+            (category, elevation) == (published.FOCUS_CATEGORY, 0),
+        )
+    title = f"MAE of {category_label(category)} by viewpoint group at elevation {elevation}°"
+    return _table(name, title, "Viewpoint group", cells, _notes(name, settings), settings)
+
+
+def _examples(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+    unit = focus_unit(evaluations, settings)
+    frame = evaluations[unit]
+    example = choose_example(frame, settings)
+    comparable = unit == (published.FOCUS_CATEGORY, 0)
+    cells = []
+    for azimuth in settings.example_initial_deg:
+        for method in settings.methods:
+            row = example_row(frame, example, method, azimuth)
+            if row is None:
+                continue
+            for metric, column in (("estimate", "pose_estimate_deg"), ("error", "error_deg")):
+                printed = published.published_value(name, metric, str(azimuth), method)
+                cells.append(
+                    _cell(
+                        name,
+                        str(azimuth),
+                        f"{azimuth}°",
+                        method=method,
+                        metric=metric,
+                        value=float(row[column]),
+                        published=np.nan if printed is None or not comparable else printed,
+                        n_objects=1,
+                        n_images=1,
+                    )
+                )
+    title = (
+        f"Examples of estimates (and errors) for {category_label(unit[0])} at elevation {unit[1]}°"
+    )
+    notes = (f"Object {example.object_id} of fold {example.fold}: {example.reason}.",)
+    return _table(name, title, "Initial azimuth", cells, notes + _notes(name, settings), settings)
+
+
+def _by_fold(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+    category, elevation = focus_unit(evaluations, settings)
+    resampler = Resampler(settings.seed, settings.n_resamples)
+    everything = pair_methods(evaluations[category, elevation], category)
+    comparable = (category, elevation) == (published.FOCUS_CATEGORY, 0)
+    rows = [
+        (str(fold), f"Fold {fold}", everything.select(everything.folds == fold))
+        for fold in np.unique(everything.folds)
+    ]
+    rows.append((published.AVERAGE_ROW, "Average", everything))
+    cells = []
+    for metric in ("mae", "pauc"):
+        for row, label, sample in rows:
+            cells += _cells(name, row, label, metric, sample, resampler, settings, comparable)
+        cells += [
+            cell | {"metric": metric}
+            for cell in _cells(
+                name,
+                published.SIGMA_ROW,
+                "σ",
+                f"{metric}_sigma",
+                everything,
+                resampler,
+                settings,
+                comparable=False,
+            )
+        ]
+    for cell in cells:
+        if cell["row"] == published.SIGMA_ROW:
+            cell["sigma"] = np.nan
+            printed = published.published_value(name, cell["metric"], cell["row"], cell["method"])
+            cell["published"] = np.nan if printed is None or not comparable else printed
+    title = f"MAE and pAUC of {category_label(category)} by fold at elevation {elevation}°"
+    notes = ("The average is over the pooled images of all folds.", *_notes(name, settings))
+    return _table(name, title, "Fold", cells, notes, settings)
+
+
+def _notes(name: str, settings: ReadingSettings) -> tuple[str, ...]:
+    own: tuple[str, ...] = ()
+    if name not in ("table6", "table7"):
+        own = (
+            f"{method_label(settings.subject)} − {method_label(settings.reference)} is the paired "
+            f"difference with its 95 % interval over objects ({settings.n_resamples} resamples).",
+        )
+    return own + published.PUBLISHED[name].notes
+
+
+_METRIC_TITLES: Mapping[str, str] = {"mae": "MAE", "pauc": "pAUC"}
+
+_BUILDERS: Mapping[str, Callable[[str, Evaluations, ReadingSettings], Table]] = {
+    "table1": _by_category,
+    "table2": _by_elevation,
+    "table3": _by_category,
+    "table4": _by_elevation,
+    "table5": _by_group,
+    "table6": _examples,
+    "table7": _by_fold,
+}
+
+TABLES = tuple(_BUILDERS)
+"""Names of the tables that `build_table` knows."""

@@ -1,0 +1,59 @@
+"""Writing files whole or not at all, with the same bytes for the same content."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path` that takes its place when the block succeeds.
+
+    The suffix of `path` is kept, for writers that choose a format by it. On any error the
+    temporary file is removed and `path` is left as it was.
+    """
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = target.with_name(f".{target.stem}.partial{target.suffix}")
+    try:
+        yield temporary
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write UTF-8 text."""
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: str | Path, value: Any) -> None:
+    """Write JSON, indented, with sorted keys."""
+    write_text(path, json.dumps(value, indent=2, sort_keys=True, ensure_ascii=False) + "\n")
+
+
+def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
+    """Write a table without its index; floats are rounded to `decimals`, absent values empty."""
+    with replacing(path) as temporary:
+        frame.round(decimals).to_csv(temporary, index=False, lineterminator="\n")
+
+
+def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write named arrays as a compressed `.npz` (deterministic: numpy dates members 1980)."""
+    with replacing(path) as temporary:
+        np.savez_compressed(temporary, **dict(arrays))
+
+
+def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
+    """Read a whole `.npz` written by `write_arrays`."""
+    with np.load(path, allow_pickle=False) as stored:
+        return {name: stored[name] for name in stored.files}

@@ -1,0 +1,73 @@
+"""What every workflow job does besides its work: say how it goes, and fail in one clear line."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import logging
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from nbv.errors import UserError
+
+log = logging.getLogger(__name__)
+
+
+@contextmanager
+def job(snakemake: Any) -> Iterator[None]:
+    """Log a job's progress to the terminal and to its log file, and end it cleanly on errors.
+
+    Parameters
+    ----------
+    snakemake : object
+        What Snakemake gives a script. Lines are labelled with rule and wildcards, since jobs run
+        side by side. The log file also receives the traceback of an unexpected error, which the
+        terminal is spared; the error's one line goes to `last_error.txt` in the folder ``logs`` as
+        well, for the workflow's last words.
+
+    Raises
+    ------
+    SystemExit
+        With status 1 after an error has been reported.
+    """
+    path = Path(snakemake.log[0])
+    label = " ".join([snakemake.rule, "/".join(snakemake.wildcards)]).strip()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    to_file = logging.FileHandler(path, mode="w", encoding="utf-8")
+    to_terminal = logging.StreamHandler(sys.stderr)
+    to_terminal.addFilter(lambda record: not getattr(record, "log_only", False))
+    root = logging.getLogger()
+    for handler in (to_file, to_terminal):
+        handler.setFormatter(logging.Formatter(f"[%(asctime)s {label}] %(message)s", "%H:%M:%S"))
+        root.addHandler(handler)
+    root.setLevel(logging.INFO)
+    for noisy in ("matplotlib", "fontTools", "trimesh", "OpenGL"):
+        logging.getLogger(noisy).setLevel(logging.ERROR)
+    try:
+        yield
+    except UserError as error:
+        _fail(f"{error}", path)
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            _fail_unexpectedly(error, path)
+        where = f" for {error.filename}" if error.filename else ""
+        _fail(f"no space left on the disk{where}: free some and run the same command again", path)
+    except Exception as error:
+        _fail_unexpectedly(error, path)
+
+
+def _fail(message: str, log_file: Path) -> None:
+    log.error("error: %s", message)
+    logs = next((folder for folder in log_file.parents if folder.name == "logs"), log_file.parent)
+    # On a full disk not even this line may fit; it has been said on the terminal.
+    with contextlib.suppress(OSError):
+        (logs / "last_error.txt").write_text(f"error: {message}\n", encoding="utf-8")
+    raise SystemExit(1)
+
+
+def _fail_unexpectedly(error: Exception, path: Path) -> None:
+    log.error("traceback", exc_info=error, extra={"log_only": True})
+    _fail(f"{type(error).__name__}: {error} (traceback in {path})", path)

@@ -1,0 +1,164 @@
+"""The object frame: z up, front +x, unit bounding-box diagonal.
+
+Sets of meshes disagree about which way is up and which way is forward. Both are said in the
+configuration as axes of the file ("+y", "-z") or as vectors ("0,0,1"), and the rotation follows
+from them; it is always proper, so nothing is ever mirrored.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.errors import UserError, nearest
+
+if TYPE_CHECKING:
+    import trimesh
+
+Centre = Literal["box", "origin"]
+CENTRES = ("box", "origin")
+AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+# Directions given as numbers may be rounded; 0.02 is about one degree.
+_PERPENDICULAR_WITHIN = 0.02
+
+
+def direction(axis: str, key: str) -> NDArray[np.float64]:
+    """Return the unit vector that an axis of the file names.
+
+    Parameters
+    ----------
+    axis : str
+        One of ±x, ±y, ±z (a missing sign is +), or three numbers with commas, as in "0,-1,0".
+        Backslashes before the commas, as ShapeNetSem's metadata has them, are ignored.
+    key : str
+        Names the setting in an error.
+
+    Raises
+    ------
+    UserError
+        If it is neither.
+    """
+    text = axis.strip().replace("\\", "").lower()
+    signed = text if text[:1] in ("+", "-") else f"+{text}"
+    if signed in AXES:
+        vector = np.zeros(3)
+        vector["xyz".index(signed[1])] = 1.0 if signed[0] == "+" else -1.0
+        return vector
+    try:
+        vector = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        vector = np.zeros(0)
+    length = float(np.linalg.norm(vector))
+    if vector.shape != (3,) or not np.isfinite(length) or length == 0:
+        raise UserError(f"{key}={axis}: not an axis; give one of {', '.join(AXES)}, or x,y,z")
+    return vector / length
+
+
+def frame_rotation(up: str, front: str, turn_deg: float) -> NDArray[np.float64]:
+    """Return the rotation from a file's frame into the object frame.
+
+    Parameters
+    ----------
+    up, front : str
+        Axes of the file that become +z and (before the turn) +x; see `direction`.
+    turn_deg : float
+        Turn about +z afterwards, counter-clockwise: the azimuth at which `front` ends.
+
+    Returns
+    -------
+    (3, 3) float
+        Proper (determinant 1); to be applied to column vectors.
+
+    Raises
+    ------
+    UserError
+        If up and front are not perpendicular.
+    """
+    z = direction(up, "up")
+    x = direction(front, "front")
+    if abs(float(x @ z)) > _PERPENDICULAR_WITHIN:
+        raise UserError(f"up={up}, front={front}: the two must be perpendicular")
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    turn = np.radians(turn_deg)
+    cos, sin = np.cos(turn), np.sin(turn)
+    about_z = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    rotation: NDArray[np.float64] = about_z @ np.stack([x, np.cross(z, x), z])
+    return rotation
+
+
+def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
+    """Make sure that a mesh can be rendered.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh
+    origin : str
+        Where it came from, to be named in the error.
+
+    Raises
+    ------
+    UserError
+        If it has no face, a face index out of range, a vertex that is not finite (among those that
+        faces use), or no extent.
+    """
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    if len(faces) == 0:
+        raise UserError(f"{origin}: the mesh has no faces; at least 1 triangle expected")
+    lowest, highest = int(faces.min()), int(faces.max())
+    if lowest < 0 or highest >= len(vertices):
+        wrong = lowest if lowest < 0 else highest
+        raise UserError(f"{origin}: a face refers to vertex {wrong}, of {len(vertices)} vertices")
+    used = np.unique(faces)
+    broken = used[~np.isfinite(vertices[used]).all(axis=1)]
+    if len(broken):
+        raise UserError(
+            f"{origin}: {len(broken)} vertices are not finite, the first is vertex {broken[0]}; "
+            "numbers expected"
+        )
+    if float(np.linalg.norm(np.ptp(vertices[used], axis=0))) == 0.0:
+        raise UserError(f"{origin}: all faces lie in one point; a non-zero extent expected")
+
+
+def normalise(
+    mesh: trimesh.Trimesh, up: str, front: str, turn_deg: float, centre: Centre
+) -> trimesh.Trimesh:
+    """Return a mesh in the object frame, at unit size.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh
+        Checked by `check_mesh`.
+    up, front, turn_deg
+        See `frame_rotation`.
+    centre : {"box", "origin"}
+        The turning axis x = y = 0: through the middle of the bounding box, or where the file has
+        it. The height is always centred on the box.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        Faces in their old order; only vertices that they use, in their old order. The diagonal of
+        the axis-aligned bounding box has length 1.
+
+    Raises
+    ------
+    UserError
+        If an axis or `centre` is not valid.
+    """
+    import trimesh
+
+    if centre not in CENTRES:
+        raise UserError(f"centre={centre}: no such centre; {nearest(centre, CENTRES)}")
+    used, faces = np.unique(np.asarray(mesh.faces), return_inverse=True)
+    rotation = frame_rotation(up, front, turn_deg)
+    vertices = np.asarray(mesh.vertices, dtype=np.float64)[used] @ rotation.T
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle = (low + high) / 2.0
+    if centre == "origin":
+        middle[:2] = 0.0
+    vertices = (vertices - middle) / np.linalg.norm(high - low)
+    return trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False)

@@ -1,0 +1,101 @@
+"""Mugs: a hollow body of revolution, and a handle at azimuth 270 degrees."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from nbv.meshes.procedural.solids import Points, fillet, join, revolve, superellipse, sweep
+
+# Fine enough that the facets of the body do not tell a camera where it stands.
+_AROUND = 96
+# How far a handle's centre line stands out: small, usual and large, in heights of the mug.
+_REACHES = ((0.09, 0.16), (0.18, 0.3), (0.3, 0.48))
+
+
+def mug(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a mug of height 1 standing on z = 0, its handle towards -y."""
+    outer = _body_curve(rng)
+    wall = rng.uniform(0.025, 0.06)
+    handle = _handle(rng, outer, wall)
+    return join([_cup(outer, wall, floor=rng.uniform(0.04, 0.09)), handle])
+
+
+def _body_curve(rng: np.random.Generator) -> Points:
+    """Return the outer wall as (m, 2) of (radius, height), heights rising from 0 to 1."""
+    height = np.linspace(0.0, 1.0, 25)
+    radius = rng.uniform(0.3, 0.56) * np.ones_like(height)
+    plan = rng.choice(
+        ["straight", "tapered", "waisted", "barrel", "flared", "cup"],
+        p=[0.4, 0.2, 0.1, 0.12, 0.09, 0.09],
+    )
+    if plan == "tapered":
+        radius *= 1.0 + rng.uniform(-0.08, 0.3) * (height - 1.0)
+    elif plan == "waisted":
+        radius *= 1.0 - rng.uniform(0.05, 0.16) * np.sin(np.pi * height)
+    elif plan == "barrel":
+        radius *= 1.0 + rng.uniform(0.04, 0.16) * (np.sin(np.pi * height) - 1.0)
+    elif plan == "flared":
+        radius *= 1.0 + rng.uniform(0.05, 0.2) * (height ** rng.uniform(3.0, 6.0) - 1.0)
+    elif plan == "cup":
+        base = rng.uniform(0.5, 0.7)
+        radius *= base + (1.0 - base) * height**0.4
+    edge = rng.uniform(0.01, 0.12)
+    radius *= 1.0 - 0.25 * edge / 0.12 * np.clip(1.0 - height / edge, 0.0, 1.0) ** 2
+    if rng.random() < 0.15:
+        lip = rng.uniform(0.04, 0.1)
+        radius = radius + rng.uniform(0.01, 0.03) * (height > 1.0 - lip)
+    if rng.random() < 0.15:
+        foot = rng.uniform(0.03, 0.08)
+        radius = radius - rng.uniform(0.02, 0.05) * (height < foot)
+    return np.stack([radius, height], axis=-1)
+
+
+def _cup(outer: Points, wall: float, floor: float) -> trimesh.Trimesh:
+    """Return the hollow body: up the outer wall, over the rim and down the inner one."""
+    rim = [[outer[-1, 0] - wall / 2, 1.0 + wall / 3]]
+    inside = outer[outer[:, 1] > floor][::-1] - (wall, 0.0)
+    bottom = [[0.97 * inside[-1, 0], floor]]
+    return revolve(np.concatenate([outer, rim, inside, bottom]), n=_AROUND)
+
+
+def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Trimesh:
+    """Return the handle, both its ends buried in the wall."""
+    # From a finger ring to a tankard's: this alone sets how wide a range the body hides.
+    low, high = _REACHES[rng.choice(3, p=[0.12, 0.53, 0.35])]
+    reach = rng.uniform(low, high)
+    span = float(np.clip(rng.uniform(1.2, 2.6) * reach + rng.uniform(0.0, 0.2), 0.24, 0.76))
+    top = rng.uniform(max(0.12 + span, 0.6), 0.94)
+    heights = np.array([top, top - span])
+    radii = np.interp(heights, outer[:, 1], outer[:, 0])
+    style = rng.choice(["round", "square", "d", "ear"], p=[0.3, 0.25, 0.2, 0.25])
+    side = _handle_curve(rng, style, reach, span)
+    ends = radii - 0.5 * wall
+    # Straight between the two ends of the wall, plus how far the handle stands out from it.
+    t = np.linspace(0.0, 1.0, len(side))[:, None]
+    along = (side[:, 1:] - side[:1, 1:]) / (side[-1:, 1:] - side[:1, 1:])
+    out = ends[0] + (ends[1] - ends[0]) * np.clip(along, 0.0, 1.0) + side[:, :1]
+    up = top + side[:, 1:] - side[:1, 1:]
+    path = np.concatenate([np.zeros_like(t), -out, up], axis=1)
+    half_width = np.exp(rng.uniform(np.log(0.02), np.log(0.12)))
+    half_thick = min(np.exp(rng.uniform(np.log(0.018), np.log(0.055))), 0.35 * reach)
+    outline = superellipse(half_width, half_thick, rng.uniform(2.0, 5.0), n=20)
+    swell = 1.0 + rng.uniform(0.0, 0.5) * np.abs(2.0 * t[:, 0] - 1.0) ** 3
+    return sweep(path, outline, (1.0, 0.0, 0.0), scale=swell)
+
+
+def _handle_curve(rng: np.random.Generator, style: str, reach: float, span: float) -> Points:
+    """Return the handle's centre line as (m, 2) of (distance from the wall, height)."""
+    if style == "round":
+        angle = np.linspace(0.5 * np.pi, -0.5 * np.pi, 25)
+        return np.stack([reach * np.cos(angle), span / 2 * np.sin(angle)], axis=-1)
+    if style == "ear":
+        angle = np.linspace(0.5 * np.pi, -0.5 * np.pi, 25)
+        droop = 1.0 + rng.uniform(0.2, 0.45) * np.sin(angle)
+        out = reach * np.cos(angle) ** rng.uniform(0.6, 1.0) * droop / droop.max()
+        return np.stack([out, span / 2 * np.sin(angle)], axis=-1)
+    lean = rng.uniform(0.0, 0.12) if style == "square" else rng.uniform(0.15, 0.3)
+    corners = [[0, 0, span / 2], [reach, 0, span * (0.5 - lean / 2)],
+               [reach, 0, -span * (0.5 - lean)], [0, 0, -span / 2]]
+    radius = rng.uniform(0.04, 0.1) if style == "square" else 0.3
+    return fillet(corners, radius, n=9)[:, [0, 2]]

@@ -1,0 +1,331 @@
+"""Closed solids from rings of points: everything the five categories are built of.
+
+Every function returns one watertight :class:`trimesh.Trimesh` whose faces point outwards.
+They all end in :func:`loft`, which joins a stack of rings of equally many points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+
+Points = NDArray[np.float64]
+Axis = Literal["x", "y", "z"]
+
+# Cyclic permutations keep a right-handed frame right-handed.
+_FROM_Z: dict[str, list[int]] = {"x": [2, 0, 1], "y": [1, 2, 0], "z": [0, 1, 2]}
+
+
+def loft(rings: ArrayLike, *, closed: bool = False) -> trimesh.Trimesh:
+    """Join consecutive rings of points by a skin.
+
+    Parameters
+    ----------
+    rings : array_like
+        (m, k, 3): m rings of k points each, point j of one ring joined to point j of the next.
+    closed : bool
+        Join the last ring to the first, as in a torus; otherwise both ends are closed by a fan
+        about the ring's centroid, so end rings must be star-shaped from there.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        Watertight, of positive volume.
+    """
+    stack = np.asarray(rings, dtype=np.float64)
+    m, k, _ = stack.shape
+    index = np.arange(m * k).reshape(m, k)
+    near = index if closed else index[:-1]
+    far = np.roll(index, -1, axis=0) if closed else index[1:]
+    near_next, far_next = np.roll(near, -1, axis=1), np.roll(far, -1, axis=1)
+    faces = [np.stack([near, near_next, far_next], -1), np.stack([near, far_next, far], -1)]
+    vertices = stack.reshape(-1, 3)
+    if not closed:
+        first, last = index[0], index[-1]
+        hub = np.full(k, m * k)
+        faces += [np.stack([hub, np.roll(first, -1), first], -1)]
+        faces += [np.stack([hub + 1, last, np.roll(last, -1)], -1)]
+        vertices = np.concatenate([vertices, stack[[0, -1]].mean(axis=1)])
+    return _outward(vertices, np.concatenate([part.reshape(-1, 3) for part in faces]))
+
+
+def _outward(vertices: Points, faces: NDArray[np.intp]) -> trimesh.Trimesh:
+    """Turn every face over if the enclosed volume is negative."""
+    corners = vertices[faces]
+    six_volumes = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    return trimesh.Trimesh(vertices, faces if six_volumes > 0 else faces[:, ::-1], process=False)
+
+
+def superellipse(
+    half_width: float, half_height: float, exponent: float = 2.0, n: int = 24
+) -> Points:
+    """Return an oval between ellipse and rectangle, counter-clockwise.
+
+    Parameters
+    ----------
+    half_width, half_height : float
+        Semi-axes along the first and the second coordinate, > 0.
+    exponent : float
+        2 is an ellipse, 4 to 8 a rectangle with rounded corners.
+    n : int
+        Number of points; a multiple of 4 keeps both mirror symmetries.
+
+    Returns
+    -------
+    numpy.ndarray
+        (n, 2).
+    """
+    angle = 2 * np.pi * np.arange(n) / n
+    unit = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    rounded = np.sign(unit) * np.abs(unit) ** (2.0 / exponent)
+    return np.asarray(np.where(np.abs(unit) < 1e-12, 0.0, rounded) * (half_width, half_height))
+
+
+def stack_outlines(outlines: ArrayLike, heights: ArrayLike, axis: Axis = "z") -> trimesh.Trimesh:
+    """Loft plane outlines placed at heights along an axis.
+
+    Parameters
+    ----------
+    outlines : array_like
+        (m, k, 2), or (k, 2) for the same outline at every height. In-plane coordinates are
+        (x, y) for axis z, (y, z) for axis x and (z, x) for axis y.
+    heights : array_like
+        (m,), strictly monotonic where neighbouring outlines are equal.
+    axis : {"x", "y", "z"}
+        What the heights run along.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        The solid.
+    """
+    level = np.asarray(heights, dtype=np.float64)
+    outline = np.asarray(outlines, dtype=np.float64)
+    outline = np.broadcast_to(outline, (len(level), *outline.shape[-2:]))
+    rings = np.concatenate(
+        [outline, np.broadcast_to(level[:, None, None], (*outline.shape[:2], 1))], axis=-1
+    )
+    return loft(rings[..., _FROM_Z[axis]])
+
+
+def slab(
+    outline: ArrayLike, low: float, high: float, *, bevel: float = 0.0, axis: Axis = "z"
+) -> trimesh.Trimesh:
+    """Return a prism over an outline, its edges bevelled if asked.
+
+    Parameters
+    ----------
+    outline : array_like
+        (k, 2), star-shaped from its centroid; coordinates as in :func:`stack_outlines`.
+    low, high : float
+        Ends along the axis.
+    bevel : float
+        Depth of the bevel along the axis; the end outlines shrink by about as much.
+    axis : {"x", "y", "z"}
+        The prism's direction.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        The solid.
+    """
+    flat = np.asarray(outline, dtype=np.float64)
+    if bevel <= 0.0:
+        return stack_outlines(flat, [low, high], axis)
+    centre = flat.mean(axis=0)
+    shrink = 1.0 - bevel / np.abs(flat - centre).max(axis=0)
+    small = centre + (flat - centre) * np.clip(shrink, 0.3, 1.0)
+    return stack_outlines([small, flat, flat, small], [low, low + bevel, high - bevel, high], axis)
+
+
+def box(
+    centre: ArrayLike, extents: ArrayLike, *, exponent: float = 8.0, bevel: float = 0.0
+) -> trimesh.Trimesh:
+    """Return an upright box with rounded vertical edges.
+
+    Parameters
+    ----------
+    centre, extents : array_like
+        (3,) each.
+    exponent : float
+        Roundness in plan, see :func:`superellipse`.
+    bevel : float
+        Of the top and bottom edges.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        The solid.
+    """
+    x, y, z = np.asarray(centre, dtype=np.float64)
+    width, depth, height = np.asarray(extents, dtype=np.float64)
+    outline = superellipse(width / 2, depth / 2, exponent) + (x, y)
+    return slab(outline, z - height / 2, z + height / 2, bevel=bevel)
+
+
+def revolve(
+    profile: ArrayLike, *, n: int = 32, axis: Axis = "z", centre: ArrayLike = (0.0, 0.0, 0.0)
+) -> trimesh.Trimesh:
+    """Return a solid of revolution.
+
+    Parameters
+    ----------
+    profile : array_like
+        (m, 2) of (radius > 0, height along the axis); discs close both ends.
+    n : int
+        Points around.
+    axis : {"x", "y", "z"}
+        Direction of the axis of revolution.
+    centre : array_like
+        (3,): where height 0 on the axis comes to lie.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        The solid.
+    """
+    curve = np.asarray(profile, dtype=np.float64)
+    outlines = curve[:, :1, None] * superellipse(1.0, 1.0, n=n)
+    solid = stack_outlines(outlines, curve[:, 1], axis)
+    solid.vertices += np.asarray(centre, dtype=np.float64)
+    return solid
+
+
+def fillet(corners: ArrayLike, radius: float, n: int = 5) -> Points:
+    """Round the inner corners of a polyline by quadratic Bézier arcs.
+
+    Parameters
+    ----------
+    corners : array_like
+        (m, 3) points, neighbours distinct.
+    radius : float
+        How far from a corner its arc begins, at most 0.45 of the shorter adjoining edge.
+    n : int
+        Points per arc.
+
+    Returns
+    -------
+    numpy.ndarray
+        (2 + n (m - 2), 3), the ends unmoved.
+    """
+    points = np.asarray(corners, dtype=np.float64)
+    edges = np.diff(points, axis=0)
+    lengths = np.linalg.norm(edges, axis=1, keepdims=True)
+    reach = np.minimum(radius, 0.45 * np.minimum(lengths[:-1], lengths[1:]))
+    begin = points[1:-1] - edges[:-1] / lengths[:-1] * reach
+    end = points[1:-1] + edges[1:] / lengths[1:] * reach
+    t = np.linspace(0.0, 1.0, n)[:, None, None]
+    arcs = (1 - t) ** 2 * begin + 2 * t * (1 - t) * points[1:-1] + t**2 * end
+    return np.concatenate([points[:1], arcs.swapaxes(0, 1).reshape(-1, 3), points[-1:]])
+
+
+def sweep(
+    path: ArrayLike, outline: ArrayLike, normal: ArrayLike, *, scale: ArrayLike = 1.0
+) -> trimesh.Trimesh:
+    """Carry an outline along a path.
+
+    Parameters
+    ----------
+    path : array_like
+        (m, 3), neighbours distinct.
+    outline : array_like
+        (k, 2): first coordinate along `normal`, second across both normal and path.
+    normal : array_like
+        (3,), nowhere parallel to the path.
+    scale : array_like
+        Scalar or (m,): the outline's size along the path.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        The solid, its ends closed.
+    """
+    points, flat = np.asarray(path, dtype=np.float64), np.asarray(outline, dtype=np.float64)
+    steps = np.diff(points, axis=0)
+    steps /= np.linalg.norm(steps, axis=1, keepdims=True)
+    # A ring stands in the plane that bisects its two edges, so straight runs keep their thickness.
+    tangents = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    first = np.asarray(normal, dtype=np.float64) - tangents * (tangents @ np.asarray(normal))[:, None]
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(tangents, first)
+    size = np.broadcast_to(np.asarray(scale, dtype=np.float64), len(points))[:, None, None]
+    across = flat[None, :, :1] * first[:, None] + flat[None, :, 1:] * second[:, None]
+    return loft(points[:, None] + size * across)
+
+
+def tube(path: ArrayLike, radius: float, *, n: int = 12, taper: float = 1.0) -> trimesh.Trimesh:
+    """Return a round tube along a path that bends in one plane or not at all.
+
+    Parameters
+    ----------
+    path : array_like
+        (m, 3).
+    radius : float
+        At the start.
+    n : int
+        Points around.
+    taper : float
+        Radius at the end divided by that at the start.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        The solid, its ends closed.
+    """
+    points = np.asarray(path, dtype=np.float64)
+    # The direction of least extent is the normal of the plane the path lies in.
+    normal = np.linalg.svd(points - points.mean(axis=0))[2][-1]
+    scale = np.linspace(1.0, taper, len(points))
+    return sweep(points, superellipse(radius, radius, n=n), normal, scale=scale)
+
+
+def mirrored(solid: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the solid reflected in the plane y = 0, its faces still outwards."""
+    vertices = np.asarray(solid.vertices) * (1.0, -1.0, 1.0)
+    return trimesh.Trimesh(vertices, np.asarray(solid.faces)[:, ::-1], process=False)
+
+
+def both_sides(solids: Iterable[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
+    """Return the solids followed by their reflections in the plane y = 0."""
+    one_side = list(solids)
+    return one_side + [mirrored(solid) for solid in one_side]
+
+
+def moved(solid: trimesh.Trimesh, offset: ArrayLike) -> trimesh.Trimesh:
+    """Return the solid shifted by `offset`, (3,)."""
+    vertices = np.asarray(solid.vertices) + np.asarray(offset, dtype=np.float64)
+    return trimesh.Trimesh(vertices, solid.faces, process=False)
+
+
+def turned(
+    solid: trimesh.Trimesh, angle_deg: float, axis: Axis, centre: ArrayLike = (0.0, 0.0, 0.0)
+) -> trimesh.Trimesh:
+    """Return the solid turned about an axis through `centre`, counter-clockwise."""
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    rotation = about_z[np.ix_(_FROM_Z[axis], _FROM_Z[axis])]
+    pivot = np.asarray(centre, dtype=np.float64)
+    vertices = (np.asarray(solid.vertices) - pivot) @ rotation.T + pivot
+    return trimesh.Trimesh(vertices, solid.faces, process=False)
+
+
+def join(solids: Iterable[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Return the solids as one mesh; they may touch or pass through one another."""
+    parts = list(solids)
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    return trimesh.Trimesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
+        process=False,
+    )
+
+
+def centred(solid: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the solid with its bounding box centred on the z axis and standing on z = 0."""
+    low, high = np.asarray(solid.bounds)
+    return moved(solid, [-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])

@@ -1,0 +1,179 @@
+"""Toilets: a bowl on a foot, a seat and lid, and a cistern behind, above or in the wall.
+
+Lengths are in metres; the sitter looks towards +x and the floor is z = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from nbv.meshes.procedural.solids import (
+    Points,
+    both_sides,
+    box,
+    centred,
+    fillet,
+    join,
+    loft,
+    revolve,
+    slab,
+    stack_outlines,
+    superellipse,
+    tube,
+    turned,
+)
+
+Solids = list[trimesh.Trimesh]
+_POINTS = 40
+
+
+@dataclass(frozen=True)
+class _Bowl:
+    """The rim's outline: its rear and front end, half width and squareness; and its height."""
+
+    back: float
+    front: float
+    half_width: float
+    square: float
+    rim: float
+
+    def outline(self, grow: float = 0.0) -> Points:
+        """Return the rim, (n, 2), grown outwards by so much: blunt behind, oval in front."""
+        half = (self.front - self.back) / 2
+        shape = superellipse(half + grow, self.half_width + grow, self.square, n=_POINTS)
+        behind = superellipse(half + grow, self.half_width + grow, self.square + 2.5, n=_POINTS)
+        return np.where(shape[:, :1] < 0.0, behind, shape) + ((self.front + self.back) / 2, 0.0)
+
+
+def toilet(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a toilet, the front of its bowl towards +x."""
+    long = rng.uniform(0.42, 0.54)
+    bowl = _Bowl(
+        -long / 2,
+        long / 2,
+        rng.uniform(0.17, 0.2),
+        float(rng.choice([rng.uniform(1.9, 2.4), rng.uniform(3.0, 6.0)], p=[0.7, 0.3])),
+        rng.uniform(0.36, 0.44),
+    )
+    kind = rng.choice(["two-piece", "one-piece", "high cistern", "no cistern"],
+                      p=[0.5, 0.24, 0.13, 0.13])  # fmt: skip
+    parts = [*_pedestal(rng, bowl, kind), *_seat(rng, bowl)]
+    if kind == "two-piece":
+        parts += _close_cistern(rng, bowl)
+    elif kind == "one-piece":
+        parts += _grown_cistern(rng, bowl)
+    elif kind == "high cistern":
+        parts += _high_cistern(rng, bowl)
+    return centred(join(parts))
+
+
+def _pedestal(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
+    """Return the bowl and its foot, and what stands behind it."""
+    skirted = rng.random() < 0.3
+    t = np.linspace(0.0, 1.0, 17)
+    if skirted:
+        waist, flare = rng.uniform(0.75, 0.95), 0.0
+        swell = t ** rng.uniform(1.2, 2.6)
+    else:
+        waist, flare = rng.uniform(0.42, 0.68), rng.uniform(0.05, 0.3)
+        swell = np.clip((t - 0.25) / 0.75, 0.0, 1.0) ** rng.uniform(0.55, 1.0)
+    foot = flare * np.clip(1.0 - t / 0.25, 0.0, 1.0) ** 1.5
+    scale = (waist + (1.0 - waist) * swell) * (1.0 + foot)
+    # A bowl that narrows downwards stands towards its back, under the sitter.
+    shift = (bowl.back - bowl.front) * rng.uniform(0.05, 0.16) * (1.0 - swell)
+    outside = scale[:, None, None] * bowl.outline(-0.008)
+    outside[..., 0] += shift[:, None]
+    # One skin: up the outside, over the rim, and down into the hollow, as in a mug.
+    thick, depth = rng.uniform(0.03, 0.05), rng.uniform(0.12, 0.2)
+    inner = bowl.outline(-rng.uniform(0.035, 0.05))
+    inside = [bowl.outline(), bowl.outline(), inner, 0.85 * inner, 0.45 * inner, 0.2 * inner]
+    down = np.array([0.6 * thick, 0.0, 0.0, 0.5 * depth, depth, depth + 0.005])
+    levels = np.concatenate([(bowl.rim - thick) * t, bowl.rim - down])
+    parts = [stack_outlines(np.concatenate([outside, inside]), levels)]
+    if kind in ("two-piece", "one-piece") or rng.random() < 0.5:
+        low = rng.choice([0.0, rng.uniform(0.1, 0.25)])
+        width = 2 * bowl.half_width * rng.uniform(0.5, 0.9)
+        parts += [box((bowl.back - 0.04, 0.0, (low + bowl.rim) / 2),
+                      (0.28, width, bowl.rim - low), exponent=5.0, bevel=0.02)]  # fmt: skip
+    return parts
+
+
+def _seat(rng: np.random.Generator, bowl: _Bowl) -> Solids:
+    """Return seat and lid: both down, the lid up, or both up."""
+    thick, grow = rng.uniform(0.015, 0.028), rng.uniform(0.0, 0.014)
+    z, hinge = bowl.rim + 0.004, bowl.back + 0.035
+    outer, inner = bowl.outline(grow), bowl.outline(-rng.uniform(0.05, 0.065))
+    outer, inner = np.maximum(outer, (hinge, -1.0)), np.maximum(inner, (hinge + 0.05, -1.0))
+    levels = (z, z + thick, z + thick, z)
+    rings = np.stack([np.column_stack([ring, np.full(_POINTS, level)]) for ring, level in
+                      zip((outer, outer, inner, inner), levels, strict=True)])  # fmt: skip
+    seat = loft(rings, closed=True)
+    lid = slab(outer, z + thick + 0.003, z + 2 * thick, bevel=0.006)
+    pivot = (hinge, 0.0, z + thick)
+    up = -rng.uniform(92.0, 104.0)
+    state = rng.choice(["down", "lid up", "both up", "none"], p=[0.45, 0.3, 0.1, 0.15])
+    pins = both_sides([tube([(hinge, 0.05, z + thick / 2), (hinge, 0.1, z + thick / 2)], 0.014)])
+    if state == "none":
+        return [seat, *pins]
+    if state == "both up":
+        seat = turned(seat, up + 3.0, "y", pivot)
+    if state != "down":
+        lid = turned(lid, up, "y", pivot)
+    return [seat, lid, *pins]
+
+
+def _flush(rng: np.random.Generator, front: float, half_width: float, top: float) -> Solids:
+    """Return a lever on the cistern's front or a button on its lid."""
+    if rng.random() < 0.5:
+        return [revolve([[0.028, -0.01], [0.028, 0.006], [0.022, 0.012]], n=20,
+                        centre=(front - 0.09, 0.0, top))]  # fmt: skip
+    y, z = half_width * rng.uniform(0.5, 0.75), top - 0.085
+    return [tube([(front - 0.02, y, z), (front + 0.018, y, z)], 0.012),
+            tube([(front + 0.016, y + 0.01, z), (front + 0.016, y - 0.07, z - 0.012)], 0.009)]  # fmt: skip
+
+
+def _tank(
+    rng: np.random.Generator, front: float, low: float, high: float, half_width: float
+) -> Solids:
+    """Return a cistern, its lid overhanging, and the flush."""
+    depth, exponent = rng.uniform(0.15, 0.21), rng.uniform(3.5, 9.0)
+    unit = superellipse(1.0, 1.0, exponent, n=32)
+    draw = rng.uniform(0.78, 1.0)
+    t = np.array([0.0, 0.06, 0.5, 1.0])
+    size = (draw + (1.0 - draw) * t) * np.array([0.93, 1.0, 1.0, 1.0])
+    outlines = size[:, None, None] * unit * (depth / 2, half_width)
+    outlines[..., 0] += front - size[:, None] * depth / 2
+    over = rng.uniform(0.003, 0.015)
+    lid = unit * (depth / 2 + over, half_width + over) + (front - depth / 2, 0.0)
+    thick = rng.uniform(0.02, 0.04)
+    return [
+        stack_outlines(outlines, low + (high - low) * t),
+        slab(lid, high - 0.002, high + thick, bevel=0.4 * thick),
+        *_flush(rng, front, half_width, high + thick),
+    ]
+
+
+def _close_cistern(rng: np.random.Generator, bowl: _Bowl) -> Solids:
+    low = bowl.rim + rng.uniform(-0.01, 0.03)
+    return _tank(rng, bowl.back + rng.uniform(-0.05, 0.01), low, low + rng.uniform(0.27, 0.4),
+                 rng.uniform(0.17, 0.25))  # fmt: skip
+
+
+def _grown_cistern(rng: np.random.Generator, bowl: _Bowl) -> Solids:
+    """Return a cistern that rises from the floor or flows out of the bowl."""
+    front, half_width = bowl.back + rng.uniform(-0.03, 0.02), rng.uniform(0.16, 0.2)
+    low = rng.choice([0.0, 0.7 * bowl.rim])
+    return _tank(rng, front, low, bowl.rim + rng.uniform(0.14, 0.38), half_width)
+
+
+def _high_cistern(rng: np.random.Generator, bowl: _Bowl) -> Solids:
+    """Return a cistern on the wall, its flush pipe, and a chain or none."""
+    low, half_width = bowl.rim + rng.uniform(0.25, 0.8), rng.uniform(0.19, 0.25)
+    wall = bowl.back - rng.uniform(0.08, 0.14)
+    tank = _tank(rng, wall + 0.17, low, low + rng.uniform(0.22, 0.32), half_width)
+    corners = [(wall + 0.07, 0.0, low + 0.02), (wall + 0.07, 0.0, bowl.rim - 0.1),
+               (bowl.back + 0.05, 0.0, bowl.rim - 0.1)]  # fmt: skip
+    return [*tank, tube(fillet(corners, 0.08, n=7), rng.uniform(0.018, 0.026))]

@@ -1,0 +1,167 @@
+"""What all sources of mesh files share: the root, exclusions, reading, and honest messages."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nbv.errors import UserError
+from nbv.meshes.normalisation import check_mesh, normalise
+
+if TYPE_CHECKING:
+    import trimesh
+
+logger = logging.getLogger(__name__)
+
+EXTENSIONS = (".obj", ".ply", ".off", ".stl", ".glb")
+
+
+class FileSource(ABC):
+    """A source of mesh files below one folder.
+
+    A list of exclusions may serve several categories, so an entry that is not in the one asked for
+    is no error. If others of the list are, though, it is probably misspelt, and a warning says so.
+    """
+
+    name: str
+    endless = False
+
+    def __init__(self, settings: Mapping[str, Any], seed: int) -> None:
+        self.seed = seed
+        self.settings = settings
+        if not settings["root"]:
+            raise UserError(f"dataset={self.name}: dataset.root is not set; give the data's folder")
+        self.root = Path(settings["root"]).expanduser()
+        self._excluded = _exclusions(settings)
+        self._found: dict[str, dict[str, Path]] = {}
+
+    @abstractmethod
+    def find(self, category: str) -> dict[str, Path]:
+        """Return the mesh files of a category by object id, found by name alone."""
+
+    @abstractmethod
+    def whereabouts(self, category: str) -> str:
+        """Return the place that a category's files come from, for messages."""
+
+    def orientation(self, category: str, object_id: str) -> tuple[str, str]:
+        """Return the axes of a file that point up and to the front."""
+        return self.settings["up"], self.settings["front"]
+
+    def object_ids(self, category: str) -> list[str]:
+        """Return the ids of all files, sorted, less the excluded."""
+        found = self.files(category)
+        unknown = sorted(self._excluded - found.keys())
+        if unknown and len(unknown) < len(self._excluded):
+            logger.warning(
+                "dataset=%s: %d listed exclusions are not among the files of %s, the first is %s",
+                *(self.name, len(unknown), category, unknown[0]),
+            )
+        return sorted(found.keys() - self._excluded)
+
+    def load(self, category: str, object_id: str) -> trimesh.Trimesh:
+        """Read, check and normalise one file."""
+        files = self.files(category)
+        if object_id not in files:
+            raise UserError(f"dataset={self.name}: {self.whereabouts(category)}: no {object_id}")
+        mesh = read_mesh(files[object_id])
+        check_mesh(mesh, str(files[object_id]))
+        up, front = self.orientation(category, object_id)
+        turn_deg = self.settings["turn_deg"].get(category, 0.0)
+        try:
+            return normalise(mesh, up, front, turn_deg, self.settings["centre"])
+        except UserError as error:
+            raise UserError(f"dataset={self.name}, {files[object_id]}: {error}") from error
+
+    def files(self, category: str) -> dict[str, Path]:
+        """Return what `find` found, looked for once."""
+        if category not in self._found:
+            self.need_folder(self.root, "the data set (dataset.root)")
+            self._found[category] = self.find(category)
+        return self._found[category]
+
+    def existing(self, files: Mapping[str, Path], category: str) -> dict[str, Path]:
+        """Return those files that exist; a listed model without one is worth a warning."""
+        existing = {name: path for name, path in files.items() if path.is_file()}
+        absent = sorted(files.keys() - existing.keys())
+        if absent:
+            logger.warning(
+                "dataset=%s: %d of %d %s models have no file, the first is %s",
+                *(self.name, len(absent), len(files), category, files[absent[0]]),
+            )
+        return existing
+
+    def label(self, category: str) -> str:
+        """Return what the data set calls a category."""
+        label: str = self.settings["categories"].get(category, category)
+        return label
+
+    def need_folder(self, folder: Path, meaning: str) -> Path:
+        """Return `folder`, or say that there is none."""
+        if not folder.is_dir():
+            what = "is not a folder" if folder.exists() else "does not exist"
+            raise UserError(f"dataset={self.name}: {folder} {what}; it should hold {meaning}")
+        return folder
+
+    def by_stem(self, paths: Iterable[Path]) -> dict[str, Path]:
+        """Return files by their stem, which must name one file alone."""
+        files: dict[str, Path] = {}
+        for path in sorted(paths):
+            if path.stem in files:
+                raise UserError(
+                    f"dataset={self.name}: {files[path.stem]} and {path} have the same id "
+                    f"{path.stem}: rename or remove one"
+                )
+            files[path.stem] = path
+        return files
+
+
+def _exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
+    listed = list(settings["exclude"])
+    if settings["exclude_file"]:
+        path = Path(settings["exclude_file"]).expanduser()
+        try:
+            lines = path.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+            raise UserError(f"dataset.exclude_file={path} cannot be read: {reason}") from error
+        listed += [line.partition("#")[0].strip() for line in lines]
+    return frozenset(object_id for object_id in listed if object_id)
+
+
+def read_mesh(path: Path) -> trimesh.Trimesh:
+    """Read a mesh file as it is: vertices neither merged nor reordered, materials left aside.
+
+    The parts of a scene are joined, each where its transform puts it.
+
+    Raises
+    ------
+    UserError
+        With the path and the reader's reason.
+    """
+    import trimesh
+
+    options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
+    try:
+        with _only_errors(trimesh.util.log):
+            mesh = trimesh.load_mesh(path, process=False, **options)
+    # A reader meets arbitrary bytes, and no list of what it may raise on them is complete.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{path}: cannot be read as a mesh ({reason})") from error
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise UserError(f"{path}: holds no mesh; at least 1 triangle expected")
+    return mesh
+
+
+@contextlib.contextmanager
+def _only_errors(log: logging.Logger) -> Iterator[None]:
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)

@@ -1,0 +1,56 @@
+"""The data set that needs no download: see `nbv.meshes.procedural`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from nbv.errors import UserError, nearest
+from nbv.meshes.normalisation import check_mesh, normalise
+
+if TYPE_CHECKING:
+    import trimesh
+
+# The keys of nbv.meshes.procedural.CATEGORIES, which cannot be asked without importing trimesh.
+CATEGORIES = ("airplane", "car", "chair", "mug", "toilet")
+
+# Ids have four digits.
+_N_OBJECTS = 10_000
+
+
+class ProceduralSource:
+    """Objects "mug-0000", "mug-0001", … made from the seed; `dataset.root` plays no part."""
+
+    name = "procedural"
+    endless = True
+
+    def __init__(self, settings: Mapping[str, Any], seed: int) -> None:
+        self.seed = seed
+        self._settings = settings
+
+    def object_ids(self, category: str) -> list[str]:
+        """Return all ids that there can be, less the excluded."""
+        if category not in CATEGORIES:
+            raise UserError(
+                f"dataset=procedural has no category {category}; {nearest(category, CATEGORIES)}"
+            )
+        excluded = set(self._settings["exclude"])
+        ids = (f"{category}-{index:04d}" for index in range(_N_OBJECTS))
+        return [object_id for object_id in ids if object_id not in excluded]
+
+    def whereabouts(self, category: str) -> str:
+        """Return the generator's name."""
+        return f"the generator of {category} meshes"
+
+    def load(self, category: str, object_id: str) -> trimesh.Trimesh:
+        """Make one object; it depends on the seed, the category and its number alone."""
+        from nbv.meshes.procedural import generate
+
+        number = object_id.removeprefix(f"{category}-")
+        if not number.isdecimal():
+            raise UserError(f"dataset=procedural: {object_id} is not an id like {category}-0000")
+        mesh = generate(category, self.seed, int(number))
+        check_mesh(mesh, f"dataset=procedural: {object_id}")
+        settings = self._settings
+        turn_deg = settings["turn_deg"].get(category, 0.0)
+        return normalise(mesh, settings["up"], settings["front"], turn_deg, settings["centre"])

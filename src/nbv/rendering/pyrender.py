@@ -1,0 +1,106 @@
+"""Depth through OpenGL with pyrender, on EGL: a second opinion on every image, and the GPU's way.
+
+It draws the same views as Embree. Three of pyrender's habits need care:
+
+- It draws into a multisampled buffer and keeps one sample of each pixel, off the pixel's centre
+  wherever the driver has it. Drawing with its segmentation flag switches multisampling off: depth
+  is then that of the pixel's centre, by OpenGL's definition, and comes two or three times faster.
+- Whatever the material says, depth is drawn of front faces alone. Meshes from the wild have faces
+  either way round, so each face is handed over both ways.
+- Depth comes back through a 24-bit buffer, so the near and far planes stand close to the object.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.errors import UserError
+from nbv.rendering.camera import Camera, Views, object_views
+
+# Between the object and the near and far planes, in object diagonals.
+_CLEARANCE = 0.01
+_INSTALL = "install EGL (Debian: libegl1 libgl1 libgl1-mesa-dri) or take renderer=embree"
+
+
+@cache
+def _offscreen() -> Any:
+    """Return the process's one OpenGL context: releasing a second would terminate the first."""
+    import pyrender
+
+    return pyrender.OffscreenRenderer(1, 1)
+
+
+class PyrenderRenderer:
+    """The renderer that draws with OpenGL.
+
+    Raises
+    ------
+    UserError
+        On construction, where pyrender or EGL is missing or does not work.
+    """
+
+    def __init__(self) -> None:
+        # PyOpenGL reads this once, when it is first imported.
+        platform = os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
+        if platform != "egl":
+            raise UserError(
+                f"renderer=pyrender: PYOPENGL_PLATFORM={platform} is set; unset it or set it to egl"
+            )
+        # Loaders and drivers fail in ways of their own: no list of what they raise is complete.
+        try:
+            self._offscreen = _offscreen()
+        except Exception as error:
+            reason = " ".join(str(error).split())[:120] or type(error).__name__
+            raise UserError(f"renderer=pyrender cannot start ({reason}): {_INSTALL}") from error
+
+    def render(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        elevation_deg: float,
+        azimuths_deg: ArrayLike,
+        camera: Camera,
+    ) -> NDArray[np.float32]:
+        """Return depth images (k, side, side): see `nbv.rendering.Renderer.render`.
+
+        Depths are good to 1e-5 object diagonals (24-bit depth buffer).
+        """
+        import pyrender
+
+        views = object_views(vertices, faces, elevation_deg, azimuths_deg, camera)
+        side = camera.image_side
+        self._offscreen.viewport_width = self._offscreen.viewport_height = side
+        one_way = np.asarray(faces, dtype=np.uint32)
+        triangles = pyrender.Primitive(
+            positions=np.asarray(vertices, dtype=np.float32),
+            indices=np.concatenate([one_way, one_way[:, ::-1]]),
+            mode=pyrender.constants.GLTF.TRIANGLES,
+        )
+        scene = pyrender.Scene()
+        visible = {scene.add(pyrender.Mesh([triangles])): (1, 1, 1)}
+        near, far = views.nearest - _CLEARANCE, views.farthest + _CLEARANCE
+        lens = pyrender.IntrinsicsCamera(
+            *(camera.focal_px, camera.focal_px, side / 2, side / 2),
+            znear=max(near, _CLEARANCE),
+            zfar=far,
+        )
+        node = scene.add(lens)
+        flags = pyrender.RenderFlags.DEPTH_ONLY | pyrender.RenderFlags.SEG
+        depth = np.empty((len(views.position), side, side), dtype=np.float32)
+        for view, (lens.cx, lens.cy) in enumerate(views.principal_px):
+            scene.set_pose(node, _pose(views, view))
+            depth[view] = self._offscreen.render(scene, flags, visible)
+        return depth
+
+
+def _pose(views: Views, view: int) -> NDArray[np.float64]:
+    """Return the matrix from OpenGL's camera frame (x right, y up, looking along -z)."""
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1] = views.right[view], views.up[view]
+    pose[:3, 2], pose[:3, 3] = -views.forward[view], views.position[view]
+    return pose

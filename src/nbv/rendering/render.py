@@ -1,0 +1,131 @@
+"""Depth images of many objects, written straight to one array on disk."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.errors import UserError
+from nbv.files import replacing
+from nbv.meshes.store import Surface
+from nbv.rendering import Renderer
+from nbv.rendering.camera import Camera
+from nbv.rendering.sensor import Codes, Sensor, encode_depth, ideal
+
+logger = logging.getLogger(__name__)
+
+# Progress is logged at each tenth of the work, but no more often than this.
+_SECONDS_BETWEEN_LINES = 5.0
+
+
+def render_objects(
+    meshes: Mapping[str, Surface],
+    elevation_deg: float,
+    camera: Camera,
+    renderer: Renderer,
+    sensor: Sensor = ideal,
+    n_azimuths: int = 360,
+) -> Iterator[Codes]:
+    """Yield the encoded depth images of each object in turn.
+
+    Parameters
+    ----------
+    meshes : mapping of str to mesh
+        Normalised meshes by object id.
+    elevation_deg : float
+        In [-90, 90].
+    camera : Camera
+    renderer : Renderer
+    sensor : callable, optional
+        Applied to the depth of one object's images before they are encoded.
+    n_azimuths : int
+        View k is at azimuth 360 k / n_azimuths degrees.
+
+    Yields
+    ------
+    (n_azimuths, side, side) uint8
+        See `nbv.rendering.sensor.encode_depth`.
+
+    Raises
+    ------
+    UserError
+        Naming the object that does not fit the image.
+    """
+    azimuths_deg = np.arange(n_azimuths) * (360.0 / n_azimuths)
+    for object_id, mesh in meshes.items():
+        try:
+            depth = renderer.render(mesh.vertices, mesh.faces, elevation_deg, azimuths_deg, camera)
+        except UserError as error:
+            raise UserError(f"{object_id}: {error}") from error
+        yield encode_depth(sensor(depth), camera)
+
+
+def write_depth(
+    path: str | Path,
+    meshes: Mapping[str, Surface],
+    elevation_deg: float,
+    camera: Camera,
+    renderer: Renderer,
+    sensor: Sensor = ideal,
+    n_azimuths: int = 360,
+) -> None:
+    """Render all objects into one `.npy` file, (n_objects, n_azimuths, side, side) uint8.
+
+    The images go to disk as they are made; memory holds those of one object. The file appears
+    under its name only when it is complete. Parameters and errors as in `render_objects`.
+    """
+    side = camera.image_side
+    with replacing(path) as temporary:
+        stored = np.lib.format.open_memmap(
+            temporary, mode="w+", dtype=np.uint8, shape=(len(meshes), n_azimuths, side, side)
+        )
+        images = render_objects(meshes, elevation_deg, camera, renderer, sensor, n_azimuths)
+        progress = _Progress(str(path), len(meshes), n_azimuths)
+        for index, codes in enumerate(images):
+            stored[index] = codes
+            progress.advance(index + 1)
+        stored.flush()
+        del stored
+
+
+def open_depth(path: str | Path) -> NDArray[np.uint8]:
+    """Open images written by `write_depth`, read-only and without reading them into memory.
+
+    Returns
+    -------
+    (n_objects, n_azimuths, side, side) uint8 memmap
+    """
+    stored: NDArray[np.uint8] = np.load(path, mmap_mode="r", allow_pickle=False)
+    return stored
+
+
+class _Progress:
+    def __init__(self, name: str, n_objects: int, images_each: int) -> None:
+        self._name, self._n_objects, self._images_each = name, n_objects, images_each
+        self._start = self._last = time.monotonic()
+        self._tenth = 0
+
+    def advance(self, done: int) -> None:
+        now = time.monotonic()
+        elapsed = max(now - self._start, 1e-9)
+        rate = done * self._images_each / elapsed
+        if done == self._n_objects:
+            images = done * self._images_each
+            logger.info(
+                "%s: %d objects, %d images in %.1f s (%.0f images/s)",
+                *(self._name, done, images, elapsed, rate),
+            )
+            return
+        tenth = 10 * done // self._n_objects
+        if tenth > self._tenth and now - self._last >= _SECONDS_BETWEEN_LINES:
+            self._tenth, self._last = tenth, now
+            left = elapsed / done * (self._n_objects - done)
+            logger.info(
+                "%s: object %d of %d, %.0f images/s, %.0f s left",
+                *(self._name, done, self._n_objects, rate, left),
+            )

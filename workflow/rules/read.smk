@@ -1,0 +1,5 @@
+# Tables, claims, figures, report (to come)
+rule tables:
+    input: []
+rule figures:
+    input: []

@@ -1,0 +1,87 @@
+# Lookup tables from calibration pairs, and what each method makes of the test objects.
+
+
+def rotation_of(wildcards):
+    return CONFIG["methods"][wildcards.method]["rotation"]
+
+
+rule lookup:
+    input:
+        sources("lookup"),
+        splits=rules.splits.output[0],
+        calibration=rules.estimate.output.calibration,
+    output:
+        f"{RESULTS}/lookup/{FOLD}/{{criterion}}.npz",
+    log:
+        log_path("lookup", f"/{FOLD}/{{criterion}}"),
+    benchmark:
+        benchmark_path("lookup", f"/{FOLD}/{{criterion}}")
+    params:
+        density=CONFIG["density"],
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=10,
+    script:
+        script_path("lookup")
+
+
+rule evaluate_baselines:
+    input:
+        sources("evaluate_baselines"),
+        splits=rules.splits.output[0],
+        test=rules.estimate.output.test,
+    output:
+        expand(
+            f"{RESULTS}/evaluation/{FOLD}/{{method}}.csv",
+            method=BASELINE_METHODS,
+            allow_missing=True,
+        ),
+    log:
+        log_path("evaluate_baselines", f"/{FOLD}"),
+    benchmark:
+        benchmark_path("evaluate_baselines", f"/{FOLD}")
+    params:
+        methods={name: CONFIG["methods"][name] for name in BASELINE_METHODS},
+        seed=CONFIG["seed"],
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=10,
+    script:
+        script_path("evaluate_baselines")
+
+
+rule evaluate_recommended:
+    input:
+        sources("evaluate_recommended"),
+        splits=rules.splits.output[0],
+        test=rules.estimate.output.test,
+        lookup=lambda wildcards: f"{RESULTS}/lookup/{FOLD}/{rotation_of(wildcards)}.npz",
+    output:
+        f"{RESULTS}/evaluation/{FOLD}/{{method}}.csv",
+    log:
+        log_path("evaluate_recommended", f"/{FOLD}/{{method}}"),
+    benchmark:
+        benchmark_path("evaluate_recommended", f"/{FOLD}/{{method}}")
+    params:
+        method=lambda wildcards: CONFIG["methods"][wildcards.method],
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=10,
+    script:
+        script_path("evaluate_recommended")
+
+
+rule lookups:
+    input:
+        per_fold(
+            "lookup",
+            [f"{rotation}.npz" for rotation in LOOKUP_ROTATIONS],
+        ),
+
+
+rule evaluation:
+    input:
+        per_fold("evaluation", [f"{method}.csv" for method in CONFIG["methods"]]),

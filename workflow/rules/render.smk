@@ -1,0 +1,75 @@
+# Meshes, folds and depth images.
+
+
+rule meshes:
+    input:
+        sources("meshes", SOURCES[CONFIG["dataset"]["source"]]),
+    output:
+        f"{RESULTS}/meshes/{{category}}.npz",
+    log:
+        log_path("meshes", "/{category}"),
+    benchmark:
+        benchmark_path("meshes", "/{category}")
+    params:
+        dataset=CONFIG["dataset"],
+        n_objects=CONFIG["n_objects"],
+        seed=CONFIG["seed"],
+    # All cores and the highest priority: every mesh of every category is checked before anything
+    # is rendered, so that a bad file stops the run when nothing has been spent on it.
+    threads: workflow.cores or 1
+    priority: 100
+    resources:
+        mem_mb=1000,
+        runtime=30,
+    script:
+        script_path("meshes")
+
+
+rule splits:
+    input:
+        sources("splits"),
+        meshes=rules.meshes.output[0],
+    output:
+        f"{RESULTS}/splits/{{category}}.csv",
+    log:
+        log_path("splits", "/{category}"),
+    benchmark:
+        benchmark_path("splits", "/{category}")
+    params:
+        n_folds=CONFIG["n_folds"],
+        calibration_fraction=CONFIG["calibration_fraction"],
+        seed=CONFIG["seed"],
+    threads: 1
+    priority: 90
+    resources:
+        mem_mb=500,
+        runtime=5,
+    script:
+        script_path("splits")
+
+
+rule render:
+    input:
+        sources("render", RENDERERS[CONFIG["renderer"]["name"]]),
+        meshes=rules.meshes.output[0],
+    output:
+        f"{RESULTS}/depth/{{category}}/el{{elevation}}.npy",
+    log:
+        log_path("render", "/{category}/el{elevation}"),
+    benchmark:
+        benchmark_path("render", "/{category}/el{elevation}")
+    params:
+        renderer=CONFIG["renderer"],
+        camera=CONFIG["camera"],
+        sensor=CONFIG["sensor"],
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    script:
+        script_path("render")
+
+
+rule renders:
+    input:
+        expand(f"{RESULTS}/depth/{{unit}}.npy", unit=UNITS),

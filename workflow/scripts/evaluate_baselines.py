@@ -1,0 +1,21 @@
+"""Evaluate the methods that need no lookup table on the test objects of one fold."""
+
+from pathlib import Path
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.calibration.folds import assert_role, read_splits
+    from nbv.calibration.pairs import read_estimates
+    from nbv.evaluation.methods import evaluate_method
+    from nbv.files import write_csv
+    from nbv.seeds import rng_for
+
+    params, wildcards = snakemake.params, snakemake.wildcards
+    test = read_estimates(snakemake.input.test)
+    splits = read_splits(snakemake.input.splits)
+    assert_role(splits, int(wildcards.fold), "test", test.object_ids)
+    for path in snakemake.output:
+        method = Path(path).stem
+        rng = rng_for(params.seed, method, *wildcards)
+        write_csv(path, evaluate_method(params.methods[method], test, rng))

@@ -1,0 +1,16 @@
+"""Evaluate one method that follows a lookup table on the test objects of one fold."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.calibration.folds import assert_role, read_splits
+    from nbv.calibration.pairs import read_estimates
+    from nbv.evaluation.methods import evaluate_method
+    from nbv.files import write_csv
+    from nbv.recommendation.lookup import load_lookup
+
+    test = read_estimates(snakemake.input.test)
+    splits = read_splits(snakemake.input.splits)
+    assert_role(splits, int(snakemake.wildcards.fold), "test", test.object_ids)
+    lookup = load_lookup(snakemake.input.lookup)
+    write_csv(snakemake.output[0], evaluate_method(snakemake.params.method, test, lookup=lookup))

@@ -1,0 +1,17 @@
+"""Build the lookup table of one criterion from the calibration pairs of one fold."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.calibration.folds import assert_role, read_splits
+    from nbv.calibration.pairs import read_estimates
+    from nbv.recommendation.lookup import save_lookup
+    from nbv.recommendation.selection import chosen_lookup
+
+    calibration = read_estimates(snakemake.input.calibration)
+    splits = read_splits(snakemake.input.splits)
+    assert_role(splits, int(snakemake.wildcards.fold), "calibration", calibration.object_ids)
+    table = chosen_lookup(
+        calibration.estimate_deg, snakemake.wildcards.criterion, snakemake.params.density
+    )
+    save_lookup(snakemake.output[0], table)

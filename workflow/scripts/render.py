@@ -1,0 +1,17 @@
+"""Render a full turn of each object of one category at one elevation."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.meshes.store import load_meshes
+    from nbv.rendering import open_renderer
+    from nbv.rendering.camera import Camera
+    from nbv.rendering.render import write_depth
+
+    write_depth(
+        snakemake.output[0],
+        load_meshes(snakemake.input.meshes),
+        float(snakemake.wildcards.elevation),
+        Camera(**snakemake.params.camera),
+        open_renderer(snakemake.params.renderer["name"]),
+    )

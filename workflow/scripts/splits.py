@@ -1,0 +1,18 @@
+"""Divide one category's objects into folds."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.calibration.folds import make_splits
+    from nbv.files import write_csv
+    from nbv.meshes.store import load_meshes
+    from nbv.seeds import rng_for
+
+    params = snakemake.params
+    splits = make_splits(
+        list(load_meshes(snakemake.input.meshes)),
+        params.n_folds,
+        params.calibration_fraction,
+        rng_for(params.seed, "splits", snakemake.wildcards.category),
+    )
+    write_csv(snakemake.output[0], splits)

@@ -1,0 +1,26 @@
+"""Train the estimator of one category, elevation and fold."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.calibration.folds import objects_with_role, read_splits
+    from nbv.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.estimation.training import train_estimator
+    from nbv.estimation.weights import save_estimator
+    from nbv.rendering.render import open_depth
+    from nbv.seeds import seed_for
+
+    params, wildcards = snakemake.params, snakemake.wildcards
+    use_one_thread()
+    splits = read_splits(snakemake.input.splits)
+    hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
+    chosen = objects_with_role(splits, int(wildcards.fold), "train")
+    estimator = train_estimator(
+        open_depth(snakemake.input.depth),
+        chosen.rows,
+        chosen.ids,
+        params.estimator,
+        hardware,
+        seed_for(params.seed, "train", *wildcards),
+    )
+    save_estimator(snakemake.output[0], estimator, hardware)
