@@ -24,11 +24,16 @@ localrules:
     figures,
 
 
+rule all:
+    default_target: True
+    input:
+        f"{RESULTS}/report.html",
 
 
 include: "workflow/rules/render.smk"
 include: "workflow/rules/estimate.smk"
 include: "workflow/rules/recommend.smk"
+include: "workflow/rules/reading.smk"
 include: "workflow/rules/read.smk"
 
 
@@ -55,9 +60,3 @@ onerror:
         "what was finished is kept; the same command goes on from there",
         f"logs: {RESULTS}/logs/",
     )
-
-
-rule all:
-    input:
-        rules.evaluation.input,
-    default_target: True

@@ -6,110 +6,20 @@ import dataclasses
 import re
 import typing
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from nbv.errors import UserError, nearest
+from nbv.schema import Config, validate
 
+# The key of each group that names what its files configure: valid are the names they hold.
+_NAMING_KEYS = {
+    "dataset": "source",
+    "renderer": "name",
+    "sensor": "name",
+    "estimator": "kind",
+}
 GROUPS = ("experiment", "dataset", "renderer", "sensor", "estimator", "density")
-
-
-@dataclass
-class DatasetConfig:
-    """Where meshes come from; see `nbv.meshes.sources`."""
-
-    source: str
-    root: str | None = None
-    layout: str = "auto"
-    categories: dict[str, str] = field(default_factory=dict)
-    up: str = "+z"
-    front: str = "+x"
-    turn_deg: dict[str, float] = field(default_factory=dict)
-    centre: str = "box"
-    exclude: list[str] = field(default_factory=list)
-    exclude_file: str | None = None
-
-
-@dataclass
-class RendererConfig:
-    """Which renderer draws depth."""
-
-    name: str
-
-
-@dataclass
-class CameraConfig:
-    """The depth camera; see `nbv.rendering.camera`."""
-
-    distance: float
-    fov_deg: float
-    image_side: int
-    framing: str
-
-
-@dataclass
-class SensorConfig:
-    """How the depth camera measures; see `nbv.rendering.sensor`."""
-
-    name: str
-
-
-@dataclass
-class EstimatorConfig:
-    """The single-view estimator; see `nbv.estimation`."""
-
-    kind: str
-    channels: list[int]
-    hidden: int
-    epochs: int
-    batch_size: int
-    learning_rate: float
-    weight_decay: float
-    device: str
-    precision: str
-
-
-@dataclass
-class DensityConfig:
-    """The density of calibration pairs and how it is chosen; see `nbv.recommendation.selection`."""
-
-    reading: str
-    spread: str
-    bandwidths_deg: list[float]
-    pseudo_observations: list[float]
-    n_parts: int
-
-
-@dataclass
-class MethodConfig:
-    """A way to choose the second view and to fuse the two; see `nbv.evaluation.methods`."""
-
-    rotation: str
-    fusion: str = "average"
-
-
-@dataclass
-class Config:
-    """Everything a run depends on."""
-
-    experiment: str
-    name: str | None
-    seed: int
-    categories: list[str]
-    focus_category: str
-    elevations_deg: dict[str, list[int]]
-    n_objects: int | None
-    n_folds: int
-    calibration_fraction: float
-    methods: dict[str, MethodConfig]
-    n_resamples: int
-    dataset: DatasetConfig
-    renderer: RendererConfig
-    camera: CameraConfig
-    sensor: SensorConfig
-    estimator: EstimatorConfig
-    density: DensityConfig
 
 
 def _dataclass_of(annotation: Any) -> type | None:
@@ -188,78 +98,26 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
         source = settings["dataset"]["source"]
         suffix = "" if source == "procedural" else f"-{source}"
         settings["name"] = settings["experiment"] + suffix
+    _check_names(folder, settings)
     validate(settings)
     return settings
+
+
+def _check_names(directory: Path, settings: Mapping[str, Any]) -> None:
+    from omegaconf import OmegaConf
+
+    for group, key in _NAMING_KEYS.items():
+        value = settings[group][key]
+        files = (directory / group).glob("*.yaml")
+        valid = [str(OmegaConf.select(OmegaConf.load(path), key)) for path in files]
+        if value not in valid:
+            raise UserError(f"{group}.{key}={value} is unknown: {nearest(value, valid)}")
 
 
 def _one_line(error: Exception) -> str:
     full_key = getattr(error, "full_key", None)
     text = re.split(r"\n", str(error).strip())[0]
     return f"configuration key {full_key!r}: {text}" if full_key else f"configuration: {text}"
-
-
-def _require(holds: bool, message: str) -> None:
-    if not holds:
-        raise UserError(message)
-
-
-def validate(config: Mapping[str, Any]) -> None:
-    """Check values that types cannot: ranges and names.
-
-    Raises
-    ------
-    UserError
-        One line that names the key.
-    """
-    positive = {
-        "n_folds (2 or more)": config["n_folds"] >= 2,
-        "n_objects (3 or more, or null for all there are)": config["n_objects"] is None
-        or config["n_objects"] >= 3,
-        "calibration_fraction (between 0 and 1)": 0 < config["calibration_fraction"] < 1,
-        "n_resamples (100 or more)": config["n_resamples"] >= 100,
-        "estimator.epochs (1 or more)": config["estimator"]["epochs"] >= 1,
-        "estimator.batch_size (2 or more)": config["estimator"]["batch_size"] >= 2,
-        "estimator.hidden (1 or more)": config["estimator"]["hidden"] >= 1,
-        "estimator.channels (one or more, each 1 or more)": len(config["estimator"]["channels"]) > 0
-        and min(config["estimator"]["channels"]) >= 1,
-        "estimator.learning_rate (above 0)": config["estimator"]["learning_rate"] > 0,
-        "camera.image_side (8 or more)": config["camera"]["image_side"] >= 8,
-        "camera.distance (above 1, in object diagonals)": config["camera"]["distance"] > 1,
-        "camera.fov_deg (between 0 and 180)": 0 < config["camera"]["fov_deg"] < 180,
-        "density.bandwidths_deg (one or more, 0 or more)": len(config["density"]["bandwidths_deg"])
-        > 0
-        and min(config["density"]["bandwidths_deg"]) >= 0,
-        "density.pseudo_observations (one or more, 0 or more)": len(
-            config["density"]["pseudo_observations"]
-        )
-        > 0
-        and min(config["density"]["pseudo_observations"]) >= 0,
-        "density.n_parts (2 or more)": config["density"]["n_parts"] >= 2,
-    }
-    for name, holds in positive.items():
-        key, _, range_ = name.partition(" ")
-        value: Any = config
-        for part in key.split("."):
-            value = value[part]
-        _require(holds, f"{key}={value} is out of range: {range_.strip('()')}")
-    _require(len(config["categories"]) > 0, "categories=[] names no category")
-    known = config["elevations_deg"]
-    for category in config["categories"]:
-        _require(
-            category in known,
-            f"categories: {category!r} is unknown: {nearest(category, known)} "
-            "(a new category also needs elevations_deg.<category>)",
-        )
-        for elevation in known[category]:
-            _require(
-                0 <= elevation < 90,
-                f"elevations_deg.{category}: {elevation} is outside 0 to 89 degrees",
-            )
-        _require(len(known[category]) > 0, f"elevations_deg.{category}=[] names no elevation")
-    _require(
-        re.fullmatch(r"[A-Za-z0-9._-]+", config["name"]) is not None,
-        f"name={config['name']}: use letters, digits, '.', '_' and '-'",
-    )
 
 
 def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:

@@ -50,7 +50,13 @@ def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
 def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write named arrays as a compressed `.npz` (deterministic: numpy dates members 1980)."""
     with replacing(path) as temporary:
-        np.savez_compressed(temporary, **dict(arrays))
+        np.savez_compressed(temporary, allow_pickle=False, **arrays)
+
+
+def open_array(path: str | Path) -> NDArray[Any]:
+    """Open an array stored as `.npy`, read-only and without reading it into memory."""
+    stored: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+    return stored
 
 
 def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:

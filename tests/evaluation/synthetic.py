@@ -15,6 +15,7 @@ import pandas as pd
 
 METHODS = ("single", "random", "opposite", "proposed")
 N_VIEWS = 360
+_POINTS = 800
 HIDDEN = {"mug": (90.0, 50.0), "chair": (180.0, 25.0)}
 FLIPS = {"airplane": 0.02, "car": 0.06, "chair": 0.01, "mug": 0.01, "toilet": 0.02}
 
@@ -28,8 +29,9 @@ def build_tree(
     units=(("mug", 0), ("mug", 30), ("chair", 0)),
     n_objects: int = 9,
     n_folds: int = 3,
-    side: int = 24,
+    side: int = 20,
     seed: int = 0,
+    delta_step: int = 12,
 ) -> Path:
     """Write splits, depth, lookups, evaluations, settings and benchmarks; return `root`."""
     for category in dict.fromkeys(category for category, _ in units):
@@ -43,7 +45,7 @@ def build_tree(
             images = np.stack([_render(cloud, elevation, side) for cloud in clouds])
             np.save(directory / f"el{elevation:02d}.npy", images)
             estimates = _estimates(category, elevation, n_objects, rng)
-            _write_folds(root, category, elevation, ids, estimates, n_folds, rng)
+            _write_folds(root, category, elevation, ids, estimates, n_folds, rng, delta_step)
     _write_surroundings(root, units)
     return root
 
@@ -83,8 +85,11 @@ def _smooth(counts, bandwidth_deg):
     return np.maximum(spread, 0.0)
 
 
-def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0):
-    """V, L, A and the recommendation from (n_objects, 360) estimates, as in Eqs. 1 to 6."""
+def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0, delta_step=1):
+    """V, L, A and the recommendation from (n_objects, 360) estimates, as in Eqs. 1 to 6.
+
+    A is exact at multiples of `delta_step` and held from each to the next.
+    """
     counts = np.zeros((N_VIEWS, N_VIEWS))
     truth = np.broadcast_to(np.arange(N_VIEWS), estimates.shape)
     np.add.at(counts, (np.round(estimates).astype(int) % N_VIEWS, truth), 1.0)
@@ -92,11 +97,12 @@ def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0):
     viewpoint = joint / joint.sum(axis=1, keepdims=True)
     estimate = (joint / joint.sum(axis=0, keepdims=True)).T
     ambiguity = np.empty((N_VIEWS, N_VIEWS))
-    for delta in range(N_VIEWS):
+    for delta in range(0, N_VIEWS, delta_step):
         second = np.roll(viewpoint, (-delta, -delta), axis=(0, 1))
         both = viewpoint * second
         pose = viewpoint @ (both / both.sum(axis=1, keepdims=True))
-        ambiguity[:, delta] = -(pose * np.log(pose)).sum(axis=1)
+        spread = -(pose * np.log(pose)).sum(axis=1)
+        ambiguity[:, delta : delta + delta_step] = spread[:, None]
     return {
         "viewpoint_likelihood": viewpoint.astype(np.float32),
         "estimate_likelihood": estimate.astype(np.float32),
@@ -107,11 +113,11 @@ def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0):
     }
 
 
-def _write_folds(root, category, elevation, ids, estimates, n_folds, rng):
+def _write_folds(root, category, elevation, ids, estimates, n_folds, rng, delta_step):
     unit = Path(category) / f"el{elevation:02d}"
     for fold in range(1, n_folds + 1):
         test = np.arange(len(ids)) % n_folds == fold - 1
-        arrays = lookup_arrays(estimates[~test])
+        arrays = lookup_arrays(estimates[~test], delta_step=delta_step)
         target = root / "lookup" / unit / f"fold{fold}"
         target.mkdir(parents=True, exist_ok=True)
         np.savez_compressed(target / "entropy.npz", **arrays)
@@ -152,7 +158,7 @@ def evaluate(names, estimates, method, recommended, rng):
     )
 
 
-def _box(low, high, rng, n=900):
+def _box(low, high, rng, n=_POINTS // 4):
     points = rng.uniform(low, high, (n, 3))
     axis = rng.integers(3, size=n)
     end = rng.integers(2, size=n)
@@ -164,16 +170,19 @@ def _cloud(category, rng):
     """Points on a shape of about unit diagonal, front +x, the mug's handle towards -y."""
     if category == "mug":
         radius, height = rng.uniform(0.22, 0.3), rng.uniform(0.5, 0.7)
-        angle = rng.uniform(0, 2 * np.pi, 3000)
+        angle = rng.uniform(0, 2 * np.pi, _POINTS)
         body = np.stack(
             [
                 radius * np.cos(angle),
                 radius * np.sin(angle),
-                rng.uniform(-height / 2, height / 2, 3000),
+                rng.uniform(-height / 2, height / 2, _POINTS),
             ],
             axis=1,
         )
-        around, tube = rng.uniform(-np.pi / 2, np.pi / 2, 900), rng.uniform(0, 2 * np.pi, 900)
+        around, tube = (
+            rng.uniform(-np.pi / 2, np.pi / 2, _POINTS // 4),
+            rng.uniform(0, 2 * np.pi, _POINTS // 4),
+        )
         ring = 0.16 + 0.03 * np.cos(tube)
         handle = np.stack(
             [0.03 * np.sin(tube), -radius - ring * np.cos(around), ring * np.sin(around)], axis=1

@@ -10,10 +10,11 @@ import trimesh
 from rendering_shapes import procedural, shape_of
 
 from nbv.errors import UserError
+from nbv.files import open_array
 from nbv.rendering import open_renderer
 from nbv.rendering import render as room
 from nbv.rendering.camera import Camera
-from nbv.rendering.render import open_depth, render_objects, write_depth
+from nbv.rendering.render import render_objects, write_depth
 from nbv.rendering.sensor import decode_depth, encode_depth
 
 CAMERA = Camera(image_side=16)
@@ -32,7 +33,7 @@ def meshes():
 def test_the_file_holds_each_object_from_each_azimuth(tmp_path, embree, meshes):
     path = tmp_path / "depth" / "el15.npy"
     write_depth(path, meshes, 15.0, CAMERA, embree)
-    stored = open_depth(path)
+    stored = open_array(path)
     assert isinstance(stored, np.memmap)
     assert stored.shape == (2, 360, 16, 16)
     assert stored.dtype == np.uint8

@@ -1,16 +1,14 @@
 # Configuration, names and helpers that the other rule files share.
 
-import os
 import sys
 from pathlib import Path
 
-BASE = Path(workflow.basedir)
-SOURCE_ROOT = BASE / "src"
-# Scripts run in processes of their own; they are to find the same sources as this file.
-sys.path.insert(0, str(SOURCE_ROOT))
-os.environ["PYTHONPATH"] = os.pathsep.join(
-    filter(None, [str(SOURCE_ROOT), os.environ.get("PYTHONPATH")])
-)
+try:
+    import nbv
+except ModuleNotFoundError:
+    sys.exit(
+        "nbv: error: the package is not installed here: run make, or pip install --editable ."
+    )
 
 from nbv import provenance
 from nbv.config import load_config, snakemake_overrides
@@ -18,6 +16,9 @@ from nbv.errors import UserError
 from nbv.evaluation.methods import needs_lookup
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.rendering import RENDERERS
+
+BASE = Path(workflow.basedir)
+SOURCE_ROOT = Path(nbv.__file__).parents[1]
 
 
 def stop(message):
@@ -38,19 +39,26 @@ try:
     RESULTS = f"results/{CONFIG['name']}"
     CATEGORIES = CONFIG["categories"]
     LOOKUP_METHODS = [
-        name for name, method in CONFIG["methods"].items() if needs_lookup(method["rotation"])
+        name
+        for name, method in CONFIG["methods"].items()
+        if needs_lookup(method["rotation"])
     ]
     check_meshes_are_there()
 except UserError as error:
     stop(error)
 
-LOOKUP_ROTATIONS = sorted({CONFIG["methods"][name]["rotation"] for name in LOOKUP_METHODS})
+LOOKUP_ROTATIONS = sorted(
+    {CONFIG["methods"][name]["rotation"] for name in LOOKUP_METHODS}
+)
+# Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
+ENVIRONMENT = "../environment.yaml"
 LAST_ERROR = f"{RESULTS}/logs/last_error.txt"
 FOLDS = range(1, CONFIG["n_folds"] + 1)
 BASELINE_METHODS = [name for name in CONFIG["methods"] if name not in LOOKUP_METHODS]
 # A unit is what has an estimator of its own in each fold: a category at an elevation.
+FOLD = "{category}/el{elevation}/fold{fold}"
 UNITS = [
-    f"{category}/el{elevation:02d}"
+    (category, elevation)
     for category in CATEGORIES
     for elevation in CONFIG["elevations_deg"][category]
 ]
@@ -78,18 +86,30 @@ def sources(name, *chosen):
     ]
 
 
+def unit_names(units):
+    return [f"{category}/el{elevation:02d}" for category, elevation in units]
+
+
 def per_fold(stage, names):
     return expand(
-        f"{RESULTS}/{stage}/{{unit}}/fold{{fold}}/{{name}}", unit=UNITS, fold=FOLDS, name=names
+        f"{RESULTS}/{stage}/{{unit}}/fold{{fold}}/{{name}}",
+        unit=unit_names(UNITS),
+        fold=FOLDS,
+        name=names,
     )
 
 
-def log_path(stage, wildcards=""):
-    return f"{RESULTS}/logs/{stage}{wildcards}.log"
+def recommending_lookup(wildcards):
+    rotation = CONFIG["methods"][wildcards.method]["rotation"]
+    return f"{RESULTS}/lookup/{FOLD}/{rotation}.npz"
 
 
-def benchmark_path(stage, wildcards=""):
-    return f"{RESULTS}/benchmarks/{stage}{wildcards}.tsv"
+def log_path(job):
+    return f"{RESULTS}/logs/{job}.log"
+
+
+def benchmark_path(job):
+    return f"{RESULTS}/benchmarks/{job}.tsv"
 
 
 def banner(*lines):

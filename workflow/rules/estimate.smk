@@ -1,7 +1,5 @@
 # One estimator for each category, elevation and fold, and what it answers for objects it never saw.
 
-FOLD = "{category}/el{elevation}/fold{fold}"
-
 
 rule train:
     input:
@@ -11,16 +9,18 @@ rule train:
     output:
         f"{RESULTS}/estimators/{FOLD}/estimator.safetensors",
     log:
-        log_path("train", f"/{FOLD}"),
+        log_path(f"train/{FOLD}"),
     benchmark:
-        benchmark_path("train", f"/{FOLD}")
-    params:
-        estimator=CONFIG["estimator"],
-        seed=CONFIG["seed"],
+        benchmark_path(f"train/{FOLD}")
+    conda:
+        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=2000,
         runtime=60,
+    params:
+        estimator=CONFIG["estimator"],
+        seed=CONFIG["seed"],
     script:
         script_path("train")
 
@@ -35,16 +35,18 @@ rule estimate:
         calibration=f"{RESULTS}/estimates/{FOLD}/calibration.csv",
         test=f"{RESULTS}/estimates/{FOLD}/test.csv",
     log:
-        log_path("estimate", f"/{FOLD}"),
+        log_path(f"estimate/{FOLD}"),
     benchmark:
-        benchmark_path("estimate", f"/{FOLD}")
-    params:
-        device=CONFIG["estimator"]["device"],
-        precision=CONFIG["estimator"]["precision"],
+        benchmark_path(f"estimate/{FOLD}")
+    conda:
+        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=1500,
         runtime=10,
+    params:
+        device=CONFIG["estimator"]["device"],
+        precision=CONFIG["estimator"]["precision"],
     script:
         script_path("estimate")
 

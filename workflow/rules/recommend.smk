@@ -1,10 +1,6 @@
 # Lookup tables from calibration pairs, and what each method makes of the test objects.
 
 
-def rotation_of(wildcards):
-    return CONFIG["methods"][wildcards.method]["rotation"]
-
-
 rule lookup:
     input:
         sources("lookup"),
@@ -13,15 +9,17 @@ rule lookup:
     output:
         f"{RESULTS}/lookup/{FOLD}/{{criterion}}.npz",
     log:
-        log_path("lookup", f"/{FOLD}/{{criterion}}"),
+        log_path(f"lookup/{FOLD}/{{criterion}}"),
     benchmark:
-        benchmark_path("lookup", f"/{FOLD}/{{criterion}}")
-    params:
-        density=CONFIG["density"],
+        benchmark_path(f"lookup/{FOLD}/{{criterion}}")
+    conda:
+        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=500,
         runtime=10,
+    params:
+        density=CONFIG["density"],
     script:
         script_path("lookup")
 
@@ -38,16 +36,18 @@ rule evaluate_baselines:
             allow_missing=True,
         ),
     log:
-        log_path("evaluate_baselines", f"/{FOLD}"),
+        log_path(f"evaluate_baselines/{FOLD}"),
     benchmark:
-        benchmark_path("evaluate_baselines", f"/{FOLD}")
-    params:
-        methods={name: CONFIG["methods"][name] for name in BASELINE_METHODS},
-        seed=CONFIG["seed"],
+        benchmark_path(f"evaluate_baselines/{FOLD}")
+    conda:
+        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=500,
         runtime=10,
+    params:
+        methods={name: CONFIG["methods"][name] for name in BASELINE_METHODS},
+        seed=CONFIG["seed"],
     script:
         script_path("evaluate_baselines")
 
@@ -57,19 +57,21 @@ rule evaluate_recommended:
         sources("evaluate_recommended"),
         splits=rules.splits.output[0],
         test=rules.estimate.output.test,
-        lookup=lambda wildcards: f"{RESULTS}/lookup/{FOLD}/{rotation_of(wildcards)}.npz",
+        lookup=recommending_lookup,
     output:
         f"{RESULTS}/evaluation/{FOLD}/{{method}}.csv",
     log:
-        log_path("evaluate_recommended", f"/{FOLD}/{{method}}"),
+        log_path(f"evaluate_recommended/{FOLD}/{{method}}"),
     benchmark:
-        benchmark_path("evaluate_recommended", f"/{FOLD}/{{method}}")
-    params:
-        method=lambda wildcards: CONFIG["methods"][wildcards.method],
+        benchmark_path(f"evaluate_recommended/{FOLD}/{{method}}")
+    conda:
+        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=500,
         runtime=10,
+    params:
+        method=lambda wildcards: CONFIG["methods"][wildcards.method],
     script:
         script_path("evaluate_recommended")
 

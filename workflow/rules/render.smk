@@ -7,20 +7,22 @@ rule meshes:
     output:
         f"{RESULTS}/meshes/{{category}}.npz",
     log:
-        log_path("meshes", "/{category}"),
+        log_path("meshes/{category}"),
     benchmark:
-        benchmark_path("meshes", "/{category}")
+        benchmark_path("meshes/{category}")
+    priority: 100
+    conda:
+        ENVIRONMENT
+    # All cores and the highest priority: every mesh of every category is checked before anything
+    # is rendered, so that a bad file stops the run when nothing has been spent on it.
+    threads: workflow.cores or 1
+    resources:
+        mem_mb=1000,
+        runtime=30,
     params:
         dataset=CONFIG["dataset"],
         n_objects=CONFIG["n_objects"],
         seed=CONFIG["seed"],
-    # All cores and the highest priority: every mesh of every category is checked before anything
-    # is rendered, so that a bad file stops the run when nothing has been spent on it.
-    threads: workflow.cores or 1
-    priority: 100
-    resources:
-        mem_mb=1000,
-        runtime=30,
     script:
         script_path("meshes")
 
@@ -32,18 +34,20 @@ rule splits:
     output:
         f"{RESULTS}/splits/{{category}}.csv",
     log:
-        log_path("splits", "/{category}"),
+        log_path("splits/{category}"),
     benchmark:
-        benchmark_path("splits", "/{category}")
+        benchmark_path("splits/{category}")
+    priority: 90
+    conda:
+        ENVIRONMENT
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=5,
     params:
         n_folds=CONFIG["n_folds"],
         calibration_fraction=CONFIG["calibration_fraction"],
         seed=CONFIG["seed"],
-    threads: 1
-    priority: 90
-    resources:
-        mem_mb=500,
-        runtime=5,
     script:
         script_path("splits")
 
@@ -55,21 +59,23 @@ rule render:
     output:
         f"{RESULTS}/depth/{{category}}/el{{elevation}}.npy",
     log:
-        log_path("render", "/{category}/el{elevation}"),
+        log_path("render/{category}/el{elevation}"),
     benchmark:
-        benchmark_path("render", "/{category}/el{elevation}")
-    params:
-        renderer=CONFIG["renderer"],
-        camera=CONFIG["camera"],
-        sensor=CONFIG["sensor"],
+        benchmark_path("render/{category}/el{elevation}")
+    conda:
+        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=1000,
         runtime=60,
+    params:
+        renderer=CONFIG["renderer"],
+        camera=CONFIG["camera"],
+        sensor=CONFIG["sensor"],
     script:
         script_path("render")
 
 
 rule renders:
     input:
-        expand(f"{RESULTS}/depth/{{unit}}.npy", unit=UNITS),
+        expand(f"{RESULTS}/depth/{{unit}}.npy", unit=unit_names(UNITS)),

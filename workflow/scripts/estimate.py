@@ -8,14 +8,14 @@ with job(snakemake):
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.inference import estimate_objects
     from nbv.estimation.weights import load_estimator
-    from nbv.rendering.render import open_depth
+    from nbv.files import open_array
 
     params = snakemake.params
     use_one_thread()
     hardware = choose_hardware(params.device, params.precision)
     estimator = load_estimator(snakemake.input.estimator, hardware)
     splits = read_splits(snakemake.input.splits)
-    depth = open_depth(snakemake.input.depth)
+    depth = open_array(snakemake.input.depth)
     for role in ("calibration", "test"):
         chosen = objects_with_role(splits, int(snakemake.wildcards.fold), role)
         write_estimates(

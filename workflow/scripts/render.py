@@ -7,11 +7,14 @@ with job(snakemake):
     from nbv.rendering import open_renderer
     from nbv.rendering.camera import Camera
     from nbv.rendering.render import write_depth
+    from nbv.rendering.sensor import open_sensor
 
+    params = snakemake.params
     write_depth(
         snakemake.output[0],
         load_meshes(snakemake.input.meshes),
         float(snakemake.wildcards.elevation),
-        Camera(**snakemake.params.camera),
-        open_renderer(snakemake.params.renderer["name"]),
+        Camera(**params.camera),
+        open_renderer(params.renderer["name"]),
+        open_sensor(params.sensor["name"]),
     )

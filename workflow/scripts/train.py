@@ -7,7 +7,7 @@ with job(snakemake):
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.training import train_estimator
     from nbv.estimation.weights import save_estimator
-    from nbv.rendering.render import open_depth
+    from nbv.files import open_array
     from nbv.seeds import seed_for
 
     params, wildcards = snakemake.params, snakemake.wildcards
@@ -16,7 +16,7 @@ with job(snakemake):
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
     chosen = objects_with_role(splits, int(wildcards.fold), "train")
     estimator = train_estimator(
-        open_depth(snakemake.input.depth),
+        open_array(snakemake.input.depth),
         chosen.rows,
         chosen.ids,
         params.estimator,

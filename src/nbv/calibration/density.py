@@ -67,7 +67,7 @@ def von_mises_kernel(n_bins: int, bandwidth_deg: float) -> NDArray[np.float64]:
     if bandwidth_deg < 0:
         raise ValueError(f"bandwidth_deg must be 0 or more, not {bandwidth_deg}")
     if bandwidth_deg == 0:
-        return np.eye(1, n_bins)[0]
+        return np.asarray(np.eye(1, n_bins)[0])
     concentration = 1.0 / np.radians(bandwidth_deg) ** 2
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
     kernel = np.exp(concentration * (np.cos(angles) - 1.0))
@@ -119,7 +119,9 @@ def conditional(joint: Matrix, pseudo_observations: float) -> Matrix:
     n_bins = joint.shape[1]
     mass = joint.sum(axis=1, keepdims=True) + pseudo_observations
     filled = joint + pseudo_observations / n_bins
-    return np.divide(filled, mass, out=np.full_like(joint, 1.0 / n_bins), where=mass > 0)
+    rows = np.full_like(joint, 1.0 / n_bins)
+    np.divide(filled, mass, out=rows, where=mass > 0)
+    return rows
 
 
 def likelihoods(

@@ -38,7 +38,7 @@ class Estimates:
     def azimuth_deg(self) -> NDArray[np.float64]:
         """The true azimuth of each view, (n_views,)."""
         n_views = self.estimate_deg.shape[1]
-        return np.arange(n_views) * (360.0 / n_views)
+        return np.asarray(np.arange(n_views) * (360.0 / n_views))
 
 
 def write_estimates(

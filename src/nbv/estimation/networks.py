@@ -66,4 +66,7 @@ def build_network(settings: Mapping[str, Any], image_side: int) -> nn.Module:
     kind = settings["kind"]
     if kind not in NETWORKS:
         raise UserError(f"estimator.kind={kind}: {nearest(kind, NETWORKS)}")
-    return NETWORKS[kind](settings, image_side).to(memory_format=torch.channels_last)
+    network = NETWORKS[kind](settings, image_side)
+    # torch's annotations lack this form of `to`, which works in place.
+    network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    return network

@@ -124,7 +124,7 @@ def train_regressor(
             with hardware.autocast():
                 output = network(images[chosen])
             loss = nn.functional.mse_loss(output.float(), targets[chosen])
-            loss.backward()
+            loss.backward()  # type: ignore[no-untyped-call]
             optimiser.step()
             schedule.step()
             running += loss.detach()

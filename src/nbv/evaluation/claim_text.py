@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 
-from nbv.evaluation import comparisons, paired
+from nbv.evaluation import comparisons
 from nbv.evaluation.comparisons import (
     AtLeast,
+    Better,
     Comparison,
     FreeOfOutliers,
     Statement,
@@ -17,28 +18,11 @@ from nbv.evaluation.comparisons import (
     combine_statement,
 )
 from nbv.evaluation.layout import number
+from nbv.evaluation.paired import LOWER_IS_BETTER, UNIT_OF
 from nbv.evaluation.settings import category_label, method_label
 
 Measured = Mapping[Comparison, Mapping[str, Any]]
 """The figures of each comparison, by the column names of the claims' table."""
-
-
-def claims_markdown(claims: pd.DataFrame) -> str:
-    """Return one line per claim: sentence, verdict, our figures, and the paper's own."""
-    lines = [
-        "## The paper's claims",
-        "",
-        "| Section | The paper says | What is compared | Verdict | Our figures "
-        "| The paper's own figures |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
-    for row in claims.drop_duplicates("id").itertuples():
-        note = f" ({row.note})" if row.note else ""
-        texts = [row.section, row.sentence, f"{row.compared}{note}", f"**{row.verdict}**"]
-        texts += [row.summary or "–", row.published_verdict]
-        lines.append("| " + " | ".join(str(text).replace("|", "\\|") for text in texts) + " |")
-    return "\n".join([*lines, "", *(f"- {rule}" for rule in VERDICT_RULES)]) + "\n"
-
 
 VERDICT_RULES = (
     "“A below B” holds where the 95 % interval of the paired difference (resampling whole "
@@ -47,14 +31,119 @@ VERDICT_RULES = (
     "“Comparable” holds where the interval lies inside the margin, does not hold where it lies "
     "outside altogether.",
     "A compound claim is decided only where no undecided or unevaluated part could change it.",
-    "Intervals are not corrected for the number of comparisons; the paper's own figures are "
-    "compared as printed, without intervals.",
+    "“By point estimates” judges ours as the paper judges its own figures: as they stand, without "
+    "intervals. Intervals are not corrected for the number of comparisons.",
+    "Our figures: each competitor with the paired difference to the claim's subject and its "
+    "interval; of compound claims, the closest competitor of each part.",
 )
 """How verdicts are reached, for readers."""
 
 
+def claims_markdown(claims: pd.DataFrame) -> str:
+    """Return one line per claim: sentence, verdicts, our figures, and the paper's own."""
+    header = (
+        "Section",
+        "The paper says",
+        "What is compared",
+        "Verdict",
+        "By point estimates",
+        "Our figures",
+        "The paper's own figures",
+    )
+    lines = ["## The paper's claims", "", _pipe_row(header), _pipe_row(["---"] * len(header))]
+    for row in claims.drop_duplicates("id").to_dict("records"):
+        note = f" ({row['note']})" if row["note"] else ""
+        lines.append(
+            _pipe_row(
+                [
+                    str(row["section"]),
+                    row["sentence"],
+                    f"{row['compared']}{note}",
+                    f"**{row['verdict']}**",
+                    row["point_verdict"],
+                    row["summary"] or "–",
+                    row["published_verdict"],
+                ]
+            )
+        )
+    return "\n".join([*lines, "", *(f"- {rule}" for rule in VERDICT_RULES)]) + "\n"
+
+
 def term_text(term: Term) -> str:
     """Name a method and the images it is judged on."""
+    return f"{method_label(term.method)} ({_where(term)})"
+
+
+def summarise(statement: Statement, measured: Measured) -> str:
+    """Return the figures a reader needs: every competitor, or the closest one of each part."""
+    if isinstance(statement, AtLeast) and any(
+        isinstance(part, AtLeast) and part.label for part in statement.parts
+    ):
+        verdicts = {leaf: row["part_verdict"] for leaf, row in measured.items()}
+        texts = []
+        for part in statement.parts:
+            label = part.label if isinstance(part, AtLeast) else ""
+            verdict = combine_statement(part, verdicts)
+            found = [leaf for leaf in comparisons.leaves(part) if "value" in measured[leaf]]
+            closest = _competition([_closest(found, measured)], measured, False) if found else ""
+            texts.append(f"{label}: {verdict}" + (f" ({closest})" if closest else ""))
+        return "; ".join(texts)
+    return _competition(comparisons.leaves(statement), measured)
+
+
+def _competition(leaves: Sequence[Comparison], measured: Measured, place: bool = True) -> str:
+    """Return each subject's figure, with its competitors and their paired differences."""
+    rivals: dict[str, list[str]] = {}
+    told: set[tuple[str, frozenset[Term]]] = set()
+    for leaf in leaves:
+        row = measured[leaf]
+        name = term_text(leaf.a) if place else method_label(leaf.a.method)
+        if "value" not in row:
+            rivals[f"{name}: not run"] = []
+            continue
+        if isinstance(leaf, FreeOfOutliers):
+            share, fence = number(row["value"], 1), number(row["versus_value"])
+            rivals[f"{category_label(leaf.a.units[0][0])}: {share} % above {fence}°"] = []
+            continue
+        pair = leaf.statistic, frozenset((leaf.a, leaf.b))
+        if pair in told:
+            continue
+        told.add(pair)
+        unit = UNIT_OF[leaf.statistic]
+        subject = f"{name}, {_STATISTIC_LABELS[leaf.statistic]} {number(row['value'])}{unit}"
+        same_images = _where(leaf.a) == _where(leaf.b)
+        rival = method_label(leaf.b.method) if same_images else term_text(leaf.b)
+        rivals.setdefault(subject, []).append(
+            f"{rival} {number(row['versus_value'])}{unit}, difference "
+            f"{number(row['difference'])} ({number(row['ci_low'])} to {number(row['ci_high'])})"
+        )
+    return "; ".join(
+        f"{subject}, against {', '.join(others)}" if others else subject
+        for subject, others in rivals.items()
+    )
+
+
+_STATISTIC_LABELS: Mapping[str, str] = {
+    "mae": "MAE",
+    "pauc": "pAUC",
+    "median": "median",
+    "mae_sigma": "σ of MAE",
+    "pauc_sigma": "σ of pAUC",
+}
+
+
+def _closest(leaves: Sequence[Comparison], measured: Measured) -> Comparison:
+    """Return the comparison that favours its subject least."""
+
+    def advantage(leaf: Comparison) -> float:
+        difference = float(measured[leaf].get("difference", 0.0))
+        lower = not isinstance(leaf, Better) or LOWER_IS_BETTER[leaf.statistic]
+        return -difference if lower else difference
+
+    return min(leaves, key=advantage)
+
+
+def _where(term: Term) -> str:
     if len(term.units) > 1:
         where = f"{len(term.units)} categories pooled"
     else:
@@ -63,31 +152,8 @@ def term_text(term: Term) -> str:
         where += f", {name} {value}" if value is not None else ""
     if term.initial_deg:
         where += f", initial azimuths {', '.join(f'{a}°' for a in term.initial_deg)}"
-    return f"{method_label(term.method)} ({where})"
+    return where
 
 
-def summarise(statement: Statement, measured: Measured) -> str:
-    """Return the figures that a reader needs: all of a few parts, or a verdict per group."""
-    if isinstance(statement, AtLeast) and any(isinstance(p, AtLeast) for p in statement.parts):
-        verdicts = {leaf: row["part_verdict"] for leaf, row in measured.items()}
-        groups = [
-            f"{part.label}: {combine_statement(part, verdicts)}"
-            for part in statement.parts
-            if isinstance(part, AtLeast) and part.label
-        ]
-        return "; ".join(groups)
-    texts = [_part_text(part, measured[part]) for part in comparisons.leaves(statement)]
-    return "; ".join(dict.fromkeys(texts))
-
-
-def _part_text(part: Comparison, row: Mapping[str, Any]) -> str:
-    if row["part_verdict"] == comparisons.NOT_RUN:
-        return f"{row['subject']}: not run"
-    if isinstance(part, FreeOfOutliers):
-        return f"{row['subject']}: {number(row['value'], 1)} % above {number(row['versus_value'])}°"
-    unit = paired.UNIT_OF[part.statistic]
-    return (
-        f"{row['subject']} {number(row['value'])}{unit} against {row['versus']} "
-        f"{number(row['versus_value'])}{unit}, difference {number(row['difference'])} "
-        f"({number(row['ci_low'])} to {number(row['ci_high'])})"
-    )
+def _pipe_row(texts: Sequence[str]) -> str:
+    return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"

@@ -11,6 +11,7 @@ import pandas as pd
 from nbv.evaluation import comparisons, paired, published
 from nbv.evaluation.claim_text import claims_markdown, summarise, term_text
 from nbv.evaluation.comparisons import (
+    Better,
     Claim,
     Comparable,
     Comparison,
@@ -38,6 +39,7 @@ CLAIM_COLUMNS = (
     "sentence",
     "compared",
     "verdict",
+    "point_verdict",
     "published_verdict",
     "summary",
     "note",
@@ -72,7 +74,8 @@ def evaluate_claims(
     evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
         Frames of `results.load_unit`; what is absent is reported as ``not run``.
     rng : numpy.random.Generator
-        Seeds the object resamples, which all comparisons share.
+        Seeds the object resamples, which all comparisons share. ``default_rng(seed)`` gives the
+        same intervals as the tables of ``ReadingSettings(seed=seed)``.
     n_resamples : int
         Number of resamples.
     claims : sequence of Claim
@@ -82,15 +85,17 @@ def evaluate_claims(
     -------
     pandas.DataFrame
         Tidy: one row per comparison, `CLAIM_COLUMNS` (the same for all parts of a claim) and
-        `PART_COLUMNS`. ``difference`` is subject minus versus, in degrees or percent, with its
-        95 % interval over objects, whatever direction the claim asks for.
+        `PART_COLUMNS`. ``point_verdict`` judges our figures as they stand, without intervals, as
+        the paper judges its own. ``difference`` is subject minus versus, in degrees or percent,
+        with its 95 % interval over objects, whatever direction the claim asks for.
     """
-    evaluator = _Evaluator(evaluations, int(rng.integers(2**31)), n_resamples)
+    evaluator = _Evaluator(evaluations, Resampler.seeded(rng, n_resamples))
     rows: list[dict[str, Any]] = []
     for claim in claims:
         parts = comparisons.leaves(claim.statement)
         measured = {part: evaluator.measure(part) for part in parts}
         verdicts = {leaf: row["part_verdict"] for leaf, row in measured.items()}
+        points = {part: _point_verdict(part, row) for part, row in measured.items()}
         printed = {part: _published_verdict(part) for part in parts}
         shared = {
             "id": claim.id,
@@ -98,6 +103,7 @@ def evaluate_claims(
             "sentence": claim.sentence,
             "compared": claim.compared,
             "verdict": combine_statement(claim.statement, verdicts),
+            "point_verdict": combine_statement(claim.statement, points),
             "published_verdict": PAPER_VERDICTS[combine_statement(claim.statement, printed)],
             "summary": summarise(claim.statement, measured),
             "note": claim.note,
@@ -109,11 +115,9 @@ def evaluate_claims(
 class _Evaluator:
     """Measures comparisons, keeping what several of them need."""
 
-    def __init__(
-        self, evaluations: Mapping[Unit, pd.DataFrame], seed: int, n_resamples: int
-    ) -> None:
+    def __init__(self, evaluations: Mapping[Unit, pd.DataFrame], resampler: Resampler) -> None:
         self._evaluations = evaluations
-        self._resampler = Resampler(seed, n_resamples)
+        self._resampler = resampler
         self._samples: dict[Unit, PairedErrors] = {}
         self._estimates: dict[tuple[str, Term], Estimate | None] = {}
 
@@ -233,8 +237,18 @@ def _published_verdict(part: Comparison) -> Verdict:
     if isinstance(part, FreeOfOutliers):
         return comparisons.NOT_RUN
     a, b = _published(part.statistic, part.a), _published(part.statistic, part.b)
-    if a is None or b is None:
-        return comparisons.NOT_RUN
+    return comparisons.NOT_RUN if a is None or b is None else _as_it_stands(part, a - b)
+
+
+def _point_verdict(part: Comparison, row: Mapping[str, Any]) -> Verdict:
+    verdict: Verdict = row["part_verdict"]
+    if isinstance(part, FreeOfOutliers) or verdict == comparisons.NOT_RUN:
+        return verdict
+    return _as_it_stands(part, row["difference"])
+
+
+def _as_it_stands(part: Better | Comparable, difference: float) -> Verdict:
+    """Judge a difference without regard to its uncertainty."""
     if isinstance(part, Comparable):
-        return comparisons.comparable_verdict(a - b, a - b, part.margin)
-    return comparisons.better_verdict(part.statistic, a - b, a - b)
+        return comparisons.comparable_verdict(difference, difference, part.margin)
+    return comparisons.better_verdict(part.statistic, difference, difference)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from nbv.angles import circular_distance_deg
-from nbv.evaluation.settings import ReadingSettings
+from nbv.evaluation.settings import ReadingSettings, method_label
 
 _BASELINE = "single"
 _SMOOTHING_DEG = 15.0
@@ -44,7 +44,10 @@ def choose_example(frame: pd.DataFrame, settings: ReadingSettings) -> Example:
     errors = in_fold[in_fold["method"] == method].groupby("object_id")["error_deg"].mean()
     ordered = errors.sort_index().sort_values(kind="stable")
     chosen = str(ordered.index[(len(ordered) - 1) // 2])
-    reason = f"the one with the median {method} error of that fold's {len(ordered)} test objects"
+    reason = (
+        f"the one with the median {method_label(method)} error of that fold's {len(ordered)} test "
+        "objects"
+    )
     return Example(chosen, fold, reason)
 
 

@@ -16,18 +16,20 @@ import numpy as np
 import pandas as pd
 
 from nbv.evaluation import published
+from nbv.evaluation.cells import Table
 from nbv.evaluation.settings import method_label
-from nbv.evaluation.tables import Table
 from nbv.files import write_csv, write_text
 
 _METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}
 _MINUS = "\u2212"
+_WIDE = 7
 
 
 @dataclass(frozen=True)
 class _Cell:
     text: str
     best: bool = False
+    printed: str = ""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,9 @@ def to_markdown(table: Table) -> str:
     lines = [f"## {heading(table)}", "", _pipe_row(grid.header)]
     lines.append(_pipe_row(["---"] + ["---:"] * (len(grid.header) - 1)))
     for row in grid.rows:
-        lines.append(_pipe_row([f"**{cell.text}**" if cell.best else cell.text for cell in row]))
+        texts = [f"**{cell.text}**" if cell.best else cell.text for cell in row]
+        printed = [cell.printed for cell in row]
+        lines.append(_pipe_row([f"{t} {p}".rstrip() for t, p in zip(texts, printed, strict=True)]))
     lines += ["", *(f"- {note}" for note in _notes(table))]
     return "\n".join(lines) + "\n"
 
@@ -66,15 +70,19 @@ def to_latex(table: Table) -> str:
         "\\centering",
         f"\\caption{{{escape_latex(table.title)}}}",
         f"\\label{{tab:{table.name}}}",
-        "\\small",
+        "\\small" if len(grid.header) <= _WIDE else "\\scriptsize\\setlength{\\tabcolsep}{2.5pt}",
         f"\\begin{{tabular}}{{l{'r' * (len(grid.header) - 1)}}}",
         "\\toprule",
         _latex_row([escape_latex(text) for text in grid.header]),
         "\\midrule",
     ]
     for row in grid.rows:
-        texts = [(escape_latex(cell.text), cell.best) for cell in row]
-        lines.append(_latex_row([f"\\textbf{{{t}}}" if best else t for t, best in texts]))
+        texts = []
+        for cell in row:
+            text = escape_latex(cell.text)
+            text = f"\\textbf{{{text}}}" if cell.best else text
+            texts.append(f"{text} {escape_latex(cell.printed)}".rstrip())
+        lines.append(_latex_row(texts))
     lines += ["\\bottomrule", "\\end{tabular}", "", "\\footnotesize\\raggedright"]
     lines += [f"{escape_latex(note)}\\par" for note in _notes(table)]
     return "\n".join([*lines, "\\end{table}"]) + "\n"
@@ -100,6 +108,7 @@ _LATEX_CHARACTERS = {
     "σ": "$\\sigma$",
     "δ": "$\\delta$",
     "τ": "$\\tau$",
+    "φ": "$\\varphi$",
     _MINUS: "$-$",
     "–": "--",
     "…": "\\dots{}",
@@ -121,20 +130,17 @@ def number(value: float, decimals: int = 2) -> str:
 
 def _notes(table: Table) -> list[str]:
     cells = table.cells
-    objects = cells["n_objects"].max()
-    images = cells["n_images"].max()
-    counts = (
-        f"{int(objects)} test objects and {int(images):,} initial views"
-        if table.name not in ("table1", "table3")
-        else "Test objects by row: "
-        + ", ".join(
-            f"{label} {int(part['n_objects'].max())}"
-            for label, part in cells.groupby("row_label", sort=False)
+    objects = cells.groupby("row_label", sort=False)["n_objects"].max()
+    if objects.min() == objects.max() or table.name == "table7":
+        counts = (
+            f"{int(objects.max())} test objects, {int(cells['n_images'].max()):,} initial views"
         )
-    )
+        counts += " in each row" if table.name != "table7" else ""
+    else:
+        counts = "Test objects: " + ", ".join(f"{row} {int(n)}" for row, n in objects.items())
     shown = [] if table.name == "table6" else [f"{counts}."]
     if cells["published"].notna().any() and table.name != "table6":
-        shown.insert(0, "Ours [published]; the best of each row in bold.")
+        shown.insert(0, "Ours [published]; our best of each row in bold.")
     elif table.name != "table6":
         shown.insert(0, "The best of each row in bold; the paper prints no such figures.")
     return [*shown, *table.notes]
@@ -224,9 +230,8 @@ def _method_cells(part: pd.DataFrame, methods: Sequence[str], degrees: str) -> l
             continue
         text = f"{number(values[method])}{degrees}"
         printed = float(row["published"].iloc[0])
-        if np.isfinite(printed):
-            text += f" [{number(printed)}{degrees}]"
-        cells.append(_Cell(text, bool(values[method] == best)))
+        beside = f"[{number(printed)}{degrees}]" if np.isfinite(printed) else ""
+        cells.append(_Cell(text, bool(values[method] == best), beside))
     return cells
 
 
@@ -263,9 +268,8 @@ def markdown_to_html(markdown: str, inline: Callable[[str], str]) -> str:
     for row in rows[2:]:
         cells = [f'<th scope="row">{inline(row[0])}</th>']
         for text in row[1:]:
-            bold = text.startswith("**") and text.endswith("**")
-            shown = inline(text.strip("*"))
-            cells.append(f"<td><strong>{shown}</strong></td>" if bold else f"<td>{shown}</td>")
+            shown = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", inline(text))
+            cells.append(f"<td>{shown}</td>")
         body.append(f"<tr>{''.join(cells)}</tr>")
     items = "".join(f"<li>{inline(note)}</li>" for note in notes)
     return (

@@ -28,9 +28,9 @@ COLUMNS = (
 
 
 def _random(estimate_deg: NDArray[np.float64], rng: np.random.Generator) -> Rotations:
-    """A view other than the first, all equally likely."""
+    """Return a view other than the first, all equally likely."""
     n_views = estimate_deg.shape[1]
-    return rng.integers(1, n_views, estimate_deg.shape) * (360 // n_views)
+    return np.asarray(rng.integers(1, n_views, estimate_deg.shape) * (360 // n_views))
 
 
 def _opposite(estimate_deg: NDArray[np.float64], rng: np.random.Generator) -> Rotations:

@@ -135,6 +135,11 @@ class Resampler:
     n_resamples: int = 2000
     _drawn: dict[tuple[str, int, int], Ints] = field(default_factory=dict, repr=False)
 
+    @classmethod
+    def seeded(cls, rng: np.random.Generator, n_resamples: int) -> Resampler:
+        """Take the seed from a generator."""
+        return cls(int(rng.integers(2**31)), n_resamples)
+
     def multiplicities(self, sample: PairedErrors) -> Ints:
         """Return (n_resamples, n_objects) draws, resampling within each category."""
         blocks = []
@@ -173,10 +178,10 @@ LOWER_IS_BETTER: Mapping[str, bool] = {
 
 UNIT_OF: Mapping[str, str] = {
     "mae": "°",
-    "pauc": " %",
+    "pauc": "\u00a0%",
     "median": "°",
     "mae_sigma": "°",
-    "pauc_sigma": " %",
+    "pauc_sigma": "\u00a0%",
 }
 
 

@@ -117,6 +117,8 @@ _TABLES: dict[str, PublishedTable] = {
         (
             "The mean of the four published groups (10.20°, 8.06°, 7.76°, 6.85°) is fold 3 of "
             "Table 7, so Table 5 appears to show that fold alone.",
+            "Opposite takes the same two views from φ and from φ + 180°, so averaging them gives "
+            "groups 1 and 3, and 2 and 4, the same error.",
         ),
     ),
     "table6": PublishedTable(

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.files import read_arrays
+from nbv.files import open_array, read_arrays
 
 Unit = tuple[str, int]
 """A category and an elevation in degrees."""
@@ -135,8 +135,7 @@ def load_depth(root: str | Path, category: str, elevation_deg: int) -> NDArray[n
     path = depth_path(root, category, elevation_deg)
     if not path.is_file():
         raise _missing(path)
-    images: NDArray[np.uint8] = np.load(path, mmap_mode="r")
-    return images
+    return open_array(path)
 
 
 def load_lookup(

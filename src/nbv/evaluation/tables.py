@@ -1,6 +1,6 @@
 """The paper's Tables 1 to 7 from our results, tidy: one row per cell.
 
-Columns of `Table.cells`: ``table, row, row_label, method, metric, value, sigma, published,
+Columns of `cells.Table.cells`: ``table, row, row_label, method, metric, value, sigma, published,
 ci_low, ci_high, difference, difference_low, difference_high, n_objects, n_images``.
 
 ``value`` is in degrees (``mae``, ``estimate``, ``error``) or percent (``pauc``), pooled over the
@@ -11,17 +11,16 @@ method (Opposite, unless set otherwise).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
 
 from nbv.errors import UserError, nearest
 from nbv.evaluation import paired, published
+from nbv.evaluation.cells import Table, assemble, cell, method_cells, shared_resampler
 from nbv.evaluation.examples import choose_example, example_row
-from nbv.evaluation.paired import PairedErrors, Resampler, pair_methods
+from nbv.evaluation.paired import pair_methods
 from nbv.evaluation.results import Unit
 from nbv.evaluation.settings import (
     ReadingSettings,
@@ -32,37 +31,7 @@ from nbv.evaluation.settings import (
     reference_units,
 )
 
-CELL_COLUMNS = (
-    "table",
-    "row",
-    "row_label",
-    "method",
-    "metric",
-    "value",
-    "sigma",
-    "published",
-    "ci_low",
-    "ci_high",
-    "difference",
-    "difference_low",
-    "difference_high",
-    "n_objects",
-    "n_images",
-)
-
 Evaluations = Mapping[Unit, pd.DataFrame]
-
-
-@dataclass(frozen=True)
-class Table:
-    """One table: its cells (see the module's docstring), and the words around them."""
-
-    name: str
-    title: str
-    row_header: str
-    cells: pd.DataFrame
-    notes: tuple[str, ...]
-    settings: ReadingSettings
 
 
 def build_table(
@@ -92,91 +61,30 @@ def build_table(
     return _BUILDERS[name](name, evaluations, chosen)
 
 
-def _cell(name: str, row: str, row_label: str, **rest: Any) -> dict[str, Any]:
-    return dict.fromkeys(CELL_COLUMNS, np.nan) | {
-        "table": name,
-        "row": row,
-        "row_label": row_label,
-        **rest,
-    }
-
-
-def _table(
-    name: str,
-    title: str,
-    row_header: str,
-    cells: Iterable[dict[str, Any]],
-    notes: tuple[str, ...],
-    settings: ReadingSettings,
-) -> Table:
-    frame = pd.DataFrame(list(cells), columns=list(CELL_COLUMNS))
-    return Table(name, title, row_header, frame, notes, settings)
-
-
-def _cells(
-    name: str,
-    row: str,
-    row_label: str,
-    metric: str,
-    sample: PairedErrors,
-    resampler: Resampler,
-    settings: ReadingSettings,
-    comparable: bool,
-) -> list[dict[str, Any]]:
-    """Return one row's cells: a statistic of each method on the same images."""
-    methods = [method for method in settings.methods if method in sample.errors_deg]
-    estimates = {m: paired.estimate(metric, sample, m, resampler) for m in methods}
-    cells = []
-    for method, found in estimates.items():
-        interval = found.interval()
-        cell = _cell(
-            name,
-            row,
-            row_label,
-            method=method,
-            metric=metric,
-            value=interval.value,
-            sigma=paired.fold_sigma(metric, sample, method),
-            ci_low=interval.low,
-            ci_high=interval.high,
-            n_objects=sample.n_objects,
-            n_images=sample.n_images,
-        )
-        printed = published.published_value(name, metric, row, method) if comparable else None
-        cell["published"] = np.nan if printed is None else printed
-        if settings.reference in estimates and method != settings.reference:
-            gap = found.minus(estimates[settings.reference])
-            cell |= {
-                "difference": gap.value,
-                "difference_low": gap.low,
-                "difference_high": gap.high,
-            }
-        cells.append(cell)
-    return cells
-
-
 def _by_category(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
     metric = "mae" if name == "table1" else "pauc"
     units = reference_units(evaluations, settings)
     elevation = units[0][1]
-    resampler = Resampler(settings.seed, settings.n_resamples)
+    resampler = shared_resampler(settings)
     cells = []
     for unit in units:
         sample = pair_methods(evaluations[unit], unit[0])
         label = category_label(unit[0])
-        cells += _cells(name, unit[0], label, metric, sample, resampler, settings, elevation == 0)
+        cells += method_cells(
+            name, unit[0], label, metric, sample, resampler, settings, elevation == 0
+        )
     title = f"{_METRIC_TITLES[metric]} by category at elevation {elevation}°"
-    return _table(name, title, "Category", cells, _notes(name, settings), settings)
+    return assemble(name, title, "Category", cells, _notes(name, settings), settings)
 
 
 def _by_elevation(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
     metric = "mae" if name == "table2" else "pauc"
     category = focus_category(evaluations, settings)
-    resampler = Resampler(settings.seed, settings.n_resamples)
+    resampler = shared_resampler(settings)
     cells = []
     for elevation in sorted(elevation for name_, elevation in evaluations if name_ == category):
         sample = pair_methods(evaluations[category, elevation], category)
-        cells += _cells(
+        cells += method_cells(
             name,
             str(elevation),
             f"{elevation}°",
@@ -187,12 +95,12 @@ def _by_elevation(name: str, evaluations: Evaluations, settings: ReadingSettings
             category == published.FOCUS_CATEGORY,
         )
     title = f"{_METRIC_TITLES[metric]} of {category_label(category)} by elevation"
-    return _table(name, title, "Elevation", cells, _notes(name, settings), settings)
+    return assemble(name, title, "Elevation", cells, _notes(name, settings), settings)
 
 
 def _by_group(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
     category, elevation = focus_unit(evaluations, settings)
-    resampler = Resampler(settings.seed, settings.n_resamples)
+    resampler = shared_resampler(settings)
     everything = pair_methods(evaluations[category, elevation], category)
     groups = paired.viewpoint_group(everything.initial_deg)
     cells = []
@@ -201,7 +109,7 @@ def _by_group(name: str, evaluations: Evaluations, settings: ReadingSettings) ->
         if not mask.any():
             continue
         span = f"{start}–359°, 0–{stop - 1}°" if start > stop else f"{start}–{stop - 1}°"
-        cells += _cells(
+        cells += method_cells(
             name,
             str(group),
             f"{group} ({span})",
@@ -212,7 +120,7 @@ def _by_group(name: str, evaluations: Evaluations, settings: ReadingSettings) ->
             (category, elevation) == (published.FOCUS_CATEGORY, 0),
         )
     title = f"MAE of {category_label(category)} by viewpoint group at elevation {elevation}°"
-    return _table(name, title, "Viewpoint group", cells, _notes(name, settings), settings)
+    return assemble(name, title, "Viewpoint group", cells, _notes(name, settings), settings)
 
 
 def _examples(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
@@ -229,7 +137,7 @@ def _examples(name: str, evaluations: Evaluations, settings: ReadingSettings) ->
             for metric, column in (("estimate", "pose_estimate_deg"), ("error", "error_deg")):
                 printed = published.published_value(name, metric, str(azimuth), method)
                 cells.append(
-                    _cell(
+                    cell(
                         name,
                         str(azimuth),
                         f"{azimuth}°",
@@ -245,12 +153,12 @@ def _examples(name: str, evaluations: Evaluations, settings: ReadingSettings) ->
         f"Examples of estimates (and errors) for {category_label(unit[0])} at elevation {unit[1]}°"
     )
     notes = (f"Object {example.object_id} of fold {example.fold}: {example.reason}.",)
-    return _table(name, title, "Initial azimuth", cells, notes + _notes(name, settings), settings)
+    return assemble(name, title, "Initial azimuth", cells, notes + _notes(name, settings), settings)
 
 
 def _by_fold(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
     category, elevation = focus_unit(evaluations, settings)
-    resampler = Resampler(settings.seed, settings.n_resamples)
+    resampler = shared_resampler(settings)
     everything = pair_methods(evaluations[category, elevation], category)
     comparable = (category, elevation) == (published.FOCUS_CATEGORY, 0)
     rows = [
@@ -261,10 +169,10 @@ def _by_fold(name: str, evaluations: Evaluations, settings: ReadingSettings) -> 
     cells = []
     for metric in ("mae", "pauc"):
         for row, label, sample in rows:
-            cells += _cells(name, row, label, metric, sample, resampler, settings, comparable)
+            cells += method_cells(name, row, label, metric, sample, resampler, settings, comparable)
         cells += [
-            cell | {"metric": metric}
-            for cell in _cells(
+            found | {"metric": metric}
+            for found in method_cells(
                 name,
                 published.SIGMA_ROW,
                 "σ",
@@ -275,14 +183,14 @@ def _by_fold(name: str, evaluations: Evaluations, settings: ReadingSettings) -> 
                 comparable=False,
             )
         ]
-    for cell in cells:
-        if cell["row"] == published.SIGMA_ROW:
-            cell["sigma"] = np.nan
-            printed = published.published_value(name, cell["metric"], cell["row"], cell["method"])
-            cell["published"] = np.nan if printed is None or not comparable else printed
+    for one in cells:
+        if one["row"] == published.SIGMA_ROW:
+            one["sigma"] = np.nan
+            printed = published.published_value(name, one["metric"], one["row"], one["method"])
+            one["published"] = np.nan if printed is None or not comparable else printed
     title = f"MAE and pAUC of {category_label(category)} by fold at elevation {elevation}°"
     notes = ("The average is over the pooled images of all folds.", *_notes(name, settings))
-    return _table(name, title, "Fold", cells, notes, settings)
+    return assemble(name, title, "Fold", cells, notes, settings)
 
 
 def _notes(name: str, settings: ReadingSettings) -> tuple[str, ...]:

@@ -116,7 +116,7 @@ def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
     broken = used[~np.isfinite(vertices[used]).all(axis=1)]
     if len(broken):
         raise UserError(
-            f"{origin}: {len(broken)} vertices are not finite, the first is vertex {broken[0]}; "
+            f"{origin}: vertex {broken[0]} is not finite, {len(broken)} of {len(used)} in all; "
             "numbers expected"
         )
     if float(np.linalg.norm(np.ptp(vertices[used], axis=0))) == 0.0:

@@ -23,7 +23,7 @@ def entropy(distributions: Table) -> NDArray[np.float32]:
     """Return the entropy of each row in nats, 0 log 0 being 0 (Eq. 1)."""
     tiny = np.finfo(np.float32).tiny
     logs = np.log(np.maximum(distributions, tiny))
-    return -np.einsum("ij,ij->i", distributions, logs)
+    return np.asarray(-np.einsum("ij,ij->i", distributions, logs), dtype=np.float32)
 
 
 def circular_variance(distributions: Table) -> NDArray[np.float32]:

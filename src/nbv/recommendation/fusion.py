@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import midpoint_deg, wrap_deg
 
-
 Rotations = NDArray[np.int64]
 
 

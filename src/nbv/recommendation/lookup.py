@@ -44,7 +44,8 @@ class LookupTable:
 
     def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
         """Return the recommended rotation for each estimate, degrees in [0, 360)."""
-        return self.recommended_delta_deg[nearest_bin(estimate_deg, len(self.ambiguity))]
+        bins = nearest_bin(estimate_deg, len(self.ambiguity))
+        return np.asarray(self.recommended_delta_deg[bins])
 
 
 def least_ambiguous_delta(ambiguity: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
@@ -56,7 +57,8 @@ def least_ambiguous_delta(ambiguity: NDArray[np.floating[Any]]) -> NDArray[np.in
     deltas = np.arange(n_bins) * (360.0 / n_bins)
     order = np.lexsort((deltas, travel_deg(deltas)))
     best = order[np.argmin(ambiguity[:, order], axis=1)]
-    return np.rint(deltas[best]).astype(np.int64)
+    recommended: NDArray[np.int64] = np.rint(deltas[best]).astype(np.int64)
+    return recommended
 
 
 def build_lookup(

@@ -79,7 +79,7 @@ Window = tuple[int, int, int, int]
 
 def _pixel_windows(views: Views) -> list[Window]:
     """Return each view's first and last + 1 column and row whose centres the outline can cover."""
-    # A pixel's width of rounding is too little to matter and enough to be safe.
+    # Up to one pixel more on each side than the outline covers: never one less by rounding.
     first = np.floor(views.outline_px[:, 0::2] - 0.5)
     last = np.ceil(views.outline_px[:, 1::2] + 0.5)
     first_last = np.stack([first[:, 0], last[:, 0], first[:, 1], last[:, 1]], axis=1)

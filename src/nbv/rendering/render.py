@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nbv.errors import UserError
 from nbv.files import replacing
@@ -80,28 +79,19 @@ def write_depth(
     under its name only when it is complete. Parameters and errors as in `render_objects`.
     """
     side = camera.image_side
-    with replacing(path) as temporary:
-        stored = np.lib.format.open_memmap(
-            temporary, mode="w+", dtype=np.uint8, shape=(len(meshes), n_azimuths, side, side)
-        )
-        images = render_objects(meshes, elevation_deg, camera, renderer, sensor, n_azimuths)
-        progress = _Progress(str(path), len(meshes), n_azimuths)
+    header = {
+        "descr": np.lib.format.dtype_to_descr(np.dtype(np.uint8)),
+        "fortran_order": False,
+        "shape": (len(meshes), n_azimuths, side, side),
+    }
+    images = render_objects(meshes, elevation_deg, camera, renderer, sensor, n_azimuths)
+    progress = _Progress(str(path), len(meshes), n_azimuths)
+    # Written, not mapped: a full disk is then an error that can be told, not a fatal signal.
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, header)
         for index, codes in enumerate(images):
-            stored[index] = codes
+            file.write(codes.tobytes())
             progress.advance(index + 1)
-        stored.flush()
-        del stored
-
-
-def open_depth(path: str | Path) -> NDArray[np.uint8]:
-    """Open images written by `write_depth`, read-only and without reading them into memory.
-
-    Returns
-    -------
-    (n_objects, n_azimuths, side, side) uint8 memmap
-    """
-    stored: NDArray[np.uint8] = np.load(path, mmap_mode="r", allow_pickle=False)
-    return stored
 
 
 class _Progress:

@@ -5,11 +5,12 @@ A noise model is one function from depth to depth, applied before encoding; `ide
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.errors import UserError, nearest
 from nbv.rendering.camera import Camera
 
 Depths = NDArray[np.float32]
@@ -26,6 +27,22 @@ ZERO_CODE = 128
 def ideal(depth: Depths) -> Depths:
     """Return the depth as it is."""
     return depth
+
+
+SENSORS: Mapping[str, Sensor] = {"ideal": ideal}
+
+
+def open_sensor(name: str) -> Sensor:
+    """Return a sensor by its name in `SENSORS`.
+
+    Raises
+    ------
+    UserError
+        For an unknown name.
+    """
+    if name not in SENSORS:
+        raise UserError(f"sensor={name} is unknown: {nearest(name, SENSORS)}")
+    return SENSORS[name]
 
 
 def reference_depth(depth: Depths, camera: Camera) -> NDArray[np.float32]:

@@ -13,20 +13,16 @@ import numpy as np
 import trimesh
 
 from nbv.errors import UserError, nearest
-from nbv.meshes.procedural.airplane import airplane
-from nbv.meshes.procedural.car import car
-from nbv.meshes.procedural.chair import chair
-from nbv.meshes.procedural.mug import mug
-from nbv.meshes.procedural.toilet import toilet
+from nbv.meshes.procedural import airplane, car, chair, mug, toilet
 
 __all__ = ["CATEGORIES", "generate"]
 
 CATEGORIES: dict[str, Callable[[np.random.Generator], trimesh.Trimesh]] = {
-    "airplane": airplane,
-    "car": car,
-    "chair": chair,
-    "mug": mug,
-    "toilet": toilet,
+    "airplane": airplane.airplane,
+    "car": car.car,
+    "chair": chair.chair,
+    "mug": mug.mug,
+    "toilet": toilet.toilet,
 }
 
 

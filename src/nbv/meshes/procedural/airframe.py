@@ -67,16 +67,18 @@ def jet_pod(centre: ArrayLike, radius: float, length: float) -> trimesh.Trimesh:
 def hung_jet(rng: np.random.Generator, leading: np.ndarray, radius: float) -> Solids:
     """Return a jet on a pylon under the leading edge at `leading`, (3,)."""
     size, length = radius * rng.uniform(0.5, 0.65), rng.uniform(0.09, 0.13)
-    pod = leading + (0.035, 0.0, -1.25 * size)
-    pylon = panel([pod + (0.01, 0.0, 0.0), leading + (-0.015, 0.0, 0.0)], [0.08, 0.1], 0.08)
+    pod = leading + np.array([0.035, 0.0, -1.25 * size])
+    pylon = panel(
+        [pod + np.array([0.01, 0, 0]), leading - np.array([0.015, 0, 0])], [0.08, 0.1], 0.08
+    )
     return [jet_pod(pod, size, length), pylon]
 
 
 def wing_propeller(rng: np.random.Generator, leading: np.ndarray) -> Solids:
     """Return a propeller engine in the wing at `leading`, (3,)."""
-    pod = leading + (-0.02, 0.0, 0.0)
+    pod = leading - np.array([0.02, 0.0, 0.0])
     body = [[0.008, -0.13], [0.024, -0.04], [0.026, 0.05], [0.015, 0.09]]
-    hub = pod + (0.09, 0.0, 0.0)
+    hub = pod + np.array([0.09, 0.0, 0.0])
     return [
         revolve(body, n=16, axis="x", centre=pod),
         *propeller(rng, hub, rng.uniform(0.07, 0.1)),
@@ -118,7 +120,7 @@ def landing_gear(rng: np.random.Generator, radius: float) -> Solids:
     disc = np.array([[0.6, -0.35], [1.0, -0.2], [1.0, 0.2], [0.6, 0.35]]) * size
     foot = np.array([0.08, track, -drop])
     main = [
-        tube([(0.08, 0.03, -0.5 * radius), foot], 0.008, n=8),
+        tube(np.array([[0.08, 0.03, -0.5 * radius], foot]), 0.008, n=8),
         revolve(disc, n=20, axis="y", centre=foot),
     ]
     end = (third, 0.0, -drop if third > 0 else -0.9 * radius)

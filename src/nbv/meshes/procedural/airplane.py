@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 
 from nbv.meshes.procedural.airframe import (
     Solids,
@@ -24,6 +25,7 @@ from nbv.meshes.procedural.airframe import (
     wing_propeller,
 )
 from nbv.meshes.procedural.solids import (
+    Points,
     both_sides,
     box,
     centred,
@@ -95,11 +97,11 @@ _PLANS = {
     ),
     "pusher": _Plan(
         0.04, (0.055, 0.08), (0.9, 1.3), (0.16, 0.22), (0.4, 0.8), (8, 28), (-0.2, -0.12),
-        (-0.3, 0.2), ("canard", "tips", "tips"), ("pusher",), (0.2, 0.4), (0.2, 0.35),
+        (-0.3, 0.2), ("canard", "tips canard"), ("pusher",), (0.2, 0.4), (0.2, 0.35),
     ),
     "flying wing": _Plan(
-        0.02, (0.06, 0.085), (1.4, 1.9), (0.75, 0.9), (0.1, 0.25), (28, 38), (0.42, 0.46),
-        (0.0,), ("tips", "none"), ("fuselage",), (0.3, 0.5), (0.3, 0.5),
+        0.015, (0.06, 0.085), (1.3, 1.7), (0.75, 0.9), (0.1, 0.25), (28, 38), (0.42, 0.46),
+        (0.0,), ("tips", "fin"), ("fuselage",), (0.3, 0.5), (0.3, 0.5),
     ),
     "twin boom": _Plan(
         0.04, (0.07, 0.11), (1.4, 1.9), (0.22, 0.32), (0.5, 0.9), (-2, 8), (0.05, 0.15),
@@ -117,8 +119,8 @@ def airplane(rng: np.random.Generator) -> trimesh.Trimesh:
     tip = rng.uniform(0.6, 0.8) if engines == "fuselage" else rng.uniform(0.12, 0.3)
     rise = rng.uniform(0.2, 0.9) * (1.0 - tip)
     parts = [_fuselage(rng, plan, radius, tip, rise)]
-    parts += _wings(rng, plan, radius, name, engines)
-    parts += _tail(rng, plan, radius, rise * radius)
+    wings, wing_tip = _wings(rng, plan, radius, name, engines)
+    parts += wings + _tail(rng, plan, radius, rise * radius, wing_tip)
     parts += _cockpit(rng, name, radius)
     if engines == "fuselage" and rng.random() < 0.8:
         size = (rng.uniform(0.25, 0.4), 0.9 * radius, rng.uniform(0.8, 1.4) * radius)
@@ -154,8 +156,8 @@ def _fuselage(
 
 def _wings(
     rng: np.random.Generator, plan: _Plan, radius: float, name: str, engines: str
-) -> Solids:
-    """Return the wings and what hangs on them."""
+) -> tuple[Solids, Points]:
+    """Return the wings and what hangs on them; and where the left one's leading edge ends."""
     half_span, chord = rng.uniform(*plan.span) / 2, rng.uniform(*plan.chord)
     taper, sweep = rng.uniform(*plan.taper), np.tan(np.radians(rng.uniform(*plan.sweep_deg)))
     z = float(rng.choice(plan.wing_heights)) * radius
@@ -181,18 +183,20 @@ def _wings(
         for place in rng.uniform(0.25, 1.0, int(rng.integers(1, 4))):
             hook = root + place * half_span * slope
             parts += [store(rng, hook - (0.3 * chord * (1.0 - place), 0.0, 0.0))]
-    return both_sides(parts)
+    return both_sides(parts), tip
 
 
 def _rear_jets(rng: np.random.Generator, radius: float) -> Solids:
     size, length = radius * rng.uniform(0.45, 0.6), rng.uniform(0.12, 0.17)
     pod = np.array([-0.24, radius + 0.9 * size, 0.45 * radius])
-    root = pod * (1.0, 0.0, 1.0) + (0.04, 0.0, 0.0)
-    pylon = panel([root, pod + (0.04, 0.0, 0.0)], [0.09, 0.09], 0.12)
+    edge = pod + np.array([0.04, 0.0, 0.0])
+    pylon = panel([edge * (1.0, 0.0, 1.0), edge], [0.09, 0.09], 0.12)
     return both_sides([jet_pod(pod, size, length), pylon])
 
 
-def _tail(rng: np.random.Generator, plan: _Plan, radius: float, z: float) -> Solids:
+def _tail(
+    rng: np.random.Generator, plan: _Plan, radius: float, z: float, wing_tip: Points
+) -> Solids:
     """Return fins and tailplanes: low, cruciform, T, V, twin, canards, tip fins or booms."""
     kind = str(rng.choice(plan.tails))
     fast = plan.sweep_deg[1] > 20
@@ -205,13 +209,14 @@ def _tail(rng: np.random.Generator, plan: _Plan, radius: float, z: float) -> Sol
     x, plane_x = -0.5 + chord + rng.uniform(-0.04, 0.03), -0.48 + plane_chord
     top = z + 0.3 * radius + height
 
-    def fin(foot: tuple[float, float, float], lean: float, size: float) -> trimesh.Trimesh:
-        head = np.asarray(foot) + (-sweep * size, lean * size, size)
-        return panel([foot, head], [chord, taper * chord], 0.09)
+    def fin(foot: ArrayLike, lean: float, size: float) -> trimesh.Trimesh:
+        head = np.asarray(foot) + size * np.array([-sweep, lean, 1.0])
+        return panel(np.stack([foot, head]), [chord, taper * chord], 0.09)
 
-    def plane(root: tuple[float, float, float], size: float = 1.0) -> Solids:
+    def plane(root: ArrayLike, size: float = 1.0) -> Solids:
         return both_sides([wing(root, size * span, plane_chord, taper, 0.75 * sweep, rise)])
 
+    ahead = plane((rng.uniform(0.22, 0.32), 0.0, 0.3 * radius), 0.8)
     if kind == "v":
         return both_sides([fin((plane_x + 0.03, 0.0, z), rng.uniform(0.8, 1.3), 0.8 * span)])
     if kind == "twin":
@@ -227,18 +232,14 @@ def _tail(rng: np.random.Generator, plan: _Plan, radius: float, z: float) -> Sol
         across = panel([(end + 0.9 * plane_chord, 0.0, level), (end + 0.9 * plane_chord, y, level)],
                        [plane_chord, plane_chord], 0.1)  # fmt: skip
         return both_sides([*booms, across])
-    if kind == "tips":
-        reach = plan.span[0] * 0.42
-        slope = np.tan(np.radians(plan.sweep_deg[0] + 4))
-        foot = (plan.wing_x[0] - slope * reach, reach, 0.0)
-        return both_sides([fin(foot, rng.uniform(0.0, 0.3), 0.8 * height)])
-    if kind == "none":
-        return []
+    if kind.startswith("tips"):
+        fins = both_sides([fin(0.97 * wing_tip, rng.uniform(0.0, 0.3), 0.8 * height)])
+        return fins + (ahead if kind.endswith("canard") else [])
     centre = [fin((x, 0.0, z), 0.0, top - z)]
     if kind == "fin":
         return centre
     if kind == "canard":
-        return centre + plane((rng.uniform(0.22, 0.32), 0.0, 0.3 * radius), 0.8)
+        return centre + ahead
     share = {"low": 0.0, "cross": 0.5, "t": 0.97}[kind]
     lead = x - share * (sweep * (top - z) + 0.5 * (chord - plane_chord))
     return centre + plane((lead if share else plane_x, 0.0, 0.8 * z + share * (top - z)))

@@ -23,7 +23,16 @@ from nbv.meshes.procedural.coachwork import (
     wheels,
 )
 from nbv.meshes.procedural.lorry import bus, lorry
-from nbv.meshes.procedural.solids import both_sides, box, centred, join, loft, revolve, superellipse, turned
+from nbv.meshes.procedural.solids import (
+    both_sides,
+    box,
+    centred,
+    join,
+    loft,
+    revolve,
+    superellipse,
+    turned,
+)
 
 
 @dataclass(frozen=True)
@@ -48,8 +57,8 @@ class _Plan:
 _PLANS = {
     "hatchback": _Plan(0.17, (3.2, 4.3), (1.38, 1.6), (0.12, 0.25), (0.08, 0.2), (0.01, 0.06),
                        (0.06, 0.2)),
-    "saloon": _Plan(0.19, (4.1, 5.3), (1.34, 1.52), (0.19, 0.29), (0.08, 0.18), (0.12, 0.26),
-                    (0.08, 0.2)),
+    "saloon": _Plan(0.19, (4.1, 5.3), (1.34, 1.52), (0.2, 0.3), (0.1, 0.18), (0.1, 0.22),
+                    (0.08, 0.19)),
     "estate": _Plan(0.08, (4.1, 5.2), (1.38, 1.56), (0.17, 0.28), (0.08, 0.17), (0.0, 0.03),
                     (0.02, 0.1)),
     "off-roader": _Plan(0.13, (3.5, 4.9), (1.62, 2.0), (0.16, 0.28), (0.02, 0.12), (0.0, 0.02),
@@ -60,9 +69,9 @@ _PLANS = {
                      (0.01, 0.06), (0.55, 0.64), (0.2, 0.32), (0.32, 0.43)),
     "coupé": _Plan(0.1, (3.7, 4.8), (1.1, 1.36), (0.17, 0.38), (0.1, 0.2), (0.02, 0.18),
                    (0.12, 0.34), (0.58, 0.7), (0.1, 0.16), (0.28, 0.36)),
-    "roadster": _Plan(0.05, (3.4, 4.4), (1.1, 1.4), (0.28, 0.4), (0.02, 0.08), (0.2, 0.35),
+    "roadster": _Plan(0.03, (3.4, 4.4), (1.1, 1.4), (0.28, 0.4), (0.02, 0.08), (0.2, 0.35),
                       (0.0, 0.01), (0.62, 0.72), (0.12, 0.22), (0.28, 0.36)),
-    "veteran": _Plan(0.05, (3.2, 4.4), (1.6, 1.95), (0.26, 0.38), (0.0, 0.04), (0.02, 0.14),
+    "veteran": _Plan(0.03, (3.2, 4.4), (1.6, 1.95), (0.26, 0.38), (0.0, 0.04), (0.02, 0.14),
                      (0.01, 0.08), (0.5, 0.6), (0.24, 0.34), (0.34, 0.42)),
 }  # fmt: skip
 _LORRIES, _BUSES = 0.09, 0.04
@@ -87,8 +96,8 @@ def _motor_car(rng: np.random.Generator, name: str, plan: _Plan) -> Solids:
     rear_foot = -front + rng.uniform(*plan.boot) * length
     rear_top = min(rear_foot + rng.uniform(*plan.rear_glass) * length, top - 0.16 * length)
     axles = (front - rng.uniform(0.15, 0.21) * length, -front + rng.uniform(0.15, 0.22) * length)
-    # Nose and tail are drawn alike: what tells front from back is the whole, not one number.
-    nose, back, deck = belt * rng.uniform((0.78, 0.78, 0.92), (1.0, 1.0, 1.03))
+    # The ranges overlap: what tells front from back is the whole, not one number.
+    nose, back, deck = belt * rng.uniform((0.74, 0.82, 0.93), (0.97, 1.0, 1.03))
     if name == "pick-up":
         back = deck = belt * rng.uniform(0.62, 0.72)
     line = [[-front, back], [rear_foot - 0.05, deck], [rear_foot + 0.05, belt], [foot, belt]]
@@ -106,15 +115,13 @@ def _motor_car(rng: np.random.Generator, name: str, plan: _Plan) -> Solids:
         parts += bed_walls(-front, rear_foot, half_width, (deck - 0.15, belt))
     if name == "veteran":
         parts += _mudguards(axles, wheel, half_width, clearance)
-    elif rng.random() < 0.5:
+    elif rng.random() < 0.65:
         parts += mirrors(rng, foot - 0.25, half_width, belt + 0.06)
     return parts + _fittings(rng, name, (-front, rear_top, foot, front), (clearance, belt, height),
                              half_width)  # fmt: skip
 
 
-def _open_top(
-    rng: np.random.Generator, ends: Range, heights: Range, half_width: float
-) -> Solids:
+def _open_top(rng: np.random.Generator, ends: Range, heights: Range, half_width: float) -> Solids:
     """Return a windscreen, seat backs and now and then a roll bar."""
     belt, height = heights
     tilt, x = -rng.uniform(15.0, 45.0), ends[1] - 0.05
@@ -169,7 +176,10 @@ def _fittings(
             parts += bumper(rng, end, half_width, clearance)
     if name in ("off-roader", "van", "estate") and rng.random() < 0.3:
         back, ahead = rear_top + 0.1, foot - 0.9
-        centre, extents = ((back + ahead) / 2, 0.7 * half_width, height + 0.03), (ahead - back, 0.06, 0.1)
+        centre, extents = (
+            ((back + ahead) / 2, 0.7 * half_width, height + 0.03),
+            (ahead - back, 0.06, 0.1),
+        )
         parts += both_sides([box(centre, extents, bevel=0.02)])
     if name in ("off-roader", "veteran") and rng.random() < 0.35:
         parts += [spare_wheel(rng, rear - 0.04, belt - 0.05)]

@@ -95,7 +95,11 @@ def _handle_curve(rng: np.random.Generator, style: str, reach: float, span: floa
         out = reach * np.cos(angle) ** rng.uniform(0.6, 1.0) * droop / droop.max()
         return np.stack([out, span / 2 * np.sin(angle)], axis=-1)
     lean = rng.uniform(0.0, 0.12) if style == "square" else rng.uniform(0.15, 0.3)
-    corners = [[0, 0, span / 2], [reach, 0, span * (0.5 - lean / 2)],
-               [reach, 0, -span * (0.5 - lean)], [0, 0, -span / 2]]
+    corners = [
+        [0, 0, span / 2],
+        [reach, 0, span * (0.5 - lean / 2)],
+        [reach, 0, -span * (0.5 - lean)],
+        [0, 0, -span / 2],
+    ]
     radius = rng.uniform(0.04, 0.1) if style == "square" else 0.3
     return fillet(corners, radius, n=9)[:, [0, 2]]

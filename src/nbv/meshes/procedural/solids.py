@@ -163,7 +163,7 @@ def box(
     """
     x, y, z = np.asarray(centre, dtype=np.float64)
     width, depth, height = np.asarray(extents, dtype=np.float64)
-    outline = superellipse(width / 2, depth / 2, exponent) + (x, y)
+    outline = superellipse(width / 2, depth / 2, exponent, n=40) + np.array([x, y])
     return slab(outline, z - height / 2, z + height / 2, bevel=bevel)
 
 
@@ -250,7 +250,8 @@ def sweep(
     # A ring stands in the plane that bisects its two edges, so straight runs keep their thickness.
     tangents = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-    first = np.asarray(normal, dtype=np.float64) - tangents * (tangents @ np.asarray(normal))[:, None]
+    upright = np.asarray(normal, dtype=np.float64)
+    first = upright - tangents * (tangents @ upright)[:, None]
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(tangents, first)
     size = np.broadcast_to(np.asarray(scale, dtype=np.float64), len(points))[:, None, None]

@@ -28,6 +28,8 @@ from nbv.meshes.procedural.solids import (
 
 Solids = list[trimesh.Trimesh]
 _POINTS = 40
+_KINDS = {"two-piece": 0.38, "one-piece": 0.18, "high cistern": 0.11, "no cistern": 0.15,
+          "wall-hung": 0.1, "chest": 0.08}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,28 +47,26 @@ class _Bowl:
         half = (self.front - self.back) / 2
         shape = superellipse(half + grow, self.half_width + grow, self.square, n=_POINTS)
         behind = superellipse(half + grow, self.half_width + grow, self.square + 2.5, n=_POINTS)
-        return np.where(shape[:, :1] < 0.0, behind, shape) + ((self.front + self.back) / 2, 0.0)
+        middle = np.array([(self.front + self.back) / 2, 0.0])
+        return middle + np.where(shape[:, :1] < 0.0, behind, shape)
 
 
 def toilet(rng: np.random.Generator) -> trimesh.Trimesh:
     """Return a toilet, the front of its bowl towards +x."""
-    long = rng.uniform(0.42, 0.54)
+    long = rng.uniform(0.36, 0.56)
     bowl = _Bowl(
         -long / 2,
         long / 2,
-        rng.uniform(0.17, 0.2),
-        float(rng.choice([rng.uniform(1.9, 2.4), rng.uniform(3.0, 6.0)], p=[0.7, 0.3])),
-        rng.uniform(0.36, 0.44),
+        rng.uniform(0.16, 0.21),
+        float(rng.choice([rng.uniform(1.9, 2.4), rng.uniform(3.0, 6.0)], p=[0.65, 0.35])),
+        rng.uniform(0.34, 0.46),
     )
-    kind = rng.choice(["two-piece", "one-piece", "high cistern", "no cistern"],
-                      p=[0.5, 0.24, 0.13, 0.13])  # fmt: skip
-    parts = [*_pedestal(rng, bowl, kind), *_seat(rng, bowl)]
-    if kind == "two-piece":
-        parts += _close_cistern(rng, bowl)
-    elif kind == "one-piece":
-        parts += _grown_cistern(rng, bowl)
-    elif kind == "high cistern":
-        parts += _high_cistern(rng, bowl)
+    kind = str(rng.choice(list(_KINDS), p=list(_KINDS.values())))
+    parts = _seat(rng, bowl, has_cistern=kind not in ("no cistern", "chest"))
+    parts += _chest(rng, bowl) if kind == "chest" else _pedestal(rng, bowl, kind)
+    parts += _cistern(rng, bowl, kind)
+    if rng.random() < 0.08:
+        parts += _grab_rails(rng, bowl)
     return centred(join(parts))
 
 
@@ -91,9 +91,11 @@ def _pedestal(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
     inner = bowl.outline(-rng.uniform(0.035, 0.05))
     inside = [bowl.outline(), bowl.outline(), inner, 0.85 * inner, 0.45 * inner, 0.2 * inner]
     down = np.array([0.6 * thick, 0.0, 0.0, 0.5 * depth, depth, depth + 0.005])
-    levels = np.concatenate([(bowl.rim - thick) * t, bowl.rim - down])
+    # A wall-hung bowl ends in the air.
+    base = rng.uniform(0.1, 0.2) if kind == "wall-hung" else 0.0
+    levels = np.concatenate([base + (bowl.rim - thick - base) * t, bowl.rim - down])
     parts = [stack_outlines(np.concatenate([outside, inside]), levels)]
-    if kind in ("two-piece", "one-piece") or rng.random() < 0.5:
+    if kind in ("two-piece", "one-piece") or (kind != "wall-hung" and rng.random() < 0.5):
         low = rng.choice([0.0, rng.uniform(0.1, 0.25)])
         width = 2 * bowl.half_width * rng.uniform(0.5, 0.9)
         parts += [box((bowl.back - 0.04, 0.0, (low + bowl.rim) / 2),
@@ -101,7 +103,7 @@ def _pedestal(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
     return parts
 
 
-def _seat(rng: np.random.Generator, bowl: _Bowl) -> Solids:
+def _seat(rng: np.random.Generator, bowl: _Bowl, *, has_cistern: bool) -> Solids:
     """Return seat and lid: both down, the lid up, or both up."""
     thick, grow = rng.uniform(0.015, 0.028), rng.uniform(0.0, 0.014)
     z, hinge = bowl.rim + 0.004, bowl.back + 0.035
@@ -114,7 +116,9 @@ def _seat(rng: np.random.Generator, bowl: _Bowl) -> Solids:
     lid = slab(outer, z + thick + 0.003, z + 2 * thick, bevel=0.006)
     pivot = (hinge, 0.0, z + thick)
     up = -rng.uniform(92.0, 104.0)
-    state = rng.choice(["down", "lid up", "both up", "none"], p=[0.45, 0.3, 0.1, 0.15])
+    # Without a cistern to name it, a toilet shows what it is by its open lid.
+    shares = [0.45, 0.3, 0.1, 0.15] if has_cistern else [0.2, 0.5, 0.2, 0.1]
+    state = rng.choice(["down", "lid up", "both up", "none"], p=shares)
     pins = both_sides([tube([(hinge, 0.05, z + thick / 2), (hinge, 0.1, z + thick / 2)], 0.014)])
     if state == "none":
         return [seat, *pins]
@@ -131,8 +135,9 @@ def _flush(rng: np.random.Generator, front: float, half_width: float, top: float
         return [revolve([[0.028, -0.01], [0.028, 0.006], [0.022, 0.012]], n=20,
                         centre=(front - 0.09, 0.0, top))]  # fmt: skip
     y, z = half_width * rng.uniform(0.5, 0.75), top - 0.085
-    return [tube([(front - 0.02, y, z), (front + 0.018, y, z)], 0.012),
-            tube([(front + 0.016, y + 0.01, z), (front + 0.016, y - 0.07, z - 0.012)], 0.009)]  # fmt: skip
+    axle = tube([(front - 0.02, y, z), (front + 0.018, y, z)], 0.012)
+    lever = tube([(front + 0.016, y + 0.01, z), (front + 0.016, y - 0.07, z - 0.012)], 0.009)
+    return [axle, lever]
 
 
 def _tank(
@@ -156,24 +161,55 @@ def _tank(
     ]
 
 
-def _close_cistern(rng: np.random.Generator, bowl: _Bowl) -> Solids:
-    low = bowl.rim + rng.uniform(-0.01, 0.03)
-    return _tank(rng, bowl.back + rng.uniform(-0.05, 0.01), low, low + rng.uniform(0.27, 0.4),
-                 rng.uniform(0.17, 0.25))  # fmt: skip
-
-
-def _grown_cistern(rng: np.random.Generator, bowl: _Bowl) -> Solids:
-    """Return a cistern that rises from the floor or flows out of the bowl."""
-    front, half_width = bowl.back + rng.uniform(-0.03, 0.02), rng.uniform(0.16, 0.2)
-    low = rng.choice([0.0, 0.7 * bowl.rim])
-    return _tank(rng, front, low, bowl.rim + rng.uniform(0.14, 0.38), half_width)
+def _cistern(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
+    """Return what holds the water, or the wall that hides it."""
+    front, rim = bowl.back + rng.uniform(-0.05, 0.02), bowl.rim
+    if kind == "two-piece":
+        low = rim + rng.uniform(-0.01, 0.03)
+        return _tank(rng, front, low, low + rng.uniform(0.2, 0.42), rng.uniform(0.15, 0.26))
+    if kind == "one-piece":
+        low = rng.choice([0.0, 0.7 * rim])
+        return _tank(rng, front, low, rim + rng.uniform(0.06, 0.38), rng.uniform(0.16, 0.2))
+    if kind == "wall-hung":
+        wall = (0.12, rng.uniform(0.4, 0.6), rng.uniform(0.6, 1.1))
+        centre = (bowl.back - 0.04, 0.0, wall[2] / 2)
+        button = box((bowl.back + 0.02, 0.0, 0.9 * wall[2]), (0.03, 0.2, 0.07), bevel=0.01)
+        return [box(centre, wall, exponent=20.0), button]
+    if kind == "high cistern":
+        return _high_cistern(rng, bowl)
+    return []
 
 
 def _high_cistern(rng: np.random.Generator, bowl: _Bowl) -> Solids:
-    """Return a cistern on the wall, its flush pipe, and a chain or none."""
-    low, half_width = bowl.rim + rng.uniform(0.25, 0.8), rng.uniform(0.19, 0.25)
+    """Return a cistern on the wall and its flush pipe."""
+    low, half_width = bowl.rim + rng.uniform(0.2, 0.8), rng.uniform(0.16, 0.25)
     wall = bowl.back - rng.uniform(0.08, 0.14)
-    tank = _tank(rng, wall + 0.17, low, low + rng.uniform(0.22, 0.32), half_width)
-    corners = [(wall + 0.07, 0.0, low + 0.02), (wall + 0.07, 0.0, bowl.rim - 0.1),
-               (bowl.back + 0.05, 0.0, bowl.rim - 0.1)]  # fmt: skip
-    return [*tank, tube(fillet(corners, 0.08, n=7), rng.uniform(0.018, 0.026))]
+    x, z = wall + 0.07, bowl.rim - 0.1
+    pipe = fillet([(x, 0.0, low + 0.02), (x, 0.0, z), (bowl.back + 0.05, 0.0, z)], 0.08, n=7)
+    tank = _tank(rng, wall + 0.17, low, low + rng.uniform(0.2, 0.32), half_width)
+    return [*tank, tube(pipe, rng.uniform(0.018, 0.026))]
+
+
+def _chest(rng: np.random.Generator, bowl: _Bowl) -> Solids:
+    """Return the box of a camping toilet or of an old earth closet, around the bowl's rim."""
+    x, y = (bowl.front - bowl.back) / 2 + 0.02, bowl.half_width + rng.uniform(0.02, 0.12)
+    back = rng.uniform(0.0, 0.14)
+    outline = superellipse(x + back / 2, y, rng.uniform(4.0, 12.0), n=_POINTS) - (back / 2, 0.0)
+    inner = bowl.outline(-0.05)
+    deep = 0.6 * bowl.rim
+    base = outline * rng.uniform(0.85, 1.0)
+    outlines = [base, outline, outline, inner, 0.8 * inner]
+    parts = [stack_outlines(outlines, [0.0, 0.3 * bowl.rim, bowl.rim, bowl.rim, deep])]
+    if back > 0.08:
+        ledge = (back - 0.02, 1.8 * y, rng.uniform(0.05, 0.5))
+        parts += [box((bowl.back - 0.02 - back / 2, 0.0, bowl.rim + ledge[2] / 2 - 0.002), ledge,
+                      bevel=0.01)]  # fmt: skip
+    return parts
+
+
+def _grab_rails(rng: np.random.Generator, bowl: _Bowl) -> Solids:
+    """Return a rail on either side, from the wall to a foot on the floor."""
+    y, z = bowl.half_width + rng.uniform(0.08, 0.15), bowl.rim + rng.uniform(0.15, 0.28)
+    back, front = bowl.back - 0.1, bowl.back + rng.uniform(0.5, 0.95) * (bowl.front - bowl.back)
+    corners = [(back, y, z), (front, y, z), (front, y, 0.0)]
+    return both_sides([tube(fillet(corners, 0.08, n=7), rng.uniform(0.012, 0.02))])

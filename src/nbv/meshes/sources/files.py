@@ -144,10 +144,13 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     """
     import trimesh
 
+    if path.is_file() and path.stat().st_size == 0:
+        raise UserError(f"{path}: the file is empty; at least 1 triangle expected")
     options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     try:
         with _only_errors(trimesh.util.log):
             mesh = trimesh.load_mesh(path, process=False, **options)
+        _need_whole_text(path)
     # A reader meets arbitrary bytes, and no list of what it may raise on them is complete.
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
@@ -155,6 +158,34 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     if not isinstance(mesh, trimesh.Trimesh):
         raise UserError(f"{path}: holds no mesh; at least 1 triangle expected")
     return mesh
+
+
+def _need_whole_text(path: Path) -> None:
+    """Raise ValueError for a text file cut short: trimesh takes what is left of its faces.
+
+    Binary files are found out by trimesh. OBJ files do not say how much is in them.
+    """
+    extension = path.suffix.lower()
+    if extension == ".off":
+        text = path.read_text(encoding="utf-8", errors="replace").partition("OFF")[2]
+        (n_vertices, n_faces, *_), *body = _tokens(text)
+        expected, faces_last = int(n_vertices) + int(n_faces), True
+    elif extension == ".ply" and b"format ascii" in path.open("rb").read(100):
+        header, _, text = path.read_text(encoding="utf-8", errors="replace").partition("end_header")
+        elements = [line for line in _tokens(header) if line[0] == "element"]
+        body = _tokens(text)
+        expected, faces_last = sum(int(line[2]) for line in elements), elements[-1][1] == "face"
+    else:
+        return
+    if faces_last and 0 < len(body) == expected and len(body[-1]) <= int(body[-1][0]):
+        del body[-1]
+    if len(body) < expected:
+        raise ValueError(f"{len(body)} of {expected} lines are there: the file was cut short")
+
+
+def _tokens(text: str) -> list[list[str]]:
+    lines = (line.partition("#")[0].split() for line in text.splitlines())
+    return [line for line in lines if line]
 
 
 @contextlib.contextmanager

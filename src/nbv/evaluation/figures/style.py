@@ -1,0 +1,87 @@
+"""How every figure looks: colours that survive colour blindness, marks that survive grey print."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.typing import LineStyleType
+
+RC: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#d9d9d9",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "hatch.linewidth": 0.7,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "nbv",
+}
+"""Matplotlib settings in force while a figure is built and saved."""
+
+INK = "#222222"
+MUTED = "#666666"
+
+
+@dataclass(frozen=True)
+class MethodStyle:
+    """One method's colour, line, marker and hatch, the same in every figure."""
+
+    color: str
+    line: LineStyleType
+    marker: str
+    hatch: str
+    width: float = 1.5
+
+
+_STYLES: Mapping[str, MethodStyle] = {
+    "single": MethodStyle("#000000", (0, (1.0, 1.2)), "o", ""),
+    "random": MethodStyle("#E69F00", (0, (5.0, 2.0)), "s", "////"),
+    "opposite": MethodStyle("#0072B2", (0, (6.0, 1.5, 1.0, 1.5)), "^", "...."),
+    "proposed": MethodStyle("#D55E00", "solid", "D", "", 2.2),
+}
+_FURTHER = (
+    MethodStyle("#009E73", (0, (3.0, 1.0)), "v", "xxxx"),
+    MethodStyle("#CC79A7", (0, (8.0, 2.0)), "P", "\\\\\\\\"),
+    MethodStyle("#56B4E9", (0, (4.0, 1.0, 1.0, 1.0, 1.0, 1.0)), "X", "++++"),
+    MethodStyle("#8C6D00", (0, (2.0, 2.0)), "<", "oo"),
+)
+
+
+def method_style(method: str, methods: tuple[str, ...]) -> MethodStyle:
+    """Return a method's style; those beyond the paper's take the next ones in turn."""
+    if method in _STYLES:
+        return _STYLES[method]
+    others = [name for name in methods if name not in _STYLES]
+    return _FURTHER[others.index(method) % len(_FURTHER)]
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty figure that draws itself without a display or any global state."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def azimuth_axis(axes: Axes, label: str, vertical: bool = False) -> None:
+    """Mark a circle of degrees every 90."""
+    ticks = [0, 90, 180, 270, 360]
+    if vertical:
+        axes.set_ylim(0, 360)
+        axes.set_yticks(ticks)
+        axes.set_ylabel(label)
+    else:
+        axes.set_xlim(0, 360)
+        axes.set_xticks(ticks)
+        axes.set_xlabel(label)

@@ -1,0 +1,253 @@
+"""One HTML page with everything: claims first, then tables, figures, settings and cost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from omegaconf import OmegaConf
+
+from nbv.errors import UserError
+from nbv.evaluation import page
+from nbv.evaluation.claim_text import VERDICT_RULES
+from nbv.evaluation.comparisons import VERDICTS
+from nbv.evaluation.figures import FIGURES
+from nbv.evaluation.layout import markdown_to_html, number
+from nbv.evaluation.page import escape
+from nbv.evaluation.paired import UNIT_OF
+from nbv.evaluation.results import discover_units, load_object_ids
+from nbv.evaluation.runtime import load_runtime
+from nbv.evaluation.settings import category_label
+from nbv.evaluation.tables import TABLES
+
+_CONTENTS = (
+    ("claims", "The paper's claims"),
+    ("tables", "Tables"),
+    ("figures", "Figures"),
+    ("comparisons", "Every comparison"),
+    ("settings", "Settings"),
+    ("runtime", "Running time"),
+)
+
+
+def build_report(root: str | Path) -> str:
+    """Return the report of an experiment as one self-contained HTML page.
+
+    Reads what earlier stages wrote under `root`: ``claims.csv``, ``tables/*.md``,
+    ``figures/*.png``, ``splits/``, ``configuration.yaml``, ``provenance.json`` and
+    ``benchmarks/``. Tables and figures that are absent are named as such.
+
+    Parameters
+    ----------
+    root : path
+        ``results/<experiment>``.
+
+    Raises
+    ------
+    UserError
+        If the claims, the configuration or the provenance are missing.
+    """
+    root = Path(root)
+    claims = pd.read_csv(_existing(root / "claims.csv"), dtype={"section": str}).fillna(
+        {"note": "", "summary": "", "versus": ""}
+    )
+    configuration = _existing(root / "configuration.yaml").read_text(encoding="utf-8")
+    provenance = json.loads(_existing(root / "provenance.json").read_text(encoding="utf-8"))
+    settings = OmegaConf.to_container(OmegaConf.create(configuration), resolve=False)
+    experiment = root.name
+    if isinstance(settings, dict):
+        experiment = str(settings.get("experiment") or root.name)
+    title = f"Best next viewpoint: experiment {experiment}"
+    links = "".join(f'<li><a href="#{key}">{escape(text)}</a></li>' for key, text in _CONTENTS)
+    bodies = {
+        "claims": _claims(claims),
+        "tables": _tables(root),
+        "figures": _figures(root),
+        "comparisons": _comparisons(claims),
+        "settings": _settings(configuration, provenance),
+        "runtime": _runtime(root),
+    }
+    return page.page(
+        title,
+        [
+            f"<header><h1>{escape(title)}</h1>",
+            page.facts(_facts(root, settings, provenance)),
+            "</header>",
+            f'<nav aria-label="Contents"><ul>{links}</ul></nav>',
+            "<main>",
+            *(page.section(key, text, bodies[key]) for key, text in _CONTENTS),
+            "</main>",
+        ],
+    )
+
+
+def _existing(path: Path) -> Path:
+    if not path.is_file():
+        raise UserError(f"{path} does not exist; run the workflow's target that makes it first")
+    return path
+
+
+def _facts(root: Path, settings: object, provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
+    units = discover_units(root)
+    categories = list(dict.fromkeys(category for category, _ in units))
+    objects = [f"{category_label(c)} {len(load_object_ids(root, c))}" for c in categories]
+    elevations = [
+        f"{category_label(c)} {', '.join(f'{e}°' for name, e in units if name == c)}"
+        for c in categories
+    ]
+    dataset = settings.get("dataset") if isinstance(settings, dict) else None
+    if isinstance(dataset, dict):
+        dataset = dataset.get("source") or dataset.get("name")
+    return [
+        ("Data set", str(dataset or "not recorded")),
+        ("Objects", "; ".join(objects)),
+        ("Elevations", "; ".join(elevations)),
+        ("Commit", str(provenance.get("commit") or "not recorded")),
+    ]
+
+
+def _claims(claims: pd.DataFrame) -> list[str]:
+    each = claims.drop_duplicates("id")
+    rows = []
+    for claim in each.to_dict("records"):
+        note = f'<br><span class="muted">{escape(claim["note"])}</span>' if claim["note"] else ""
+        figures = "<br>".join(escape(text) for text in str(claim["summary"]).split("; "))
+        rows.append(
+            [
+                f"{escape(claim['section'])}",
+                f'{escape(claim["sentence"])}<br><span class="muted">{escape(claim["compared"])}'
+                f"</span>{note}",
+                f"{page.badge(claim['verdict'])}<br>"
+                f'<span class="muted">by point estimates: {escape(claim["point_verdict"])}</span>',
+                figures,
+                escape(claim["published_verdict"]),
+            ]
+        )
+    header = ("Sec.", "The paper says", "Verdict", "Our figures", "Its own figures")
+    return [
+        f"<p>Of {len(each)} checkable sentences, {_tally(each['verdict'])}. Judged as the paper "
+        f"judges its own figures, by point estimates alone: {_tally(each['point_verdict'])}.</p>",
+        page.table(header, rows, "text"),
+        page.notes(VERDICT_RULES),
+    ]
+
+
+def _tally(verdicts: pd.Series) -> str:
+    counts = verdicts.value_counts()
+    words = ("hold", "do not hold", "are undecided", "were not run")
+    return ", ".join(f"{counts.get(v, 0)} {w}" for v, w in zip(VERDICTS, words, strict=True))
+
+
+def _tables(root: Path) -> list[str]:
+    parts, absent = [], []
+    for name in TABLES:
+        path = root / "tables" / f"{name}.md"
+        if not path.is_file():
+            absent.append(name)
+            continue
+        text = path.read_text(encoding="utf-8")
+        title = text.splitlines()[0].removeprefix("## ")
+        parts += [f'<h3 id="{name}">{escape(title)}</h3>', markdown_to_html(text, escape)]
+    return parts + _absent(absent)
+
+
+def _figures(root: Path) -> list[str]:
+    parts, absent = [], []
+    for name, kind in FIGURES.items():
+        path = root / "figures" / f"{name}.png"
+        if path.is_file():
+            parts.append(page.inline_image(path, kind.caption))
+        else:
+            absent.append(name)
+    return parts + _absent(absent)
+
+
+def _absent(names: list[str]) -> list[str]:
+    return [f"<p>Not made in this run: {escape(', '.join(names))}.</p>"] if names else []
+
+
+def _comparisons(claims: pd.DataFrame) -> list[str]:
+    """Return the parts that the compound claims are made of, for whoever checks one."""
+    rows = []
+    for part in claims.to_dict("records"):
+        unit = UNIT_OF.get(str(part["statistic"]), "")
+        interval = "–"
+        if np.isfinite(part["difference"]):
+            interval = (
+                f"{number(part['difference'])} "
+                f"({number(part['ci_low'])} to {number(part['ci_high'])})"
+            )
+        figures = [
+            f"{number(part[column])}{unit}" if np.isfinite(part[column]) else "–"
+            for column in ("value", "versus_value")
+        ]
+        rows.append(
+            [
+                escape(part["id"]),
+                escape(str(part["statistic"]).replace("_", " ")),
+                escape(part["subject"]),
+                figures[0],
+                escape(part["versus"]),
+                figures[1],
+                interval,
+                escape(part["part_verdict"]),
+            ]
+        )
+    header = (
+        "Claim",
+        "Statistic",
+        "Better",
+        "Value",
+        "Than",
+        "Value",
+        "Difference (95 %)",
+        "Verdict",
+    )
+    return [page.table(header, rows, "text")]
+
+
+def _settings(configuration: str, provenance: Mapping[str, Any]) -> list[str]:
+    machine = [
+        ("Python", str(provenance.get("python", "not recorded"))),
+        ("Platform", str(provenance.get("platform", "not recorded"))),
+    ]
+    packages = provenance.get("packages", {})
+    versions = ", ".join(f"{name} {packages[name]}" for name in sorted(packages))
+    return [
+        page.facts([*machine, ("Packages", versions)]),
+        f"<pre>{escape(configuration.strip())}</pre>",
+    ]
+
+
+def _runtime(root: Path) -> list[str]:
+    runtime = load_runtime(root)
+    if runtime.empty:
+        return ["<p>No job was timed in this run.</p>"]
+    rows = [
+        [
+            escape(rule["rule"]),
+            str(int(rule["jobs"])),
+            f"{rule['cpu_s']:,.1f}",
+            f"{rule['wall_s']:,.1f}",
+            f"{rule['max_rss_mb']:,.0f}" if np.isfinite(rule["max_rss_mb"]) else "–",
+        ]
+        for rule in runtime.to_dict("records")
+    ]
+    rows.append(
+        [
+            "all",
+            str(int(runtime["jobs"].sum())),
+            f"{runtime['cpu_s'].sum():,.1f}",
+            f"{runtime['wall_s'].sum():,.1f}",
+            f"{runtime['max_rss_mb'].max():,.0f}" if runtime["max_rss_mb"].notna().any() else "–",
+        ]
+    )
+    header = ("Rule", "Jobs", "Processor (s)", "Wall clock (s)", "Largest memory (MB)")
+    return [
+        page.table(header, rows),
+        page.notes(["Sums over jobs, some of which ran side by side; memory is of one job."]),
+    ]

@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import i0e, i1e
+
+from nbv.calibration import density
+
+B = 24
+
+
+def random_pairs(seed: int, n: int = 300):
+    rng = np.random.default_rng(seed)
+    truth = rng.integers(0, 360, n).astype(float)
+    return (truth + rng.normal(0, 25, n)) % 360, truth
+
+
+def brute_force_smooth(counts, kernel):
+    n = len(counts)
+    out = np.zeros_like(counts)
+    for e in range(n):
+        for g in range(n):
+            for a in range(n):
+                for b in range(n):
+                    out[e, g] += counts[a, b] * kernel[(e - a) % n] * kernel[(g - b) % n]
+    return out
+
+
+def test_smoothing_is_the_double_sum_over_the_torus():
+    counts = density.pair_counts(*random_pairs(0, 40), 12)
+    expected = brute_force_smooth(counts, density.von_mises_kernel(12, 25.0))
+    np.testing.assert_allclose(density.smooth(counts, 25.0), expected, atol=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 99), st.integers(0, B - 1), st.sampled_from([0.0, 10.0, 40.0]))
+def test_turning_the_object_rolls_both_likelihoods(seed, k, bandwidth):
+    estimate, truth = random_pairs(seed)
+    kwargs = {"bandwidth_deg": bandwidth, "pseudo_observations": 5.0, "n_bins": B}
+    before = density.likelihoods(estimate, truth, **kwargs)
+    turn = k * 360 / B
+    after = density.likelihoods((estimate + turn) % 360, (truth + turn) % 360, **kwargs)
+    for one, two in ((before.viewpoint, after.viewpoint), (before.estimate, after.estimate)):
+        np.testing.assert_allclose(np.roll(one, (k, k), (0, 1)), two, atol=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 99), st.floats(0.5, 60), st.floats(0, 100))
+def test_rows_are_distributions(seed, bandwidth, alpha):
+    pair = density.likelihoods(
+        *random_pairs(seed, 20), bandwidth_deg=bandwidth, pseudo_observations=alpha, n_bins=B
+    )
+    for rows in (pair.viewpoint, pair.estimate):
+        assert (rows >= 0).all()
+        np.testing.assert_allclose(rows.sum(axis=1), 1.0)
+
+
+def test_smoothing_keeps_the_number_of_pairs():
+    counts = density.pair_counts(*random_pairs(1), 360)
+    assert counts.sum() == 300
+    assert density.smooth(counts, 8.0).sum() == pytest.approx(300)
+
+
+def test_kernel_is_von_mises_by_its_entropy():
+    """Against the closed form of the entropy, log(2 pi I0(k)) - k I1(k)/I0(k)."""
+    sigma = 20.0
+    kappa = 1 / np.radians(sigma) ** 2
+    kernel = density.von_mises_kernel(720, sigma)
+    cell = 2 * np.pi / 720
+    differential = -np.sum(kernel * np.log(kernel / cell))
+    log_i0 = np.log(i0e(kappa)) + kappa
+    closed = np.log(2 * np.pi) + log_i0 - kappa * i1e(kappa) / i0e(kappa)
+    assert differential == pytest.approx(closed, abs=1e-9)
+
+
+def test_kernel_is_continuous_across_zero_and_even():
+    kernel = density.von_mises_kernel(360, 6.0)
+    np.testing.assert_allclose(kernel[1:], kernel[1:][::-1])
+    assert kernel[0] > kernel[1] > kernel[2]
+
+
+def test_no_smoothing_and_no_pseudo_observations_are_the_plain_frequencies():
+    estimate, truth = [10.0, 10.0, 10.0, 200.0], [10.0, 20.0, 20.0, 200.0]
+    pair = density.likelihoods(estimate, truth, bandwidth_deg=0, pseudo_observations=0, n_bins=36)
+    assert pair.viewpoint[1, 1] == pytest.approx(1 / 3)
+    assert pair.viewpoint[1, 2] == pytest.approx(2 / 3)
+    assert pair.estimate[2, 1] == 1.0
+    np.testing.assert_allclose(pair.viewpoint[5], 1 / 36)  # never seen: uniform
+
+
+def test_pseudo_observations_weigh_the_same_at_any_number_of_bins():
+    estimate, truth = random_pairs(3, 4000)
+    fine, coarse = (
+        density.likelihoods(
+            estimate, truth, bandwidth_deg=20, pseudo_observations=30, n_bins=n
+        ).viewpoint
+        for n in (360, 120)
+    )
+    merged = fine[::3].reshape(120, 120, 3)
+    # Bins are centred: three fine bins straddle the coarse one when rolled by one.
+    merged = np.roll(fine[::3], 1, axis=1).reshape(120, 120, 3).sum(axis=2)
+    np.testing.assert_allclose(merged, coarse, atol=2e-3)
+
+
+@pytest.mark.parametrize("kwargs", [{"bandwidth_deg": -1.0}, {"pseudo_observations": -1.0}])
+def test_negative_settings_are_refused(kwargs):
+    full = {"bandwidth_deg": 5.0, "pseudo_observations": 1.0} | kwargs
+    with pytest.raises(ValueError, match="0 or more"):
+        density.likelihoods([1.0], [2.0], **full)

@@ -1,0 +1,56 @@
+"""All meshes of a category at once."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+import trimesh
+from mesh_files import put, source_of
+
+from nbv.errors import UserError
+from nbv.meshes import preparation
+from nbv.meshes.preparation import prepare_meshes
+
+
+@pytest.fixture
+def root(tmp_path):
+    for i in range(12):
+        put(tmp_path / "mug" / f"m{i:02d}.ply", trimesh.creation.icosphere(subdivisions=i % 3))
+    return tmp_path
+
+
+def test_the_number_of_processes_changes_nothing(root):
+    source = source_of("folder", root=str(root))
+    ids = source.object_ids("mug")[::-1]
+    alone, together = (prepare_meshes(source, "mug", ids, workers) for workers in (1, 2))
+    assert list(alone) == list(together) == ids
+    for one, other in zip(alone.values(), together.values(), strict=True):
+        assert np.array_equal(one.vertices, other.vertices)
+        assert np.array_equal(one.faces, other.faces)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_every_bad_file_is_logged_and_the_first_is_raised(root, caplog, workers):
+    bad = [root / "mug" / f"m{i:02d}.ply" for i in (3, 7, 8)]
+    for path in bad:
+        path.write_bytes(b"")
+    source = source_of("folder", root=str(root))
+    with pytest.raises(UserError, match=r"and 2 more, logged above.*dataset.exclude") as caught:
+        prepare_meshes(source, "mug", source.object_ids("mug"), workers)
+    assert str(caught.value).startswith(str(bad[0]))
+    assert "\n" not in str(caught.value)
+    errors = [record.message for record in caplog.records if record.levelno == logging.ERROR]
+    assert [line.startswith(str(path)) for line, path in zip(errors, bad, strict=True)] == [
+        True
+    ] * 3
+
+
+def test_progress_is_logged(root, caplog, monkeypatch):
+    monkeypatch.setattr(preparation, "_SECONDS_BETWEEN_LINES", 0.0)
+    source = source_of("folder", root=str(root))
+    with caplog.at_level(logging.INFO, logger="nbv"):
+        prepare_meshes(source, "mug", source.object_ids("mug"))
+    assert "mug: mesh 3 of 12" in caplog.text
+    assert "mug: 12 meshes prepared" in caplog.text

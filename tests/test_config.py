@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nbv.config import load_config, snakemake_overrides
+from nbv.errors import UserError
+from nbv.estimation import hardware
+from nbv.recommendation import criteria
+from nbv.rendering.camera import FRAMINGS
+from nbv.schema import CHOICES as CHOICES_OF_CODE
+
+CONFIG = Path(__file__).parents[1] / "config"
+CHOICES = [f"{path.parent.name}={path.stem}" for path in sorted(CONFIG.glob("*/*.yaml"))]
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+def test_every_choice_composes_and_validates(choice):
+    assert load_config(CONFIG, [choice])["name"]
+
+
+def test_the_default_is_the_paper():
+    config = load_config(CONFIG)
+    assert config["name"] == "paper"
+    assert (config["n_objects"], config["n_folds"]) == (125, 5)
+    units = [(c, e) for c in config["categories"] for e in config["elevations_deg"][c]]
+    assert len(units) == 10
+
+
+def test_names_are_those_that_the_code_knows():
+    assert CHOICES_OF_CODE["camera.framing"] == FRAMINGS
+    assert CHOICES_OF_CODE["density.reading"] == criteria.READINGS
+    assert CHOICES_OF_CODE["density.spread"] == tuple(criteria.SPREADS)
+    assert CHOICES_OF_CODE["estimator.device"] == hardware.DEVICES
+    assert CHOICES_OF_CODE["estimator.precision"] == hardware.PRECISIONS
+
+
+def plain(value) -> bool:
+    if isinstance(value, dict):
+        return all(type(key) is str and plain(item) for key, item in value.items())
+    if isinstance(value, list):
+        return all(map(plain, value))
+    return type(value) in (str, int, float, bool, type(None))
+
+
+def test_values_are_plain_python_which_is_all_that_snakemake_compares():
+    assert plain(load_config(CONFIG))
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("estimator.epocs=3", "'estimator.epocs' is unknown: did you mean 'estimator.epochs'?"),
+        ("sed=1", "'sed' is unknown: did you mean 'seed'?"),
+        ("renderer=foo", "renderer=foo is unknown: choose from: embree, pyrender"),
+        ("renderer=pyrendr", "renderer=pyrendr is unknown: did you mean 'pyrender'?"),
+        ("experiment=quik", "did you mean 'quick'?"),
+        ("renderer.name=embre", "renderer.name=embre is unknown: did you mean 'embree'?"),
+        ("camera.framing=axs", "camera.framing=axs is unknown: did you mean 'axis'?"),
+        ("density.reading=truth", "density.reading=truth is unknown"),
+        ("density.spread=entrop", "density.spread=entrop is unknown: did you mean 'entropy'?"),
+        ("estimator.epochs=many", "'estimator.epochs': Value 'many'"),
+        ("n_objects=1.5", "'n_objects': Value '1.5'"),
+        ("categories=[mgu]", "'mgu' is unknown: did you mean 'mug'?"),
+        ("elevations_deg.mug=[95]", "elevations_deg.mug: 95 is outside 0 to 89"),
+        ("estimator.epochs=0", "estimator.epochs=0 is out of range: 1 or more"),
+        ("n_folds=1", "n_folds=1 is out of range: 2 or more"),
+        ("density.bandwidths_deg=[]", "density.bandwidths_deg=[] is out of range"),
+        ("name='a b'", "name=a b: use letters"),
+        ("estimator", "is not of the form key=value"),
+    ],
+)
+def test_a_mistake_is_one_line_with_its_key(override, message):
+    with pytest.raises(UserError) as caught:
+        load_config(CONFIG, [override])
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_another_data_set_gets_its_own_folder():
+    assert load_config(CONFIG, ["dataset=shapenet"])["name"] == "paper-shapenet"
+    assert load_config(CONFIG, ["dataset=shapenet", "name=mine"])["name"] == "mine"
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"experiment": "quick"}, ["experiment=quick"]),
+        ({"n_objects": None}, ["n_objects=null"]),
+        ({"overrides": ["a=1", "b=2"]}, ["a=1", "b=2"]),
+        ({"overrides": "[a=[1,2],b={c:[3,4]},d=5]"}, ["a=[1,2]", "b={c:[3,4]}", "d=5"]),
+        ({"overrides": "a=[1,2]"}, ["a=[1,2]"]),
+        ({}, []),
+    ],
+)
+def test_what_snakemake_hands_over(given, expected):
+    assert snakemake_overrides(given) == expected
