@@ -22,7 +22,6 @@ from nbv.files import write_csv, write_text
 
 _METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}
 _MINUS = "\u2212"
-_WIDE = 7
 
 
 @dataclass(frozen=True)
@@ -62,15 +61,19 @@ def to_markdown(table: Table) -> str:
 
 
 def to_latex(table: Table) -> str:
-    r"""Return the table as a ``table`` environment; needs ``\usepackage{booktabs}``."""
+    r"""Return the table as a ``table`` environment, shrunk to the line where it is wider.
+
+    Needs ``\usepackage{booktabs,graphicx}``.
+    """
     grid = _grid(table)
     lines = [
-        "% needs \\usepackage{booktabs}",
+        "% needs \\usepackage{booktabs,graphicx}",
         "\\begin{table}",
         "\\centering",
         f"\\caption{{{escape_latex(table.title)}}}",
         f"\\label{{tab:{table.name}}}",
-        "\\small" if len(grid.header) <= _WIDE else "\\scriptsize\\setlength{\\tabcolsep}{2.5pt}",
+        "\\small",
+        "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{%",
         f"\\begin{{tabular}}{{l{'r' * (len(grid.header) - 1)}}}",
         "\\toprule",
         _latex_row([escape_latex(text) for text in grid.header]),
@@ -83,7 +86,7 @@ def to_latex(table: Table) -> str:
             text = f"\\textbf{{{text}}}" if cell.best else text
             texts.append(f"{text} {escape_latex(cell.printed)}".rstrip())
         lines.append(_latex_row(texts))
-    lines += ["\\bottomrule", "\\end{tabular}", "", "\\footnotesize\\raggedright"]
+    lines += ["\\bottomrule", "\\end{tabular}}", "", "\\footnotesize\\raggedright"]
     lines += [f"{escape_latex(note)}\\par" for note in _notes(table)]
     return "\n".join([*lines, "\\end{table}"]) + "\n"
 

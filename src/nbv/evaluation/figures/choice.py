@@ -55,7 +55,7 @@ def ambiguity(inputs: FigureInputs) -> Figure:
         linewidth=0.8,
         hatch=["", "....", "////"],
     )
-    bars.bar_label(drawn, fmt="%.2f", padding=2)
+    bars.bar_label(drawn, fmt="%.3f", padding=2)
     bars.set_xticks(range(3), [name for _, name in candidates])
     bars.set_xlim(-0.6, 2.6)
     bars.set_ylim(0, max(values) * 1.18)
@@ -133,7 +133,7 @@ def idea(inputs: FigureInputs) -> Figure:
         axes.set_ylim(0, top)
         axes.set_title(titles[row])
         axes.set_ylabel(f"Probability per {step:g}°")
-        axes.legend(loc="upper right", fontsize=8)
+        axes.legend(loc="best", fontsize=8)
         last = row == len(curves) - 1
         azimuth_axis(axes, "Pose: azimuth of the first view (degrees)" if last else "")
     figure.suptitle(f"One viewpoint and two: {shown.title}", fontsize=10)

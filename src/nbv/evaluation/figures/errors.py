@@ -26,7 +26,7 @@ def boxplots(inputs: FigureInputs) -> Figure:
     """Fig. 9: minimum, quartiles, median and maximum, and the same without the upper tail."""
     units = reference_units(inputs.evaluations, inputs.settings)
     methods = inputs.methods(units[0])
-    figure = new_figure(max(1.5 * len(units) + 1.2, 4.5), 6.4)
+    figure = new_figure(max(1.5 * len(units) + 1.2, 6.0), 6.4)
     whole, close = figure.subplots(2, 1)
     errors = {unit: _paired(inputs, unit).errors_deg for unit in units}
     for axes, whiskers in ((whole, (0, 100)), (close, (5, 95))):
@@ -182,7 +182,7 @@ def _panels(units: Sequence[Unit], height_in: float) -> tuple[Figure, list[Axes]
     """Return one panel a unit, at most three abreast; cells left over are removed."""
     columns = min(len(units), _COLUMNS)
     rows = -(-len(units) // columns)
-    figure = new_figure(max(2.9 * columns, 4.0), height_in * rows + 0.7)
+    figure = new_figure(max(2.9 * columns, 6.4), height_in * rows + 0.7)
     panels = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
     for spare in panels[len(units) :]:
         spare.remove()

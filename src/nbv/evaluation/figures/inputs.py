@@ -19,6 +19,8 @@ from nbv.evaluation.settings import ReadingSettings, focus_unit
 
 Codes = NDArray[np.uint8]
 
+_LONGEST_NAME = 16
+
 
 @dataclass(frozen=True)
 class FigureInputs:
@@ -101,7 +103,10 @@ class ExampleView:
         """Which object this is."""
         category, elevation = self.unit
         fold = self.example.fold
-        return f"{category} {self.example.object_id} (fold {fold}, elevation {elevation}°)"
+        # Hashes of 32 digits fill the line; eight tell objects apart, and Table 6 has all.
+        name = self.example.object_id
+        short = name if len(name) <= _LONGEST_NAME else f"{name[:8]}…"
+        return f"{short} ({category}, fold {fold}, elevation {elevation}°)"
 
 
 def example_view(inputs: FigureInputs) -> ExampleView:

@@ -56,7 +56,7 @@ def _load(
     run, middle, low = start + front, (start - front) / 2, floor + 0.1
     kind = rng.choice(["box", "tank", "bed"], p=[0.6, 0.15, 0.25])
     if kind == "box":
-        top = cab + rng.uniform(-0.2, 0.9)
+        top = cab + rng.uniform(0.0, 0.9)
         centre, extents = (middle, 0.0, (low + top) / 2), (run, 2.04 * half_width, top - low)
         return [box(centre, extents, exponent=20.0, bevel=0.03)]
     if kind == "tank":
@@ -76,7 +76,7 @@ def bus(rng: np.random.Generator) -> Solids:
     front, belt = length / 2, rng.uniform(0.42, 0.52) * height
     axles = (front - rng.uniform(0.12, 0.24) * length, -front + rng.uniform(0.2, 0.3) * length)
     line = np.array([[-front, belt], [front, belt]])
-    rake, back = rng.uniform(0.1, 0.55), rng.uniform(0.0, 0.2)
+    rake, back = rng.uniform(0.2, 0.6), rng.uniform(0.0, 0.15)
     parts = [
         hull(rng, line, half_width, clearance, axles, wheel),
         cabin(rng, (-front + 0.02, front - 0.02), (-front + back, front - rake), (belt, height),

@@ -10,7 +10,7 @@ from nbv.meshes.procedural.solids import Points, fillet, join, revolve, superell
 # Fine enough that the facets of the body do not tell a camera where it stands.
 _AROUND = 96
 # How far a handle's centre line stands out: small, usual and large, in heights of the mug.
-_REACHES = ((0.09, 0.16), (0.18, 0.3), (0.3, 0.48))
+_REACHES = ((0.08, 0.15), (0.16, 0.3), (0.3, 0.52))
 
 
 def mug(rng: np.random.Generator) -> trimesh.Trimesh:
@@ -24,7 +24,7 @@ def mug(rng: np.random.Generator) -> trimesh.Trimesh:
 def _body_curve(rng: np.random.Generator) -> Points:
     """Return the outer wall as (m, 2) of (radius, height), heights rising from 0 to 1."""
     height = np.linspace(0.0, 1.0, 25)
-    radius = rng.uniform(0.3, 0.56) * np.ones_like(height)
+    radius = rng.uniform(0.28, 0.6) * np.ones_like(height)
     plan = rng.choice(
         ["straight", "tapered", "waisted", "barrel", "flared", "cup"],
         p=[0.4, 0.2, 0.1, 0.12, 0.09, 0.09],
@@ -60,15 +60,15 @@ def _cup(outer: Points, wall: float, floor: float) -> trimesh.Trimesh:
 
 
 def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Trimesh:
-    """Return the handle, both its ends buried in the wall."""
+    """Return the handle, its ends buried in the wall; a hook has its lower end free."""
     # From a finger ring to a tankard's: this alone sets how wide a range the body hides.
-    low, high = _REACHES[rng.choice(3, p=[0.12, 0.53, 0.35])]
+    low, high = _REACHES[rng.choice(3, p=[0.15, 0.45, 0.4])]
     reach = rng.uniform(low, high)
     span = float(np.clip(rng.uniform(1.2, 2.6) * reach + rng.uniform(0.0, 0.2), 0.24, 0.76))
     top = rng.uniform(max(0.12 + span, 0.6), 0.94)
     heights = np.array([top, top - span])
     radii = np.interp(heights, outer[:, 1], outer[:, 0])
-    style = rng.choice(["round", "square", "d", "ear"], p=[0.3, 0.25, 0.2, 0.25])
+    style = str(rng.choice(["round", "square", "d", "ear"], p=[0.3, 0.25, 0.2, 0.25]))
     side = _handle_curve(rng, style, reach, span)
     ends = radii - 0.5 * wall
     # Straight between the two ends of the wall, plus how far the handle stands out from it.
@@ -77,11 +77,13 @@ def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Tri
     out = ends[0] + (ends[1] - ends[0]) * np.clip(along, 0.0, 1.0) + side[:, :1]
     up = top + side[:, 1:] - side[:1, 1:]
     path = np.concatenate([np.zeros_like(t), -out, up], axis=1)
-    half_width = np.exp(rng.uniform(np.log(0.02), np.log(0.12)))
-    half_thick = min(np.exp(rng.uniform(np.log(0.018), np.log(0.055))), 0.35 * reach)
+    half_width = np.exp(rng.uniform(np.log(0.015), np.log(0.13)))
+    half_thick = min(np.exp(rng.uniform(np.log(0.013), np.log(0.055))), 0.35 * reach)
     outline = superellipse(half_width, half_thick, rng.uniform(2.0, 5.0), n=20)
     swell = 1.0 + rng.uniform(0.0, 0.5) * np.abs(2.0 * t[:, 0] - 1.0) ** 3
-    return sweep(path, outline, (1.0, 0.0, 0.0), scale=swell)
+    hook = style in ("round", "ear") and rng.random() < 0.12
+    kept = int(rng.uniform(0.7, 0.9) * len(path)) if hook else len(path)
+    return sweep(path[:kept], outline, (1.0, 0.0, 0.0), scale=swell[:kept])
 
 
 def _handle_curve(rng: np.random.Generator, style: str, reach: float, span: float) -> Points:

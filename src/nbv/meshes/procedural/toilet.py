@@ -28,8 +28,8 @@ from nbv.meshes.procedural.solids import (
 
 Solids = list[trimesh.Trimesh]
 _POINTS = 40
-_KINDS = {"two-piece": 0.38, "one-piece": 0.18, "high cistern": 0.11, "no cistern": 0.15,
-          "wall-hung": 0.1, "chest": 0.08}  # fmt: skip
+_KINDS = {"two-piece": 0.42, "one-piece": 0.2, "high cistern": 0.11, "no cistern": 0.11,
+          "wall-hung": 0.11, "chest": 0.05}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def _cistern(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
         return _tank(rng, front, low, low + rng.uniform(0.2, 0.42), rng.uniform(0.15, 0.26))
     if kind == "one-piece":
         low = rng.choice([0.0, 0.7 * rim])
-        return _tank(rng, front, low, rim + rng.uniform(0.06, 0.38), rng.uniform(0.16, 0.2))
+        return _tank(rng, front, low, rim + rng.uniform(0.1, 0.38), rng.uniform(0.16, 0.2))
     if kind == "wall-hung":
         wall = (0.12, rng.uniform(0.4, 0.6), rng.uniform(0.6, 1.1))
         centre = (bowl.back - 0.04, 0.0, wall[2] / 2)

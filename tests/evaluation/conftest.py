@@ -1,0 +1,27 @@
+"""One small results tree for all tests of the reading side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import synthetic
+
+from nbv.evaluation.results import load_evaluations
+
+UNITS = (("mug", 0), ("mug", 30), ("chair", 0))
+N_FOLDS = 3
+
+
+@pytest.fixture(scope="session")
+def tree(tmp_path_factory):
+    return synthetic.build_tree(tmp_path_factory.mktemp("results") / "synthetic", UNITS)
+
+
+@pytest.fixture(scope="session")
+def evaluations(tree):
+    return load_evaluations(tree, UNITS, N_FOLDS, synthetic.METHODS)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)

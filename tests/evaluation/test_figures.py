@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+import synthetic
+from matplotlib.image import imread
+
+from nbv.errors import UserError
+from nbv.evaluation import examples
+from nbv.evaluation.figures import FIGURES, FigureInputs, build_figure, save_figure
+from nbv.evaluation.figures.choice import entropy_nats, pose_likelihood
+from nbv.evaluation.figures.depth import depth_limits, shade
+from nbv.evaluation.settings import ReadingSettings
+
+
+@pytest.fixture(scope="module")
+def inputs(tree, evaluations):
+    return FigureInputs(tree, evaluations)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures_draw_and_are_written_the_same_twice(inputs, tmp_path, name):
+    before = dict(mpl.rcParams)
+    first = save_figure(build_figure(name, inputs), tmp_path / "a" / name)
+    second = save_figure(build_figure(name, inputs), tmp_path / "b" / name)
+    assert dict(mpl.rcParams) == before
+    assert [path.suffix for path in first] == [".png", ".pdf"]
+    for one, other in zip(first, second, strict=True):
+        assert one.read_bytes() == other.read_bytes()
+    image = imread(first[0])
+    assert image.shape[1] >= 500
+    assert np.ptp(image[..., :3]) == 1.0
+    for word in (b"Software", b"Creation"):
+        assert word not in first[0].read_bytes()
+    assert b"CreationDate" not in first[1].read_bytes()
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_quantity_on_an_axis_has_a_unit(inputs, name):
+    for axes in build_figure(name, inputs).axes:
+        for label in (axes.get_xlabel(), axes.get_ylabel()):
+            if "error" in label.lower() and "pose" not in label:
+                assert "degrees" in label
+            if "azimuth" in label.lower() or "δ (" in label:
+                assert "degrees" in label
+            if "A[e" in label:
+                assert "nats" in label
+
+
+@pytest.mark.parametrize("units", [[("mug", 0)], [("mug", 0), ("mug", 30), ("chair", 0)]])
+def test_text_stays_inside_the_figure(tree, evaluations, units):
+    few = FigureInputs(tree, {unit: evaluations[unit] for unit in units})
+    for name in FIGURES:
+        figure = build_figure(name, few)
+        figure.canvas.draw()
+        width, height = figure.canvas.get_width_height()
+        texts = [text for axes in figure.axes for text in (axes.title, axes.xaxis.label)]
+        texts += [axes.yaxis.label for axes in figure.axes] + figure.texts
+        shown = [text for text in texts if text.get_text() and text.get_visible()]
+        for artist in [*shown, *figure.legends]:
+            box = artist.get_window_extent()
+            assert box.x0 >= -1, (name, artist)
+            assert box.y0 >= -1, (name, artist)
+            assert box.x1 <= width + 1, (name, artist)
+            assert box.y1 <= height + 1, (name, artist)
+
+
+def test_figures_work_for_one_category_and_one_fold(tree, evaluations):
+    frame = evaluations["chair", 0]
+    few = {("chair", 0): frame[(frame["fold"] == 2) & frame["method"].isin(["single", "proposed"])]}
+    for name in FIGURES:
+        build_figure(name, FigureInputs(tree, few))
+
+
+def test_methods_beyond_the_papers_are_drawn(tree, evaluations):
+    frame = evaluations["mug", 0].astype({"method": str})
+    extra = frame[frame["method"] == "proposed"].assign(method="expected_error")
+    joined = {("mug", 0): pd.concat([frame, extra], ignore_index=True)}
+    settings = ReadingSettings(methods=(*synthetic.METHODS, "expected_error"))
+    for name in ("figure7", "figure9", "pea", "azimuth"):
+        build_figure(name, FigureInputs(tree, joined, settings))
+
+
+def test_nearer_is_brighter_and_background_is_white():
+    codes = np.array([[0, 50, 120, 200]], dtype=np.uint8)
+    assert depth_limits(codes) == (50, 200)
+    grey = shade(codes, (50, 200))[0]
+    assert grey[0] == 1.0
+    assert grey[1] < grey[2] < grey[3] < 0.9
+    assert depth_limits(np.zeros((2, 2), np.uint8)) == (1, 255)
+
+
+def test_the_shown_pose_likelihood_has_the_entropy_that_the_table_stores():
+    rng = np.random.default_rng(0)
+    truth = np.arange(360)
+    estimates = (truth + rng.normal(0, 6, (5, 360))) % 360
+    arrays = synthetic.lookup_arrays(estimates, delta_step=60)
+    one = arrays["viewpoint_likelihood"].astype(float)
+    for delta in (0, 60, 180):
+        spread = pose_likelihood(one[25], one, delta)
+        assert spread.sum() == pytest.approx(1.0, abs=1e-4)
+        assert entropy_nats(spread) == pytest.approx(arrays["ambiguity"][25, delta], abs=1e-3)
+
+
+def test_entropy_of_a_uniform_distribution():
+    assert entropy_nats(np.full(360, 1 / 360)) == pytest.approx(np.log(360))
+    assert entropy_nats(np.eye(4)[0]) == 0.0
+
+
+def test_the_hardest_azimuth_of_the_mug_is_in_the_hidden_range(evaluations):
+    assert 30 <= examples.hardest_azimuth_deg(evaluations["mug", 0]) <= 150
+
+
+def test_mistakes_are_named(inputs, tmp_path, evaluations):
+    with pytest.raises(UserError, match="no figure 'figure1'; did you mean 'figure"):
+        build_figure("figure1", inputs)
+    with pytest.raises(UserError, match="no evaluated category"):
+        build_figure("pea", FigureInputs(tmp_path, {}))
+    with pytest.raises(UserError, match="does not exist"):
+        build_figure("figure5", FigureInputs(tmp_path, evaluations))

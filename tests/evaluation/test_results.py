@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import synthetic
+from conftest import N_FOLDS, UNITS
+
+from nbv.errors import UserError
+from nbv.evaluation import methods, results
+
+
+def test_columns_are_those_that_methods_write():
+    assert methods.COLUMNS == results.EVALUATION_COLUMNS
+
+
+def test_a_unit_has_every_method_fold_object_and_view(evaluations):
+    frame = evaluations["mug", 0]
+    assert list(frame.columns) == ["method", "fold", *results.EVALUATION_COLUMNS]
+    assert len(frame) == 4 * 9 * synthetic.N_VIEWS
+    assert list(frame["method"].cat.categories) == list(synthetic.METHODS)
+    assert set(frame["object_id"]) == {f"{index:04d}" for index in range(9)}
+    assert frame.loc[frame["method"] == "single", "delta_deg"].isna().all()
+
+
+def test_units_are_found(tree):
+    assert results.discover_units(tree) == sorted(UNITS)
+
+
+def test_objects_come_in_the_order_of_the_depth_images(tree):
+    assert results.load_object_ids(tree, "mug") == tuple(f"{index:04d}" for index in range(9))
+    assert results.load_depth(tree, "mug", 0).shape[:2] == (9, 360)
+
+
+def test_a_missing_file_is_named(tree):
+    with pytest.raises(UserError, match=r"el00/fold4/single\.csv does not exist"):
+        results.load_unit(tree, "mug", 0, N_FOLDS + 1, synthetic.METHODS)
+    with pytest.raises(UserError, match=r"el45\.npy does not exist"):
+        results.load_depth(tree, "mug", 45)
+    with pytest.raises(UserError, match=r"magic\.npz does not exist"):
+        results.load_lookup(tree, "mug", 0, 1, "magic")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "no column 'object_id'"),
+        ("object_id,initial_deg\n", "no column 'initial_estimate_deg'"),
+    ],
+)
+def test_a_broken_file_is_named(tmp_path, text, message):
+    path = results.evaluation_path(tmp_path, "mug", 0, 1, "single")
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    with pytest.raises(UserError, match=message):
+        results.load_unit(tmp_path, "mug", 0, 1, ["single"])
+
+
+def test_an_empty_table_is_named(tmp_path):
+    path = results.evaluation_path(tmp_path, "mug", 0, 1, "single")
+    path.parent.mkdir(parents=True)
+    path.write_text(",".join(results.EVALUATION_COLUMNS) + "\n")
+    with pytest.raises(UserError, match="holds no rows"):
+        results.load_unit(tmp_path, "mug", 0, 1, ["single"])
+
+
+def test_lookups_are_read_whole(tree):
+    lookup = results.load_lookup(tree, "mug", 0, 1, "entropy")
+    np.testing.assert_allclose(lookup["viewpoint_likelihood"].sum(axis=1), 1, atol=1e-4)

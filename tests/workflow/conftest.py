@@ -1,0 +1,118 @@
+"""A copy of the project, small runs of its real Snakefile, and ways to look at them."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PARTS = ("Snakefile", "config", "workflow", "profiles", "src")
+TINY = (
+    "categories=[mug,chair]",
+    "elevations_deg.mug=[0]",
+    "n_objects=6",
+    "n_resamples=100",
+    "camera.image_side=16",
+    "estimator.channels=[4,8]",
+    "estimator.epochs=1",
+    "density.bandwidths_deg=[8,20]",
+    "density.pseudo_observations=[10]",
+    "density.n_parts=2",
+    "name=tiny",
+)
+
+
+@dataclass(frozen=True)
+class Project:
+    """A working copy in which the workflow can be run."""
+
+    folder: Path
+
+    @property
+    def results(self) -> Path:
+        return self.folder / "results" / "tiny"
+
+    def command(self, *arguments: str, overrides: tuple[str, ...] = TINY) -> list[str]:
+        joined = ",".join(overrides)
+        base = [sys.executable, "-m", "snakemake", *arguments]
+        return [*base, "--config", "experiment=quick", f"overrides=[{joined}]"]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        own = os.environ | {"PYTHONPATH": str(self.folder / "src")}
+        own.pop("SNAKEMAKE_PROFILE", None)
+        return own
+
+    def run(
+        self, *arguments: str, overrides: tuple[str, ...] = TINY, fails: bool = False
+    ) -> subprocess.CompletedProcess[str]:
+        done = subprocess.run(
+            self.command(*arguments, overrides=overrides),
+            cwd=self.folder,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=600,
+        )
+        assert (done.returncode != 0) == fails, done.stdout + done.stderr
+        return done
+
+    def would_run(self, *more: str) -> dict[str, int]:
+        """Return how many jobs of which rule a run with more overrides would start."""
+        done = self.run(
+            "--cores", "2", "--dry-run", "--workflow-profile", "none", overrides=(*TINY, *more)
+        )
+        stats = re.search(r"^job +count\n[- ]+\n(.*?)\n\n", done.stdout, re.M | re.S)
+        if stats is None:
+            assert "Nothing to be done" in done.stdout + done.stderr
+            return {}
+        counts = dict(line.split() for line in stats.group(1).splitlines())
+        return {name: int(n) for name, n in counts.items() if name not in ("all", "total")}
+
+    def outcome(self) -> dict[str, bytes]:
+        """Return the bytes of everything that has to be reproducible."""
+        kinds = ("evaluation/**/*.csv", "estimates/**/*.csv", "splits/*.csv", "tables/*")
+        kinds += ("lookup/**/*.npz", "depth/**/*.npy", "estimators/**/*.safetensors")
+        kinds += ("claims.*", "figures/*", "meshes/*.npz")
+        paths = sorted(path for kind in kinds for path in self.results.glob(kind))
+        return {str(path.relative_to(self.results)): path.read_bytes() for path in paths}
+
+
+def copy_of_project(folder: Path) -> Project:
+    for part in PARTS:
+        source = ROOT / part
+        if source.is_dir():
+            ignored = shutil.ignore_patterns("__pycache__", "*.egg-info")
+            shutil.copytree(source, folder / part, symlinks=True, ignore=ignored)
+        else:
+            shutil.copy2(source, folder / part)
+    return Project(folder)
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    """A project after a whole tiny run on two cores. Not to be changed: see `scratch`."""
+    project = copy_of_project(tmp_path_factory.mktemp("finished"))
+    project.run("--cores", "2")
+    return project
+
+
+@pytest.fixture
+def scratch(finished: Project, tmp_path: Path) -> Project:
+    """A copy of the finished project, with what Snakemake remembers of it."""
+    shutil.copytree(finished.folder, tmp_path / "project", symlinks=True)
+    return Project(tmp_path / "project")
+
+
+@pytest.fixture
+def fresh(tmp_path: Path) -> Project:
+    """A project in which nothing has been run."""
+    (tmp_path / "project").mkdir()
+    return copy_of_project(tmp_path / "project")

@@ -1,0 +1,159 @@
+"""The real Snakefile, run small: what it writes, what it reruns, and that it can be stopped."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+
+pytestmark = pytest.mark.slow
+
+EVALUATED = ["single", "random", "opposite", "proposed"]
+READING = {"table": 7, "figure": 10, "claims": 1, "report": 1}
+
+
+def test_every_file_of_the_design_is_there_with_its_columns(finished):
+    results = finished.results
+    for category in ("mug", "chair"):
+        splits = pd.read_csv(results / "splits" / f"{category}.csv")
+        assert list(splits.columns) == ["object_id", "fold", "role"]
+        depth = np.load(results / "depth" / category / "el00.npy", mmap_mode="r")
+        assert depth.shape == (6, 360, 16, 16)
+        assert depth.dtype == np.uint8
+        for fold in (1, 2):
+            place = f"{category}/el00/fold{fold}"
+            assert (results / "estimators" / place / "estimator.safetensors").is_file()
+            for role in ("calibration", "test"):
+                estimates = pd.read_csv(results / "estimates" / place / f"{role}.csv")
+                assert list(estimates.columns) == [
+                    "object_id",
+                    "azimuth_deg",
+                    "estimate_deg",
+                    "concentration",
+                ]
+            with np.load(results / "lookup" / place / "entropy.npz") as lookup:
+                assert lookup["viewpoint_likelihood"].shape == (360, 360)
+                assert lookup["estimate_likelihood"].shape == (360, 360)
+                assert lookup["ambiguity"].dtype == np.float32
+                assert lookup["recommended_delta_deg"].shape == (360,)
+                assert lookup["bandwidth_deg"] in (8.0, 20.0)
+            for method in EVALUATED:
+                rows = pd.read_csv(results / "evaluation" / place / f"{method}.csv")
+                assert list(rows.columns) == [
+                    "object_id",
+                    "initial_deg",
+                    "initial_estimate_deg",
+                    "delta_deg",
+                    "next_estimate_deg",
+                    "pose_estimate_deg",
+                    "error_deg",
+                ]
+                assert len(rows) == 3 * 360
+                assert rows["delta_deg"].isna().all() == (method == "single")
+    for number in range(1, 8):
+        for kind in ("csv", "md", "tex"):
+            assert (results / "tables" / f"table{number}.{kind}").stat().st_size > 0
+    for name in ("figure2", "figure3", "figure5", "figure6", "figure7", "figure8", "figure9"):
+        assert (results / "figures" / f"{name}.png").stat().st_size > 5_000
+        assert (results / "figures" / f"{name}.pdf").stat().st_size > 5_000
+    for name in ("claims.csv", "claims.md", "report.html", "configuration.yaml"):
+        assert (results / name).stat().st_size > 0
+
+
+def test_a_finished_run_has_nothing_to_do(finished):
+    assert finished.would_run() == {}
+
+
+def test_another_bandwidth_reruns_lookups_and_what_follows(finished):
+    assert finished.would_run("density.bandwidths_deg=[11]") == {
+        "lookup": 4,
+        "evaluate_recommended": 4,
+        "settings": 1,
+        **READING,
+    }
+
+
+def test_another_training_length_reruns_training_and_what_follows(finished):
+    assert finished.would_run("estimator.epochs=2") == {
+        "train": 4,
+        "estimate": 4,
+        "lookup": 4,
+        "evaluate_baselines": 4,
+        "evaluate_recommended": 4,
+        "settings": 1,
+        **READING,
+    }
+
+
+def test_another_number_of_resamples_reruns_what_shows_intervals(finished):
+    assert finished.would_run("n_resamples=200") == {"settings": 1, **READING}
+
+
+def test_another_seed_reruns_everything(finished):
+    jobs = finished.would_run("seed=1")
+    assert jobs["meshes"] == 2
+    assert jobs["train"] == 4
+
+
+def test_an_edit_of_a_metric_reruns_what_reads_errors(scratch):
+    metrics = scratch.folder / "src/nbv/evaluation/metrics.py"
+    metrics.write_text(metrics.read_text() + "\n\nEDITED = True\n")
+    assert scratch.would_run() == READING
+
+
+def test_an_edit_of_a_criterion_leaves_training_alone(scratch):
+    criteria = scratch.folder / "src/nbv/recommendation/criteria.py"
+    criteria.write_text(criteria.read_text() + "\n\nEDITED = True\n")
+    jobs = scratch.would_run()
+    assert jobs["lookup"] == 4
+    assert jobs["evaluate_recommended"] == 4
+    assert not {"meshes", "render", "train", "estimate"} & set(jobs)
+
+
+def test_a_comment_elsewhere_reruns_nothing(scratch):
+    for name in ("src/nbv/rendering/pyrender.py", "Snakefile", "config/config.yaml"):
+        path = scratch.folder / name
+        path.write_text(path.read_text() + "\n# a remark\n")
+    assert scratch.would_run() == {}
+
+
+def test_touching_a_source_file_reruns_nothing(scratch):
+    (scratch.folder / "src/nbv/evaluation/metrics.py").touch()
+    assert scratch.would_run() == {}
+
+
+def test_one_file_of_one_fold_by_name(scratch):
+    target = "results/tiny/evaluation/mug/el00/fold2/proposed.csv"
+    before = scratch.outcome()
+    (scratch.folder / target).unlink()
+    scratch.run("--cores", "1", target)
+    assert scratch.outcome() == before
+
+
+def test_one_core_gives_the_same_bytes_as_two(finished, fresh):
+    fresh.run("--cores", "1")
+    assert fresh.outcome() == finished.outcome()
+
+
+def test_an_interrupted_run_continues_to_the_same_bytes(finished, fresh):
+    command = fresh.command("--cores", "2")
+    running = subprocess.Popen(
+        command, cwd=fresh.folder, env=fresh.environment, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 300
+    while not list(fresh.results.glob("estimators/*/*/*/*.safetensors")):
+        assert time.monotonic() < deadline
+        assert running.poll() is None
+        time.sleep(0.2)
+    running.send_signal(signal.SIGINT)
+    _, printed = running.communicate(timeout=120)
+    assert running.returncode != 0
+    assert "the same command goes on from there" in printed
+    assert not (fresh.results / "report.html").exists()
+    again = fresh.run("--cores", "2")
+    assert "nbv: finished" in again.stderr
+    assert fresh.outcome() == finished.outcome()
