@@ -14,7 +14,10 @@ from nbv.jobs import job
 @pytest.fixture
 def snakemake(tmp_path):
     yield SimpleNamespace(
-        log=[str(tmp_path / "logs" / "train" / "mug.log")], rule="train", wildcards=["mug", "00"]
+        output=["out.csv"],
+        log=[str(tmp_path / "logs" / "train" / "mug.log")],
+        rule="train",
+        wildcards=["mug", "00"],
     )
     root = logging.getLogger()
     for handler in root.handlers[:]:
@@ -28,8 +31,12 @@ def snakemake(tmp_path):
     [
         (UserError("x.obj: no faces"), "error: x.obj: no faces"),
         (
+            OSError(errno.ENOSPC, "No space left on device"),
+            "error: out.csv: no space left on the disk; free some and run the same command again",
+        ),
+        (
             OSError(errno.ENOSPC, "No space left on device", "a.npy"),
-            "error: no space left on the disk for a.npy: free some and run the same command again",
+            "error: a.npy: no space left on the disk; free some and run the same command again",
         ),
     ],
 )

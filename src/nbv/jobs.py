@@ -53,8 +53,9 @@ def job(snakemake: Any) -> Iterator[None]:
     except OSError as error:
         if error.errno != errno.ENOSPC:
             _fail_unexpectedly(error, path)
-        where = f" for {error.filename}" if error.filename else ""
-        _fail(f"no space left on the disk{where}: free some and run the same command again", path)
+        # Writing to an open file does not say which; it can only be one of the job's own.
+        where = error.filename or snakemake.output[0]
+        _fail(f"{where}: no space left on the disk; free some and run the same command again", path)
     except Exception as error:
         _fail_unexpectedly(error, path)
 

@@ -216,7 +216,7 @@ def _tail(
     def plane(root: ArrayLike, size: float = 1.0) -> Solids:
         return both_sides([wing(root, size * span, plane_chord, taper, 0.75 * sweep, rise)])
 
-    ahead = plane((rng.uniform(0.22, 0.32), 0.0, 0.3 * radius), 0.8)
+    ahead = plane((rng.uniform(0.3, 0.4), 0.0, 0.3 * radius), rng.uniform(0.9, 1.2))
     if kind == "v":
         return both_sides([fin((plane_x + 0.03, 0.0, z), rng.uniform(0.8, 1.3), 0.8 * span)])
     if kind == "twin":

@@ -27,7 +27,7 @@ from nbv.meshes.procedural.solids import (
 )
 
 Solids = list[trimesh.Trimesh]
-_POINTS = 40
+_POINTS = 56
 _KINDS = {"two-piece": 0.42, "one-piece": 0.2, "high cistern": 0.11, "no cistern": 0.11,
           "wall-hung": 0.11, "chest": 0.05}  # fmt: skip
 
