@@ -80,8 +80,11 @@ def _files_of(module: str, root: Path) -> Iterator[Path]:
                 yield path
 
 
-def git_commit(directory: str | Path) -> str:
-    """Return the commit checked out in a folder, marked where files differ from it."""
+def git_commit(directory: str | Path = Path(__file__).parent) -> str:
+    """Return the commit checked out in a folder, this package's own unless another is given.
+
+    It is marked ``-dirty`` where files differ from it, and ``unknown`` outside a checkout.
+    """
     try:
         described = subprocess.run(
             ["git", "-C", str(directory), "describe", "--always", "--dirty", "--abbrev=12"],

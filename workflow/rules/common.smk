@@ -75,15 +75,25 @@ def script_path(name):
     return f"../scripts/{name}.py"
 
 
-def sources(name, *chosen):
+def sources(name):
     """The package's modules that a script depends on: an edit reruns what uses them."""
     script = BASE / "workflow/scripts" / f"{name}.py"
-    files = provenance.source_files(script, SOURCE_ROOT, chosen)
+    chosen = {
+        "meshes": [SOURCES[CONFIG["dataset"]["source"]]],
+        "render": [RENDERERS[CONFIG["renderer"]["name"]]],
+    }
+    files = provenance.source_files(script, SOURCE_ROOT, chosen.get(name, []))
     here = Path.cwd()
     return [
         str(Path(file).relative_to(here)) if Path(file).is_relative_to(here) else file
         for file in files
     ]
+
+
+def all_sources():
+    """What the results as a whole were made with."""
+    scripts = (BASE / "workflow/scripts").glob("*.py")
+    return sorted({file for script in scripts for file in sources(script.stem)})
 
 
 def unit_names(units):

@@ -80,7 +80,7 @@ rule claims:
 
 rule settings:
     input:
-        sources("settings"),
+        all_sources(),
     output:
         configuration=f"{RESULTS}/configuration.yaml",
         provenance=f"{RESULTS}/provenance.json",
@@ -97,7 +97,6 @@ rule settings:
         runtime=5,
     params:
         configuration=CONFIG,
-        commit=provenance.git_commit(BASE),
     script:
         script_path("settings")
 

@@ -3,7 +3,7 @@
 
 rule meshes:
     input:
-        sources("meshes", SOURCES[CONFIG["dataset"]["source"]]),
+        sources("meshes"),
     output:
         f"{RESULTS}/meshes/{{category}}.npz",
     log:
@@ -54,7 +54,7 @@ rule splits:
 
 rule render:
     input:
-        sources("render", RENDERERS[CONFIG["renderer"]["name"]]),
+        sources("render"),
         meshes=rules.meshes.output[0],
     output:
         f"{RESULTS}/depth/{{category}}/el{{elevation}}.npy",
