@@ -78,6 +78,19 @@ def test_a_mistake_is_one_line_with_its_key(override, message):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "override", ["elevations_deg.bottle=[0,30]", "elevations_deg={bottle:[0,30]}"]
+)
+def test_a_category_of_ones_own(override):
+    config = load_config(CONFIG, ["dataset=folder", override, "categories=[bottle]"])
+    assert config["elevations_deg"]["bottle"] == [0, 30]
+
+
+def test_a_method_of_ones_own():
+    config = load_config(CONFIG, ["methods.mine={rotation: opposite}"])
+    assert config["methods"]["mine"] == {"rotation": "opposite", "fusion": "average"}
+
+
 def test_another_data_set_gets_its_own_folder():
     assert load_config(CONFIG, ["dataset=shapenet"])["name"] == "paper-shapenet"
     assert load_config(CONFIG, ["dataset=shapenet", "name=mine"])["name"] == "mine"

@@ -26,18 +26,21 @@ def _dataclass_of(annotation: Any) -> type | None:
     return annotation if dataclasses.is_dataclass(annotation) else None  # type: ignore[return-value]
 
 
-def _check_key(key: str) -> None:
-    """Raise UserError for a dotted key that the schema does not have."""
+def _check_key(key: str) -> bool:
+    """Raise UserError for a dotted key that the schema does not have; say if it leads to data."""
     schema: type | None = Config
+    annotation: Any = Config
     for depth, part in enumerate(parts := key.split(".")):
         if schema is None:
-            return  # below a dict or a list: its keys are data
+            return True  # below a dict: its keys are data
         hints = typing.get_type_hints(schema)
         if part not in hints:
             meant = [".".join([*parts[:depth], name]) for name in hints]
             written = ".".join(parts[: depth + 1])
             raise UserError(f"configuration key {written!r} is unknown: {nearest(written, meant)}")
-        schema = _dataclass_of(hints[part])
+        annotation = hints[part]
+        schema = _dataclass_of(annotation)
+    return typing.get_origin(annotation) is dict
 
 
 def _check_choice(directory: Path, group: str, choice: str) -> None:
@@ -46,15 +49,18 @@ def _check_choice(directory: Path, group: str, choice: str) -> None:
         raise UserError(f"{group}={choice} is unknown: {nearest(choice, choices)}")
 
 
-def _check_override(directory: Path, override: str) -> None:
+def _checked(directory: Path, override: str) -> str:
+    """Return an override as Hydra takes it, after checking its key and its choice."""
     key, separator, value = override.partition("=")
     bare = key.lstrip("+~")
     if not separator and not key.startswith("~"):
         raise UserError(f"override {override!r} is not of the form key=value")
     if bare in GROUPS:
         _check_choice(directory, bare, value)
-    else:
-        _check_key(bare)
+        return override
+    below_dict = _check_key(bare)
+    # What is data may have new keys, which Hydra calls adding and otherwise refuses.
+    return f"++{override}" if below_dict and key == bare else override
 
 
 def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[str, Any]:
@@ -83,11 +89,10 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
     from omegaconf.errors import OmegaConfBaseException
 
     folder = Path(directory).resolve()
-    for override in overrides:
-        _check_override(folder, override)
+    checked = [_checked(folder, override) for override in overrides]
     try:
         with initialize_config_dir(str(folder), version_base="1.3"):
-            composed = compose("config", overrides=list(overrides))
+            composed = compose("config", overrides=checked)
         typed = OmegaConf.merge(OmegaConf.structured(Config), composed)
         plain = OmegaConf.to_container(typed, resolve=True, throw_on_missing=True)
     except (HydraException, OmegaConfBaseException) as error:

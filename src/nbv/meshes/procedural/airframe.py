@@ -6,16 +6,8 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from nbv.meshes.procedural.solids import (
-    both_sides,
-    box,
-    loft,
-    moved,
-    revolve,
-    superellipse,
-    tube,
-    turned,
-)
+from nbv.meshes.procedural.assembly import both_sides, moved, turned
+from nbv.meshes.procedural.solids import box, loft, revolve, superellipse, tube
 
 Solids = list[trimesh.Trimesh]
 

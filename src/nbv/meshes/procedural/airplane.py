@@ -24,16 +24,8 @@ from nbv.meshes.procedural.airframe import (
     wing,
     wing_propeller,
 )
-from nbv.meshes.procedural.solids import (
-    Points,
-    both_sides,
-    box,
-    centred,
-    join,
-    stack_outlines,
-    superellipse,
-    tube,
-)
+from nbv.meshes.procedural.assembly import both_sides, centred, join
+from nbv.meshes.procedural.solids import Points, box, stack_outlines, superellipse, tube
 
 Range = tuple[float, float]
 

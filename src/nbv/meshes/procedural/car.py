@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
+from nbv.meshes.procedural.assembly import both_sides, centred, join, turned
 from nbv.meshes.procedural.coachwork import (
     Range,
     Solids,
@@ -23,16 +24,7 @@ from nbv.meshes.procedural.coachwork import (
     wheels,
 )
 from nbv.meshes.procedural.lorry import bus, lorry
-from nbv.meshes.procedural.solids import (
-    both_sides,
-    box,
-    centred,
-    join,
-    loft,
-    revolve,
-    superellipse,
-    turned,
-)
+from nbv.meshes.procedural.solids import box, loft, revolve, superellipse
 
 
 @dataclass(frozen=True)

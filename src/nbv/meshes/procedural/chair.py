@@ -8,21 +8,9 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
+from nbv.meshes.procedural.assembly import both_sides, centred, join, turned
 from nbv.meshes.procedural.joinery import Seat, Solids, base
-from nbv.meshes.procedural.solids import (
-    Points,
-    both_sides,
-    box,
-    centred,
-    fillet,
-    join,
-    loft,
-    slab,
-    superellipse,
-    sweep,
-    tube,
-    turned,
-)
+from nbv.meshes.procedural.solids import Points, box, fillet, loft, slab, superellipse, sweep, tube
 
 _KINDS = {"dining": 0.38, "office": 0.12, "armchair": 0.18, "stool": 0.12, "tube": 0.1,
           "shell": 0.1}  # fmt: skip

@@ -9,14 +9,8 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from nbv.meshes.procedural.solids import (
-    both_sides,
-    box,
-    revolve,
-    stack_outlines,
-    superellipse,
-    turned,
-)
+from nbv.meshes.procedural.assembly import both_sides, turned
+from nbv.meshes.procedural.solids import box, revolve, stack_outlines, superellipse
 
 Solids = list[trimesh.Trimesh]
 Range = tuple[float, float]

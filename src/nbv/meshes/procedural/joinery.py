@@ -10,18 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from nbv.meshes.procedural.solids import (
-    Points,
-    both_sides,
-    box,
-    fillet,
-    mirrored,
-    revolve,
-    superellipse,
-    sweep,
-    tube,
-    turned,
-)
+from nbv.meshes.procedural.assembly import both_sides, mirrored, turned
+from nbv.meshes.procedural.solids import Points, box, fillet, revolve, superellipse, sweep, tube
 
 Solids = list[trimesh.Trimesh]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from nbv.meshes.procedural.assembly import both_sides
 from nbv.meshes.procedural.coachwork import (
     Solids,
     bed_walls,
@@ -13,7 +14,7 @@ from nbv.meshes.procedural.coachwork import (
     mirrors,
     wheels,
 )
-from nbv.meshes.procedural.solids import both_sides, box, revolve
+from nbv.meshes.procedural.solids import box, revolve
 
 
 def lorry(rng: np.random.Generator) -> Solids:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from nbv.meshes.procedural.solids import Points, fillet, join, revolve, superellipse, sweep
+from nbv.meshes.procedural.assembly import join
+from nbv.meshes.procedural.solids import Points, fillet, revolve, superellipse, sweep
 
 # Fine enough that the facets of the body do not tell a camera where it stands.
 _AROUND = 96

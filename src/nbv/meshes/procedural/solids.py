@@ -6,7 +6,6 @@ They all end in :func:`loft`, which joins a stack of rings of equally many point
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
@@ -17,7 +16,7 @@ Points = NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
 
 # Cyclic permutations keep a right-handed frame right-handed.
-_FROM_Z: dict[str, list[int]] = {"x": [2, 0, 1], "y": [1, 2, 0], "z": [0, 1, 2]}
+FROM_Z: dict[str, list[int]] = {"x": [2, 0, 1], "y": [1, 2, 0], "z": [0, 1, 2]}
 
 
 def loft(rings: ArrayLike, *, closed: bool = False) -> trimesh.Trimesh:
@@ -109,7 +108,7 @@ def stack_outlines(outlines: ArrayLike, heights: ArrayLike, axis: Axis = "z") ->
     rings = np.concatenate(
         [outline, np.broadcast_to(level[:, None, None], (*outline.shape[:2], 1))], axis=-1
     )
-    return loft(rings[..., _FROM_Z[axis]])
+    return loft(rings[..., FROM_Z[axis]])
 
 
 def slab(
@@ -283,50 +282,3 @@ def tube(path: ArrayLike, radius: float, *, n: int = 12, taper: float = 1.0) -> 
     normal = np.linalg.svd(points - points.mean(axis=0))[2][-1]
     scale = np.linspace(1.0, taper, len(points))
     return sweep(points, superellipse(radius, radius, n=n), normal, scale=scale)
-
-
-def mirrored(solid: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the solid reflected in the plane y = 0, its faces still outwards."""
-    vertices = np.asarray(solid.vertices) * (1.0, -1.0, 1.0)
-    return trimesh.Trimesh(vertices, np.asarray(solid.faces)[:, ::-1], process=False)
-
-
-def both_sides(solids: Iterable[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
-    """Return the solids followed by their reflections in the plane y = 0."""
-    one_side = list(solids)
-    return one_side + [mirrored(solid) for solid in one_side]
-
-
-def moved(solid: trimesh.Trimesh, offset: ArrayLike) -> trimesh.Trimesh:
-    """Return the solid shifted by `offset`, (3,)."""
-    vertices = np.asarray(solid.vertices) + np.asarray(offset, dtype=np.float64)
-    return trimesh.Trimesh(vertices, solid.faces, process=False)
-
-
-def turned(
-    solid: trimesh.Trimesh, angle_deg: float, axis: Axis, centre: ArrayLike = (0.0, 0.0, 0.0)
-) -> trimesh.Trimesh:
-    """Return the solid turned about an axis through `centre`, counter-clockwise."""
-    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
-    about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    rotation = about_z[np.ix_(_FROM_Z[axis], _FROM_Z[axis])]
-    pivot = np.asarray(centre, dtype=np.float64)
-    vertices = (np.asarray(solid.vertices) - pivot) @ rotation.T + pivot
-    return trimesh.Trimesh(vertices, solid.faces, process=False)
-
-
-def join(solids: Iterable[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Return the solids as one mesh; they may touch or pass through one another."""
-    parts = list(solids)
-    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
-    return trimesh.Trimesh(
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
-        process=False,
-    )
-
-
-def centred(solid: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the solid with its bounding box centred on the z axis and standing on z = 0."""
-    low, high = np.asarray(solid.bounds)
-    return moved(solid, [-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])

@@ -10,20 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
+from nbv.meshes.procedural.assembly import both_sides, centred, join, turned
 from nbv.meshes.procedural.solids import (
     Points,
-    both_sides,
     box,
-    centred,
     fillet,
-    join,
     loft,
     revolve,
     slab,
     stack_outlines,
     superellipse,
     tube,
-    turned,
 )
 
 Solids = list[trimesh.Trimesh]
@@ -86,14 +83,20 @@ def _pedestal(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
     shift = (bowl.back - bowl.front) * rng.uniform(0.05, 0.16) * (1.0 - swell)
     outside = scale[:, None, None] * bowl.outline(-0.008)
     outside[..., 0] += shift[:, None]
-    # One skin: up the outside, over the rim, and down into the hollow, as in a mug.
-    thick, depth = rng.uniform(0.03, 0.05), rng.uniform(0.12, 0.2)
-    inner = bowl.outline(-rng.uniform(0.035, 0.05))
-    inside = [bowl.outline(), bowl.outline(), inner, 0.85 * inner, 0.45 * inner, 0.2 * inner]
-    down = np.array([0.6 * thick, 0.0, 0.0, 0.5 * depth, depth, depth + 0.005])
     # A wall-hung bowl ends in the air.
     base = rng.uniform(0.1, 0.2) if kind == "wall-hung" else 0.0
-    levels = np.concatenate([base + (bowl.rim - thick - base) * t, bowl.rim - down])
+    # One skin: up the outside, over the rim, and down into the hollow, as in a mug.
+    thick = rng.uniform(0.03, 0.05)
+    depth = min(rng.uniform(0.12, 0.2), 0.6 * (bowl.rim - base))
+    inner = bowl.outline(-rng.uniform(0.035, 0.05))
+    up = base + (bowl.rim - thick - base) * t
+    down = bowl.rim - np.array([0.6 * thick, 0.0, 0.0, 0.5 * depth, depth, depth + 0.005])
+    # The hollow keeps within the outside, which may draw in and back faster than it.
+    room = np.minimum([0.85, 0.45, 0.2], 0.75 * np.interp(down[3:], up, scale))
+    hollow = room[:, None, None] * inner
+    hollow[..., 0] += np.interp(down[3:], up, shift)[:, None]
+    inside = np.concatenate([[bowl.outline(), bowl.outline(), inner], hollow])
+    levels = np.concatenate([up, down])
     parts = [stack_outlines(np.concatenate([outside, inside]), levels)]
     if kind in ("two-piece", "one-piece") or (kind != "wall-hung" and rng.random() < 0.5):
         low = rng.choice([0.0, rng.uniform(0.1, 0.25)])

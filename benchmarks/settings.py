@@ -1,0 +1,16 @@
+"""The project's default configuration, which the benchmarks measure."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from nbv.config import load_config
+
+ROOT = Path(__file__).parents[1]
+
+
+@cache
+def configuration() -> dict[str, Any]:
+    return load_config(ROOT / "config", [])

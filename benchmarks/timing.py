@@ -1,0 +1,69 @@
+"""Ratios on a machine that has other things to do: take turns, compare neighbours, take the median."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+Work = Callable[[], object]
+
+
+def seconds(work: Work) -> float:
+    """Return the wall-clock time of one call."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Times of several works that took turns, one row a round, one column a work, in seconds."""
+
+    rounds: np.ndarray
+
+    def typical(self, column: int) -> float:
+        """Return the median time of one work."""
+        return float(np.median(self.rounds[:, column]))
+
+    def ratio(self, numerator: int, denominator: int) -> float:
+        """Return the median, over rounds, of one work's time over another's in the same round."""
+        return median_ratio(self.rounds[:, numerator], self.rounds[:, denominator])
+
+
+def median_ratio(numerators: Sequence[float], denominators: Sequence[float]) -> float:
+    """Return the median of the ratios of neighbours: what slows both of a pair cancels."""
+    return float(np.median(np.asarray(numerators) / np.asarray(denominators)))
+
+
+def take_turns(works: Sequence[Work], n_rounds: int, warm_up: bool = True) -> Turns:
+    """Time works in turn: A B A B ...; unless `warm_up` is false, each is called once before."""
+    if warm_up:
+        for work in works:
+            work()
+    return Turns(np.array([[seconds(work) for work in works] for _ in range(n_rounds)]))
+
+
+def growth_exponent(sizes: Sequence[float], turns: Turns) -> float:
+    """Return b of the best time = a · size^b on logarithmic axes: the median over rounds."""
+    x = np.log(np.asarray(sizes, dtype=float))
+    slopes = [float(np.polyfit(x, np.log(row), 1)[0]) for row in turns.rounds]
+    return float(np.median(slopes))
+
+
+@contextmanager
+def on_one_core() -> Iterator[None]:
+    """Keep the process, and threads that libraries start meanwhile, on one core where possible."""
+    if not hasattr(os, "sched_setaffinity"):  # Linux alone has it.
+        yield
+        return
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(allowed)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, allowed)
