@@ -1,7 +1,12 @@
 # What the reading rules share: which units a table or figure is about, and the files it needs.
 
 from nbv.evaluation.figures import FIGURES
-from nbv.evaluation.settings import ReadingSettings, focus_category, reference_units
+from nbv.evaluation.settings import (
+    ReadingSettings,
+    focus_category,
+    focus_unit,
+    reference_units,
+)
 from nbv.evaluation.tables import TABLES
 
 READING = {
@@ -11,21 +16,23 @@ READING = {
     "seed": CONFIG["seed"],
 }
 REFERENCE_UNITS = reference_units(UNITS, ReadingSettings())
-FOCUS = focus_category(UNITS, ReadingSettings(focus_category=CONFIG["focus_category"]))
-FOCUS_UNITS = [unit for unit in UNITS if unit[0] == FOCUS]
-# Tables and figures of the focus category alone; all others compare the categories.
-OF_FOCUS = {"table2", "table4", "table5", "table6", "table7"} | {
-    "figure2",
-    "figure3",
-    "figure6",
-    "figure7",
-    "figure8",
-    "heatmaps",
+READING_SETTINGS = ReadingSettings(focus_category=CONFIG["focus_category"])
+FOCUS = focus_category(UNITS, READING_SETTINGS)
+# Of the focus category at every elevation, or at the reference elevation alone; all other tables
+# and figures compare the categories.
+OF_ELEVATIONS = {"table2", "table4", "figure6"}
+OF_FOCUS = {
+    *("table5", "table6", "table7"),
+    *("figure2", "figure3", "figure7", "figure8", "heatmaps"),
 }
 
 
 def units_of(name):
-    return FOCUS_UNITS if name in OF_FOCUS else REFERENCE_UNITS
+    if name in OF_ELEVATIONS:
+        return [unit for unit in UNITS if unit[0] == FOCUS]
+    if name in OF_FOCUS:
+        return [focus_unit(UNITS, READING_SETTINGS)]
+    return REFERENCE_UNITS
 
 
 def evaluations_of(units):

@@ -20,7 +20,7 @@ from nbv.evaluation.layout import markdown_to_html, number
 from nbv.evaluation.page import escape
 from nbv.evaluation.paired import UNIT_OF
 from nbv.evaluation.results import discover_units, load_object_ids
-from nbv.evaluation.runtime import load_runtime
+from nbv.evaluation.runtime import load_runtime, runtime_markdown
 from nbv.evaluation.settings import category_label
 from nbv.evaluation.tables import TABLES
 
@@ -224,30 +224,9 @@ def _settings(configuration: str, provenance: Mapping[str, Any]) -> list[str]:
 
 
 def _runtime(root: Path) -> list[str]:
-    runtime = load_runtime(root)
-    if runtime.empty:
-        return ["<p>No job was timed in this run.</p>"]
-    rows = [
-        [
-            escape(rule["rule"]),
-            str(int(rule["jobs"])),
-            f"{rule['cpu_s']:,.1f}",
-            f"{rule['wall_s']:,.1f}",
-            f"{rule['max_rss_mb']:,.0f}" if np.isfinite(rule["max_rss_mb"]) else "–",
-        ]
-        for rule in runtime.to_dict("records")
-    ]
-    rows.append(
-        [
-            "all",
-            str(int(runtime["jobs"].sum())),
-            f"{runtime['cpu_s'].sum():,.1f}",
-            f"{runtime['wall_s'].sum():,.1f}",
-            f"{runtime['max_rss_mb'].max():,.0f}" if runtime["max_rss_mb"].notna().any() else "–",
-        ]
-    )
-    header = ("Rule", "Jobs", "Processor (s)", "Wall clock (s)", "Largest memory (MB)")
-    return [
-        page.table(header, rows),
-        page.notes(["Sums over jobs, some of which ran side by side; memory is of one job."]),
-    ]
+    """Return the table beside the others, or where it was not made, what it would say."""
+    path = root / "tables" / "runtime.md"
+    text = path.read_text("utf-8") if path.is_file() else runtime_markdown(load_runtime(root))
+    if "|" not in text:
+        return [f"<p>{escape(text.splitlines()[-1])}</p>"]
+    return [markdown_to_html(text, escape)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -117,7 +118,7 @@ def summarise_jobs(jobs: pd.DataFrame) -> pd.DataFrame:
     if jobs.empty:
         return pd.DataFrame(columns=list(RUNTIME_COLUMNS))
     rules = [_summary(str(rule), part) for rule, part in jobs.groupby("rule", sort=True)]
-    rules.sort(key=lambda row: -float(row["wall_s"]))
+    rules.sort(key=lambda row: row["wall_s"], reverse=True)
     total = _summary(TOTAL_ROW, jobs)
     total["elapsed_s"], total["side_by_side"] = _on_the_clock(jobs)
     summary = pd.DataFrame([*rules, total], columns=list(RUNTIME_COLUMNS))
@@ -143,9 +144,7 @@ def efficiency(runtime: pd.DataFrame) -> float:
     return float(total["cpu_s"] / (total["side_by_side"] * total["elapsed_s"]))
 
 
-def _belongs(
-    place: list[str], units: set[tuple[str, str]] | None, n_folds: int | None
-) -> bool:
+def _belongs(place: list[str], units: set[tuple[str, str]] | None, n_folds: int | None) -> bool:
     """Say whether a job's ``category, el<EE>, fold<k>, ...`` are of the configuration."""
     if len(place) < 2 or not re.fullmatch(r"el\d+", place[1]):
         return True
@@ -163,7 +162,7 @@ def _told_cpu_s(log_file: Path) -> float | None:
     return float(told[-1]) if told else None
 
 
-def _summary(rule: str, jobs: pd.DataFrame) -> dict[str, object]:
+def _summary(rule: str, jobs: pd.DataFrame) -> dict[str, Any]:
     return {
         "rule": rule,
         "jobs": len(jobs),
@@ -197,7 +196,8 @@ def _notes(runtime: pd.DataFrame) -> list[str]:
         f"From the first job's start to the last one's end: {_duration(total['elapsed_s'])}, "
         f"leaving out pauses of more than {PAUSE_S:.0f} s in which no job ran. At most {beside} "
         f"{'job' if beside == 1 else 'jobs'} ran at once; the jobs' own work kept as many "
-        f"processors busy for {at_least}{busy} % of that time.",
+        f"processors busy for {at_least}{busy} % of that time. Other work on the machine lowers "
+        "that figure and lengthens every time here but the processors'.",
         "Processor and wall-clock times are sums over jobs, some of which ran side by side. A job "
         "that was run again counts once, as it last ran; the jobs that write this table and the "
         "report do not count, nor does Snakemake's own start.",
@@ -216,10 +216,9 @@ def _notes(runtime: pd.DataFrame) -> list[str]:
 
 
 def _duration(seconds: float) -> str:
+    if seconds >= 3600:
+        return "{} h {} min".format(*divmod(round(seconds / 60), 60))
     minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes} min"
     return f"{minutes} min {rest} s" if minutes else f"{rest} s"
 
 

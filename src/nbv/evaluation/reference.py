@@ -1,0 +1,233 @@
+"""Reference results: what of a run is kept under version control, and what it was made with."""
+
+from __future__ import annotations
+
+import json
+import logging
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from omegaconf import OmegaConf
+
+from nbv.errors import UserError
+from nbv.evaluation.cells import CELL_COLUMNS
+from nbv.files import replacing
+
+log = logging.getLogger(__name__)
+
+SettingDifference = tuple[str, Any, Any]
+"""A dotted configuration key, the reference's value, the run's value; `UNSET` where absent."""
+
+UNSET = "not set"
+
+Cell = dict[str, Any]
+"""One cell of a table: its `CELL_COLUMNS`."""
+
+CELL_KEY = ("row", "method", "metric")
+"""What tells the cells of one table apart."""
+
+# They say where files lie, and on what hardware and in which precision an estimator is trained:
+# that, too, is a retrained estimator and no other experiment.
+_SURROUNDINGS = frozenset(
+    {
+        "experiment",
+        "name",
+        "dataset.root",
+        "dataset.exclude_file",
+        "estimator.device",
+        "estimator.precision",
+    }
+)
+_KEPT = ("tables/*.csv", "tables/*.md", "tables/*.tex", "figures/*.png")
+_REQUIRED = (
+    "claims.csv",
+    "claims.md",
+    "tables/runtime.csv",
+    "tables/runtime.md",
+    "configuration.yaml",
+    "provenance.json",
+)
+
+
+def collect_reference(run: Path, reference: Path) -> list[Path]:
+    """Copy what a reviewer reads of a run, byte for byte, to be committed as a reference.
+
+    Tables, figures as PNG, claims, runtime, configuration and provenance: a few MB. The runtime
+    goes beside the tables rather than among them. ``bench.json``, which ``python -m benchmarks``
+    writes beside the runs, comes along where there is one. Tables and figures that the reference
+    had and the run has not are removed; whatever else lies there is left alone.
+
+    Parameters
+    ----------
+    run : pathlib.Path
+        ``results/<name>``, finished.
+    reference : pathlib.Path
+        ``docs/reference/<name>``.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written, sorted.
+
+    Raises
+    ------
+    UserError
+        If the run lacks one of them; the reference is then as it was.
+    """
+    copies = {reference / _kept_as(source.relative_to(run)): source for source in _sources(run)}
+    bench = run.parent / "bench.json"
+    if bench.is_file():
+        copies[reference / bench.name] = bench
+    for stale in {old for pattern in _KEPT for old in reference.glob(pattern)} - copies.keys():
+        stale.unlink()
+    for target, source in copies.items():
+        with replacing(target) as temporary:
+            shutil.copyfile(source, temporary)
+    commit = str(read_provenance(run).get("commit", "unknown"))
+    if commit.endswith("-dirty") or commit == "unknown":
+        log.warning("%s was not made at a clean commit but at %s", run, commit)
+    size_mb = sum(target.stat().st_size for target in copies) / 1e6
+    log.info("%d files, %.1f MB, are now in %s", len(copies), size_mb, reference)
+    return sorted(copies)
+
+
+def _sources(run: Path) -> Iterator[Path]:
+    for name in _REQUIRED:
+        yield existing(run / name)
+    for pattern in _KEPT:
+        found = sorted(path for path in run.glob(pattern) if path.stem != "runtime")
+        if not found:
+            raise UserError(f"{run / pattern}: no such file; finish the run first")
+        yield from found
+
+
+def _kept_as(name: Path) -> Path:
+    return Path(name.name) if name.stem == "runtime" else name
+
+
+def find_reference(folder: Path, name: str) -> Path:
+    """Return the reference that is kept for runs of a name.
+
+    Raises
+    ------
+    UserError
+        If there is none; names those there are.
+    """
+    found = folder / name
+    if not found.is_dir():
+        kept = sorted(path.parent.name for path in folder.glob("*/configuration.yaml"))
+        there = f"there are: {', '.join(kept)}" if kept else "there is none yet"
+        raise UserError(
+            f"{found} does not exist, so that {name!r} cannot be compared ({there}); "
+            "`snakemake --cores 2 reference` makes one of a run"
+        )
+    return found
+
+
+def existing(path: Path) -> Path:
+    """Return the path of a file that has to be there.
+
+    Raises
+    ------
+    UserError
+        If it is not.
+    """
+    if not path.is_file():
+        raise UserError(f"{path} does not exist; finish the run first, or is it another folder?")
+    return path
+
+
+def read_configuration(root: Path) -> dict[str, Any]:
+    """Read ``configuration.yaml`` of a run or reference as plain values.
+
+    Raises
+    ------
+    UserError
+        If it is missing, not a mapping, or does not say how many folds there are.
+    """
+    path = existing(root / "configuration.yaml")
+    configuration = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
+    if not isinstance(configuration, dict):
+        raise UserError(f"{path}: holds no settings; make it again")
+    if not isinstance(configuration.get("n_folds"), int) or configuration["n_folds"] < 2:
+        raise UserError(f"{path}: n_folds has to be 2 or more")
+    return {str(key): value for key, value in configuration.items()}
+
+
+def table_files(root: Path) -> list[Path]:
+    """Return the tidy CSV of every table of cells, sorted.
+
+    Raises
+    ------
+    UserError
+        If there is none.
+    """
+    found = sorted(path for path in (root / "tables").glob("*.csv") if path.stem != "runtime")
+    if not found:
+        raise UserError(f"{root / 'tables'} holds no tables; finish the run first")
+    return found
+
+
+def read_cells(path: Path) -> dict[tuple[str, ...], Cell]:
+    """Read a table's cells by `CELL_KEY`, in their order.
+
+    Raises
+    ------
+    UserError
+        If a column is missing.
+    """
+    frame = pd.read_csv(path, dtype=dict.fromkeys(("table", "row", "row_label", "method"), str))
+    absent = [name for name in CELL_COLUMNS if name not in frame.columns]
+    if absent:
+        raise UserError(f"{path}: no column {absent[0]!r}; delete the file and make it again")
+    cells = [{name: cell[name] for name in CELL_COLUMNS} for cell in frame.to_dict("records")]
+    return {tuple(cell[name] for name in CELL_KEY): cell for cell in cells}
+
+
+def read_verdicts(root: Path) -> dict[str, str]:
+    """Read the verdict of each claim of a run or reference."""
+    claims = pd.read_csv(existing(root / "claims.csv")).drop_duplicates("id")
+    return dict(zip(claims["id"], claims["verdict"], strict=True))
+
+
+def read_provenance(root: Path) -> dict[str, Any]:
+    """Read ``provenance.json`` of a run or reference; empty where there is none."""
+    path = root / "provenance.json"
+    return dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else {}
+
+
+def differing_settings(
+    reference: Mapping[str, Any], run: Mapping[str, Any]
+) -> tuple[SettingDifference, ...]:
+    """Return the settings on which results depend and that differ, in the reference's order."""
+    return tuple(d for d in _differences(reference, run) if d[0] not in _SURROUNDINGS)
+
+
+def differing_surroundings(
+    reference: Path, run: Path, known: Mapping[str, Any], ours: Mapping[str, Any]
+) -> list[str]:
+    """Return a line on paths, hardware, commit and versions, where they differ."""
+    settings = [d for d in _differences(known, ours) if d[0] in _SURROUNDINGS]
+    made = list(_differences(read_provenance(reference), read_provenance(run)))
+    texts = [setting_text((key.removeprefix("packages."), *rest)) for key, *rest in settings + made]
+    return [f"made with: {', '.join(texts)}"] if texts else []
+
+
+def setting_text(difference: SettingDifference) -> str:
+    """Return a difference as ``key=run's value (reference: value)``."""
+    key, theirs, mine = difference
+    return f"{key}={mine} (reference: {theirs})"
+
+
+def _differences(
+    theirs: Mapping[str, Any], mine: Mapping[str, Any], prefix: str = ""
+) -> Iterator[SettingDifference]:
+    for key in dict.fromkeys([*theirs, *mine]):
+        a, b = theirs.get(key, UNSET), mine.get(key, UNSET)
+        if isinstance(a, Mapping) and isinstance(b, Mapping):
+            yield from _differences(a, b, f"{prefix}{key}.")
+        elif a != b:
+            yield f"{prefix}{key}", a, b
