@@ -1,5 +1,6 @@
 # make reproduce   the paper, end to end        make quick   the same graph, small
 # make test        the test suite               make check   lint, types, workflow lint
+# make bench       the speed benchmarks         make compare a finished run against docs/reference
 
 PYTHON ?= python3
 CORES ?= 2
@@ -7,13 +8,22 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: reproduce quick test test-quick check clean
+.PHONY: reproduce quick compare reference bench test test-quick check clean
 
 reproduce: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
 
 quick: $(READY)
 	$(BIN)/snakemake --cores $(CORES) --config experiment=quick
+
+compare: $(READY)
+	$(BIN)/snakemake --cores $(CORES) compare
+
+reference: $(READY)
+	$(BIN)/snakemake --cores $(CORES) reference
+
+bench: $(READY)
+	$(BIN)/python -m benchmarks
 
 test: $(READY)
 	$(BIN)/pytest

@@ -15,6 +15,7 @@ class Target:
     at_most: bool = False
 
     def holds(self, ratio: float) -> bool:
+        """Say whether a ratio lies on the right side of the bound, or on it."""
         return ratio <= self.bound if self.at_most else ratio >= self.bound
 
     def __str__(self) -> str:
@@ -49,6 +50,7 @@ class Figure:
         return self.target.holds(self.ratio)
 
     def as_json(self) -> dict[str, Any]:
+        """Return what is kept: numbers for the ratio, text for the target."""
         return {
             "name": self.name,
             "ratio": None if self.ratio is None else round(self.ratio, 4),

@@ -6,17 +6,18 @@ import time
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from benchmarks.figures import Figure, Target
 from benchmarks.lookup import calibration_estimates
 from benchmarks.settings import configuration
 from benchmarks.timing import median_ratio
-from nbv.estimation.hardware import choose_hardware, use_one_thread
+from nbv.estimation.hardware import Hardware, choose_hardware, use_one_thread
 from nbv.estimation.images import to_input
 from nbv.estimation.inference import estimate_azimuth
 from nbv.estimation.networks import build_network
-from nbv.meshes.procedural import generate
 from nbv.meshes.normalisation import normalise
+from nbv.meshes.procedural import generate
 from nbv.recommendation.lookup import build_lookup
 from nbv.rendering import open_renderer
 from nbv.rendering.camera import Camera
@@ -62,10 +63,12 @@ def run(quick: bool) -> list[Figure]:
                 start = time.perf_counter()
                 work()
                 spent[block, call, column] = time.perf_counter() - start
-    return [_figure(spent, name, q, hardware) for name, q in (("median", 50), ("99th percentile", 99))]
+    return [
+        _figure(spent, name, q, hardware) for name, q in (("median", 50), ("99th percentile", 99))
+    ]
 
 
-def _figure(spent: np.ndarray, name: str, percentile: int, hardware: object) -> Figure:
+def _figure(spent: NDArray[np.float64], name: str, percentile: int, hardware: Hardware) -> Figure:
     by_block = np.percentile(spent, percentile, axis=1)
     ms = 1e3 * np.median(by_block, axis=0)
     detail = (

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.figures import Figure, Target
 from benchmarks.solids import object_with_faces
@@ -90,7 +90,7 @@ def _check_same(mesh: trimesh.Trimesh) -> None:
         raise RuntimeError(f"the renderers draw different things: {visible} of all pixels visible")
 
 
-def plain_pyrender(mesh: trimesh.Trimesh, azimuths_deg: NDArray[np.float64]) -> Depths:
+def plain_pyrender(mesh: trimesh.Trimesh, azimuths_deg: ArrayLike) -> Depths:
     """Return depth images as pyrender's documentation has them drawn, framed like the project's."""
     import pyrender
 
@@ -108,7 +108,8 @@ def plain_pyrender(mesh: trimesh.Trimesh, azimuths_deg: NDArray[np.float64]) -> 
     scene = pyrender.Scene()
     scene.add(pyrender.Mesh.from_trimesh(mesh))
     node = scene.add(lens)
-    depth = np.empty((len(azimuths_deg), CAMERA.image_side, CAMERA.image_side), dtype=np.float32)
+    side = CAMERA.image_side
+    depth = np.empty((len(views.position), side, side), dtype=np.float32)
     for view, (lens.cx, lens.cy) in enumerate(views.principal_px):
         scene.set_pose(node, _pose(views, view))
         depth[view] = offscreen.render(scene, flags=pyrender.RenderFlags.DEPTH_ONLY)

@@ -39,5 +39,5 @@ def _merged(mesh: trimesh.Trimesh, cell: float) -> trimesh.Trimesh:
 
 def _divided(mesh: trimesh.Trimesh, n_divided: int) -> trimesh.Trimesh:
     largest = np.argsort(-mesh.area_faces, kind="stable")[:n_divided]
-    vertices, faces = trimesh.remesh.subdivide(mesh.vertices, mesh.faces, face_index=largest)
-    return trimesh.Trimesh(vertices, faces, process=False)
+    divided: trimesh.Trimesh = mesh.subdivide(face_index=largest)
+    return divided

@@ -1,4 +1,4 @@
-"""Ratios on a machine that has other things to do: take turns, compare neighbours, take the median."""
+"""Ratios on a machine that has other things to do: take turns, compare neighbours in time."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 Work = Callable[[], object]
 
@@ -24,7 +25,7 @@ def seconds(work: Work) -> float:
 class Turns:
     """Times of several works that took turns, one row a round, one column a work, in seconds."""
 
-    rounds: np.ndarray
+    rounds: NDArray[np.float64]
 
     def typical(self, column: int) -> float:
         """Return the median time of one work."""
@@ -35,9 +36,9 @@ class Turns:
         return median_ratio(self.rounds[:, numerator], self.rounds[:, denominator])
 
 
-def median_ratio(numerators: Sequence[float], denominators: Sequence[float]) -> float:
+def median_ratio(numerators: ArrayLike, denominators: ArrayLike) -> float:
     """Return the median of the ratios of neighbours: what slows both of a pair cancels."""
-    return float(np.median(np.asarray(numerators) / np.asarray(denominators)))
+    return float(np.median(np.divide(numerators, denominators)))
 
 
 def take_turns(works: Sequence[Work], n_rounds: int, warm_up: bool = True) -> Turns:

@@ -28,6 +28,7 @@ from nbv.evaluation.reference import (
     differing_settings,
     find_reference,
     read_cells,
+    read_configuration,
 )
 from nbv.evaluation.settings import ReadingSettings
 from nbv.evaluation.tables import TABLES, build_table
@@ -337,7 +338,6 @@ def test_a_reference_keeps_what_a_reviewer_reads(finished, tmp_path):
     for name, content in kept.items():
         assert content == run[f"tables/{name}" if name.startswith("runtime") else name]
     assert compare_runs(reference, finished).agrees
-    assert find_reference(reference.parent, "synthetic") == reference
 
 
 def test_a_reference_made_again_loses_what_the_run_has_not(run, tmp_path, caplog):
@@ -374,7 +374,16 @@ def test_an_unfinished_run_leaves_the_reference_as_it_was(run, finished, tmp_pat
 
 def test_a_name_without_a_reference_is_told_those_there_are(finished, tmp_path):
     with pytest.raises(UserError, match="there is none yet"):
-        find_reference(tmp_path / "reference", "quick")
+        find_reference(tmp_path / "reference", {"name": "quick"})
     collect_reference(finished, tmp_path / "reference" / "paper")
     with pytest.raises(UserError, match=r"'quick' cannot be compared \(there are: paper\)"):
-        find_reference(tmp_path / "reference", "quick")
+        find_reference(tmp_path / "reference", {"name": "quick"})
+
+
+def test_other_settings_are_told_before_a_run_is_made(finished, tmp_path):
+    reference = tmp_path / "synthetic"
+    collect_reference(finished, reference)
+    configuration = read_configuration(finished)
+    assert find_reference(tmp_path, configuration) == reference
+    with pytest.raises(UserError, match=r"other settings than .*: seed=3 \(reference: not set\)$"):
+        find_reference(tmp_path, configuration | {"seed": 3})

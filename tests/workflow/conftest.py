@@ -81,7 +81,8 @@ class Project:
         kinds = ("evaluation/**/*.csv", "estimates/**/*.csv", "splits/*.csv", "tables/*")
         kinds += ("lookup/**/*.npz", "depth/**/*.npy", "estimators/**/*.safetensors")
         kinds += ("claims.*", "figures/*", "meshes/*.npz")
-        paths = sorted(path for kind in kinds for path in self.results.glob(kind))
+        found = (path for kind in kinds for path in self.results.glob(kind))
+        paths = sorted(path for path in found if path.stem != "runtime")
         return {str(path.relative_to(self.results)): path.read_bytes() for path in paths}
 
 

@@ -13,7 +13,7 @@ import pytest
 pytestmark = pytest.mark.slow
 
 EVALUATED = ["single", "random", "opposite", "proposed"]
-READING = {"table": 7, "figure": 10, "claims": 1, "report": 1}
+READING = {"table": 7, "figure": 10, "claims": 1, "runtime": 1, "report": 1}
 
 
 def test_every_file_of_the_design_is_there_with_its_columns(finished):

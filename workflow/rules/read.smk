@@ -101,11 +101,39 @@ rule settings:
         script_path("settings")
 
 
+rule runtime:
+    input:
+        sources("runtime"),
+        rules.settings.output,
+        rules.claims.output,
+        expand(rules.table.output, table=TABLES),
+        expand(rules.figure.output, figure=FIGURES),
+    output:
+        csv=f"{RESULTS}/tables/runtime.csv",
+        md=f"{RESULTS}/tables/runtime.md",
+    log:
+        log_path("runtime"),
+    benchmark:
+        benchmark_path("runtime")
+    conda:
+        ENVIRONMENT
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        units=UNITS,
+        n_folds=CONFIG["n_folds"],
+    script:
+        script_path("runtime")
+
+
 rule report:
     input:
         sources("report"),
         rules.settings.output,
         rules.claims.output,
+        rules.runtime.output,
         tables=expand(rules.table.output, table=TABLES),
         figures=expand(rules.figure.output, figure=FIGURES),
     output:
@@ -132,3 +160,39 @@ rule tables:
 rule figures:
     input:
         rules.report.input.figures,
+
+
+# Only where somebody asks for it: the one reads a reference, the other writes one.
+rule compare:
+    input:
+        sources("compare"),
+        reference=reference_of_run,
+        report=rules.report.output[0],
+    log:
+        log_path("compare"),
+    conda:
+        ENVIRONMENT
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=5,
+    script:
+        script_path("compare")
+
+
+rule reference:
+    input:
+        sources("reference"),
+        report=rules.report.output[0],
+    log:
+        log_path("reference"),
+    conda:
+        ENVIRONMENT
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        reference=str(REFERENCES / CONFIG["name"]),
+    script:
+        script_path("reference")

@@ -1,6 +1,9 @@
 # What the reading rules share: which units a table or figure is about, and the files it needs.
 
+import os
+
 from nbv.evaluation.figures import FIGURES
+from nbv.evaluation.reference import find_reference
 from nbv.evaluation.settings import (
     ReadingSettings,
     focus_category,
@@ -60,3 +63,14 @@ def figure_inputs(wildcards):
             fold=FOLDS,
         )
     return sorted(files)
+
+
+REFERENCES = Path(os.path.relpath(BASE / "docs/reference"))
+
+
+def reference_of_run(wildcards):
+    """The reference to compare with, looked for before anything is run."""
+    try:
+        return str(find_reference(REFERENCES, CONFIG) / "configuration.yaml")
+    except UserError as error:
+        stop(error)

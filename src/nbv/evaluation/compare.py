@@ -30,6 +30,7 @@ from pathlib import Path
 import pandas as pd
 from scipy import stats
 
+from nbv.evaluation.cells import CELL_COLUMNS
 from nbv.evaluation.comparisons import FAILS, HOLDS
 from nbv.evaluation.layout import number
 from nbv.evaluation.published import SIGMA_ROW
@@ -39,29 +40,18 @@ from nbv.evaluation.reference import (
     SettingDifference,
     differing_settings,
     differing_surroundings,
+    other_settings,
     read_cells,
     read_configuration,
     read_verdicts,
-    setting_text,
     table_files,
 )
 from nbv.evaluation.settings import method_label
 
 IDENTICAL, WITHIN, OUTSIDE, UNJUDGED = "identical", "within", "outside", "not judged"
 
-JUDGED_COLUMNS = (
-    "table",
-    "row",
-    "row_label",
-    "method",
-    "metric",
-    "quantity",
-    "reference",
-    "low",
-    "high",
-    "here",
-    "status",
-)
+# Which cell (table, row, row_label, method, metric), which of its figures, and how it was judged.
+JUDGED_COLUMNS = (*CELL_COLUMNS[:5], "quantity", "reference", "low", "high", "here", "status")
 _EXAMPLE_METRICS = frozenset({"estimate", "error"})
 _METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}
 _COUNTS = {"n_objects": "test objects", "n_images": "initial views"}
@@ -105,13 +95,7 @@ class Comparison:
 
     def settings_line(self) -> str:
         """Return the line that says which settings differ; empty where none does."""
-        if not self.settings:
-            return ""
-        texts = ", ".join(setting_text(difference) for difference in self.settings)
-        return (
-            f"{self.run} was made with other settings than {self.reference}, so that no agreement "
-            f"is to be expected: {texts}"
-        )
+        return other_settings(self.reference, self.settings) if self.settings else ""
 
     def summary_line(self) -> str:
         """Return the counts: how many cells are identical, within tolerance, outside."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -108,14 +108,23 @@ def _kept_as(name: Path) -> Path:
     return Path(name.name) if name.stem == "runtime" else name
 
 
-def find_reference(folder: Path, name: str) -> Path:
-    """Return the reference that is kept for runs of a name.
+def find_reference(folder: Path, configuration: Mapping[str, Any]) -> Path:
+    """Return the reference that a run can be held against, known before the run is made.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        ``docs/reference``.
+    configuration : mapping
+        The run's; its ``name`` says which reference.
 
     Raises
     ------
     UserError
-        If there is none; names those there are.
+        If there is none of that name (those there are are named), or if it was made with other
+        settings (they are named).
     """
+    name = str(configuration["name"])
     found = folder / name
     if not found.is_dir():
         kept = sorted(path.parent.name for path in folder.glob("*/configuration.yaml"))
@@ -124,6 +133,9 @@ def find_reference(folder: Path, name: str) -> Path:
             f"{found} does not exist, so that {name!r} cannot be compared ({there}); "
             "`snakemake --cores 2 reference` makes one of a run"
         )
+    differences = differing_settings(read_configuration(found), configuration)
+    if differences:
+        raise UserError(other_settings(found, differences))
     return found
 
 
@@ -214,6 +226,12 @@ def differing_surroundings(
     made = list(_differences(read_provenance(reference), read_provenance(run)))
     texts = [setting_text((key.removeprefix("packages."), *rest)) for key, *rest in settings + made]
     return [f"made with: {', '.join(texts)}"] if texts else []
+
+
+def other_settings(reference: Path, differences: Iterable[SettingDifference]) -> str:
+    """Return the line that says why a run cannot be expected to agree with a reference."""
+    texts = ", ".join(setting_text(difference) for difference in differences)
+    return f"other settings than {reference}, so that no agreement is to be expected: {texts}"
 
 
 def setting_text(difference: SettingDifference) -> str:

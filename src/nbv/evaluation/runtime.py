@@ -59,9 +59,10 @@ def load_jobs(
     """Read ``benchmarks/<rule>/**/*.tsv``, and of the log file beside each its processor time.
 
     Snakemake samples a script's process and its children: 31 times half a second apart, then
-    every 30 seconds, and keeps the last processor time that it saw. A job of a minute may so be
-    short of almost half of it. Where the job's log ends with what the operating system told the
-    job itself (``processor time 12.3 s``), that is taken instead.
+    every 30 seconds, and keeps the last processor time that it saw. A job of 45 seconds may so be
+    short of two thirds of it. A job's log may end with what the operating system told the job
+    itself (``processor time 12.3 s``), which lacks only how the interpreter shut down. Neither can
+    be too much, so the larger is taken.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def load_jobs(
         told = _told_cpu_s(folder / "logs" / relative.with_suffix(".log"))
         table = pd.read_csv(path, sep="\t", na_values=["-"])
         for row in table.reindex(columns=["s", "cpu_time", "max_rss"]).to_dict("records"):
-            cpu_s = told if told is not None else float(np.nan_to_num(row["cpu_time"]))
+            cpu_s = max(told or 0.0, float(np.nan_to_num(row["cpu_time"])))
             ended_s = path.stat().st_mtime
             jobs.append((rule, cpu_s, told is None, row["s"], row["max_rss"], ended_s))
     return pd.DataFrame(jobs, columns=list(JOB_COLUMNS))
