@@ -41,6 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> list[Figure]:
     whole = not options.quick and set(names) == set(BENCHMARKS)
     path = options.output or Path("results", "bench.json" if whole else "bench-partial.json")
     write_json(path, [figure.as_json() for figure in figures])
+    if options.quick:
+        print("quick: too small for the targets, which are for the whole form")
     print(f"{summary_line(figures)}; {time.perf_counter() - started:.0f} s; written to {path}")
     return figures
 

@@ -10,12 +10,11 @@ rule meshes:
         log_path("meshes/{category}"),
     benchmark:
         benchmark_path("meshes/{category}")
-    priority: 100
+    # Before all else: a bad file is to stop the run when little has been spent.
+    priority: 1000
     conda:
         ENVIRONMENT
-    # All cores and the highest priority: every mesh of every category is checked before anything
-    # is rendered, so that a bad file stops the run when nothing has been spent on it.
-    threads: workflow.cores or 1
+    threads: 1
     resources:
         mem_mb=1000,
         runtime=30,
