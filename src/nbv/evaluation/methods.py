@@ -109,7 +109,7 @@ def results_frame(
     n_objects, n_views = test.estimate_deg.shape
     # Rounded before the error is taken, so that the columns of a row agree with each other.
     pose = np.round(pose_estimate_deg, 4) % 360.0
-    frame = pd.DataFrame(
+    return pd.DataFrame(
         {
             "object_id": np.repeat(np.asarray(test.object_ids, dtype=object), n_views),
             "initial_deg": np.tile(test.azimuth_deg.astype(int), n_objects),
@@ -124,4 +124,3 @@ def results_frame(
             "error_deg": circular_distance_deg(pose, test.azimuth_deg).ravel(),
         }
     )
-    return frame[list(COLUMNS)]

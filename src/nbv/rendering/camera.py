@@ -148,7 +148,10 @@ def hull_vertices(vertices: ArrayLike, faces: ArrayLike) -> Floats:
 
     Vertices that no face uses are left out. Surfaces with no volume keep all others.
     """
-    used: Floats = np.asarray(vertices, dtype=np.float64)[np.unique(np.asarray(faces))]
+    points = np.asarray(vertices, dtype=np.float64)
+    is_used = np.zeros(len(points), dtype=bool)
+    is_used[np.asarray(faces)] = True
+    used: Floats = points[is_used]
     if len(used) > _FEW_VERTICES:
         with contextlib.suppress(QhullError):  # A flat object has no hull in three dimensions.
             used = used[ConvexHull(used).vertices]

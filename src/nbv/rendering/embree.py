@@ -100,14 +100,15 @@ class _RayBuffer:
         self._directions = np.empty((capacity, 3), dtype=np.float32)
         self._used = 0
         self._pending: list[tuple[int, Window]] = []
-        self._position = views.position.astype(np.float32)
+        # Origins of a row of pixels: the pinhole's coordinates over and over.
+        self._position = np.tile(views.position.astype(np.float32), camera.image_side)
         centres = np.arange(camera.image_side) + 0.5
         column, row = views.principal_px.T[:, :, None]
-        # Separable: direction[i, j] = across[j] + down[i], each in double precision until here.
+        # Separable: direction[i, j] = across[:, j] + down[:, i], in double precision until here.
         x = (centres - column) / camera.focal_px
         y = (row - centres) / camera.focal_px
-        across = views.forward[:, None] + x[..., None] * views.right[:, None]
-        down = y[..., None] * views.up[:, None]
+        across = views.forward[..., None] + x[:, None] * views.right[..., None]
+        down = y[:, None] * views.up[..., None]
         self._across = across.astype(np.float32)
         self._down = down.astype(np.float32)
 
@@ -117,11 +118,14 @@ class _RayBuffer:
 
     def add(self, view: int, window: Window) -> None:
         left, right, top, bottom = window
-        count = (right - left) * (bottom - top)
+        columns, rows = right - left, bottom - top
+        count = columns * rows
         taken = slice(self._used, self._used + count)
-        self._origins[taken] = self._position[view]
-        grid = self._directions[taken].reshape(bottom - top, right - left, 3)
-        np.add(self._across[view, None, left:right], self._down[view, top:bottom, None], out=grid)
+        self._origins[taken].reshape(rows, 3 * columns)[:] = self._position[view, : 3 * columns]
+        # Coordinate by coordinate: numpy's inner loop is then a row of pixels, not three numbers.
+        grid = np.moveaxis(self._directions[taken].reshape(rows, columns, 3), 2, 0)
+        across = self._across[view, :, None, left:right]
+        np.add(across, self._down[view, :, top:bottom, None], out=grid)
         self._pending.append((view, window))
         self._used += count
 

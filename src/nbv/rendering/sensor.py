@@ -62,13 +62,16 @@ def reference_depth(depth: Depths, camera: Camera) -> NDArray[np.float32]:
     (k,) float32
         Object diagonals. Images without a visible pixel get the camera's distance.
     """
-    reference = np.full(len(depth), camera.distance, dtype=np.float32)
-    if camera.framing == "silhouette":
-        for view, image in enumerate(depth):
-            visible = image[image > 0]
-            if len(visible):
-                reference[view] = np.median(visible)
-    return reference
+    return np.array([_reference(image[image > 0], camera) for image in depth], dtype=np.float32)
+
+
+def _reference(visible: Depths, camera: Camera) -> np.float32:
+    if camera.framing != "silhouette" or not len(visible):
+        return np.float32(camera.distance)
+    # numpy.median gives the same and takes six times as long for one image.
+    low, high = (len(visible) - 1) // 2, len(visible) // 2
+    ordered = np.partition(visible, (low, high))
+    return np.float32((ordered[low] + ordered[high]) / 2)
 
 
 def encode_depth(depth: Depths, camera: Camera) -> Codes:
@@ -87,9 +90,18 @@ def encode_depth(depth: Depths, camera: Camera) -> Codes:
         ``round((reference - depth) / STEP) + 128``, kept within 1..255: offsets beyond −0.635 and
         0.635 diagonals saturate.
     """
-    reference = reference_depth(depth, camera)[:, None, None]
-    steps = np.rint((reference - depth) * np.float32(1.0 / STEP)) + np.float32(ZERO_CODE)
-    return np.where(depth > 0, np.clip(steps, 1, 255), 0).astype(np.uint8)
+    codes = np.zeros(depth.shape, dtype=np.uint8)
+    # One image at a time and in place: what is visible of one stays in the processor's cache.
+    for image, code in zip(depth, codes, strict=True):
+        seen = image > 0
+        visible = image[seen]
+        steps = _reference(visible, camera) - visible
+        steps *= np.float32(1.0 / STEP)
+        np.rint(steps, out=steps)
+        steps += np.float32(ZERO_CODE)
+        np.maximum(steps, np.float32(1), out=steps)
+        code[seen] = np.minimum(steps, np.float32(255), out=steps)
+    return codes
 
 
 def decode_depth(codes: Codes) -> Depths:
