@@ -66,6 +66,10 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
         ("elevations_deg.mug=[95]", "elevations_deg.mug: 95 is outside 0 to 89"),
         ("estimator.epochs=0", "estimator.epochs=0 is out of range: 1 or more"),
         ("n_folds=1", "n_folds=1 is out of range: 2 or more"),
+        ("seed=-1", "seed=-1 is out of range: 0 or more"),
+        ("n_objects=3", "n_objects=3 is out of range"),
+        ("dataset.centre=midle", "dataset.centre=midle is unknown: choose from: box, origin"),
+        ("dataset.turn_deg.mgu=270", "dataset.turn_deg.mgu: no such category; did you mean 'mug'"),
         ("density.bandwidths_deg=[]", "density.bandwidths_deg=[] is out of range"),
         ("name='a b'", "name=a b: use letters"),
         ("estimator", "is not of the form key=value"),
@@ -86,6 +90,12 @@ def test_a_category_of_ones_own(override):
     assert config["elevations_deg"]["bottle"] == [0, 30]
 
 
+@pytest.mark.parametrize("root", ["~/data", "/data/v=2", "/data/(old) set", "it's"])
+def test_a_path_needs_no_quotes(root):
+    config = load_config(CONFIG, ["dataset=folder", f"dataset.root={root}"])
+    assert config["dataset"]["root"] == root
+
+
 def test_a_method_of_ones_own():
     config = load_config(CONFIG, ["methods.mine={rotation: opposite}"])
     assert config["methods"]["mine"] == {"rotation": "opposite", "fusion": "average"}
@@ -104,6 +114,7 @@ def test_another_data_set_gets_its_own_folder():
         ({"overrides": ["a=1", "b=2"]}, ["a=1", "b=2"]),
         ({"overrides": "[a=[1,2],b={c:[3,4]},d=5]"}, ["a=[1,2]", "b={c:[3,4]}", "d=5"]),
         ({"overrides": "a=[1,2]"}, ["a=[1,2]"]),
+        ({"overrides": ["a='0", 0, "1'", "b=2"]}, ["a='0,0,1'", "b=2"]),
         ({}, []),
     ],
 )

@@ -26,13 +26,13 @@ def _dataclass_of(annotation: Any) -> type | None:
     return annotation if dataclasses.is_dataclass(annotation) else None  # type: ignore[return-value]
 
 
-def _check_key(key: str) -> bool:
-    """Raise UserError for a dotted key that the schema does not have; say if it leads to data."""
+def _check_key(key: str) -> Any:
+    """Return a dotted key's type, None below a dict; raise UserError for an unknown key."""
     schema: type | None = Config
     annotation: Any = Config
     for depth, part in enumerate(parts := key.split(".")):
         if schema is None:
-            return True  # below a dict: its keys are data
+            return None  # its keys are data
         hints = typing.get_type_hints(schema)
         if part not in hints:
             meant = [".".join([*parts[:depth], name]) for name in hints]
@@ -40,7 +40,7 @@ def _check_key(key: str) -> bool:
             raise UserError(f"configuration key {written!r} is unknown: {nearest(written, meant)}")
         annotation = hints[part]
         schema = _dataclass_of(annotation)
-    return typing.get_origin(annotation) is dict
+    return annotation
 
 
 def _check_choice(directory: Path, group: str, choice: str) -> None:
@@ -58,7 +58,12 @@ def _checked(directory: Path, override: str) -> str:
     if bare in GROUPS:
         _check_choice(directory, bare, value)
         return override
-    below_dict = _check_key(bare)
+    annotation = _check_key(bare)
+    if annotation in (str, str | None) and value not in ("null", "") and value[0] not in "'\"":
+        # Quoted, for Hydra's grammar has no place for ~, = or brackets in plain text.
+        escaped = value.replace("'", "\\'")
+        override = f"{key}='{escaped}'"
+    below_dict = annotation is None or typing.get_origin(annotation) is dict
     # What is data may have new keys, which Hydra calls adding and otherwise refuses.
     return f"++{override}" if below_dict and key == bare else override
 
@@ -147,19 +152,25 @@ def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
             raise UserError(f'--config {key}: write it as overrides="[{key}=...]"')
         overrides.append(f"{key}={'null' if value is None else value}")
     extra = given.get("overrides") or []
-    return overrides + (_items(extra) if isinstance(extra, str) else [str(item) for item in extra])
+    return overrides + _items(extra if isinstance(extra, str) else ",".join(map(str, extra)))
 
 
 def _items(text: str) -> list[str]:
-    """Split ``[a=1,b=[2,3]]`` or ``a=1,b=[2,3]`` at the commas that no bracket encloses.
+    """Split ``[a=1,b=[2,3]]`` or ``a=1,b='2,3'`` at commas outside brackets and quotes.
 
-    Snakemake hands over as text what YAML cannot read, such as a list within an item.
+    Snakemake hands over as text what YAML cannot read, such as a list within an item, and as a
+    list that is cut at every comma what YAML can.
     """
     inner = text[1:-1] if text.startswith("[") and text.endswith("]") else text
-    items, depth = [""], 0
+    items, depth, quote = [""], 0, ""
     for character in inner:
-        depth += (character in "[{(") - (character in "]})")
-        if character == "," and depth == 0:
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "'\"":
+            quote = character
+        else:
+            depth += (character in "[{(") - (character in "]})")
+        if character == "," and depth == 0 and not quote:
             items.append("")
         else:
             items[-1] += character

@@ -47,6 +47,17 @@ def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
         frame.round(decimals).to_csv(temporary, index=False, lineterminator="\n")
 
 
+def read_csv(path: str | Path) -> pd.DataFrame:
+    """Read a table written by `write_csv`.
+
+    Object ids stay the text they are (``007``, ``NA``, ``null``); in other columns empty cells are
+    absent values and nothing else is.
+    """
+    columns = pd.read_csv(path, nrows=0).columns
+    empty = {name: [""] for name in columns if name != "object_id"}
+    return pd.read_csv(path, dtype={"object_id": str}, keep_default_na=False, na_values=empty)
+
+
 def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write named arrays as a compressed `.npz` (deterministic: numpy dates members 1980)."""
     with replacing(path) as temporary:

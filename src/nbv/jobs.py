@@ -45,6 +45,8 @@ def job(snakemake: Any) -> Iterator[None]:
         handler.setFormatter(logging.Formatter(f"[%(asctime)s {label}] %(message)s", "%H:%M:%S"))
         root.addHandler(handler)
     root.setLevel(logging.INFO)
+    # A log that cannot be written to is no reason to fill the terminal with tracebacks.
+    logging.raiseExceptions = False
     for noisy in ("matplotlib", "fontTools", "trimesh", "OpenGL"):
         logging.getLogger(noisy).setLevel(logging.ERROR)
     try:

@@ -110,6 +110,7 @@ class Config:
 # Names that belong to code rather than to a file of a configuration group.
 CHOICES = {
     "camera.framing": ("silhouette", "axis"),
+    "dataset.centre": ("box", "origin"),
     "density.reading": ("given_estimate", "given_truth"),
     "density.spread": ("entropy", "circular_variance"),
     "estimator.device": ("auto", "cpu", "cuda", "mps"),
@@ -120,6 +121,12 @@ CHOICES = {
 def _require(holds: bool, message: str) -> None:
     if not holds:
         raise UserError(message)
+
+
+def enough_objects(n_objects: int, n_folds: int) -> bool:
+    """Say whether each fold can test one object and has two more, to train and to calibrate."""
+    largest = -(-n_objects // n_folds)
+    return n_objects >= n_folds and n_objects - largest >= 2
 
 
 def value_of(config: Mapping[str, Any], key: str) -> Any:
@@ -140,8 +147,11 @@ def validate(config: Mapping[str, Any]) -> None:
     """
     positive = {
         "n_folds (2 or more)": config["n_folds"] >= 2,
-        "n_objects (3 or more, or null for all there are)": config["n_objects"] is None
-        or config["n_objects"] >= 3,
+        "n_objects (enough to train, calibrate and test in each of n_folds, or null for all)": (
+            config["n_objects"] is None or enough_objects(config["n_objects"], config["n_folds"])
+        ),
+        "seed (0 or more)": config["seed"] >= 0,
+        "estimator.weight_decay (0 or more)": config["estimator"]["weight_decay"] >= 0,
         "calibration_fraction (between 0 and 1)": 0 < config["calibration_fraction"] < 1,
         "n_resamples (100 or more)": config["n_resamples"] >= 100,
         "estimator.epochs (1 or more)": config["estimator"]["epochs"] >= 1,
@@ -193,3 +203,8 @@ def validate(config: Mapping[str, Any]) -> None:
         re.fullmatch(r"[A-Za-z0-9._-]+", config["name"]) is not None,
         f"name={config['name']}: use letters, digits, '.', '_' and '-'",
     )
+    for category in config["dataset"]["turn_deg"]:
+        _require(
+            category in known,
+            f"dataset.turn_deg.{category}: no such category; {nearest(category, known)}",
+        )

@@ -98,7 +98,6 @@ def test_pseudo_observations_weigh_the_same_at_any_number_of_bins():
         ).viewpoint
         for n in (360, 120)
     )
-    merged = fine[::3].reshape(120, 120, 3)
     # Bins are centred: three fine bins straddle the coarse one when rolled by one.
     merged = np.roll(fine[::3], 1, axis=1).reshape(120, 120, 3).sum(axis=2)
     np.testing.assert_allclose(merged, coarse, atol=2e-3)

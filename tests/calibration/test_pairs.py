@@ -11,9 +11,9 @@ def test_estimates_come_back_to_four_decimals(tmp_path):
     rng = np.random.default_rng(0)
     estimate = rng.uniform(0, 360, (3, 360))
     estimate[0, 0] = 359.99999  # would be printed as 360.0
-    write_estimates(tmp_path / "e.csv", ["a", "b", "007"], estimate, rng.random((3, 360)))
+    write_estimates(tmp_path / "e.csv", ["null", "NA", "007"], estimate, rng.random((3, 360)))
     read = read_estimates(tmp_path / "e.csv")
-    assert read.object_ids == ("a", "b", "007")
+    assert read.object_ids == ("null", "NA", "007")
     assert read.estimate_deg[0, 0] == 0.0
     np.testing.assert_allclose(read.estimate_deg.ravel()[1:], estimate.ravel()[1:], atol=5.1e-5)
     np.testing.assert_array_equal(read.azimuth_deg, np.arange(360))

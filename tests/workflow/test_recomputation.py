@@ -96,7 +96,7 @@ def test_no_object_is_estimated_by_a_network_that_saw_it(finished):
         train = set(of_fold.object_id[of_fold.role == "train"])
         assert not train & (seen["calibration"] | seen["test"])
         assert not seen["calibration"] & seen["test"]
-        assert len(train | seen["calibration"] | seen["test"]) == 6
+        assert len(train | seen["calibration"] | seen["test"]) == 8
 
 
 @pytest.mark.parametrize(("table", "metric"), [("table1", "mae"), ("table3", "pauc")])

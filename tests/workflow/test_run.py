@@ -22,7 +22,7 @@ def test_every_file_of_the_design_is_there_with_its_columns(finished):
         splits = pd.read_csv(results / "splits" / f"{category}.csv")
         assert list(splits.columns) == ["object_id", "fold", "role"]
         depth = np.load(results / "depth" / category / "el00.npy", mmap_mode="r")
-        assert depth.shape == (6, 360, 16, 16)
+        assert depth.shape == (8, 360, 16, 16)
         assert depth.dtype == np.uint8
         for fold in (1, 2):
             place = f"{category}/el00/fold{fold}"
@@ -52,7 +52,7 @@ def test_every_file_of_the_design_is_there_with_its_columns(finished):
                     "pose_estimate_deg",
                     "error_deg",
                 ]
-                assert len(rows) == 3 * 360
+                assert len(rows) == 4 * 360
                 assert rows["delta_deg"].isna().all() == (method == "single")
     for number in range(1, 8):
         for kind in ("csv", "md", "tex"):
@@ -90,7 +90,27 @@ def test_another_training_length_reruns_training_and_what_follows(finished):
 
 
 def test_another_number_of_resamples_reruns_what_shows_intervals(finished):
-    assert finished.would_run("n_resamples=200") == {"settings": 1, **READING}
+    shown = {name: jobs for name, jobs in READING.items() if name != "figure"}
+    assert finished.would_run("n_resamples=200") == {"settings": 1, **shown}
+
+
+def test_another_turn_of_one_category_leaves_the_others_alone(finished):
+    jobs = finished.would_run("dataset.turn_deg.mug=10")
+    assert {name: jobs[name] for name in ("meshes", "render", "train")} == {
+        "meshes": 1,
+        "render": 1,
+        "train": 2,
+    }
+
+
+def test_leaving_out_an_object_changes_its_category_alone(finished):
+    jobs = finished.would_run("dataset.exclude=[chair-0003]")
+    assert (jobs["meshes"], jobs["train"]) == (1, 2)
+    assert finished.would_run("dataset.exclude=[bottle-0003]") == {
+        "settings": 1,
+        "runtime": 1,
+        "report": 1,
+    }
 
 
 def test_another_seed_reruns_everything(finished):

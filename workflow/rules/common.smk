@@ -1,5 +1,6 @@
 # Configuration, names and helpers that the other rule files share.
 
+import re
 import sys
 from pathlib import Path
 
@@ -13,8 +14,9 @@ except ModuleNotFoundError:
 from nbv import provenance
 from nbv.config import load_config, snakemake_overrides
 from nbv.errors import UserError
-from nbv.evaluation.methods import needs_lookup
+from nbv.evaluation.methods import check_method, needs_lookup
 from nbv.meshes.sources import SOURCES, open_source, select_objects
+from nbv.meshes.store import stored_ids
 from nbv.rendering import RENDERERS
 
 BASE = Path(workflow.basedir)
@@ -26,24 +28,42 @@ def stop(message):
     sys.exit(f"nbv: error: {message}")
 
 
-def check_meshes_are_there():
-    """Look for each category's files, unless its meshes have been prepared already."""
-    for category in CATEGORIES:
-        if not Path(f"{RESULTS}/meshes/{category}.npz").exists():
-            source = open_source(CONFIG["dataset"], CONFIG["seed"])
-            select_objects(source, category, CONFIG["n_objects"])
+def chosen_objects(category):
+    """The objects of a category, by name; those of the last run where its files are out of reach."""
+    try:
+        source = open_source(CONFIG["dataset"], CONFIG["seed"])
+        return select_objects(source, category, CONFIG["n_objects"])
+    except UserError:
+        prepared = Path(f"{RESULTS}/meshes/{category}.npz")
+        if not prepared.exists():
+            raise
+        return stored_ids(prepared)
+
+
+def dataset_of(category):
+    """What of the data set's settings concerns one category, the objects left out apart."""
+    settings = {
+        key: value
+        for key, value in CONFIG["dataset"].items()
+        if key not in ("exclude", "exclude_file")
+    }
+    for key in ("categories", "turn_deg"):
+        settings[key] = {k: v for k, v in settings[key].items() if k == category}
+    return settings | {"exclude": [], "exclude_file": None}
 
 
 try:
     CONFIG = load_config(BASE / "config", snakemake_overrides(config))
     RESULTS = f"results/{CONFIG['name']}"
     CATEGORIES = CONFIG["categories"]
+    for name, method in CONFIG["methods"].items():
+        check_method(name, method)
     LOOKUP_METHODS = [
         name
         for name, method in CONFIG["methods"].items()
         if needs_lookup(method["rotation"])
     ]
-    check_meshes_are_there()
+    OBJECTS = {category: chosen_objects(category) for category in CATEGORIES}
 except UserError as error:
     stop(error)
 
@@ -65,10 +85,10 @@ UNITS = [
 
 
 wildcard_constraints:
-    category="[^/]+",
+    category="|".join(map(re.escape, CATEGORIES)),
     elevation=r"\d\d",
-    fold=r"\d+",
-    method="|".join(LOOKUP_METHODS) or "none",
+    fold="|".join(map(str, FOLDS)),
+    method="|".join(map(re.escape, LOOKUP_METHODS)) or "none",
 
 
 def script_path(name):

@@ -20,7 +20,7 @@ rule table:
         mem_mb=1000,
         runtime=10,
     params:
-        reading=READING,
+        reading=lambda wildcards: shown(RESAMPLED, wildcards.table),
         n_folds=CONFIG["n_folds"],
         units=lambda wildcards: units_of(wildcards.table),
     script:
@@ -46,7 +46,7 @@ rule figure:
         mem_mb=1500,
         runtime=10,
     params:
-        reading=READING,
+        reading=lambda wildcards: shown(SHOWN, wildcards.figure),
         n_folds=CONFIG["n_folds"],
         units=lambda wildcards: units_of(wildcards.figure),
     script:
@@ -71,7 +71,7 @@ rule claims:
         mem_mb=2000,
         runtime=10,
     params:
-        reading=READING,
+        reading=RESAMPLED,
         n_folds=CONFIG["n_folds"],
         units=UNITS,
     script:

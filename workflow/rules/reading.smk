@@ -12,12 +12,9 @@ from nbv.evaluation.settings import (
 )
 from nbv.evaluation.tables import TABLES
 
-READING = {
-    "methods": list(CONFIG["methods"]),
-    "focus_category": CONFIG["focus_category"],
-    "n_resamples": CONFIG["n_resamples"],
-    "seed": CONFIG["seed"],
-}
+SHOWN = {"methods": list(CONFIG["methods"])}
+# Figures show no intervals.
+RESAMPLED = SHOWN | {"n_resamples": CONFIG["n_resamples"], "seed": CONFIG["seed"]}
 REFERENCE_UNITS = reference_units(UNITS, ReadingSettings())
 READING_SETTINGS = ReadingSettings(focus_category=CONFIG["focus_category"])
 FOCUS = focus_category(UNITS, READING_SETTINGS)
@@ -36,6 +33,12 @@ def units_of(name):
     if name in OF_FOCUS:
         return [focus_unit(UNITS, READING_SETTINGS)]
     return REFERENCE_UNITS
+
+
+def shown(settings, name):
+    """What of the reading settings a table or figure depends on."""
+    of_focus = name in OF_ELEVATIONS | OF_FOCUS
+    return settings | ({"focus_category": FOCUS} if of_focus else {})
 
 
 def evaluations_of(units):

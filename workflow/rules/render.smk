@@ -19,8 +19,8 @@ rule meshes:
         mem_mb=1000,
         runtime=30,
     params:
-        dataset=CONFIG["dataset"],
-        n_objects=CONFIG["n_objects"],
+        dataset=lambda wildcards: dataset_of(wildcards.category),
+        objects=lambda wildcards: OBJECTS[wildcards.category],
         seed=CONFIG["seed"],
     script:
         script_path("meshes")

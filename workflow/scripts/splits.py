@@ -5,12 +5,12 @@ from nbv.jobs import job
 with job(snakemake):
     from nbv.calibration.folds import make_splits
     from nbv.files import write_csv
-    from nbv.meshes.store import load_meshes
+    from nbv.meshes.store import stored_ids
     from nbv.seeds import rng_for
 
     params = snakemake.params
     splits = make_splits(
-        list(load_meshes(snakemake.input.meshes)),
+        stored_ids(snakemake.input.meshes),
         params.n_folds,
         params.calibration_fraction,
         rng_for(params.seed, "splits", snakemake.wildcards.category),

@@ -91,9 +91,9 @@ def smooth(counts: Matrix, bandwidth_deg: float) -> Matrix:
     """
     if bandwidth_deg == 0:
         return counts.copy()
-    spectrum = np.fft.rfft(von_mises_kernel(len(counts), bandwidth_deg))
-    full = np.fft.fft(von_mises_kernel(len(counts), bandwidth_deg))
-    smoothed = np.fft.irfft2(np.fft.rfft2(counts) * np.outer(full, spectrum), s=counts.shape)
+    spectrum = np.fft.fft(von_mises_kernel(len(counts), bandwidth_deg))
+    response = np.outer(spectrum, spectrum[: len(counts) // 2 + 1])
+    smoothed = np.fft.irfft2(np.fft.rfft2(counts) * response, s=counts.shape)
     # The transform leaves rounding errors of either sign where the truth is almost 0.
     return np.maximum(smoothed, 0.0)
 

@@ -11,6 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
+from nbv.files import read_csv
+from nbv.schema import enough_objects
 
 Role = Literal["train", "calibration", "test"]
 ROLES: tuple[Role, ...] = ("train", "calibration", "test")
@@ -46,10 +48,10 @@ def make_splits(
         Where there are too few objects for that many folds.
     """
     n_objects = len(object_ids)
-    if n_objects < max(n_folds, 3):
+    if not enough_objects(n_objects, n_folds):
         raise UserError(
             f"n_folds={n_folds}: {n_objects} objects cannot be divided into folds that train, "
-            f"calibrate and test; use at least {max(n_folds, 3)} objects or fewer folds"
+            "calibrate and test; use more objects or another number of folds"
         )
     fold_of = np.empty(n_objects, dtype=int)
     fold_of[rng.permutation(n_objects)] = np.arange(n_objects) % n_folds + 1
@@ -78,7 +80,7 @@ def read_splits(path: str | Path) -> pd.DataFrame:
     UserError
         Where columns are missing or a role is unknown.
     """
-    splits = pd.read_csv(path, dtype={"object_id": str})
+    splits = read_csv(path)
     if list(splits.columns) != ["object_id", "fold", "role"]:
         raise UserError(f"{path}: the columns must be object_id, fold, role")
     unknown = set(splits["role"]) - set(ROLES)

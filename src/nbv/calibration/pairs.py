@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.files import write_csv
+from nbv.files import read_csv, write_csv
 
 COLUMNS = ("object_id", "azimuth_deg", "estimate_deg", "concentration")
 
@@ -71,7 +71,7 @@ def read_estimates(path: str | Path) -> Estimates:
     UserError
         Where columns or views are missing.
     """
-    frame = pd.read_csv(path, dtype={"object_id": str})
+    frame = read_csv(path)
     missing = set(COLUMNS) - set(frame.columns)
     if missing:
         raise UserError(f"{path}: column {sorted(missing)[0]!r} is missing")

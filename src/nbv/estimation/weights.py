@@ -54,7 +54,8 @@ def save_estimator(path: str | Path, estimator: Estimator, hardware: Hardware) -
     }
     metadata = {"nbv": json.dumps(history, sort_keys=True)}
     with replacing(path) as temporary:
-        safetensors.torch.save_file(tensors, temporary, metadata=metadata)
+        # Not save_file: its error on a full disk is not the system's.
+        temporary.write_bytes(safetensors.torch.save(tensors, metadata=metadata))
 
 
 def load_estimator(path: str | Path, hardware: Hardware) -> Estimator:

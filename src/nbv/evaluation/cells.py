@@ -11,7 +11,7 @@ import pandas as pd
 
 from nbv.evaluation import paired, published
 from nbv.evaluation.paired import PairedErrors, Resampler
-from nbv.evaluation.settings import ReadingSettings
+from nbv.evaluation.settings import ReadingSettings, method_label
 
 CELL_COLUMNS = (
     "table",
@@ -64,12 +64,24 @@ def assemble(
     title: str,
     row_header: str,
     cells: Iterable[dict[str, Any]],
-    notes: tuple[str, ...],
     settings: ReadingSettings,
+    *notes: str,
 ) -> Table:
-    """Return the table of some cells."""
+    """Return the table of some cells, its notes followed by those on what it shows."""
     frame = pd.DataFrame(list(cells), columns=list(CELL_COLUMNS))
+    if name not in ("table6", "table7") and shows_difference(frame, settings):
+        notes += (
+            f"{method_label(settings.subject)} − {method_label(settings.reference)} is the paired "
+            f"difference with its 95 % interval over objects ({settings.n_resamples} resamples).",
+        )
+    known = published.PUBLISHED[name].notes
+    notes += tuple(note.text for note in known if note.applies(frame))
     return Table(name, title, row_header, frame, notes, settings)
+
+
+def shows_difference(cells: pd.DataFrame, settings: ReadingSettings) -> bool:
+    """Say whether the two methods of the paired difference are both among the cells."""
+    return {settings.subject, settings.reference} <= set(cells["method"])
 
 
 def method_cells(

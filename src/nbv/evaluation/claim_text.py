@@ -18,6 +18,7 @@ from nbv.evaluation.comparisons import (
     combine_statement,
 )
 from nbv.evaluation.layout import number
+from nbv.evaluation.markdown import pipe_row
 from nbv.evaluation.paired import LOWER_IS_BETTER, UNIT_OF
 from nbv.evaluation.settings import category_label, method_label
 
@@ -50,11 +51,11 @@ def claims_markdown(claims: pd.DataFrame) -> str:
         "Our figures",
         "The paper's own figures",
     )
-    lines = ["## The paper's claims", "", _pipe_row(header), _pipe_row(["---"] * len(header))]
+    lines = ["## The paper's claims", "", pipe_row(header), pipe_row(["---"] * len(header))]
     for row in claims.drop_duplicates("id").to_dict("records"):
         note = f" ({row['note']})" if row["note"] else ""
         lines.append(
-            _pipe_row(
+            pipe_row(
                 [
                     str(row["section"]),
                     row["sentence"],
@@ -153,7 +154,3 @@ def _where(term: Term) -> str:
     if term.initial_deg:
         where += f", initial azimuths {', '.join(f'{a}°' for a in term.initial_deg)}"
     return where
-
-
-def _pipe_row(texts: Sequence[str]) -> str:
-    return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"

@@ -7,8 +7,7 @@ without another table.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +15,8 @@ import numpy as np
 import pandas as pd
 
 from nbv.evaluation import published
-from nbv.evaluation.cells import Table
+from nbv.evaluation.cells import Table, shows_difference
+from nbv.evaluation.markdown import pipe_row
 from nbv.evaluation.settings import method_label
 from nbv.files import write_csv, write_text
 
@@ -50,12 +50,12 @@ def save_table(table: Table, stem: str | Path) -> list[Path]:
 def to_markdown(table: Table) -> str:
     """Return the table as a heading, a pipe table and its notes as a list."""
     grid = _grid(table)
-    lines = [f"## {heading(table)}", "", _pipe_row(grid.header)]
-    lines.append(_pipe_row(["---"] + ["---:"] * (len(grid.header) - 1)))
+    lines = [f"## {heading(table)}", "", pipe_row(grid.header)]
+    lines.append(pipe_row(["---"] + ["---:"] * (len(grid.header) - 1)))
     for row in grid.rows:
         texts = [f"**{cell.text}**" if cell.best else cell.text for cell in row]
         printed = [cell.printed for cell in row]
-        lines.append(_pipe_row([f"{t} {p}".rstrip() for t, p in zip(texts, printed, strict=True)]))
+        lines.append(pipe_row([f"{t} {p}".rstrip() for t, p in zip(texts, printed, strict=True)]))
     lines += ["", *(f"- {note}" for note in _notes(table))]
     return "\n".join(lines) + "\n"
 
@@ -163,7 +163,7 @@ def _comparison_grid(table: Table) -> _Grid:
     methods = list(dict.fromkeys(cells["method"]))
     degrees = "°" if cells["metric"].iloc[0] == "mae" else ""
     gap = f"{method_label(settings.subject)} {_MINUS} {method_label(settings.reference)}"
-    shows_gap = {settings.subject, settings.reference} <= set(methods)
+    shows_gap = shows_difference(cells, settings)
     rows = []
     for label, part in cells.groupby("row_label", sort=False):
         row = [_Cell(str(label))]
@@ -213,7 +213,8 @@ def _example_grid(table: Table) -> _Grid:
                 if estimate is None or error is None or not np.isfinite(error):
                     row.append(_Cell("–"))
                     continue
-                text = f"{number(estimate, 1)}° ({number(error, 1)}°)"
+                turned = number(round(estimate, 1) % 360, 1)  # 359.96 reads 0.0, not 360.0
+                text = f"{turned}° ({number(error, 1)}°)"
                 row.append(_Cell(text, bool(round(error, 1) == lowest)))
             rows.append(tuple(row))
     return _Grid((table.row_header, *map(method_label, methods)), tuple(rows))
@@ -245,43 +246,5 @@ def _gap_text(cell: pd.Series) -> str:
     )
 
 
-def _pipe_row(texts: Sequence[str]) -> str:
-    return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"
-
-
 def _latex_row(texts: Sequence[str]) -> str:
     return " & ".join(texts) + " \\\\"
-
-
-def markdown_to_html(markdown: str, inline: Callable[[str], str]) -> str:
-    """Return the HTML of what `to_markdown` writes, below its heading.
-
-    Parameters
-    ----------
-    markdown : str
-        A pipe table followed by a list of notes; the heading is left to the caller.
-    inline : callable
-        Escapes text for HTML.
-    """
-    lines = [line for line in markdown.splitlines() if line and not line.startswith("#")]
-    rows = [_split_pipes(line) for line in lines if line.startswith("|")]
-    notes = [line.removeprefix("- ") for line in lines if line.startswith("- ")]
-    head = "".join(f'<th scope="col">{inline(text)}</th>' for text in rows[0])
-    body = []
-    for row in rows[2:]:
-        cells = [f'<th scope="row">{inline(row[0])}</th>']
-        for text in row[1:]:
-            shown = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", inline(text))
-            cells.append(f"<td>{shown}</td>")
-        body.append(f"<tr>{''.join(cells)}</tr>")
-    items = "".join(f"<li>{inline(note)}</li>" for note in notes)
-    return (
-        f'<div class="scroll"><table><thead><tr>{head}</tr></thead>'
-        f"<tbody>{''.join(body)}</tbody></table></div>"
-        + (f'<ul class="notes">{items}</ul>' if items else "")
-    )
-
-
-def _split_pipes(line: str) -> list[str]:
-    cells = re.split(r"(?<!\\)\|", line.strip().strip("|"))
-    return [cell.strip().replace("\\|", "|") for cell in cells]

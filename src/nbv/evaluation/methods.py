@@ -44,6 +44,14 @@ BASELINES: dict[str, Callable[[NDArray[np.float64], np.random.Generator], Rotati
 SINGLE = "none"
 
 
+def check_method(name: str, method: Mapping[str, Any]) -> None:
+    """Raise UserError where a configured method's rotation or fusion is unknown."""
+    needs_lookup(method["rotation"])
+    if method["fusion"] not in FUSIONS:
+        key = f"methods.{name}.fusion={method['fusion']}"
+        raise UserError(f"{key} is unknown: {nearest(method['fusion'], FUSIONS)}")
+
+
 def needs_lookup(rotation: str) -> bool:
     """Say whether a method's ``rotation`` is recommended by a lookup table.
 
@@ -94,7 +102,9 @@ def evaluate_method(
             raise ValueError(f"rotation {rotation!r} needs a lookup table")
         delta = lookup.recommend(first)
     else:
-        delta = BASELINES[rotation](first, rng or np.random.default_rng())
+        if rng is None:
+            raise ValueError(f"rotation {rotation!r} needs a generator")
+        delta = BASELINES[rotation](first, rng)
     second = second_look(first, delta)
     return results_frame(test, delta, second, FUSIONS[method["fusion"]](first, second, delta))
 

@@ -194,47 +194,6 @@ def percentile_interval(samples: ArrayLike, level: float = 0.95) -> tuple[float,
     return float(low), float(high)
 
 
-def bootstrap_difference(
-    errors_a: ArrayLike,
-    errors_b: ArrayLike,
-    objects: ArrayLike,
-    rng: np.random.Generator,
-    n_resamples: int = 2000,
-) -> Interval:
-    """Return mean(a) - mean(b) with its 95 % interval over objects, paired by image.
-
-    Parameters
-    ----------
-    errors_a, errors_b : (n_images,) float
-        The two methods' errors (or any figure per image) on the same images, row by row.
-    objects : (n_images,) labels
-        Object of each image; whole objects are resampled.
-    rng : numpy.random.Generator
-        Source of the resamples.
-    n_resamples : int
-        Number of resamples.
-
-    Returns
-    -------
-    Interval
-        In the unit of the errors; negative where `a` is lower. Exactly zero, with a zero-width
-        interval, where the two are identical. With fewer than about ten objects the interval
-        is too narrow to be believed.
-
-    Raises
-    ------
-    ValueError
-        If the three arrays differ in length or are empty.
-    """
-    difference = _non_empty(errors_a) - np.asarray(errors_b, dtype=np.float64)
-    names, codes = np.unique(np.asarray(objects), return_inverse=True)
-    if codes.shape != difference.shape:
-        raise ValueError(f"{difference.shape[0]} errors but {codes.shape[0]} object labels")
-    drawn = resample_objects(len(names), rng, n_resamples)
-    low, high = percentile_interval(resampled_means(difference, codes, drawn))
-    return Interval(float(np.mean(difference)), low, high)
-
-
 def _non_empty(errors_deg: ArrayLike) -> Floats:
     errors = np.asarray(errors_deg, dtype=np.float64)
     if errors.size == 0:

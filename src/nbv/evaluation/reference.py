@@ -9,12 +9,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from omegaconf import OmegaConf
 
 from nbv.errors import UserError
 from nbv.evaluation.cells import CELL_COLUMNS
-from nbv.files import replacing
+from nbv.evaluation.results import existing
+from nbv.files import read_csv, replacing
 
 log = logging.getLogger(__name__)
 
@@ -139,19 +139,6 @@ def find_reference(folder: Path, configuration: Mapping[str, Any]) -> Path:
     return found
 
 
-def existing(path: Path) -> Path:
-    """Return the path of a file that has to be there.
-
-    Raises
-    ------
-    UserError
-        If it is not.
-    """
-    if not path.is_file():
-        raise UserError(f"{path} does not exist; finish the run first, or is it another folder?")
-    return path
-
-
 def read_configuration(root: Path) -> dict[str, Any]:
     """Read ``configuration.yaml`` of a run or reference as plain values.
 
@@ -191,17 +178,18 @@ def read_cells(path: Path) -> dict[tuple[str, ...], Cell]:
     UserError
         If a column is missing.
     """
-    frame = pd.read_csv(path, dtype=dict.fromkeys(("table", "row", "row_label", "method"), str))
+    frame = read_csv(path)
     absent = [name for name in CELL_COLUMNS if name not in frame.columns]
     if absent:
         raise UserError(f"{path}: no column {absent[0]!r}; delete the file and make it again")
+    frame = frame.astype(dict.fromkeys(CELL_COLUMNS[:4], str))
     cells = [{name: cell[name] for name in CELL_COLUMNS} for cell in frame.to_dict("records")]
     return {tuple(cell[name] for name in CELL_KEY): cell for cell in cells}
 
 
 def read_verdicts(root: Path) -> dict[str, str]:
     """Read the verdict of each claim of a run or reference."""
-    claims = pd.read_csv(existing(root / "claims.csv")).drop_duplicates("id")
+    claims = read_csv(existing(root / "claims.csv")).drop_duplicates("id")
     return dict(zip(claims["id"], claims["verdict"], strict=True))
 
 

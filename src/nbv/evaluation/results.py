@@ -5,30 +5,32 @@ A *unit* is one category at one elevation: what a row of Tables 1 to 4 is made o
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nbv.calibration.folds import read_splits
 from nbv.errors import UserError
-from nbv.files import open_array, read_arrays
+from nbv.evaluation.methods import COLUMNS
+from nbv.files import open_array, read_csv
 
 Unit = tuple[str, int]
 """A category and an elevation in degrees."""
 
-EVALUATION_COLUMNS = (
-    "object_id",
-    "initial_deg",
-    "initial_estimate_deg",
-    "delta_deg",
-    "next_estimate_deg",
-    "pose_estimate_deg",
-    "error_deg",
-)
+def existing(path: Path) -> Path:
+    """Return the path of a file that has to be there.
+
+    Raises
+    ------
+    UserError
+        If it is not.
+    """
+    if not path.is_file():
+        raise UserError(f"{path} does not exist; finish the run first, or is it another folder?")
+    return path
 
 
 def unit_dir(root: str | Path, stage: str, category: str, elevation_deg: int) -> Path:
@@ -81,7 +83,7 @@ def load_unit(
     Returns
     -------
     pandas.DataFrame
-        ``method, fold`` and `EVALUATION_COLUMNS`; one row per method, test object and initial
+        ``method, fold`` and `methods.COLUMNS`; one row per method, test object and initial
         viewpoint. `method` is categorical, its categories in the order given.
 
     Raises
@@ -93,11 +95,11 @@ def load_unit(
     for method in methods:
         for fold in range(1, n_folds + 1):
             path = evaluation_path(root, category, elevation_deg, fold, method)
-            frame = _read_csv(path, EVALUATION_COLUMNS)
+            frame = _read_csv(path, COLUMNS)
             parts.append(frame.assign(method=method, fold=fold))
     unit = pd.concat(parts, ignore_index=True)
     unit["method"] = pd.Categorical(unit["method"], categories=list(methods), ordered=True)
-    return unit[["method", "fold", *EVALUATION_COLUMNS]]
+    return unit[["method", "fold", *COLUMNS]]
 
 
 def load_evaluations(
@@ -110,19 +112,9 @@ def load_evaluations(
     }
 
 
-def discover_units(root: str | Path) -> list[Unit]:
-    """Return the units that have evaluation files under `root`, sorted."""
-    found = []
-    for directory in Path(root).glob("evaluation/*/el*"):
-        elevation = re.fullmatch(r"el(\d+)", directory.name)
-        if elevation and directory.is_dir():
-            found.append((directory.parent.name, int(elevation.group(1))))
-    return sorted(found)
-
-
 def load_object_ids(root: str | Path, category: str) -> tuple[str, ...]:
     """Return the category's objects in the order of the depth images."""
-    splits = _read_csv(splits_path(root, category), ("object_id", "fold", "role"))
+    splits = read_splits(existing(splits_path(root, category)))
     first = splits[splits["fold"] == splits["fold"].min()]
     return tuple(first["object_id"])
 
@@ -132,28 +124,12 @@ def load_depth(root: str | Path, category: str, elevation_deg: int) -> NDArray[n
 
     0 is background; nearer is a larger code. The file is read as far as it is indexed.
     """
-    path = depth_path(root, category, elevation_deg)
-    if not path.is_file():
-        raise _missing(path)
-    return open_array(path)
-
-
-def load_lookup(
-    root: str | Path, category: str, elevation_deg: int, fold: int, criterion: str
-) -> Mapping[str, NDArray[Any]]:
-    """Read the arrays of one lookup table."""
-    path = lookup_path(root, category, elevation_deg, fold, criterion)
-    if not path.is_file():
-        raise _missing(path)
-    return read_arrays(path)
+    return open_array(existing(depth_path(root, category, elevation_deg)))
 
 
 def _read_csv(path: Path, columns: Sequence[str]) -> pd.DataFrame:
-    if not path.is_file():
-        raise _missing(path)
     try:
-        # Identifiers such as 00217 are names: read as numbers they would match nothing else.
-        frame = pd.read_csv(path, dtype={"object_id": str})
+        frame = read_csv(existing(path))
     except pd.errors.EmptyDataError:
         frame = pd.DataFrame()
     absent = [name for name in columns if name not in frame.columns]
@@ -162,7 +138,3 @@ def _read_csv(path: Path, columns: Sequence[str]) -> pd.DataFrame:
     if frame.empty:
         raise UserError(f"{path}: holds no rows; delete the file and run the stage again")
     return frame
-
-
-def _missing(path: Path) -> UserError:
-    return UserError(f"{path} does not exist; run the workflow's target that makes it first")

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from nbv.evaluation.layout import number
+from nbv.evaluation.markdown import pipe_row
 from nbv.evaluation.results import Unit
 
 RUNTIME_COLUMNS = (
@@ -131,11 +132,11 @@ def runtime_markdown(runtime: pd.DataFrame) -> str:
     lines = ["## Running time", ""]
     if runtime.empty:
         return "\n".join([*lines, "No job was timed in this run."]) + "\n"
-    lines += [_pipe_row(_HEADER), _pipe_row(["---"] + ["---:"] * (len(_HEADER) - 1))]
+    lines += [pipe_row(_HEADER), pipe_row(["---"] + ["---:"] * (len(_HEADER) - 1))]
     for row in runtime.to_dict("records"):
         seconds = [f"{row[name]:,.1f}" for name in ("cpu_s", "wall_s", "median_s", "max_s")]
         memory = f"{row['peak_mib']:,.0f}" if np.isfinite(row["peak_mib"]) else "–"
-        lines.append(_pipe_row([row["rule"], f"{row['jobs']:,}", *seconds, memory]))
+        lines.append(pipe_row([row["rule"], f"{row['jobs']:,}", *seconds, memory]))
     return "\n".join([*lines, "", *(f"- {note}" for note in _notes(runtime))]) + "\n"
 
 
@@ -221,7 +222,3 @@ def _duration(seconds: float) -> str:
         return "{} h {} min".format(*divmod(round(seconds / 60), 60))
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest} s" if minutes else f"{rest} s"
-
-
-def _pipe_row(texts: Iterable[str]) -> str:
-    return "| " + " | ".join(texts) + " |"

@@ -28,7 +28,7 @@ class ReadingSettings:
     focus_category : str or None
         The category of Tables 2 and 4 to 7; None takes ``mug``, or else the first one present.
     reference_elevation_deg : int
-        The elevation of Tables 1, 3 and 5 to 7; the lowest one present where this was not run.
+        The elevation of Tables 1, 3 and 5 to 7; a category's lowest one where it was not run.
     example_fold : int
         Fold of the examples (Table 6, Figs. 2, 3, 7); the first one where this was not run.
     example_initial_deg : tuple of int
@@ -86,18 +86,39 @@ def focus_category(units: Iterable[Unit], settings: ReadingSettings) -> str:
 
 
 def reference_units(units: Iterable[Unit], settings: ReadingSettings) -> list[Unit]:
-    """Return the units at the elevation that the comparison of categories is made at."""
+    """Return the units that categories are compared by: one of each, in the order given.
+
+    Each category at the reference elevation, or where it was not run, at its lowest one.
+    """
     present = list(units)
-    elevations = {elevation for _, elevation in present}
+    return [
+        (category, _reference_elevation_deg(present, category, settings))
+        for category in dict.fromkeys(category for category, _ in present)
+    ]
+
+
+def common_elevation_deg(units: Iterable[Unit], settings: ReadingSettings) -> int:
+    """Return the elevation that a heading over `reference_units` names; see `unit_label`."""
+    elevations = {elevation for _, elevation in units}
     wanted = settings.reference_elevation_deg
-    elevation = wanted if wanted in elevations else min(elevations)
-    return [unit for unit in present if unit[1] == elevation]
+    return wanted if wanted in elevations else min(elevations)
+
+
+def unit_label(unit: Unit, common_deg: int) -> str:
+    """Return a unit's category, with its elevation where the heading names another one."""
+    category, elevation = unit
+    label = category_label(category)
+    return label if elevation == common_deg else f"{label} ({elevation}°)"
 
 
 def focus_unit(units: Iterable[Unit], settings: ReadingSettings) -> Unit:
     """Return the focus category at the reference elevation, or at its lowest one."""
     present = list(units)
     category = focus_category(present, settings)
-    elevations = [elevation for name, elevation in present if name == category]
+    return category, _reference_elevation_deg(present, category, settings)
+
+
+def _reference_elevation_deg(units: list[Unit], category: str, settings: ReadingSettings) -> int:
+    elevations = [elevation for name, elevation in units if name == category]
     wanted = settings.reference_elevation_deg
-    return category, wanted if wanted in elevations else min(elevations)
+    return wanted if wanted in elevations else min(elevations)

@@ -25,10 +25,11 @@ from nbv.evaluation.results import Unit
 from nbv.evaluation.settings import (
     ReadingSettings,
     category_label,
+    common_elevation_deg,
     focus_category,
     focus_unit,
-    method_label,
     reference_units,
+    unit_label,
 )
 
 Evaluations = Mapping[Unit, pd.DataFrame]
@@ -64,17 +65,17 @@ def build_table(
 def _by_category(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
     metric = "mae" if name == "table1" else "pauc"
     units = reference_units(evaluations, settings)
-    elevation = units[0][1]
+    elevation = common_elevation_deg(units, settings)
     resampler = shared_resampler(settings)
     cells = []
     for unit in units:
         sample = pair_methods(evaluations[unit], unit[0])
-        label = category_label(unit[0])
+        label = unit_label(unit, elevation)
         cells += method_cells(
-            name, unit[0], label, metric, sample, resampler, settings, elevation == 0
+            name, unit[0], label, metric, sample, resampler, settings, unit[1] == 0
         )
     title = f"{_METRIC_TITLES[metric]} by category at elevation {elevation}°"
-    return assemble(name, title, "Category", cells, _notes(name, settings), settings)
+    return assemble(name, title, "Category", cells, settings)
 
 
 def _by_elevation(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
@@ -95,7 +96,7 @@ def _by_elevation(name: str, evaluations: Evaluations, settings: ReadingSettings
             category == published.FOCUS_CATEGORY,
         )
     title = f"{_METRIC_TITLES[metric]} of {category_label(category)} by elevation"
-    return assemble(name, title, "Elevation", cells, _notes(name, settings), settings)
+    return assemble(name, title, "Elevation", cells, settings)
 
 
 def _by_group(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
@@ -120,7 +121,7 @@ def _by_group(name: str, evaluations: Evaluations, settings: ReadingSettings) ->
             (category, elevation) == (published.FOCUS_CATEGORY, 0),
         )
     title = f"MAE of {category_label(category)} by viewpoint group at elevation {elevation}°"
-    return assemble(name, title, "Viewpoint group", cells, _notes(name, settings), settings)
+    return assemble(name, title, "Viewpoint group", cells, settings)
 
 
 def _examples(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
@@ -152,8 +153,8 @@ def _examples(name: str, evaluations: Evaluations, settings: ReadingSettings) ->
     title = (
         f"Examples of estimates (and errors) for {category_label(unit[0])} at elevation {unit[1]}°"
     )
-    notes = (f"Object {example.object_id} of fold {example.fold}: {example.reason}.",)
-    return assemble(name, title, "Initial azimuth", cells, notes + _notes(name, settings), settings)
+    note = f"Object {example.object_id} of fold {example.fold}: {example.reason}."
+    return assemble(name, title, "Initial azimuth", cells, settings, note)
 
 
 def _by_fold(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
@@ -189,18 +190,8 @@ def _by_fold(name: str, evaluations: Evaluations, settings: ReadingSettings) -> 
             printed = published.published_value(name, one["metric"], one["row"], one["method"])
             one["published"] = np.nan if printed is None or not comparable else printed
     title = f"MAE and pAUC of {category_label(category)} by fold at elevation {elevation}°"
-    notes = ("The average is over the pooled images of all folds.", *_notes(name, settings))
-    return assemble(name, title, "Fold", cells, notes, settings)
-
-
-def _notes(name: str, settings: ReadingSettings) -> tuple[str, ...]:
-    own: tuple[str, ...] = ()
-    if name not in ("table6", "table7"):
-        own = (
-            f"{method_label(settings.subject)} − {method_label(settings.reference)} is the paired "
-            f"difference with its 95 % interval over objects ({settings.n_resamples} resamples).",
-        )
-    return own + published.PUBLISHED[name].notes
+    note = "The average is over the pooled images of all folds."
+    return assemble(name, title, "Fold", cells, settings, note)
 
 
 _METRIC_TITLES: Mapping[str, str] = {"mae": "MAE", "pauc": "pAUC"}

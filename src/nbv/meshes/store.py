@@ -66,6 +66,12 @@ def save_meshes(path: str | Path, meshes: Mapping[str, Surface]) -> None:
     write_arrays(path, arrays)
 
 
+def stored_ids(path: str | Path) -> list[str]:
+    """Return the ids in a file of `save_meshes`, in its order, without reading the meshes."""
+    with np.load(path, allow_pickle=False) as stored:
+        return [str(object_id) for object_id in stored["ids"]]
+
+
 def load_meshes(path: str | Path) -> dict[str, Mesh]:
     """Read what `save_meshes` wrote, in its order."""
     arrays = read_arrays(path)

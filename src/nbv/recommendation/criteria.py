@@ -50,6 +50,32 @@ def pose_likelihood(likelihoods: Likelihoods, reading: str) -> Table:
     return chosen.astype(np.float32)
 
 
+def two_view_poses(viewpoint: Table, pose: Table, delta_bins: int) -> Table:
+    """Return p(theta | estimate, delta) for one rotation (Eqs. 3 and 6).
+
+    Parameters
+    ----------
+    viewpoint : ndarray (B, B) float32
+        V[estimate, viewpoint].
+    pose : ndarray (B, B) float32
+        T[viewpoint, pose].
+    delta_bins : int
+        The rotation, in bins.
+
+    Returns
+    -------
+    ndarray (B, B) float32
+        Rows are distributions. Two answers that exclude each other say nothing about the pose.
+    """
+    product = pose * np.roll(pose, (-delta_bins, -delta_bins), axis=(0, 1))
+    total = product.sum(axis=1)
+    impossible = total <= 0
+    if impossible.any():
+        product[impossible] = 1.0 / len(pose)
+        total[impossible] = 1.0
+    return np.asarray((viewpoint / total) @ product)
+
+
 def pose_ambiguity(likelihoods: Likelihoods, settings: Mapping[str, Any]) -> Table:
     """Return the paper's ambiguity of the pose seen from two viewpoints (Eqs. 1 to 6).
 
@@ -80,20 +106,9 @@ def pose_ambiguity(likelihoods: Likelihoods, settings: Mapping[str, Any]) -> Tab
     n_bins = likelihoods.n_bins
     viewpoint = likelihoods.viewpoint.astype(np.float32)
     first = pose_likelihood(likelihoods, settings["reading"])
-    # Tiled twice along both axes, T[phi + delta, theta + delta] is a slice and never a copy.
-    tiled = np.tile(first, (2, 2))
     ambiguity = np.empty((n_bins, n_bins), dtype=np.float32)
-    product = np.empty_like(first)
     for delta in range(n_bins):
-        second = tiled[delta : delta + n_bins, delta : delta + n_bins]
-        np.multiply(first, second, out=product)
-        total = product.sum(axis=1)
-        impossible = total <= 0
-        if impossible.any():
-            # Two answers that exclude each other say nothing about the pose.
-            product[impossible] = 1.0 / n_bins
-            total[impossible] = 1.0
-        ambiguity[:, delta] = spread((viewpoint / total) @ product)
+        ambiguity[:, delta] = spread(two_view_poses(viewpoint, first, delta))
     return ambiguity
 
 

@@ -33,6 +33,8 @@ class LookupTable:
         The rotation of least ambiguity for each estimate, degrees in [0, 360).
     bandwidth_deg, pseudo_observations : float
         The density's settings.
+    reading, spread : str
+        The criterion's settings; see `nbv.recommendation.criteria.pose_ambiguity`.
     """
 
     viewpoint_likelihood: NDArray[np.float32]
@@ -41,6 +43,8 @@ class LookupTable:
     recommended_delta_deg: NDArray[np.int64]
     bandwidth_deg: float
     pseudo_observations: float
+    reading: str
+    spread: str
 
     def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
         """Return the recommended rotation for each estimate, degrees in [0, 360)."""
@@ -107,6 +111,8 @@ def build_lookup(
         recommended_delta_deg=least_ambiguous_delta(ambiguity),
         bandwidth_deg=bandwidth_deg,
         pseudo_observations=pseudo_observations,
+        reading=settings["reading"],
+        spread=settings["spread"],
     )
 
 
@@ -125,4 +131,6 @@ def load_lookup(path: str | Path) -> LookupTable:
         recommended_delta_deg=stored["recommended_delta_deg"],
         bandwidth_deg=float(stored["bandwidth_deg"]),
         pseudo_observations=float(stored["pseudo_observations"]),
+        reading=str(stored["reading"]),
+        spread=str(stored["spread"]),
     )

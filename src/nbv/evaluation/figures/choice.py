@@ -8,21 +8,31 @@ from numpy.typing import NDArray
 
 from nbv.angles import nearest_bin, wrap_deg
 from nbv.evaluation.figures.depth import depth_limits, draw_depth
-from nbv.evaluation.figures.inputs import ExampleView, FigureInputs, example_view, focus_lookup
+from nbv.evaluation.figures.inputs import (
+    ExampleView,
+    FigureInputs,
+    example_view,
+    focus_lookup,
+    spread_unit,
+)
 from nbv.evaluation.figures.style import INK, MUTED, azimuth_axis, method_style, new_figure
 from nbv.evaluation.settings import method_label
+from nbv.recommendation.criteria import SPREADS, two_view_poses
 
-Floats = NDArray[np.float64]
+Likelihood = NDArray[np.float32]
 
 
 def ambiguity(inputs: FigureInputs) -> Figure:
     """Fig. 2: an initial view of the hidden range, three next views, and their ambiguities."""
     shown = example_view(inputs)
     lookup = focus_lookup(inputs, shown.example.fold)
-    table = np.asarray(lookup["ambiguity"], dtype=np.float64)
-    row = table[int(nearest_bin(shown.estimate_deg, table.shape[0]))]
-    step = 360 / table.shape[1]
-    best, worst = int(np.argmin(row)), int(np.argmax(row))
+    n_bins = len(lookup.ambiguity)
+    first = int(nearest_bin(shown.estimate_deg, n_bins))
+    row = lookup.ambiguity[first].astype(np.float64)
+    step = 360 / n_bins
+    best = round(int(lookup.recommended_delta_deg[first]) / step)
+    worst = int(np.argmax(row))
+    unit = spread_unit(lookup.spread)
     candidates = [
         (best, "recommended"),
         (round(180 / step), "opposite"),
@@ -36,7 +46,7 @@ def ambiguity(inputs: FigureInputs) -> Figure:
         initial,
         shown.view(shown.azimuth_deg),
         limits,
-        f"Initial view, φ = {shown.azimuth_deg}°\nestimate {shown.estimate_deg:.0f}°",
+        f"Initial view, φ = {shown.azimuth_deg}°\nestimate {round(shown.estimate_deg) % 360}°",
     )
     for column, (delta_bin, name) in enumerate(candidates, 1):
         azimuth = float(wrap_deg(shown.azimuth_deg + delta_bin * step))
@@ -59,7 +69,7 @@ def ambiguity(inputs: FigureInputs) -> Figure:
     bars.set_xticks(range(3), [name for _, name in candidates])
     bars.set_xlim(-0.6, 2.6)
     bars.set_ylim(0, max(values) * 1.18)
-    bars.set_ylabel("Ambiguity A[e, δ] (nats)")
+    bars.set_ylabel(f"Ambiguity A[e, δ] ({unit})")
     bars.grid(visible=False, axis="x")
     curve = figure.add_subplot(grid[1, 0])
     curve.plot(np.arange(row.size) * step, row, color=INK, linewidth=1.3)
@@ -74,7 +84,7 @@ def ambiguity(inputs: FigureInputs) -> Figure:
             clip_on=False,
         )
     azimuth_axis(curve, "Rotation δ (degrees)")
-    curve.set_ylabel("A[e, δ] (nats)")
+    curve.set_ylabel(f"A[e, δ] ({unit})")
     figure.suptitle(f"Ambiguity selects the next view: {shown.title}", fontsize=10)
     return figure
 
@@ -83,25 +93,19 @@ def idea(inputs: FigureInputs) -> Figure:
     """Fig. 3: the spread of the pose after one view, before a second look, and after it."""
     shown = example_view(inputs)
     lookup = focus_lookup(inputs, shown.example.fold)
-    viewpoint = np.asarray(lookup["viewpoint_likelihood"], dtype=np.float64)
-    answers = np.asarray(lookup["estimate_likelihood"], dtype=np.float64)
-    table = np.asarray(lookup["ambiguity"], dtype=np.float64)
-    n_bins = viewpoint.shape[0]
+    viewpoint, answers = lookup.viewpoint_likelihood, lookup.estimate_likelihood
+    n_bins = len(viewpoint)
     step = 360 / n_bins
     first = int(nearest_bin(shown.estimate_deg, n_bins))
     one = viewpoint[first]
-    best = round(int(lookup["recommended_delta_deg"][first]) / step)
-    worst = int(np.argmax(table[first]))
-    # The file does not say which reading of p(θ | φ) the table has; the entropy it stores does.
-    reading = min(
-        (viewpoint, answers),
-        key=lambda given: abs(entropy_nats(pose_likelihood(one, given, best)) - table[first, best]),
-    )
-    curves: list[list[tuple[Floats, str, str, str]]] = [
+    best = round(int(lookup.recommended_delta_deg[first]) / step)
+    worst = int(np.argmax(lookup.ambiguity[first]))
+    given = viewpoint if lookup.reading == "given_estimate" else answers
+    curves: list[list[tuple[Likelihood, str, str, str]]] = [
         [(one, "p(φ | e)", "#E69F00", "solid")],
         [
-            (pose_likelihood(one, reading, best), "recommended", "#D55E00", "solid"),
-            (pose_likelihood(one, reading, worst), "worst", MUTED, "dashed"),
+            (two_view_poses(viewpoint, given, best)[first], "recommended", "#D55E00", "solid"),
+            (two_view_poses(viewpoint, given, worst)[first], "worst", MUTED, "dashed"),
         ],
     ]
     titles = ["After one view", "Before a second look: p(θ | e, δ)"]
@@ -117,6 +121,7 @@ def idea(inputs: FigureInputs) -> Figure:
     figure = new_figure(7.6, 2.1 * len(curves) + 0.4)
     grid = figure.add_gridspec(len(curves), 2, width_ratios=(1, 2.9))
     limits = depth_limits(shown.views)
+    unit = " nats" if lookup.spread == "entropy" else ""
     top = 1.12 * max(float(spread.max()) for row in curves for spread, *_ in row)
     azimuths = np.arange(n_bins) * step
     for row, lines in enumerate(curves):
@@ -126,7 +131,8 @@ def idea(inputs: FigureInputs) -> Figure:
         image.set_xlabel(f"{captions[row]}, {azimuth:.0f}°")
         axes = figure.add_subplot(grid[row, 1])
         for spread, name, color, dashes in lines:
-            label = f"{name}, {entropy_nats(spread):.2f} nats"
+            width = float(SPREADS[lookup.spread](spread[np.newaxis])[0])
+            label = f"{name}, {width:.2f}{unit}"
             axes.plot(azimuths, spread, color=color, linewidth=1.8, linestyle=dashes, label=label)
         axes.fill_between(azimuths, lines[0][0], color=lines[0][2], alpha=0.25, linewidth=0)
         axes.axvline(shown.azimuth_deg, color=INK, linewidth=1.0, linestyle=":", label="true pose")
@@ -138,29 +144,6 @@ def idea(inputs: FigureInputs) -> Figure:
         azimuth_axis(axes, "Pose: azimuth of the first view (degrees)" if last else "")
     figure.suptitle(f"One viewpoint and two: {shown.title}", fontsize=10)
     return figure
-
-
-def pose_likelihood(viewpoint: Floats, table: Floats, delta_bins: int) -> Floats:
-    """Return p(θ | e, δ) of Eqs. 3 and 6, normalised.
-
-    Parameters
-    ----------
-    viewpoint : (n_bins,) float
-        p(φ | e), one row of V.
-    table : (n_bins, n_bins) float
-        T[φ, θ], the pose likelihood given a viewpoint.
-    delta_bins : int
-        Rotation in bins.
-    """
-    turned = np.roll(table, (-delta_bins, -delta_bins), axis=(0, 1))
-    both = table * turned
-    return np.asarray(viewpoint @ (both / both.sum(axis=1, keepdims=True)), dtype=np.float64)
-
-
-def entropy_nats(spread: Floats) -> float:
-    """Return the entropy of a distribution over bins, in nats."""
-    positive = spread[spread > 0]
-    return float(-(positive * np.log(positive)).sum())
 
 
 def picks(inputs: FigureInputs) -> Figure:

@@ -16,7 +16,12 @@ from nbv.evaluation.figures.inputs import FigureInputs
 from nbv.evaluation.figures.style import INK, MUTED, azimuth_axis, method_style, new_figure
 from nbv.evaluation.paired import PairedErrors, pair_methods
 from nbv.evaluation.results import Unit
-from nbv.evaluation.settings import category_label, method_label, reference_units
+from nbv.evaluation.settings import (
+    common_elevation_deg,
+    method_label,
+    reference_units,
+    unit_label,
+)
 
 _WINDOW_DEG = 15
 _COLUMNS = 3
@@ -25,6 +30,7 @@ _COLUMNS = 3
 def boxplots(inputs: FigureInputs) -> Figure:
     """Fig. 9: minimum, quartiles, median and maximum, and the same without the upper tail."""
     units = reference_units(inputs.evaluations, inputs.settings)
+    common = common_elevation_deg(units, inputs.settings)
     methods = inputs.methods(units[0])
     figure = new_figure(max(1.5 * len(units) + 1.2, 6.0), 6.4)
     whole, close = figure.subplots(2, 1)
@@ -54,7 +60,7 @@ def boxplots(inputs: FigureInputs) -> Figure:
             )
             for box in boxes["boxes"]:
                 box.set(facecolor=style.color, edgecolor=INK, hatch=style.hatch, linewidth=0.8)
-        axes.set_xticks(np.arange(len(units)), [category_label(unit[0]) for unit in units])
+        axes.set_xticks(np.arange(len(units)), [unit_label(unit, common) for unit in units])
         axes.set_ylabel("Pose error (degrees)")
         axes.set_ylim(bottom=0)
         axes.grid(visible=False, axis="x")
@@ -77,7 +83,7 @@ def boxplots(inputs: FigureInputs) -> Figure:
     )
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     figure.suptitle(
-        f"Errors at elevation {units[0][1]}° (box: quartiles, line: median)", fontsize=10
+        f"Errors at elevation {common}° (box: quartiles, line: median)", fontsize=10
     )
     return figure
 
@@ -91,6 +97,7 @@ def _close_limit_deg(errors_deg: NDArray[np.float64]) -> float:
 def accuracy(inputs: FigureInputs) -> Figure:
     """PEA by threshold, up to the 100 degrees that the pAUC integrates over (Eq. 10)."""
     units = reference_units(inputs.evaluations, inputs.settings)
+    common = common_elevation_deg(units, inputs.settings)
     figure, panels = _panels(units, 2.5)
     thresholds = np.linspace(0.0, np.sqrt(metrics.PAUC_LIMIT_DEG), 401) ** 2
     for axes, unit in zip(panels, units, strict=True):
@@ -109,17 +116,18 @@ def accuracy(inputs: FigureInputs) -> Figure:
         axes.set_xlim(0, metrics.PAUC_LIMIT_DEG)
         axes.set_xticks([0, 5, 10, 20, 40, 60, 100])
         axes.set_ylim(0, 1.01)
-        axes.set_title(category_label(unit[0]))
+        axes.set_title(unit_label(unit, common))
         axes.set_xlabel("Threshold τ (degrees, root scale)")
         axes.set_ylabel("PEA(τ)")
     _line_legend(figure, inputs, units)
-    figure.suptitle(f"Pose estimation accuracy at elevation {units[0][1]}°", fontsize=10)
+    figure.suptitle(f"Pose estimation accuracy at elevation {common}°", fontsize=10)
     return figure
 
 
 def by_azimuth(inputs: FigureInputs) -> Figure:
     """Mean error by initial azimuth, smoothed over 15 degrees."""
     units = reference_units(inputs.evaluations, inputs.settings)
+    common = common_elevation_deg(units, inputs.settings)
     figure, panels = _panels(units, 2.5)
     for axes, unit in zip(panels, units, strict=True):
         sample = _paired(inputs, unit)
@@ -151,12 +159,12 @@ def by_azimuth(inputs: FigureInputs) -> Figure:
                 transform=axes.get_xaxis_transform(),
             )
         axes.grid(visible=False, axis="x")
-        axes.set_title(category_label(unit[0]))
+        axes.set_title(unit_label(unit, common))
         axes.set_ylabel("Mean error (degrees)")
         azimuth_axis(axes, "Initial azimuth (degrees)")
     _line_legend(figure, inputs, units, markers=True)
     figure.suptitle(
-        f"Error by initial azimuth at elevation {units[0][1]}° (viewpoint groups 1–4 above)",
+        f"Error by initial azimuth at elevation {common}° (viewpoint groups 1–4 above)",
         fontsize=10,
     )
     return figure

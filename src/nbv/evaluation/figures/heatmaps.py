@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from nbv.evaluation.figures.inputs import FigureInputs, focus_lookup
+from nbv.evaluation.figures.inputs import FigureInputs, focus_lookup, spread_unit
 from nbv.evaluation.figures.style import azimuth_axis, new_figure
 
 _DECADES = 3.0
@@ -19,8 +19,8 @@ def lookup_maps(inputs: FigureInputs) -> Figure:
     wanted = inputs.settings.example_fold
     fold = int(wanted if wanted in folds else folds[0])
     lookup = focus_lookup(inputs, fold)
-    likelihood = np.asarray(lookup["viewpoint_likelihood"], dtype=np.float64)
-    table = np.asarray(lookup["ambiguity"], dtype=np.float64)
+    likelihood = np.asarray(lookup.viewpoint_likelihood, dtype=np.float64)
+    table = np.asarray(lookup.ambiguity, dtype=np.float64)
     figure = new_figure(8.6, 4.1)
     left, right = figure.subplots(1, 2)
     half = 180 / likelihood.shape[0]
@@ -50,7 +50,7 @@ def lookup_maps(inputs: FigureInputs) -> Figure:
     n_bins = table.shape[0]
     right.plot(
         np.arange(n_bins) * 360 / n_bins,
-        lookup["recommended_delta_deg"],
+        lookup.recommended_delta_deg,
         linestyle="",
         marker="o",
         markersize=2.2,
@@ -58,17 +58,14 @@ def lookup_maps(inputs: FigureInputs) -> Figure:
         markeredgecolor="black",
         markeredgewidth=0.3,
     )
-    right.set_title(
-        f"{inputs.settings.criterion.replace('_', ' ').capitalize()} A[e, δ], dots: recommended"
-    )
+    name = lookup.spread.replace("_", " ").capitalize()
+    right.set_title(f"{name} A[e, δ], dots: recommended")
     azimuth_axis(right, "Rotation δ (degrees)", vertical=True)
-    unit_name = "nats" if inputs.settings.criterion in _IN_NATS else "criterion's unit"
-    figure.colorbar(shown, ax=right, label=f"Ambiguity ({unit_name}); lower is better")
+    label = f"Ambiguity ({spread_unit(lookup.spread)}); lower is better"
+    figure.colorbar(shown, ax=right, label=label)
     for axes in (left, right):
         azimuth_axis(axes, "Estimate e (degrees)")
         axes.grid(visible=False)
     figure.suptitle(f"Lookup table of {unit[0]}, elevation {unit[1]}°, fold {fold}", fontsize=10)
     return figure
 
-
-_IN_NATS = frozenset({"entropy", "information_gain"})

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,6 +15,7 @@ from nbv.evaluation import results
 from nbv.evaluation.examples import Example, choose_example, example_row, hardest_azimuth_deg
 from nbv.evaluation.results import Unit
 from nbv.evaluation.settings import ReadingSettings, focus_unit
+from nbv.recommendation.lookup import LookupTable, load_lookup
 
 Codes = NDArray[np.uint8]
 
@@ -127,6 +127,12 @@ def example_view(inputs: FigureInputs) -> ExampleView:
     return ExampleView(unit, example, azimuth, estimate, views, outcomes)
 
 
-def focus_lookup(inputs: FigureInputs, fold: int) -> Mapping[str, NDArray[Any]]:
+def focus_lookup(inputs: FigureInputs, fold: int) -> LookupTable:
     """Return the focus category's lookup table of one fold."""
-    return results.load_lookup(inputs.root, *inputs.focus, fold, inputs.settings.criterion)
+    path = results.lookup_path(inputs.root, *inputs.focus, fold, inputs.settings.criterion)
+    return load_lookup(results.existing(path))
+
+
+def spread_unit(spread: str) -> str:
+    """Return the unit of an ambiguity that is a spread of that name."""
+    return "nats" if spread == "entropy" else "0–1"

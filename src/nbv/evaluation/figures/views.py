@@ -9,7 +9,7 @@ from nbv.evaluation.figures.depth import depth_limits, draw_depth
 from nbv.evaluation.figures.inputs import FigureInputs
 from nbv.evaluation.figures.style import INK, MUTED, new_figure
 from nbv.evaluation.paired import VIEWPOINT_GROUPS
-from nbv.evaluation.settings import category_label, reference_units
+from nbv.evaluation.settings import common_elevation_deg, reference_units, unit_label
 
 _AZIMUTHS_DEG = tuple(range(0, 360, 45))
 _CELL_IN = 1.05
@@ -19,8 +19,9 @@ _RING_HEIGHT = 6.4 / 6.8
 def categories(inputs: FigureInputs) -> Figure:
     """Fig. 5: the first object of each category from eight azimuths."""
     units = reference_units(inputs.evaluations, inputs.settings)
-    labels = [category_label(category) for category, _ in units]
-    title = f"First object of each category, elevation {units[0][1]}°, by azimuth"
+    common = common_elevation_deg(units, inputs.settings)
+    labels = [unit_label(unit, common) for unit in units]
+    title = f"First object of each category, elevation {common}°, by azimuth"
     return _sheet(inputs, units, labels, title)
 
 

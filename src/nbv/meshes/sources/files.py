@@ -36,7 +36,7 @@ class FileSource(ABC):
         if not settings["root"]:
             raise UserError(f"dataset={self.name}: dataset.root is not set; give the data's folder")
         self.root = Path(settings["root"]).expanduser()
-        self._excluded = _exclusions(settings)
+        self._excluded = exclusions(settings)
         self._found: dict[str, dict[str, Path]] = {}
 
     @abstractmethod
@@ -60,7 +60,15 @@ class FileSource(ABC):
                 "dataset=%s: %d listed exclusions are not among the files of %s, the first is %s",
                 *(self.name, len(unknown), category, unknown[0]),
             )
-        return sorted(found.keys() - self._excluded)
+        chosen = sorted(found.keys() - self._excluded)
+        absent = [object_id for object_id in chosen if not found[object_id].is_file()]
+        if absent:
+            more = f", nor do {len(absent) - 1} more" if len(absent) > 1 else ""
+            raise UserError(
+                f"dataset={self.name}: {found[absent[0]]} does not exist{more}: put it there or "
+                "list its id in dataset.exclude"
+            )
+        return chosen
 
     def load(self, category: str, object_id: str) -> trimesh.Trimesh:
         """Read, check and normalise one file."""
@@ -82,17 +90,6 @@ class FileSource(ABC):
             self.need_folder(self.root, "the data set (dataset.root)")
             self._found[category] = self.find(category)
         return self._found[category]
-
-    def existing(self, files: Mapping[str, Path], category: str) -> dict[str, Path]:
-        """Return those files that exist; a listed model without one is worth a warning."""
-        existing = {name: path for name, path in files.items() if path.is_file()}
-        absent = sorted(files.keys() - existing.keys())
-        if absent:
-            logger.warning(
-                "dataset=%s: %d of %d %s models have no file, the first is %s",
-                *(self.name, len(absent), len(files), category, files[absent[0]]),
-            )
-        return existing
 
     def label(self, category: str) -> str:
         """Return what the data set calls a category."""
@@ -119,7 +116,14 @@ class FileSource(ABC):
         return files
 
 
-def _exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
+def exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
+    """Return the ids that `exclude` and `exclude_file` list.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read.
+    """
     listed = list(settings["exclude"])
     if settings["exclude_file"]:
         path = Path(settings["exclude_file"]).expanduser()

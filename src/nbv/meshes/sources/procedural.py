@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from nbv.errors import UserError, nearest
 from nbv.meshes.normalisation import check_mesh, normalise
+from nbv.meshes.sources.files import exclusions
 
 if TYPE_CHECKING:
     import trimesh
@@ -34,7 +35,7 @@ class ProceduralSource:
             raise UserError(
                 f"dataset=procedural has no category {category}; {nearest(category, CATEGORIES)}"
             )
-        excluded = set(self._settings["exclude"])
+        excluded = exclusions(self._settings)
         ids = (f"{category}-{index:04d}" for index in range(_N_OBJECTS))
         return [object_id for object_id in ids if object_id not in excluded]
 

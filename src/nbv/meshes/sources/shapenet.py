@@ -66,7 +66,7 @@ class ShapeNetCoreSource(_ShapeNetSource):
         if layout == "auto":
             is_v1 = any((folder / _MODEL["v1"]).is_file() for folder in models)
             layout = "v1" if is_v1 else "v2"
-        return self.existing({m.name: m / _MODEL[layout] for m in models}, category)
+        return {m.name: m / _MODEL[layout] for m in models}
 
     def whereabouts(self, category: str) -> str:
         """Return the synset's folder."""
@@ -110,7 +110,7 @@ class ShapeNetSemSource(_ShapeNetSource):
             raise UserError(
                 f"dataset=shapenet: {self.root} has no folder models with the OBJ files"
             )
-        return self.existing({model: folders[0] / f"{model}.obj" for model in members}, category)
+        return {model: folders[0] / f"{model}.obj" for model in members}
 
     def whereabouts(self, category: str) -> str:
         """Return the metadata's path."""
