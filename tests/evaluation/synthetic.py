@@ -46,7 +46,7 @@ def build_tree(
             np.save(directory / f"el{elevation:02d}.npy", images)
             estimates = _estimates(category, elevation, n_objects, rng)
             _write_folds(root, category, elevation, ids, estimates, n_folds, rng, delta_step)
-    _write_surroundings(root, units)
+    _write_surroundings(root, units, n_folds)
     return root
 
 
@@ -110,6 +110,8 @@ def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0, delta_s
         "recommended_delta_deg": ambiguity.argmin(axis=1),
         "bandwidth_deg": np.array(bandwidth_deg),
         "pseudo_observations": np.array(pseudo_observations),
+        "reading": np.array("given_estimate"),
+        "spread": np.array("entropy"),
     }
 
 
@@ -233,10 +235,22 @@ def _render(cloud, elevation_deg, side):
     return images
 
 
-def _write_surroundings(root, units):
-    (root / "configuration.yaml").write_text(
-        "experiment: synthetic\nfocus_category: mug\ndataset:\n  source: procedural\nseed: 0\n"
-    )
+def _write_surroundings(root, units, n_folds):
+    elevations = {}
+    for category, elevation in units:
+        elevations.setdefault(category, []).append(elevation)
+    settings = {
+        "experiment": "quick",
+        "name": "synthetic",
+        "seed": 0,
+        "categories": list(elevations),
+        "focus_category": "mug",
+        "elevations_deg": {**elevations, "spoon": [0]},
+        "n_folds": n_folds,
+        "dataset": {"source": "procedural"},
+    }
+    # JSON is YAML.
+    (root / "configuration.yaml").write_text(json.dumps(settings, indent=2) + "\n")
     (root / "provenance.json").write_text(
         json.dumps(
             {

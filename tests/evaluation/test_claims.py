@@ -243,10 +243,57 @@ def test_ids_are_unique_and_quotes_name_their_section():
     ids = [claim.id for claim in CLAIMS]
     assert len(ids) == len(set(ids))
     assert {claim.section for claim in CLAIMS} == {"3.3.1", "3.3.2", "3.3.3", "3.3.4", "4"}
-    assert all(
-        isinstance(claim.statement, AtLeast) or comparisons.leaves(claim.statement)
-        for claim in CLAIMS
-    )
+    for claim in CLAIMS:
+        leaves = comparisons.leaves(claim.statement)
+        assert leaves, claim.id
+        for leaf in leaves:
+            assert isinstance(leaf, FreeOfOutliers) or leaf.a != leaf.b, claim.id
+
+
+def test_compounds_ask_for_no_more_parts_than_they_have():
+    def compounds(statement):
+        if isinstance(statement, AtLeast):
+            yield statement
+            for part in statement.parts:
+                yield from compounds(part)
+
+    for claim in CLAIMS:
+        for compound in compounds(claim.statement):
+            assert 0 < compound.count <= len(compound.parts), claim.id
+
+
+@pytest.mark.parametrize("n_objects", [1, 4, 5])
+def test_fewer_than_five_objects_decide_nothing(n_objects):
+    frame = unit({"proposed": 4.0, "opposite": 10.0}, 0.1, n_objects=n_objects)
+    a, b = term("proposed"), term("opposite")
+    decided = n_objects == 5
+    for statement, verdict in (
+        (Better("mae", a, b), HOLDS),
+        (Better("median", b, a), FAILS),
+        (Comparable("mae", a, b, 1.0), FAILS),
+        (FreeOfOutliers(a), HOLDS),
+    ):
+        claim = Claim("few", "3", "s", "c", statement)
+        found = evaluate_claims({MUG: frame}, np.random.default_rng(0), 200, [claim]).iloc[0]
+        assert found["verdict"] == (verdict if decided else UNDECIDED)
+        assert found["point_verdict"] == verdict
+    absent = Better("mae", a, term("single"))
+    assert verdict_of(absent, {MUG: frame}) == NOT_RUN
+
+
+def test_sigma_needs_five_objects_in_each_fold():
+    a, b = term("proposed"), term("opposite")
+    for n_objects, expected in ((25, HOLDS), (24, UNDECIDED)):
+        frame = unit({"proposed": 5.0, "opposite": 5.0}, 0.1, n_objects=n_objects)
+        frame.loc[frame["method"] == "opposite", "error_deg"] += 8.0 * frame["fold"]
+        assert verdict_of(Better("mae_sigma", a, b), {MUG: frame}) == expected
+
+
+def test_pooling_categories_does_not_make_enough_objects():
+    units = [(category, 0) for category in CATEGORIES]
+    frames = {key: unit({"proposed": 4.0, "opposite": 10.0}, 0.1, n_objects=3) for key in units}
+    a, b = (Term(method, tuple(units)) for method in ("proposed", "opposite"))
+    assert verdict_of(Better("mae", a, b), frames) == UNDECIDED
 
 
 def test_the_table_of_claims_is_tidy_and_repeatable(evaluations):
@@ -259,7 +306,10 @@ def test_the_table_of_claims_is_tidy_and_repeatable(evaluations):
 
 def test_markdown_has_one_row_for_each_claim(evaluations, rng):
     text = claims_markdown(evaluate_claims(evaluations, rng, 100))
-    rows = [line for line in text.splitlines() if line.startswith("|")]
-    assert len(rows) == 2 + len(CLAIMS)
-    assert len({row.count("|") for row in rows}) == 1
+    run, absent = text.split("### Not run")
+    rows = [[line for line in part.splitlines() if line.startswith("|")] for part in (run, absent)]
+    assert len(rows[0]) + len(rows[1]) == 4 + len(CLAIMS)
+    assert not any("**not run**" in row for row in rows[0][2:])
+    assert all("**not run**" in row for row in rows[1][2:])
+    assert len({row.count("|") for row in rows[0] + rows[1]}) == 1
     assert "nan" not in text

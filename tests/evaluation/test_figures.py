@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import shutil
+from dataclasses import replace
+
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
@@ -10,9 +13,10 @@ from matplotlib.image import imread
 from nbv.errors import UserError
 from nbv.evaluation import examples
 from nbv.evaluation.figures import FIGURES, FigureInputs, build_figure, save_figure
-from nbv.evaluation.figures.choice import entropy_nats, pose_likelihood
 from nbv.evaluation.figures.depth import depth_limits, shade
+from nbv.evaluation.figures.inputs import example_view
 from nbv.evaluation.settings import ReadingSettings
+from nbv.recommendation.lookup import build_lookup, load_lookup, save_lookup
 
 
 @pytest.fixture(scope="module")
@@ -92,21 +96,65 @@ def test_nearer_is_brighter_and_background_is_white():
     assert depth_limits(np.zeros((2, 2), np.uint8)) == (1, 255)
 
 
-def test_the_shown_pose_likelihood_has_the_entropy_that_the_table_stores():
-    rng = np.random.default_rng(0)
-    truth = np.arange(360)
-    estimates = (truth + rng.normal(0, 6, (5, 360))) % 360
-    arrays = synthetic.lookup_arrays(estimates, delta_step=60)
-    one = arrays["viewpoint_likelihood"].astype(float)
-    for delta in (0, 60, 180):
-        spread = pose_likelihood(one[25], one, delta)
-        assert spread.sum() == pytest.approx(1.0, abs=1e-4)
-        assert entropy_nats(spread) == pytest.approx(arrays["ambiguity"][25, delta], abs=1e-3)
+@pytest.fixture
+def one_fold(tree, evaluations, tmp_path):
+    """Inputs of one unit whose lookup table in the example fold a test may replace."""
+    root = shutil.copytree(tree, tmp_path / "one")
+    path = root / "lookup" / "mug" / "el00" / "fold2" / "entropy.npz"
+    return FigureInputs(root, {("mug", 0): evaluations["mug", 0]}), path
 
 
-def test_entropy_of_a_uniform_distribution():
-    assert entropy_nats(np.full(360, 1 / 360)) == pytest.approx(np.log(360))
-    assert entropy_nats(np.eye(4)[0]) == 0.0
+@pytest.mark.parametrize("reading", ["given_estimate", "given_truth"])
+@pytest.mark.parametrize("spread", ["entropy", "circular_variance"])
+def test_the_spread_drawn_is_the_one_that_the_table_stores(one_fold, reading, spread):
+    inputs, path = one_fold
+    estimates = (np.arange(360) + np.random.default_rng(0).normal(0, 20, (5, 360))) % 360
+    made = build_lookup(
+        estimates,
+        "entropy",
+        {"reading": reading, "spread": spread},
+        bandwidth_deg=9.0,
+        pseudo_observations=5.0,
+    )
+    save_lookup(path, made)
+    shown = example_view(inputs)
+    first = round(shown.estimate_deg) % 360
+    figure = build_figure("figure3", inputs)
+    lines = {line.get_label().split(",")[0]: line for a in figure.axes for line in a.lines}
+    unit = " nats" if spread == "entropy" else ""
+    best = int(made.recommended_delta_deg[first])
+    worst = int(made.ambiguity[first].argmax())
+    for name, delta in (("recommended", best), ("worst", worst)):
+        stored = made.ambiguity[first, delta]
+        assert lines[name].get_label() == f"{name}, {stored:.2f}{unit}"
+        assert lines[name].get_ydata().sum() == pytest.approx(1.0, abs=1e-4)
+    unit = "nats" if spread == "entropy" else "0–1"
+    for figure_name in ("figure2", "heatmaps"):
+        labels = [a.get_ylabel() for a in build_figure(figure_name, inputs).axes]
+        shown_units = [label for label in labels if "mbiguity" in label or "A[e, δ]" in label]
+        assert shown_units
+        assert all(f"({unit})" in label for label in shown_units)
+
+
+def test_of_equal_ambiguities_the_recommended_one_is_shown(one_fold):
+    inputs, path = one_fold
+    stored = load_lookup(path)
+    save_lookup(path, replace(stored, ambiguity=np.ones_like(stored.ambiguity)))
+    shown = example_view(inputs)
+    delta = stored.recommended_delta_deg[round(shown.estimate_deg) % 360]
+    titles = [axes.get_title() for axes in build_figure("figure2", inputs).axes]
+    assert any(title.startswith(f"recommended: δ = {delta}°") for title in titles)
+
+
+def test_a_category_without_the_reference_elevation_is_shown_at_its_own(tree, evaluations):
+    units = {("mug", 30): evaluations["mug", 30], ("chair", 0): evaluations["chair", 0]}
+    for name in ("figure5", "figure9", "pea", "azimuth"):
+        figure = build_figure(name, FigureInputs(tree, units))
+        words = [text.get_text() for a in figure.axes for text in a.get_xticklabels()]
+        words += [axes.get_title() for axes in figure.axes]
+        words += [axes.get_ylabel() for axes in figure.axes]
+        assert {"Mug (30°)", "Chair"} <= set(words), name
+        assert "elevation 0°" in figure.get_suptitle()
 
 
 def test_the_hardest_azimuth_of_the_mug_is_in_the_hidden_range(evaluations):

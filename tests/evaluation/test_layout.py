@@ -4,18 +4,19 @@ import html
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from nbv.evaluation.layout import (
     escape_latex,
-    markdown_to_html,
     number,
     save_table,
     to_latex,
     to_markdown,
 )
+from nbv.evaluation.markdown import markdown_to_html, pipe_row
 from nbv.evaluation.settings import ReadingSettings
 from nbv.evaluation.tables import TABLES, build_table
 
@@ -124,8 +125,26 @@ def test_special_characters_are_escaped():
         (-0.001, "0.00"),
         (0.0, "0.00"),
         (float("nan"), "–"),
-        (12.345, "12.35"),
+        (12.344, "12.34"),
+        (12.346, "12.35"),
     ],
 )
 def test_numbers(value, text):
-    assert number(value) in (text, "12.34")
+    assert number(value) == text
+
+
+def test_an_estimate_that_rounds_to_a_full_turn_is_zero(tables):
+    table = tables["table6"]
+    cells = table.cells.copy()
+    first = (cells["row"] == "0") & (cells["method"] == "single")
+    cells.loc[first & (cells["metric"] == "estimate"), "value"] = 359.96
+    cells.loc[first & (cells["metric"] == "error"), "value"] = 0.04
+    markdown = to_markdown(replace(table, cells=cells))
+    assert "0.0° (0.0°)" in markdown
+    assert "360.0°" not in markdown
+
+
+def test_a_bar_within_a_cell_stays_within_it():
+    lines = [pipe_row(["a|b", "c"]), pipe_row(["---", "---"]), pipe_row(["|", "d"])]
+    page = markdown_to_html("\n".join(lines), html.escape)
+    assert re.findall(r"<t[dh](?: [^>]*)?>(.*?)</t[dh]>", page) == ["a|b", "c", "|", "d"]

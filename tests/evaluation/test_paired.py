@@ -93,3 +93,70 @@ def test_one_fold_has_no_sigma(evaluations):
     )
     assert np.isnan(found.value)
     assert np.isnan(found.interval().low)
+
+
+def sample_of(a, b, objects, categories=("mug",)):
+    """Two methods' errors; objects in equal shares of the categories."""
+    n_objects = int(np.max(objects)) + 1
+    per_category = -(-n_objects // len(categories))
+    return paired.PairedErrors(
+        {"a": np.asarray(a, dtype=float), "b": np.asarray(b, dtype=float)},
+        np.asarray(objects),
+        np.asarray(objects) % 3 + 1,
+        np.arange(len(objects)) * 10.0 % 360,
+        tuple(categories[index // per_category] for index in range(n_objects)),
+    )
+
+
+def difference(sample, seed=1, n_resamples=2000, a="a", b="b", statistic="mae"):
+    resampler = paired.Resampler(seed, n_resamples)
+    first = paired.estimate(statistic, sample, a, resampler)
+    return first.minus(paired.estimate(statistic, sample, b, resampler))
+
+
+def uneven(rng, n_objects=7):
+    objects = np.repeat(np.arange(n_objects), rng.integers(1, 9, n_objects))
+    return rng.gamma(2.0, 5.0, objects.size), rng.gamma(2.0, 6.0, objects.size), objects
+
+
+@pytest.mark.parametrize("statistic", paired.LOWER_IS_BETTER)
+def test_identical_methods_differ_by_exactly_nothing(rng, statistic):
+    a, _, objects = uneven(rng)
+    found = difference(sample_of(a, a.copy(), objects), statistic=statistic)
+    assert found == metrics.Interval(0, 0, 0)
+
+
+@pytest.mark.parametrize("statistic", paired.LOWER_IS_BETTER)
+def test_swapping_the_methods_mirrors_the_interval(rng, statistic):
+    sample = sample_of(*uneven(rng))
+    one = difference(sample, statistic=statistic)
+    other = difference(sample, a="b", b="a", statistic=statistic)
+    mirrored = (-other.value, -other.high, -other.low)
+    assert (one.value, one.low, one.high) == pytest.approx(mirrored)
+
+
+def test_repeating_every_view_does_not_narrow_the_interval(rng):
+    # Whole objects are the units of evidence: more views of the same ones are no more of it.
+    a, b, objects = rng.normal(5, 2, 30), rng.normal(6, 2, 30), np.arange(30)
+    few = difference(sample_of(a, b, objects))
+    many = difference(sample_of(*(np.repeat(each, 360) for each in (a, b, objects))))
+    assert (many.low, many.high) == pytest.approx((few.low, few.high))
+
+
+def test_the_interval_covers_the_truth_about_as_often_as_it_says():
+    hits = 0
+    for seed in range(200):
+        a = np.repeat(np.random.default_rng(seed).normal(1.0, 2.0, 40), 5)
+        sample = sample_of(a, np.zeros(200), np.repeat(np.arange(40), 5))
+        interval = difference(sample, seed, 400)
+        hits += interval.low <= 1.0 <= interval.high
+    assert 0.89 <= hits / 200 <= 0.99
+
+
+def test_objects_that_are_resampled_together_are_counted():
+    objects = np.repeat(np.arange(12), 4)
+    sample = sample_of(objects, objects, objects, ("chair", "mug"))
+    assert paired.fewest_resampled("mae", sample) == 6
+    assert paired.fewest_resampled("mae_sigma", sample) == 2
+    assert paired.fewest_resampled("mae", sample.select(objects != 11)) == 5
+    assert paired.fewest_resampled("mae", sample.select(objects < 0)) == 0

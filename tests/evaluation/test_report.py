@@ -145,9 +145,30 @@ def test_what_it_cannot_do_without_is_named(root, tmp_path, name):
 def test_text_is_escaped(root, tmp_path):
     copy = tmp_path / "escaped"
     shutil.copytree(root, copy)
-    (copy / "configuration.yaml").write_text("experiment: '<script>alert(1)</script>'\n")
+    path = copy / "configuration.yaml"
+    path.write_text(path.read_text().replace("procedural", "<script>alert(1)</script>"))
     assert "<script" not in build_report(copy)
     assert escape('a<b & "c"') == "a&lt;b &amp; &quot;c&quot;"
+
+
+def test_what_an_earlier_configuration_left_is_passed_over(root, tmp_path, html):
+    copy = tmp_path / "stale"
+    shutil.copytree(root, copy)
+    shutil.copytree(copy / "evaluation" / "mug" / "el00", copy / "evaluation" / "mug" / "el75")
+    shutil.copytree(copy / "evaluation" / "mug", copy / "evaluation" / "spoon")
+    shutil.copytree(copy / "benchmarks" / "train" / "mug", copy / "benchmarks/train/spoon")
+    assert build_report(copy) == html
+
+
+def test_claims_that_were_not_run_come_last_and_folded_away(html):
+    claims = html[html.index('<section id="claims">') : html.index('<section id="tables">')]
+    run, absent = claims.split("<details>")
+    assert 'class="badge none"' not in run
+    assert 'class="badge holds"' in run
+    folded = absent[: absent.index("</details>")]
+    n_folded = folded.count('class="badge')
+    assert folded.count('class="badge none"') == n_folded > 0
+    assert f"Not run: {n_folded} of {len(CLAIMS)}" in folded
 
 
 def test_badges_differ_by_more_than_colour():

@@ -1,29 +1,22 @@
 from __future__ import annotations
 
-import numpy as np
+import pandas as pd
 import pytest
 import synthetic
-from conftest import N_FOLDS, UNITS
+from conftest import N_FOLDS
 
 from nbv.errors import UserError
 from nbv.evaluation import methods, results
-
-
-def test_columns_are_those_that_methods_write():
-    assert methods.COLUMNS == results.EVALUATION_COLUMNS
+from nbv.files import write_csv
 
 
 def test_a_unit_has_every_method_fold_object_and_view(evaluations):
     frame = evaluations["mug", 0]
-    assert list(frame.columns) == ["method", "fold", *results.EVALUATION_COLUMNS]
+    assert list(frame.columns) == ["method", "fold", *methods.COLUMNS]
     assert len(frame) == 4 * 9 * synthetic.N_VIEWS
     assert list(frame["method"].cat.categories) == list(synthetic.METHODS)
     assert set(frame["object_id"]) == {f"{index:04d}" for index in range(9)}
     assert frame.loc[frame["method"] == "single", "delta_deg"].isna().all()
-
-
-def test_units_are_found(tree):
-    assert results.discover_units(tree) == sorted(UNITS)
 
 
 def test_objects_come_in_the_order_of_the_depth_images(tree):
@@ -36,8 +29,8 @@ def test_a_missing_file_is_named(tree):
         results.load_unit(tree, "mug", 0, N_FOLDS + 1, synthetic.METHODS)
     with pytest.raises(UserError, match=r"el45\.npy does not exist"):
         results.load_depth(tree, "mug", 45)
-    with pytest.raises(UserError, match=r"magic\.npz does not exist"):
-        results.load_lookup(tree, "mug", 0, 1, "magic")
+    with pytest.raises(UserError, match=r"spoon\.csv does not exist"):
+        results.load_object_ids(tree, "spoon")
 
 
 @pytest.mark.parametrize(
@@ -58,11 +51,21 @@ def test_a_broken_file_is_named(tmp_path, text, message):
 def test_an_empty_table_is_named(tmp_path):
     path = results.evaluation_path(tmp_path, "mug", 0, 1, "single")
     path.parent.mkdir(parents=True)
-    path.write_text(",".join(results.EVALUATION_COLUMNS) + "\n")
+    path.write_text(",".join(methods.COLUMNS) + "\n")
     with pytest.raises(UserError, match="holds no rows"):
         results.load_unit(tmp_path, "mug", 0, 1, ["single"])
 
 
-def test_lookups_are_read_whole(tree):
-    lookup = results.load_lookup(tree, "mug", 0, 1, "entropy")
-    np.testing.assert_allclose(lookup["viewpoint_likelihood"].sum(axis=1), 1, atol=1e-4)
+def test_object_ids_are_names_whatever_they_look_like(tree, tmp_path):
+    names = ["0007", "NA", "null", "None", "nan", "1e3", "inf", "-", "true"]
+    path = results.evaluation_path(tree, "mug", 0, 1, "single")
+    frame = pd.read_csv(path, dtype={"object_id": str})
+    short = frame.groupby("object_id").head(len(names)).head(len(names))
+    target = results.evaluation_path(tmp_path, "mug", 0, 1, "single")
+    write_csv(target, short.assign(object_id=names))
+    unit = results.load_unit(tmp_path, "mug", 0, 1, ["single"])
+    assert unit["object_id"].tolist() == names
+    assert unit["delta_deg"].isna().all()
+    splits = pd.DataFrame({"object_id": names, "fold": 1, "role": "test"})
+    write_csv(results.splits_path(tmp_path, "mug"), splits)
+    assert results.load_object_ids(tmp_path, "mug") == tuple(names)

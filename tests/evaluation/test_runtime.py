@@ -25,6 +25,8 @@ from nbv.files import write_csv
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 START_S = 1_700_000_000.0
 
+SETTINGS = {"categories": ["mug"], "elevations_deg": {"mug": [0, 30]}, "n_folds": 1}
+
 
 def add_job(root, job, start_s, wall_s, cpu_s, rss_mib, told_s=None):
     """Write what Snakemake leaves of one job; `told_s` is what the job's log says at its end."""
@@ -165,10 +167,10 @@ def test_no_benchmarks_is_an_empty_table(tmp_path):
 
 
 def test_the_report_shows_the_table_that_was_written(root):
-    computed = _runtime(root)
+    computed = _runtime(root, SETTINGS)
     assert "<strong>" not in computed[0]
     assert '<th scope="row">train</th>' in computed[0]
     (root / "tables").mkdir()
     (root / "tables" / "runtime.md").write_text(runtime_markdown(load_runtime(root)))
     add_job(root, "claims", 51, 4.0, 1.0, 90.0)
-    assert _runtime(root) == computed
+    assert _runtime(root, SETTINGS) == computed

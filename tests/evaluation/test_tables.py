@@ -152,6 +152,34 @@ def test_published_figures_stand_beside_the_same_category_and_elevation_only(eva
     assert other.cells["published"].isna().all()
 
 
+def test_every_category_has_a_row(evaluations):
+    units = {("mug", 30): evaluations["mug", 30], ("chair", 0): evaluations["chair", 0]}
+    for name in ("table1", "table3"):
+        table = build_table(name, units, QUICK)
+        labels = table.cells.drop_duplicates("row").set_index("row")["row_label"]
+        assert labels.to_dict() == {"mug": "Mug (30°)", "chair": "Chair"}
+        assert "elevation 0°" in table.title
+        shown = table.cells.groupby("row")["published"].agg(lambda printed: printed.notna().any())
+        assert shown.to_dict() == {"mug": False, "chair": True}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_notes_are_about_what_is_shown(evaluations, name):
+    mug = build_table(name, evaluations, QUICK).notes
+    assert {note.text for note in PUBLISHED[name].notes} <= set(mug)
+    chair = {("chair", 0): evaluations["chair", 0]}
+    notes = " ".join(build_table(name, chair, QUICK).notes)
+    assert "Mug" not in notes
+    if name not in ("table1", "table3"):
+        assert "ublished" not in notes
+    elif name == "table3":
+        assert "published pAUC" in notes
+    frame = evaluations["mug", 0]
+    alone = {("mug", 0): frame[frame["method"].isin(["single", "proposed"])]}
+    assert "Opposite is the paired" not in " ".join(build_table(name, alone, QUICK).notes)
+    assert "Opposite takes" not in " ".join(build_table(name, alone, QUICK).notes)
+
+
 def test_the_difference_is_to_the_reference_and_has_the_sign_of_the_values(evaluations):
     table = build_table("table1", evaluations, QUICK)
     found = cell(table, "mug", "single", "mae")

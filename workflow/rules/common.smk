@@ -84,6 +84,13 @@ UNITS = [
 ]
 
 
+if workflow.scheduling_settings is not None and workflow.local_exec:
+    # With its default limit of 100 jobs a second, Snakemake 9.27 looks at the schedule again once
+    # a second for every job that has been started so far (as its pull request 3744 describes):
+    # a fifth of a core at the end of the paper's run. Local jobs need no limit.
+    workflow.scheduling_settings.max_jobs_per_timespan = None
+
+
 wildcard_constraints:
     category="|".join(map(re.escape, CATEGORIES)),
     elevation=r"\d\d",

@@ -11,6 +11,7 @@ import pandas as pd
 
 from nbv.evaluation import paired, published
 from nbv.evaluation.paired import PairedErrors, Resampler
+from nbv.evaluation.published import Note
 from nbv.evaluation.settings import ReadingSettings, method_label
 
 CELL_COLUMNS = (
@@ -75,8 +76,20 @@ def assemble(
             f"difference with its 95 % interval over objects ({settings.n_resamples} resamples).",
         )
     known = published.PUBLISHED[name].notes
-    notes += tuple(note.text for note in known if note.applies(frame))
+    notes += tuple(note.text for note in known if _applies(note, frame))
     return Table(name, title, row_header, frame, notes, settings)
+
+
+def _applies(note: Note, cells: pd.DataFrame) -> bool:
+    """Say whether a figure that the note explains is among the cells."""
+    explained = pd.Series(True, index=cells.index) if note.ours else cells["published"].notna()
+    if note.metric:
+        explained &= cells["metric"] == note.metric
+    if note.rows:
+        explained &= cells["row"].isin(note.rows)
+    if note.method:
+        explained &= cells["method"] == note.method
+    return bool(explained.any())
 
 
 def shows_difference(cells: pd.DataFrame, settings: ReadingSettings) -> bool:

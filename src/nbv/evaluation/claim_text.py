@@ -31,6 +31,8 @@ VERDICT_RULES = (
     "side; otherwise it is undecided.",
     "“Comparable” holds where the interval lies inside the margin, does not hold where it lies "
     "outside altogether.",
+    f"With fewer than {comparisons.FEWEST_OBJECTS} test objects (of a category; of a fold, where σ "
+    "over folds is compared) a comparison is undecided whatever its interval.",
     "A compound claim is decided only where no undecided or unevaluated part could change it.",
     "“By point estimates” judges ours as the paper judges its own figures: as they stand, without "
     "intervals. Intervals are not corrected for the number of comparisons.",
@@ -41,7 +43,10 @@ VERDICT_RULES = (
 
 
 def claims_markdown(claims: pd.DataFrame) -> str:
-    """Return one line per claim: sentence, verdicts, our figures, and the paper's own."""
+    """Return one line per claim: sentence, verdicts, our figures, and the paper's own.
+
+    Those that were not run come last, below a heading of their own.
+    """
     header = (
         "Section",
         "The paper says",
@@ -51,23 +56,36 @@ def claims_markdown(claims: pd.DataFrame) -> str:
         "Our figures",
         "The paper's own figures",
     )
-    lines = ["## The paper's claims", "", pipe_row(header), pipe_row(["---"] * len(header))]
-    for row in claims.drop_duplicates("id").to_dict("records"):
-        note = f" ({row['note']})" if row["note"] else ""
-        lines.append(
-            pipe_row(
-                [
-                    str(row["section"]),
-                    row["sentence"],
-                    f"{row['compared']}{note}",
-                    f"**{row['verdict']}**",
-                    row["point_verdict"],
-                    row["summary"] or "–",
-                    row["published_verdict"],
-                ]
+    lines = ["## The paper's claims", ""]
+    for title, part in zip(("", "### Not run"), by_run(claims), strict=True):
+        if part.empty:
+            continue
+        lines += [title, ""] if title else []
+        lines += [pipe_row(header), pipe_row(["---"] * len(header))]
+        for row in part.to_dict("records"):
+            note = f" ({row['note']})" if row["note"] else ""
+            lines.append(
+                pipe_row(
+                    [
+                        str(row["section"]),
+                        row["sentence"],
+                        f"{row['compared']}{note}",
+                        f"**{row['verdict']}**",
+                        row["point_verdict"],
+                        row["summary"] or "–",
+                        row["published_verdict"],
+                    ]
+                )
             )
-        )
-    return "\n".join([*lines, "", *(f"- {rule}" for rule in VERDICT_RULES)]) + "\n"
+        lines.append("")
+    return "\n".join([*lines, *(f"- {rule}" for rule in VERDICT_RULES)]) + "\n"
+
+
+def by_run(claims: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return one row per claim: those that were run, decided or not, and those that were not."""
+    each = claims.drop_duplicates("id")
+    absent = each["verdict"] == comparisons.NOT_RUN
+    return each[~absent], each[absent]
 
 
 def term_text(term: Term) -> str:

@@ -141,13 +141,16 @@ class _Evaluator:
             verdict = comparisons.comparable_verdict(gap.low, gap.high, part.margin)
         else:
             verdict = comparisons.better_verdict(part.statistic, gap.low, gap.high)
+        fewest = min(
+            paired.fewest_resampled(part.statistic, self._sample(term)) for term in (part.a, part.b)
+        )
         return row | {
             "value": a.value,
             "versus_value": b.value,
             "difference": gap.value,
             "ci_low": gap.low,
             "ci_high": gap.high,
-            "part_verdict": verdict,
+            "part_verdict": comparisons.if_enough(verdict, fewest),
             "n_objects": self._sample(part.a).n_objects,
         }
 
@@ -165,10 +168,12 @@ class _Evaluator:
         lower, upper = np.quantile(errors, [0.25, 0.75])
         fence = float(upper + comparisons.TUKEY_FACTOR * (upper - lower))
         percent = 100.0 * float(np.mean(errors > fence))
+        verdict = _outlier_verdict(percent)
+        fewest = paired.fewest_resampled("outliers_percent", sample)
         return row | {
             "value": percent,
             "versus_value": fence,
-            "part_verdict": comparisons.FAILS if percent > 0 else comparisons.HOLDS,
+            "part_verdict": comparisons.if_enough(verdict, fewest),
             "n_objects": sample.n_objects,
         }
 
@@ -242,9 +247,15 @@ def _published_verdict(part: Comparison) -> Verdict:
 
 def _point_verdict(part: Comparison, row: Mapping[str, Any]) -> Verdict:
     verdict: Verdict = row["part_verdict"]
-    if isinstance(part, FreeOfOutliers) or verdict == comparisons.NOT_RUN:
+    if verdict == comparisons.NOT_RUN:
         return verdict
+    if isinstance(part, FreeOfOutliers):
+        return _outlier_verdict(row["value"])
     return _as_it_stands(part, row["difference"])
+
+
+def _outlier_verdict(percent: float) -> Verdict:
+    return comparisons.FAILS if percent > 0 else comparisons.HOLDS
 
 
 def _as_it_stands(part: Better | Comparable, difference: float) -> Verdict:

@@ -11,7 +11,9 @@ A statement is one comparison or a compound of statements. Each gets one of four
     The interval excludes zero on the other side; it lies outside ±margin altogether; there is
     an outlier; so many parts do not hold that k cannot be reached.
 ``undecided``
-    Neither: the interval includes zero, or reaches over the margin.
+    Neither: the interval includes zero, or reaches over the margin. And wherever fewer than
+    `FEWEST_OBJECTS` test objects are resampled together (those of a category; for σ over folds,
+    those of a fold): an interval over so few means nothing.
 ``not run``
     What it speaks of was not evaluated. A compound is ``not run`` where its verdict depends on
     parts that were not.
@@ -37,6 +39,8 @@ NOT_RUN: Verdict = "not run"
 VERDICTS: tuple[Verdict, ...] = (HOLDS, FAILS, UNDECIDED, NOT_RUN)
 
 TUKEY_FACTOR = 1.5
+FEWEST_OBJECTS = 5
+"""Test objects that an interval over objects, and so a verdict, needs."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +131,11 @@ def leaves(statement: Statement) -> list[Comparison]:
     if isinstance(statement, AtLeast):
         return [leaf for part in statement.parts for leaf in leaves(part)]
     return [statement]
+
+
+def if_enough(verdict: Verdict, n_objects: int) -> Verdict:
+    """Return a verdict, or that it is open where too few objects are resampled together."""
+    return UNDECIDED if verdict != NOT_RUN and n_objects < FEWEST_OBJECTS else verdict
 
 
 def better_verdict(statistic: str, low: float, high: float) -> Verdict:

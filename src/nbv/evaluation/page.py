@@ -18,6 +18,7 @@ body { font: 16px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color
   background: #fff; margin: 0 auto; padding: 1.5rem; max-width: 76rem; }
 h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 .5rem; }
 h2 { font-size: 1.35rem; margin: 2.5rem 0 .75rem; border-bottom: 2px solid #1a1a1a; }
+summary { margin: 1rem 0 .5rem; cursor: pointer; font-weight: 600; }
 h3 { font-size: 1.05rem; margin: 1.75rem 0 .5rem; }
 a { color: #00497a; }
 dl.facts { display: grid; grid-template-columns: max-content 1fr; gap: .15rem 1rem;

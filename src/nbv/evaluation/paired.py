@@ -123,6 +123,18 @@ def pool(parts: Sequence[PairedErrors]) -> PairedErrors:
     )
 
 
+def fewest_resampled(statistic: str, sample: PairedErrors) -> int:
+    """Return the smallest number of objects that `estimate` resamples together.
+
+    Objects are resampled within their category, and for σ within their fold as well.
+    """
+    objects, images = np.unique(sample.objects, return_index=True)
+    strata = [sample.category_of[one] for one in objects]
+    if statistic.endswith("_sigma"):
+        strata = [f"{fold} {name}" for fold, name in zip(sample.folds[images], strata, strict=True)]
+    return int(np.unique(strata, return_counts=True)[1].min(initial=objects.size))
+
+
 @dataclass
 class Resampler:
     """Object resamples, drawn once per category, so that all comparisons share them.

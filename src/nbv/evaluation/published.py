@@ -9,8 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-import pandas as pd
-
 METHODS = ("single", "random", "opposite", "proposed")
 """The paper's methods, in the order of its columns."""
 
@@ -43,17 +41,6 @@ class Note:
     rows: tuple[str, ...] = ()
     method: str = ""
     ours: bool = False
-
-    def applies(self, cells: pd.DataFrame) -> bool:
-        """Say whether a table of `cells.CELL_COLUMNS` shows a figure that this explains."""
-        explained = pd.Series(True, index=cells.index) if self.ours else cells["published"].notna()
-        if self.metric:
-            explained &= cells["metric"] == self.metric
-        if self.rows:
-            explained &= cells["row"].isin(self.rows)
-        if self.method:
-            explained &= cells["method"] == self.method
-        return bool(explained.any())
 
 
 @dataclass(frozen=True)

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from omegaconf import OmegaConf
 
-from nbv.errors import UserError
 from nbv.evaluation import page
-from nbv.evaluation.claim_text import VERDICT_RULES
+from nbv.evaluation.claim_text import VERDICT_RULES, by_run
 from nbv.evaluation.comparisons import VERDICTS
 from nbv.evaluation.figures import FIGURES
-from nbv.evaluation.layout import markdown_to_html, number
+from nbv.evaluation.layout import number
+from nbv.evaluation.markdown import markdown_to_html
 from nbv.evaluation.page import escape
 from nbv.evaluation.paired import UNIT_OF
-from nbv.evaluation.results import discover_units, load_object_ids
+from nbv.evaluation.reference import read_configuration, read_provenance
+from nbv.evaluation.results import existing, load_object_ids
 from nbv.evaluation.runtime import load_runtime, runtime_markdown
 from nbv.evaluation.settings import category_label
 from nbv.evaluation.tables import TABLES
+from nbv.files import read_csv
 
 _CONTENTS = (
     ("claims", "The paper's claims"),
@@ -49,19 +49,18 @@ def build_report(root: str | Path) -> str:
     Raises
     ------
     UserError
-        If the claims, the configuration or the provenance are missing.
+        If the claims, the configuration or the provenance are missing, or the splits of a
+        category that the configuration names.
     """
     root = Path(root)
-    claims = pd.read_csv(_existing(root / "claims.csv"), dtype={"section": str}).fillna(
+    claims = read_csv(existing(root / "claims.csv")).fillna(
         {"note": "", "summary": "", "versus": ""}
     )
-    configuration = _existing(root / "configuration.yaml").read_text(encoding="utf-8")
-    provenance = json.loads(_existing(root / "provenance.json").read_text(encoding="utf-8"))
-    settings = OmegaConf.to_container(OmegaConf.create(configuration), resolve=False)
-    experiment = root.name
-    if isinstance(settings, dict):
-        experiment = str(settings.get("experiment") or root.name)
-    title = f"Best next viewpoint: experiment {experiment}"
+    settings = read_configuration(root)
+    configuration = (root / "configuration.yaml").read_text(encoding="utf-8")
+    existing(root / "provenance.json")
+    provenance = read_provenance(root)
+    title = f"Best next viewpoint: experiment {settings['name']}"
     links = "".join(f'<li><a href="#{key}">{escape(text)}</a></li>' for key, text in _CONTENTS)
     bodies = {
         "claims": _claims(claims),
@@ -69,7 +68,7 @@ def build_report(root: str | Path) -> str:
         "figures": _figures(root),
         "comparisons": _comparisons(claims),
         "settings": _settings(configuration, provenance),
-        "runtime": _runtime(root),
+        "runtime": _runtime(root, settings),
     }
     return page.page(
         title,
@@ -85,25 +84,17 @@ def build_report(root: str | Path) -> str:
     )
 
 
-def _existing(path: Path) -> Path:
-    if not path.is_file():
-        raise UserError(f"{path} does not exist; run the workflow's target that makes it first")
-    return path
-
-
-def _facts(root: Path, settings: object, provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
-    units = discover_units(root)
-    categories = list(dict.fromkeys(category for category, _ in units))
+def _facts(
+    root: Path, settings: Mapping[str, Any], provenance: Mapping[str, Any]
+) -> list[tuple[str, str]]:
+    categories = settings["categories"]
     objects = [f"{category_label(c)} {len(load_object_ids(root, c))}" for c in categories]
     elevations = [
-        f"{category_label(c)} {', '.join(f'{e}°' for name, e in units if name == c)}"
+        f"{category_label(c)} {', '.join(f'{e}°' for e in settings['elevations_deg'][c])}"
         for c in categories
     ]
-    dataset = settings.get("dataset") if isinstance(settings, dict) else None
-    if isinstance(dataset, dict):
-        dataset = dataset.get("source") or dataset.get("name")
     return [
-        ("Data set", str(dataset or "not recorded")),
+        ("Data set", str(settings["dataset"]["source"])),
         ("Objects", "; ".join(objects)),
         ("Elevations", "; ".join(elevations)),
         ("Commit", str(provenance.get("commit") or "not recorded")),
@@ -112,8 +103,22 @@ def _facts(root: Path, settings: object, provenance: Mapping[str, Any]) -> list[
 
 def _claims(claims: pd.DataFrame) -> list[str]:
     each = claims.drop_duplicates("id")
+    run, absent = by_run(claims)
+    parts = [
+        f"<p>Of {len(each)} checkable sentences, {_tally(each['verdict'])}. Judged as the paper "
+        f"judges its own figures, by point estimates alone: {_tally(each['point_verdict'])}.</p>"
+    ]
+    if len(run):
+        parts.append(_claim_table(run))
+    if len(absent):
+        summary = f"<summary>Not run: {len(absent)} of {len(each)}</summary>"
+        parts.append(f"<details>{summary}{_claim_table(absent)}</details>")
+    return [*parts, page.notes(VERDICT_RULES)]
+
+
+def _claim_table(claims: pd.DataFrame) -> str:
     rows = []
-    for claim in each.to_dict("records"):
+    for claim in claims.to_dict("records"):
         note = f'<br><span class="muted">{escape(claim["note"])}</span>' if claim["note"] else ""
         figures = "<br>".join(escape(text) for text in str(claim["summary"]).split("; "))
         rows.append(
@@ -128,12 +133,7 @@ def _claims(claims: pd.DataFrame) -> list[str]:
             ]
         )
     header = ("Sec.", "The paper says", "Verdict", "Our figures", "Its own figures")
-    return [
-        f"<p>Of {len(each)} checkable sentences, {_tally(each['verdict'])}. Judged as the paper "
-        f"judges its own figures, by point estimates alone: {_tally(each['point_verdict'])}.</p>",
-        page.table(header, rows, "text"),
-        page.notes(VERDICT_RULES),
-    ]
+    return page.table(header, rows, "text")
 
 
 def _tally(verdicts: pd.Series) -> str:
@@ -223,10 +223,14 @@ def _settings(configuration: str, provenance: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _runtime(root: Path) -> list[str]:
+def _runtime(root: Path, settings: Mapping[str, Any]) -> list[str]:
     """Return the table beside the others, or where it was not made, what it would say."""
     path = root / "tables" / "runtime.md"
-    text = path.read_text("utf-8") if path.is_file() else runtime_markdown(load_runtime(root))
+    if path.is_file():
+        text = path.read_text(encoding="utf-8")
+    else:
+        units = [(c, e) for c in settings["categories"] for e in settings["elevations_deg"][c]]
+        text = runtime_markdown(load_runtime(root, units, settings["n_folds"]))
     if "|" not in text:
         return [f"<p>{escape(text.splitlines()[-1])}</p>"]
     return [markdown_to_html(text, escape)]

@@ -20,6 +20,7 @@ from nbv.files import open_array, read_csv
 Unit = tuple[str, int]
 """A category and an elevation in degrees."""
 
+
 def existing(path: Path) -> Path:
     """Return the path of a file that has to be there.
 
@@ -95,7 +96,7 @@ def load_unit(
     for method in methods:
         for fold in range(1, n_folds + 1):
             path = evaluation_path(root, category, elevation_deg, fold, method)
-            frame = _read_csv(path, COLUMNS)
+            frame = _read_evaluation(path)
             parts.append(frame.assign(method=method, fold=fold))
     unit = pd.concat(parts, ignore_index=True)
     unit["method"] = pd.Categorical(unit["method"], categories=list(methods), ordered=True)
@@ -127,12 +128,12 @@ def load_depth(root: str | Path, category: str, elevation_deg: int) -> NDArray[n
     return open_array(existing(depth_path(root, category, elevation_deg)))
 
 
-def _read_csv(path: Path, columns: Sequence[str]) -> pd.DataFrame:
+def _read_evaluation(path: Path) -> pd.DataFrame:
     try:
         frame = read_csv(existing(path))
     except pd.errors.EmptyDataError:
         frame = pd.DataFrame()
-    absent = [name for name in columns if name not in frame.columns]
+    absent = [name for name in COLUMNS if name not in frame.columns]
     if absent:
         raise UserError(f"{path}: no column {absent[0]!r}; delete the file and run the stage again")
     if frame.empty:

@@ -116,6 +116,8 @@ def idea(inputs: FigureInputs) -> Figure:
         delta = round(float(seen["delta_deg"]) / step)
         second = int(nearest_bin(float(seen["next_estimate_deg"]), n_bins))
         belief = one * np.roll(answers[:, second], -delta)
+        # As before a second look: two answers that exclude each other say nothing.
+        belief = belief if belief.any() else np.ones_like(one)
         curves.append([(belief / belief.sum(), "p(θ | e₁, e₂, δ)", "#D55E00", "solid")])
         titles.append(f"After the second look at δ = {delta * step:.0f}°")
     figure = new_figure(7.6, 2.1 * len(curves) + 0.4)

@@ -82,9 +82,7 @@ def boxplots(inputs: FigureInputs) -> Figure:
         Line2D([], [], marker="D", linestyle="", markerfacecolor="white", color=INK, label="mean")
     )
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    figure.suptitle(
-        f"Errors at elevation {common}° (box: quartiles, line: median)", fontsize=10
-    )
+    figure.suptitle(f"Errors at elevation {common}° (box: quartiles, line: median)", fontsize=10)
     return figure
 
 

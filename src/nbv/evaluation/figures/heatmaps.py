@@ -68,4 +68,3 @@ def lookup_maps(inputs: FigureInputs) -> Figure:
         axes.grid(visible=False)
     figure.suptitle(f"Lookup table of {unit[0]}, elevation {unit[1]}°, fold {fold}", fontsize=10)
     return figure
-
