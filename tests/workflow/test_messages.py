@@ -59,6 +59,16 @@ def test_too_few_meshes(fresh):
     assert complaints(done.stderr) == 1
 
 
+def test_too_few_meshes_left_after_an_earlier_run(fresh):
+    write_meshes(fresh.folder / "things/mug", 8)
+    (fresh.results / "meshes").mkdir(parents=True)
+    (fresh.results / "meshes/mug.npz").touch()
+    (fresh.folder / "without.txt").write_text("0\n1\n2\n")
+    more = (FOLDER, "dataset.root=things", "dataset.exclude_file=without.txt", "categories=[mug]")
+    done = fresh.run("--cores", "1", overrides=(*TINY, *more), fails=True)
+    assert "holds 5 usable meshes, n_objects=8 asked for" in done.stderr
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "content", "message"),

@@ -29,15 +29,13 @@ def stop(message):
 
 
 def chosen_objects(category):
-    """The objects of a category, by name; those of the last run where its files are out of reach."""
-    try:
-        source = open_source(CONFIG["dataset"], CONFIG["seed"])
-        return select_objects(source, category, CONFIG["n_objects"])
-    except UserError:
-        prepared = Path(f"{RESULTS}/meshes/{category}.npz")
-        if not prepared.exists():
-            raise
+    """The objects of a category, by name; those of the last run where the data set is gone."""
+    root = CONFIG["dataset"]["root"]
+    prepared = Path(f"{RESULTS}/meshes/{category}.npz")
+    if root and not Path(root).expanduser().exists() and prepared.exists():
         return stored_ids(prepared)
+    source = open_source(CONFIG["dataset"], CONFIG["seed"])
+    return select_objects(source, category, CONFIG["n_objects"])
 
 
 def dataset_of(category):
