@@ -7,6 +7,7 @@ from them; it is always proper, so nothing is ever mirrored.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -155,10 +156,11 @@ def normalise(
         raise UserError(f"centre={centre}: no such centre; {nearest(centre, CENTRES)}")
     used, faces = np.unique(np.asarray(mesh.faces), return_inverse=True)
     rotation = frame_rotation(up, front, turn_deg)
-    vertices = np.asarray(mesh.vertices, dtype=np.float64)[used] @ rotation.T
+    # Without BLAS, whose kernels round differently: the same mesh everywhere.
+    vertices = np.einsum("nj,ij->ni", np.asarray(mesh.vertices, dtype=np.float64)[used], rotation)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle = (low + high) / 2.0
     if centre == "origin":
         middle[:2] = 0.0
-    vertices = (vertices - middle) / np.linalg.norm(high - low)
+    vertices = (vertices - middle) / math.hypot(*(high - low))
     return trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False)

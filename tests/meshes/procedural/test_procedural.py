@@ -60,22 +60,28 @@ def test_same_bytes_whenever_an_object_is_generated(category):
     assert [digest(mesh) for mesh in again] == [digest(mesh) for mesh in objects(category)]
 
 
-@pytest.mark.parametrize("hash_seed", ["1", "2"])
-def test_same_bytes_in_another_process(hash_seed):
+@pytest.mark.parametrize(
+    "settings",
+    [{"PYTHONHASHSEED": "1"}, {"PYTHONHASHSEED": "2", "OPENBLAS_CORETYPE": "Prescott"}],
+    ids=["hash seed", "hash seed and BLAS kernels"],
+)
+def test_same_bytes_in_another_process(settings):
     script = (
         "import hashlib; from nbv.meshes.procedural import CATEGORIES, generate\n"
         "for c in CATEGORIES:\n"
-        "    m = generate(c, 0, 3)\n"
-        "    print(hashlib.sha256(m.vertices.tobytes() + m.faces.tobytes()).hexdigest())"
+        f"    for i in range({N_OBJECTS}):\n"
+        "        m = generate(c, 0, i)\n"
+        "        print(hashlib.sha256(m.vertices.tobytes() + m.faces.tobytes()).hexdigest())"
     )
     done = subprocess.run(
         [sys.executable, "-c", script],
-        env=os.environ | {"PYTHONHASHSEED": hash_seed},
+        env=os.environ | settings,
         capture_output=True,
         text=True,
         check=True,
     )
-    assert done.stdout.split() == [digest(objects(category)[3]) for category in CATEGORIES]
+    expected = [digest(mesh) for category in CATEGORIES for mesh in objects(category)]
+    assert done.stdout.split() == expected
 
 
 @each_category

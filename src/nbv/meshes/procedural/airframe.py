@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
@@ -31,7 +33,7 @@ def panel(leading: ArrayLike, chords: ArrayLike, thickness: float) -> trimesh.Tr
     """
     edge, chord = np.asarray(leading, dtype=np.float64), np.asarray(chords, dtype=np.float64)
     across = np.cross((1.0, 0.0, 0.0), edge[-1] - edge[0])
-    across /= np.linalg.norm(across)
+    across /= math.hypot(*across)
     angle = 2 * np.pi * np.arange(20) / 20
     back = 0.5 - 0.5 * np.cos(angle)
     thick = 0.5 * thickness * np.sin(angle) * (1.25 - 0.75 * back)

@@ -37,7 +37,8 @@ def turned(
     about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     rotation = about_z[np.ix_(FROM_Z[axis], FROM_Z[axis])]
     pivot = np.asarray(centre, dtype=np.float64)
-    vertices = (np.asarray(solid.vertices) - pivot) @ rotation.T + pivot
+    arm = np.asarray(solid.vertices) - pivot
+    vertices = np.einsum("nj,ij->ni", arm, rotation) + pivot
     return trimesh.Trimesh(vertices, solid.faces, process=False)
 
 

@@ -250,7 +250,7 @@ def sweep(
     tangents = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     upright = np.asarray(normal, dtype=np.float64)
-    first = upright - tangents * (tangents @ upright)[:, None]
+    first = upright - tangents * (tangents * upright).sum(axis=1, keepdims=True)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(tangents, first)
     size = np.broadcast_to(np.asarray(scale, dtype=np.float64), len(points))[:, None, None]
@@ -278,7 +278,14 @@ def tube(path: ArrayLike, radius: float, *, n: int = 12, taper: float = 1.0) -> 
         The solid, its ends closed.
     """
     points = np.asarray(path, dtype=np.float64)
-    # The direction of least extent is the normal of the plane the path lies in.
-    normal = np.linalg.svd(points - points.mean(axis=0))[2][-1]
+    # From the edges by hand: of a straight path's many normals, a decomposition would return one
+    # that the rounding of the linear algebra library chose.
+    edges = np.diff(points, axis=0)
+    bends = np.cross(edges[:1], edges)
+    sharpest = bends[np.argmax(np.abs(bends).max(axis=1))]
+    straight = np.abs(sharpest).max() < 1e-9 * np.abs(edges).max() ** 2
+    upright = np.abs(edges[0, 2]) > np.abs(edges[0, :2]).max()
+    across = np.cross(edges[0], (1.0, 0.0, 0.0) if upright else (0.0, 0.0, 1.0))
+    normal = across if straight else sharpest
     scale = np.linspace(1.0, taper, len(points))
     return sweep(points, superellipse(radius, radius, n=n), normal, scale=scale)
