@@ -38,6 +38,7 @@ include: "workflow/rules/read.smk"
 
 
 onstart:
+    lift_rate_limit()
     Path(LAST_ERROR).unlink(missing_ok=True)
     banner(
         f"nbv: experiment {CONFIG['experiment']}, data set {CONFIG['dataset']['source']}, "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import subprocess
+import sys
 import time
 
 import numpy as np
@@ -177,3 +178,30 @@ def test_an_interrupted_run_continues_to_the_same_bytes(finished, fresh):
     again = fresh.run("--cores", "2")
     assert "nbv: finished" in again.stderr
     assert fresh.outcome() == finished.outcome()
+
+
+def test_a_finished_job_and_not_a_clock_makes_the_schedule_be_looked_at_again(scratch):
+    """Snakemake's timers, one more for every job, would cost a fifth of a core in a long run."""
+    driver = (
+        "import sys\n"
+        "from snakemake.cli import main\n"
+        "from snakemake.scheduling.job_scheduler import JobScheduler\n"
+        "calls = []\n"
+        "JobScheduler._schedule_reevalutation = lambda self, delay: calls.append(delay)\n"
+        "try:\n"
+        "    main(sys.argv[1:])\n"
+        "finally:\n"
+        "    print('looked again', len(calls))\n"
+    )
+    target = "results/tiny/configuration.yaml"
+    arguments = scratch.command("--cores", "1", "--force", target)[3:]
+    done = subprocess.run(
+        [sys.executable, "-c", driver, *arguments],
+        cwd=scratch.folder,
+        env=scratch.environment,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert "nbv: finished" in done.stderr
+    assert "looked again 0" in done.stdout

@@ -82,13 +82,6 @@ UNITS = [
 ]
 
 
-if workflow.scheduling_settings is not None and workflow.local_exec:
-    # With its default limit of 100 jobs a second, Snakemake 9.27 looks at the schedule again once
-    # a second for every job that has been started so far (as its pull request 3744 describes):
-    # a fifth of a core at the end of the paper's run. Local jobs need no limit.
-    workflow.scheduling_settings.max_jobs_per_timespan = None
-
-
 wildcard_constraints:
     category="|".join(map(re.escape, CATEGORIES)),
     elevation=r"\d\d",
@@ -150,6 +143,17 @@ def benchmark_path(job):
 def banner(*lines):
     line = "-" * 72
     print("\n".join(["", line, *lines, line]), file=sys.stderr, flush=True)
+
+
+def lift_rate_limit():
+    """Let local jobs start as they can.
+
+    With its default limit of 100 jobs a second, Snakemake 9.27 looks at the schedule again once a
+    second for every job that has been started so far (as its pull request 3744 describes): a
+    fifth of a core at the end of the paper's run. The limit exists once the run starts.
+    """
+    if workflow.local_exec:
+        workflow.scheduler.job_rate_limiter = None
 
 
 def last_error():

@@ -12,6 +12,8 @@ rule train:
         log_path(f"train/{FOLD}"),
     benchmark:
         benchmark_path(f"train/{FOLD}")
+    # Longest jobs first: the short ones fill the gaps at the end, when cores would stand idle.
+    priority: 50
     conda:
         ENVIRONMENT
     threads: 1

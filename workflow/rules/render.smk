@@ -61,6 +61,7 @@ rule render:
         log_path("render/{category}/el{elevation}"),
     benchmark:
         benchmark_path("render/{category}/el{elevation}")
+    priority: 60
     conda:
         ENVIRONMENT
     threads: 1
