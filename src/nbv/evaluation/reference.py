@@ -57,8 +57,8 @@ def collect_reference(run: Path, reference: Path) -> list[Path]:
 
     Tables, figures as PNG, claims, runtime, configuration and provenance: a few MB. The runtime
     goes beside the tables rather than among them. ``bench.json``, which ``python -m benchmarks``
-    writes beside the runs, comes along where there is one. Tables and figures that the reference
-    had and the run has not are removed; whatever else lies there is left alone.
+    writes beside the runs, goes beside the references where there is one. Tables and figures that
+    the reference had and the run has not are removed; whatever else lies there is left alone.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def collect_reference(run: Path, reference: Path) -> list[Path]:
     copies = {reference / _kept_as(source.relative_to(run)): source for source in _sources(run)}
     bench = run.parent / "bench.json"
     if bench.is_file():
-        copies[reference / bench.name] = bench
+        copies[reference.parent / bench.name] = bench
     for stale in {old for pattern in _KEPT for old in reference.glob(pattern)} - copies.keys():
         stale.unlink()
     for target, source in copies.items():
