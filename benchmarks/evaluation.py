@@ -19,6 +19,7 @@ from benchmarks.timing import take_turns
 from nbv.angles import circular_distance_deg
 from nbv.calibration.pairs import Estimates
 from nbv.evaluation.methods import COLUMNS, evaluate_method
+from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.fusion import average
 from nbv.recommendation.lookup import LookupTable, build_lookup
 
@@ -33,11 +34,13 @@ def run(quick: bool) -> list[Figure]:
         np.ones((n_objects, 360)),
     )
     table = build_lookup(
-        calibration_estimates(20, 360),
+        gather_evidence(
+            calibration_estimates(20, 360),
+            configuration()["density"],
+            bandwidth_deg=8.0,
+            pseudo_observations=30.0,
+        ),
         "entropy",
-        configuration()["density"],
-        bandwidth_deg=8.0,
-        pseudo_observations=30.0,
     )
     method = configuration()["methods"]["proposed"]
     works: list[Callable[[], pd.DataFrame]] = [

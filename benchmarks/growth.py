@@ -14,6 +14,7 @@ from benchmarks.timing import Work, growth_exponent, take_turns
 from benchmarks.training import bare_steps, random_codes
 from nbv.estimation.hardware import choose_hardware, use_one_thread
 from nbv.estimation.training import train_regressor
+from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.lookup import build_lookup
 from nbv.recommendation.selection import chosen_lookup
 from nbv.rendering import open_renderer
@@ -76,12 +77,14 @@ def _chosen(n_objects: int) -> Work:
 def _lookup(n_bins: int) -> Work:
     estimate_deg = calibration_estimates(20, N_VIEWS)
     return lambda: build_lookup(
-        estimate_deg,
+        gather_evidence(
+            estimate_deg,
+            configuration()["density"],
+            bandwidth_deg=8.0,
+            pseudo_observations=30.0,
+            n_bins=n_bins,
+        ),
         "entropy",
-        configuration()["density"],
-        bandwidth_deg=8.0,
-        pseudo_observations=30.0,
-        n_bins=n_bins,
     )
 
 

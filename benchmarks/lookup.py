@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from benchmarks.figures import Figure, Target
 from benchmarks.settings import configuration
 from benchmarks.timing import median_ratio
+from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.lookup import LookupTable, build_lookup
 
 TARGET = Target(200)
@@ -63,12 +64,14 @@ def calibration_estimates(n_objects: int, n_views: int) -> NDArray[np.float64]:
 
 def _own(estimate_deg: NDArray[np.float64], n_bins: int) -> LookupTable:
     return build_lookup(
-        estimate_deg,
+        gather_evidence(
+            estimate_deg,
+            configuration()["density"],
+            bandwidth_deg=BANDWIDTH_DEG,
+            pseudo_observations=PSEUDO_OBSERVATIONS,
+            n_bins=n_bins,
+        ),
         "entropy",
-        configuration()["density"],
-        bandwidth_deg=BANDWIDTH_DEG,
-        pseudo_observations=PSEUDO_OBSERVATIONS,
-        n_bins=n_bins,
     )
 
 

@@ -18,6 +18,7 @@ from nbv.estimation.inference import estimate_azimuth
 from nbv.estimation.networks import build_network
 from nbv.meshes.normalisation import normalise
 from nbv.meshes.procedural import generate
+from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.lookup import build_lookup
 from nbv.rendering import open_renderer
 from nbv.rendering.camera import Camera
@@ -34,11 +35,13 @@ def run(quick: bool) -> list[Figure]:
     torch.manual_seed(0)
     network = build_network(settings, camera.image_side).eval()
     table = build_lookup(
-        calibration_estimates(20, 360),
+        gather_evidence(
+            calibration_estimates(20, 360),
+            configuration()["density"],
+            bandwidth_deg=8.0,
+            pseudo_observations=30.0,
+        ),
         "entropy",
-        configuration()["density"],
-        bandwidth_deg=8.0,
-        pseudo_observations=30.0,
     )
     mug = normalise(generate("mug", 0, 0), "+z", "+x", 0.0, "box")
     depth = open_renderer("embree").render(mug.vertices, mug.faces, 0.0, [40.0], camera)

@@ -7,7 +7,8 @@ import pytest
 from nbv.config import load_config, snakemake_overrides
 from nbv.errors import UserError
 from nbv.estimation import hardware
-from nbv.recommendation import criteria
+from nbv.recommendation.criteria.pose_ambiguity import READINGS
+from nbv.recommendation.criteria.spreads import SPREADS
 from nbv.rendering.camera import FRAMINGS
 from nbv.schema import CHOICES as CHOICES_OF_CODE
 
@@ -30,8 +31,8 @@ def test_the_default_is_the_paper():
 
 def test_names_are_those_that_the_code_knows():
     assert CHOICES_OF_CODE["camera.framing"] == FRAMINGS
-    assert CHOICES_OF_CODE["density.reading"] == criteria.READINGS
-    assert CHOICES_OF_CODE["density.spread"] == tuple(criteria.SPREADS)
+    assert CHOICES_OF_CODE["density.reading"] == READINGS
+    assert CHOICES_OF_CODE["density.spread"] == tuple(SPREADS)
     assert CHOICES_OF_CODE["estimator.device"] == hardware.DEVICES
     assert CHOICES_OF_CODE["estimator.precision"] == hardware.PRECISIONS
 

@@ -16,6 +16,7 @@ from nbv.evaluation.figures import FIGURES, FigureInputs, build_figure, save_fig
 from nbv.evaluation.figures.depth import depth_limits, shade
 from nbv.evaluation.figures.inputs import example_view
 from nbv.evaluation.settings import ReadingSettings
+from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.lookup import build_lookup, load_lookup, save_lookup
 
 
@@ -110,11 +111,13 @@ def test_the_spread_drawn_is_the_one_that_the_table_stores(one_fold, reading, sp
     inputs, path = one_fold
     estimates = (np.arange(360) + np.random.default_rng(0).normal(0, 20, (5, 360))) % 360
     made = build_lookup(
-        estimates,
+        gather_evidence(
+            estimates,
+            {"reading": reading, "spread": spread},
+            bandwidth_deg=9.0,
+            pseudo_observations=5.0,
+        ),
         "entropy",
-        {"reading": reading, "spread": spread},
-        bandwidth_deg=9.0,
-        pseudo_observations=5.0,
     )
     save_lookup(path, made)
     shown = example_view(inputs)

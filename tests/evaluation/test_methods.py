@@ -6,8 +6,10 @@ import pytest
 from nbv.angles import circular_distance_deg
 from nbv.calibration.pairs import Estimates
 from nbv.errors import UserError
-from nbv.evaluation.methods import COLUMNS, check_method, evaluate_method, needs_lookup
+from nbv.evaluation.methods import COLUMNS, check_method, evaluate_method
+from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.lookup import build_lookup
+from nbv.recommendation.rotations import needs_lookup
 
 RNG = np.random.default_rng(0)
 SETTINGS = {"reading": "given_estimate", "spread": "entropy"}
@@ -68,12 +70,14 @@ def test_random_views_are_the_generators():
 def test_recommended_rotations_come_from_the_table_and_errors_from_what_is_seen():
     test = estimates()
     lookup = build_lookup(
-        estimates(seed=5).estimate_deg,
+        gather_evidence(
+            estimates(seed=5).estimate_deg,
+            SETTINGS,
+            bandwidth_deg=15,
+            pseudo_observations=5,
+            n_bins=36,
+        ),
         "entropy",
-        SETTINGS,
-        bandwidth_deg=15,
-        pseudo_observations=5,
-        n_bins=36,
     )
     rows = evaluate_method(method("entropy"), test, lookup=lookup)
     for row in rows.itertuples():

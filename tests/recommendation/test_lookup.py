@@ -5,9 +5,20 @@ import pytest
 
 from nbv.errors import UserError
 from nbv.recommendation import lookup
-from nbv.recommendation.selection import choose_density, chosen_lookup, two_view_error_deg
+from nbv.recommendation.evidence import gather_evidence
+from nbv.recommendation.fusion import two_view_error_deg
+from nbv.recommendation.selection import choose_densities, chosen_lookup
 
-SETTINGS = {"reading": "given_estimate", "spread": "entropy"}
+SETTINGS = {"reading": "given_estimate", "spread": "entropy", "n_parts": 5}
+
+
+def build_lookup(estimate_deg, criterion, settings, **density):
+    return lookup.build_lookup(gather_evidence(estimate_deg, settings, **density), criterion)
+
+
+def choose_density(estimate_deg, criterion, settings, **grid):
+    method = {"rotation": criterion, "fusion": "average"}
+    return choose_densities(estimate_deg, {criterion: method}, settings | grid)[criterion]
 
 
 def hidden_range_estimates(n_objects: int, seed: int = 0) -> np.ndarray:
@@ -30,7 +41,7 @@ def test_ties_go_to_the_smallest_travel_and_then_to_the_smaller_delta():
 
 
 def test_a_stored_table_comes_back_whole(tmp_path):
-    table = lookup.build_lookup(
+    table = build_lookup(
         hidden_range_estimates(4),
         "entropy",
         SETTINGS,
@@ -46,7 +57,7 @@ def test_a_stored_table_comes_back_whole(tmp_path):
 
 
 def test_recommendations_are_read_at_the_nearest_bin():
-    table = lookup.build_lookup(
+    table = build_lookup(
         hidden_range_estimates(4), "entropy", SETTINGS, bandwidth_deg=8, pseudo_observations=10
     )
     assert table.recommend([359.6, 0.2, 89.5]).tolist() == [
@@ -56,9 +67,7 @@ def test_recommendations_are_read_at_the_nearest_bin():
 
 def test_an_unknown_criterion():
     with pytest.raises(UserError, match="did you mean 'entropy'"):
-        lookup.build_lookup(
-            np.zeros((1, 360)), "entrpy", SETTINGS, bandwidth_deg=1, pseudo_observations=1
-        )
+        build_lookup(np.zeros((1, 360)), "entrpy", SETTINGS, bandwidth_deg=1, pseudo_observations=1)
 
 
 def test_two_view_error_is_that_of_a_plain_loop():
@@ -86,7 +95,7 @@ def test_the_chosen_density_decides_best_on_objects_it_has_not_seen():
     total = 0.0
     for part in range(5):
         held_out = np.arange(10) % 5 == part
-        table = lookup.build_lookup(
+        table = build_lookup(
             estimate[~held_out],
             "entropy",
             SETTINGS,
@@ -105,7 +114,7 @@ def test_coarse_tables_decide_like_fine_ones():
     errors = [
         two_view_error_deg(
             unseen,
-            lookup.build_lookup(
+            build_lookup(
                 estimate, "entropy", SETTINGS, bandwidth_deg=8, pseudo_observations=30, n_bins=n
             ).recommend(unseen),
         ).mean()

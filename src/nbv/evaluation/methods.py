@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.angles import circular_distance_deg
 from nbv.calibration.pairs import Estimates
 from nbv.errors import UserError, nearest
-from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.fusion import FUSIONS, Rotations, second_look
 from nbv.recommendation.lookup import LookupTable
+from nbv.recommendation.rotations import BASELINES, ORACLE, SINGLE, needs_lookup
 
 COLUMNS = (
     "object_id",
@@ -27,45 +27,26 @@ COLUMNS = (
 )
 
 
-def _random(estimate_deg: NDArray[np.float64], rng: np.random.Generator) -> Rotations:
-    """Return a view other than the first, all equally likely."""
-    n_views = estimate_deg.shape[1]
-    return np.asarray(rng.integers(1, n_views, estimate_deg.shape) * (360 // n_views))
-
-
-def _opposite(estimate_deg: NDArray[np.float64], rng: np.random.Generator) -> Rotations:
-    return np.full(estimate_deg.shape, 180, dtype=np.int64)
-
-
-BASELINES: dict[str, Callable[[NDArray[np.float64], np.random.Generator], Rotations]] = {
-    "random": _random,
-    "opposite": _opposite,
-}
-SINGLE = "none"
+def check_names(key: str, method: Mapping[str, Any]) -> None:
+    """Raise UserError where the rotation or the fusion that stands at `key` is unknown."""
+    needs_lookup(method["rotation"])
+    if method["fusion"] not in FUSIONS:
+        given = f"{key}.fusion={method['fusion']}"
+        raise UserError(f"{given} is unknown: {nearest(method['fusion'], FUSIONS)}")
 
 
 def check_method(name: str, method: Mapping[str, Any]) -> None:
-    """Raise UserError where a configured method's rotation or fusion is unknown."""
-    needs_lookup(method["rotation"])
-    if method["fusion"] not in FUSIONS:
-        key = f"methods.{name}.fusion={method['fusion']}"
-        raise UserError(f"{key} is unknown: {nearest(method['fusion'], FUSIONS)}")
-
-
-def needs_lookup(rotation: str) -> bool:
-    """Say whether a method's ``rotation`` is recommended by a lookup table.
+    """Check what a configuration says about one of the paper's columns.
 
     Raises
     ------
     UserError
-        Where it is neither a baseline nor a criterion.
+        Where its rotation or fusion is unknown, or is none that `evaluate_method` can do.
     """
-    if rotation == SINGLE or rotation in BASELINES:
-        return False
-    if rotation in CRITERIA:
-        return True
-    known = [SINGLE, *BASELINES, *CRITERIA]
-    raise UserError(f"methods: rotation {rotation!r} is unknown: {nearest(rotation, known)}")
+    key = f"methods.{name}"
+    check_names(key, method)
+    if method["rotation"] == ORACLE or method["fusion"] != "average":
+        raise UserError(f"{key}: oracles and fusion other than average belong under contenders")
 
 
 def evaluate_method(
@@ -106,7 +87,7 @@ def evaluate_method(
             raise ValueError(f"rotation {rotation!r} needs a generator")
         delta = BASELINES[rotation](first, rng)
     second = second_look(first, delta)
-    return results_frame(test, delta, second, FUSIONS[method["fusion"]](first, second, delta))
+    return results_frame(test, delta, second, FUSIONS[method["fusion"]](first, second, delta, None))
 
 
 def results_frame(

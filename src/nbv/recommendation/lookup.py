@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -11,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import nearest_bin, travel_deg
-from nbv.calibration.density import likelihoods
-from nbv.errors import UserError, nearest
 from nbv.files import read_arrays, write_arrays
-from nbv.recommendation.criteria import CRITERIA
+from nbv.recommendation.criteria import tabulate
+from nbv.recommendation.evidence import Evidence
 
 
 @dataclass(frozen=True)
@@ -30,7 +28,7 @@ class LookupTable:
     ambiguity : ndarray (B, B) float32
         A[estimate, delta].
     recommended_delta_deg : ndarray (B,) int64
-        The rotation of least ambiguity for each estimate, degrees in [0, 360).
+        The rotation of least ambiguity for each estimate, degrees in [0, 360), travel considered.
     bandwidth_deg, pseudo_observations : float
         The density's settings.
     reading, spread : str
@@ -52,67 +50,71 @@ class LookupTable:
         return np.asarray(self.recommended_delta_deg[bins])
 
 
-def least_ambiguous_delta(ambiguity: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
+def least_ambiguous_delta(
+    ambiguity: NDArray[np.floating[Any]],
+    *,
+    travel_cost: float = 0.0,
+    max_travel_deg: float = 180.0,
+) -> NDArray[np.int64]:
     """Return the argmin of each row of A[estimate, delta] (Eq. 2), in degrees.
 
-    Of equal minima the one of smallest travel is taken, then the smaller delta.
+    Parameters
+    ----------
+    ambiguity : ndarray (n, B)
+    travel_cost : float, 0 or more
+        Added to A for every degree that the camera travels, in A's own unit.
+    max_travel_deg : float in [0, 180]
+        Rotations that travel farther are left out.
+
+    Returns
+    -------
+    ndarray (n,) int64
+        In [0, 360). Of equal minima the one of smallest travel is taken, then the smaller delta.
     """
     n_bins = ambiguity.shape[1]
     deltas = np.arange(n_bins) * (360.0 / n_bins)
-    order = np.lexsort((deltas, travel_deg(deltas)))
-    best = order[np.argmin(ambiguity[:, order], axis=1)]
+    travel = travel_deg(deltas)
+    order = np.lexsort((deltas, travel))
+    order = order[travel[order] <= max_travel_deg]
+    worth = ambiguity[:, order]
+    if travel_cost:
+        worth = worth + travel_cost * travel[order]
+    best = order[np.argmin(worth, axis=1)]
     recommended: NDArray[np.int64] = np.rint(deltas[best]).astype(np.int64)
     return recommended
 
 
-def build_lookup(
-    estimate_deg: NDArray[np.float64],
-    criterion: str,
-    settings: Mapping[str, Any],
-    *,
-    bandwidth_deg: float,
-    pseudo_observations: float,
-    n_bins: int = 360,
-) -> LookupTable:
-    """Build a lookup table from calibration estimates.
+def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") -> LookupTable:
+    """Tabulate a criterion.
 
     Parameters
     ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        The estimate for every view; view k of n has the azimuth 360 k / n.
+    evidence : Evidence
+        Of B bins.
     criterion : str
         A name in `nbv.recommendation.criteria.CRITERIA`.
-    settings : mapping
-        The criterion's settings.
-    bandwidth_deg, pseudo_observations, n_bins
-        See `nbv.calibration.density.likelihoods`.
+    fusion : str
+        A name in `nbv.recommendation.fusion.FUSIONS`.
 
     Raises
     ------
     UserError
         For an unknown criterion.
     """
-    if criterion not in CRITERIA:
-        raise UserError(f"criterion {criterion!r} is unknown: {nearest(criterion, CRITERIA)}")
-    n_views = estimate_deg.shape[1]
-    azimuth_deg = np.broadcast_to(np.arange(n_views) * (360.0 / n_views), estimate_deg.shape)
-    pair = likelihoods(
-        estimate_deg,
-        azimuth_deg,
-        bandwidth_deg=bandwidth_deg,
-        pseudo_observations=pseudo_observations,
-        n_bins=n_bins,
-    )
-    ambiguity = CRITERIA[criterion](pair, settings)
+    ambiguity = tabulate(criterion, evidence, fusion)
     return LookupTable(
-        viewpoint_likelihood=pair.viewpoint.astype(np.float32),
-        estimate_likelihood=pair.estimate.astype(np.float32),
+        viewpoint_likelihood=evidence.likelihoods.viewpoint.astype(np.float32),
+        estimate_likelihood=evidence.likelihoods.estimate.astype(np.float32),
         ambiguity=ambiguity,
-        recommended_delta_deg=least_ambiguous_delta(ambiguity),
-        bandwidth_deg=bandwidth_deg,
-        pseudo_observations=pseudo_observations,
-        reading=settings["reading"],
-        spread=settings["spread"],
+        recommended_delta_deg=least_ambiguous_delta(
+            ambiguity,
+            travel_cost=evidence.settings.get("travel_cost", 0.0),
+            max_travel_deg=evidence.settings.get("max_travel_deg", 180.0),
+        ),
+        bandwidth_deg=evidence.bandwidth_deg,
+        pseudo_observations=evidence.pseudo_observations,
+        reading=evidence.settings["reading"],
+        spread=evidence.settings["spread"],
     )
 
 

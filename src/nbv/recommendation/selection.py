@@ -1,8 +1,8 @@
 """Choosing the density's smoothing and pseudo-observations by the decisions they lead to.
 
 The density's own likelihood prefers sharp rows where estimates hardly ever occur, and an argmin
-finds just those. So each candidate is judged by the two-view error of its recommendations on
-calibration objects that its table was not built from; test objects are never seen.
+finds just those. So each candidate is judged by the two-view error of its decisions on
+calibration objects that its tables were not built from; test objects are never seen.
 """
 
 from __future__ import annotations
@@ -16,24 +16,139 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.angles import circular_distance_deg
-from nbv.recommendation.fusion import average, second_look
+from nbv.recommendation.evidence import Evidence, gather_evidence
+from nbv.recommendation.fusion import two_view_error_deg
 from nbv.recommendation.lookup import LookupTable, build_lookup
+from nbv.recommendation.rotations import rotate
 
 log = logging.getLogger(__name__)
+
+# Bins of the tables compared. Fewer than of the final ones changes no choice among bandwidths
+# well above 3 degrees, and costs 27 times less.
+COARSE_BINS = 120
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The density settings chosen, and the error in degrees that each candidate made."""
+    """The density settings chosen, and the errors that decided.
+
+    Attributes
+    ----------
+    bandwidth_deg, pseudo_observations : float
+    candidate_error_deg : dict
+        Cross-validated two-view error by (bandwidth, pseudo-observations); empty where there was
+        nothing to choose from.
+    object_error_deg : tuple of float
+        That of the chosen candidate on each calibration object, or empty.
+    """
 
     bandwidth_deg: float
     pseudo_observations: float
     candidate_error_deg: dict[tuple[float, float], float]
+    object_error_deg: tuple[float, ...] = ()
+
+    @property
+    def error_deg(self) -> float:
+        """The cross-validated error of what was chosen, NaN where nothing was compared."""
+        chosen = (self.bandwidth_deg, self.pseudo_observations)
+        return self.candidate_error_deg.get(chosen, float("nan"))
+
+
+def choose_densities(
+    estimate_deg: NDArray[np.float64],
+    methods: Mapping[str, Mapping[str, Any]],
+    settings: Mapping[str, Any],
+    *,
+    n_bins: int = COARSE_BINS,
+) -> dict[str, Choice]:
+    """Cross-validate the decisions of several methods over calibration objects.
+
+    Parameters
+    ----------
+    estimate_deg : ndarray (n_objects, n_views)
+        Calibration estimates.
+    methods : mapping
+        ``rotation`` (see `nbv.recommendation.rotations.rotate`) and ``fusion`` by name.
+    settings : mapping
+        The configuration's ``density``. Candidates are all pairs of its ``bandwidths_deg`` and
+        ``pseudo_observations``; where there is but one, nothing is computed. The objects are
+        divided into ``n_parts`` (every n-th object), fewer where there are fewer objects; one
+        object alone cannot be cross-validated, and the widest candidate is taken.
+    n_bins : int
+        Of the tables compared.
+
+    Returns
+    -------
+    dict of str to Choice
+        For each method the candidate of least mean error; of equals, the largest bandwidth and
+        then the most pseudo-observations.
+    """
+    candidates = sorted(
+        itertools.product(settings["bandwidths_deg"], settings["pseudo_observations"]), reverse=True
+    )
+    n_objects = len(estimate_deg)
+    parts = min(settings["n_parts"], n_objects)
+    if len(candidates) == 1 or parts < 2:
+        return {name: Choice(*candidates[0], candidate_error_deg={}) for name in methods}
+    part_of = np.arange(n_objects) % parts
+    # Of each object, for each candidate.
+    errors = {name: np.empty((len(candidates), n_objects)) for name in methods}
+    for which, (bandwidth, alpha) in enumerate(candidates):
+        for part in range(parts):
+            held_out = estimate_deg[part_of == part]
+            evidence = gather_evidence(
+                estimate_deg[part_of != part],
+                settings,
+                bandwidth_deg=bandwidth,
+                pseudo_observations=alpha,
+                n_bins=n_bins,
+            )
+            for name, method in methods.items():
+                # The same draws for every candidate.
+                rng = np.random.default_rng(part)
+                rotation, fusion = method["rotation"], method["fusion"]
+                delta = rotate(rotation, fusion, held_out, evidence, rng)
+                made = two_view_error_deg(held_out, delta, fusion, evidence)
+                errors[name][which, part_of == part] = made.mean(axis=1)
+    return {name: _best(name, candidates, tried) for name, tried in errors.items()}
+
+
+def _best(
+    name: str, candidates: Sequence[tuple[float, float]], errors: NDArray[np.float64]
+) -> Choice:
+    mean = errors.mean(axis=1)
+    best = int(mean.argmin())
+    log.info(
+        "%s: bandwidth %g deg, %g pseudo-observations (two-view error %.2f deg; worst %.2f)",
+        name,
+        *candidates[best],
+        mean[best],
+        mean.max(),
+    )
+    return Choice(
+        *candidates[best],
+        candidate_error_deg=dict(zip(candidates, mean.tolist(), strict=True)),
+        object_error_deg=tuple(errors[best].tolist()),
+    )
+
+
+def chosen_evidence(
+    estimate_deg: NDArray[np.float64], choice: Choice, settings: Mapping[str, Any]
+) -> Evidence:
+    """Return the evidence of all calibration estimates with the density settings chosen."""
+    return gather_evidence(
+        estimate_deg,
+        settings,
+        bandwidth_deg=choice.bandwidth_deg,
+        pseudo_observations=choice.pseudo_observations,
+    )
 
 
 def chosen_lookup(
-    estimate_deg: NDArray[np.float64], criterion: str, settings: Mapping[str, Any]
+    estimate_deg: NDArray[np.float64],
+    criterion: str,
+    settings: Mapping[str, Any],
+    fusion: str = "average",
 ) -> LookupTable:
     """Build a lookup table with the density settings that decide best.
 
@@ -41,107 +156,11 @@ def chosen_lookup(
     ----------
     estimate_deg : ndarray (n_objects, n_views)
         Calibration estimates.
-    criterion : str
+    criterion, fusion : str
+        See `nbv.recommendation.lookup.build_lookup`.
     settings : mapping
-        The configuration's ``density``: the criterion's own settings, the candidates
-        ``bandwidths_deg`` and ``pseudo_observations``, and ``n_parts``.
+        The configuration's ``density``; see `choose_densities`.
     """
-    choice = choose_density(
-        estimate_deg,
-        criterion,
-        settings,
-        bandwidths_deg=settings["bandwidths_deg"],
-        pseudo_observations=settings["pseudo_observations"],
-        n_parts=settings["n_parts"],
-    )
-    return build_lookup(
-        estimate_deg,
-        criterion,
-        settings,
-        bandwidth_deg=choice.bandwidth_deg,
-        pseudo_observations=choice.pseudo_observations,
-    )
-
-
-def two_view_error_deg(
-    estimate_deg: NDArray[np.float64], delta_deg: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return the error after averaging two views.
-
-    Parameters
-    ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        View k of n has the azimuth 360 k / n.
-    delta_deg : ndarray (n_objects, n_views) int
-        The rotation taken from each view; a multiple of 360 / n.
-
-    Returns
-    -------
-    ndarray (n_objects, n_views), degrees in [0, 180]
-    """
-    n_views = estimate_deg.shape[1]
-    fused = average(estimate_deg, second_look(estimate_deg, delta_deg), delta_deg)
-    return circular_distance_deg(fused, np.arange(n_views) * (360.0 / n_views))
-
-
-def choose_density(
-    estimate_deg: NDArray[np.float64],
-    criterion: str,
-    settings: Mapping[str, Any],
-    *,
-    bandwidths_deg: Sequence[float],
-    pseudo_observations: Sequence[float],
-    n_parts: int = 5,
-    n_bins: int = 120,
-) -> Choice:
-    """Cross-validate the decision over calibration objects.
-
-    Parameters
-    ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        Calibration estimates.
-    criterion, settings
-        As in `nbv.recommendation.lookup.build_lookup`.
-    bandwidths_deg, pseudo_observations : sequences of float
-        The candidates are all pairs. Where there is but one, nothing is computed.
-    n_parts : int
-        Parts that the objects are divided into (every n-th object); fewer where there are fewer
-        objects. One object alone cannot be cross-validated: the widest candidate is taken.
-    n_bins : int
-        Bins of the tables compared: coarser than the final one, which changes no choice among
-        bandwidths well above 360 / n_bins degrees and costs (360 / n_bins)³ less.
-
-    Returns
-    -------
-    Choice
-        Least mean error; of equals, the largest bandwidth and then the most pseudo-observations.
-    """
-    candidates = sorted(itertools.product(bandwidths_deg, pseudo_observations), reverse=True)
-    n_objects = len(estimate_deg)
-    parts = min(n_parts, n_objects)
-    if len(candidates) == 1 or parts < 2:
-        return Choice(*candidates[0], candidate_error_deg={})
-    part_of = np.arange(n_objects) % parts
-    errors = {}
-    for bandwidth, alpha in candidates:
-        total = 0.0
-        for part in range(parts):
-            held_out = estimate_deg[part_of == part]
-            table = build_lookup(
-                estimate_deg[part_of != part],
-                criterion,
-                settings,
-                bandwidth_deg=bandwidth,
-                pseudo_observations=alpha,
-                n_bins=n_bins,
-            )
-            total += two_view_error_deg(held_out, table.recommend(held_out)).sum()
-        errors[bandwidth, alpha] = float(total / estimate_deg.size)
-    best = min(errors, key=errors.__getitem__)
-    log.info(
-        "density: bandwidth %g deg, %g pseudo-observations (two-view error %.2f deg; worst %.2f)",
-        *best,
-        errors[best],
-        max(errors.values()),
-    )
-    return Choice(*best, candidate_error_deg=errors)
+    method = {"rotation": criterion, "fusion": fusion}
+    choice = choose_densities(estimate_deg, {criterion: method}, settings)[criterion]
+    return build_lookup(chosen_evidence(estimate_deg, choice, settings), criterion, fusion)

@@ -17,7 +17,8 @@ from nbv.evaluation.figures.inputs import (
 )
 from nbv.evaluation.figures.style import INK, MUTED, azimuth_axis, method_style, new_figure
 from nbv.evaluation.settings import method_label
-from nbv.recommendation.criteria import SPREADS, two_view_poses
+from nbv.recommendation.criteria.pose_ambiguity import two_view_poses
+from nbv.recommendation.criteria.spreads import SPREADS
 
 Likelihood = NDArray[np.float32]
 

@@ -1,40 +1,14 @@
-"""What a rotation is worth: ambiguity tables A[estimate, delta], lower is better.
-
-Every criterion has the signature ``criterion(likelihoods, settings) -> A``.
-All axis shifts are cyclic: turning the object by k bins rolls the tables by k.
-"""
+"""The paper's ambiguity of the pose seen from two viewpoints."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from nbv.calibration.density import Likelihoods
 from nbv.errors import UserError, nearest
+from nbv.recommendation.criteria.spreads import SPREADS
+from nbv.recommendation.evidence import Evidence, Table
 
-Table = NDArray[np.float32]
-Spread = Callable[[Table], NDArray[np.float32]]
-
-
-def entropy(distributions: Table) -> NDArray[np.float32]:
-    """Return the entropy of each row in nats, 0 log 0 being 0 (Eq. 1)."""
-    tiny = np.finfo(np.float32).tiny
-    logs = np.log(np.maximum(distributions, tiny))
-    return np.asarray(-np.einsum("ij,ij->i", distributions, logs), dtype=np.float32)
-
-
-def circular_variance(distributions: Table) -> NDArray[np.float32]:
-    """Return 1 - |mean direction| of each row, in [0, 1]."""
-    angles = 2 * np.pi * np.arange(distributions.shape[1]) / distributions.shape[1]
-    cosine = distributions @ np.cos(angles).astype(np.float32)
-    sine = distributions @ np.sin(angles).astype(np.float32)
-    return np.asarray(1.0 - np.hypot(cosine, sine), dtype=np.float32)
-
-
-SPREADS: dict[str, Spread] = {"entropy": entropy, "circular_variance": circular_variance}
 READINGS = ("given_estimate", "given_truth")
 
 
@@ -76,7 +50,7 @@ def two_view_poses(viewpoint: Table, pose: Table, delta_bins: int) -> Table:
     return np.asarray((viewpoint / total) @ product)
 
 
-def pose_ambiguity(likelihoods: Likelihoods, settings: Mapping[str, Any]) -> Table:
+def pose_ambiguity(evidence: Evidence, fusion: str) -> Table:
     """Return the paper's ambiguity of the pose seen from two viewpoints (Eqs. 1 to 6).
 
     ::
@@ -87,30 +61,24 @@ def pose_ambiguity(likelihoods: Likelihoods, settings: Mapping[str, Any]) -> Tab
 
     Parameters
     ----------
-    likelihoods : Likelihoods
-        B bins.
-    settings : mapping
-        ``reading`` (see `pose_likelihood`) and ``spread``, the name of G: ``entropy`` (nats) or
-        ``circular_variance``.
+    evidence : Evidence
+        B bins. Its settings' ``reading`` is described in `pose_likelihood`; ``spread`` is the name
+        of G: ``entropy`` (nats) or ``circular_variance``.
+    fusion : str
+        Not used.
 
     Returns
     -------
     ndarray (B, B) float32
         A[estimate, delta].
     """
-    spread = SPREADS.get(settings["spread"])
+    name = evidence.settings["spread"]
+    spread = SPREADS.get(name)
     if spread is None:
-        raise UserError(
-            f"density.spread={settings['spread']}: {nearest(settings['spread'], SPREADS)}"
-        )
-    n_bins = likelihoods.n_bins
-    viewpoint = likelihoods.viewpoint.astype(np.float32)
-    first = pose_likelihood(likelihoods, settings["reading"])
+        raise UserError(f"density.spread={name}: {nearest(name, SPREADS)}")
+    n_bins = evidence.n_bins
+    first = pose_likelihood(evidence.likelihoods, evidence.settings["reading"])
     ambiguity = np.empty((n_bins, n_bins), dtype=np.float32)
     for delta in range(n_bins):
-        ambiguity[:, delta] = spread(two_view_poses(viewpoint, first, delta))
+        ambiguity[:, delta] = spread(two_view_poses(evidence.viewpoint, first, delta))
     return ambiguity
-
-
-Criterion = Callable[[Likelihoods, Mapping[str, Any]], Table]
-CRITERIA: dict[str, Criterion] = {"entropy": pose_ambiguity}

@@ -1,0 +1,24 @@
+"""One rotation for every estimate: the best on calibration objects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nbv.recommendation.evidence import Evidence, Table
+from nbv.recommendation.fusion import calibration_errors_deg
+
+
+def fixed(evidence: Evidence, fusion: str) -> Table:
+    """Return the mean error of each rotation over all calibration views, the same in every row.
+
+    What `nbv.recommendation.criteria.expected_error.expected_error` tends to with ever more
+    pseudo-observations; parameters as there.
+
+    Returns
+    -------
+    ndarray (B, B) float32
+        A[estimate, delta], degrees.
+    """
+    errors = calibration_errors_deg(evidence, fusion)
+    mean = errors.reshape(evidence.n_bins, -1).mean(axis=1)
+    return np.tile(mean, (evidence.n_bins, 1)).astype(np.float32)
