@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from nbv.amounts import enough_objects
 from nbv.errors import UserError, nearest
 
 
@@ -77,6 +78,23 @@ class DensityConfig:
 
 
 @dataclass
+class RecommendationConfig:
+    """What travelling costs; see `nbv.recommendation.lookup.least_ambiguous_delta`."""
+
+    travel_cost: float
+    max_travel_deg: float
+
+
+@dataclass
+class SequenceConfig:
+    """More than two views; see `nbv.evaluation.sequences`."""
+
+    n_views: int
+    start_every_deg: int
+    min_separation_deg: float
+
+
+@dataclass
 class MethodConfig:
     """A way to choose the second view and to fuse the two; see `nbv.evaluation.methods`."""
 
@@ -98,6 +116,8 @@ class Config:
     n_folds: int
     calibration_fraction: float
     methods: dict[str, MethodConfig]
+    contenders: dict[str, MethodConfig]
+    leaderboard_runs: list[str]
     n_resamples: int
     dataset: DatasetConfig
     renderer: RendererConfig
@@ -105,6 +125,8 @@ class Config:
     sensor: SensorConfig
     estimator: EstimatorConfig
     density: DensityConfig
+    recommendation: RecommendationConfig
+    sequence: SequenceConfig
 
 
 # Names that belong to code rather than to a file of a configuration group.
@@ -121,12 +143,6 @@ CHOICES = {
 def _require(holds: bool, message: str) -> None:
     if not holds:
         raise UserError(message)
-
-
-def enough_objects(n_objects: int, n_folds: int) -> bool:
-    """Say whether each fold can test one object and has two more, to train and to calibrate."""
-    largest = -(-n_objects // n_folds)
-    return n_objects >= n_folds and n_objects - largest >= 2
 
 
 def value_of(config: Mapping[str, Any], key: str) -> Any:
@@ -171,6 +187,18 @@ def validate(config: Mapping[str, Any]) -> None:
         )
         > 0
         and min(config["density"]["pseudo_observations"]) >= 0,
+        "recommendation.travel_cost (0 or more, in the criterion's unit per degree)": config[
+            "recommendation"
+        ]["travel_cost"]
+        >= 0,
+        "recommendation.max_travel_deg (0 to 180)": 0
+        <= config["recommendation"]["max_travel_deg"]
+        <= 180,
+        "sequence.n_views (2 to 8)": 2 <= config["sequence"]["n_views"] <= 8,
+        "sequence.start_every_deg (1 to 180)": 1 <= config["sequence"]["start_every_deg"] <= 180,
+        "sequence.min_separation_deg (0 to 45)": 0
+        <= config["sequence"]["min_separation_deg"]
+        <= 45,
         "density.n_parts (2 or more)": config["density"]["n_parts"] >= 2,
     }
     for name, holds in positive.items():

@@ -6,10 +6,10 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import N_FOLDS
 from hypothesis import given
 from hypothesis import strategies as st
 
+from conftest import N_FOLDS
 from nbv.errors import UserError
 from nbv.evaluation.claims import evaluate_claims
 from nbv.evaluation.compare import (

@@ -9,8 +9,8 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
+from nbv.evaluation.grid import escape_latex
 from nbv.evaluation.layout import (
-    escape_latex,
     number,
     save_table,
     to_latex,

@@ -65,11 +65,10 @@ class Project:
         assert (done.returncode != 0) == fails, done.stdout + done.stderr
         return done
 
-    def would_run(self, *more: str) -> dict[str, int]:
+    def would_run(self, *more: str, targets: tuple[str, ...] = ()) -> dict[str, int]:
         """Return how many jobs of which rule a run with more overrides would start."""
-        done = self.run(
-            "--cores", "2", "--dry-run", "--workflow-profile", "none", overrides=(*TINY, *more)
-        )
+        asked = ("--cores", "2", "--dry-run", "--workflow-profile", "none", *targets)
+        done = self.run(*asked, overrides=(*TINY, *more))
         stats = re.search(r"^job +count\n[- ]+\n(.*?)\n\n", done.stdout, re.M | re.S)
         if stats is None:
             assert "Nothing to be done" in done.stdout + done.stderr

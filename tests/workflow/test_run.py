@@ -10,6 +10,11 @@ import time
 import numpy as np
 import pandas as pd
 import pytest
+from snakemake.utils import Paramspace
+
+from nbv.evaluation.ablation import ablation_space
+
+from .conftest import TINY
 
 pytestmark = pytest.mark.slow
 
@@ -127,7 +132,7 @@ def test_an_edit_of_a_metric_reruns_what_reads_errors(scratch):
 
 
 def test_an_edit_of_a_criterion_leaves_training_alone(scratch):
-    criteria = scratch.folder / "src/nbv/recommendation/criteria.py"
+    criteria = scratch.folder / "src/nbv/recommendation/criteria/pose_ambiguity.py"
     criteria.write_text(criteria.read_text() + "\n\nEDITED = True\n")
     jobs = scratch.would_run()
     assert jobs["lookup"] == 4
@@ -205,3 +210,52 @@ def test_a_finished_job_and_not_a_clock_makes_the_schedule_be_looked_at_again(sc
     )
     assert "nbv: finished" in done.stderr
     assert "looked again 0" in done.stdout
+
+
+def test_what_goes_beyond_the_paper_is_made_and_leaves_the_paper_alone(scratch):
+    targets = ("beyond",)
+    assert not {"meshes", "render", "train", "estimate"} & set(scratch.would_run(targets=targets))
+    before = scratch.outcome()
+    tall = tuple(each for each in TINY if not each.startswith("elevations_deg"))
+    scratch.run("--cores", "2", *targets, overrides=(*tall, "elevations_deg.mug=[0,30]"))
+    after = scratch.outcome()
+    assert {name: after[name] for name in before} == before
+    tables = scratch.results / "tables"
+    for name in ("leaderboard", "beyond", "sequences", "sphere"):
+        for kind in ("csv", "md", "tex"):
+            assert (tables / f"{name}.{kind}").stat().st_size > 100
+    for name in ("sequences", "travel"):
+        assert (scratch.results / f"figures/{name}.png").stat().st_size > 1000
+    board = pd.read_csv(tables / "leaderboard.csv")
+    assert {"single", "proposed", "chosen", "oracle_posterior"} <= set(board["method"])
+    for category in ("chair", "mug"):
+        mine = board[(board["category"] == category) & (board["method"] == "proposed")]
+        errors = pd.concat(
+            pd.read_csv(path)
+            for path in scratch.results.glob(f"evaluation/{category}/el00/*/proposed.csv")
+        )
+        assert abs(mine["value"].iloc[0] - errors["error_deg"].mean()) < 1e-3
+
+
+def test_a_new_contender_trains_nothing(finished):
+    jobs = finished.would_run(
+        "contenders.mine={rotation: fixed,fusion: average}", targets=("leaderboard",)
+    )
+    assert jobs == {"contend": 4, "leaderboard": 1}
+
+
+def test_the_ablation_trains_nothing_and_each_of_its_settings_is_a_file(scratch):
+    jobs = scratch.would_run(targets=("ablation",))
+    assert jobs == {"ablate": len(ablation_space()), "ablation": 1}
+    patterns = Paramspace(ablation_space(), filename_params="*", filename_sep=",").instance_patterns
+    target = f"results/tiny/ablation/{next(iter(patterns))}.csv"
+    scratch.run("--cores", "1", target)
+    found = pd.read_csv(scratch.folder / target)
+    plain = pd.concat(
+        pd.read_csv(path).assign(fold=fold)
+        for fold in (1, 2)
+        for path in scratch.results.glob(f"evaluation/mug/el00/fold{fold}/proposed.csv")
+    )
+    expected = plain.groupby(["fold", "object_id"])["error_deg"].mean().to_numpy()
+    mine = found.sort_values(["fold", "object_id"])["error_deg"]
+    assert abs(mine.to_numpy() - expected).max() < 1e-3

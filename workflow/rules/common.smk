@@ -14,9 +14,12 @@ except ModuleNotFoundError:
 from nbv import provenance
 from nbv.config import load_config, snakemake_overrides
 from nbv.errors import UserError
-from nbv.evaluation.methods import check_method, needs_lookup
+from nbv.evaluation.contest import check_contenders
+from nbv.evaluation.methods import check_method
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
+from nbv.recommendation.criteria import CRITERIA
+from nbv.recommendation.rotations import needs_lookup
 from nbv.rendering import RENDERERS
 
 BASE = Path(workflow.basedir)
@@ -56,6 +59,7 @@ try:
     CATEGORIES = CONFIG["categories"]
     for name, method in CONFIG["methods"].items():
         check_method(name, method)
+    check_contenders(CONFIG["contenders"], CONFIG["methods"])
     LOOKUP_METHODS = [
         name
         for name, method in CONFIG["methods"].items()
@@ -65,6 +69,8 @@ try:
 except UserError as error:
     stop(error)
 
+# What decides on a rotation: the density, and what travelling costs.
+DECISION = CONFIG["density"] | CONFIG["recommendation"]
 LOOKUP_ROTATIONS = sorted(
     {CONFIG["methods"][name]["rotation"] for name in LOOKUP_METHODS}
 )
@@ -87,6 +93,7 @@ wildcard_constraints:
     elevation=r"\d\d",
     fold="|".join(map(str, FOLDS)),
     method="|".join(map(re.escape, LOOKUP_METHODS)) or "none",
+    criterion="|".join(LOOKUP_ROTATIONS) or "none",
 
 
 def script_path(name):

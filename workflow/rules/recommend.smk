@@ -19,7 +19,7 @@ rule lookup:
         mem_mb=500,
         runtime=10,
     params:
-        density=CONFIG["density"],
+        density=DECISION,
     script:
         script_path("lookup")
 

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nbv.amounts import enough_objects
 from nbv.errors import UserError
 from nbv.files import read_csv
-from nbv.schema import enough_objects
 
 Role = Literal["train", "calibration", "test"]
 ROLES: tuple[Role, ...] = ("train", "calibration", "test")

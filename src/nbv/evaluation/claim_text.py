@@ -17,7 +17,7 @@ from nbv.evaluation.comparisons import (
     Term,
     combine_statement,
 )
-from nbv.evaluation.layout import number
+from nbv.evaluation.grid import number
 from nbv.evaluation.markdown import pipe_row
 from nbv.evaluation.paired import LOWER_IS_BETTER, UNIT_OF
 from nbv.evaluation.settings import category_label, method_label

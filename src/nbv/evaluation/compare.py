@@ -32,7 +32,7 @@ from scipy import stats
 
 from nbv.evaluation.cells import CELL_COLUMNS
 from nbv.evaluation.comparisons import FAILS, HOLDS
-from nbv.evaluation.layout import number
+from nbv.evaluation.grid import number
 from nbv.evaluation.published import SIGMA_ROW
 from nbv.evaluation.reference import (
     CELL_KEY,

@@ -8,7 +8,6 @@ without another table.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,25 +15,11 @@ import pandas as pd
 
 from nbv.evaluation import published
 from nbv.evaluation.cells import Table, shows_difference
-from nbv.evaluation.markdown import pipe_row
+from nbv.evaluation.grid import MINUS, Cell, Grid, grid_latex, grid_markdown, interval_text, number
 from nbv.evaluation.settings import method_label
 from nbv.files import write_csv, write_text
 
 _METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}
-_MINUS = "\u2212"
-
-
-@dataclass(frozen=True)
-class _Cell:
-    text: str
-    best: bool = False
-    printed: str = ""
-
-
-@dataclass(frozen=True)
-class _Grid:
-    header: tuple[str, ...]
-    rows: tuple[tuple[_Cell, ...], ...]
 
 
 def save_table(table: Table, stem: str | Path) -> list[Path]:
@@ -49,86 +34,17 @@ def save_table(table: Table, stem: str | Path) -> list[Path]:
 
 def to_markdown(table: Table) -> str:
     """Return the table as a heading, a pipe table and its notes as a list."""
-    grid = _grid(table)
-    lines = [f"## {heading(table)}", "", pipe_row(grid.header)]
-    lines.append(pipe_row(["---"] + ["---:"] * (len(grid.header) - 1)))
-    for row in grid.rows:
-        texts = [f"**{cell.text}**" if cell.best else cell.text for cell in row]
-        printed = [cell.printed for cell in row]
-        lines.append(pipe_row([f"{t} {p}".rstrip() for t, p in zip(texts, printed, strict=True)]))
-    lines += ["", *(f"- {note}" for note in _notes(table))]
-    return "\n".join(lines) + "\n"
+    return grid_markdown(heading(table), _grid(table), _notes(table))
 
 
 def to_latex(table: Table) -> str:
-    r"""Return the table as a ``table`` environment, shrunk to the line where it is wider.
-
-    Needs ``\usepackage{booktabs,graphicx}``.
-    """
-    grid = _grid(table)
-    lines = [
-        "% needs \\usepackage{booktabs,graphicx}",
-        "\\begin{table}",
-        "\\centering",
-        f"\\caption{{{escape_latex(table.title)}}}",
-        f"\\label{{tab:{table.name}}}",
-        "\\small",
-        "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{%",
-        f"\\begin{{tabular}}{{l{'r' * (len(grid.header) - 1)}}}",
-        "\\toprule",
-        _latex_row([escape_latex(text) for text in grid.header]),
-        "\\midrule",
-    ]
-    for row in grid.rows:
-        texts = []
-        for cell in row:
-            text = escape_latex(cell.text)
-            text = f"\\textbf{{{text}}}" if cell.best else text
-            texts.append(f"{text} {escape_latex(cell.printed)}".rstrip())
-        lines.append(_latex_row(texts))
-    lines += ["\\bottomrule", "\\end{tabular}}", "", "\\footnotesize\\raggedright"]
-    lines += [f"{escape_latex(note)}\\par" for note in _notes(table)]
-    return "\n".join([*lines, "\\end{table}"]) + "\n"
+    """Return the table as LaTeX; see `nbv.evaluation.grid.grid_latex`."""
+    return grid_latex(table.name, table.title, _grid(table), _notes(table))
 
 
 def heading(table: Table) -> str:
     """Return the table's number and title."""
     return f"Table {table.name.removeprefix('table')}: {table.title}"
-
-
-_LATEX_CHARACTERS = {
-    "\\": "\\textbackslash{}",
-    "&": "\\&",
-    "%": "\\%",
-    "$": "\\$",
-    "#": "\\#",
-    "_": "\\_",
-    "{": "\\{",
-    "}": "\\}",
-    "~": "\\textasciitilde{}",
-    "^": "\\textasciicircum{}",
-    "°": "$^\\circ$",
-    "σ": "$\\sigma$",
-    "δ": "$\\delta$",
-    "τ": "$\\tau$",
-    "φ": "$\\varphi$",
-    _MINUS: "$-$",
-    "–": "--",
-    "…": "\\dots{}",
-}
-
-
-def escape_latex(text: str) -> str:
-    """Return the text with LaTeX's special characters, degree signs and Greek made safe."""
-    return "".join(_LATEX_CHARACTERS.get(character, character) for character in text)
-
-
-def number(value: float, decimals: int = 2) -> str:
-    """Return a number with a true minus sign; an en dash where there is none."""
-    if not np.isfinite(value):
-        return "–"
-    text = f"{value:.{decimals}f}"
-    return text.replace("-", _MINUS) if float(text) != 0 else text.lstrip("-")
 
 
 def _notes(table: Table) -> list[str]:
@@ -149,7 +65,7 @@ def _notes(table: Table) -> list[str]:
     return [*shown, *table.notes]
 
 
-def _grid(table: Table) -> _Grid:
+def _grid(table: Table) -> Grid:
     if table.name == "table6":
         return _example_grid(table)
     if table.name == "table7":
@@ -157,25 +73,25 @@ def _grid(table: Table) -> _Grid:
     return _comparison_grid(table)
 
 
-def _comparison_grid(table: Table) -> _Grid:
+def _comparison_grid(table: Table) -> Grid:
     """Rows by methods, then the difference of the subject to the reference (Tables 1 to 5)."""
     cells, settings = table.cells, table.settings
     methods = list(dict.fromkeys(cells["method"]))
     degrees = "°" if cells["metric"].iloc[0] == "mae" else ""
-    gap = f"{method_label(settings.subject)} {_MINUS} {method_label(settings.reference)}"
+    gap = f"{method_label(settings.subject)} {MINUS} {method_label(settings.reference)}"
     shows_gap = shows_difference(cells, settings)
     rows = []
     for label, part in cells.groupby("row_label", sort=False):
-        row = [_Cell(str(label))]
+        row = [Cell(str(label))]
         row += _method_cells(part, methods, degrees)
         if shows_gap:
-            row.append(_Cell(_gap_text(part[part["method"] == settings.subject].iloc[0])))
+            row.append(Cell(_gap_text(part[part["method"] == settings.subject].iloc[0])))
         rows.append(tuple(row))
     header = [table.row_header, *map(method_label, methods)] + ([gap] if shows_gap else [])
-    return _Grid(tuple(header), tuple(rows))
+    return Grid(tuple(header), tuple(rows))
 
 
-def _fold_grid(table: Table) -> _Grid:
+def _fold_grid(table: Table) -> Grid:
     """Folds by (method, metric), as the paper's Table 7."""
     cells = table.cells
     methods = list(dict.fromkeys(cells["method"]))
@@ -185,17 +101,17 @@ def _fold_grid(table: Table) -> _Grid:
             metric: _method_cells(part[part["metric"] == metric], methods, degrees)
             for metric, degrees in (("mae", "°"), ("pauc", ""))
         }
-        row = [_Cell(str(label))]
+        row = [Cell(str(label))]
         for position in range(len(methods)):
             row += [by_metric["mae"][position], by_metric["pauc"][position]]
         rows.append(tuple(row))
     header = [table.row_header]
     for method in methods:
         header += [f"{method_label(method)} {label}" for label in _METRIC_LABELS.values()]
-    return _Grid(tuple(header), tuple(rows))
+    return Grid(tuple(header), tuple(rows))
 
 
-def _example_grid(table: Table) -> _Grid:
+def _example_grid(table: Table) -> Grid:
     """Ours and the published example in paired rows: they are different objects (Table 6)."""
     cells = table.cells
     methods = list(dict.fromkeys(cells["method"]))
@@ -207,20 +123,20 @@ def _example_grid(table: Table) -> _Grid:
             if errors[column].isna().all():
                 continue
             lowest = errors[column].round(1).min()
-            row = [_Cell(f"{label}{suffix}")]
+            row = [Cell(f"{label}{suffix}")]
             for method in methods:
                 estimate, error = estimates[column].get(method), errors[column].get(method)
                 if estimate is None or error is None or not np.isfinite(error):
-                    row.append(_Cell("–"))
+                    row.append(Cell("–"))
                     continue
                 turned = number(round(estimate, 1) % 360, 1)  # 359.96 reads 0.0, not 360.0
                 text = f"{turned}° ({number(error, 1)}°)"
-                row.append(_Cell(text, bool(round(error, 1) == lowest)))
+                row.append(Cell(text, bool(round(error, 1) == lowest)))
             rows.append(tuple(row))
-    return _Grid((table.row_header, *map(method_label, methods)), tuple(rows))
+    return Grid((table.row_header, *map(method_label, methods)), tuple(rows))
 
 
-def _method_cells(part: pd.DataFrame, methods: Sequence[str], degrees: str) -> list[_Cell]:
+def _method_cells(part: pd.DataFrame, methods: Sequence[str], degrees: str) -> list[Cell]:
     """Return ``ours [published]`` per method; the best, as printed, is marked."""
     values = part.set_index("method")["value"].round(2)
     is_sigma = (part["row"] == published.SIGMA_ROW).all()
@@ -230,21 +146,14 @@ def _method_cells(part: pd.DataFrame, methods: Sequence[str], degrees: str) -> l
     for method in methods:
         row = part[part["method"] == method]
         if row.empty or not np.isfinite(values[method]):
-            cells.append(_Cell("–"))
+            cells.append(Cell("–"))
             continue
         text = f"{number(values[method])}{degrees}"
         printed = float(row["published"].iloc[0])
         beside = f"[{number(printed)}{degrees}]" if np.isfinite(printed) else ""
-        cells.append(_Cell(text, bool(values[method] == best), beside))
+        cells.append(Cell(text, bool(values[method] == best), beside))
     return cells
 
 
 def _gap_text(cell: pd.Series) -> str:
-    return (
-        f"{number(cell['difference'])} "
-        f"({number(cell['difference_low'])} to {number(cell['difference_high'])})"
-    )
-
-
-def _latex_row(texts: Sequence[str]) -> str:
-    return " & ".join(texts) + " \\\\"
+    return interval_text(cell["difference"], cell["difference_low"], cell["difference_high"])

@@ -13,7 +13,7 @@ from nbv.evaluation import page
 from nbv.evaluation.claim_text import VERDICT_RULES, by_run
 from nbv.evaluation.comparisons import VERDICTS
 from nbv.evaluation.figures import FIGURES
-from nbv.evaluation.layout import number
+from nbv.evaluation.grid import number
 from nbv.evaluation.markdown import markdown_to_html
 from nbv.evaluation.page import escape
 from nbv.evaluation.paired import UNIT_OF

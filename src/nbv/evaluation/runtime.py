@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.evaluation.layout import number
+from nbv.evaluation.grid import number
 from nbv.evaluation.markdown import pipe_row
 from nbv.evaluation.results import Unit
 

@@ -1,0 +1,9 @@
+"""How many objects an experiment needs. Apart from the schema, whose every edit is none of it."""
+
+from __future__ import annotations
+
+
+def enough_objects(n_objects: int, n_folds: int) -> bool:
+    """Say whether each fold can test one object and has two more, to train and to calibrate."""
+    largest = -(-n_objects // n_folds)
+    return n_objects >= n_folds and n_objects - largest >= 2

@@ -1,0 +1,17 @@
+"""Evaluate one setting of the ablation on every fold of a category."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    import pandas as pd
+
+    from nbv.calibration.pairs import read_estimates
+    from nbv.evaluation.ablation import ablate
+    from nbv.files import write_csv
+
+    params, found = snakemake.params, []
+    pairs = zip(snakemake.input.calibration, snakemake.input.test, params.folds, strict=True)
+    for calibration, test, fold in pairs:
+        estimates = read_estimates(calibration), read_estimates(test)
+        found.append(ablate(*estimates, params.instance, params.density).assign(fold=fold))
+    write_csv(snakemake.output[0], pd.concat(found))

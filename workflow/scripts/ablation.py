@@ -1,0 +1,19 @@
+"""Set the ablation's settings side by side."""
+
+from pathlib import Path
+
+from nbv.jobs import job
+
+with job(snakemake):
+    import numpy as np
+
+    from nbv.evaluation.ablation import ablation_sheet, ablation_space
+    from nbv.evaluation.paired import Resampler
+    from nbv.evaluation.sheets import save_sheet
+    from nbv.files import read_csv
+
+    params = snakemake.params
+    found = {row: read_csv(path) for row, path in enumerate(snakemake.input.found)}
+    resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
+    sheet = ablation_sheet(ablation_space(), found, params.category, resampler)
+    save_sheet(sheet, Path(snakemake.output[0]).with_suffix(""))

@@ -1,0 +1,22 @@
+"""Look again and again at the test objects of one fold, by every rule."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.calibration.folds import assert_role, read_splits
+    from nbv.calibration.pairs import read_estimates
+    from nbv.evaluation.contest import read_choices, stored_evidence
+    from nbv.evaluation.sequences import sequence_rows
+    from nbv.files import write_csv
+    from nbv.seeds import rng_for
+
+    params, wildcards = snakemake.params, snakemake.wildcards
+    splits = read_splits(snakemake.input.splits)
+    calibration, test = (read_estimates(snakemake.input[r]) for r in ("calibration", "test"))
+    assert_role(splits, int(wildcards.fold), "calibration", calibration.object_ids)
+    assert_role(splits, int(wildcards.fold), "test", test.object_ids)
+    choices = read_choices(snakemake.input.choices)
+    evidences = stored_evidence(calibration, choices, params.density)
+    rng = rng_for(params.seed, "sequence", *wildcards)
+    rows = sequence_rows(test, evidences, params.sequence, rng)
+    write_csv(snakemake.output[0], rows)

@@ -1,0 +1,22 @@
+"""Choose rotation and elevation of the second view jointly, for one category and fold."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.calibration.folds import assert_role, read_splits
+    from nbv.calibration.pairs import read_estimates
+    from nbv.evaluation.contest import read_choices, stored_evidence
+    from nbv.evaluation.sphere import sphere_rows
+    from nbv.files import write_csv
+
+    params, fold = snakemake.params, int(snakemake.wildcards.fold)
+    splits = read_splits(snakemake.input.splits)
+    tests, evidences = {}, {}
+    for position, elevation in enumerate(params.elevations):
+        calibration = read_estimates(snakemake.input.calibration[position])
+        tests[elevation] = read_estimates(snakemake.input.test[position])
+        assert_role(splits, fold, "calibration", calibration.object_ids)
+        assert_role(splits, fold, "test", tests[elevation].object_ids)
+        choices = read_choices(snakemake.input.choices[position])
+        evidences[elevation] = stored_evidence(calibration, choices, params.density)
+    write_csv(snakemake.output[0], sphere_rows(tests, evidences, params.sequence))
