@@ -73,6 +73,8 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
         ("density.bandwidths_deg=[]", "density.bandwidths_deg=[] is out of range"),
         ("name='a b'", "name=a b: use letters"),
         ("estimator", "is not of the form key=value"),
+        ("sensor=kinct", "sensor=kinct is unknown: did you mean 'kinect'?"),
+        ("sensor.diagonal_m.mug=0", "sensor.diagonal_m.mug=0.0 is out of range: above 0"),
     ],
 )
 def test_a_mistake_is_one_line_with_its_key(override, message):

@@ -45,9 +45,11 @@ class CameraConfig:
 
 @dataclass
 class SensorConfig:
-    """How the depth camera measures; see `nbv.rendering.sensor`."""
+    """How the depth camera measures; see `nbv.rendering.sensors`."""
 
     name: str
+    parameters: dict[str, float] = field(default_factory=dict)
+    diagonal_m: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -203,6 +205,10 @@ def validate(config: Mapping[str, Any]) -> None:
         re.fullmatch(r"[A-Za-z0-9._-]+", config["name"]) is not None,
         f"name={config['name']}: use letters, digits, '.', '_' and '-'",
     )
+    for category, diagonal_m in config["sensor"]["diagonal_m"].items():
+        _require(
+            diagonal_m > 0, f"sensor.diagonal_m.{category}={diagonal_m} is out of range: above 0"
+        )
     for category in config["dataset"]["turn_deg"]:
         _require(
             category in known,

@@ -18,6 +18,7 @@ from nbv.evaluation.methods import check_method, needs_lookup
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
 from nbv.rendering import RENDERERS
+from nbv.rendering.sensors import SENSORS, check_sensor, sensor_settings
 
 BASE = Path(workflow.basedir)
 SOURCE_ROOT = Path(nbv.__file__).parents[1]
@@ -56,6 +57,7 @@ try:
     CATEGORIES = CONFIG["categories"]
     for name, method in CONFIG["methods"].items():
         check_method(name, method)
+    check_sensor(CONFIG["sensor"], CATEGORIES)
     LOOKUP_METHODS = [
         name
         for name, method in CONFIG["methods"].items()
@@ -103,9 +105,13 @@ def script_path(name):
 def sources(name):
     """The package's modules that a script depends on: an edit reruns what uses them."""
     script = BASE / "workflow/scripts" / f"{name}.py"
+    sensor = CONFIG["sensor"]["name"]
     chosen = {
         "meshes": [SOURCES[CONFIG["dataset"]["source"]]],
-        "render": [RENDERERS[CONFIG["renderer"]["name"]]],
+        "render": [
+            RENDERERS[CONFIG["renderer"]["name"]],
+            *([SENSORS[sensor]] if sensor in SENSORS else []),
+        ],
     }
     files = provenance.source_files(script, SOURCE_ROOT, chosen.get(name, []))
     here = Path.cwd()
