@@ -3,6 +3,7 @@
 #   snakemake --cores 2                                                  the paper
 #   snakemake --cores 2 --config experiment=quick                        the same graph, small
 #   snakemake --cores 2 tables                                           one stage
+#   snakemake --cores 2 transfer                                         trained on × tested on
 #   snakemake --cores 2 results/paper/evaluation/mug/el00/fold3/proposed.csv   one file
 
 from snakemake.utils import min_version
@@ -22,6 +23,7 @@ localrules:
     evaluation,
     tables,
     figures,
+    transfer,
 
 
 rule all:
@@ -35,6 +37,8 @@ include: "workflow/rules/estimate.smk"
 include: "workflow/rules/recommend.smk"
 include: "workflow/rules/reading.smk"
 include: "workflow/rules/read.smk"
+include: "workflow/rules/conditions.smk"
+include: "workflow/rules/transfer.smk"
 
 
 onstart:

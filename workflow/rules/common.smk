@@ -12,7 +12,7 @@ except ModuleNotFoundError:
     )
 
 from nbv import provenance
-from nbv.config import load_config, snakemake_overrides
+from nbv.config import load_condition, load_config, snakemake_overrides
 from nbv.errors import UserError
 from nbv.evaluation.methods import check_method, needs_lookup
 from nbv.meshes.sources import SOURCES, open_source, select_objects
@@ -52,7 +52,8 @@ def dataset_of(category):
 
 
 try:
-    CONFIG = load_config(BASE / "config", snakemake_overrides(config))
+    OVERRIDES = snakemake_overrides(config)
+    CONFIG = load_config(BASE / "config", OVERRIDES)
     RESULTS = f"results/{CONFIG['name']}"
     CATEGORIES = CONFIG["categories"]
     for name, method in CONFIG["methods"].items():
@@ -102,14 +103,14 @@ def script_path(name):
     return f"../scripts/{name}.py"
 
 
-def sources(name):
+def sources(name, settings=CONFIG):
     """The package's modules that a script depends on: an edit reruns what uses them."""
     script = BASE / "workflow/scripts" / f"{name}.py"
-    sensor = CONFIG["sensor"]["name"]
+    sensor = settings["sensor"]["name"]
     chosen = {
-        "meshes": [SOURCES[CONFIG["dataset"]["source"]]],
+        "meshes": [SOURCES[settings["dataset"]["source"]]],
         "render": [
-            RENDERERS[CONFIG["renderer"]["name"]],
+            RENDERERS[settings["renderer"]["name"]],
             *([SENSORS[sensor]] if sensor in SENSORS else []),
         ],
     }

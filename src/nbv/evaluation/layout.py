@@ -18,6 +18,7 @@ from nbv.evaluation import published
 from nbv.evaluation.cells import Table, shows_difference
 from nbv.evaluation.markdown import pipe_row
 from nbv.evaluation.settings import method_label
+from nbv.evaluation.transfer import TRANSFER
 from nbv.files import write_csv, write_text
 
 _METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}
@@ -92,7 +93,9 @@ def to_latex(table: Table) -> str:
 
 
 def heading(table: Table) -> str:
-    """Return the table's number and title."""
+    """Return the table's number, where it has one, and title."""
+    if table.name == TRANSFER:
+        return table.title
     return f"Table {table.name.removeprefix('table')}: {table.title}"
 
 
@@ -142,7 +145,9 @@ def _notes(table: Table) -> list[str]:
     else:
         counts = "Test objects: " + ", ".join(f"{row} {int(n)}" for row, n in objects.items())
     shown = [] if table.name == "table6" else [f"{counts}."]
-    if cells["published"].notna().any() and table.name != "table6":
+    if table.name == TRANSFER:
+        shown.insert(0, "The best of each column in bold, for each method.")
+    elif cells["published"].notna().any() and table.name != "table6":
         shown.insert(0, "Ours [published]; our best of each row in bold.")
     elif table.name != "table6":
         shown.insert(0, "The best of each row in bold; the paper prints no such figures.")
@@ -150,6 +155,8 @@ def _notes(table: Table) -> list[str]:
 
 
 def _grid(table: Table) -> _Grid:
+    if table.name == TRANSFER:
+        return _transfer_grid(table)
     if table.name == "table6":
         return _example_grid(table)
     if table.name == "table7":
@@ -193,6 +200,23 @@ def _fold_grid(table: Table) -> _Grid:
     for method in methods:
         header += [f"{method_label(method)} {label}" for label in _METRIC_LABELS.values()]
     return _Grid(tuple(header), tuple(rows))
+
+
+def _transfer_grid(table: Table) -> _Grid:
+    """Methods and conditions trained on by conditions tested on; the best of each column."""
+    cells = table.cells
+    tested = list(dict.fromkeys(cells["tested_on"]))
+    lowest = cells.groupby(["method", "tested_on"])["value"].min().round(2).to_dict()
+    rows = []
+    for (method, trained), part in cells.groupby(["method", "trained_on"], sort=False):
+        row = [_Cell(method_label(str(method))), _Cell(str(trained))]
+        for cell in part.to_dict("records"):
+            value = round(cell["value"], 2)
+            interval = f"({number(cell['ci_low'])} to {number(cell['ci_high'])})"
+            is_best = value == lowest[method, cell["tested_on"]]
+            row.append(_Cell(f"{number(value)}°", bool(is_best), interval))
+        rows.append(tuple(row))
+    return _Grid(("Method", table.row_header, *tested), tuple(rows))
 
 
 def _example_grid(table: Table) -> _Grid:

@@ -14,6 +14,7 @@ from omegaconf import OmegaConf
 from nbv.errors import UserError
 from nbv.evaluation.cells import CELL_COLUMNS
 from nbv.evaluation.results import existing
+from nbv.evaluation.transfer import TRANSFER
 from nbv.files import read_csv, replacing
 from nbv.rendering.sensors import IDEAL
 
@@ -210,7 +211,7 @@ def differing_settings(
 
 def _telling(configuration: Mapping[str, Any]) -> dict[str, Any]:
     """Leave out what no table that every run has depends on."""
-    kept = dict(configuration)
+    kept = {key: value for key, value in configuration.items() if key != TRANSFER}
     if kept.get("sensor", {}).get("name") == IDEAL:
         kept["sensor"] = {"name": IDEAL}
     return kept
