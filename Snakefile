@@ -4,6 +4,7 @@
 #   snakemake --cores 2 --config experiment=quick                        the same graph, small
 #   snakemake --cores 2 tables                                           one stage
 #   snakemake --cores 2 beyond                                           what goes beyond the paper
+#   snakemake --cores 2 transfer                                         trained on × tested on
 #   snakemake --cores 2 results/paper/evaluation/mug/el00/fold3/proposed.csv   one file
 
 from snakemake.utils import min_version
@@ -25,6 +26,7 @@ localrules:
     figures,
     contest,
     beyond,
+    transfer,
 
 
 rule all:
@@ -40,6 +42,8 @@ include: "workflow/rules/reading.smk"
 include: "workflow/rules/read.smk"
 include: "workflow/rules/beyond.smk"
 include: "workflow/rules/ablation.smk"
+include: "workflow/rules/conditions.smk"
+include: "workflow/rules/transfer.smk"
 
 
 onstart:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from nbv.config import load_config, snakemake_overrides
+from nbv.config import load_condition, load_config, snakemake_overrides
 from nbv.errors import UserError
 from nbv.estimation import hardware
 from nbv.recommendation.criteria.pose_ambiguity import READINGS
@@ -74,6 +74,14 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
         ("density.bandwidths_deg=[]", "density.bandwidths_deg=[] is out of range"),
         ("name='a b'", "name=a b: use letters"),
         ("estimator", "is not of the form key=value"),
+        ("sensor=kinct", "sensor=kinct is unknown: did you mean 'kinect'?"),
+        ("sensor.diagonal_m.mug=0", "sensor.diagonal_m.mug=0.0 is out of range: above 0"),
+        ("transfer.folds=[6]", "transfer.folds=[6] is out of range: one or more of 1 to n_folds=5"),
+        ("transfer.category=mgu", "transfer.category=mgu is no category of this run"),
+        ("transfer.elevation_deg=90", "transfer.elevation_deg=90 is outside 0 to 89"),
+        ("transfer.conditions.stereo.sensor=sterio", "did you mean 'stereo'?"),
+        ("transfer.conditions.axis.framing=axs", "transfer.conditions.axis.framing=axs is unknown"),
+        ("transfer.conditions.new.sensr=ideal", "sensr"),
     ],
 )
 def test_a_mistake_is_one_line_with_its_key(override, message):
@@ -100,6 +108,42 @@ def test_a_path_needs_no_quotes(root):
 def test_a_method_of_ones_own():
     config = load_config(CONFIG, ["methods.mine={rotation: opposite}"])
     assert config["methods"]["mine"] == {"rotation": "opposite", "fusion": "average"}
+
+
+def test_conditions_can_be_left_out_and_added():
+    config = load_config(
+        CONFIG,
+        [
+            "~transfer.conditions.axis",
+            "transfer.conditions.both={sensor: stereo, framing: axis}",
+        ],
+    )
+    assert list(config["transfer"]["conditions"]) == ["ideal", "kinect", "stereo", "both"]
+
+
+def test_a_condition_is_the_run_but_for_sensor_and_framing():
+    overrides = ["experiment=quick", "camera.framing=axis", "camera.image_side=16", "seed=3"]
+    run = load_config(CONFIG, overrides)
+    for name, condition in run["transfer"]["conditions"].items():
+        found = load_condition(CONFIG, overrides, run, condition)
+        assert found["camera"] == run["camera"] | {"framing": condition["framing"]}
+        assert found["sensor"] == load_config(CONFIG, [f"sensor={condition['sensor']}"])["sensor"]
+        same = {key: value for key, value in found.items() if key not in ("camera", "sensor")}
+        assert same == {key: run[key] for key in same}, name
+
+
+def test_parameters_belong_to_the_sensor_that_they_were_given_for():
+    overrides = ["sensor=stereo", "sensor.parameters.baseline_m=0.1", "sensor.diagonal_m.mug=0.2"]
+    run = load_config(CONFIG, overrides)
+
+    def seen_by(sensor):
+        condition = {"sensor": sensor, "framing": "silhouette"}
+        return load_condition(CONFIG, overrides, run, condition)
+
+    assert seen_by("stereo") == run
+    kinect = seen_by("kinect")["sensor"]
+    assert kinect["parameters"] == load_config(CONFIG, ["sensor=kinect"])["sensor"]["parameters"]
+    assert kinect["diagonal_m"] == run["sensor"]["diagonal_m"]
 
 
 def test_another_data_set_gets_its_own_folder():

@@ -43,10 +43,10 @@ def _check_key(key: str) -> Any:
     return annotation
 
 
-def _check_choice(directory: Path, group: str, choice: str) -> None:
+def _check_choice(directory: Path, group: str, choice: str, key: str | None = None) -> None:
     choices = [path.stem for path in (directory / group).glob("*.yaml")]
     if choice not in choices:
-        raise UserError(f"{group}={choice} is unknown: {nearest(choice, choices)}")
+        raise UserError(f"{key or group}={choice} is unknown: {nearest(choice, choices)}")
 
 
 def _checked(directory: Path, override: str) -> str:
@@ -122,6 +122,40 @@ def _check_names(directory: Path, settings: Mapping[str, Any]) -> None:
         valid = [str(OmegaConf.select(OmegaConf.load(path), key)) for path in files]
         if value not in valid:
             raise UserError(f"{group}.{key}={value} is unknown: {nearest(value, valid)}")
+    for name, condition in settings["transfer"]["conditions"].items():
+        key = f"transfer.conditions.{name}.sensor"
+        _check_choice(directory, "sensor", condition["sensor"], key)
+
+
+def load_condition(
+    directory: str | Path,
+    overrides: Sequence[str],
+    run: Mapping[str, Any],
+    condition: Mapping[str, str],
+) -> dict[str, Any]:
+    """Return a run's configuration with the sensor and the framing of another condition.
+
+    Parameters
+    ----------
+    directory, overrides
+        What the run was composed of; see `load_config`.
+    run : mapping
+        Its configuration.
+    condition : mapping
+        ``sensor`` and ``framing``, from ``transfer.conditions``.
+
+    Returns
+    -------
+    dict
+        As from `load_config`. The run's overrides hold here too, but its sensor's parameters are
+        no other sensor's.
+    """
+    replaced = r"sensor|camera\.framing"
+    if condition["sensor"] != run["sensor"]["name"]:
+        replaced += r"|sensor\.parameters.*"
+    kept = [o for o in overrides if not re.fullmatch(replaced, o.partition("=")[0].lstrip("+~"))]
+    chosen = [f"sensor={condition['sensor']}", f"camera.framing={condition['framing']}"]
+    return load_config(directory, [*kept, *chosen])
 
 
 def _one_line(error: Exception) -> str:

@@ -46,9 +46,11 @@ class CameraConfig:
 
 @dataclass
 class SensorConfig:
-    """How the depth camera measures; see `nbv.rendering.sensor`."""
+    """How the depth camera measures; see `nbv.rendering.sensors`."""
 
     name: str
+    parameters: dict[str, float] = field(default_factory=dict)
+    diagonal_m: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -103,6 +105,24 @@ class MethodConfig:
 
 
 @dataclass
+class ConditionConfig:
+    """What sees the objects, and how they are framed."""
+
+    sensor: str
+    framing: str
+
+
+@dataclass
+class TransferConfig:
+    """Conditions to train under and to test under; see `nbv.evaluation.transfer`."""
+
+    category: str | None
+    elevation_deg: int
+    folds: list[int] | None
+    conditions: dict[str, ConditionConfig]
+
+
+@dataclass
 class Config:
     """Everything a run depends on."""
 
@@ -127,6 +147,7 @@ class Config:
     density: DensityConfig
     recommendation: RecommendationConfig
     sequence: SequenceConfig
+    transfer: TransferConfig
 
 
 # Names that belong to code rather than to a file of a configuration group.
@@ -231,8 +252,42 @@ def validate(config: Mapping[str, Any]) -> None:
         re.fullmatch(r"[A-Za-z0-9._-]+", config["name"]) is not None,
         f"name={config['name']}: use letters, digits, '.', '_' and '-'",
     )
+    for category, diagonal_m in config["sensor"]["diagonal_m"].items():
+        _require(
+            diagonal_m > 0, f"sensor.diagonal_m.{category}={diagonal_m} is out of range: above 0"
+        )
+    _validate_transfer(config)
     for category in config["dataset"]["turn_deg"]:
         _require(
             category in known,
             f"dataset.turn_deg.{category}: no such category; {nearest(category, known)}",
+        )
+
+
+def _validate_transfer(config: Mapping[str, Any]) -> None:
+    transfer = config["transfer"]
+    category, folds = transfer["category"], transfer["folds"]
+    _require(
+        category is None or category in config["categories"],
+        f"transfer.category={category} is no category of this run: "
+        f"{nearest(str(category), config['categories'])}",
+    )
+    _require(
+        0 <= transfer["elevation_deg"] < 90,
+        f"transfer.elevation_deg={transfer['elevation_deg']} is outside 0 to 89 degrees",
+    )
+    _require(
+        folds is None or (len(folds) > 0 and set(folds) <= set(range(1, config["n_folds"] + 1))),
+        f"transfer.folds={folds} is out of range: one or more of 1 to n_folds={config['n_folds']}",
+    )
+    _require(len(transfer["conditions"]) > 0, "transfer.conditions={} names no condition")
+    for name, condition in transfer["conditions"].items():
+        key, framing = f"transfer.conditions.{name}", condition["framing"]
+        _require(
+            re.fullmatch(r"[A-Za-z0-9_-]+", name) is not None,
+            f"{key}: use letters, digits, '_' and '-' in a condition's name",
+        )
+        choices = CHOICES["camera.framing"]
+        _require(
+            framing in choices, f"{key}.framing={framing} is unknown: {nearest(framing, choices)}"
         )

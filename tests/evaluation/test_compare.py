@@ -109,6 +109,23 @@ def test_a_run_agrees_with_itself(finished, run):
     assert comparison.lines()[-1] == f"{run} agrees with {finished}"
 
 
+def test_a_table_made_on_request_may_be_missing(finished, run):
+    shutil.copy(run / "tables/table1.csv", run / "tables/transfer.csv")
+    comparison = compare_runs(run, finished)
+    assert comparison.agrees
+    assert comparison.remarks == ("transfer: missing",)
+
+
+def test_settings_that_no_table_of_every_run_depends_on():
+    sizes = {"parameters": {}, "diagonal_m": {"mug": 0.17}}
+    before = {"sensor": {"name": "ideal"}}
+    after = {"sensor": {"name": "ideal", **sizes}, "transfer": {"folds": [1]}}
+    assert differing_settings(before, after) == ()
+    kinect = {"sensor": {"name": "kinect", **sizes}}
+    other = {"sensor": {"name": "kinect", **sizes, "diagonal_m": {"mug": 0.2}}}
+    assert differing_settings(kinect, other) == (("sensor.diagonal_m.mug", 0.17, 0.2),)
+
+
 @pytest.mark.parametrize("side", ["ci_low", "ci_high"])
 def test_a_value_may_move_within_its_interval(finished, run, side):
     change(run, "table1", "mug", "proposed", value=lambda cell: cell[side])

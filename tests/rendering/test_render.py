@@ -60,7 +60,8 @@ def test_fewer_azimuths_are_every_so_many_of_all(embree, meshes):
 def test_a_sensor_stands_between_depth_and_code(embree, meshes):
     camera = Camera(image_side=16, framing="axis")
 
-    def nearer(depth):
+    def nearer(depth, object_id):
+        assert object_id in meshes
         return np.where(depth > 0, depth - np.float32(0.1), 0)
 
     plain = next(render_objects(meshes, 0.0, camera, embree, n_azimuths=4))

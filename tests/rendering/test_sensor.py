@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from nbv.rendering.camera import Camera
-from nbv.rendering.sensor import STEP, decode_depth, encode_depth, ideal, reference_depth
+from nbv.rendering.sensor import STEP, decode_depth, encode_depth, reference_depth
 
 DEPTHS = arrays(
     np.float32, (3, 6, 6), elements=st.one_of(st.just(0.0), st.floats(2.0, 3.0, width=32))
@@ -62,8 +62,3 @@ def test_the_median_is_over_what_is_visible():
     image[0, 0] = [2.0, 2.2, 2.9]
     assert reference_depth(image, Camera()) == pytest.approx(2.2)
     assert reference_depth(image, Camera(framing="axis")) == pytest.approx(2.5)
-
-
-def test_the_ideal_sensor_changes_nothing():
-    depth = np.random.default_rng(0).uniform(2, 3, (2, 4, 4)).astype(np.float32)
-    assert np.array_equal(ideal(depth), depth)

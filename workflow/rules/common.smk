@@ -12,7 +12,7 @@ except ModuleNotFoundError:
     )
 
 from nbv import provenance
-from nbv.config import load_config, snakemake_overrides
+from nbv.config import load_condition, load_config, snakemake_overrides
 from nbv.errors import UserError
 from nbv.evaluation.contest import check_contenders
 from nbv.evaluation.methods import check_method
@@ -21,6 +21,7 @@ from nbv.meshes.store import stored_ids
 from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.rotations import needs_lookup
 from nbv.rendering import RENDERERS
+from nbv.rendering.sensors import SENSORS, check_sensor, sensor_settings
 
 BASE = Path(workflow.basedir)
 SOURCE_ROOT = Path(nbv.__file__).parents[1]
@@ -54,12 +55,14 @@ def dataset_of(category):
 
 
 try:
-    CONFIG = load_config(BASE / "config", snakemake_overrides(config))
+    OVERRIDES = snakemake_overrides(config)
+    CONFIG = load_config(BASE / "config", OVERRIDES)
     RESULTS = f"results/{CONFIG['name']}"
     CATEGORIES = CONFIG["categories"]
     for name, method in CONFIG["methods"].items():
         check_method(name, method)
     check_contenders(CONFIG["contenders"], CONFIG["methods"])
+    check_sensor(CONFIG["sensor"], CATEGORIES)
     LOOKUP_METHODS = [
         name
         for name, method in CONFIG["methods"].items()
@@ -100,12 +103,16 @@ def script_path(name):
     return f"../scripts/{name}.py"
 
 
-def sources(name):
+def sources(name, settings=CONFIG):
     """The package's modules that a script depends on: an edit reruns what uses them."""
     script = BASE / "workflow/scripts" / f"{name}.py"
+    sensor = settings["sensor"]["name"]
     chosen = {
-        "meshes": [SOURCES[CONFIG["dataset"]["source"]]],
-        "render": [RENDERERS[CONFIG["renderer"]["name"]]],
+        "meshes": [SOURCES[settings["dataset"]["source"]]],
+        "render": [
+            RENDERERS[settings["renderer"]["name"]],
+            *([SENSORS[sensor]] if sensor in SENSORS else []),
+        ],
     }
     files = provenance.source_files(script, SOURCE_ROOT, chosen.get(name, []))
     here = Path.cwd()

@@ -71,7 +71,9 @@ rule render:
     params:
         renderer=CONFIG["renderer"],
         camera=CONFIG["camera"],
-        sensor=CONFIG["sensor"],
+        sensor=lambda wildcards: sensor_settings(
+            CONFIG["sensor"], wildcards.category, CONFIG["seed"]
+        ),
     script:
         script_path("render")
 

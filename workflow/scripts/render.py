@@ -7,14 +7,15 @@ with job(snakemake):
     from nbv.rendering import open_renderer
     from nbv.rendering.camera import Camera
     from nbv.rendering.render import write_depth
-    from nbv.rendering.sensor import open_sensor
+    from nbv.rendering.sensors import open_sensor
 
-    params = snakemake.params
+    params, wildcards = snakemake.params, snakemake.wildcards
+    camera = Camera(**params.camera)
     write_depth(
         snakemake.output[0],
         load_meshes(snakemake.input.meshes),
-        float(snakemake.wildcards.elevation),
-        Camera(**params.camera),
+        float(wildcards.elevation),
+        camera,
         open_renderer(params.renderer["name"]),
-        open_sensor(params.sensor["name"]),
+        open_sensor(params.sensor, camera, wildcards.category, int(wildcards.elevation)),
     )

@@ -17,6 +17,7 @@ from nbv.evaluation import published
 from nbv.evaluation.cells import Table, shows_difference
 from nbv.evaluation.grid import MINUS, Cell, Grid, grid_latex, grid_markdown, interval_text, number
 from nbv.evaluation.settings import method_label
+from nbv.evaluation.transfer import TRANSFER
 from nbv.files import write_csv, write_text
 
 _METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}
@@ -43,7 +44,9 @@ def to_latex(table: Table) -> str:
 
 
 def heading(table: Table) -> str:
-    """Return the table's number and title."""
+    """Return the table's number, where it has one, and title."""
+    if table.name == TRANSFER:
+        return table.title
     return f"Table {table.name.removeprefix('table')}: {table.title}"
 
 
@@ -58,7 +61,9 @@ def _notes(table: Table) -> list[str]:
     else:
         counts = "Test objects: " + ", ".join(f"{row} {int(n)}" for row, n in objects.items())
     shown = [] if table.name == "table6" else [f"{counts}."]
-    if cells["published"].notna().any() and table.name != "table6":
+    if table.name == TRANSFER:
+        shown.insert(0, "The best of each column in bold, for each method.")
+    elif cells["published"].notna().any() and table.name != "table6":
         shown.insert(0, "Ours [published]; our best of each row in bold.")
     elif table.name != "table6":
         shown.insert(0, "The best of each row in bold; the paper prints no such figures.")
@@ -66,6 +71,8 @@ def _notes(table: Table) -> list[str]:
 
 
 def _grid(table: Table) -> Grid:
+    if table.name == TRANSFER:
+        return _transfer_grid(table)
     if table.name == "table6":
         return _example_grid(table)
     if table.name == "table7":
@@ -109,6 +116,23 @@ def _fold_grid(table: Table) -> Grid:
     for method in methods:
         header += [f"{method_label(method)} {label}" for label in _METRIC_LABELS.values()]
     return Grid(tuple(header), tuple(rows))
+
+
+def _transfer_grid(table: Table) -> Grid:
+    """Methods and conditions trained on by conditions tested on; the best of each column."""
+    cells = table.cells
+    tested = list(dict.fromkeys(cells["tested_on"]))
+    lowest = cells.groupby(["method", "tested_on"])["value"].min().round(2).to_dict()
+    rows = []
+    for (method, trained), part in cells.groupby(["method", "trained_on"], sort=False):
+        row = [Cell(method_label(str(method))), Cell(str(trained))]
+        for cell in part.to_dict("records"):
+            value = round(cell["value"], 2)
+            interval = f"({number(cell['ci_low'])} to {number(cell['ci_high'])})"
+            is_best = value == lowest[method, cell["tested_on"]]
+            row.append(Cell(f"{number(value)}°", bool(is_best), interval))
+        rows.append(tuple(row))
+    return Grid(("Method", table.row_header, *tested), tuple(rows))
 
 
 def _example_grid(table: Table) -> Grid:

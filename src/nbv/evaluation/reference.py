@@ -14,7 +14,9 @@ from omegaconf import OmegaConf
 from nbv.errors import UserError
 from nbv.evaluation.cells import CELL_COLUMNS
 from nbv.evaluation.results import existing
+from nbv.evaluation.transfer import TRANSFER
 from nbv.files import read_csv, replacing
+from nbv.rendering.sensors import IDEAL
 
 log = logging.getLogger(__name__)
 
@@ -203,7 +205,16 @@ def differing_settings(
     reference: Mapping[str, Any], run: Mapping[str, Any]
 ) -> tuple[SettingDifference, ...]:
     """Return the settings on which results depend and that differ, in the reference's order."""
-    return tuple(d for d in _differences(reference, run) if d[0] not in _SURROUNDINGS)
+    differences = _differences(_telling(reference), _telling(run))
+    return tuple(d for d in differences if d[0] not in _SURROUNDINGS)
+
+
+def _telling(configuration: Mapping[str, Any]) -> dict[str, Any]:
+    """Leave out what no table that every run has depends on."""
+    kept = {key: value for key, value in configuration.items() if key != TRANSFER}
+    if kept.get("sensor", {}).get("name") == IDEAL:
+        kept["sensor"] = {"name": IDEAL}
+    return kept
 
 
 def differing_surroundings(

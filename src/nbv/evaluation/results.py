@@ -96,7 +96,7 @@ def load_unit(
     for method in methods:
         for fold in range(1, n_folds + 1):
             path = evaluation_path(root, category, elevation_deg, fold, method)
-            frame = _read_evaluation(path)
+            frame = read_evaluation(path)
             parts.append(frame.assign(method=method, fold=fold))
     unit = pd.concat(parts, ignore_index=True)
     unit["method"] = pd.Categorical(unit["method"], categories=list(methods), ordered=True)
@@ -128,7 +128,14 @@ def load_depth(root: str | Path, category: str, elevation_deg: int) -> NDArray[n
     return open_array(existing(depth_path(root, category, elevation_deg)))
 
 
-def _read_evaluation(path: Path) -> pd.DataFrame:
+def read_evaluation(path: Path) -> pd.DataFrame:
+    """Read one method's errors of one fold: `methods.COLUMNS`.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, empty, or lacks a column.
+    """
     try:
         frame = read_csv(existing(path))
     except pd.errors.EmptyDataError:

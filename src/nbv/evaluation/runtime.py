@@ -32,7 +32,8 @@ PAUSE_S = 60.0
 """A gap between jobs that is longer than this is a pause of the run, not a part of it."""
 
 # They read the results, some of them this very table: with them it would never be the same twice.
-_NOT_COUNTED = frozenset({"runtime", "report", "compare", "reference"})
+# Or they belong to a target of its own.
+_NOT_COUNTED = frozenset({"runtime", "report", "compare", "reference", "transfer"})
 _PROCESSOR_TIME = re.compile(r"processor time (\d+\.\d+) s$", re.MULTILINE)
 # Benchmark files round to hundredths of a second, so that neighbours in time may seem to overlap.
 _ROUNDING_S = 0.01

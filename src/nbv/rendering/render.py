@@ -14,7 +14,8 @@ from nbv.files import replacing
 from nbv.meshes.store import Surface
 from nbv.rendering import Renderer
 from nbv.rendering.camera import Camera
-from nbv.rendering.sensor import Codes, Sensor, encode_depth, ideal
+from nbv.rendering.sensor import Codes, encode_depth
+from nbv.rendering.sensors import Measure, ideal
 
 logger = logging.getLogger(__name__)
 
@@ -27,7 +28,7 @@ def render_objects(
     elevation_deg: float,
     camera: Camera,
     renderer: Renderer,
-    sensor: Sensor = ideal,
+    measure: Measure = ideal,
     n_azimuths: int = 360,
 ) -> Iterator[Codes]:
     """Yield the encoded depth images of each object in turn.
@@ -40,8 +41,9 @@ def render_objects(
         In [-90, 90].
     camera : Camera
     renderer : Renderer
-    sensor : callable, optional
-        Applied to the depth of one object's images before they are encoded.
+    measure : callable, optional
+        From `nbv.rendering.sensors.open_sensor`: what is read of one object's images before they
+        are encoded.
     n_azimuths : int
         View k is at azimuth 360 k / n_azimuths degrees.
 
@@ -61,7 +63,7 @@ def render_objects(
             depth = renderer.render(mesh.vertices, mesh.faces, elevation_deg, azimuths_deg, camera)
         except UserError as error:
             raise UserError(f"{object_id}: {error}") from error
-        yield encode_depth(sensor(depth), camera)
+        yield encode_depth(measure(depth, object_id), camera)
 
 
 def write_depth(
@@ -70,7 +72,7 @@ def write_depth(
     elevation_deg: float,
     camera: Camera,
     renderer: Renderer,
-    sensor: Sensor = ideal,
+    measure: Measure = ideal,
     n_azimuths: int = 360,
 ) -> None:
     """Render all objects into one `.npy` file, (n_objects, n_azimuths, side, side) uint8.
@@ -84,7 +86,7 @@ def write_depth(
         "fortran_order": False,
         "shape": (len(meshes), n_azimuths, side, side),
     }
-    images = render_objects(meshes, elevation_deg, camera, renderer, sensor, n_azimuths)
+    images = render_objects(meshes, elevation_deg, camera, renderer, measure, n_azimuths)
     progress = _Progress(str(path), len(meshes), n_azimuths)
     # Written, not mapped: a full disk is then an error that can be told, not a fatal signal.
     with replacing(path) as temporary, temporary.open("wb") as file:

@@ -1,48 +1,20 @@
-"""What a depth sensor keeps of an image: one byte a pixel, in steps of 0.5 % of the object's size.
-
-A noise model is one function from depth to depth, applied before encoding; `ideal` adds none.
-"""
+"""What is kept of a depth image: one byte a pixel, in steps of 0.5 % of the object's size."""
 
 from __future__ import annotations
-
-from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.errors import UserError, nearest
 from nbv.rendering.camera import Camera
 
 Depths = NDArray[np.float32]
 Codes = NDArray[np.uint8]
-Sensor = Callable[[Depths], Depths]
 
 STEP = 0.005
 """Depth per code, in object diagonals."""
 
 ZERO_CODE = 128
 """The code of the reference depth itself."""
-
-
-def ideal(depth: Depths) -> Depths:
-    """Return the depth as it is."""
-    return depth
-
-
-SENSORS: Mapping[str, Sensor] = {"ideal": ideal}
-
-
-def open_sensor(name: str) -> Sensor:
-    """Return a sensor by its name in `SENSORS`.
-
-    Raises
-    ------
-    UserError
-        For an unknown name.
-    """
-    if name not in SENSORS:
-        raise UserError(f"sensor={name} is unknown: {nearest(name, SENSORS)}")
-    return SENSORS[name]
 
 
 def reference_depth(depth: Depths, camera: Camera) -> NDArray[np.float32]:

@@ -1,0 +1,172 @@
+"""What a reading of a triangulating depth camera depends on, whatever its light.
+
+Such a camera finds, for a small window of its image, the same window in the view of a second eye:
+another camera, or the projector's pattern. Hence what Kinect and stereo share: noise that
+neighbours share because their windows overlap, readings lost where the window holds something
+else besides the surface, and a shadow where the second eye does not see the surface.
+
+Throughout, z are depth images (k, rows, columns) float32 in metres, 0 where there is nothing, and
+``focal_px`` is the focal length in pixels of these images.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import correlate1d
+from scipy.special import ndtr
+
+Metres = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+STEEPEST_DEG = 80.0
+"""Neighbours further apart in depth than on a surface at this incidence lie on two surfaces."""
+
+FAINTEST_DEG = 60.0
+"""Up to this incidence no reading is lost to it; see `is_lost`."""
+
+
+def incidence_rad(z: Metres, focal_px: float) -> Metres:
+    """Return the angle between the surface's normal and the ray, in [0, π/2]; 0 for background.
+
+    Slopes are the gentler of the two differences to a neighbour, so that an edge does not make
+    the surface beside it look steep.
+    """
+    down, across = _slope(z, -2), _slope(z, -1)
+    row, column = (
+        np.arange(size, dtype=np.float32) + np.float32(0.5 - size / 2) for size in z.shape[-2:]
+    )
+    row = row[:, None]
+    # The normal of the surface (column z, row z, focal z) / focal, and its product with the ray.
+    along = z + column * across + row * down
+    normal = np.sqrt(np.float32(focal_px**2) * (down**2 + across**2) + along**2)
+    ray = np.sqrt(1 + (row**2 + column**2) / np.float32(focal_px**2))
+    cosine = np.ones_like(z)
+    np.divide(z, normal * ray, out=cosine, where=z > 0)
+    return np.arccos(np.minimum(cosine, 1))
+
+
+def _slope(z: Metres, axis: int) -> Metres:
+    step = np.diff(np.where(z > 0, z, np.float32(np.nan)), axis=axis)
+    none = np.full_like(z.take([0], axis=axis), np.nan)
+    before, after = (np.concatenate(pair, axis=axis) for pair in ((none, step), (step, none)))
+    gentler = np.where((np.abs(before) <= np.abs(after)) | np.isnan(after), before, after)
+    return np.nan_to_num(gentler, copy=False, nan=0.0)
+
+
+def same_surface(z: Metres, there: Metres, apart_px: float | Metres, focal_px: float) -> Mask:
+    """Say whether two pixels, `apart_px` from each other, show one surface (`STEEPEST_DEG`)."""
+    steepest = np.float32(math.tan(math.radians(STEEPEST_DEG)) / focal_px)
+    return np.asarray((there > 0) & (np.abs(there - z) <= steepest * z * apart_px))
+
+
+def window_weights(width_px: float) -> NDArray[np.float64]:
+    """Return how much of each pixel a window of that width covers, from end to end."""
+    reach = max(math.ceil(width_px / 2 - 0.5), 0)
+    return np.clip(width_px / 2 + 0.5 - np.abs(np.arange(-reach, reach + 1)), 0, 1)
+
+
+def window_share(z: Metres, width_px: float, focal_px: float) -> Metres:
+    """Return the share of each pixel's window that shows the pixel's own surface, in [0, 1]."""
+    weights = window_weights(width_px)
+    reach = len(weights) // 2
+    padded = np.pad(z, [(0, 0), (reach, reach), (reach, reach)])
+    rows, columns = z.shape[-2:]
+    share = np.zeros_like(z)
+    for down, of_row in enumerate(weights):
+        for across, of_column in enumerate(weights):
+            there = padded[:, down : down + rows, across : across + columns]
+            apart = math.hypot(down - reach, across - reach)
+            weight = np.float32(of_row * of_column / weights.sum() ** 2)
+            share += weight * same_surface(z, there, apart, focal_px)
+    return share
+
+
+def window_noise(
+    shape: tuple[int, ...], width_px: float, rng: np.random.Generator
+) -> NDArray[np.float32]:
+    """Return standard normal noise that neighbours share as far as their windows overlap."""
+    weights = window_weights(width_px)
+    weights /= np.sqrt((weights**2).sum())
+    noise = rng.standard_normal(shape, dtype=np.float32)
+    # Wrapped, so that the variance is 1 up to the edge of the image.
+    for axis in (-2, -1):
+        noise = correlate1d(noise, weights, axis=axis, mode="wrap")
+    return noise
+
+
+def is_lost(
+    z: Metres, incidence: Metres, width_px: float, focal_px: float, rng: np.random.Generator
+) -> Mask:
+    """Draw which readings fail because their window holds too little of the surface.
+
+    A reading succeeds with a probability that is the product of two shares: that of the window
+    which shows the surface (less at silhouettes, least on thin parts), and the surface's apparent
+    breadth, the cosine of its incidence, as a share of that at `FAINTEST_DEG` (at most 1). Losses
+    come in patches as large as a window. That readings fail for these reasons is known; that the
+    probability is this product is an assumption of ours.
+    """
+    breadth = np.cos(incidence) / np.float32(math.cos(math.radians(FAINTEST_DEG)))
+    kept = window_share(z, width_px, focal_px) * np.minimum(breadth, 1)
+    return np.asarray(ndtr(window_noise(z.shape, width_px, rng)) >= kept)
+
+
+def is_hidden(z: Metres, focal_px: float, baseline_m: float) -> Mask:
+    """Say which pixels a second eye, `baseline_m` to the right, does not see.
+
+    A pixel is hidden where another one of its row, more than one pixel of disparity nearer, falls
+    on the same pixel of the second eye's image. Shadows so lie to the left of what casts them.
+    """
+    seen = np.flatnonzero(z > 0)
+    hidden = np.zeros(z.size, dtype=bool)
+    if len(seen):
+        disparity = np.float32(focal_px * baseline_m) / z.ravel()[seen]
+        row, column = np.divmod(seen, z.shape[-1])
+        shift = disparity - disparity.min()
+        width = z.shape[-1] + math.ceil(shift.max()) + 1
+        place = row * width + np.rint(column - shift).astype(np.intp) + (width - z.shape[-1])
+        nearest = np.zeros(z.size // z.shape[-1] * width, dtype=np.float32)
+        np.maximum.at(nearest, place, disparity)
+        hidden[seen] = nearest[place] > disparity + 1
+    return hidden.reshape(z.shape)
+
+
+def displaced(
+    readings: Metres, z: Metres, sigma_px: Metres, focal_px: float, rng: np.random.Generator
+) -> Metres:
+    """Return readings at positions off by a normal error, which shows at edges alone.
+
+    Within a surface a displacement is part of the axial noise as it was measured. Where a pixel
+    lies between an edge and the next pixel is not known, so displacements are rounded at random,
+    in proportion: an edge is crossed as often as one that lies anywhere in between.
+
+    Parameters
+    ----------
+    readings : (k, rows, columns) float32
+        What is read in each pixel, 0 for nothing.
+    z : (k, rows, columns) float32
+        What is there.
+    sigma_px : (k, rows, columns) float32
+        Standard deviation of the displacement along rows and along columns.
+    focal_px, rng
+        See the module.
+    """
+    shifts = []
+    for _ in range(2):
+        shift = sigma_px * rng.standard_normal(z.shape, dtype=np.float32)
+        shift += rng.random(z.shape, dtype=np.float32)
+        shifts.append(np.floor(shift).astype(np.intp))
+    image, row, column = np.nonzero((shifts[0] != 0) | (shifts[1] != 0))
+    moved = image, row, column
+    source = (
+        image,
+        np.clip(row + shifts[0][moved], 0, z.shape[-2] - 1),
+        np.clip(column + shifts[1][moved], 0, z.shape[-1] - 1),
+    )
+    apart = np.hypot(source[1] - row, source[2] - column).astype(np.float32)
+    crosses = ~same_surface(z[moved], z[source], apart, focal_px)
+    out = readings.copy()
+    out[image[crosses], row[crosses], column[crosses]] = readings[source][crosses]
+    return out

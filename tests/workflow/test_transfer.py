@@ -1,0 +1,55 @@
+"""The target `transfer` of the real Snakefile, run small."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from .conftest import TINY
+
+pytestmark = pytest.mark.slow
+
+MORE = (
+    "transfer.folds=[2]",
+    "~transfer.conditions.stereo",
+    "~transfer.conditions.axis",
+)
+PLACE = "mug/el00/fold2"
+
+
+def test_trained_on_and_tested_on(scratch):
+    scratch.run("--cores", "2", "transfer", overrides=(*TINY, *MORE))
+    results = scratch.results
+    made = sorted(str(path.relative_to(results)) for path in results.glob("transfer/depth/*/*/*"))
+    assert made == ["transfer/depth/kinect/mug/el00.npy"]  # ideal is the run's own condition
+    clean, noisy = (
+        np.load(results / name, mmap_mode="r") for name in ("depth/mug/el00.npy", made[0])
+    )
+    lost = (clean > 0) & (noisy == 0)
+    assert 0.01 < lost.sum() / (clean > 0).sum() < 0.5
+    assert not (results / "transfer/estimators/ideal").exists()
+
+    cells = pd.read_csv(results / "tables/transfer.csv").set_index(
+        ["trained_on", "tested_on", "method"]
+    )
+    assert len(cells) == 2 * 2 * 4
+    for (trained, tested, method), cell in cells.iterrows():
+        errors = pd.read_csv(
+            results / f"transfer/evaluation/{trained}/{tested}/{PLACE}/{method}.csv"
+        )["error_deg"]
+        assert cell["value"] == pytest.approx(errors.mean(), abs=1e-3)
+    for method in ("single", "opposite", "proposed"):
+        ours = results / f"transfer/evaluation/ideal/ideal/{PLACE}/{method}.csv"
+        assert ours.read_bytes() == (results / f"evaluation/{PLACE}/{method}.csv").read_bytes()
+
+    text = (results / "tables/transfer.md").read_text()
+    assert len(re.findall(r"^\| (Single|Random|Opposite|Proposed) \|", text, re.M)) == 8
+    # The run itself is as finished as it was, and a size concerns its own sensor and category.
+    assert scratch.would_run(*MORE, "sensor.diagonal_m.mug=0.3") == {
+        "settings": 1,
+        "runtime": 1,
+        "report": 1,
+    }
