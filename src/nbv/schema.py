@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from typing import Any, get_type_hints
 
 from nbv.errors import UserError, nearest
 
@@ -52,7 +52,7 @@ class SensorConfig:
 
 @dataclass
 class EstimatorConfig:
-    """The single-view estimator; see `nbv.estimation`."""
+    """The single-view estimator; see `nbv.estimation`. Null stands for what a kind has not."""
 
     kind: str
     channels: list[int]
@@ -63,6 +63,8 @@ class EstimatorConfig:
     weight_decay: float
     device: str
     precision: str
+    n_classes: int | None = None
+    target_bandwidth_deg: float | None = None
 
 
 @dataclass
@@ -105,10 +107,15 @@ class Config:
     sensor: SensorConfig
     estimator: EstimatorConfig
     density: DensityConfig
+    calibration: str = "holdout"
+    crossfit_parts: int = 2
+    crossfit_epochs: int | None = None
+    beside: list[str] = field(default_factory=list)
 
 
 # Names that belong to code rather than to a file of a configuration group.
 CHOICES = {
+    "calibration": ("holdout", "crossfit"),
     "camera.framing": ("silhouette", "axis"),
     "dataset.centre": ("box", "origin"),
     "density.reading": ("given_estimate", "given_truth"),
@@ -135,6 +142,20 @@ def value_of(config: Mapping[str, Any], key: str) -> Any:
     for part in key.split("."):
         value = value[part]
     return value
+
+
+def default_of(key: str, otherwise: Any) -> Any:
+    """Return what a dotted key stands at where a configuration, perhaps an older one, lacks it."""
+    schema: Any = Config
+    for part in key.split("."):
+        found = [item for item in fields(schema) if item.name == part] if schema else []
+        if not found:
+            return otherwise
+        last, hint = found[0], get_type_hints(schema)[part]
+        schema = hint if is_dataclass(hint) else None
+    if last.default_factory is not MISSING:
+        return last.default_factory()
+    return otherwise if last.default is MISSING else last.default
 
 
 def validate(config: Mapping[str, Any]) -> None:
@@ -172,7 +193,24 @@ def validate(config: Mapping[str, Any]) -> None:
         > 0
         and min(config["density"]["pseudo_observations"]) >= 0,
         "density.n_parts (2 or more)": config["density"]["n_parts"] >= 2,
+        "crossfit_parts (2 or more)": config["crossfit_parts"] >= 2,
+        "crossfit_epochs (1 or more; as many as null stands for need more estimator.epochs)": (
+            config["crossfit_epochs"] is None or config["crossfit_epochs"] >= 1
+        ),
     }
+    estimator = config["estimator"]
+    if estimator["kind"] == "classifier":
+        _require(
+            {"n_classes", "target_bandwidth_deg"} <= estimator.keys(),
+            "estimator.kind=classifier: it needs n_classes and target_bandwidth_deg; choose "
+            "estimator=classifier, which has them",
+        )
+        positive |= {
+            "estimator.n_classes (8 or more, a divisor of 360)": (
+                estimator["n_classes"] >= 8 and 360 % estimator["n_classes"] == 0
+            ),
+            "estimator.target_bandwidth_deg (above 0)": estimator["target_bandwidth_deg"] > 0,
+        }
     for name, holds in positive.items():
         key, _, range_ = name.partition(" ")
         _require(holds, f"{key}={value_of(config, key)} is out of range: {range_.strip('()')}")

@@ -15,6 +15,7 @@ from nbv.errors import UserError
 from nbv.evaluation.cells import CELL_COLUMNS
 from nbv.evaluation.results import existing
 from nbv.files import read_csv, replacing
+from nbv.schema import default_of
 
 log = logging.getLogger(__name__)
 
@@ -29,12 +30,13 @@ Cell = dict[str, Any]
 CELL_KEY = ("row", "method", "metric")
 """What tells the cells of one table apart."""
 
-# They say where files lie, and on what hardware and in which precision an estimator is trained:
-# that, too, is a retrained estimator and no other experiment.
+# They say where files lie, what is shown beside, and on what hardware and in which precision an
+# estimator is trained: that, too, is a retrained estimator and no other experiment.
 _SURROUNDINGS = frozenset(
     {
         "experiment",
         "name",
+        "beside",
         "dataset.root",
         "dataset.exclude_file",
         "estimator.device",
@@ -232,7 +234,9 @@ def _differences(
     theirs: Mapping[str, Any], mine: Mapping[str, Any], prefix: str = ""
 ) -> Iterator[SettingDifference]:
     for key in dict.fromkeys([*theirs, *mine]):
-        a, b = theirs.get(key, UNSET), mine.get(key, UNSET)
+        # A key that is younger than one of the two has its default there.
+        otherwise = default_of(f"{prefix}{key}", UNSET)
+        a, b = theirs.get(key, otherwise), mine.get(key, otherwise)
         if isinstance(a, Mapping) and isinstance(b, Mapping):
             yield from _differences(a, b, f"{prefix}{key}.")
         elif a != b:
