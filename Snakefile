@@ -35,6 +35,7 @@ include: "workflow/rules/estimate.smk"
 include: "workflow/rules/recommend.smk"
 include: "workflow/rules/reading.smk"
 include: "workflow/rules/read.smk"
+include: "workflow/rules/beside.smk"
 
 
 onstart:
