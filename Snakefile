@@ -44,6 +44,7 @@ include: "workflow/rules/beyond.smk"
 include: "workflow/rules/ablation.smk"
 include: "workflow/rules/conditions.smk"
 include: "workflow/rules/transfer.smk"
+include: "workflow/rules/beside.smk"
 
 
 onstart:

@@ -13,7 +13,7 @@ from benchmarks.solids import object_with_faces
 from benchmarks.timing import Work, growth_exponent, take_turns
 from benchmarks.training import bare_steps, random_codes
 from nbv.estimation.hardware import choose_hardware, use_one_thread
-from nbv.estimation.training import train_regressor
+from nbv.estimation.training import train_network
 from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.lookup import build_lookup
 from nbv.recommendation.selection import chosen_lookup
@@ -60,7 +60,7 @@ def _training(n_objects: int) -> Work:
     settings = {**configuration()["estimator"], "epochs": 1}
     hardware = choose_hardware("cpu", settings["precision"])
     codes = random_codes(n_objects * N_VIEWS, 64).reshape(n_objects, N_VIEWS, 64, 64)
-    return lambda: train_regressor(codes, settings, hardware, seed=0)
+    return lambda: train_network(codes, settings, hardware, seed=0)
 
 
 def _step(side: int) -> Work:

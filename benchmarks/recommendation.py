@@ -16,6 +16,7 @@ from nbv.estimation.hardware import Hardware, choose_hardware, use_one_thread
 from nbv.estimation.images import to_input
 from nbv.estimation.inference import estimate_azimuth
 from nbv.estimation.networks import build_network
+from nbv.estimation.weights import Estimator
 from nbv.meshes.normalisation import normalise
 from nbv.meshes.procedural import generate
 from nbv.recommendation.evidence import gather_evidence
@@ -34,6 +35,7 @@ def run(quick: bool) -> list[Figure]:
     hardware = choose_hardware("cpu", settings["precision"])
     torch.manual_seed(0)
     network = build_network(settings, camera.image_side).eval()
+    estimator = Estimator(network, settings, camera.image_side, [])
     table = build_lookup(
         gather_evidence(
             calibration_estimates(20, 360),
@@ -48,7 +50,7 @@ def run(quick: bool) -> list[Figure]:
     ready = to_input(encode_depth(depth, camera), hardware)
 
     def recommend() -> None:
-        estimate_deg, _ = estimate_azimuth(network, encode_depth(depth, camera), hardware)
+        estimate_deg, _ = estimate_azimuth(estimator, encode_depth(depth, camera), hardware)
         table.recommend(estimate_deg)
 
     def forward() -> None:

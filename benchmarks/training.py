@@ -16,7 +16,7 @@ from benchmarks.timing import Work, take_turns
 from nbv.estimation.hardware import Hardware, choose_hardware, use_one_thread
 from nbv.estimation.images import to_input
 from nbv.estimation.networks import build_network
-from nbv.estimation.training import train_regressor
+from nbv.estimation.training import train_network
 
 TARGET = Target(0.90)
 N_VIEWS, SIDE = 360, 64
@@ -33,10 +33,10 @@ def run(quick: bool) -> list[Figure]:
     steps = n_images // settings["batch_size"] * settings["epochs"]
     works = [
         bare_steps(settings, hardware, SIDE, steps),
-        lambda: train_regressor(codes, settings, hardware, seed=0),
+        lambda: train_network(codes, settings, hardware, seed=0),
     ]
     bare_steps(settings, hardware, SIDE, 3)()
-    train_regressor(codes[:3], {**settings, "epochs": 1}, hardware, seed=0)
+    train_network(codes[:3], {**settings, "epochs": 1}, hardware, seed=0)
     turns = take_turns(works, 1 if quick else 8, warm_up=False)
     bare, own = (steps * settings["batch_size"] / turns.typical(column) for column in (0, 1))
     detail = (

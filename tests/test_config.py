@@ -1,16 +1,19 @@
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from nbv.config import load_condition, load_config, snakemake_overrides
+from nbv.config import equal_cost_epochs, load_condition, load_config, snakemake_overrides
 from nbv.errors import UserError
-from nbv.estimation import hardware
+from nbv.estimation import hardware, networks
 from nbv.recommendation.criteria.pose_ambiguity import READINGS
 from nbv.recommendation.criteria.spreads import SPREADS
 from nbv.rendering.camera import FRAMINGS
-from nbv.schema import CHOICES as CHOICES_OF_CODE
+from nbv.validation import CHOICES as CHOICES_OF_CODE
 
 CONFIG = Path(__file__).parents[1] / "config"
 CHOICES = [f"{path.parent.name}={path.stem}" for path in sorted(CONFIG.glob("*/*.yaml"))]
@@ -33,6 +36,7 @@ def test_names_are_those_that_the_code_knows():
     assert CHOICES_OF_CODE["camera.framing"] == FRAMINGS
     assert CHOICES_OF_CODE["density.reading"] == READINGS
     assert CHOICES_OF_CODE["density.spread"] == tuple(SPREADS)
+    assert {path.stem for path in (CONFIG / "estimator").glob("*.yaml")} == set(networks.KINDS)
     assert CHOICES_OF_CODE["estimator.device"] == hardware.DEVICES
     assert CHOICES_OF_CODE["estimator.precision"] == hardware.PRECISIONS
 
@@ -82,6 +86,11 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
         ("transfer.conditions.stereo.sensor=sterio", "did you mean 'stereo'?"),
         ("transfer.conditions.axis.framing=axs", "transfer.conditions.axis.framing=axs is unknown"),
         ("transfer.conditions.new.sensr=ideal", "sensr"),
+        ("calibration=crosfit", "calibration=crosfit is unknown: did you mean 'crossfit'?"),
+        ("crossfit_parts=1", "crossfit_parts=1 is out of range: 2 or more"),
+        ("crossfit_epochs=0", "crossfit_epochs=0 is out of range: 1 or more"),
+        ("estimator.kind=classifier", "estimator.kind=classifier: it needs n_classes"),
+        ("estimator.n_classes=72", "n_classes"),
     ],
 )
 def test_a_mistake_is_one_line_with_its_key(override, message):
@@ -152,7 +161,53 @@ def test_another_data_set_gets_its_own_folder():
 
 
 @pytest.mark.parametrize(
-    ("given", "expected"),
+    ("overrides", "name"),
+    [
+        ([], "paper"),
+        (["estimator=classifier"], "paper-classifier"),
+        (["calibration=crossfit"], "paper-crossfit"),
+        (["dataset=shapenet", "estimator=classifier"], "paper-shapenet-classifier"),
+        (["experiment=quick", "calibration=crossfit", "name=mine"], "mine"),
+    ],
+)
+def test_another_estimator_or_calibration_gets_its_own_folder(overrides, name):
+    assert load_config(CONFIG, overrides)["name"] == name
+
+
+@pytest.mark.parametrize("override", ["n_classes=7", "n_classes=4", "target_bandwidth_deg=0"])
+def test_a_classifier_with_settings_out_of_range(override):
+    with pytest.raises(UserError, match=f"estimator.{override}.* is out of range"):
+        load_config(CONFIG, ["estimator=classifier", f"estimator.{override}"])
+
+
+def test_a_regressor_has_no_setting_of_a_classifier():
+    assert "n_classes" not in load_config(CONFIG)["estimator"]
+    assert load_config(CONFIG, ["estimator=classifier"])["estimator"]["n_classes"] > 2
+
+
+@given(st.integers(1, 40), st.integers(1, 19), st.integers(2, 5))
+def test_cross_fitting_costs_what_the_hold_out_costs_and_no_epoch_more(epochs, twentieths, parts):
+    objects = 100 * parts
+    fraction = twentieths / 20
+    held_out = Fraction(20 - twentieths, 20) * objects * epochs
+
+    def cost(each):
+        return each * (parts * (objects - objects // parts) + objects)
+
+    found = equal_cost_epochs(epochs, fraction, parts)
+    assert cost(found) <= held_out < cost(found + 1)
+
+
+def test_the_epochs_of_cross_fitting_are_written_down():
+    config = load_config(CONFIG, ["calibration=crossfit", "estimator.epochs=20"])
+    assert config["crossfit_epochs"] == 8
+    assert load_config(CONFIG)["crossfit_epochs"] is None
+    with pytest.raises(UserError, match="crossfit_epochs=0 is out of range: 1 or more"):
+        load_config(CONFIG, ["calibration=crossfit", "estimator.epochs=2"])
+
+
+@pytest.mark.parametrize(
+    ("handed", "expected"),
     [
         ({"experiment": "quick"}, ["experiment=quick"]),
         ({"n_objects": None}, ["n_objects=null"]),
@@ -163,5 +218,5 @@ def test_another_data_set_gets_its_own_folder():
         ({}, []),
     ],
 )
-def test_what_snakemake_hands_over(given, expected):
-    assert snakemake_overrides(given) == expected
+def test_what_snakemake_hands_over(handed, expected):
+    assert snakemake_overrides(handed) == expected

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from nbv.errors import UserError, nearest
-from nbv.schema import Config, validate
+from nbv.schema import Config
+from nbv.validation import validate
 
 # The key of each group that names what its files configure: valid are the names they hold.
 _NAMING_KEYS = {
@@ -104,13 +105,52 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
         raise UserError(_one_line(error)) from error
     assert isinstance(plain, dict)
     settings = typing.cast(dict[str, Any], plain)
+    # So that a key of one kind of estimator is no setting of another.
+    estimator = {key: value for key, value in settings["estimator"].items() if value is not None}
+    settings["estimator"] = estimator
     if settings["name"] is None:
-        source = settings["dataset"]["source"]
-        suffix = "" if source == "procedural" else f"-{source}"
-        settings["name"] = settings["experiment"] + suffix
+        settings["name"] = _name(settings)
     _check_names(folder, settings)
+    if settings["calibration"] == "crossfit" and settings["crossfit_epochs"] is None:
+        settings["crossfit_epochs"] = equal_cost_epochs(
+            estimator["epochs"], settings["calibration_fraction"], settings["crossfit_parts"]
+        )
     validate(settings)
     return settings
+
+
+def _name(settings: Mapping[str, Any]) -> str:
+    """Return the experiment's name and what sets a run apart from the experiment's own."""
+    apart = {
+        settings["dataset"]["source"]: "procedural",
+        settings["estimator"]["kind"]: "regressor",
+        settings["calibration"]: "holdout",
+    }
+    return "-".join([settings["experiment"], *(name for name, own in apart.items() if name != own)])
+
+
+def equal_cost_epochs(epochs: int, calibration_fraction: float, parts: int) -> int:
+    """Return the epochs of cross-fitting that see as many images as the hold-out does, or fewer.
+
+    Of n objects that are not tested, the hold-out trains on (1 - f) n. Cross-fitting trains k
+    estimators on (1 - 1/k) n and one on n, which is k n in every epoch.
+
+    Parameters
+    ----------
+    epochs : int
+        Of the hold-out.
+    calibration_fraction : float
+        f.
+    parts : int
+        k.
+
+    Returns
+    -------
+    int
+        The largest whole number e with e k <= epochs (1 - f); 0 where a single epoch is too much.
+    """
+    # Rounded first, for 10 * (1 - 0.4) / 2 falls short of 3.
+    return int(round(epochs * (1.0 - calibration_fraction) / parts, 9))
 
 
 def _check_names(directory: Path, settings: Mapping[str, Any]) -> None:

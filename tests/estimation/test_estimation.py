@@ -3,14 +3,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 
 from nbv.angles import circular_distance_deg
 from nbv.errors import UserError
 from nbv.estimation import hardware as hw
-from nbv.estimation.images import direction_targets, to_input
-from nbv.estimation.inference import estimate_azimuth, estimate_objects
+from nbv.estimation.images import to_input
+from nbv.estimation.inference import (
+    decode,
+    estimate_azimuth,
+    network_outputs,
+    outputs_of_parts,
+)
 from nbv.estimation.networks import build_network
-from nbv.estimation.training import train_estimator, train_regressor
+from nbv.estimation.outputs import class_targets, decode_classes, direction_targets
+from nbv.estimation.training import train_estimator, train_network
 from nbv.estimation.weights import Estimator, load_estimator, save_estimator
 
 SETTINGS = {
@@ -22,7 +30,12 @@ SETTINGS = {
     "learning_rate": 3e-3,
     "weight_decay": 1e-2,
 }
+CLASSES = SETTINGS | {"kind": "classifier", "n_classes": 24, "target_bandwidth_deg": 10}
 CPU = hw.Hardware(torch.device("cpu"), torch.float32)
+
+
+def untrained(settings=SETTINGS, side: int = 16, seen: tuple[str, ...] = ()) -> Estimator:
+    return Estimator(build_network(settings, side).eval(), settings, side, seen)
 
 
 @pytest.fixture(autouse=True)
@@ -47,9 +60,9 @@ def clock_faces(n_objects: int, n_views: int = 72, side: int = 16, seed: int = 0
 def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():
     faces = clock_faces(12)
     first, again, other = (
-        train_regressor(faces[:10], SETTINGS | {"epochs": 12}, CPU, seed) for seed in (1, 1, 2)
+        train_network(faces[:10], SETTINGS | {"epochs": 12}, CPU, seed) for seed in (1, 1, 2)
     )
-    estimate, concentration = estimate_azimuth(first, faces[10:], CPU)
+    estimate, concentration = estimate_azimuth(Estimator(first, SETTINGS, 16, []), faces[10:], CPU)
     truth = np.arange(72) * 5.0
     assert circular_distance_deg(estimate, truth).mean() < 6
     assert 0.7 < concentration.mean() < 1.2
@@ -58,12 +71,42 @@ def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():
     assert not torch.equal(states[0]["4.weight"], states[2]["4.weight"])
 
 
-def test_estimates_do_not_depend_on_the_batch():
-    network = build_network(SETTINGS, 16).eval()
-    faces = clock_faces(1, 20)
-    whole, _ = estimate_azimuth(network, faces, CPU)
-    parts, _ = estimate_azimuth(network, faces, CPU, batch_size=7)
-    np.testing.assert_allclose(circular_distance_deg(whole, parts), 0, atol=1e-3)
+def test_a_classifier_learns_to_read_a_clock_and_knows_how_well():
+    faces = clock_faces(12)
+    settings = CLASSES | {"epochs": 12}
+    trained = train_estimator(faces, np.arange(10), ["x"] * 10, settings, CPU, 1)
+    estimate, concentration = estimate_azimuth(trained, faces[10:], CPU)
+    assert circular_distance_deg(estimate, np.arange(72) * 5.0).mean() < 6
+    assert 0.7 < concentration.mean() < 1.0
+
+
+def test_outputs_do_not_depend_on_the_batch():
+    estimator, faces = untrained(), clock_faces(1, 20)
+    whole = network_outputs(estimator, faces, CPU)
+    assert whole.shape == (1, 20, 2)
+    np.testing.assert_allclose(whole, network_outputs(estimator, faces, CPU, 7), atol=1e-5)
+
+
+@given(st.integers(0, 99), st.integers(0, 23), st.floats(0.1, 10))
+def test_decoding_turns_with_the_classes_and_is_the_mean_direction(seed, k, scale):
+    logits = scale * np.random.default_rng(seed).normal(size=24)
+    estimate, length = decode_classes(logits)
+    turned, same = decode_classes(np.roll(logits, k))
+    weights = np.exp(logits) / np.exp(logits).sum()
+    mean = sum(w * np.exp(2j * np.pi * c / 24) for c, w in enumerate(weights))
+    assert length == pytest.approx(abs(mean))
+    assert same == pytest.approx(length)
+    assert circular_distance_deg(turned, estimate + 15 * k) < 1e-6
+    assert circular_distance_deg(estimate, np.degrees(np.angle(mean))) < 1e-6
+
+
+def test_a_temperature_widens_a_classifier_and_leaves_a_regressors_angle():
+    outputs = np.random.default_rng(0).normal(size=(5, 24))
+    lengths = [decode(untrained(CLASSES), outputs, t)[1] for t in (0.5, 1.0, 2.0)]
+    assert (lengths[0] > lengths[1]).all()
+    assert (lengths[1] > lengths[2]).all()
+    cold, warm = (decode(untrained(), outputs[:, :2], t)[0] for t in (1.0, 3.0))
+    np.testing.assert_allclose(cold, warm)
 
 
 def test_an_estimator_comes_back_from_its_file_with_its_history(tmp_path):
@@ -74,22 +117,31 @@ def test_an_estimator_comes_back_from_its_file_with_its_history(tmp_path):
     read = load_estimator(tmp_path / "estimator.safetensors", CPU)
     assert list(read.trained_on) == ["a", "c"]
     assert read.image_side == 16
-    one = estimate_objects(trained, faces, np.array([1]), ["b"], CPU)
-    two = estimate_objects(read, faces, np.array([1]), ["b"], CPU)
-    np.testing.assert_array_equal(one, two)
+    np.testing.assert_array_equal(*(network_outputs(e, faces, CPU) for e in (trained, read)))
+
+
+def test_each_part_is_asked_of_its_own_estimator():
+    torch.manual_seed(0)
+    faces = clock_faces(3, 8)
+    estimators = [untrained(seen=("b",)), untrained(seen=("a", "c"))]
+    parts = [(["c", "a"], np.array([2, 0])), (["b"], np.array([1]))]
+    names, outputs = outputs_of_parts(estimators, faces, parts, CPU)
+    assert names == ["c", "a", "b"]
+    for name, found in zip(names, outputs, strict=True):
+        asked = estimators[1] if name == "b" else estimators[0]
+        np.testing.assert_allclose(found, network_outputs(asked, faces["abc".index(name)], CPU))
 
 
 def test_objects_that_were_trained_on_are_refused():
-    network = build_network(SETTINGS, 16)
-    estimator = Estimator(network, SETTINGS, 16, ["a", "b"])
-    with pytest.raises(UserError, match="'b' was trained on"):
-        estimate_objects(estimator, clock_faces(1, 8), np.array([0]), ["b"], CPU)
+    estimators = [untrained(seen=("a", "b")), untrained(seen=("c",))]
+    parts = [(["c"], np.array([0])), (["b", "c"], np.array([1, 0]))]
+    with pytest.raises(UserError, match="'c' was trained on"):
+        outputs_of_parts(estimators, clock_faces(2, 8), parts, CPU)
 
 
 def test_images_of_another_size_are_refused():
-    estimator = Estimator(build_network(SETTINGS, 16), SETTINGS, 16, [])
     with pytest.raises(UserError, match="32 pixels a side"):
-        estimate_objects(estimator, clock_faces(1, 8, side=32), np.array([0]), ["x"], CPU)
+        network_outputs(untrained(), clock_faces(1, 8, side=32), CPU)
 
 
 def test_a_file_that_is_no_estimator_is_named(tmp_path):
@@ -105,22 +157,37 @@ def test_every_depth_code_is_exact_in_bfloat16():
     np.testing.assert_array_equal(half.float().numpy().ravel(), np.arange(256) / 128)
 
 
-def test_targets_are_the_unit_vectors_of_each_objects_turn():
-    targets = direction_targets(2, 4).numpy()
-    np.testing.assert_allclose(targets[:4], [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-7)
-    np.testing.assert_array_equal(targets[4:], targets[:4])
+def test_targets_of_a_regressor_are_unit_vectors():
+    targets = direction_targets(SETTINGS, 4)
+    np.testing.assert_allclose(targets, [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-7)
+
+
+@given(st.sampled_from([8, 24, 72]), st.floats(2, 60))
+def test_targets_of_a_classifier_are_circular_and_centred_on_the_azimuth(n_classes, bandwidth):
+    settings = {"n_classes": n_classes, "target_bandwidth_deg": bandwidth}
+    targets = class_targets(settings, 360).astype(np.float64)
+    np.testing.assert_allclose(targets.sum(axis=1), 1, atol=1e-6)
+    turned = np.roll(targets, (360 // n_classes, 1), axis=(0, 1))
+    np.testing.assert_allclose(turned, targets, atol=1e-6)
+    centres = np.arange(n_classes) * 360 / n_classes
+    for view in (0, 1, 100, 359):
+        apart = circular_distance_deg(centres, view)
+        by_distance = targets[view][np.argsort(apart)]
+        assert (np.diff(by_distance) <= 1e-7).all()
 
 
 @pytest.mark.parametrize("side", [8, 15, 33, 64])
 def test_any_image_side_fits_the_network(side):
-    assert build_network(SETTINGS, side)(torch.zeros(2, 1, side, side)).shape == (2, 2)
+    images = torch.zeros(2, 1, side, side)
+    assert build_network(SETTINGS, side)(images).shape == (2, 2)
+    assert build_network(CLASSES, side)(images).shape == (2, 24)
 
 
 def test_bfloat16_and_float32_answer_alike():
     faces = clock_faces(8)
-    network = train_regressor(faces[:7], SETTINGS, CPU, 0)
-    full, _ = estimate_azimuth(network, faces[7:], CPU)
-    half, _ = estimate_azimuth(network, faces[7:], hw.Hardware(torch.device("cpu"), torch.bfloat16))
+    trained = train_estimator(faces, np.arange(7), ["x"] * 7, SETTINGS, CPU, 0)
+    full, _ = estimate_azimuth(trained, faces[7:], CPU)
+    half, _ = estimate_azimuth(trained, faces[7:], hw.Hardware(torch.device("cpu"), torch.bfloat16))
     assert np.median(circular_distance_deg(full, half)) < 1.0
 
 

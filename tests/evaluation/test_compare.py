@@ -288,6 +288,14 @@ def test_other_settings_come_first_and_speak_against_agreement(finished, run):
     assert "cells identical" in comparison.lines()[1]
 
 
+def test_a_key_that_is_younger_than_the_reference_has_its_default_there():
+    assert differing_settings({}, {"calibration": "holdout", "beside": ["other"]}) == ()
+    changed = ("calibration", "holdout", "crossfit")
+    assert differing_settings({}, {"calibration": "crossfit"}) == (changed,)
+    younger = {"estimator": {"n_classes": 72}}
+    assert differing_settings({"estimator": {}}, younger) == (("estimator.n_classes", None, 72),)
+
+
 def test_names_paths_hardware_and_versions_are_only_mentioned(finished, run):
     text = CONFIGURATION.replace("name: synthetic", "name: other")
     text = text.replace("root: null", "root: /data").replace("auto", "float32")

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.recommendation.test_definitions import N_BINS, estimates, evidence_of
 
 from nbv.angles import circular_distance_deg
 from nbv.recommendation import belief
 from nbv.recommendation.criteria import CRITERIA
+
+B = 12
+
+
+def random_rows(seed, n):
+    return np.random.default_rng(seed).dirichlet(np.full(B, 0.5), n)
 
 
 @pytest.mark.parametrize("criterion", ["entropy", "information_gain", "expected_dispersion"])
@@ -99,3 +107,31 @@ def test_more_views_of_an_honest_estimator_err_less():
         errors.append(circular_distance_deg(belief.mean_direction_deg(beliefs), starts).mean())
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 0.5 * errors[0]
+
+
+@given(st.integers(0, 99), st.integers(0, B - 1), st.integers(0, B - 1))
+def test_fusing_multiplies_in_the_frame_of_the_first_view(seed, delta, k):
+    first, second = random_rows(seed, 1), random_rows(seed + 1, 1)
+    found = belief.fuse_beliefs(first, second, np.array([delta * 30]))
+    product = [first[0, t] * second[0, (t + delta) % B] for t in range(B)]
+    mean = sum(p * np.exp(2j * np.pi * t / B) for t, p in enumerate(product))
+    assert circular_distance_deg(found[0], np.degrees(np.angle(mean))) < 1e-6
+    turned = belief.fuse_beliefs(
+        np.roll(first, k, axis=1), np.roll(second, k, axis=1), np.array([delta * 30])
+    )
+    assert circular_distance_deg(turned[0], found[0] + 30 * k) < 1e-6
+
+
+def test_images_that_exclude_each_other_fall_back_on_the_first():
+    first, second = np.eye(B)[[3]], np.eye(B)[[8]]
+    assert belief.fuse_beliefs(first, second, np.array([60]))[0] == pytest.approx(90)
+
+
+def test_beliefs_in_parts_give_what_they_give_at_once(monkeypatch):
+    evidence = evidence_of()
+    beliefs = np.random.default_rng(5).dirichlet(np.ones(N_BINS), 7).astype(np.float32)
+    whole = belief.worth("information_gain", beliefs, evidence)
+    monkeypatch.setattr(belief, "_CHUNK", 3 * N_BINS**2)
+    np.testing.assert_allclose(
+        belief.worth("information_gain", beliefs, evidence), whole, atol=1e-5
+    )

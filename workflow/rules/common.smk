@@ -82,6 +82,9 @@ ENVIRONMENT = "../environment.yaml"
 LAST_ERROR = f"{RESULTS}/logs/last_error.txt"
 FOLDS = range(1, CONFIG["n_folds"] + 1)
 BASELINE_METHODS = [name for name in CONFIG["methods"] if name not in LOOKUP_METHODS]
+# Parts of a fold's training objects, where calibration is cross-fitted.
+CROSSFIT = CONFIG["calibration"] == "crossfit"
+PARTS = range(1, CONFIG["crossfit_parts"] + 1) if CROSSFIT else []
 # A unit is what has an estimator of its own in each fold: a category at an elevation.
 FOLD = "{category}/el{elevation}/fold{fold}"
 UNITS = [
@@ -95,6 +98,7 @@ wildcard_constraints:
     category="|".join(map(re.escape, CATEGORIES)),
     elevation=r"\d\d",
     fold="|".join(map(str, FOLDS)),
+    part="|".join(map(str, PARTS)) or "none",
     method="|".join(map(re.escape, LOOKUP_METHODS)) or "none",
     criterion="|".join(LOOKUP_ROTATIONS) or "none",
 
@@ -126,6 +130,17 @@ def all_sources():
     """What the results as a whole were made with."""
     scripts = (BASE / "workflow/scripts").glob("*.py")
     return sorted({file for script in scripts for file in sources(script.stem)})
+
+
+def has_posteriors(configuration):
+    """Whether a run's estimator has classes, and so says how likely each azimuth is."""
+    return "n_classes" in configuration["estimator"]
+
+
+def evaluated(configuration):
+    """The names of the errors in a run's folder `evaluation`."""
+    own = ["belief"] if has_posteriors(configuration) else []
+    return [*configuration["methods"], *own]
 
 
 def unit_names(units):

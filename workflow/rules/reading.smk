@@ -3,7 +3,7 @@
 import os
 
 from nbv.evaluation.figures import FIGURES
-from nbv.evaluation.reference import find_reference
+from nbv.evaluation.reference import find_reference, read_configuration
 from nbv.evaluation.settings import (
     ReadingSettings,
     focus_category,
@@ -77,3 +77,51 @@ def reference_of_run(wildcards):
         return str(find_reference(REFERENCES, CONFIG) / "configuration.yaml")
     except UserError as error:
         stop(error)
+
+
+def runs_beside():
+    """Configurations of this run and those beside it, by name, this one first."""
+    runs = {CONFIG["name"]: CONFIG}
+    for name in CONFIG["beside"]:
+        if name not in runs:
+            try:
+                runs[name] = read_configuration(Path("results") / name)
+            except UserError as error:
+                stop(f"beside: {error}")
+    return runs
+
+
+def files_of_runs(files_of):
+    """What a table reads of every run; other runs' files are not made here, and have to be there."""
+    found = []
+    for name, configuration in runs_beside().items():
+        files = expand(
+            f"results/{name}/{{file}}",
+            file=[
+                path
+                for unit in unit_names(REFERENCE_UNITS)
+                for fold in FOLDS
+                for path in files_of(f"{unit}/fold{fold}", configuration)
+            ],
+        )
+        missing = [path for path in files if not Path(path).exists()]
+        if missing and name != CONFIG["name"]:
+            stop(f"beside: {missing[0]} does not exist; finish the run {name} first")
+        found += files
+    return found
+
+
+def likelihood_files(place, configuration):
+    own = has_posteriors(configuration)
+    return [
+        f"estimates/{place}/test.csv",
+        f"lookup/{place}/entropy.npz",
+        *(f"evaluation/{place}/{name}.csv" for name in ("single", "opposite")),
+        f"evaluation/{place}/proposed.csv",
+        *([f"estimates/{place}/test_posteriors.npz"] if own else []),
+        *([f"evaluation/{place}/belief.csv"] if own else []),
+    ]
+
+
+def evaluation_files(place, configuration):
+    return [f"evaluation/{place}/{name}.csv" for name in evaluated(configuration)]

@@ -76,6 +76,31 @@ rule evaluate_recommended:
         script_path("evaluate_recommended")
 
 
+# Recommends from what the estimator says of each image, and looks nothing up but a density's choice.
+rule evaluate_belief:
+    input:
+        sources("evaluate_belief"),
+        splits=rules.splits.output[0],
+        calibration=rules.estimate.output.calibration,
+        test=rules.estimate.output.test,
+        posteriors=f"{RESULTS}/estimates/{FOLD}/test_posteriors.npz",
+        lookup=f"{RESULTS}/lookup/{FOLD}/entropy.npz",
+    output:
+        f"{RESULTS}/evaluation/{FOLD}/belief.csv",
+    log:
+        log_path(f"evaluate_belief/{FOLD}"),
+    benchmark:
+        benchmark_path(f"evaluate_belief/{FOLD}")
+    conda:
+        ENVIRONMENT
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    script:
+        script_path("evaluate_belief")
+
+
 rule lookups:
     input:
         per_fold(
@@ -86,4 +111,4 @@ rule lookups:
 
 rule evaluation:
     input:
-        per_fold("evaluation", [f"{method}.csv" for method in CONFIG["methods"]]),
+        per_fold("evaluation", [f"{method}.csv" for method in evaluated(CONFIG)]),

@@ -44,6 +44,7 @@ rule splits:
         mem_mb=500,
         runtime=5,
     params:
+        **({"crossfit_parts": len(PARTS)} if CROSSFIT else {}),
         n_folds=CONFIG["n_folds"],
         calibration_fraction=CONFIG["calibration_fraction"],
         seed=CONFIG["seed"],

@@ -14,5 +14,6 @@ with job(snakemake):
         params.n_folds,
         params.calibration_fraction,
         rng_for(params.seed, "splits", snakemake.wildcards.category),
+        params.get("crossfit_parts"),
     )
     write_csv(snakemake.output[0], splits)

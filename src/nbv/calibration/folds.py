@@ -1,10 +1,15 @@
-"""Which object is trained on, calibrated with and tested on, in each fold."""
+"""Which object is trained on, calibrated with and tested on, in each fold.
+
+Held out: the roles are train, calibration and test. Cross-fitted: part1, part2, … and test. Each
+part is calibrated by an estimator of the other parts; the one for test objects trains on them all.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,8 +19,8 @@ from nbv.amounts import enough_objects
 from nbv.errors import UserError
 from nbv.files import read_csv
 
-Role = Literal["train", "calibration", "test"]
-ROLES: tuple[Role, ...] = ("train", "calibration", "test")
+ROLES = ("train", "calibration", "test")
+_PART = re.compile(r"part([1-9]\d*)")
 
 
 def make_splits(
@@ -23,11 +28,13 @@ def make_splits(
     n_folds: int,
     calibration_fraction: float,
     rng: np.random.Generator,
+    crossfit_parts: int | None = None,
 ) -> pd.DataFrame:
     """Divide objects into folds; each object is tested in exactly one.
 
     Of a fold's remaining objects, `calibration_fraction` (at least one, and at least one is left
-    to train on) calibrate and the others train.
+    to train on) calibrate and the others train; or they are divided into parts. Which objects a
+    fold tests does not depend on that.
 
     Parameters
     ----------
@@ -35,6 +42,8 @@ def make_splits(
     n_folds : int, 2 or more
     calibration_fraction : float in (0, 1)
     rng : numpy.random.Generator
+    crossfit_parts : int, 2 or more, optional
+        Parts of equal size (to within one object) for cross-fitting; none where held out.
 
     Returns
     -------
@@ -59,8 +68,16 @@ def make_splits(
     for fold in range(1, n_folds + 1):
         roles = np.where(fold_of == fold, "test", "train").astype(object)
         rest = np.flatnonzero(fold_of != fold)
-        n_calibration = int(np.clip(round(calibration_fraction * len(rest)), 1, len(rest) - 1))
-        roles[rng.choice(rest, n_calibration, replace=False)] = "calibration"
+        if crossfit_parts is None:
+            n_calibration = int(np.clip(round(calibration_fraction * len(rest)), 1, len(rest) - 1))
+            roles[rng.choice(rest, n_calibration, replace=False)] = "calibration"
+        elif crossfit_parts > len(rest):
+            raise UserError(
+                f"crossfit_parts={crossfit_parts}: fold {fold} has {len(rest)} objects to divide"
+            )
+        else:
+            parts = np.arange(len(rest)) % crossfit_parts + 1
+            roles[rng.permutation(rest)] = [f"part{part}" for part in parts]
         rows.append(pd.DataFrame({"object_id": object_ids, "fold": fold, "role": roles}))
     return pd.concat(rows, ignore_index=True)
 
@@ -83,14 +100,40 @@ def read_splits(path: str | Path) -> pd.DataFrame:
     splits = read_csv(path)
     if list(splits.columns) != ["object_id", "fold", "role"]:
         raise UserError(f"{path}: the columns must be object_id, fold, role")
-    unknown = set(splits["role"]) - set(ROLES)
+    unknown = sorted(
+        role for role in set(splits["role"]) if role not in ROLES and not _PART.fullmatch(str(role))
+    )
     if unknown:
-        raise UserError(f"{path}: role {sorted(unknown)[0]!r} is none of {', '.join(ROLES)}")
+        raise UserError(f"{path}: role {unknown[0]!r} is none of {', '.join(ROLES)}, part1, …")
     return splits
 
 
-def objects_with_role(splits: pd.DataFrame, fold: int, role: Role) -> Chosen:
-    """Return the objects of one role in one fold, after asserting that no object has two roles.
+def calibration_roles(splits: pd.DataFrame) -> tuple[str, ...]:
+    """Return the roles that are calibrated with, each by an estimator that has not seen it.
+
+    One where held out, calibrated by the estimator that is tested; else every part in order.
+    """
+    parts = {role for role in splits["role"] if _PART.fullmatch(role)}
+    return tuple(sorted(parts, key=lambda role: int(role[4:]))) or ("calibration",)
+
+
+def training_roles(splits: pd.DataFrame, without: int | None = None) -> tuple[str, ...]:
+    """Return the roles that an estimator trains on.
+
+    Parameters
+    ----------
+    splits : DataFrame
+    without : int, optional
+        The part that the estimator is to calibrate; None for the one that test objects meet.
+    """
+    roles = calibration_roles(splits)
+    if roles == ("calibration",):
+        return ("train",)
+    return tuple(role for role in roles if role != f"part{without}")
+
+
+def objects_with_role(splits: pd.DataFrame, fold: int, *roles: str) -> Chosen:
+    """Return the objects of some roles in one fold, after asserting that none has two roles.
 
     Raises
     ------
@@ -103,17 +146,18 @@ def objects_with_role(splits: pd.DataFrame, fold: int, role: Role) -> Chosen:
     repeated = of_fold.loc[of_fold["object_id"].duplicated(), "object_id"]
     if len(repeated):
         raise UserError(f"fold {fold} gives object {repeated.iloc[0]!r} more than one role")
-    rows = np.flatnonzero((of_fold["role"] == role).to_numpy())
+    rows = np.flatnonzero(of_fold["role"].isin(roles).to_numpy())
     return Chosen([str(name) for name in of_fold["object_id"].iloc[rows]], rows)
 
 
-def assert_role(splits: pd.DataFrame, fold: int, role: Role, object_ids: Iterable[str]) -> None:
+def assert_role(splits: pd.DataFrame, fold: int, role: str, object_ids: Iterable[str]) -> None:
     """Raise UserError where an object that was read has another role in this fold, naming it.
 
     This holds what is read to the splits: no object may be trained on and calibrated or tested
-    with, wherever its file came from.
+    with, wherever its file came from. ``calibration`` stands for all `calibration_roles`.
     """
-    strangers = sorted(set(object_ids) - set(objects_with_role(splits, fold, role).ids))
+    roles = calibration_roles(splits) if role == "calibration" else (role,)
+    strangers = sorted(set(object_ids) - set(objects_with_role(splits, fold, *roles).ids))
     if strangers:
         raise UserError(
             f"object {strangers[0]!r} is no {role} object of fold {fold}: estimates and splits are "

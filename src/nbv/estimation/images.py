@@ -28,13 +28,3 @@ def to_input(codes: NDArray[np.uint8], hardware: Hardware) -> torch.Tensor:
     flat = torch.from_numpy(np.ascontiguousarray(codes).reshape(-1, 1, side, side))
     scaled = flat.to(hardware.device).to(hardware.dtype).mul_(1 / 128)
     return scaled.contiguous(memory_format=torch.channels_last)
-
-
-def direction_targets(n_objects: int, n_views: int) -> torch.Tensor:
-    """Return (cos, sin) of the azimuth of every view, (n_objects * n_views, 2) float32.
-
-    View k of n has the azimuth 360 k / n.
-    """
-    angles = 2 * np.pi * np.arange(n_views) / n_views
-    unit = np.stack([np.cos(angles), np.sin(angles)], axis=1).astype(np.float32)
-    return torch.from_numpy(np.tile(unit, (n_objects, 1)))

@@ -1,4 +1,4 @@
-"""Estimating azimuths with a trained network."""
+"""What a trained network answers for images."""
 
 from __future__ import annotations
 
@@ -7,67 +7,73 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import nn
 
-from nbv.angles import direction_deg
 from nbv.errors import UserError
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.images import to_input
+from nbv.estimation.networks import kind_of
+from nbv.estimation.outputs import Outputs
 from nbv.estimation.weights import Estimator
 
 
-def estimate_objects(
-    estimator: Estimator,
+def outputs_of_parts(
+    estimators: Sequence[Estimator],
     depth: NDArray[np.uint8],
-    rows: NDArray[np.intp],
-    object_ids: Sequence[str],
+    parts: Sequence[tuple[Sequence[str], NDArray[np.intp]]],
     hardware: Hardware,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Estimate every view of some objects of a depth file, none of which was trained on.
+) -> tuple[list[str], Outputs]:
+    """Return the outputs for some objects of a depth file, divided among estimators.
 
     Parameters
     ----------
-    estimator : Estimator
+    estimators : sequence of Estimator
+        One for each part: the whole is one part, or each is asked about what it has not seen.
     depth : ndarray (n_objects, n_views, side, side) uint8
         All objects of a category.
-    rows, object_ids
-        Which of them to estimate, and their names.
+    parts : sequence of (names, rows)
+        The objects of each part, and where they stand among all.
     hardware : Hardware
 
     Returns
     -------
-    estimate_deg, concentration : ndarray (n, n_views) float64
+    object_ids : list of str
+        n objects, part by part.
+    outputs : ndarray (n, n_views, k) float64
 
     Raises
     ------
     UserError
-        Where the estimator has seen one of the objects, or images of another size.
+        Where an estimator has seen one of its objects, or images of another size.
     """
+    names: list[str] = []
+    outputs = []
+    for estimator, (object_ids, rows) in zip(estimators, parts, strict=True):
+        _refuse_objects_seen(estimator, object_ids)
+        names += object_ids
+        outputs.append(network_outputs(estimator, depth[rows], hardware))
+    return names, np.concatenate(outputs)
+
+
+def _refuse_objects_seen(estimator: Estimator, object_ids: Sequence[str]) -> None:
     seen = sorted(set(object_ids) & set(estimator.trained_on))
     if seen:
         raise UserError(
             f"object {seen[0]!r} was trained on: its estimates say nothing; train again"
         )
-    if depth.shape[-1] != estimator.image_side:
-        raise UserError(
-            f"the images have {depth.shape[-1]} pixels a side, the estimator was trained on "
-            f"{estimator.image_side}; train again"
-        )
-    return estimate_azimuth(estimator.network, depth[rows], hardware)
 
 
-def estimate_azimuth(
-    network: nn.Module,
+def network_outputs(
+    estimator: Estimator,
     codes: NDArray[np.uint8],
     hardware: Hardware,
     batch_size: int = 1024,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Estimate the azimuth that each image was taken from (Eq. 4).
+) -> Outputs:
+    """Return the network's outputs for images.
 
     Parameters
     ----------
-    network : torch.nn.Module
-        A regressor, in evaluation mode.
+    estimator : Estimator
+        Its network in evaluation mode.
     codes : ndarray (..., side, side) uint8
         Depth codes.
     hardware : Hardware
@@ -75,18 +81,53 @@ def estimate_azimuth(
 
     Returns
     -------
-    estimate_deg : ndarray (...) float64
-        In [0, 360).
-    concentration : ndarray (...) float64
-        The length of the (cos, sin) output.
+    ndarray (..., k) float64
+
+    Raises
+    ------
+    UserError
+        Where the estimator was trained on images of another size.
     """
     side = codes.shape[-1]
+    if side != estimator.image_side:
+        raise UserError(
+            f"the images have {side} pixels a side, the estimator was trained on "
+            f"{estimator.image_side}; train again"
+        )
     flat = codes.reshape(-1, side, side)
     outputs = []
     with torch.inference_mode(), hardware.autocast():
         for start in range(0, len(flat), batch_size):
-            output = network(to_input(flat[start : start + batch_size], hardware))
+            output = estimator.network(to_input(flat[start : start + batch_size], hardware))
             outputs.append(output.float().cpu().numpy().astype(np.float64))
-    vectors = np.concatenate(outputs).reshape(*codes.shape[:-2], 2)
-    cosine, sine = vectors[..., 0], vectors[..., 1]
-    return direction_deg(cosine, sine), np.hypot(cosine, sine)
+    return np.concatenate(outputs).reshape(*codes.shape[:-2], -1)
+
+
+def decode(
+    estimator: Estimator, outputs: Outputs, temperature: float = 1.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the azimuth that outputs tell (Eq. 4), and how sure it is.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        Whose outputs they are.
+    outputs : ndarray (..., k)
+    temperature : float
+        Divides the outputs; a regressor's angle does not depend on it.
+
+    Returns
+    -------
+    estimate_deg : ndarray (...)
+        In [0, 360).
+    concentration : ndarray (...)
+        The length of the (cos, sin) output, or the resultant length of a classifier's distribution.
+    """
+    return kind_of(estimator.settings).decode(outputs / temperature)
+
+
+def estimate_azimuth(
+    estimator: Estimator, codes: NDArray[np.uint8], hardware: Hardware, temperature: float = 1.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Estimate the azimuth that each image was taken from: `network_outputs`, then `decode`."""
+    return decode(estimator, network_outputs(estimator, codes, hardware), temperature)

@@ -1,14 +1,23 @@
-"""The networks. A network maps images (n, 1, side, side) to outputs (n, k)."""
+"""The kinds of estimators. A network maps images (n, 1, side, side) to outputs (n, k)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import torch
 from torch import nn
 
 from nbv.errors import UserError, nearest
+from nbv.estimation.outputs import (
+    Outputs,
+    Settings,
+    Targets,
+    class_targets,
+    decode_classes,
+    decode_directions,
+    direction_targets,
+)
 
 
 def _strided_trunk(channels: list[int]) -> nn.Sequential:
@@ -23,7 +32,21 @@ def _strided_trunk(channels: list[int]) -> nn.Sequential:
     return nn.Sequential(*layers)
 
 
-def regressor(settings: Mapping[str, Any], image_side: int) -> nn.Module:
+def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.Module:
+    channels = list(settings["channels"])
+    side = image_side
+    for _ in channels:
+        side = (side + 1) // 2
+    return nn.Sequential(
+        _strided_trunk(channels),
+        nn.Flatten(),
+        nn.Linear(channels[-1] * side * side, settings["hidden"]),
+        nn.ReLU(inplace=True),
+        nn.Linear(settings["hidden"], n_outputs),
+    )
+
+
+def regressor(settings: Settings, image_side: int) -> nn.Module:
     """Return a network in the spirit of Pose-CyclicR-Net with the outputs (cos, sin).
 
     Strided convolutions with batch normalisation, one hidden layer, two linear outputs (paper,
@@ -37,23 +60,57 @@ def regressor(settings: Mapping[str, Any], image_side: int) -> nn.Module:
     image_side : int
         Pixels.
     """
-    channels = list(settings["channels"])
-    side = image_side
-    for _ in channels:
-        side = (side + 1) // 2
-    return nn.Sequential(
-        _strided_trunk(channels),
-        nn.Flatten(),
-        nn.Linear(channels[-1] * side * side, settings["hidden"]),
-        nn.ReLU(inplace=True),
-        nn.Linear(settings["hidden"], 2),
-    )
+    return _strided_network(settings, image_side, 2)
 
 
-NETWORKS: dict[str, Callable[[Mapping[str, Any], int], nn.Module]] = {"regressor": regressor}
+def classifier(settings: Settings, image_side: int) -> nn.Module:
+    """Return the regressor's network with one logit for each of ``n_classes`` azimuths."""
+    return _strided_network(settings, image_side, settings["n_classes"])
 
 
-def build_network(settings: Mapping[str, Any], image_side: int) -> nn.Module:
+@dataclass(frozen=True)
+class Kind:
+    """A kind of estimator.
+
+    Attributes
+    ----------
+    network : callable
+        ``network(settings, image_side)``, untrained.
+    targets : callable
+        ``targets(settings, n_views)``: what is wanted of each view of a turn, (n_views, k).
+    loss : callable
+        ``loss(outputs, targets)``, a scalar tensor.
+    decode : callable
+        ``decode(outputs)``: the angle (degrees in [0, 360)) and how sure it is, of (..., k) each.
+    """
+
+    network: Callable[[Settings, int], nn.Module]
+    targets: Callable[[Settings, int], Targets]
+    loss: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+    decode: Callable[[Outputs], tuple[Outputs, Outputs]]
+
+
+KINDS: dict[str, Kind] = {
+    "regressor": Kind(regressor, direction_targets, nn.functional.mse_loss, decode_directions),
+    "classifier": Kind(classifier, class_targets, nn.functional.cross_entropy, decode_classes),
+}
+
+
+def kind_of(settings: Settings) -> Kind:
+    """Return the kind that ``settings["kind"]`` names.
+
+    Raises
+    ------
+    UserError
+        For an unknown kind.
+    """
+    name = settings["kind"]
+    if name not in KINDS:
+        raise UserError(f"estimator.kind={name}: {nearest(name, KINDS)}")
+    return KINDS[name]
+
+
+def build_network(settings: Settings, image_side: int) -> nn.Module:
     """Return an untrained network of the kind that ``settings["kind"]`` names.
 
     Its weights come from torch's global generator; seed that first.
@@ -63,10 +120,7 @@ def build_network(settings: Mapping[str, Any], image_side: int) -> nn.Module:
     UserError
         For an unknown kind.
     """
-    kind = settings["kind"]
-    if kind not in NETWORKS:
-        raise UserError(f"estimator.kind={kind}: {nearest(kind, NETWORKS)}")
-    network = NETWORKS[kind](settings, image_side)
+    network = kind_of(settings).network(settings, image_side)
     # torch's annotations lack this form of `to`, which works in place.
     network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     return network

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from torch import nn
 
 from nbv.estimation.hardware import Hardware
-from nbv.estimation.images import direction_targets, to_input
-from nbv.estimation.networks import build_network
+from nbv.estimation.images import to_input
+from nbv.estimation.networks import build_network, kind_of
 from nbv.estimation.weights import Estimator
 
 log = logging.getLogger(__name__)
@@ -67,26 +67,27 @@ def train_estimator(
     object_ids : sequence of str
         Their names, kept with the weights.
     settings, hardware, seed
-        As in `train_regressor`.
+        As in `train_network`.
     """
-    network = train_regressor(depth[rows], settings, hardware, seed)
+    network = train_network(depth[rows], settings, hardware, seed)
     return Estimator(network, settings, depth.shape[-1], object_ids)
 
 
-def train_regressor(
+def train_network(
     codes: NDArray[np.uint8],
     settings: Mapping[str, Any],
     hardware: Hardware,
     seed: int,
 ) -> nn.Module:
-    """Train a regressor of (cos, sin) on squared error with AdamW and a one-cycle schedule.
+    """Train a network on its kind's targets and loss, with AdamW and a one-cycle schedule.
 
     Parameters
     ----------
     codes : ndarray (n_objects, n_views, side, side) uint8
         Training images; view k of n has the azimuth 360 k / n.
     settings : mapping
-        ``kind, channels, hidden, epochs, batch_size, learning_rate, weight_decay``.
+        ``kind, channels, hidden, epochs, batch_size, learning_rate, weight_decay``, and what the
+        kind needs besides.
     hardware : Hardware
     seed : int
         Of the weights and of the order of the images: the same seed on the same machine gives the
@@ -98,10 +99,12 @@ def train_regressor(
         In evaluation mode, on the hardware's device.
     """
     n_objects, n_views, side, _ = codes.shape
+    kind = kind_of(settings)
     torch.manual_seed(seed)
     network = build_network(settings, side).to(hardware.device)
     images = to_input(codes, hardware)
-    targets = direction_targets(n_objects, n_views).to(hardware.device)
+    of_one = kind.targets(settings, n_views)
+    targets = torch.from_numpy(np.tile(of_one, (n_objects, 1))).to(hardware.device)
     n_images, batch_size, n_epochs = len(images), settings["batch_size"], settings["epochs"]
     batches = max(n_images // batch_size, 1)
     optimiser = torch.optim.AdamW(
@@ -123,7 +126,7 @@ def train_regressor(
             optimiser.zero_grad(set_to_none=True)
             with hardware.autocast():
                 output = network(images[chosen])
-            loss = nn.functional.mse_loss(output.float(), targets[chosen])
+            loss = kind.loss(output.float(), targets[chosen])
             loss.backward()  # type: ignore[no-untyped-call]
             optimiser.step()
             schedule.step()

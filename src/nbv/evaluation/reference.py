@@ -17,6 +17,7 @@ from nbv.evaluation.results import existing
 from nbv.evaluation.transfer import TRANSFER
 from nbv.files import read_csv, replacing
 from nbv.rendering.sensors import IDEAL
+from nbv.schema import default_of
 
 log = logging.getLogger(__name__)
 
@@ -31,18 +32,22 @@ Cell = dict[str, Any]
 CELL_KEY = ("row", "method", "metric")
 """What tells the cells of one table apart."""
 
-# They say where files lie, and on what hardware and in which precision an estimator is trained:
-# that, too, is a retrained estimator and no other experiment.
+# They say where files lie, what is shown beside, and on what hardware and in which precision an
+# estimator is trained: that, too, is a retrained estimator and no other experiment.
 _SURROUNDINGS = frozenset(
     {
         "experiment",
         "name",
+        "beside",
         "dataset.root",
         "dataset.exclude_file",
         "estimator.device",
         "estimator.precision",
     }
 )
+# What the paper's own tables do not depend on.
+_BEYOND = frozenset({TRANSFER, "contenders", "leaderboard_runs", "sequence"})
+_FREE_TRAVEL = {"travel_cost": 0.0, "max_travel_deg": 180.0}
 _KEPT = ("tables/*.csv", "tables/*.md", "tables/*.tex", "figures/*.png")
 _REQUIRED = (
     "claims.csv",
@@ -211,7 +216,9 @@ def differing_settings(
 
 def _telling(configuration: Mapping[str, Any]) -> dict[str, Any]:
     """Leave out what no table that every run has depends on."""
-    kept = {key: value for key, value in configuration.items() if key != TRANSFER}
+    kept = {key: value for key, value in configuration.items() if key not in _BEYOND}
+    if kept.get("recommendation") == _FREE_TRAVEL:
+        del kept["recommendation"]
     if kept.get("sensor", {}).get("name") == IDEAL:
         kept["sensor"] = {"name": IDEAL}
     return kept
@@ -243,7 +250,9 @@ def _differences(
     theirs: Mapping[str, Any], mine: Mapping[str, Any], prefix: str = ""
 ) -> Iterator[SettingDifference]:
     for key in dict.fromkeys([*theirs, *mine]):
-        a, b = theirs.get(key, UNSET), mine.get(key, UNSET)
+        # A key that is younger than one of the two has its default there.
+        otherwise = default_of(f"{prefix}{key}", UNSET)
+        a, b = theirs.get(key, otherwise), mine.get(key, otherwise)
         if isinstance(a, Mapping) and isinstance(b, Mapping):
             yield from _differences(a, b, f"{prefix}{key}.")
         elif a != b:

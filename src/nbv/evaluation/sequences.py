@@ -19,6 +19,7 @@ from nbv.recommendation.belief import (
     first_beliefs,
     mean_direction_deg,
     updated,
+    worth,
 )
 from nbv.recommendation.evidence import Evidence
 from nbv.recommendation.fusion import Rotations
@@ -27,7 +28,6 @@ from nbv.recommendation.lookup import least_ambiguous_delta
 COLUMNS = ("method", "n_views", "object_id", "error_deg", "travel_deg")
 BISECTING_DEG = (180, 90, 270, 45, 225, 135, 315)
 COARSE_BINS = 120
-_BATCH = 200
 
 
 @dataclass(frozen=True)
@@ -64,15 +64,10 @@ def recommended_step(criterion: str, coarse: Evidence, min_separation_deg: float
     """
 
     def step(walk: Walk, rng: np.random.Generator) -> Rotations:
-        worth = np.concatenate(
-            [
-                BELIEF_CRITERIA[criterion](coarser(part, coarse.n_bins), coarse)
-                for part in np.array_split(walk.beliefs, -(-len(walk.beliefs) // _BATCH))
-            ]
-        )
+        gain = worth(criterion, coarser(walk.beliefs, coarse.n_bins), coarse)
         rotations = np.arange(coarse.n_bins) * (360.0 / coarse.n_bins)
         apart = circular_distance_deg(walk.taken_deg[:, :, None], rotations).min(axis=1)
-        return least_ambiguous_delta(np.where(apart < min_separation_deg, np.inf, worth))
+        return least_ambiguous_delta(np.where(apart < min_separation_deg, np.inf, gain))
 
     return step
 

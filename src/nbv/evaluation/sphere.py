@@ -20,6 +20,7 @@ from nbv.recommendation.belief import (
     first_beliefs,
     mean_direction_deg,
     updated,
+    worth,
 )
 from nbv.recommendation.evidence import Evidence
 from nbv.recommendation.lookup import least_ambiguous_delta
@@ -131,7 +132,7 @@ def _from_elevation(
             continue
         coarse = coarser(first_beliefs(first_deg, mine[criterion](n_views)), COARSE_BINS)
         worths = {
-            other: BELIEF_CRITERIA[criterion](coarse, evidences[other][criterion](COARSE_BINS))
+            other: worth(criterion, coarse, evidences[other][criterion](COARSE_BINS))
             for other in (elevation, *(e for e in tests if e != elevation))
         }
         circle = best_view({elevation: worths[elevation]})

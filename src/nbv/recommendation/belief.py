@@ -1,7 +1,8 @@
 """More than two views: what is believed of the pose after any number of looks.
 
 A belief b(theta) starts as V[e1] and is multiplied by L[theta + delta_t, e_t] after each look,
-theta always being the pose in the first view (design, section 3). A criterion over beliefs says
+theta always being the pose in the first view (design, section 3); or it is what an image says of
+itself, where the estimator gives a distribution. A criterion over beliefs says
 what each next rotation, counted from the first view, is worth; lower is better. At a belief V[e]
 the information gain and the expected dispersion are row e of their lookup tables.
 """
@@ -9,6 +10,7 @@ the information gain and the expected dispersion are row e of their lookup table
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -24,6 +26,8 @@ Angles = NDArray[np.float64]
 
 # Of the calibration views, in bins; neighbouring views tell much the same.
 _STRIDE = 2
+# Numbers in the largest array that a criterion makes of several beliefs at once.
+_CHUNK = 2**22
 
 
 def first_beliefs(estimate_deg: Angles, evidence: Evidence) -> Beliefs:
@@ -70,6 +74,40 @@ def coarser(beliefs: Beliefs, n_bins: int) -> Beliefs:
     width = beliefs.shape[1] // n_bins
     centred = np.roll(beliefs, width // 2, axis=1)
     return np.asarray(centred.reshape(len(beliefs), n_bins, width).sum(axis=2))
+
+
+def fuse_beliefs(
+    first: NDArray[np.floating[Any]],
+    second: NDArray[np.floating[Any]],
+    delta_deg: NDArray[np.int64],
+) -> Angles:
+    """Return the mean direction of the pose given two images, in [0, 360) degrees.
+
+    The direction of sum_theta b1(theta) b2(theta + delta) / p0 exp(i theta), the prior p0 of the
+    pose being uniform. Bayes' rule gives this posterior where the two images are independent given
+    the pose. They are not quite: both show the same object, and what is unusual about it misleads
+    both looks alike, so the product is surer than it should be.
+
+    Parameters
+    ----------
+    first, second : ndarray (n, B), rows summing to 1
+        Beliefs from each image alone, each in the frame of its own view.
+    delta_deg : ndarray (n,) int
+        The rotations between them, multiples of 360 / B.
+
+    Returns
+    -------
+    ndarray (n,)
+        In the frame of the first view; its own mean direction where the two exclude each other.
+    """
+    n_bins = first.shape[1]
+    bins = np.arange(n_bins)
+    seen = (bins + nearest_bin(delta_deg, n_bins)[:, None]) % n_bins
+    own = np.asarray(first, dtype=np.float64)
+    both = own * np.take_along_axis(np.asarray(second, dtype=np.float64), seen, axis=1)
+    both = np.where(both.sum(axis=1, keepdims=True) > 0, both, own)
+    angles = 2 * np.pi * bins / n_bins
+    return direction_deg(both @ np.cos(angles), both @ np.sin(angles))
 
 
 def _predicted(beliefs: Beliefs, evidence: Evidence) -> Beliefs:
@@ -145,3 +183,23 @@ BELIEF_CRITERIA: dict[str, Callable[[Beliefs, Evidence], Beliefs]] = {
     "expected_dispersion": expected_dispersion,
     "expected_error": expected_error,
 }
+
+
+def worth(criterion: str, beliefs: Beliefs, evidence: Evidence) -> Beliefs:
+    """Return what each rotation is worth under a criterion by name, a few beliefs at a time.
+
+    Parameters
+    ----------
+    criterion : str
+        A name in `BELIEF_CRITERIA`.
+    beliefs : ndarray (n, B)
+    evidence : Evidence
+        Of the estimator that will look, in the beliefs' B bins.
+
+    Returns
+    -------
+    ndarray (n, B), lower is better
+    """
+    at_once = max(1, _CHUNK // evidence.n_bins**2)
+    parts = [beliefs[k : k + at_once] for k in range(0, len(beliefs), at_once)]
+    return np.concatenate([BELIEF_CRITERIA[criterion](part, evidence) for part in parts])

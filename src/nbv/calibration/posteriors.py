@@ -1,0 +1,155 @@
+"""A classifier's own distributions p(azimuth | image): their temperature, likelihood and files.
+
+Class c of k is centred on 360 c / k degrees; between the centres the density is linear. Densities
+are over B one-degree bins (B = 360), so that log-likelihoods, in nats per degree, do not depend on
+k and compare with those of V: the uniform density has -log 360 = -5.886.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize_scalar
+from scipy.special import log_softmax
+
+from nbv.errors import UserError
+from nbv.files import read_arrays, write_arrays
+
+Floats = NDArray[np.float64]
+
+TEMPERATURES = (0.05, 20.0)
+"""The least and the largest temperature that `fit_temperature` finds."""
+
+
+@dataclass(frozen=True)
+class Posteriors:
+    """Distributions for full turns of objects.
+
+    Attributes
+    ----------
+    object_ids : tuple of str
+        n objects.
+    log_posterior : ndarray (n, n_views, k)
+        log p(class | image) at the temperature; view v has the azimuth 360 v / n_views.
+    temperature : float
+        What the network's logits were divided by.
+    """
+
+    object_ids: tuple[str, ...]
+    log_posterior: NDArray[np.floating]
+    temperature: float
+
+    @property
+    def as_trained(self) -> Floats:
+        """The log of the distributions at a temperature of 1, (n, n_views, k)."""
+        logits = self.log_posterior.astype(np.float64) * self.temperature
+        return np.asarray(log_softmax(logits, axis=-1))
+
+
+def on_degrees(posterior: Floats, n_bins: int = 360) -> Floats:
+    """Return distributions over bins from distributions over classes.
+
+    Parameters
+    ----------
+    posterior : ndarray (..., k), rows summing to 1
+        k divides `n_bins`.
+    n_bins : int
+        B; bin b is centred on 360 b / B degrees.
+
+    Returns
+    -------
+    ndarray (..., B), rows summing to 1
+    """
+    n_classes = posterior.shape[-1]
+    below, part = _neighbours(np.arange(n_bins) * (360.0 / n_bins), n_classes)
+    above = (below + 1) % n_classes
+    mixed = (1.0 - part) * posterior[..., below] + part * posterior[..., above]
+    return np.asarray(mixed * (n_classes / n_bins))
+
+
+def log_likelihood(log_posterior: NDArray[np.floating], azimuth_deg: ArrayLike) -> Floats:
+    """Return the log density at an azimuth, in nats per degree.
+
+    Parameters
+    ----------
+    log_posterior : ndarray (..., k)
+        Logs of distributions over classes.
+    azimuth_deg : array-like, broadcasting to (...)
+
+    Returns
+    -------
+    ndarray (...)
+    """
+    n_classes = log_posterior.shape[-1]
+    below, part = _neighbours(np.broadcast_to(azimuth_deg, log_posterior.shape[:-1]), n_classes)
+    at = [
+        np.take_along_axis(log_posterior, bins[..., None], axis=-1)[..., 0].astype(np.float64)
+        for bins in (below, (below + 1) % n_classes)
+    ]
+    with np.errstate(divide="ignore"):
+        mixed = np.logaddexp(at[0] + np.log1p(-part), at[1] + np.log(part))
+    return np.asarray(mixed + np.log(n_classes / 360.0))
+
+
+def _neighbours(azimuth_deg: ArrayLike, n_classes: int) -> tuple[NDArray[np.intp], Floats]:
+    """Return the class centre at or below each azimuth, and how far it lies towards the next."""
+    place = np.asarray(azimuth_deg, dtype=np.float64) * (n_classes / 360.0)
+    below = np.floor(place)
+    return below.astype(np.intp) % n_classes, place - below
+
+
+def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:
+    """Return the T of softmax(logits / T) under which the true azimuths are likeliest.
+
+    Parameters
+    ----------
+    logits : ndarray (..., k)
+        Of images that the network was not trained on.
+    azimuth_deg : array-like, broadcasting to (...)
+        The truth.
+
+    Returns
+    -------
+    float
+        Within `TEMPERATURES`. Above 1 the network was too sure of itself.
+    """
+
+    def loss(log_temperature: float) -> float:
+        tempered = log_softmax(logits / np.exp(log_temperature), axis=-1)
+        return -float(log_likelihood(tempered, azimuth_deg).mean())
+
+    bounds = tuple(np.log(TEMPERATURES))
+    return float(np.exp(minimize_scalar(loss, bounds=bounds, method="bounded").x))
+
+
+def write_posteriors(
+    path: str | Path, object_ids: Sequence[str], logits: Floats, temperature: float
+) -> None:
+    """Write the distributions softmax(logits / temperature) of full turns (n, n_views, k)."""
+    write_arrays(
+        path,
+        {
+            "object_ids": np.asarray(object_ids, dtype=np.str_),
+            "log_posterior": log_softmax(logits / temperature, axis=-1).astype(np.float32),
+            "temperature": np.asarray(temperature),
+        },
+    )
+
+
+def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
+    """Read what `write_posteriors` wrote.
+
+    Raises
+    ------
+    UserError
+        Where it is about other objects than those given, or in another order.
+    """
+    stored = read_arrays(path)
+    names = tuple(str(name) for name in stored["object_ids"])
+    if names != tuple(object_ids):
+        raise UserError(f"{path}: not of the objects that the estimates are of; make both again")
+    return Posteriors(names, stored["log_posterior"], float(stored["temperature"]))

@@ -1,0 +1,96 @@
+"""Another estimator and calibration in the real Snakefile, beside a finished default run."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import safetensors
+
+from .conftest import TINY, Project
+
+pytestmark = pytest.mark.slow
+
+OTHER = (
+    *(item for item in TINY if not item.startswith(("name=", "categories="))),
+    "categories=[mug]",
+    "name=other",
+    "estimator=classifier",
+    "estimator.n_classes=24",
+    "calibration=crossfit",
+    "crossfit_epochs=1",
+)
+PLACES = [f"mug/el00/fold{fold}" for fold in (1, 2)]
+
+
+@pytest.fixture(scope="module")
+def other(finished: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of a cross-fitted classifier; those of the default run lie beside them."""
+    folder = tmp_path_factory.mktemp("beside") / "project"
+    shutil.copytree(finished.folder, folder, symlinks=True)
+    targets = ("likelihoods", "sidebyside", "evaluation")
+    Project(folder).run("--cores", "2", *targets, overrides=(*OTHER, "beside=[tiny]"))
+    return folder / "results/other"
+
+
+def test_a_classifier_says_how_likely_each_azimuth_is(other):
+    for place in PLACES:
+        test = pd.read_csv(other / "estimates" / place / "test.csv", dtype={"object_id": str})
+        with np.load(other / "estimates" / place / "test_posteriors.npz") as stored:
+            p = np.exp(stored["log_posterior"].astype(float))
+        assert p.shape == (4, 360, 24)
+        np.testing.assert_allclose(p.sum(axis=-1), 1, atol=1e-5)
+        mean = (p @ np.exp(2j * np.pi * np.arange(24) / 24)).ravel()
+        np.testing.assert_allclose(test["concentration"], abs(mean), atol=2e-4)
+        turned = np.exp(1j * np.radians(test["estimate_deg"])) * abs(mean)
+        np.testing.assert_allclose(turned, mean, atol=1e-4)
+
+
+def test_beliefs_recommend_for_the_images_of_the_default_run(other):
+    for place in PLACES:
+        belief = pd.read_csv(other / "evaluation" / place / "belief.csv")
+        single = pd.read_csv(other.parent / "tiny/evaluation" / place / "single.csv")
+        assert list(belief.columns) == list(single.columns)
+        assert (belief["object_id"] == single["object_id"]).all()
+        assert (belief["delta_deg"] % 15 == 0).all()
+
+
+def test_both_runs_are_shown(other):
+    cells = pd.read_csv(other / "tables/likelihoods.csv")
+    densities = {"other:estimate", "other:as_trained", "other:posterior", "tiny:estimate"}
+    assert set(cells["method"]) == densities
+    text = (other / "tables/sidebyside.md").read_text()
+    assert "| MAE | other | tiny | tiny − other |" in text
+    assert "| Mug: Belief |" in text
+
+
+def test_cross_fitting_calibrates_with_every_object_that_is_not_tested(other):
+    splits = pd.read_csv(other / "splits/mug.csv")
+    held_out = pd.read_csv(other.parent / "tiny/splits/mug.csv")
+    assert ((splits["role"] == "test") == (held_out["role"] == "test")).all()
+    for fold, place in enumerate(PLACES, start=1):
+        of_fold = splits[splits["fold"] == fold].set_index("object_id")["role"]
+        everyone = set(of_fold.index[of_fold != "test"])
+        estimates = pd.read_csv(other / "estimates" / place / "calibration.csv")
+        assert set(estimates["object_id"]) == everyone
+        folder = other / "estimators" / place
+        assert trained_on(folder / "estimator.safetensors") == everyone
+        for part in (1, 2):
+            own = set(of_fold.index[of_fold == f"part{part}"])
+            assert trained_on(folder / f"without_part{part}.safetensors") == everyone - own
+
+
+def trained_on(path):
+    with safetensors.safe_open(path, framework="np") as stored:
+        return set(json.loads(stored.metadata()["nbv"])["trained_on"])
+
+
+def test_a_run_beside_that_is_not_there_is_named(finished):
+    settings = (*OTHER, "beside=[nowhere]")
+    done = finished.run("--cores", "1", "sidebyside", overrides=settings, fails=True)
+    assert "nbv: error: beside: results/nowhere/configuration.yaml does not exist" in done.stderr
+    assert "Traceback" not in done.stderr
