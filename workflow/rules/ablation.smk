@@ -7,12 +7,6 @@ from nbv.evaluation.ablation import ablation_space
 ABLATIONS = Paramspace(
     ablation_space(), filename_params="*", filename_sep=",", single_wildcard="setting"
 )
-ABLATED = focus_unit(UNITS, READING_SETTINGS)
-
-
-def of_ablated(pattern):
-    category, elevation = ABLATED
-    return expand(pattern, category=category, elevation=f"{elevation:02d}", fold=FOLDS)
 
 
 rule ablate:
