@@ -14,6 +14,7 @@ except ModuleNotFoundError:
 from nbv import provenance
 from nbv.config import load_config, snakemake_overrides
 from nbv.errors import UserError
+from nbv.evaluation.beliefs import METHODS as BELIEF_METHODS
 from nbv.evaluation.methods import check_method, needs_lookup
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
@@ -132,7 +133,7 @@ def has_posteriors(configuration):
 
 def evaluated(configuration):
     """The names of the errors in a run's folder `evaluation`."""
-    own = ["belief"] if has_posteriors(configuration) else []
+    own = BELIEF_METHODS if has_posteriors(configuration) else ()
     return [*configuration["methods"], *own]
 
 

@@ -14,14 +14,14 @@ from nbv.recommendation.lookup import least_ambiguous_delta
 
 Beliefs = NDArray[np.floating]
 
-# Numbers in the largest array that `expected_entropy` makes at once.
-_CHUNK = 2**22
+# Numbers in the largest array that `expected_entropy` makes at once: what fits into a cache.
+_CHUNK = 2**18
 
 
 def expected_entropy(beliefs: Beliefs, estimate_likelihood: NDArray[np.floating]) -> Table:
     """Return the expected entropy of the pose after the second look (design, section 3).
 
-    With the pose theta, distributed as the belief b, and the second estimate, distributed as
+    With the pose theta, distributed as the belief b, and the second answer, distributed as
     L[theta + delta], the chain rule of entropy gives ::
 
         A_b[delta] = H(b) + sum_theta b(theta) H(L[theta + delta])
@@ -32,9 +32,10 @@ def expected_entropy(beliefs: Beliefs, estimate_likelihood: NDArray[np.floating]
     Parameters
     ----------
     beliefs : ndarray (n, B), rows summing to 1
-    estimate_likelihood : ndarray (B, B)
-        L[viewpoint, estimate] = p(estimate | viewpoint), of the estimator that answers the second
-        look.
+    estimate_likelihood : ndarray (B, B), rows summing to 1
+        L[viewpoint, answer] = p(answer | viewpoint), of the estimator that answers the second look:
+        of its estimates, or of classes drawn from its distributions
+        (`nbv.calibration.posteriors.answer_likelihood`).
 
     Returns
     -------
