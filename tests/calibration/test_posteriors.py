@@ -64,6 +64,15 @@ def test_a_hotter_network_has_a_proportionally_higher_temperature():
     assert hot == pytest.approx(4 * cold, rel=1e-3)
 
 
+def test_answers_are_the_mean_distribution_of_each_viewpoint():
+    logs = log_softmax(random_logits(4, (3, 48, 24)), axis=-1)
+    found = posteriors.answer_likelihood(posteriors.Posteriors(("a", "b", "c"), logs, 1.0))
+    # 7.5 degrees a view and 15 a class: centred on the even views, half-way ones go upwards.
+    for viewpoint in range(24):
+        views = [2 * viewpoint - 1, 2 * viewpoint]
+        np.testing.assert_allclose(found[viewpoint], np.exp(logs[:, views]).mean(axis=(0, 1)))
+
+
 def test_posteriors_come_back_with_their_temperature(tmp_path):
     logits = random_logits(3, (2, 5, 24))
     posteriors.write_posteriors(tmp_path / "p.npz", ["007", "NA"], logits, 1.7)

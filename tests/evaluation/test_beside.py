@@ -43,6 +43,7 @@ def runs(tree, tmp_path_factory):
             write_posteriors(target / "test_posteriors.npz", ids, logits, 1.0 + fold)
             written = folder / name / "evaluation" / place
             shutil.copy(written / "proposed.csv", written / "belief.csv")
+            shutil.copy(written / "random.csv", written / "belief_opposite.csv")
     for path in (folder / "second/evaluation").rglob("*.csv"):
         rows = pd.read_csv(path, dtype={"object_id": str})
         rows.assign(error_deg=rows["error_deg"] / 2).to_csv(path, index=False)
@@ -87,8 +88,9 @@ def test_likelihoods_are_means_over_images_of_the_density_at_the_truth(runs):
     assert value["first:estimate", "entropy"] == pytest.approx(np.mean(entropies), abs=1e-4)
     assert value["second:posterior", "log_likelihood"] == pytest.approx(np.mean(tempered))
     assert value["second:as_trained", "log_likelihood"] == pytest.approx(np.mean(plain), abs=1e-6)
-    errors = pd.concat(read(runs / "second", "evaluation", "belief.csv"))["error_deg"]
-    assert value["second:posterior", "recommended"] == pytest.approx(errors.mean())
+    for column, name in (("recommended", "belief"), ("opposite", "belief_opposite")):
+        errors = pd.concat(read(runs / "second", "evaluation", f"{name}.csv"))["error_deg"]
+        assert value["second:posterior", column] == pytest.approx(errors.mean())
     assert ("first:posterior", "entropy") not in value.index
     assert (cells["ci_low"] <= cells["value"]).all()
     assert (cells["ci_high"] >= cells["value"]).all()

@@ -52,11 +52,16 @@ def test_a_classifier_says_how_likely_each_azimuth_is(other):
 
 def test_beliefs_recommend_for_the_images_of_the_default_run(other):
     for place in PLACES:
-        belief = pd.read_csv(other / "evaluation" / place / "belief.csv")
         single = pd.read_csv(other.parent / "tiny/evaluation" / place / "single.csv")
-        assert list(belief.columns) == list(single.columns)
-        assert (belief["object_id"] == single["object_id"]).all()
+        belief, opposite = (
+            pd.read_csv(other / "evaluation" / place / f"{name}.csv")
+            for name in ("belief", "belief_opposite")
+        )
+        for rows in (belief, opposite):
+            assert list(rows.columns) == list(single.columns)
+            assert (rows["object_id"] == single["object_id"]).all()
         assert (belief["delta_deg"] % 15 == 0).all()
+        assert (opposite["delta_deg"] == 180).all()
 
 
 def test_both_runs_are_shown(other):

@@ -14,6 +14,7 @@ except ModuleNotFoundError:
 from nbv import provenance
 from nbv.config import load_condition, load_config, snakemake_overrides
 from nbv.errors import UserError
+from nbv.evaluation.beliefs import METHODS as BELIEF_METHODS
 from nbv.evaluation.contest import check_contenders
 from nbv.evaluation.methods import check_method
 from nbv.meshes.sources import SOURCES, open_source, select_objects
@@ -139,7 +140,7 @@ def has_posteriors(configuration):
 
 def evaluated(configuration):
     """The names of the errors in a run's folder `evaluation`."""
-    own = ["belief"] if has_posteriors(configuration) else []
+    own = BELIEF_METHODS if has_posteriors(configuration) else ()
     return [*configuration["methods"], *own]
 
 

@@ -112,15 +112,13 @@ def files_of_runs(files_of):
 
 
 def likelihood_files(place, configuration):
-    own = has_posteriors(configuration)
-    return [
-        f"estimates/{place}/test.csv",
-        f"lookup/{place}/entropy.npz",
-        *(f"evaluation/{place}/{name}.csv" for name in ("single", "opposite")),
-        f"evaluation/{place}/proposed.csv",
-        *([f"estimates/{place}/test_posteriors.npz"] if own else []),
-        *([f"evaluation/{place}/belief.csv"] if own else []),
-    ]
+    methods, files = ["single", "opposite", "proposed"], ["estimates/{}/test.csv"]
+    files.append("lookup/{}/entropy.npz")
+    if has_posteriors(configuration):
+        methods += BELIEF_METHODS
+        files.append("estimates/{}/test_posteriors.npz")
+    files += [f"evaluation/{{}}/{name}.csv" for name in methods]
+    return [name.format(place) for name in files]
 
 
 def evaluation_files(place, configuration):

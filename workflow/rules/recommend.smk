@@ -76,21 +76,22 @@ rule evaluate_recommended:
         script_path("evaluate_recommended")
 
 
-# Recommends from what the estimator says of each image, and looks nothing up but a density's choice.
-rule evaluate_belief:
+# By what the estimator says of each image, where it does.
+rule evaluate_beliefs:
     input:
-        sources("evaluate_belief"),
+        sources("evaluate_beliefs"),
         splits=rules.splits.output[0],
         calibration=rules.estimate.output.calibration,
         test=rules.estimate.output.test,
-        posteriors=f"{RESULTS}/estimates/{FOLD}/test_posteriors.npz",
-        lookup=f"{RESULTS}/lookup/{FOLD}/entropy.npz",
+        calibration_posteriors=f"{RESULTS}/estimates/{FOLD}/calibration_posteriors.npz",
+        test_posteriors=f"{RESULTS}/estimates/{FOLD}/test_posteriors.npz",
     output:
-        f"{RESULTS}/evaluation/{FOLD}/belief.csv",
+        belief=f"{RESULTS}/evaluation/{FOLD}/belief.csv",
+        belief_opposite=f"{RESULTS}/evaluation/{FOLD}/belief_opposite.csv",
     log:
-        log_path(f"evaluate_belief/{FOLD}"),
+        log_path(f"evaluate_beliefs/{FOLD}"),
     benchmark:
-        benchmark_path(f"evaluate_belief/{FOLD}")
+        benchmark_path(f"evaluate_beliefs/{FOLD}")
     conda:
         ENVIRONMENT
     threads: 1
@@ -98,7 +99,7 @@ rule evaluate_belief:
         mem_mb=1000,
         runtime=10,
     script:
-        script_path("evaluate_belief")
+        script_path("evaluate_beliefs")
 
 
 rule lookups:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 from scipy.special import log_softmax
 
+from nbv.angles import nearest_bin
 from nbv.errors import UserError
 from nbv.files import read_arrays, write_arrays
 
@@ -100,6 +101,30 @@ def _neighbours(azimuth_deg: ArrayLike, n_classes: int) -> tuple[NDArray[np.intp
     place = np.asarray(azimuth_deg, dtype=np.float64) * (n_classes / 360.0)
     below = np.floor(place)
     return below.astype(np.intp) % n_classes, place - below
+
+
+def answer_likelihood(posteriors: Posteriors) -> Floats:
+    """Return how a class that is drawn from an image's distribution depends on the viewpoint.
+
+    The mean of p(class | image) over all images of a viewpoint: an L of answers that are drawn
+    rather than averaged to a point, which is as smooth as the distributions and has no setting.
+
+    Parameters
+    ----------
+    posteriors : Posteriors
+        Of objects that the network was not trained on; at least k views of each.
+
+    Returns
+    -------
+    ndarray (k, k), rows summing to 1
+        L[viewpoint, answer].
+    """
+    _, n_views, n_classes = posteriors.log_posterior.shape
+    of_view = np.exp(posteriors.log_posterior.astype(np.float64)).mean(axis=0)
+    viewpoint = nearest_bin(np.arange(n_views) * (360.0 / n_views), n_classes)
+    sums = np.zeros((n_classes, n_classes))
+    np.add.at(sums, viewpoint, of_view)
+    return np.asarray(sums / sums.sum(axis=1, keepdims=True))
 
 
 def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:

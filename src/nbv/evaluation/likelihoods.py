@@ -41,6 +41,11 @@ METRICS = (
     "recommended",
 )
 
+_ERRORS: Mapping[str, Mapping[str, str]] = {
+    "estimate": {"single": "single", "opposite": "opposite", "recommended": "proposed"},
+    "posterior": {"single": "single", "opposite": "belief_opposite", "recommended": "belief"},
+}
+
 Runs = Mapping[str, tuple[Path, bool]]
 """A run's folder, and whether its estimator has posteriors, by the run's name."""
 
@@ -67,8 +72,9 @@ def likelihood_cells(
     pandas.DataFrame
         ``log_likelihood`` in nats per degree, at the true azimuth; ``entropy`` in nats, over
         one-degree bins; ``circular_variance`` in [0, 1]; ``single``, ``opposite`` and
-        ``recommended`` the error of one view, of the opposite second one, and of the second one
-        that the density recommends, degrees (`nbv.evaluation.belief` for a classifier's own).
+        ``recommended`` the error (degrees) of one view, with the opposite second one, and with the
+        second one that the density recommends. Two estimates are averaged; a classifier's two
+        distributions are multiplied (`nbv.evaluation.beliefs`).
 
     Raises
     ------
@@ -124,9 +130,9 @@ def _figures(
         for density, figures in _density_figures(root, unit, fold, has_posteriors):
             for metric in METRICS[:3]:
                 yield density, metric, figures[_KEY].assign(error_deg=figures[metric])
-    recommended = {"estimate": "proposed"} | ({"posterior": "belief"} if has_posteriors else {})
-    for density, second_view in recommended.items():
-        methods = {"single": "single", "opposite": "opposite", "recommended": second_view}
+    for density, methods in _ERRORS.items():
+        if density == "posterior" and not has_posteriors:
+            continue
         errors = load_unit(root, *unit, n_folds, list(methods.values()))
         for metric, method in methods.items():
             of_method = errors[errors["method"] == method]
@@ -202,8 +208,9 @@ def likelihoods_markdown(cells: pd.DataFrame, notes: Iterable[str] = ()) -> str:
         "V is the smoothed density of calibration pairs that the paper's method looks up, chosen "
         "for its decisions and not for its likelihood.",
         "Single, Opposite and Recommended are errors (°) of one view, and of two: the second "
-        "opposite, and the second that the density recommends (with V the paper's method; with "
-        "p(φ given I) the least expected entropy, both images' densities multiplied).",
+        "opposite, and the second that the density recommends. With V two estimates are averaged, "
+        "and what is recommended is the paper's; with p(φ given I) both images' densities are "
+        "multiplied, and the least expected entropy is recommended.",
         *notes,
     ]
     return "\n".join([*lines, "", *(f"- {note}" for note in explained)]) + "\n"

@@ -1,4 +1,4 @@
-"""Evaluate recommendations from each image's own distribution on the test objects of one fold."""
+"""Evaluate second views by each image's own distribution on the test objects of one fold."""
 
 from nbv.jobs import job
 
@@ -6,15 +6,18 @@ with job(snakemake):
     from nbv.calibration.folds import assert_role, read_splits
     from nbv.calibration.pairs import read_estimates
     from nbv.calibration.posteriors import read_posteriors
-    from nbv.evaluation.belief import evaluate_belief
+    from nbv.evaluation.beliefs import evaluate_beliefs
     from nbv.files import write_csv
-    from nbv.recommendation.lookup import load_lookup
 
     given, fold = snakemake.input, int(snakemake.wildcards.fold)
     calibration, test = read_estimates(given.calibration), read_estimates(given.test)
     splits = read_splits(given.splits)
     assert_role(splits, fold, "calibration", calibration.object_ids)
     assert_role(splits, fold, "test", test.object_ids)
-    posteriors = read_posteriors(given.posteriors, test.object_ids)
-    frame = evaluate_belief(test, posteriors, calibration, load_lookup(given.lookup))
-    write_csv(snakemake.output[0], frame)
+    frames = evaluate_beliefs(
+        test,
+        read_posteriors(given.test_posteriors, test.object_ids),
+        read_posteriors(given.calibration_posteriors, calibration.object_ids),
+    )
+    for name, frame in frames.items():
+        write_csv(snakemake.output[name], frame)
