@@ -26,8 +26,8 @@ Angles = NDArray[np.float64]
 
 # Of the calibration views, in bins; neighbouring views tell much the same.
 _STRIDE = 2
-# Numbers in the largest array that a criterion makes of several beliefs at once.
-_CHUNK = 2**22
+# Numbers in the largest array that a criterion makes of several beliefs at once: a cache full.
+_CHUNK = 2**18
 
 
 def first_beliefs(estimate_deg: Angles, evidence: Evidence) -> Beliefs:
