@@ -138,7 +138,14 @@ def test_no_method_is_better_than_the_oracle_with_its_density(frames):
 )
 def test_a_contender_that_cannot_be(name, method, message):
     with pytest.raises(UserError, match=message):
-        contest.check_contenders({name: method}, {"single": {}})
+        contest.check_contenders({name: method}, {"single": {"rotation": "none"}})
+
+
+def test_a_contender_may_have_its_criterions_name_unless_a_method_has_that_table():
+    named = {"fixed": {"rotation": "fixed", "fusion": "posterior"}}
+    contest.check_contenders(named, {"proposed": {"rotation": "entropy"}})
+    with pytest.raises(UserError, match="name is taken"):
+        contest.check_contenders(named, {"mine": {"rotation": "fixed"}})
 
 
 def test_stored_choices_give_the_same_evidence(entries):

@@ -61,16 +61,17 @@ class Entry:
     lookup: LookupTable | None
 
 
-def check_contenders(contenders: Contenders, taken: Mapping[str, Any]) -> None:
-    """Check what a configuration says about contenders.
+def check_contenders(contenders: Contenders, methods: Contenders) -> None:
+    """Check what a configuration says about contenders, and that their files have free names.
 
     Raises
     ------
     UserError
         Where a rotation or a fusion is unknown, or a name stands for something else already.
     """
+    taken = {*methods, *(method["rotation"] for method in methods.values())}
     for name, method in contenders.items():
-        if name in taken or name in CRITERIA:
+        if name in taken:
             raise UserError(f"contenders.{name}: the name is taken by a method; choose another")
         plain = {
             "rotation": "fixed" if method["rotation"] == CHOSEN else method["rotation"],
