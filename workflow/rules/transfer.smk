@@ -42,6 +42,13 @@ use rule estimate as transfer_estimate with:
         estimator=lambda wildcards: of_condition(
             f"estimators/{FOLD}/estimator.safetensors", wildcards.trained
         ),
+        of_parts=lambda wildcards: (
+            stop(
+                "transfer calibrates with objects held out: needs calibration=holdout"
+            )
+            if CROSSFIT
+            else []
+        ),
     output:
         calibration=f"{RESULTS}/transfer/estimates/{PAIR}/{FOLD}/calibration.csv",
         test=f"{RESULTS}/transfer/estimates/{PAIR}/{FOLD}/test.csv",
