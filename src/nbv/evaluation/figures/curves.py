@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nbv.evaluation.figures.style import MethodStyle, method_style, new_figure
+from nbv.evaluation.figures.style import method_style, new_figure
 from nbv.evaluation.settings import category_label, method_label
 from nbv.evaluation.travel import ANY_DIRECTION
 
@@ -22,10 +22,19 @@ _BASELINES: Mapping[str, str] = {
 }
 
 
-def _style(method: str, methods: tuple[str, ...]) -> MethodStyle:
-    """Return a style: baselines take the paper's, criteria the further ones in turn."""
-    return method_style(
-        _BASELINES.get(method, method), tuple(m for m in methods if m not in _BASELINES)
+def _draw(axes: Axes, x: pd.Series, y: pd.Series, method: str, methods: tuple[str, ...]) -> None:
+    """Draw one curve: baselines in the paper's styles, criteria in the further ones in turn."""
+    others = tuple(name for name in methods if name not in _BASELINES)
+    style = method_style(_BASELINES.get(method, method), others)
+    axes.plot(
+        x,
+        y,
+        label=method_label(method),
+        color=style.color,
+        linestyle=style.line,
+        marker=style.marker,
+        markersize=4,
+        linewidth=style.width,
     )
 
 
@@ -58,17 +67,8 @@ def sequences(cells: pd.DataFrame) -> Figure:
     for axes, category in zip(panels, categories, strict=True):
         part = cells[cells["category"] == category]
         for method in methods:
-            curve, style = part[part["method"] == method], _style(method, methods)
-            axes.plot(
-                curve["n_views"],
-                curve["value"],
-                label=method_label(method),
-                color=style.color,
-                linestyle=style.line,
-                marker=style.marker,
-                markersize=4,
-                linewidth=style.width,
-            )
+            curve = part[part["method"] == method]
+            _draw(axes, curve["n_views"], curve["value"], method, methods)
         axes.set_title(category_label(category))
         axes.set_xticks(sorted(part["n_views"].unique()))
         axes.set_ylim(bottom=0)
@@ -93,17 +93,8 @@ def travel(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figu
         for method in methods:
             rule = "fixed" if method in _BASELINES else "cost"
             curve = rows[(rows["method"] == method) & (rows["rule"] == rule)]
-            curve, style = curve.sort_values("travel_deg"), _style(method, methods)
-            axes.plot(
-                curve["travel_deg"],
-                curve["error_deg"],
-                label=method_label(method),
-                color=style.color,
-                linestyle=style.line,
-                marker=style.marker,
-                markersize=3.5,
-                linewidth=style.width,
-            )
+            curve = curve.sort_values("travel_deg")
+            _draw(axes, curve["travel_deg"], curve["error_deg"], method, methods)
         axes.set_title(category_label(category))
         axes.set_xlim(0, 180)
         axes.set_xticks([0, 45, 90, 135, 180])
