@@ -377,3 +377,23 @@ def test_the_ablation_holds_each_row_against_the_first():
     sheet = ablation.ablation_sheet(space, found, "mug", Resampler(0, 200))
     assert sheet.cells["difference"].tolist() == pytest.approx([0.0, -1.0, 1.0])
     assert [row[3].best for row in sheet.grid.rows] == [False, True, False]
+
+
+def test_the_favoured_pair_has_the_least_validated_error_over_categories():
+    rows = pd.DataFrame(
+        [
+            ("mug", "a", "fixed", 4.0),
+            ("mug", "b", "expected_error", 6.0),
+            ("car", "a", "fixed", 9.0),
+            ("car", "b", "expected_error", 6.0),
+            ("car", "b", "expected_error", 8.0),
+            ("car", "chosen", "fixed", 0.0),
+            ("car", "oracle_average", "oracle", 0.0),
+            ("car", "random_posterior", "random", 0.0),
+        ],
+        columns=["category", "method", "rotation", "validated_error_deg"],
+    )
+    only_mug_and_car = rows[rows["method"].isin(["a", "b"])]
+    assert leaderboard.favoured({"one": only_mug_and_car, "two": rows}) == {"one": "a", "two": "a"}
+    dearer = rows.assign(validated_error_deg=rows["validated_error_deg"] + (rows["method"] == "a"))
+    assert leaderboard.favoured({"run": dearer}) == {"run": "b"}

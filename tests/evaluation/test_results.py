@@ -3,8 +3,8 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 import synthetic
-from conftest import N_FOLDS
 
+from conftest import N_FOLDS
 from nbv.errors import UserError
 from nbv.evaluation import methods, results
 from nbv.files import write_csv

@@ -124,6 +124,7 @@ rule leaderboard:
         runtime=10,
     params:
         objects=leaderboard_objects,
+        contenders=CONFIG["contenders"],
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
     script:

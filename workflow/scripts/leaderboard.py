@@ -7,14 +7,20 @@ from nbv.jobs import job
 with job(snakemake):
     import numpy as np
 
-    from nbv.evaluation.leaderboard import beyond, blocks_of, leaderboard
+    from nbv.evaluation.leaderboard import beyond, blocks_of, favoured, leaderboard
     from nbv.evaluation.paired import Resampler
     from nbv.evaluation.sheets import save_sheet
-    from nbv.evaluation.standing import load_object_means
+    from nbv.evaluation.standing import load_choices, load_object_means
 
     params = snakemake.params
     runs = {run: load_object_means(paths) for run, paths in params.objects.items()}
     blocks = blocks_of(runs)
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
-    for path, build in zip(snakemake.output[::3], (leaderboard, beyond), strict=True):
-        save_sheet(build(blocks, resampler), Path(path).with_suffix(""))
+    choices = {run: load_choices(paths) for run, paths in params.objects.items()}
+    pairs = {
+        run: (best, f"opposite_{params.contenders[best]['fusion']}")
+        for run, best in favoured(choices).items()
+    }
+    sheets = leaderboard(blocks, resampler), beyond(blocks, pairs, resampler)
+    for path, sheet in zip(snakemake.output[::3], sheets, strict=True):
+        save_sheet(sheet, Path(path).with_suffix(""))

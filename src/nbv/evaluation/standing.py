@@ -48,17 +48,31 @@ def load_object_means(paths: Iterable[str | Path]) -> pd.DataFrame:
     DataFrame
         ``category, elevation_deg, fold`` and `OBJECT_COLUMNS`.
     """
+    return _with_places(map(Path, paths))
+
+
+def load_choices(paths: Iterable[str | Path]) -> pd.DataFrame:
+    """Read the `choices.csv` that lie beside `objects.csv` files into one frame.
+
+    Returns
+    -------
+    DataFrame
+        ``category, elevation_deg, fold`` and the columns of
+        `nbv.evaluation.contest.choices_frame`.
+    """
+    return _with_places(Path(path).with_name("choices.csv") for path in paths)
+
+
+def _with_places(paths: Iterable[Path]) -> pd.DataFrame:
     parts = []
-    for path in map(Path, paths):
+    for path in paths:
         category, elevation, fold = path.parts[-4:-1]
-        rows = read_csv(existing(path)).assign(
-            category=category,
-            elevation_deg=int(elevation.removeprefix("el")),
-            fold=int(fold.removeprefix("fold")),
-        )
+        rows = read_csv(existing(path))
+        rows.insert(0, "fold", int(fold.removeprefix("fold")))
+        rows.insert(0, "elevation_deg", int(elevation.removeprefix("el")))
+        rows.insert(0, "category", category)
         parts.append(rows)
-    frame = pd.concat(parts, ignore_index=True)
-    return frame[["category", "elevation_deg", "fold", *OBJECT_COLUMNS]]
+    return pd.concat(parts, ignore_index=True)
 
 
 def paired_objects(means: pd.DataFrame, category: str) -> PairedErrors:
