@@ -46,8 +46,7 @@ from nbv.evaluation.reference import (
     read_verdicts,
     table_files,
 )
-from nbv.evaluation.settings import method_label
-from nbv.evaluation.transfer import TRANSFER
+from nbv.evaluation.settings import TRANSFER, method_label
 
 IDENTICAL, WITHIN, OUTSIDE, UNJUDGED = "identical", "within", "outside", "not judged"
 
@@ -154,7 +153,6 @@ def compare_runs(reference: Path, run: Path) -> Comparison:
     for path in table_files(reference):
         other = run / "tables" / path.name
         if not other.is_file():
-            # That one is made on request only.
             (remarks if path.stem == TRANSFER else problems).append(f"{path.stem}: missing")
             continue
         theirs, mine = read_cells(path), read_cells(other)

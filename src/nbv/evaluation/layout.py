@@ -16,8 +16,7 @@ import pandas as pd
 from nbv.evaluation import published
 from nbv.evaluation.cells import Table, shows_difference
 from nbv.evaluation.grid import MINUS, Cell, Grid, grid_latex, grid_markdown, interval_text, number
-from nbv.evaluation.settings import method_label
-from nbv.evaluation.transfer import TRANSFER
+from nbv.evaluation.settings import TRANSFER, method_label
 from nbv.files import write_csv, write_text
 
 _METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}

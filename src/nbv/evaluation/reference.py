@@ -14,7 +14,7 @@ from omegaconf import OmegaConf
 from nbv.errors import UserError
 from nbv.evaluation.cells import CELL_COLUMNS
 from nbv.evaluation.results import existing
-from nbv.evaluation.transfer import TRANSFER
+from nbv.evaluation.settings import TRANSFER
 from nbv.files import read_csv, replacing
 from nbv.rendering.sensors import IDEAL
 from nbv.schema import default_of

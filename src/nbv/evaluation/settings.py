@@ -9,6 +9,9 @@ from nbv.errors import UserError, nearest
 from nbv.evaluation import published
 from nbv.evaluation.results import Unit
 
+TRANSFER = "transfer"
+"""Name of the table trained on × tested on, which is made on request only."""
+
 _METHOD_LABELS: Mapping[str, str] = {
     "single": "Single",
     "random": "Random",

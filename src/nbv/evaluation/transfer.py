@@ -17,10 +17,7 @@ from nbv.evaluation import paired
 from nbv.evaluation.cells import Table, cell, shared_resampler
 from nbv.evaluation.paired import pair_methods
 from nbv.evaluation.results import Unit, read_evaluation, unit_dir
-from nbv.evaluation.settings import ReadingSettings, category_label
-
-TRANSFER = "transfer"
-"""The table's name."""
+from nbv.evaluation.settings import TRANSFER, ReadingSettings, category_label
 
 Evaluations = Mapping[tuple[str, str], pd.DataFrame]
 """By the condition trained on and the one tested on: ``method, fold`` and `methods.COLUMNS`."""
