@@ -38,10 +38,10 @@ def _tables(quick: bool) -> Figure:
     n_bins, rounds = (72, 1) if quick else (360, 5)
 
     def every_table() -> None:
-        evidence = _evidence(n_bins)
         for criterion in CRITERIA:
             for fusion in FUSIONS:
-                build_lookup(evidence, criterion, fusion)
+                # Each has a density of its own, so that nothing can be shared.
+                build_lookup(_evidence(n_bins), criterion, fusion)
 
     def papers_table() -> None:
         build_lookup(_evidence(n_bins), "entropy")
