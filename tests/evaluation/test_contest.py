@@ -19,6 +19,7 @@ from nbv.evaluation import (
     standing,
     travel,
 )
+from nbv.evaluation.figures import curves
 from nbv.evaluation.grid import grid_markdown
 from nbv.evaluation.paired import Resampler
 from nbv.recommendation.evidence import gather_evidence
@@ -397,3 +398,13 @@ def test_the_favoured_pair_has_the_least_validated_error_over_categories():
     assert leaderboard.favoured({"one": only_mug_and_car, "two": rows}) == {"one": "a", "two": "a"}
     dearer = rows.assign(validated_error_deg=rows["validated_error_deg"] + (rows["method"] == "a"))
     assert leaderboard.favoured({"run": dearer}) == {"run": "b"}
+
+
+def test_curves_are_drawn_in_the_houses_style():
+    """Wherever they are called from: the spines that the style takes away are gone."""
+    cells = pd.DataFrame(
+        {"category": "mug", "method": "random", "n_views": [1, 2], "value": [9, 4]}
+    )
+    axes = curves.sequences(cells).axes[0]
+    assert not axes.spines["top"].get_visible()
+    assert not axes.spines["right"].get_visible()

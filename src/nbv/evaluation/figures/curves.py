@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import matplotlib as mpl
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nbv.evaluation.figures.style import method_style, new_figure
+from nbv.evaluation.figures.style import RC, method_style, new_figure
 from nbv.evaluation.settings import category_label, method_label
 from nbv.evaluation.travel import ANY_DIRECTION
 
@@ -53,6 +54,7 @@ def _legend(figure: Figure, axes: Axes) -> None:
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4))
 
 
+@mpl.rc_context(RC)
 def sequences(cells: pd.DataFrame) -> Figure:
     """Draw the error against the number of views, a panel for each category.
 
@@ -78,6 +80,7 @@ def sequences(cells: pd.DataFrame) -> Figure:
     return figure
 
 
+@mpl.rc_context(RC)
 def travel(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
     """Draw the error against the mean travel as its price rises, a panel for each category.
 
