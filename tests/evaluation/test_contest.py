@@ -400,11 +400,23 @@ def test_the_favoured_pair_has_the_least_validated_error_over_categories():
     assert leaderboard.favoured({"run": dearer}) == {"run": "b"}
 
 
+def curve_of(methods):
+    rows = [("mug", method, views, 9.0 / views) for method in methods for views in (1, 2, 3)]
+    return pd.DataFrame(rows, columns=["category", "method", "n_views", "value"])
+
+
 def test_curves_are_drawn_in_the_houses_style():
     """Wherever they are called from: the spines that the style takes away are gone."""
-    cells = pd.DataFrame(
-        {"category": "mug", "method": "random", "n_views": [1, 2], "value": [9, 4]}
-    )
-    axes = curves.sequences(cells).axes[0]
+    axes = curves.sequences(curve_of(["random"])).axes[0]
     assert not axes.spines["top"].get_visible()
     assert not axes.spines["right"].get_visible()
+
+
+def test_the_legend_of_a_single_panel_stays_inside_the_figure():
+    methods = ["random", "bisecting", "evenly_spaced", *sequences.BELIEF_CRITERIA]
+    figure = curves.sequences(curve_of(methods))
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.width
+    assert box.y0 >= 0

@@ -49,9 +49,12 @@ def _grid(n_panels: int, height_in: float = 2.9) -> tuple[Figure, list[Axes]]:
     return figure, panels[:n_panels]
 
 
-def _legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4))
+def _legend(figure: Figure, panels: list[Axes]) -> None:
+    """Write the legend below, as wide as the panels are and as high as it has to be."""
+    handles, labels = panels[0].get_legend_handles_labels()
+    n_columns = min(len(panels), _COLUMNS) + 1
+    figure.set_figheight(figure.get_figheight() + 0.2 * (-(-len(labels) // n_columns) - 2))
+    figure.legend(handles, labels, loc="outside lower center", ncols=n_columns)
 
 
 @mpl.rc_context(RC)
@@ -76,7 +79,7 @@ def sequences(cells: pd.DataFrame) -> Figure:
         axes.set_ylim(bottom=0)
         axes.set_xlabel("Number of views")
         axes.set_ylabel("MAE (°)")
-    _legend(figure, panels[0])
+    _legend(figure, panels)
     return figure
 
 
@@ -104,5 +107,5 @@ def travel(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figu
         axes.set_ylim(bottom=0)
         axes.set_xlabel("Mean travel (°)")
         axes.set_ylabel("MAE (°)")
-    _legend(figure, panels[0])
+    _legend(figure, panels)
     return figure
