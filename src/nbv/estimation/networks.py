@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import torch
 from torch import nn
@@ -21,11 +22,15 @@ from nbv.estimation.outputs import (
 
 
 def _strided_trunk(channels: list[int]) -> nn.Sequential:
-    layers: list[nn.Module] = []
-    for before, after in zip([1, *channels], channels, strict=False):
-        kernel = 5 if before == 1 else 3
+    # The first layer's maps are the largest: normalising them too took a sixth of the time of
+    # training, and estimates were no better for it.
+    layers: list[nn.Module] = [
+        nn.Conv2d(1, channels[0], 5, stride=2, padding=2),
+        nn.ReLU(inplace=True),
+    ]
+    for before, after in pairwise(channels):
         layers += [
-            nn.Conv2d(before, after, kernel, stride=2, padding=kernel // 2, bias=False),
+            nn.Conv2d(before, after, 3, stride=2, padding=1, bias=False),
             nn.BatchNorm2d(after),
             nn.ReLU(inplace=True),
         ]
@@ -49,9 +54,9 @@ def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.
 def regressor(settings: Settings, image_side: int) -> nn.Module:
     """Return a network in the spirit of Pose-CyclicR-Net with the outputs (cos, sin).
 
-    Strided convolutions with batch normalisation, one hidden layer, two linear outputs (paper,
-    Sec. 3.2.1). The outputs are not normalised: trained on squared error they tend to the mean
-    direction, whose length says how sure the network is.
+    Strided convolutions, from the second on with batch normalisation, one hidden layer, two linear
+    outputs (paper, Sec. 3.2.1). The outputs are not normalised: trained on squared error they tend
+    to the mean direction, whose length says how sure the network is.
 
     Parameters
     ----------

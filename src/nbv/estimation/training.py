@@ -108,7 +108,10 @@ def train_network(
     n_images, batch_size, n_epochs = len(images), settings["batch_size"], settings["epochs"]
     batches = max(n_images // batch_size, 1)
     optimiser = torch.optim.AdamW(
-        network.parameters(), lr=settings["learning_rate"], weight_decay=settings["weight_decay"]
+        network.parameters(),
+        lr=settings["learning_rate"],
+        weight_decay=settings["weight_decay"],
+        fused=True,
     )
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, max_lr=settings["learning_rate"], total_steps=n_epochs * batches
