@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +28,10 @@ log = logging.getLogger(__name__)
 COARSE_BINS = 120
 
 
+Candidate = tuple[float, float]
+"""A bandwidth (degrees) and a number of pseudo-observations."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """The density settings chosen, and the errors that decided.
@@ -44,7 +48,7 @@ class Choice:
 
     bandwidth_deg: float
     pseudo_observations: float
-    candidate_error_deg: dict[tuple[float, float], float]
+    candidate_error_deg: dict[Candidate, float]
     object_error_deg: tuple[float, ...] = ()
 
     @property
@@ -52,6 +56,57 @@ class Choice:
         """The cross-validated error of what was chosen, NaN where nothing was compared."""
         chosen = (self.bandwidth_deg, self.pseudo_observations)
         return self.candidate_error_deg.get(chosen, float("nan"))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one candidate makes of all calibration objects but one part.
+
+    Attributes
+    ----------
+    candidate : tuple of float
+    part : int
+    held_out : ndarray (n_objects,) bool
+        The objects of that part.
+    evidence : Evidence
+        Of all others.
+    """
+
+    candidate: Candidate
+    part: int
+    held_out: NDArray[np.bool_]
+    evidence: Evidence
+
+
+def density_candidates(settings: Mapping[str, Any]) -> list[Candidate]:
+    """Return the pairs of ``bandwidths_deg`` and ``pseudo_observations``, the widest first."""
+    pairs = itertools.product(settings["bandwidths_deg"], settings["pseudo_observations"])
+    return sorted(pairs, reverse=True)
+
+
+def density_trials(
+    estimate_deg: NDArray[np.float64], settings: Mapping[str, Any], n_bins: int
+) -> Iterator[Trial]:
+    """Yield every candidate for every part of the calibration objects, the widest candidate first.
+
+    Nothing is yielded where there is but one candidate, or one object.
+    """
+    candidates = density_candidates(settings)
+    n_objects = len(estimate_deg)
+    parts = min(settings["n_parts"], n_objects)
+    if len(candidates) == 1 or parts < 2:
+        return
+    part_of = np.arange(n_objects) % parts
+    for candidate in candidates:
+        for part in range(parts):
+            evidence = gather_evidence(
+                estimate_deg[part_of != part],
+                settings,
+                bandwidth_deg=candidate[0],
+                pseudo_observations=candidate[1],
+                n_bins=n_bins,
+            )
+            yield Trial(candidate, part, part_of == part, evidence)
 
 
 def choose_densities(
@@ -83,53 +138,35 @@ def choose_densities(
         For each method the candidate of least mean error; of equals, the largest bandwidth and
         then the most pseudo-observations.
     """
-    candidates = sorted(
-        itertools.product(settings["bandwidths_deg"], settings["pseudo_observations"]), reverse=True
-    )
-    n_objects = len(estimate_deg)
-    parts = min(settings["n_parts"], n_objects)
-    if len(candidates) == 1 or parts < 2:
-        return {name: Choice(*candidates[0], candidate_error_deg={}) for name in methods}
-    part_of = np.arange(n_objects) % parts
-    # Of each object, for each candidate.
-    errors = {name: np.empty((len(candidates), n_objects)) for name in methods}
-    for which, (bandwidth, alpha) in enumerate(candidates):
-        for part in range(parts):
-            held_out = estimate_deg[part_of == part]
-            evidence = gather_evidence(
-                estimate_deg[part_of != part],
-                settings,
-                bandwidth_deg=bandwidth,
-                pseudo_observations=alpha,
-                n_bins=n_bins,
-            )
-            for name, method in methods.items():
-                # The same draws for every candidate.
-                rng = np.random.default_rng(part)
-                rotation, fusion = method["rotation"], method["fusion"]
-                delta = rotate(rotation, fusion, held_out, evidence, rng)
-                made = two_view_error_deg(held_out, delta, fusion, evidence)
-                errors[name][which, part_of == part] = made.mean(axis=1)
-    return {name: _best(name, candidates, tried) for name, tried in errors.items()}
+    errors: dict[str, dict[Candidate, NDArray[np.float64]]] = {name: {} for name in methods}
+    for trial in density_trials(estimate_deg, settings, n_bins):
+        held_out = estimate_deg[trial.held_out]
+        for name, method in methods.items():
+            # The same draws for every candidate.
+            rng = np.random.default_rng(trial.part)
+            rotation, fusion = method["rotation"], method["fusion"]
+            delta = rotate(rotation, fusion, held_out, trial.evidence, rng)
+            made = two_view_error_deg(held_out, delta, fusion, trial.evidence)
+            of_objects = errors[name].setdefault(trial.candidate, np.empty(len(estimate_deg)))
+            of_objects[trial.held_out] = made.mean(axis=1)
+    widest = density_candidates(settings)[0]
+    return {
+        name: _best(name, tried) if tried else Choice(*widest, candidate_error_deg={})
+        for name, tried in errors.items()
+    }
 
 
-def _best(
-    name: str, candidates: Sequence[tuple[float, float]], errors: NDArray[np.float64]
-) -> Choice:
-    mean = errors.mean(axis=1)
-    best = int(mean.argmin())
+def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
+    mean = {candidate: float(of_objects.mean()) for candidate, of_objects in errors.items()}
+    best = min(mean, key=mean.__getitem__)
     log.info(
         "%s: bandwidth %g deg, %g pseudo-observations (two-view error %.2f deg; worst %.2f)",
         name,
-        *candidates[best],
+        *best,
         mean[best],
-        mean.max(),
+        max(mean.values()),
     )
-    return Choice(
-        *candidates[best],
-        candidate_error_deg=dict(zip(candidates, mean.tolist(), strict=True)),
-        object_error_deg=tuple(errors[best].tolist()),
-    )
+    return Choice(*best, candidate_error_deg=mean, object_error_deg=tuple(errors[best].tolist()))
 
 
 def chosen_evidence(
