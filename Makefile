@@ -23,7 +23,7 @@ reference: $(READY)
 	$(BIN)/snakemake --cores $(CORES) reference
 
 bench: $(READY)
-	$(BIN)/python -m benchmarks
+	$(BIN)/python -m performance
 
 test: $(READY)
 	$(BIN)/pytest

@@ -1,6 +1,32 @@
-"""What holds for all tests."""
+"""What holds for all tests, and one small results tree for those that read results."""
+
+from __future__ import annotations
 
 import os
 
 # As in the workflow's jobs: products of small matrices on several threads wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+import pytest
+
+import synthetic
+from nbv.experiments.results import load_evaluations
+
+UNITS = (("mug", 0), ("mug", 30), ("chair", 0))
+N_FOLDS = 3
+
+
+@pytest.fixture(scope="session")
+def tree(tmp_path_factory):
+    return synthetic.build_tree(tmp_path_factory.mktemp("results") / "synthetic", UNITS)
+
+
+@pytest.fixture(scope="session")
+def evaluations(tree):
+    return load_evaluations(tree, UNITS, N_FOLDS, synthetic.METHODS)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)

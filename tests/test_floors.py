@@ -11,15 +11,18 @@ PACKAGE = Path(__file__).parents[1] / "src" / "nbv"
 FLOORS = [
     {
         *("__init__", "amounts", "angles", "config", "errors", "files", "jobs", "provenance"),
-        *("schema", "seeds", "validation"),
+        *("labels", "schema", "seeds", "validation"),
     },
     {"meshes"},
     {"rendering"},
     {"estimation"},
     {"calibration"},
     {"recommendation"},
-    {"evaluation"},
-    {"cli"},
+    {"experiments"},
+    {"statistics"},
+    {"paper"},
+    {"reporting"},
+    {"reference"},
 ]
 LIVES_ALONE = {"torch": "estimation", "OpenGL": "rendering", "pyrender": "rendering"}
 MODULES = sorted(PACKAGE.rglob("*.py"))

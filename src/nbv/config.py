@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from nbv.errors import UserError, nearest
+from nbv.files import existing
 from nbv.schema import Config
 from nbv.validation import validate
 
@@ -249,3 +250,22 @@ def _items(text: str) -> list[str]:
         else:
             items[-1] += character
     return [item.strip() for item in items if item.strip()]
+
+
+def read_configuration(root: Path) -> dict[str, Any]:
+    """Read ``configuration.yaml`` of a run or reference as plain values.
+
+    Raises
+    ------
+    UserError
+        If it is missing, not a mapping, or does not say how many folds there are.
+    """
+    from omegaconf import OmegaConf
+
+    path = existing(root / "configuration.yaml")
+    configuration = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
+    if not isinstance(configuration, dict):
+        raise UserError(f"{path}: holds no settings; make it again")
+    if not isinstance(configuration.get("n_folds"), int) or configuration["n_folds"] < 2:
+        raise UserError(f"{path}: n_folds has to be 2 or more")
+    return {str(key): value for key, value in configuration.items()}

@@ -12,6 +12,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nbv.errors import UserError
+
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
@@ -74,3 +76,16 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
     """Read a whole `.npz` written by `write_arrays`."""
     with np.load(path, allow_pickle=False) as stored:
         return {name: stored[name] for name in stored.files}
+
+
+def existing(path: Path) -> Path:
+    """Return the path of a file that has to be there.
+
+    Raises
+    ------
+    UserError
+        If it is not.
+    """
+    if not path.is_file():
+        raise UserError(f"{path} does not exist; finish the run first, or is it another folder?")
+    return path

@@ -62,7 +62,7 @@ def job(snakemake: Any) -> Iterator[None]:
     except Exception as error:
         _fail_unexpectedly(error, path)
     else:
-        # What Snakemake's benchmark only samples; `nbv.evaluation.runtime` reads it back.
+        # What Snakemake's benchmark only samples; `nbv.reporting.runtime` reads it back.
         log.info("processor time %.2f s", sum(os.times()[:4]), extra={"log_only": True})
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import ast
 import functools
 import importlib.metadata
+import json
 import platform
 import subprocess
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 PACKAGES = (
     "numpy",
@@ -110,3 +112,9 @@ def versions() -> dict[str, object]:
         "platform": f"{platform.system()} {platform.machine()}",
         "packages": packages,
     }
+
+
+def read_provenance(root: Path) -> dict[str, Any]:
+    """Read ``provenance.json`` of a run or reference; empty where there is none."""
+    path = root / "provenance.json"
+    return dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else {}

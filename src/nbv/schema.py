@@ -41,7 +41,7 @@ class CameraConfig:
 
 @dataclass
 class SensorConfig:
-    """How the depth camera measures; see `nbv.rendering.sensors`."""
+    """How the depth camera measures; see `nbv.rendering.noise`."""
 
     name: str
     parameters: dict[str, float] = field(default_factory=dict)
@@ -67,7 +67,7 @@ class EstimatorConfig:
 
 @dataclass
 class DensityConfig:
-    """The density of calibration pairs and how it is chosen; see `nbv.recommendation.selection`."""
+    """The density of calibration pairs; see `nbv.recommendation.density_selection`."""
 
     reading: str
     spread: str
@@ -86,7 +86,7 @@ class RecommendationConfig:
 
 @dataclass
 class SequenceConfig:
-    """More than two views; see `nbv.evaluation.sequences`."""
+    """More than two views; see `nbv.experiments.more_views`."""
 
     n_views: int
     start_every_deg: int
@@ -95,7 +95,7 @@ class SequenceConfig:
 
 @dataclass
 class MethodConfig:
-    """A way to choose the second view and to fuse the two; see `nbv.evaluation.methods`."""
+    """A way to choose the second view and to fuse the two; see `nbv.experiments.two_views`."""
 
     rotation: str
     fusion: str = "average"
@@ -111,7 +111,7 @@ class ConditionConfig:
 
 @dataclass
 class TransferConfig:
-    """Conditions to train under and to test under; see `nbv.evaluation.transfer`."""
+    """Conditions to train under and to test under; see `nbv.reporting.extensions.transfer`."""
 
     category: str | None
     elevation_deg: int

@@ -7,6 +7,7 @@ import pytest
 
 from nbv.angles import circular_distance_deg
 from nbv.recommendation.criteria import CRITERIA
+from nbv.recommendation.density_selection import choose_densities
 from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.fusion import (
     FUSIONS,
@@ -17,8 +18,7 @@ from nbv.recommendation.fusion import (
     two_view_error_deg,
 )
 from nbv.recommendation.lookup import build_lookup, least_ambiguous_delta
-from nbv.recommendation.rotations import oracle, rotate
-from nbv.recommendation.selection import choose_densities
+from nbv.recommendation.policies import oracle, rotate
 
 N_BINS = 24
 SETTINGS = {"reading": "given_estimate", "spread": "entropy"}

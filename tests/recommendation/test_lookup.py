@@ -5,9 +5,9 @@ import pytest
 
 from nbv.errors import UserError
 from nbv.recommendation import lookup
+from nbv.recommendation.density_selection import choose_densities, chosen_lookup
 from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.fusion import two_view_error_deg
-from nbv.recommendation.selection import choose_densities, chosen_lookup
 
 SETTINGS = {"reading": "given_estimate", "spread": "entropy", "n_parts": 5}
 

@@ -14,8 +14,8 @@ from nbv.files import open_array
 from nbv.rendering import open_renderer
 from nbv.rendering import render as room
 from nbv.rendering.camera import Camera
+from nbv.rendering.depth_codes import decode_depth, encode_depth
 from nbv.rendering.render import render_objects, write_depth
-from nbv.rendering.sensor import decode_depth, encode_depth
 
 CAMERA = Camera(image_side=16)
 

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from snakemake.utils import Paramspace
 
-from nbv.evaluation.ablation import ablation_space
+from nbv.experiments.ablation import ablation_space
 
 from .conftest import TINY
 
@@ -126,7 +126,7 @@ def test_another_seed_reruns_everything(finished):
 
 
 def test_an_edit_of_a_metric_reruns_what_reads_errors(scratch):
-    metrics = scratch.folder / "src/nbv/evaluation/metrics.py"
+    metrics = scratch.folder / "src/nbv/statistics/metrics.py"
     metrics.write_text(metrics.read_text() + "\n\nEDITED = True\n")
     assert scratch.would_run() == {"settings": 1, **READING}
 
@@ -148,7 +148,7 @@ def test_a_comment_elsewhere_reruns_nothing(scratch):
 
 
 def test_touching_a_source_file_reruns_nothing(scratch):
-    (scratch.folder / "src/nbv/evaluation/metrics.py").touch()
+    (scratch.folder / "src/nbv/statistics/metrics.py").touch()
     assert scratch.would_run() == {}
 
 

@@ -14,15 +14,15 @@ except ModuleNotFoundError:
 from nbv import provenance
 from nbv.config import load_condition, load_config, snakemake_overrides
 from nbv.errors import UserError
-from nbv.evaluation.beliefs import METHODS as BELIEF_METHODS
-from nbv.evaluation.contest import check_contenders
-from nbv.evaluation.methods import check_method
+from nbv.experiments.image_distributions import METHODS as BELIEF_METHODS
+from nbv.recommendation.method_selection import check_contenders
+from nbv.experiments.two_views import check_method
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
 from nbv.recommendation.criteria import CRITERIA
-from nbv.recommendation.rotations import needs_lookup
+from nbv.recommendation.policies import needs_lookup
 from nbv.rendering import RENDERERS
-from nbv.rendering.sensors import SENSORS, check_sensor, sensor_settings
+from nbv.rendering.noise import SENSORS, check_sensor, sensor_settings
 
 BASE = Path(workflow.basedir)
 SOURCE_ROOT = Path(nbv.__file__).parents[1]

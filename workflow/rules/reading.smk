@@ -2,15 +2,16 @@
 
 import os
 
-from nbv.evaluation.figures import FIGURES
-from nbv.evaluation.reference import find_reference, read_configuration
-from nbv.evaluation.settings import (
+from nbv.reporting.paper.figures import FIGURES
+from nbv.reference.store import find_reference
+from nbv.config import read_configuration
+from nbv.reporting.settings import (
     ReadingSettings,
     focus_category,
     focus_unit,
     reference_units,
 )
-from nbv.evaluation.tables import TABLES
+from nbv.reporting.paper.tables import TABLES
 
 SHOWN = {"methods": list(CONFIG["methods"])}
 # Figures show no intervals.

@@ -5,8 +5,8 @@ from nbv.jobs import job
 with job(snakemake):
     import pandas as pd
 
-    from nbv.calibration.pairs import read_estimates
-    from nbv.evaluation.ablation import ablate
+    from nbv.calibration.estimates import read_estimates
+    from nbv.experiments.ablation import ablate
     from nbv.files import write_csv
 
     params, found = snakemake.params, []

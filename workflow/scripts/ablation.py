@@ -7,10 +7,11 @@ from nbv.jobs import job
 with job(snakemake):
     import numpy as np
 
-    from nbv.evaluation.ablation import ablation_sheet, ablation_space
-    from nbv.evaluation.paired import Resampler
-    from nbv.evaluation.sheets import save_sheet
+    from nbv.experiments.ablation import ablation_space
     from nbv.files import read_csv
+    from nbv.reporting.extensions.ablation import ablation_sheet
+    from nbv.reporting.sheets import save_sheet
+    from nbv.statistics.paired import Resampler
 
     params = snakemake.params
     found = {row: read_csv(path) for row, path in enumerate(snakemake.input.found)}

@@ -7,10 +7,10 @@ from nbv.jobs import job
 with job(snakemake):
     import numpy as np
 
-    from nbv.evaluation.claim_text import claims_markdown
-    from nbv.evaluation.claims import evaluate_claims
-    from nbv.evaluation.results import load_evaluations
+    from nbv.experiments.results import load_evaluations
     from nbv.files import write_csv, write_text
+    from nbv.paper.verdicts import evaluate_claims
+    from nbv.reporting.paper.claims import claims_markdown
 
     params, results = snakemake.params, Path(snakemake.output[0]).parent
     evaluations = load_evaluations(results, params.units, params.n_folds, params.reading["methods"])

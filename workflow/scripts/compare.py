@@ -7,7 +7,7 @@ from nbv.jobs import job
 
 with job(snakemake):
     from nbv.errors import UserError
-    from nbv.evaluation.compare import compare_runs
+    from nbv.reference.compare import compare_runs
 
     reference = Path(snakemake.input.reference).parent
     results = Path(snakemake.input.report).parent

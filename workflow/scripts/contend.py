@@ -5,14 +5,15 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.folds import assert_role, read_splits
-    from nbv.calibration.pairs import read_estimates
-    from nbv.evaluation.contest import choices_frame, enter, evaluate_entry
-    from nbv.evaluation.standing import object_means
-    from nbv.evaluation.travel import travel_rows
+    from nbv.calibration.estimates import read_estimates
+    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.experiments.travel import travel_rows
+    from nbv.experiments.two_views import evaluate_entry
     from nbv.files import read_csv, write_csv
     from nbv.recommendation.lookup import save_lookup
+    from nbv.recommendation.method_selection import choices_frame, enter
     from nbv.seeds import rng_for
+    from nbv.statistics.object_means import object_means
 
     params, wildcards = snakemake.params, snakemake.wildcards
     splits = read_splits(snakemake.input.splits)

@@ -5,9 +5,9 @@ from nbv.jobs import job
 with job(snakemake):
     import numpy as np
 
-    from nbv.calibration.folds import calibration_roles, objects_with_role, read_splits
-    from nbv.calibration.pairs import write_estimates
+    from nbv.calibration.estimates import write_estimates
     from nbv.calibration.posteriors import fit_temperature, write_posteriors
+    from nbv.calibration.splits import calibration_roles, objects_with_role, read_splits
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.inference import decode, outputs_of_parts
     from nbv.estimation.weights import load_estimator

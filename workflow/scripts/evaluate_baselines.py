@@ -5,9 +5,9 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.folds import assert_role, read_splits
-    from nbv.calibration.pairs import read_estimates
-    from nbv.evaluation.methods import evaluate_method
+    from nbv.calibration.estimates import read_estimates
+    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.experiments.two_views import evaluate_method
     from nbv.files import write_csv
     from nbv.seeds import rng_for
 

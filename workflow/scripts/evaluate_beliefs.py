@@ -3,10 +3,10 @@
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.folds import assert_role, read_splits
-    from nbv.calibration.pairs import read_estimates
+    from nbv.calibration.estimates import read_estimates
     from nbv.calibration.posteriors import read_posteriors
-    from nbv.evaluation.beliefs import evaluate_beliefs
+    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.experiments.image_distributions import evaluate_beliefs
     from nbv.files import write_csv
 
     given, fold = snakemake.input, int(snakemake.wildcards.fold)

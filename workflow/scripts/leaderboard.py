@@ -7,10 +7,10 @@ from nbv.jobs import job
 with job(snakemake):
     import numpy as np
 
-    from nbv.evaluation.leaderboard import beyond, blocks_of, favoured, leaderboard
-    from nbv.evaluation.paired import Resampler
-    from nbv.evaluation.sheets import save_sheet
-    from nbv.evaluation.standing import load_choices, load_object_means
+    from nbv.reporting.extensions.leaderboard import beyond, blocks_of, favoured, leaderboard
+    from nbv.reporting.sheets import save_sheet
+    from nbv.statistics.object_means import load_choices, load_object_means
+    from nbv.statistics.paired import Resampler
 
     params = snakemake.params
     runs = {run: load_object_means(paths) for run, paths in params.objects.items()}

@@ -5,13 +5,13 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.evaluation.likelihoods import (
+    from nbv.files import write_csv, write_text
+    from nbv.reporting.extensions.densities import (
         likelihood_cells,
         likelihoods_markdown,
         temperature_notes,
     )
-    from nbv.evaluation.settings import ReadingSettings
-    from nbv.files import write_csv, write_text
+    from nbv.reporting.settings import ReadingSettings
 
     params, results = snakemake.params, Path(snakemake.output.csv).parents[2]
     runs = {name: (results / name, classes) for name, classes in params.runs.items()}

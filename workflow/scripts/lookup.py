@@ -3,10 +3,10 @@
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.folds import assert_role, read_splits
-    from nbv.calibration.pairs import read_estimates
+    from nbv.calibration.estimates import read_estimates
+    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.recommendation.density_selection import chosen_lookup
     from nbv.recommendation.lookup import save_lookup
-    from nbv.recommendation.selection import chosen_lookup
 
     calibration = read_estimates(snakemake.input.calibration)
     splits = read_splits(snakemake.input.splits)

@@ -5,6 +5,6 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.evaluation.reference import collect_reference
+    from nbv.reference.store import collect_reference
 
     collect_reference(Path(snakemake.input.report).parent, Path(snakemake.params.reference))

@@ -6,8 +6,8 @@ with job(snakemake):
     from nbv.meshes.store import load_meshes
     from nbv.rendering import open_renderer
     from nbv.rendering.camera import Camera
+    from nbv.rendering.noise import open_sensor
     from nbv.rendering.render import write_depth
-    from nbv.rendering.sensors import open_sensor
 
     params, wildcards = snakemake.params, snakemake.wildcards
     camera = Camera(**params.camera)

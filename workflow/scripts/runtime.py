@@ -5,8 +5,8 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.evaluation.runtime import load_runtime, runtime_markdown
     from nbv.files import write_csv, write_text
+    from nbv.reporting.runtime import load_runtime, runtime_markdown
 
     params, results = snakemake.params, Path(snakemake.output[0]).parents[1]
     runtime = load_runtime(results, params.units, params.n_folds)

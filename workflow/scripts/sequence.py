@@ -3,11 +3,11 @@
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.folds import assert_role, read_splits
-    from nbv.calibration.pairs import read_estimates
-    from nbv.evaluation.contest import read_choices, stored_evidence
-    from nbv.evaluation.sequences import sequence_rows
+    from nbv.calibration.estimates import read_estimates
+    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.experiments.more_views import sequence_rows
     from nbv.files import write_csv
+    from nbv.recommendation.method_selection import read_choices, stored_evidence
     from nbv.seeds import rng_for
 
     params, wildcards = snakemake.params, snakemake.wildcards

@@ -8,11 +8,11 @@ with job(snakemake):
     import numpy as np
     import pandas as pd
 
-    from nbv.evaluation.figures import save_figure
-    from nbv.evaluation.figures.curves import sequences
-    from nbv.evaluation.paired import Resampler
-    from nbv.evaluation.sheets import save_sheet, sequence_sheet
     from nbv.files import read_csv
+    from nbv.reporting.extensions.curves import sequences
+    from nbv.reporting.paper.figures import save_figure
+    from nbv.reporting.sheets import save_sheet, sequence_sheet
+    from nbv.statistics.paired import Resampler
 
     params = snakemake.params
     rows = {

@@ -5,9 +5,9 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.evaluation.settings import ReadingSettings
-    from nbv.evaluation.sidebyside import sidebyside_cells, sidebyside_markdown
     from nbv.files import write_csv, write_text
+    from nbv.reporting.extensions.runs import sidebyside_cells, sidebyside_markdown
+    from nbv.reporting.settings import ReadingSettings
 
     params, results = snakemake.params, Path(snakemake.output.csv).parents[2]
     runs = {name: (results / name, methods) for name, methods in params.runs.items()}

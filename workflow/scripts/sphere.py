@@ -3,11 +3,11 @@
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.folds import assert_role, read_splits
-    from nbv.calibration.pairs import read_estimates
-    from nbv.evaluation.contest import read_choices, stored_evidence
-    from nbv.evaluation.sphere import sphere_rows
+    from nbv.calibration.estimates import read_estimates
+    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.experiments.view_sphere import sphere_rows
     from nbv.files import write_csv
+    from nbv.recommendation.method_selection import read_choices, stored_evidence
 
     params, fold = snakemake.params, int(snakemake.wildcards.fold)
     splits = read_splits(snakemake.input.splits)

@@ -8,9 +8,9 @@ with job(snakemake):
     import numpy as np
     import pandas as pd
 
-    from nbv.evaluation.paired import Resampler
-    from nbv.evaluation.sheets import save_sheet, sphere_sheet
     from nbv.files import read_csv
+    from nbv.reporting.sheets import save_sheet, sphere_sheet
+    from nbv.statistics.paired import Resampler
 
     params = snakemake.params
     rows = pd.concat([read_csv(path).assign(fold=fold) for fold, path in params.files.items()])

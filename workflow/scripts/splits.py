@@ -3,7 +3,7 @@
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.folds import make_splits
+    from nbv.calibration.splits import make_splits
     from nbv.files import write_csv
     from nbv.meshes.store import stored_ids
     from nbv.seeds import rng_for

@@ -5,10 +5,10 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.evaluation.layout import save_table
-    from nbv.evaluation.results import load_evaluations
-    from nbv.evaluation.settings import ReadingSettings
-    from nbv.evaluation.tables import build_table
+    from nbv.experiments.results import load_evaluations
+    from nbv.reporting.paper.layout import save_table
+    from nbv.reporting.paper.tables import build_table
+    from nbv.reporting.settings import ReadingSettings
 
     params, results = snakemake.params, Path(snakemake.output[0]).parents[1]
     evaluations = load_evaluations(results, params.units, params.n_folds, params.reading["methods"])

@@ -3,7 +3,7 @@
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.folds import objects_with_role, read_splits, training_roles
+    from nbv.calibration.splits import objects_with_role, read_splits, training_roles
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.training import train_estimator
     from nbv.estimation.weights import save_estimator

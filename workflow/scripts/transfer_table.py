@@ -5,9 +5,9 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.evaluation.layout import save_table
-    from nbv.evaluation.settings import ReadingSettings
-    from nbv.evaluation.transfer import build_transfer, load_transfer
+    from nbv.reporting.extensions.transfer import build_transfer, load_transfer
+    from nbv.reporting.paper.layout import save_table
+    from nbv.reporting.settings import ReadingSettings
 
     params, results = snakemake.params, Path(snakemake.output[0]).parents[1]
     settings = ReadingSettings(**params.reading)

@@ -7,10 +7,10 @@ from nbv.jobs import job
 with job(snakemake):
     import pandas as pd
 
-    from nbv.evaluation.figures import save_figure
-    from nbv.evaluation.figures.curves import travel
-    from nbv.evaluation.travel import pooled_travel
+    from nbv.experiments.travel import pooled_travel
     from nbv.files import read_csv, write_csv
+    from nbv.reporting.extensions.curves import travel
+    from nbv.reporting.paper.figures import save_figure
 
     params = snakemake.params
     curves = {

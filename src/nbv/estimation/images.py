@@ -15,7 +15,7 @@ def to_input(codes: NDArray[np.uint8], hardware: Hardware) -> torch.Tensor:
     Parameters
     ----------
     codes : ndarray (..., side, side) uint8
-        Depth codes as `nbv.rendering.sensor` writes them: 0 is background, 128 the reference depth.
+        Depth codes of `nbv.rendering.depth_codes`: 0 is background, 128 the reference depth.
     hardware : Hardware
 
     Returns

@@ -14,8 +14,8 @@ from nbv.files import replacing
 from nbv.meshes.store import Surface
 from nbv.rendering import Renderer
 from nbv.rendering.camera import Camera
-from nbv.rendering.sensor import Codes, encode_depth
-from nbv.rendering.sensors import Measure, ideal
+from nbv.rendering.depth_codes import Codes, encode_depth
+from nbv.rendering.noise import Measure, ideal
 
 logger = logging.getLogger(__name__)
 
@@ -42,7 +42,7 @@ def render_objects(
     camera : Camera
     renderer : Renderer
     measure : callable, optional
-        From `nbv.rendering.sensors.open_sensor`: what is read of one object's images before they
+        From `nbv.rendering.noise.open_sensor`: what is read of one object's images before they
         are encoded.
     n_azimuths : int
         View k is at azimuth 360 k / n_azimuths degrees.
@@ -50,7 +50,7 @@ def render_objects(
     Yields
     ------
     (n_azimuths, side, side) uint8
-        See `nbv.rendering.sensor.encode_depth`.
+        See `nbv.rendering.depth_codes.encode_depth`.
 
     Raises
     ------

@@ -1,1 +1,0 @@
-"""Reading the results: metrics, tables, claims, figures and the report."""

@@ -1,0 +1,1 @@
+"""Experiments: they compute; nothing here is shown."""

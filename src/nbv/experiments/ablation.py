@@ -1,0 +1,116 @@
+"""What each choice in the method is worth: one setting at a time is changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nbv.calibration.estimates import Estimates
+from nbv.recommendation.criteria import CRITERIA
+from nbv.recommendation.density_likelihood import most_likely_density
+from nbv.recommendation.density_selection import Choice, choose_densities
+from nbv.recommendation.evidence import gather_evidence
+from nbv.recommendation.fusion import FUSIONS, two_view_error_deg
+from nbv.recommendation.lookup import build_lookup
+
+ALL = 0
+"""As a number of calibration objects: as many as there are."""
+
+PAPER: Mapping[str, Any] = {
+    "criterion": "entropy",
+    "fusion": "average",
+    "reading": "given_estimate",
+    "spread": "entropy",
+    "chosen_by": "decision",
+    "bandwidth_deg": 0.0,
+    "pseudo_observations": 0.0,
+    "n_bins": 360,
+    "n_calibration": ALL,
+}
+"""The paper's method as it is run; bandwidth and pseudo-observations are chosen, not given."""
+
+
+def ablation_space() -> pd.DataFrame:
+    """Return the settings tried, one row each; the first is the paper's method.
+
+    ``varied`` names what a row changes. Where ``chosen_by`` is ``given`` the density is the row's
+    ``bandwidth_deg`` and ``pseudo_observations``.
+    """
+    rows = [{"varied": "nothing", **PAPER}]
+    rows += [{"varied": varied, **PAPER, **change} for varied, change in _changes()]
+    return pd.DataFrame(rows)
+
+
+def _changes() -> Iterator[tuple[str, dict[str, Any]]]:
+    for bandwidth in (1.5, 3.0, 6.0, 12.0, 24.0):
+        for alpha in (0.0, 10.0, 100.0):
+            given = {"chosen_by": "given", "bandwidth_deg": bandwidth}
+            yield "density", given | {"pseudo_observations": alpha}
+    yield "chosen_by", {"chosen_by": "likelihood"}
+    for reading in ("given_estimate", "given_truth"):
+        for spread in ("entropy", "circular_variance"):
+            if (reading, spread) != (PAPER["reading"], PAPER["spread"]):
+                yield "reading", {"reading": reading, "spread": spread}
+    for n_bins in (36, 72, 120, 180):
+        yield "bins", {"n_bins": n_bins}
+    for n_calibration in (2, 5, 10, 15):
+        yield "calibration_objects", {"n_calibration": n_calibration}
+    for criterion in CRITERIA:
+        for fusion in FUSIONS:
+            if (criterion, fusion) != (PAPER["criterion"], PAPER["fusion"]):
+                yield "criterion_and_fusion", {"criterion": criterion, "fusion": fusion}
+
+
+def ablate(
+    calibration: Estimates,
+    test: Estimates,
+    instance: Mapping[str, Any],
+    settings: Mapping[str, Any],
+) -> pd.DataFrame:
+    """Return each test object's mean error in one fold under one row of the space.
+
+    Parameters
+    ----------
+    calibration, test : Estimates
+        Of one fold.
+    instance : mapping
+        A row of `ablation_space`.
+    settings : mapping
+        The configuration's ``density``.
+
+    Returns
+    -------
+    DataFrame
+        Columns ``object_id, error_deg``.
+    """
+    wanted = instance["n_calibration"]
+    estimate_deg = calibration.estimate_deg[: wanted if wanted != ALL else None]
+    own = dict(settings) | {key: instance[key] for key in ("reading", "spread")}
+    choice = _choice(estimate_deg, instance, own)
+    evidence = gather_evidence(
+        estimate_deg,
+        own,
+        bandwidth_deg=choice.bandwidth_deg,
+        pseudo_observations=choice.pseudo_observations,
+        n_bins=instance["n_bins"],
+    )
+    lookup = build_lookup(evidence, instance["criterion"], instance["fusion"])
+    delta = lookup.recommend(test.estimate_deg)
+    errors = two_view_error_deg(test.estimate_deg, delta, instance["fusion"], evidence)
+    return pd.DataFrame({"object_id": test.object_ids, "error_deg": errors.mean(axis=1)})
+
+
+def _choice(
+    estimate_deg: np.ndarray[Any, np.dtype[np.float64]],
+    instance: Mapping[str, Any],
+    settings: Mapping[str, Any],
+) -> Choice:
+    if instance["chosen_by"] == "given":
+        return Choice(instance["bandwidth_deg"], instance["pseudo_observations"], {})
+    if instance["chosen_by"] == "likelihood":
+        return most_likely_density(estimate_deg, settings)
+    method = {"rotation": instance["criterion"], "fusion": instance["fusion"]}
+    return choose_densities(estimate_deg, {"ablated": method}, settings)["ablated"]

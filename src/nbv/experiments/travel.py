@@ -1,0 +1,92 @@
+"""What less travel costs in error: each table read again with a price on degrees, or a limit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nbv.angles import nearest_bin, travel_deg
+from nbv.calibration.estimates import Estimates
+from nbv.recommendation.fusion import Rotations, rotation_errors_deg, two_view_error_deg
+from nbv.recommendation.lookup import least_ambiguous_delta
+from nbv.recommendation.method_selection import Entry
+
+# Multiples of the price at which the camera would, for the average estimate, rather stay.
+RELATIVE_COSTS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0)
+LIMITS_DEG = (15, 30, 45, 60, 90, 120, 150, 180)
+ANY_DIRECTION = "either_way"
+
+COLUMNS = ("method", "rule", "setting", "travel_deg", "error_deg", "n_images")
+
+
+def travel_rows(entries: Mapping[str, Entry], test: Estimates) -> pd.DataFrame:
+    """Return error against travel for every contender that follows a table.
+
+    Parameters
+    ----------
+    entries : mapping of str to Entry
+        Contenders in one fold.
+    test : Estimates
+        Its test objects.
+
+    Returns
+    -------
+    DataFrame
+        Columns `COLUMNS`, means over images. Rule ``cost``: `setting` is the price in the
+        criterion's unit per degree, at each of `RELATIVE_COSTS` times the table's mean range over
+        180 degrees. Rule ``limit``: `setting` is the longest travel allowed, degrees. Under the
+        name `ANY_DIRECTION` with its fusion, rule ``fixed``: travel by `setting` degrees one way
+        or the other, whatever the estimate.
+    """
+    rows = []
+    fusions: dict[str, Entry] = {}
+    for name, entry in entries.items():
+        fusions.setdefault(entry.fusion, entry)
+        if entry.lookup is None:
+            continue
+        for rule, setting, by_bin in _rereadings(entry.lookup.ambiguity):
+            delta = by_bin[nearest_bin(test.estimate_deg, len(by_bin))]
+            error = two_view_error_deg(test.estimate_deg, delta, entry.fusion, entry.evidence)
+            rows.append((name, rule, setting, travel_deg(delta).mean(), error.mean(), error.size))
+    for fusion, entry in fusions.items():
+        errors = rotation_errors_deg(test.estimate_deg, entry.evidence, fusion)
+        by_delta = errors.reshape(len(errors), -1).mean(axis=1)
+        for limit in (0, *LIMITS_DEG):
+            either = (by_delta[limit] + by_delta[-limit % len(by_delta)]) / 2
+            name = f"{ANY_DIRECTION}_{fusion}"
+            rows.append((name, "fixed", limit, limit, either, errors[0].size))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _rereadings(ambiguity: NDArray[np.float32]) -> Iterator[tuple[str, float, Rotations]]:
+    worth_going = float(np.ptp(ambiguity, axis=1).mean()) / 180.0
+    for relative in RELATIVE_COSTS:
+        price = relative * worth_going
+        yield "cost", price, least_ambiguous_delta(ambiguity, travel_cost=price)
+    for limit in LIMITS_DEG:
+        yield "limit", limit, least_ambiguous_delta(ambiguity, max_travel_deg=limit)
+
+
+def pooled_travel(frames: Mapping[int, pd.DataFrame]) -> pd.DataFrame:
+    """Return the curves of several folds as one, weighted by their images.
+
+    The k-th price of one fold is averaged with the k-th of the others: prices are relative to
+    each fold's own table.
+    """
+    parts = []
+    for fold, frame in frames.items():
+        place = frame.groupby(["method", "rule"], sort=False).cumcount()
+        parts.append(frame.assign(fold=fold, place=place))
+    everything = pd.concat(parts, ignore_index=True)
+    weighted = ["setting", "travel_deg", "error_deg"]
+    for column in weighted:
+        everything[column] *= everything["n_images"]
+    sums = everything.groupby(["method", "rule", "place"], sort=False)[
+        [*weighted, "n_images"]
+    ].sum()
+    for column in weighted:
+        sums[column] /= sums["n_images"]
+    return sums.reset_index().drop(columns="place")[list(COLUMNS)]

@@ -1,0 +1,40 @@
+"""How numbers, intervals, methods and categories are printed, everywhere alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+MINUS = "\u2212"
+
+_METHOD_LABELS: Mapping[str, str] = {
+    "single": "Single",
+    "random": "Random",
+    "opposite": "Opposite",
+    "proposed": "Proposed",
+}
+
+
+def method_label(method: str) -> str:
+    """Return a method's name as tables and figures print it."""
+    return _METHOD_LABELS.get(method, method.replace("_", " ").capitalize())
+
+
+def category_label(category: str) -> str:
+    """Return a category's name as tables and figures print it."""
+    return category.replace("_", " ").capitalize()
+
+
+def number(value: float, decimals: int = 2) -> str:
+    """Return a number with a true minus sign; an en dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    text = f"{value:.{decimals}f}"
+    return text.replace("-", MINUS) if float(text) != 0 else text.lstrip("-")
+
+
+def interval_text(value: float, low: float, high: float, decimals: int = 2) -> str:
+    """Return ``value (low to high)``."""
+    ends = f"{number(low, decimals)} to {number(high, decimals)}"
+    return f"{number(value, decimals)} ({ends})"

@@ -1,0 +1,1 @@
+"""What the paper says: its printed values, its claims, and whether they hold."""

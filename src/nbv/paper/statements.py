@@ -1,0 +1,177 @@
+"""Statements about results, and when they hold.
+
+A statement is one comparison or a compound of statements. Each gets one of four verdicts:
+
+``holds``
+    *Better(statistic, a, b)*: the 95 % interval of the paired difference excludes zero on the
+    side that favours `a`. *Comparable(statistic, a, b, margin)*: the interval lies inside
+    ±margin. *FreeOfOutliers(a)*: no error lies above the upper quartile by more than 1.5 times
+    the interquartile range. *AtLeast(k, parts)*: k parts hold.
+``does not hold``
+    The interval excludes zero on the other side; it lies outside ±margin altogether; there is
+    an outlier; so many parts do not hold that k cannot be reached.
+``undecided``
+    Neither: the interval includes zero, or reaches over the margin. And wherever fewer than
+    `FEWEST_OBJECTS` test objects are resampled together (those of a category; for σ over folds,
+    those of a fold): an interval over so few means nothing.
+``not run``
+    What it speaks of was not evaluated. A compound is ``not run`` where its verdict depends on
+    parts that were not.
+
+Intervals are not corrected for the number of comparisons.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from nbv.experiments.results import Unit
+from nbv.statistics.paired import LOWER_IS_BETTER
+
+Verdict = Literal["holds", "does not hold", "undecided", "not run"]
+
+HOLDS: Verdict = "holds"
+FAILS: Verdict = "does not hold"
+UNDECIDED: Verdict = "undecided"
+NOT_RUN: Verdict = "not run"
+VERDICTS: tuple[Verdict, ...] = (HOLDS, FAILS, UNDECIDED, NOT_RUN)
+
+TUKEY_FACTOR = 1.5
+FEWEST_OBJECTS = 5
+"""Test objects that an interval over objects, and so a verdict, needs."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """One method on some images: whole units pooled, or one group, fold or set of azimuths."""
+
+    method: str
+    units: tuple[Unit, ...]
+    group: int | None = None
+    fold: int | None = None
+    initial_deg: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Better:
+    """`a` has the better statistic: lower, or for a pAUC higher."""
+
+    statistic: str
+    a: Term
+    b: Term
+
+
+@dataclass(frozen=True)
+class Comparable:
+    """The statistics differ by less than `margin`, in the statistic's unit."""
+
+    statistic: str
+    a: Term
+    b: Term
+    margin: float
+
+
+@dataclass(frozen=True)
+class FreeOfOutliers:
+    """No error is an outlier by Tukey's rule."""
+
+    a: Term
+
+
+@dataclass(frozen=True)
+class AtLeast:
+    """At least `count` of the parts hold; `label` names the compound among its siblings."""
+
+    count: int
+    parts: tuple[Statement, ...]
+    label: str = ""
+
+
+Comparison = Better | Comparable | FreeOfOutliers
+Statement = Comparison | AtLeast
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of the paper and what it says about the results.
+
+    Attributes
+    ----------
+    id : str
+        Short name, unique.
+    section : str
+        Where the paper says it.
+    sentence : str
+        The sentence, quoted or shortened.
+    compared : str
+        What is compared and by which rule, in words.
+    statement : Statement
+        The same, to be evaluated.
+    note : str
+        What to bear in mind.
+    """
+
+    id: str
+    section: str
+    sentence: str
+    compared: str
+    statement: Statement
+    note: str = field(default="")
+
+
+def all_of(parts: Sequence[Statement], label: str = "") -> AtLeast:
+    """Return the compound that holds where every part does."""
+    return AtLeast(len(parts), tuple(parts), label)
+
+
+def leaves(statement: Statement) -> list[Comparison]:
+    """Return the comparisons of a statement, in reading order."""
+    if isinstance(statement, AtLeast):
+        return [leaf for part in statement.parts for leaf in leaves(part)]
+    return [statement]
+
+
+def if_enough(verdict: Verdict, n_objects: int) -> Verdict:
+    """Return a verdict, or that it is open where too few objects are resampled together."""
+    return UNDECIDED if verdict != NOT_RUN and n_objects < FEWEST_OBJECTS else verdict
+
+
+def better_verdict(statistic: str, low: float, high: float) -> Verdict:
+    """Return the verdict of *Better* from the interval of a - b."""
+    if not (low <= high):
+        return NOT_RUN
+    favours_a, favours_b = (
+        (high < 0, low > 0) if LOWER_IS_BETTER[statistic] else (low > 0, high < 0)
+    )
+    return HOLDS if favours_a else FAILS if favours_b else UNDECIDED
+
+
+def comparable_verdict(low: float, high: float, margin: float) -> Verdict:
+    """Return the verdict of *Comparable* from the interval of a - b."""
+    if not (low <= high):
+        return NOT_RUN
+    if -margin < low and high < margin:
+        return HOLDS
+    return FAILS if low > margin or high < -margin else UNDECIDED
+
+
+def combine(count: int, verdicts: Sequence[Verdict]) -> Verdict:
+    """Return the verdict of *AtLeast*: decided only where no open part could change it."""
+    holding = sum(verdict == HOLDS for verdict in verdicts)
+    possible = sum(verdict != FAILS for verdict in verdicts)
+    if holding >= count:
+        return HOLDS
+    if possible < count:
+        return FAILS
+    return NOT_RUN if NOT_RUN in verdicts else UNDECIDED
+
+
+def combine_statement(statement: Statement, verdicts: Mapping[Comparison, Verdict]) -> Verdict:
+    """Return a statement's verdict from those of its comparisons."""
+    if isinstance(statement, AtLeast):
+        return combine(
+            statement.count, [combine_statement(part, verdicts) for part in statement.parts]
+        )
+    return verdicts[statement]

@@ -1,0 +1,203 @@
+"""Choosing the density's smoothing and pseudo-observations by the decisions they lead to.
+
+The density's own likelihood prefers sharp rows where estimates hardly ever occur, and an argmin
+finds just those. So each candidate is judged by the two-view error of its decisions on
+calibration objects that its tables were not built from; test objects are never seen.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.recommendation.evidence import Evidence, gather_evidence
+from nbv.recommendation.fusion import two_view_error_deg
+from nbv.recommendation.lookup import LookupTable, build_lookup
+from nbv.recommendation.policies import rotate
+
+log = logging.getLogger(__name__)
+
+# Bins of the tables compared. Fewer than of the final ones changes no choice among bandwidths
+# well above 3 degrees, and costs 27 times less.
+COARSE_BINS = 120
+
+
+Candidate = tuple[float, float]
+"""A bandwidth (degrees) and a number of pseudo-observations."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The density settings chosen, and the errors that decided.
+
+    Attributes
+    ----------
+    bandwidth_deg, pseudo_observations : float
+    candidate_error_deg : dict
+        Cross-validated two-view error by (bandwidth, pseudo-observations); empty where there was
+        nothing to choose from.
+    object_error_deg : tuple of float
+        That of the chosen candidate on each calibration object, or empty.
+    """
+
+    bandwidth_deg: float
+    pseudo_observations: float
+    candidate_error_deg: dict[Candidate, float]
+    object_error_deg: tuple[float, ...] = ()
+
+    @property
+    def error_deg(self) -> float:
+        """The cross-validated error of what was chosen, NaN where nothing was compared."""
+        chosen = (self.bandwidth_deg, self.pseudo_observations)
+        return self.candidate_error_deg.get(chosen, float("nan"))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one candidate makes of all calibration objects but one part.
+
+    Attributes
+    ----------
+    candidate : tuple of float
+    part : int
+    held_out : ndarray (n_objects,) bool
+        The objects of that part.
+    evidence : Evidence
+        Of all others.
+    """
+
+    candidate: Candidate
+    part: int
+    held_out: NDArray[np.bool_]
+    evidence: Evidence
+
+
+def density_candidates(settings: Mapping[str, Any]) -> list[Candidate]:
+    """Return the pairs of ``bandwidths_deg`` and ``pseudo_observations``, the widest first."""
+    pairs = itertools.product(settings["bandwidths_deg"], settings["pseudo_observations"])
+    return sorted(pairs, reverse=True)
+
+
+def density_trials(
+    estimate_deg: NDArray[np.float64], settings: Mapping[str, Any], n_bins: int
+) -> Iterator[Trial]:
+    """Yield every candidate for every part of the calibration objects, the widest candidate first.
+
+    Nothing is yielded where there is but one candidate, or one object.
+    """
+    candidates = density_candidates(settings)
+    n_objects = len(estimate_deg)
+    parts = min(settings["n_parts"], n_objects)
+    if len(candidates) == 1 or parts < 2:
+        return
+    part_of = np.arange(n_objects) % parts
+    for candidate in candidates:
+        for part in range(parts):
+            evidence = gather_evidence(
+                estimate_deg[part_of != part],
+                settings,
+                bandwidth_deg=candidate[0],
+                pseudo_observations=candidate[1],
+                n_bins=n_bins,
+            )
+            yield Trial(candidate, part, part_of == part, evidence)
+
+
+def choose_densities(
+    estimate_deg: NDArray[np.float64],
+    methods: Mapping[str, Mapping[str, Any]],
+    settings: Mapping[str, Any],
+    *,
+    n_bins: int = COARSE_BINS,
+) -> dict[str, Choice]:
+    """Cross-validate the decisions of several methods over calibration objects.
+
+    Parameters
+    ----------
+    estimate_deg : ndarray (n_objects, n_views)
+        Calibration estimates.
+    methods : mapping
+        ``rotation`` (see `nbv.recommendation.policies.rotate`) and ``fusion`` by name.
+    settings : mapping
+        The configuration's ``density``. Candidates are all pairs of its ``bandwidths_deg`` and
+        ``pseudo_observations``; where there is but one, nothing is computed. The objects are
+        divided into ``n_parts`` (every n-th object), fewer where there are fewer objects; one
+        object alone cannot be cross-validated, and the widest candidate is taken.
+    n_bins : int
+        Of the tables compared.
+
+    Returns
+    -------
+    dict of str to Choice
+        For each method the candidate of least mean error; of equals, the largest bandwidth and
+        then the most pseudo-observations.
+    """
+    errors: dict[str, dict[Candidate, NDArray[np.float64]]] = {name: {} for name in methods}
+    for trial in density_trials(estimate_deg, settings, n_bins):
+        held_out = estimate_deg[trial.held_out]
+        for name, method in methods.items():
+            # The same draws for every candidate.
+            rng = np.random.default_rng(trial.part)
+            rotation, fusion = method["rotation"], method["fusion"]
+            delta = rotate(rotation, fusion, held_out, trial.evidence, rng)
+            made = two_view_error_deg(held_out, delta, fusion, trial.evidence)
+            of_objects = errors[name].setdefault(trial.candidate, np.empty(len(estimate_deg)))
+            of_objects[trial.held_out] = made.mean(axis=1)
+    widest = density_candidates(settings)[0]
+    return {
+        name: _best(name, tried) if tried else Choice(*widest, candidate_error_deg={})
+        for name, tried in errors.items()
+    }
+
+
+def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
+    mean = {candidate: float(of_objects.mean()) for candidate, of_objects in errors.items()}
+    best = min(mean, key=mean.__getitem__)
+    log.info(
+        "%s: bandwidth %g deg, %g pseudo-observations (two-view error %.2f deg; worst %.2f)",
+        name,
+        *best,
+        mean[best],
+        max(mean.values()),
+    )
+    return Choice(*best, candidate_error_deg=mean, object_error_deg=tuple(errors[best].tolist()))
+
+
+def chosen_evidence(
+    estimate_deg: NDArray[np.float64], choice: Choice, settings: Mapping[str, Any]
+) -> Evidence:
+    """Return the evidence of all calibration estimates with the density settings chosen."""
+    return gather_evidence(
+        estimate_deg,
+        settings,
+        bandwidth_deg=choice.bandwidth_deg,
+        pseudo_observations=choice.pseudo_observations,
+    )
+
+
+def chosen_lookup(
+    estimate_deg: NDArray[np.float64],
+    criterion: str,
+    settings: Mapping[str, Any],
+    fusion: str = "average",
+) -> LookupTable:
+    """Build a lookup table with the density settings that decide best.
+
+    Parameters
+    ----------
+    estimate_deg : ndarray (n_objects, n_views)
+        Calibration estimates.
+    criterion, fusion : str
+        See `nbv.recommendation.lookup.build_lookup`.
+    settings : mapping
+        The configuration's ``density``; see `choose_densities`.
+    """
+    method = {"rotation": criterion, "fusion": fusion}
+    choice = choose_densities(estimate_deg, {criterion: method}, settings)[criterion]
+    return build_lookup(chosen_evidence(estimate_deg, choice, settings), criterion, fusion)

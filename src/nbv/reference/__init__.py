@@ -1,0 +1,1 @@
+"""Reference results under version control: keeping them, and comparing runs with them."""

@@ -1,0 +1,173 @@
+"""Depth sensors: what becomes of true depth before it is encoded.
+
+A sensor is a class in a file of its own: its fields are its parameters, and an instance is one
+function from the depth images of one object to what the sensor reads. It is chosen by name and
+imported only then, so that an edit of one sensor renders nothing of another again. `IDEAL` is the
+name of having none.
+
+A sensor has a size and a resolution, so the object needs a size in metres: `diagonal_m` is the
+bounding box's diagonal, the unit of all depths. The camera stands at ``distance`` diagonals and
+thus scales with the object, and its image is a crop of the sensor's, resized to the nearest
+reading: an angle covers ``camera.focal_px / focal_px of the sensor`` times as many pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
+from importlib import import_module
+from typing import Any, Protocol
+
+import numpy as np
+
+from nbv.errors import UserError, nearest
+from nbv.rendering.camera import Camera
+from nbv.rendering.depth_codes import Depths
+from nbv.seeds import rng_for
+
+IDEAL = "ideal"
+SENSORS: Mapping[str, str] = {
+    "kinect": "nbv.rendering.noise.kinect:Kinect",
+    "stereo": "nbv.rendering.noise.stereo:Stereo",
+}
+
+Measure = Callable[[Depths, str], Depths]
+"""From the depth images of one object and its id to what is read of them."""
+
+
+class Sensor(Protocol):
+    """What every noisy sensor offers."""
+
+    @property
+    def nearest_m(self) -> float:
+        """The shortest distance that it can read, in metres."""
+        ...
+
+    def __call__(
+        self, depth: Depths, camera: Camera, diagonal_m: float, rng: np.random.Generator
+    ) -> Depths:
+        """Return what the sensor reads of one object.
+
+        Parameters
+        ----------
+        depth : (k, side, side) float32
+            Distance along the optical axis, in object diagonals; 0 where there is nothing.
+        camera : Camera
+            Where the sensor stands, and which part of its field of view the images are. A
+            silhouette in the middle of the image is taken for the sensor being aimed at it.
+        diagonal_m : float
+            Metres per object diagonal.
+        rng : numpy.random.Generator
+            Of this object alone.
+
+        Returns
+        -------
+        (k, side, side) float32
+            Object diagonals; 0 where nothing is read. An image may be left without any reading.
+        """
+        ...
+
+
+def ideal(depth: Depths, object_id: str) -> Depths:
+    """Return the depth as it is."""
+    return depth
+
+
+def sensor_settings(sensor: Mapping[str, Any], category: str, seed: int) -> dict[str, Any]:
+    """Return what of the configuration's ``sensor`` the images of one category depend on.
+
+    Parameters
+    ----------
+    sensor : mapping
+        ``name, parameters, diagonal_m``, the last with an entry for each category.
+    category : str
+    seed : int
+        The run's.
+
+    Returns
+    -------
+    dict
+        As `open_sensor` takes it. Without a sensor neither sizes nor seed matter.
+
+    Raises
+    ------
+    UserError
+        Where a noisy sensor is not told the category's size.
+    """
+    if sensor["name"] == IDEAL:
+        return {"name": IDEAL}
+    if category not in sensor["diagonal_m"]:
+        raise UserError(
+            f"sensor.diagonal_m.{category}: sensor={sensor['name']} needs the size of every "
+            "category in metres (the bounding box's diagonal); add it"
+        )
+    return {
+        "name": sensor["name"],
+        "parameters": sensor["parameters"],
+        "diagonal_m": sensor["diagonal_m"][category],
+        "seed": seed,
+    }
+
+
+def check_sensor(sensor: Mapping[str, Any], categories: Iterable[str]) -> None:
+    """Raise UserError where the configuration's ``sensor`` cannot be used for some category."""
+    for category in categories:
+        settings = sensor_settings(sensor, category, 0)
+        if settings["name"] != IDEAL:
+            _build(settings["name"], settings["parameters"])
+
+
+def open_sensor(settings: Mapping[str, Any], camera: Camera, *place: str | int) -> Measure:
+    """Return a sensor, ready for the objects of one category at one elevation.
+
+    Parameters
+    ----------
+    settings : mapping
+        From `sensor_settings`.
+    camera : Camera
+    *place : str or int
+        Category and elevation. With the seed and an object's id they decide the object's noise,
+        which so depends on no other object and on no order.
+
+    Raises
+    ------
+    UserError
+        For an unknown sensor or parameter, and where the object stands too near to be read.
+    """
+    name = settings["name"]
+    if name == IDEAL:
+        return ideal
+    sensor, diagonal_m = _build(name, settings["parameters"]), settings["diagonal_m"]
+    stands_m = camera.distance * diagonal_m
+    if stands_m < sensor.nearest_m:
+        raise UserError(
+            f"sensor.diagonal_m={diagonal_m:g} puts the camera {stands_m:.2f} m from the object, "
+            f"and {name} reads nothing nearer than {sensor.nearest_m:.2f} m: raise it, or "
+            f"camera.distance={camera.distance:g}"
+        )
+
+    def measure(depth: Depths, object_id: str) -> Depths:
+        rng = rng_for(settings["seed"], "sensor", *place, object_id)
+        return sensor(depth, camera, diagonal_m, rng)
+
+    return measure
+
+
+def _build(name: str, parameters: Mapping[str, float]) -> Sensor:
+    if name not in SENSORS:
+        raise UserError(f"sensor={name} is unknown: {nearest(name, [IDEAL, *SENSORS])}")
+    module, _, attribute = SENSORS[name].partition(":")
+    kind = getattr(import_module(module), attribute)
+    known = [field.name for field in fields(kind)]
+    for key, value in parameters.items():
+        if key not in known:
+            raise UserError(
+                f"sensor.parameters.{key}: {name} has no such parameter; {nearest(key, known)}"
+            )
+        if not value > 0:
+            raise UserError(f"sensor.parameters.{key}={value:g} is out of range: above 0")
+    absent = [key for key in known if key not in parameters]
+    if absent:
+        raise UserError(f"sensor.parameters.{absent[0]}: {name} needs it; add it")
+    sensor: Sensor = kind(**parameters)
+    return sensor

@@ -1,0 +1,111 @@
+"""Curves beyond the paper: error against travel, and against the number of views."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import matplotlib as mpl
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from nbv.experiments.travel import ANY_DIRECTION
+from nbv.labels import category_label, method_label
+from nbv.reporting.style import RC, method_style, new_figure
+
+_COLUMNS = 3
+_BASELINES: Mapping[str, str] = {
+    "random": "random",
+    "bisecting": "opposite",
+    "evenly_spaced": "single",
+    f"{ANY_DIRECTION}_average": "single",
+    f"{ANY_DIRECTION}_posterior": "opposite",
+}
+
+
+def _draw(axes: Axes, x: pd.Series, y: pd.Series, method: str, methods: tuple[str, ...]) -> None:
+    """Draw one curve: baselines in the paper's styles, criteria in the further ones in turn."""
+    others = tuple(name for name in methods if name not in _BASELINES)
+    style = method_style(_BASELINES.get(method, method), others)
+    axes.plot(
+        x,
+        y,
+        label=method_label(method),
+        color=style.color,
+        linestyle=style.line,
+        marker=style.marker,
+        markersize=4,
+        linewidth=style.width,
+    )
+
+
+def _grid(n_panels: int, height_in: float = 2.9) -> tuple[Figure, list[Axes]]:
+    n_columns = min(n_panels, _COLUMNS)
+    n_rows = -(-n_panels // n_columns)
+    figure = new_figure(3.4 * n_columns + 0.4, height_in * n_rows + 0.9)
+    panels = figure.subplots(n_rows, n_columns, squeeze=False).ravel().tolist()
+    for spare in panels[n_panels:]:
+        spare.set_visible(False)
+    return figure, panels[:n_panels]
+
+
+def _legend(figure: Figure, panels: list[Axes]) -> None:
+    """Write the legend below, as wide as the panels are and as high as it has to be."""
+    handles, labels = panels[0].get_legend_handles_labels()
+    n_columns = min(len(panels), _COLUMNS) + 1
+    figure.set_figheight(figure.get_figheight() + 0.2 * (-(-len(labels) // n_columns) - 2))
+    figure.legend(handles, labels, loc="outside lower center", ncols=n_columns)
+
+
+@mpl.rc_context(RC)
+def sequences(cells: pd.DataFrame) -> Figure:
+    """Draw the error against the number of views, a panel for each category.
+
+    Parameters
+    ----------
+    cells : DataFrame
+        Of `nbv.reporting.sheets.sequence_sheet`.
+    """
+    categories = list(dict.fromkeys(cells["category"]))
+    methods = tuple(dict.fromkeys(cells["method"]))
+    figure, panels = _grid(len(categories))
+    for axes, category in zip(panels, categories, strict=True):
+        part = cells[cells["category"] == category]
+        for method in methods:
+            curve = part[part["method"] == method]
+            _draw(axes, curve["n_views"], curve["value"], method, methods)
+        axes.set_title(category_label(category))
+        axes.set_xticks(sorted(part["n_views"].unique()))
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel("Number of views")
+        axes.set_ylabel("MAE (°)")
+    _legend(figure, panels)
+    return figure
+
+
+@mpl.rc_context(RC)
+def travel(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
+    """Draw the error against the mean travel as its price rises, a panel for each category.
+
+    Parameters
+    ----------
+    curves : mapping of str to DataFrame
+        By category, of `nbv.experiments.travel.pooled_travel`.
+    methods : tuple of str
+        The methods to draw.
+    """
+    figure, panels = _grid(len(curves))
+    for axes, (category, rows) in zip(panels, curves.items(), strict=True):
+        for method in methods:
+            rule = "fixed" if method in _BASELINES else "cost"
+            curve = rows[(rows["method"] == method) & (rows["rule"] == rule)]
+            curve = curve.sort_values("travel_deg")
+            _draw(axes, curve["travel_deg"], curve["error_deg"], method, methods)
+        axes.set_title(category_label(category))
+        axes.set_xlim(0, 180)
+        axes.set_xticks([0, 45, 90, 135, 180])
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel("Mean travel (°)")
+        axes.set_ylabel("MAE (°)")
+    _legend(figure, panels)
+    return figure

@@ -1,0 +1,184 @@
+"""How a next viewpoint is chosen: ambiguity (Fig. 2), the idea (3), and each method's pick (7)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from nbv.angles import nearest_bin, wrap_deg
+from nbv.labels import method_label
+from nbv.recommendation.criteria.pose_ambiguity import two_view_poses
+from nbv.recommendation.criteria.spreads import SPREADS
+from nbv.reporting.paper.figures.depth import depth_limits, draw_depth
+from nbv.reporting.paper.figures.inputs import (
+    ExampleView,
+    FigureInputs,
+    example_view,
+    focus_lookup,
+    spread_unit,
+)
+from nbv.reporting.style import INK, MUTED, azimuth_axis, method_style, new_figure
+
+Likelihood = NDArray[np.float32]
+
+
+def ambiguity(inputs: FigureInputs) -> Figure:
+    """Fig. 2: an initial view of the hidden range, three next views, and their ambiguities."""
+    shown = example_view(inputs)
+    lookup = focus_lookup(inputs, shown.example.fold)
+    n_bins = len(lookup.ambiguity)
+    first = int(nearest_bin(shown.estimate_deg, n_bins))
+    row = lookup.ambiguity[first].astype(np.float64)
+    step = 360 / n_bins
+    best = round(int(lookup.recommended_delta_deg[first]) / step)
+    worst = int(np.argmax(row))
+    unit = spread_unit(lookup.spread)
+    candidates = [
+        (best, "recommended"),
+        (round(180 / step), "opposite"),
+        (worst, "worst"),
+    ]
+    figure = new_figure(8.0, 4.2)
+    grid = figure.add_gridspec(2, 4, width_ratios=(1.15, 1, 1, 1), height_ratios=(1.0, 0.95))
+    limits = depth_limits(shown.views)
+    initial = figure.add_subplot(grid[0, 0])
+    draw_depth(
+        initial,
+        shown.view(shown.azimuth_deg),
+        limits,
+        f"Initial view, φ = {shown.azimuth_deg}°\nestimate {round(shown.estimate_deg) % 360}°",
+    )
+    for column, (delta_bin, name) in enumerate(candidates, 1):
+        azimuth = float(wrap_deg(shown.azimuth_deg + delta_bin * step))
+        axes = figure.add_subplot(grid[0, column])
+        title = f"{name}: δ = {delta_bin * step:.0f}°\nview at {azimuth:.0f}°"
+        draw_depth(axes, shown.view(azimuth), limits, title)
+    bars = figure.add_subplot(grid[1, 1:])
+    values = [row[delta_bin] for delta_bin, _ in candidates]
+    colors = ["#D55E00", "#0072B2", "#bdbdbd"]
+    drawn = bars.bar(
+        range(3),
+        values,
+        width=0.42,
+        color=colors,
+        edgecolor=INK,
+        linewidth=0.8,
+        hatch=["", "....", "////"],
+    )
+    bars.bar_label(drawn, fmt="%.3f", padding=2)
+    bars.set_xticks(range(3), [name for _, name in candidates])
+    bars.set_xlim(-0.6, 2.6)
+    bars.set_ylim(0, max(values) * 1.18)
+    bars.set_ylabel(f"Ambiguity A[e, δ] ({unit})")
+    bars.grid(visible=False, axis="x")
+    curve = figure.add_subplot(grid[1, 0])
+    curve.plot(np.arange(row.size) * step, row, color=INK, linewidth=1.3)
+    for (delta_bin, _), color in zip(candidates, colors, strict=True):
+        curve.plot(
+            delta_bin * step,
+            row[delta_bin],
+            "o",
+            color=color,
+            markeredgecolor=INK,
+            markersize=7,
+            clip_on=False,
+        )
+    azimuth_axis(curve, "Rotation δ (degrees)")
+    curve.set_ylabel(f"A[e, δ] ({unit})")
+    figure.suptitle(f"Ambiguity selects the next view: {shown.title}", fontsize=10)
+    return figure
+
+
+def idea(inputs: FigureInputs) -> Figure:
+    """Fig. 3: the spread of the pose after one view, before a second look, and after it."""
+    shown = example_view(inputs)
+    lookup = focus_lookup(inputs, shown.example.fold)
+    viewpoint, answers = lookup.viewpoint_likelihood, lookup.estimate_likelihood
+    n_bins = len(viewpoint)
+    step = 360 / n_bins
+    first = int(nearest_bin(shown.estimate_deg, n_bins))
+    one = viewpoint[first]
+    best = round(int(lookup.recommended_delta_deg[first]) / step)
+    worst = int(np.argmax(lookup.ambiguity[first]))
+    given = viewpoint if lookup.reading == "given_estimate" else answers
+    curves: list[list[tuple[Likelihood, str, str, str]]] = [
+        [(one, "p(φ | e)", "#E69F00", "solid")],
+        [
+            (two_view_poses(viewpoint, given, best)[first], "recommended", "#D55E00", "solid"),
+            (two_view_poses(viewpoint, given, worst)[first], "worst", MUTED, "dashed"),
+        ],
+    ]
+    titles = ["After one view", "Before a second look: p(θ | e, δ)"]
+    turns = [0, worst, best]
+    captions = ["first view", "worst second", "recommended"]
+    seen = shown.outcomes.get(inputs.settings.subject)
+    if seen is not None and np.isfinite(_delta(shown, inputs.settings.subject)):
+        delta = round(float(seen["delta_deg"]) / step)
+        second = int(nearest_bin(float(seen["next_estimate_deg"]), n_bins))
+        belief = one * np.roll(answers[:, second], -delta)
+        # As before a second look: two answers that exclude each other say nothing.
+        belief = belief if belief.any() else np.ones_like(one)
+        curves.append([(belief / belief.sum(), "p(θ | e₁, e₂, δ)", "#D55E00", "solid")])
+        titles.append(f"After the second look at δ = {delta * step:.0f}°")
+    figure = new_figure(7.6, 2.1 * len(curves) + 0.4)
+    grid = figure.add_gridspec(len(curves), 2, width_ratios=(1, 2.9))
+    limits = depth_limits(shown.views)
+    unit = " nats" if lookup.spread == "entropy" else ""
+    top = 1.12 * max(float(spread.max()) for row in curves for spread, *_ in row)
+    azimuths = np.arange(n_bins) * step
+    for row, lines in enumerate(curves):
+        azimuth = float(wrap_deg(shown.azimuth_deg + turns[row] * step))
+        image = figure.add_subplot(grid[row, 0])
+        draw_depth(image, shown.view(azimuth), limits)
+        image.set_xlabel(f"{captions[row]}, {azimuth:.0f}°")
+        axes = figure.add_subplot(grid[row, 1])
+        for spread, name, color, dashes in lines:
+            width = float(SPREADS[lookup.spread](spread[np.newaxis])[0])
+            label = f"{name}, {width:.2f}{unit}"
+            axes.plot(azimuths, spread, color=color, linewidth=1.8, linestyle=dashes, label=label)
+        axes.fill_between(azimuths, lines[0][0], color=lines[0][2], alpha=0.25, linewidth=0)
+        axes.axvline(shown.azimuth_deg, color=INK, linewidth=1.0, linestyle=":", label="true pose")
+        axes.set_ylim(0, top)
+        axes.set_title(titles[row])
+        axes.set_ylabel(f"Probability per {step:g}°")
+        axes.legend(loc="best", fontsize=8)
+        last = row == len(curves) - 1
+        azimuth_axis(axes, "Pose: azimuth of the first view (degrees)" if last else "")
+    figure.suptitle(f"One viewpoint and two: {shown.title}", fontsize=10)
+    return figure
+
+
+def picks(inputs: FigureInputs) -> Figure:
+    """Fig. 7: the next view that each method takes for one initial image, and what it gains."""
+    shown = example_view(inputs)
+    methods = [m for m, row in shown.outcomes.items() if np.isfinite(_delta(shown, m))]
+    single = [m for m in shown.outcomes if m not in methods]
+    figure = new_figure(1.95 * (len(methods) + 1) + 0.3, 2.9)
+    axes = figure.subplots(1, len(methods) + 1, squeeze=False)[0]
+    limits = depth_limits(shown.views)
+    caption = f"φ = {shown.azimuth_deg}°"
+    for method in single:
+        caption += f"; {method_label(method)}:\n{_result(shown, method)}"
+    draw_depth(axes[0], shown.view(shown.azimuth_deg), limits, "Initial view")
+    axes[0].set_xlabel(caption)
+    for panel, method in zip(axes[1:], methods, strict=True):
+        delta = _delta(shown, method)
+        azimuth = float(wrap_deg(shown.azimuth_deg + delta))
+        draw_depth(panel, shown.view(azimuth), limits, method_label(method))
+        panel.set_xlabel(f"δ = {delta:.0f}°, view at {azimuth:.0f}°\n{_result(shown, method)}")
+        for spine in panel.spines.values():
+            spine.set_color(method_style(method, inputs.settings.methods).color)
+            spine.set_linewidth(2.0)
+    figure.suptitle(f"Next views for one image: {shown.title}", fontsize=10)
+    return figure
+
+
+def _delta(shown: ExampleView, method: str) -> float:
+    value = shown.outcomes[method]["delta_deg"]
+    return float(value) if value == value else float("nan")
+
+
+def _result(shown: ExampleView, method: str) -> str:
+    row = shown.outcomes[method]
+    return f"pose {row['pose_estimate_deg']:.1f}°, error {row['error_deg']:.1f}°"

@@ -1,0 +1,225 @@
+"""What a run cost, from the benchmark and log files of its jobs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nbv.experiments.results import Unit
+from nbv.labels import number
+from nbv.reporting.markdown import pipe_row
+
+RUNTIME_COLUMNS = (
+    "rule",
+    "jobs",
+    "cpu_s",
+    "wall_s",
+    "median_s",
+    "max_s",
+    "peak_mib",
+    "sampled_jobs",
+    "elapsed_s",
+    "side_by_side",
+)
+JOB_COLUMNS = ("rule", "cpu_s", "sampled", "wall_s", "peak_mib", "ended_s")
+TOTAL_ROW = "all"
+PAUSE_S = 60.0
+"""A gap between jobs that is longer than this is a pause of the run, not a part of it."""
+
+# They read the results, some of them this very table: with them it would never be the same twice.
+# Or they belong to a target of its own.
+_NOT_COUNTED = frozenset({"runtime", "report", "compare", "reference", "transfer"})
+_PROCESSOR_TIME = re.compile(r"processor time (\d+\.\d+) s$", re.MULTILINE)
+# Benchmark files round to hundredths of a second, so that neighbours in time may seem to overlap.
+_ROUNDING_S = 0.01
+_HEADER = (
+    "Rule",
+    "Jobs",
+    "Processor (s)",
+    "Wall clock (s)",
+    "Median job (s)",
+    "Longest job (s)",
+    "Peak memory (MiB)",
+)
+
+
+def load_runtime(
+    root: str | Path, units: Iterable[Unit] | None = None, n_folds: int | None = None
+) -> pd.DataFrame:
+    """Read the jobs of a results tree and sum them up; see `load_jobs` and `summarise_jobs`."""
+    return summarise_jobs(load_jobs(root, units, n_folds))
+
+
+def load_jobs(
+    root: str | Path, units: Iterable[Unit] | None = None, n_folds: int | None = None
+) -> pd.DataFrame:
+    """Read ``benchmarks/<rule>/**/*.tsv``, and of the log file beside each its processor time.
+
+    Snakemake samples a script's process and its children: 31 times half a second apart, then
+    every 30 seconds, and keeps the last processor time that it saw. A job of 45 seconds may so be
+    short of two thirds of it. A job's log may end with what the operating system told the job
+    itself (``processor time 12.3 s``), which lacks only how the interpreter shut down. Neither can
+    be too much, so the larger is taken.
+
+    Parameters
+    ----------
+    root : path
+        ``results/<experiment>``. The files' times say when a job ended: a copy must keep them.
+    units : iterable of (category, elevation_deg), optional
+        Jobs of another category and elevation, left by an earlier configuration, are passed over.
+    n_folds : int, optional
+        Likewise jobs of higher folds.
+
+    Returns
+    -------
+    pandas.DataFrame
+        `JOB_COLUMNS`, one row per job: processor and wall-clock seconds, whether the former is
+        only Snakemake's last sample, the largest sampled resident memory in MiB (Snakemake's
+        ``max_rss``; NaN for a job that ended before a sample), and the time of its end in seconds
+        since the epoch.
+    """
+    folder = Path(root)
+    wanted = None if units is None else {(name, f"el{degrees:02d}") for name, degrees in units}
+    jobs = []
+    for path in sorted((folder / "benchmarks").rglob("*.tsv")):
+        relative = path.relative_to(folder / "benchmarks").with_suffix("")
+        rule, *place = relative.parts
+        if rule in _NOT_COUNTED or not _belongs(place, wanted, n_folds):
+            continue
+        told = _told_cpu_s(folder / "logs" / relative.with_suffix(".log"))
+        table = pd.read_csv(path, sep="\t", na_values=["-"])
+        for row in table.reindex(columns=["s", "cpu_time", "max_rss"]).to_dict("records"):
+            cpu_s = max(told or 0.0, float(np.nan_to_num(row["cpu_time"])))
+            ended_s = path.stat().st_mtime
+            jobs.append((rule, cpu_s, told is None, row["s"], row["max_rss"], ended_s))
+    return pd.DataFrame(jobs, columns=list(JOB_COLUMNS))
+
+
+def summarise_jobs(jobs: pd.DataFrame) -> pd.DataFrame:
+    """Sum up jobs by rule.
+
+    Parameters
+    ----------
+    jobs : pandas.DataFrame
+        From `load_jobs`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        `RUNTIME_COLUMNS`: the rule that took longest first, and at the end the row `TOTAL_ROW`.
+        ``cpu_s`` and ``wall_s`` are sums over jobs; ``median_s`` and ``max_s`` are of one job's
+        wall clock; ``peak_mib`` is of the largest job; ``sampled_jobs`` counts those whose
+        processor time is too low (see `load_jobs`). The total alone has ``elapsed_s``, from the
+        first job's start to the last one's end less pauses of more than `PAUSE_S`, and
+        ``side_by_side``, the most jobs that ran at once. Empty where nothing was benchmarked.
+    """
+    if jobs.empty:
+        return pd.DataFrame(columns=list(RUNTIME_COLUMNS))
+    rules = [_summary(str(rule), part) for rule, part in jobs.groupby("rule", sort=True)]
+    rules.sort(key=lambda row: row["wall_s"], reverse=True)
+    total = _summary(TOTAL_ROW, jobs)
+    total["elapsed_s"], total["side_by_side"] = _on_the_clock(jobs)
+    summary = pd.DataFrame([*rules, total], columns=list(RUNTIME_COLUMNS))
+    return summary.astype({"side_by_side": "Int64"})
+
+
+def runtime_markdown(runtime: pd.DataFrame) -> str:
+    """Return the table of `summarise_jobs` for people, with what to bear in mind as notes."""
+    lines = ["## Running time", ""]
+    if runtime.empty:
+        return "\n".join([*lines, "No job was timed in this run."]) + "\n"
+    lines += [pipe_row(_HEADER), pipe_row(["---"] + ["---:"] * (len(_HEADER) - 1))]
+    for row in runtime.to_dict("records"):
+        seconds = [f"{row[name]:,.1f}" for name in ("cpu_s", "wall_s", "median_s", "max_s")]
+        memory = f"{row['peak_mib']:,.0f}" if np.isfinite(row["peak_mib"]) else "–"
+        lines.append(pipe_row([row["rule"], f"{row['jobs']:,}", *seconds, memory]))
+    return "\n".join([*lines, "", *(f"- {note}" for note in _notes(runtime))]) + "\n"
+
+
+def efficiency(runtime: pd.DataFrame) -> float:
+    """Return Σ cpu / (side_by_side × elapsed): the jobs' share of the processors they could use."""
+    total = runtime.iloc[-1]
+    return float(total["cpu_s"] / (total["side_by_side"] * total["elapsed_s"]))
+
+
+def _belongs(place: list[str], units: set[tuple[str, str]] | None, n_folds: int | None) -> bool:
+    """Say whether a job's ``category, el<EE>, fold<k>, ...`` are of the configuration."""
+    if len(place) < 2 or not re.fullmatch(r"el\d+", place[1]):
+        return True
+    if units is not None and (place[0], place[1]) not in units:
+        return False
+    fold = re.fullmatch(r"fold(\d+)", place[2]) if len(place) > 2 else None
+    return n_folds is None or fold is None or int(fold.group(1)) <= n_folds
+
+
+def _told_cpu_s(log_file: Path) -> float | None:
+    """Return the processor time that a job wrote at the end of its log, if it did."""
+    if not log_file.is_file():
+        return None
+    told = _PROCESSOR_TIME.findall(log_file.read_text(encoding="utf-8", errors="replace"))
+    return float(told[-1]) if told else None
+
+
+def _summary(rule: str, jobs: pd.DataFrame) -> dict[str, Any]:
+    return {
+        "rule": rule,
+        "jobs": len(jobs),
+        "cpu_s": jobs["cpu_s"].sum(),
+        "wall_s": jobs["wall_s"].sum(),
+        "median_s": jobs["wall_s"].median(),
+        "max_s": jobs["wall_s"].max(),
+        "peak_mib": jobs["peak_mib"].max(),
+        "sampled_jobs": int(jobs["sampled"].sum()),
+    }
+
+
+def _on_the_clock(jobs: pd.DataFrame) -> tuple[float, int]:
+    """Return the seconds that a run lasted, pauses left out, and the most jobs at once."""
+    ends = jobs["ended_s"].to_numpy(dtype=np.float64)
+    starts = ends - jobs["wall_s"].to_numpy(dtype=np.float64)
+    order = np.argsort(starts, kind="stable")
+    last_end = np.maximum.accumulate(ends[order])
+    gaps = starts[order][1:] - last_end[:-1]
+    elapsed_s = float(last_end[-1] - starts.min() - gaps[gaps > PAUSE_S].sum())
+    begun = np.minimum(starts + _ROUNDING_S, ends)
+    return elapsed_s, int(max(((begun <= t) & (t < ends)).sum() for t in begun))
+
+
+def _notes(runtime: pd.DataFrame) -> list[str]:
+    total = runtime.iloc[-1]
+    jobs, sampled = int(total["jobs"]), int(total["sampled_jobs"])
+    beside, busy = int(total["side_by_side"]), number(100 * efficiency(runtime), 0)
+    at_least = "at least " if sampled else ""
+    notes = [
+        f"From the first job's start to the last one's end: {_duration(total['elapsed_s'])}, "
+        f"leaving out pauses of more than {PAUSE_S:.0f} s in which no job ran. At most {beside} "
+        f"{'job' if beside == 1 else 'jobs'} ran at once; the jobs' own work kept as many "
+        f"processors busy for {at_least}{busy} % of that time. Other work on the machine lowers "
+        "that figure and lengthens every time here but the processors'.",
+        "Processor and wall-clock times are sums over jobs, some of which ran side by side. A job "
+        "that was run again counts once, as it last ran; the jobs that write this table and the "
+        "report do not count, nor does Snakemake's own start.",
+    ]
+    if sampled:
+        which = "Processor times" if sampled == jobs else f"Processor times of {sampled} jobs"
+        notes.append(
+            f"{which} are Snakemake's samples, half a second apart for the first 15 s of a job and "
+            "30 s apart after that, and lack what a job did after its last one."
+        )
+    notes.append(
+        "Memory is the largest that Snakemake sampled of any one job, worker processes included; "
+        "a short peak may have escaped it."
+    )
+    return notes
+
+
+def _duration(seconds: float) -> str:
+    if seconds >= 3600:
+        return "{} h {} min".format(*divmod(round(seconds / 60), 60))
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

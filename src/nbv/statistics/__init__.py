@@ -1,0 +1,1 @@
+"""Errors of methods: their statistics and paired intervals."""

@@ -1,0 +1,117 @@
+"""How methods stand: the mean error of each object, and differences with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from nbv.angles import travel_deg
+from nbv.files import existing, read_csv
+from nbv.statistics.metrics import Interval
+from nbv.statistics.paired import PairedErrors, Resampler, estimate
+
+OBJECT_COLUMNS = ("method", "object_id", "n_images", "error_deg", "travel_deg")
+
+
+def object_means(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Return each object's mean error and travel under each method.
+
+    Parameters
+    ----------
+    frames : mapping of str to DataFrame
+        Rows of ``evaluation/.../<method>.csv`` by method.
+
+    Returns
+    -------
+    DataFrame
+        Columns `OBJECT_COLUMNS`; ``travel_deg`` is 0 where no second view was taken.
+    """
+    parts = []
+    for method, frame in frames.items():
+        travel = travel_deg(frame["delta_deg"].fillna(0).to_numpy(dtype=np.float64))
+        rows = frame.assign(travel_deg=travel).groupby("object_id", sort=True)
+        means = rows[["error_deg", "travel_deg"]].mean()
+        means.insert(0, "n_images", rows.size())
+        parts.append(means.reset_index().assign(method=method))
+    return pd.concat(parts, ignore_index=True)[list(OBJECT_COLUMNS)]
+
+
+def load_object_means(paths: Iterable[str | Path]) -> pd.DataFrame:
+    """Read `contest/<category>/el<EE>/fold<k>/objects.csv` files into one frame.
+
+    Returns
+    -------
+    DataFrame
+        ``category, elevation_deg, fold`` and `OBJECT_COLUMNS`.
+    """
+    return _with_places(map(Path, paths))
+
+
+def load_choices(paths: Iterable[str | Path]) -> pd.DataFrame:
+    """Read the `choices.csv` that lie beside `objects.csv` files into one frame.
+
+    Returns
+    -------
+    DataFrame
+        ``category, elevation_deg, fold`` and the columns of
+        `nbv.recommendation.method_selection.choices_frame`.
+    """
+    return _with_places(Path(path).with_name("choices.csv") for path in paths)
+
+
+def _with_places(paths: Iterable[Path]) -> pd.DataFrame:
+    parts = []
+    for path in paths:
+        category, elevation, fold = path.parts[-4:-1]
+        rows = read_csv(existing(path))
+        rows.insert(0, "fold", int(fold.removeprefix("fold")))
+        rows.insert(0, "elevation_deg", int(elevation.removeprefix("el")))
+        rows.insert(0, "category", category)
+        parts.append(rows)
+    return pd.concat(parts, ignore_index=True)
+
+
+def paired_objects(means: pd.DataFrame, category: str) -> PairedErrors:
+    """Line up the methods of one category and elevation object by object.
+
+    Every object counts as one image with its mean error: a mean over objects that were all seen
+    from equally many viewpoints is the mean over images.
+    """
+    indexed = means.set_index(["object_id", "fold", "method"])["error_deg"]
+    wide = indexed.unstack("method")  # noqa: PD010 - nothing to aggregate
+    wide = wide.sort_index(level="object_id").dropna(axis=1)
+    n_objects = len(wide)
+    return PairedErrors(
+        {str(method): wide[method].to_numpy(dtype=np.float64) for method in wide.columns},
+        np.arange(n_objects, dtype=np.int64),
+        wide.index.get_level_values("fold").to_numpy(dtype=np.int64),
+        np.zeros(n_objects),
+        (category,) * n_objects,
+    )
+
+
+def standing(sample: PairedErrors, method: str, resampler: Resampler) -> Interval:
+    """Return a method's MAE in degrees with its 95 % interval over objects."""
+    return estimate("mae", sample, method, resampler).interval()
+
+
+def gap(sample: PairedErrors, method: str, other: str, resampler: Resampler) -> Interval:
+    """Return the paired difference of two methods' MAE in degrees, with its 95 % interval."""
+    mine = estimate("mae", sample, method, resampler)
+    return mine.minus(estimate("mae", sample, other, resampler))
+
+
+def indistinct_from_best(
+    sample: PairedErrors, methods: Sequence[str], resampler: Resampler
+) -> list[str]:
+    """Return the method of least MAE, and those whose difference to it may be 0 (95 %)."""
+    found = {method: estimate("mae", sample, method, resampler) for method in methods}
+    best = min(methods, key=lambda method: found[method].value)
+    return [best] + [
+        method
+        for method in methods
+        if method != best and found[method].minus(found[best]).low <= 0.0
+    ]

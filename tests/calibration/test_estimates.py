@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nbv.calibration.estimates import read_estimates, write_estimates
+from nbv.errors import UserError
+
+
+def test_estimates_come_back_to_four_decimals(tmp_path):
+    rng = np.random.default_rng(0)
+    estimate = rng.uniform(0, 360, (3, 360))
+    estimate[0, 0] = 359.99999  # would be printed as 360.0
+    write_estimates(tmp_path / "e.csv", ["null", "NA", "007"], estimate, rng.random((3, 360)))
+    read = read_estimates(tmp_path / "e.csv")
+    assert read.object_ids == ("null", "NA", "007")
+    assert read.estimate_deg[0, 0] == 0.0
+    np.testing.assert_allclose(read.estimate_deg.ravel()[1:], estimate.ravel()[1:], atol=5.1e-5)
+    np.testing.assert_array_equal(read.azimuth_deg, np.arange(360))
+
+
+def test_a_missing_view_is_refused(tmp_path):
+    path = tmp_path / "e.csv"
+    write_estimates(path, ["a"], np.zeros((1, 360)), np.ones((1, 360)))
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(lines[:50] + lines[51:]) + "\n")
+    with pytest.raises(UserError, match="full turn"):
+        read_estimates(path)
+
+
+def test_a_missing_column_is_refused(tmp_path):
+    (tmp_path / "e.csv").write_text("object_id,azimuth_deg\na,0\n")
+    with pytest.raises(UserError, match="'concentration' is missing"):
+        read_estimates(tmp_path / "e.csv")

@@ -1,0 +1,124 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nbv.calibration import splits as folds
+from nbv.errors import UserError
+from nbv.files import write_csv
+
+
+def split(n: int, n_folds: int = 5, seed: int = 0, parts: int | None = None):
+    names = [f"{i:03d}" for i in range(n)]
+    return folds.make_splits(names, n_folds, 0.2, np.random.default_rng(seed), parts)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(5, 140), st.integers(2, 5), st.integers(0, 9))
+def test_every_object_is_tested_once_and_has_one_role_in_each_fold(n, n_folds, seed):
+    frame = split(n, n_folds, seed)
+    tested = frame[frame["role"] == "test"]
+    assert sorted(tested["object_id"]) == sorted(frame["object_id"].unique())
+    assert not frame.duplicated(["object_id", "fold"]).any()
+    for fold in range(1, n_folds + 1):
+        for role in folds.ROLES:
+            assert folds.objects_with_role(frame, fold, role).ids
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(12, 60), st.integers(2, 5), st.integers(2, 4), st.integers(0, 9))
+def test_cross_fitting_calibrates_everyone_by_an_estimator_of_the_others(n, n_folds, parts, seed):
+    frame = split(n, n_folds, seed, parts)
+    held_out = split(n, n_folds, seed)
+    roles = folds.calibration_roles(frame)
+    assert roles == tuple(f"part{part}" for part in range(1, parts + 1))
+    for fold in range(1, n_folds + 1):
+        test = folds.objects_with_role(frame, fold, "test").ids
+        assert test == folds.objects_with_role(held_out, fold, "test").ids
+        everyone = folds.objects_with_role(frame, fold, *folds.training_roles(frame)).ids
+        assert not set(test) & set(everyone)
+        calibrated = []
+        sizes = set()
+        for part in range(1, parts + 1):
+            own = set(folds.objects_with_role(frame, fold, roles[part - 1]).ids)
+            others = folds.objects_with_role(frame, fold, *folds.training_roles(frame, part)).ids
+            assert own.isdisjoint(others)
+            assert own | set(others) == set(everyone)
+            calibrated += own
+            sizes.add(len(own))
+        assert sorted(calibrated) == everyone
+        assert len(test) + len(everyone) == n
+        assert max(sizes) - min(sizes) <= 1
+
+
+def test_held_out_calibration_trains_one_estimator_on_the_rest():
+    frame = split(20)
+    assert folds.calibration_roles(frame) == ("calibration",)
+    assert folds.training_roles(frame) == ("train",)
+
+
+def test_every_part_is_a_calibration_object():
+    frame = split(12, 3, parts=2)
+    everyone = folds.objects_with_role(frame, 1, "part1", "part2").ids
+    folds.assert_role(frame, 1, "calibration", everyone)
+    with pytest.raises(UserError, match="no test object of fold 1"):
+        folds.assert_role(frame, 1, "test", everyone)
+
+
+def test_more_parts_than_objects():
+    with pytest.raises(UserError, match="crossfit_parts=9: fold 1 has 4 objects"):
+        split(6, 3, parts=9)
+
+
+def test_the_papers_numbers():
+    frame = split(125)
+    counts = frame.groupby(["fold", "role"]).size().unstack()
+    assert (counts["test"] == 25).all()
+    assert (counts["calibration"] == 20).all()
+    assert (counts["train"] == 80).all()
+
+
+def test_rows_point_into_the_order_of_all_objects(tmp_path):
+    write_csv(tmp_path / "s.csv", split(12, 3))
+    frame = folds.read_splits(tmp_path / "s.csv")
+    chosen = folds.objects_with_role(frame, 2, "calibration")
+    assert chosen.ids == [f"{row:03d}" for row in chosen.rows]
+
+
+def test_an_object_with_two_roles_is_refused():
+    frame = split(10)
+    frame.loc[1, "object_id"] = frame.loc[0, "object_id"]
+    with pytest.raises(UserError, match="'000' more than one role"):
+        folds.objects_with_role(frame, 1, "train")
+
+
+def test_reading_objects_of_another_role_is_refused():
+    frame = split(10)
+    train = folds.objects_with_role(frame, 1, "train").ids
+    with pytest.raises(UserError, match=f"{train[0]!r} is no test object of fold 1"):
+        folds.assert_role(frame, 1, "test", train[:1])
+
+
+def test_too_few_objects():
+    with pytest.raises(UserError, match="n_folds=5: 4 objects"):
+        split(4)
+
+
+def test_an_unknown_fold():
+    with pytest.raises(UserError, match="fold 9"):
+        folds.objects_with_role(split(10), 9, "test")
+
+
+def test_an_unknown_role_is_refused(tmp_path):
+    for role in ("part0", "trian"):
+        (tmp_path / "x.csv").write_text(f"object_id,fold,role\na,1,{role}\nb,1,part2\n")
+        with pytest.raises(UserError, match=rf"role '{role}' is none of"):
+            folds.read_splits(tmp_path / "x.csv")
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path):
+    (tmp_path / "x.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(UserError, match=r"x\.csv"):
+        folds.read_splits(tmp_path / "x.csv")

@@ -1,0 +1,146 @@
+import json
+import os
+import time
+
+import numpy as np
+import pytest
+from performance.__main__ import BENCHMARKS, main
+from performance.figures import Figure, Target, summary_line, table_line
+from performance.growth import in_words
+from performance.solids import object_with_faces
+from performance.timing import Turns, growth_exponent, median_ratio, take_turns
+from performance.workflow import utilisation
+
+
+def test_a_quick_run_writes_a_list_of_figures(tmp_path, capsys):
+    path = tmp_path / "bench.json"
+    main(["--quick", "--only", "evaluation", "--only", "lookup", "--output", str(path)])
+    figures = json.loads(path.read_text())
+    assert [figure["name"].split()[0] for figure in figures] == [
+        "evaluation",
+        "evaluation",
+        "lookup",
+    ]
+    for figure in figures:
+        assert list(figure) == sorted(["name", "ratio", "target", "reached", "detail"])
+        assert figure["ratio"] > 0
+        assert figure["reached"] is None or isinstance(figure["reached"], bool)
+        assert figure["name"] in capsys.readouterr().out or figure is not figures[0]
+
+
+def test_a_part_does_not_take_the_place_of_the_whole(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    main(["--only", "workflow"])
+    assert [path.name for path in tmp_path.rglob("*.json")] == ["bench-partial.json"]
+
+
+def test_an_unknown_name_is_refused_with_those_there_are(capsys):
+    with pytest.raises(SystemExit):
+        main(["--only", "rendring"])
+    message = capsys.readouterr().err
+    assert all(name in message for name in BENCHMARKS)
+
+
+def test_the_ratio_is_the_median_of_neighbours_not_the_ratio_of_medians():
+    # The machine was ten times slower in the second and third round, for both alike.
+    turns = Turns(np.array([[2.0, 1.0], [20.0, 10.0], [20.0, 10.0], [2.0, 1.0], [9.0, 1.0]]))
+    assert turns.ratio(0, 1) == 2.0
+    assert median_ratio([2, 20, 9], [1, 10, 1]) == 2.0
+
+
+def test_works_take_turns():
+    calls = []
+    turns = take_turns([lambda: calls.append("a"), lambda: calls.append("b")], 3)
+    assert "".join(calls) == "ab" * 4
+    assert turns.rounds.shape == (3, 2)
+    assert (turns.rounds > 0).all()
+
+
+def test_time_is_measured_in_seconds():
+    turns = take_turns([lambda: time.sleep(0.02), lambda: time.sleep(0.01)], 2, warm_up=False)
+    assert (turns.rounds.min(axis=0) >= [0.02, 0.01]).all()
+
+
+@pytest.mark.parametrize("power", [0.0, 1.0, 2.5])
+def test_the_growth_of_a_power_is_its_exponent(power):
+    sizes = [3, 6, 12]
+    times = np.outer([0.1, 7.0], np.array(sizes, dtype=float) ** power)
+    assert growth_exponent(sizes, Turns(times)) == pytest.approx(power, abs=1e-9)
+
+
+def test_growth_in_words():
+    assert in_words(0.02).startswith("does not grow")
+    assert in_words(0.95).startswith("proportional")
+    assert in_words(2.0) == "quadratic: twice the size takes 4.0 times as long"
+    assert in_words(1.5).startswith("power 1.5")
+
+
+@pytest.mark.parametrize(
+    ("target", "ratio", "reached"),
+    [
+        (Target(0.9), 0.9, True),
+        (Target(0.9), 0.89, False),
+        (Target(1.3, at_most=True), 1.3, True),
+        (Target(1.3, at_most=True), 1.31, False),
+        (Target(3.0), None, None),
+        (None, 3.0, None),
+    ],
+)
+def test_targets_hold_from_their_own_side(target, ratio, reached):
+    figure = Figure("what", ratio, target, "how")
+    assert figure.reached is reached
+    assert ("MISSED" in table_line(figure)) is (reached is False)
+
+
+def test_what_was_not_measured_counts_neither_way():
+    figures = [
+        Figure("a", 5.0, Target(3), ""),
+        Figure("b", 1.0, Target(3), ""),
+        Figure("c", None, Target(3), "skipped"),
+        Figure("d", 1.0, None, ""),
+    ]
+    assert summary_line(figures) == "1 of 2 targets reached"
+
+
+@pytest.mark.parametrize("category", ["chair", "mug"])
+@pytest.mark.parametrize("n_faces", [1_000, 12_345])
+def test_objects_have_the_faces_they_say(category, n_faces):
+    mesh = object_with_faces(category, n_faces)
+    assert n_faces - 2 <= len(mesh.faces) <= n_faces
+    assert np.linalg.norm(np.ptp(mesh.vertices, axis=0)) == pytest.approx(1.0)
+
+
+def job(results, name, start, seconds, cpu_time, told=None):
+    tsv = results / "benchmarks" / f"{name}.tsv"
+    log = results / "logs" / f"{name}.log"
+    for path in (tsv, log):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    tsv.write_text(f"s\th:m:s\tmax_rss\tcpu_time\n{seconds}\t0:00:00\t1.0\t{cpu_time}\n")
+    log.write_text("" if told is None else f"[12:00:00 train] processor time {told:.1f} s\n")
+    os.utime(tsv, (start + seconds, start + seconds))
+    (results / "report.html").touch()
+
+
+def test_utilisation_is_the_jobs_processor_time_over_the_cores_time(tmp_path):
+    job(tmp_path, "train/a", 1000, 50, 15, told=48)
+    job(tmp_path, "train/b", 1000, 30, 15, told=30)
+    job(tmp_path, "train/c", 1030, 20, 9, told=19)
+    figure = utilisation(tmp_path)
+    assert figure.ratio == pytest.approx((48 + 30 + 19) / (2 * 50))
+    assert figure.reached is True
+    (tmp_path / "report.html").unlink()
+    assert utilisation(tmp_path).ratio is None
+
+
+def test_incomplete_processor_times_are_no_verdict_unless_they_suffice(tmp_path):
+    job(tmp_path, "train/a", 1000, 40, 15)
+    job(tmp_path, "train/b", 1000, 40, 15, told=39)
+    figure = utilisation(tmp_path)
+    assert figure.reached is None
+    assert figure.detail.startswith("at least 0.68: processor times of 1 jobs are incomplete")
+    job(tmp_path, "train/a", 1000, 40, 39)
+    assert utilisation(tmp_path).reached is True
+
+
+def test_a_run_that_never_was_has_no_figure(tmp_path):
+    assert utilisation(tmp_path / "paper").detail.startswith("not run")

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from nbv.statistics import metrics
+
+errors_strategy = arrays(np.float64, st.integers(1, 40), elements=st.floats(0, 180))
+
+
+@given(errors_strategy)
+def test_pea_counts_errors_strictly_below_the_threshold(errors):
+    thresholds = np.array([0.0, 1.0, 45.0, 100.0, 180.0, *errors[:3]])
+    expected = [sum(e < t for e in errors) / len(errors) for t in thresholds]
+    np.testing.assert_allclose(metrics.pea(errors, thresholds), expected, rtol=0, atol=1e-15)
+
+
+@given(errors_strategy)
+@settings(max_examples=40)
+def test_pauc_is_the_integral_of_pea(errors):
+    # PEA is a step function: between neighbouring steps the midpoint's value times the width is
+    # exact, so this integral has no discretisation error.
+    edges = np.unique(np.concatenate([[0.0, 100.0], errors[errors < 100.0]]))
+    middle = metrics.pea(errors, (edges[:-1] + edges[1:]) / 2)
+    integral = float(np.sum(middle * np.diff(edges)))
+    assert metrics.pauc(errors) == pytest.approx(integral, abs=1e-9)
+
+
+def test_pauc_by_whole_degrees_lies_half_a_degree_lower():
+    # The reading note on the published pAUC: a left sum over whole degrees loses about 0.5.
+    errors = np.random.default_rng(0).gamma(2.0, 5.0, 200_000)
+    published_way = float(np.mean(metrics.pea(errors, np.arange(100)))) * 100
+    assert metrics.pauc(errors) - published_way == pytest.approx(0.5, abs=0.02)
+
+
+@given(errors_strategy)
+def test_pauc_never_counts_more_than_the_mean(errors):
+    assert metrics.pauc(errors) >= 100.0 - metrics.mae_deg(errors) - 1e-9
+    assert 0.0 <= metrics.pauc(errors) <= 100.0
+
+
+def test_fold_std_is_the_sample_one():
+    values = [1.0, 2.0, 4.0]
+    mean = sum(values) / 3
+    assert metrics.fold_std(values) == pytest.approx(
+        (sum((v - mean) ** 2 for v in values) / 2) ** 0.5
+    )
+    assert np.isnan(metrics.fold_std([3.0]))
+
+
+@pytest.mark.parametrize("function", [metrics.mae_deg, metrics.pauc])
+def test_no_errors_is_an_error(function):
+    with pytest.raises(ValueError, match="no errors"):
+        function([])
+
+
+def _uneven_objects(rng, n_objects=7):
+    objects = np.repeat(np.arange(n_objects), rng.integers(1, 9, n_objects))
+    return objects, rng.gamma(2.0, 5.0, objects.size), rng.gamma(2.0, 6.0, objects.size)
+
+
+def test_resampling_equals_a_naive_loop_over_the_same_draws(rng):
+    objects, a, b = _uneven_objects(rng)
+    drawn = np.random.default_rng(5).integers(7, size=(50, 7))
+    multiplicities = metrics.resample_objects(7, np.random.default_rng(5), 50)
+    naive = []
+    for draw in drawn:
+        rows = np.concatenate([np.flatnonzero(objects == one) for one in draw])
+        naive.append(np.mean(a[rows]) - np.mean(b[rows]))
+    fast = metrics.resampled_means(a, objects, multiplicities) - metrics.resampled_means(
+        b, objects, multiplicities
+    )
+    np.testing.assert_allclose(fast, naive, atol=1e-12)
+    assert metrics.percentile_interval(fast) == pytest.approx(
+        tuple(np.quantile(naive, [0.025, 0.975]))
+    )
+
+
+def test_resampled_medians_equal_a_naive_loop_to_within_the_grid(rng):
+    objects = np.repeat(np.arange(20), 300)
+    values = rng.gamma(2.0, 5.0, objects.size) + objects
+    multiplicities = metrics.resample_objects(20, np.random.default_rng(5), 30)
+    naive = []
+    for counts in multiplicities:
+        rows = np.repeat(np.arange(objects.size), counts[objects])
+        naive.append(np.median(values[rows]))
+    fast = metrics.resampled_medians(values, objects, multiplicities)
+    rank = np.searchsorted(np.sort(values), fast) - np.searchsorted(np.sort(values), naive)
+    assert np.abs(rank).max() <= objects.size / 1000 + 2

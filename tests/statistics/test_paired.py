@@ -1,0 +1,162 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nbv.errors import UserError
+from nbv.statistics import metrics, paired
+
+
+def test_groups_are_the_papers_quarters():
+    azimuths = np.arange(360.0)
+    expected = [
+        1 if a < 45 or a >= 315 else 2 if a < 135 else 3 if a < 225 else 4 for a in azimuths
+    ]
+    assert paired.viewpoint_group(azimuths).tolist() == expected
+    assert np.bincount(paired.viewpoint_group(azimuths))[1:].tolist() == [90] * 4
+
+
+def test_methods_are_lined_up_image_by_image(evaluations, rng):
+    frame = evaluations["mug", 0]
+    straight = paired.pair_methods(frame, "mug")
+    shuffled = paired.pair_methods(frame.sample(frac=1.0, random_state=3), "mug")
+    for method, errors in straight.errors_deg.items():
+        np.testing.assert_array_equal(errors, shuffled.errors_deg[method])
+    # Opposite sees the same pair of views from azimuths 180 apart, so its errors come in pairs.
+    opposite = straight.errors_deg["opposite"].reshape(-1, 360)
+    np.testing.assert_allclose(opposite[:, :180], opposite[:, 180:], atol=1e-3)
+
+
+def test_methods_on_different_images_are_refused(evaluations):
+    frame = evaluations["mug", 0]
+    fewer = frame.drop(frame.index[(frame["method"] == "random")][:1])
+    with pytest.raises(UserError, match="random was evaluated on other images than single"):
+        paired.pair_methods(fewer, "mug")
+
+
+def test_pooled_images_keep_their_objects_apart(evaluations):
+    parts = [paired.pair_methods(evaluations[unit], unit[0]) for unit in (("mug", 0), ("chair", 0))]
+    both = paired.pool(parts)
+    assert both.n_objects == 18
+    assert both.n_images == sum(part.n_images for part in parts)
+    joined = np.concatenate([part.errors_deg["single"] for part in parts])
+    found = paired.estimate("mae", both, "single", paired.Resampler(0, 50))
+    assert found.value == pytest.approx(joined.mean())
+
+
+def test_draws_do_not_depend_on_what_was_asked_before(evaluations):
+    mug = paired.pair_methods(evaluations["mug", 0], "mug")
+    chair = paired.pair_methods(evaluations["chair", 0], "chair")
+    one, other = paired.Resampler(3, 20), paired.Resampler(3, 20)
+    one.multiplicities(chair)
+    np.testing.assert_array_equal(one.multiplicities(mug), other.multiplicities(mug))
+    assert (one.multiplicities(mug) != one.multiplicities(chair)).any()
+
+
+def test_draws_by_fold_keep_each_folds_size(evaluations):
+    mug = paired.pair_methods(evaluations["mug", 0], "mug")
+    drawn = paired.Resampler(3, 20).multiplicities_by_fold(mug)
+    for fold in (1, 2, 3):
+        members = np.unique(mug.objects[mug.folds == fold])
+        assert (drawn[:, members].sum(axis=1) == members.size).all()
+
+
+@pytest.mark.parametrize(
+    ("statistic", "expected"),
+    [
+        ("mae", np.mean),
+        ("median", np.median),
+        ("pauc", lambda e: 100 - np.mean(np.minimum(e, 100))),
+    ],
+)
+def test_statistics_of_pooled_images(evaluations, statistic, expected):
+    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+    found = paired.estimate(statistic, sample, "random", paired.Resampler(0, 200))
+    assert found.value == pytest.approx(expected(sample.errors_deg["random"]))
+    interval = found.interval()
+    assert interval.low < interval.value < interval.high
+
+
+def test_sigma_is_over_fold_means(evaluations):
+    frame = evaluations["mug", 0]
+    means = frame[frame["method"] == "proposed"].groupby("fold")["error_deg"].mean()
+    sample = paired.pair_methods(frame, "mug")
+    found = paired.estimate("mae_sigma", sample, "proposed", paired.Resampler(0, 200))
+    assert found.value == pytest.approx(metrics.fold_std(means))
+    assert paired.fold_sigma("mae", sample, "proposed") == pytest.approx(means.std())
+
+
+def test_one_fold_has_no_sigma(evaluations):
+    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+    found = paired.estimate(
+        "mae_sigma", sample.select(sample.folds == 1), "single", paired.Resampler(0, 10)
+    )
+    assert np.isnan(found.value)
+    assert np.isnan(found.interval().low)
+
+
+def sample_of(a, b, objects, categories=("mug",)):
+    """Two methods' errors; objects in equal shares of the categories."""
+    n_objects = int(np.max(objects)) + 1
+    per_category = -(-n_objects // len(categories))
+    return paired.PairedErrors(
+        {"a": np.asarray(a, dtype=float), "b": np.asarray(b, dtype=float)},
+        np.asarray(objects),
+        np.asarray(objects) % 3 + 1,
+        np.arange(len(objects)) * 10.0 % 360,
+        tuple(categories[index // per_category] for index in range(n_objects)),
+    )
+
+
+def difference(sample, seed=1, n_resamples=2000, a="a", b="b", statistic="mae"):
+    resampler = paired.Resampler(seed, n_resamples)
+    first = paired.estimate(statistic, sample, a, resampler)
+    return first.minus(paired.estimate(statistic, sample, b, resampler))
+
+
+def uneven(rng, n_objects=7):
+    objects = np.repeat(np.arange(n_objects), rng.integers(1, 9, n_objects))
+    return rng.gamma(2.0, 5.0, objects.size), rng.gamma(2.0, 6.0, objects.size), objects
+
+
+@pytest.mark.parametrize("statistic", paired.LOWER_IS_BETTER)
+def test_identical_methods_differ_by_exactly_nothing(rng, statistic):
+    a, _, objects = uneven(rng)
+    found = difference(sample_of(a, a.copy(), objects), statistic=statistic)
+    assert found == metrics.Interval(0, 0, 0)
+
+
+@pytest.mark.parametrize("statistic", paired.LOWER_IS_BETTER)
+def test_swapping_the_methods_mirrors_the_interval(rng, statistic):
+    sample = sample_of(*uneven(rng))
+    one = difference(sample, statistic=statistic)
+    other = difference(sample, a="b", b="a", statistic=statistic)
+    mirrored = (-other.value, -other.high, -other.low)
+    assert (one.value, one.low, one.high) == pytest.approx(mirrored)
+
+
+def test_repeating_every_view_does_not_narrow_the_interval(rng):
+    # Whole objects are the units of evidence: more views of the same ones are no more of it.
+    a, b, objects = rng.normal(5, 2, 30), rng.normal(6, 2, 30), np.arange(30)
+    few = difference(sample_of(a, b, objects))
+    many = difference(sample_of(*(np.repeat(each, 360) for each in (a, b, objects))))
+    assert (many.low, many.high) == pytest.approx((few.low, few.high))
+
+
+def test_the_interval_covers_the_truth_about_as_often_as_it_says():
+    hits = 0
+    for seed in range(200):
+        a = np.repeat(np.random.default_rng(seed).normal(1.0, 2.0, 40), 5)
+        sample = sample_of(a, np.zeros(200), np.repeat(np.arange(40), 5))
+        interval = difference(sample, seed, 400)
+        hits += interval.low <= 1.0 <= interval.high
+    assert 0.89 <= hits / 200 <= 0.99
+
+
+def test_objects_that_are_resampled_together_are_counted():
+    objects = np.repeat(np.arange(12), 4)
+    sample = sample_of(objects, objects, objects, ("chair", "mug"))
+    assert paired.fewest_resampled("mae", sample) == 6
+    assert paired.fewest_resampled("mae_sigma", sample) == 2
+    assert paired.fewest_resampled("mae", sample.select(objects != 11)) == 5
+    assert paired.fewest_resampled("mae", sample.select(objects < 0)) == 0
