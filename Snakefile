@@ -3,7 +3,7 @@
 #   snakemake --cores 2                                                  the paper
 #   snakemake --cores 2 --config experiment=quick                        the same graph, small
 #   snakemake --cores 2 tables                                           one stage
-#   snakemake --cores 2 beyond                                           what goes beyond the paper
+#   snakemake --cores 2 extensions                                       methods beyond the paper
 #   snakemake --cores 2 transfer                                         trained on × tested on
 #   snakemake --cores 2 results/paper/evaluation/mug/el00/fold3/proposed.csv   one file
 
@@ -24,44 +24,55 @@ localrules:
     evaluation,
     tables,
     figures,
-    contest,
-    beyond,
+    extension_evaluations,
+    extensions,
     transfer,
 
 
 rule all:
     default_target: True
     input:
-        f"{RESULTS}/report.html",
+        LAYOUT.report,
 
 
-include: "workflow/rules/render.smk"
-include: "workflow/rules/estimate.smk"
-include: "workflow/rules/recommend.smk"
-include: "workflow/rules/reading.smk"
-include: "workflow/rules/read.smk"
-include: "workflow/rules/contests.smk"
-include: "workflow/rules/beyond.smk"
-include: "workflow/rules/ablation.smk"
-include: "workflow/rules/conditions.smk"
-include: "workflow/rules/transfer.smk"
-include: "workflow/rules/beside.smk"
+include: "workflow/rules/data.smk"
+include: "workflow/rules/estimation.smk"
+include: "workflow/rules/recommendation.smk"
+include: "workflow/rules/reporting.smk"
+include: "workflow/rules/reference.smk"
+# The paper ends here. What follows is beyond it, and nothing above depends on it.
+include: "workflow/rules/extensions/methods.smk"
+include: "workflow/rules/extensions/leaderboard.smk"
+include: "workflow/rules/extensions/more_views.smk"
+include: "workflow/rules/extensions/view_sphere.smk"
+include: "workflow/rules/extensions/travel.smk"
+include: "workflow/rules/extensions/ablation.smk"
+include: "workflow/rules/extensions/transfer.smk"
+include: "workflow/rules/extensions/comparisons.smk"
+
+
+rule extensions:
+    input:
+        rules.leaderboard.output,
+        rules.more_views.output,
+        rules.travel.output,
+        rules.view_sphere.output if SPHERE_CATEGORIES else [],
 
 
 onstart:
     lift_rate_limit()
-    Path(LAST_ERROR).unlink(missing_ok=True)
+    Path(LAYOUT.last_error).unlink(missing_ok=True)
     banner(
         f"nbv: experiment {CONFIG['experiment']}, data set {CONFIG['dataset']['source']}, "
         f"{len(UNITS)} units of {CONFIG['n_folds']} folds",
-        f"results: {RESULTS}/    logs: {RESULTS}/logs/",
+        f"results: {LAYOUT.root}/    logs: {LAYOUT.logs}/",
     )
 
 
 onsuccess:
     banner(
         "nbv: finished",
-        f"results: {RESULTS}/    read first: {RESULTS}/report.html",
+        f"results: {LAYOUT.root}/    read first: {LAYOUT.report}",
     )
 
 
@@ -70,5 +81,5 @@ onerror:
         "nbv: stopped",
         *last_error(),
         "what was finished is kept; the same command goes on from there",
-        f"logs: {RESULTS}/logs/",
+        f"logs: {LAYOUT.logs}/",
     )

@@ -50,8 +50,8 @@ def test_rotations_follow_their_rule(finished, place):
     assert drawn.between(1, 359).all()
     assert 160 < drawn.mean() < 200
     rows = read(finished, "evaluation", place, "proposed")
-    with np.load(finished.results / "lookup" / place / "entropy.npz") as lookup:
-        ambiguity = lookup["ambiguity"]
+    with np.load(finished.results / "lookup" / place / "pose_ambiguity.npz") as lookup:
+        ambiguity = lookup["cost"]
     for estimate, delta in zip(rows.initial_estimate_deg, rows.delta_deg, strict=True):
         row = ambiguity[math.floor(estimate + 0.5) % 360]
         travel = [min(d, 360 - d) for d in range(360)]
@@ -62,7 +62,7 @@ def test_rotations_follow_their_rule(finished, place):
 @pytest.mark.parametrize("place", PLACES)
 def test_likelihoods_and_ambiguity(finished, place):
     pairs = read(finished, "estimates", place, "calibration")
-    with np.load(finished.results / "lookup" / place / "entropy.npz") as stored:
+    with np.load(finished.results / "lookup" / place / "pose_ambiguity.npz") as stored:
         lookup = {name: stored[name] for name in stored.files}
     counts = np.zeros((360, 360))
     for estimate, truth in zip(pairs.estimate_deg, pairs.azimuth_deg, strict=True):
@@ -81,7 +81,7 @@ def test_likelihoods_and_ambiguity(finished, place):
         both /= both.sum(axis=1, keepdims=True)
         spread = V @ both
         entropy = -(spread * np.log(spread)).sum(axis=1)
-        np.testing.assert_allclose(lookup["ambiguity"][:, delta], entropy, atol=5e-3)
+        np.testing.assert_allclose(lookup["cost"][:, delta], entropy, atol=5e-3)
 
 
 def test_no_object_is_estimated_by_a_network_that_saw_it(finished):

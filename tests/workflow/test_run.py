@@ -19,7 +19,7 @@ from .conftest import TINY
 pytestmark = pytest.mark.slow
 
 EVALUATED = ["single", "random", "opposite", "proposed"]
-READING = {"table": 7, "figure": 10, "claims": 1, "runtime": 1, "report": 1}
+SHOWN = {"table": 7, "figure": 10, "claims": 1, "runtime": 1, "report": 1}
 
 
 def test_every_file_of_the_design_is_there_with_its_columns(finished):
@@ -35,16 +35,11 @@ def test_every_file_of_the_design_is_there_with_its_columns(finished):
             assert (results / "estimators" / place / "estimator.safetensors").is_file()
             for role in ("calibration", "test"):
                 estimates = pd.read_csv(results / "estimates" / place / f"{role}.csv")
-                assert list(estimates.columns) == [
-                    "object_id",
-                    "azimuth_deg",
-                    "estimate_deg",
-                    "concentration",
-                ]
-            with np.load(results / "lookup" / place / "entropy.npz") as lookup:
+                assert list(estimates.columns) == ["object_id", "azimuth_deg", "estimate_deg"]
+            with np.load(results / "lookup" / place / "pose_ambiguity.npz") as lookup:
                 assert lookup["viewpoint_likelihood"].shape == (360, 360)
                 assert lookup["estimate_likelihood"].shape == (360, 360)
-                assert lookup["ambiguity"].dtype == np.float32
+                assert lookup["cost"].dtype == np.float32
                 assert lookup["recommended_delta_deg"].shape == (360,)
                 assert lookup["bandwidth_deg"] in (8.0, 20.0)
             for method in EVALUATED:
@@ -79,7 +74,7 @@ def test_another_bandwidth_reruns_lookups_and_what_follows(finished):
         "lookup": 4,
         "evaluate_recommended": 4,
         "settings": 1,
-        **READING,
+        **SHOWN,
     }
 
 
@@ -91,12 +86,12 @@ def test_another_training_length_reruns_training_and_what_follows(finished):
         "evaluate_baselines": 4,
         "evaluate_recommended": 4,
         "settings": 1,
-        **READING,
+        **SHOWN,
     }
 
 
 def test_another_number_of_resamples_reruns_what_shows_intervals(finished):
-    shown = {name: jobs for name, jobs in READING.items() if name != "figure"}
+    shown = {name: jobs for name, jobs in SHOWN.items() if name != "figure"}
     assert finished.would_run("n_resamples=200") == {"settings": 1, **shown}
 
 
@@ -128,7 +123,7 @@ def test_another_seed_reruns_everything(finished):
 def test_an_edit_of_a_metric_reruns_what_reads_errors(scratch):
     metrics = scratch.folder / "src/nbv/statistics/metrics.py"
     metrics.write_text(metrics.read_text() + "\n\nEDITED = True\n")
-    assert scratch.would_run() == {"settings": 1, **READING}
+    assert scratch.would_run() == {"settings": 1, **SHOWN}
 
 
 def test_an_edit_of_a_criterion_leaves_training_alone(scratch):
@@ -185,7 +180,7 @@ def test_an_interrupted_run_continues_to_the_same_bytes(finished, fresh):
     assert fresh.outcome() == finished.outcome()
 
 
-def test_a_finished_job_and_not_a_clock_makes_the_schedule_be_looked_at_again(scratch):
+def test_a_finished_job_and_not_a_clock_makes_snakemake_schedule_again(scratch):
     """Snakemake's timers, one more for every job, would cost a fifth of a core in a long run."""
     driver = (
         "import sys\n"
@@ -196,7 +191,7 @@ def test_a_finished_job_and_not_a_clock_makes_the_schedule_be_looked_at_again(sc
         "try:\n"
         "    main(sys.argv[1:])\n"
         "finally:\n"
-        "    print('looked again', len(calls))\n"
+        "    print('timers', len(calls))\n"
     )
     target = "results/tiny/configuration.yaml"
     arguments = scratch.command("--cores", "1", "--force", target)[3:]
@@ -209,11 +204,11 @@ def test_a_finished_job_and_not_a_clock_makes_the_schedule_be_looked_at_again(sc
         timeout=100,
     )
     assert "nbv: finished" in done.stderr
-    assert "looked again 0" in done.stdout
+    assert "timers 0" in done.stdout
 
 
-def test_what_goes_beyond_the_paper_is_made_and_leaves_the_paper_alone(scratch):
-    targets = ("beyond",)
+def test_extensions_are_made_and_leave_the_paper_alone(scratch):
+    targets = ("extensions",)
     assert not {"meshes", "render", "train", "estimate"} & set(scratch.would_run(targets=targets))
     before = scratch.outcome()
     tall = tuple(each for each in TINY if not each.startswith("elevations_deg"))
@@ -221,13 +216,13 @@ def test_what_goes_beyond_the_paper_is_made_and_leaves_the_paper_alone(scratch):
     after = scratch.outcome()
     assert {name: after[name] for name in before} == before
     tables = scratch.results / "tables"
-    for name in ("leaderboard", "beyond", "sequences", "sphere"):
+    for name in ("leaderboard", "extension_gains", "more_views", "view_sphere"):
         for kind in ("csv", "md", "tex"):
             assert (tables / f"{name}.{kind}").stat().st_size > 100
-    for name in ("sequences", "travel"):
+    for name in ("more_views", "travel"):
         assert (scratch.results / f"figures/{name}.png").stat().st_size > 1000
     board = pd.read_csv(tables / "leaderboard.csv")
-    assert {"single", "proposed", "chosen", "oracle_posterior"} <= set(board["method"])
+    assert {"single", "proposed", "selected", "oracle_posterior"} <= set(board["method"])
     for category in ("chair", "mug"):
         mine = board[(board["category"] == category) & (board["method"] == "proposed")]
         errors = pd.concat(
@@ -237,16 +232,16 @@ def test_what_goes_beyond_the_paper_is_made_and_leaves_the_paper_alone(scratch):
         assert abs(mine["value"].iloc[0] - errors["error_deg"].mean()) < 1e-3
 
 
-def test_a_new_contender_trains_nothing(finished):
+def test_a_new_extension_trains_nothing(finished):
     jobs = finished.would_run(
-        "contenders.mine={rotation: fixed,fusion: average}", targets=("leaderboard",)
+        "extensions.mine={policy: bayes_error,fusion: average}", targets=("leaderboard",)
     )
-    assert jobs == {"contend": 4, "leaderboard": 1}
+    assert jobs == {"evaluate_extensions": 4, "leaderboard": 1}
 
 
 def test_the_ablation_trains_nothing_and_each_of_its_settings_is_a_file(scratch):
     jobs = scratch.would_run(targets=("ablation",))
-    assert jobs == {"ablate": len(ablation_space()), "ablation": 1}
+    assert jobs == {"evaluate_ablation": len(ablation_space()), "ablation": 1}
     patterns = Paramspace(ablation_space(), filename_params="*", filename_sep=",").instance_patterns
     target = f"results/tiny/ablation/{next(iter(patterns))}.csv"
     scratch.run("--cores", "1", target)

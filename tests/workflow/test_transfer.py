@@ -23,14 +23,14 @@ PLACE = "mug/el00/fold2"
 def test_trained_on_and_tested_on(scratch):
     scratch.run("--cores", "2", "transfer", overrides=(*TINY, *MORE))
     results = scratch.results
-    made = sorted(str(path.relative_to(results)) for path in results.glob("transfer/depth/*/*/*"))
-    assert made == ["transfer/depth/kinect/mug/el00.npy"]  # ideal is the run's own condition
+    made = sorted(str(path.relative_to(results)) for path in results.glob("transfer/*/depth/*/*"))
+    assert made == ["transfer/kinect/depth/mug/el00.npy"]  # ideal is the run's own condition
     clean, noisy = (
         np.load(results / name, mmap_mode="r") for name in ("depth/mug/el00.npy", made[0])
     )
     lost = (clean > 0) & (noisy == 0)
     assert 0.01 < lost.sum() / (clean > 0).sum() < 0.5
-    assert not (results / "transfer/estimators/ideal").exists()
+    assert not (results / "transfer/ideal/estimators").exists()
 
     cells = pd.read_csv(results / "tables/transfer.csv").set_index(
         ["trained_on", "tested_on", "method"]
@@ -38,11 +38,11 @@ def test_trained_on_and_tested_on(scratch):
     assert len(cells) == 2 * 2 * 4
     for (trained, tested, method), cell in cells.iterrows():
         errors = pd.read_csv(
-            results / f"transfer/evaluation/{trained}/{tested}/{PLACE}/{method}.csv"
+            results / f"transfer/{trained}/{tested}/evaluation/{PLACE}/{method}.csv"
         )["error_deg"]
         assert cell["value"] == pytest.approx(errors.mean(), abs=1e-3)
     for method in ("single", "opposite", "proposed"):
-        ours = results / f"transfer/evaluation/ideal/ideal/{PLACE}/{method}.csv"
+        ours = results / f"transfer/ideal/ideal/evaluation/{PLACE}/{method}.csv"
         assert ours.read_bytes() == (results / f"evaluation/{PLACE}/{method}.csv").read_bytes()
 
     text = (results / "tables/transfer.md").read_text()

@@ -1,4 +1,4 @@
-# Configuration, names and helpers that the other rule files share.
+# The configuration, and what the other rule files share.
 
 import re
 import sys
@@ -12,15 +12,18 @@ except ModuleNotFoundError:
     )
 
 from nbv import provenance
-from nbv.config import load_condition, load_config, snakemake_overrides
+from nbv.config import (
+    load_condition,
+    load_config,
+    read_configuration,
+    snakemake_overrides,
+)
 from nbv.errors import UserError
-from nbv.experiments.image_distributions import METHODS as BELIEF_METHODS
-from nbv.recommendation.method_selection import check_contenders
-from nbv.experiments.two_views import check_method
+from nbv.layout import Layout, fold_folder, unit_folder
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
 from nbv.recommendation.criteria import CRITERIA
-from nbv.recommendation.policies import needs_lookup
+from nbv.recommendation.policies import check_methods, needs_lookup
 from nbv.rendering import RENDERERS
 from nbv.rendering.noise import SENSORS, check_sensor, sensor_settings
 
@@ -33,10 +36,10 @@ def stop(message):
     sys.exit(f"nbv: error: {message}")
 
 
-def chosen_objects(category):
-    """The objects of a category, by name; those of the last run where the data set is gone."""
+def selected_objects(category):
+    """The objects of a category; those of the last run where the data set is gone."""
     root = CONFIG["dataset"]["root"]
-    prepared = Path(f"{RESULTS}/meshes/{category}.npz")
+    prepared = Path(LAYOUT.meshes(category))
     if root and not Path(root).expanduser().exists() and prepared.exists():
         return stored_ids(prepared)
     source = open_source(CONFIG["dataset"], CONFIG["seed"])
@@ -44,7 +47,7 @@ def chosen_objects(category):
 
 
 def dataset_of(category):
-    """What of the data set's settings concerns one category, the objects left out apart."""
+    """The data set's settings that concern one category; OBJECTS lists who is left out."""
     settings = {
         key: value
         for key, value in CONFIG["dataset"].items()
@@ -58,41 +61,35 @@ def dataset_of(category):
 try:
     OVERRIDES = snakemake_overrides(config)
     CONFIG = load_config(BASE / "config", OVERRIDES)
-    RESULTS = f"results/{CONFIG['name']}"
+    LAYOUT = Layout(f"results/{CONFIG['name']}")
     CATEGORIES = CONFIG["categories"]
-    for name, method in CONFIG["methods"].items():
-        check_method(name, method)
-    check_contenders(CONFIG["contenders"], CONFIG["methods"])
+    METHODS, EXTENSIONS = CONFIG["methods"], CONFIG["extensions"]
+    check_methods(METHODS, EXTENSIONS, CONFIG["gives_distributions"])
     check_sensor(CONFIG["sensor"], CATEGORIES)
-    LOOKUP_METHODS = [
-        name
-        for name, method in CONFIG["methods"].items()
-        if needs_lookup(method["rotation"])
-    ]
-    OBJECTS = {category: chosen_objects(category) for category in CATEGORIES}
+    OBJECTS = {category: selected_objects(category) for category in CATEGORIES}
 except UserError as error:
     stop(error)
 
-# What decides on a rotation: the density, and what travelling costs.
+# What decides on a rotation: the conditionals, and the cost of travel.
 DECISION = CONFIG["density"] | CONFIG["recommendation"]
-LOOKUP_ROTATIONS = sorted(
-    {CONFIG["methods"][name]["rotation"] for name in LOOKUP_METHODS}
-)
-# Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
-ENVIRONMENT = "../environment.yaml"
-LAST_ERROR = f"{RESULTS}/logs/last_error.txt"
+LOOKUP_METHODS = [name for name in METHODS if needs_lookup(METHODS[name]["policy"])]
+BASELINE_METHODS = [name for name in METHODS if name not in LOOKUP_METHODS]
+LOOKUP_CRITERIA = sorted({METHODS[name]["policy"] for name in LOOKUP_METHODS})
 FOLDS = range(1, CONFIG["n_folds"] + 1)
-BASELINE_METHODS = [name for name in CONFIG["methods"] if name not in LOOKUP_METHODS]
 # Parts of a fold's training objects, where calibration is cross-fitted.
 CROSSFIT = CONFIG["calibration"] == "crossfit"
 PARTS = range(1, CONFIG["crossfit_parts"] + 1) if CROSSFIT else []
-# A unit is what has an estimator of its own in each fold: a category at an elevation.
-FOLD = "{category}/el{elevation}/fold{fold}"
+# A unit is a category at an elevation. Each fold of a unit has an estimator of its own.
 UNITS = [
     (category, elevation)
     for category in CATEGORIES
     for elevation in CONFIG["elevations_deg"][category]
 ]
+# The wildcards of a unit and of a fold, as the paths of `nbv.layout` take them.
+UNIT = ("{category}", "{elevation}")
+FOLD = (*UNIT, "{fold}")
+# Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
+ENVIRONMENT = "../environment.yaml"
 
 
 wildcard_constraints:
@@ -101,25 +98,21 @@ wildcard_constraints:
     fold="|".join(map(str, FOLDS)),
     part="|".join(map(str, PARTS)) or "none",
     method="|".join(map(re.escape, LOOKUP_METHODS)) or "none",
-    criterion="|".join(LOOKUP_ROTATIONS) or "none",
+    criterion="|".join(LOOKUP_CRITERIA) or "none",
 
 
-def script_path(name):
-    return f"../scripts/{name}.py"
-
-
-def sources(name, settings=CONFIG):
-    """The package's modules that a script depends on: an edit reruns what uses them."""
-    script = BASE / "workflow/scripts" / f"{name}.py"
+def sources(script, settings=CONFIG):
+    """The modules that a script depends on, as inputs: an edit reruns what uses them."""
     sensor = settings["sensor"]["name"]
     chosen = {
-        "meshes": [SOURCES[settings["dataset"]["source"]]],
-        "render": [
+        "prepare_meshes": [SOURCES[settings["dataset"]["source"]]],
+        "render_depth": [
             RENDERERS[settings["renderer"]["name"]],
             *([SENSORS[sensor]] if sensor in SENSORS else []),
         ],
     }
-    files = provenance.source_files(script, SOURCE_ROOT, chosen.get(name, []))
+    path = BASE / "workflow/scripts" / f"{script}.py"
+    files = provenance.source_files(path, SOURCE_ROOT, chosen.get(script, []))
     here = Path.cwd()
     return [
         str(Path(file).relative_to(here)) if Path(file).is_relative_to(here) else file
@@ -128,46 +121,34 @@ def sources(name, settings=CONFIG):
 
 
 def all_sources():
-    """What the results as a whole were made with."""
+    """The modules that the results as a whole depend on."""
     scripts = (BASE / "workflow/scripts").glob("*.py")
     return sorted({file for script in scripts for file in sources(script.stem)})
 
 
-def has_posteriors(configuration):
-    """Whether a run's estimator has classes, and so says how likely each azimuth is."""
-    return "n_classes" in configuration["estimator"]
+def run_settings(run):
+    """The configuration of a finished run."""
+    if run == CONFIG["name"]:
+        return CONFIG
+    try:
+        return read_configuration(Path("results") / run)
+    except UserError as error:
+        stop(error)
 
 
-def evaluated(configuration):
-    """The names of the errors in a run's folder `evaluation`."""
-    own = BELIEF_METHODS if has_posteriors(configuration) else ()
-    return [*configuration["methods"], *own]
+def folds_of(units):
+    """Category, elevation and fold of every fold of some units."""
+    return [(*unit, fold) for unit in units for fold in FOLDS]
 
 
-def unit_names(units):
-    return [f"{category}/el{elevation:02d}" for category, elevation in units]
+def evaluations_of(units):
+    """Category, elevation, fold and method of every evaluation in the paper's tables."""
+    return [(*fold, method) for fold in folds_of(units) for method in METHODS]
 
 
-def per_fold(stage, names):
-    return expand(
-        f"{RESULTS}/{stage}/{{unit}}/fold{{fold}}/{{name}}",
-        unit=unit_names(UNITS),
-        fold=FOLDS,
-        name=names,
-    )
-
-
-def recommending_lookup(wildcards):
-    rotation = CONFIG["methods"][wildcards.method]["rotation"]
-    return f"{RESULTS}/lookup/{FOLD}/{rotation}.npz"
-
-
-def log_path(job):
-    return f"{RESULTS}/logs/{job}.log"
-
-
-def benchmark_path(job):
-    return f"{RESULTS}/benchmarks/{job}.tsv"
+def paths(path, keys):
+    """The path of each key: an input list that a script pairs with the keys."""
+    return [path(*key) for key in keys]
 
 
 def banner(*lines):
@@ -187,5 +168,5 @@ def lift_rate_limit():
 
 
 def last_error():
-    path = Path(LAST_ERROR)
+    path = Path(LAYOUT.last_error)
     return path.read_text().splitlines() if path.exists() else []

@@ -1,4 +1,4 @@
-"""Hold the results against the reference that is kept for their name."""
+"""Compare the results with the reference that is kept for their name."""
 
 import logging
 from pathlib import Path
@@ -9,13 +9,12 @@ with job(snakemake):
     from nbv.errors import UserError
     from nbv.reference.compare import compare_runs
 
-    reference = Path(snakemake.input.reference).parent
-    results = Path(snakemake.input.report).parent
-    comparison = compare_runs(reference, results)
+    reference, run = Path(snakemake.input.reference).parent, Path(snakemake.params.run)
+    comparison = compare_runs(reference, run)
     for line in comparison.lines():
         logging.getLogger(__name__).info("%s", line)
     if not comparison.agrees:
         raise UserError(
-            f"{results} does not agree with {reference} (the lines above, also in "
+            f"{run} does not agree with {reference} (the lines above, also in "
             f"{snakemake.log[0]}, say where)"
         )

@@ -1,20 +1,41 @@
-# Meshes, folds and depth images.
+# What a run was made with; its meshes, folds and depth images.
+
+
+rule settings:
+    input:
+        all_sources(),
+    output:
+        configuration=LAYOUT.configuration,
+        provenance=LAYOUT.provenance,
+    log:
+        LAYOUT.log("settings"),
+    benchmark:
+        LAYOUT.benchmark("settings")
+    priority: 80
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        configuration=CONFIG,
+    script:
+        "../scripts/record_settings.py"
 
 
 rule meshes:
     input:
-        sources("meshes"),
+        sources("prepare_meshes"),
     output:
-        f"{RESULTS}/meshes/{{category}}.npz",
+        LAYOUT.meshes("{category}"),
     log:
-        log_path("meshes/{category}"),
+        LAYOUT.log("meshes/{category}"),
     benchmark:
-        benchmark_path("meshes/{category}")
-    # Before all else: a bad file is to stop the run when little has been spent.
+        LAYOUT.benchmark("meshes/{category}")
+    # First of all: a bad file stops the run before much is spent.
     priority: 1000
     conda:
         ENVIRONMENT
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=30,
@@ -23,23 +44,22 @@ rule meshes:
         objects=lambda wildcards: OBJECTS[wildcards.category],
         seed=CONFIG["seed"],
     script:
-        script_path("meshes")
+        "../scripts/prepare_meshes.py"
 
 
 rule splits:
     input:
-        sources("splits"),
+        sources("split_objects"),
         meshes=rules.meshes.output[0],
     output:
-        f"{RESULTS}/splits/{{category}}.csv",
+        LAYOUT.splits("{category}"),
     log:
-        log_path("splits/{category}"),
+        LAYOUT.log("splits/{category}"),
     benchmark:
-        benchmark_path("splits/{category}")
+        LAYOUT.benchmark("splits/{category}")
     priority: 90
     conda:
         ENVIRONMENT
-    threads: 1
     resources:
         mem_mb=500,
         runtime=5,
@@ -49,23 +69,22 @@ rule splits:
         calibration_fraction=CONFIG["calibration_fraction"],
         seed=CONFIG["seed"],
     script:
-        script_path("splits")
+        "../scripts/split_objects.py"
 
 
 rule render:
     input:
-        sources("render"),
+        sources("render_depth"),
         meshes=rules.meshes.output[0],
     output:
-        f"{RESULTS}/depth/{{category}}/el{{elevation}}.npy",
+        LAYOUT.depth(*UNIT),
     log:
-        log_path("render/{category}/el{elevation}"),
+        LAYOUT.log("render/{category}/el{elevation}"),
     benchmark:
-        benchmark_path("render/{category}/el{elevation}")
+        LAYOUT.benchmark("render/{category}/el{elevation}")
     priority: 60
     conda:
         ENVIRONMENT
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=60,
@@ -76,9 +95,9 @@ rule render:
             CONFIG["sensor"], wildcards.category, CONFIG["seed"]
         ),
     script:
-        script_path("render")
+        "../scripts/render_depth.py"
 
 
 rule renders:
     input:
-        expand(f"{RESULTS}/depth/{{unit}}.npy", unit=unit_names(UNITS)),
+        paths(LAYOUT.depth, UNITS),

@@ -7,4 +7,4 @@ from nbv.jobs import job
 with job(snakemake):
     from nbv.reference.store import collect_reference
 
-    collect_reference(Path(snakemake.input.report).parent, Path(snakemake.params.reference))
+    collect_reference(Path(snakemake.params.run), Path(snakemake.params.reference))

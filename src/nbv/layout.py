@@ -1,0 +1,148 @@
+"""Where every file of a results folder lies: rules and scripts take paths from here alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The paths below one results folder.
+
+    A method takes values (``elevation=15``, ``fold=2``) or Snakemake's wildcards
+    (``elevation="{elevation}"``), and returns a path as text.
+
+    Attributes
+    ----------
+    root : str
+        ``results/<name>``.
+    """
+
+    root: str
+
+    def below(self, *folders: str) -> Layout:
+        """Return the same paths below a subfolder, such as those of one condition of transfer."""
+        return Layout("/".join((self.root, *folders)))
+
+    def meshes(self, category: str) -> str:
+        """Return the prepared meshes of a category."""
+        return f"{self.root}/meshes/{category}.npz"
+
+    def splits(self, category: str) -> str:
+        """Return the role of each object in each fold."""
+        return f"{self.root}/splits/{category}.csv"
+
+    def depth(self, category: str, elevation: int | str) -> str:
+        """Return the depth images of a unit."""
+        return f"{self.root}/depth/{unit_folder(category, elevation)}.npy"
+
+    def estimator(self, category: str, elevation: int | str, fold: int | str) -> str:
+        """Return the estimator that a fold tests."""
+        return self._of_fold("estimators", category, elevation, fold, "estimator.safetensors")
+
+    def part_estimator(
+        self, category: str, elevation: int | str, fold: int | str, part: int | str
+    ) -> str:
+        """Return the cross-fitted estimator that has not seen one part of the training objects."""
+        return self._of_fold(
+            "estimators", category, elevation, fold, f"without_part{part}.safetensors"
+        )
+
+    def estimates(
+        self, category: str, elevation: int | str, fold: int | str, role: str
+    ) -> str:
+        """Return the estimates of a fold's ``calibration`` or ``test`` objects."""
+        return self._of_fold("estimates", category, elevation, fold, f"{role}.csv")
+
+    def posteriors(
+        self, category: str, elevation: int | str, fold: int | str, role: str
+    ) -> str:
+        """Return the distributions that a classifier gives for the same images."""
+        return self._of_fold("estimates", category, elevation, fold, f"{role}_posteriors.npz")
+
+    def lookup(
+        self, category: str, elevation: int | str, fold: int | str, name: str
+    ) -> str:
+        """Return a lookup table: of a criterion, or of an extension by its name."""
+        return self._of_fold("lookup", category, elevation, fold, f"{name}.npz")
+
+    def evaluation(
+        self, category: str, elevation: int | str, fold: int | str, method: str
+    ) -> str:
+        """Return what one method made of every view of a fold's test objects."""
+        return self._of_fold("evaluation", category, elevation, fold, f"{method}.csv")
+
+    def extension(
+        self, category: str, elevation: int | str, fold: int | str, name: str
+    ) -> str:
+        """Return one of a fold's files on extensions: ``choices``, ``objects``, ``travel``, …."""
+        return self._of_fold("extensions", category, elevation, fold, f"{name}.csv")
+
+    def view_sphere(self, category: str, fold: int | str) -> str:
+        """Return a fold's errors where the elevation of the second view is chosen as well."""
+        return f"{self.root}/extensions/{category}/view_sphere/fold{fold}.csv"
+
+    def ablation(self, setting: str) -> str:
+        """Return the errors under one setting of the ablation."""
+        return f"{self.root}/ablation/{setting}.csv"
+
+    def table(self, name: str, kind: str) -> str:
+        """Return a table as ``csv``, ``md``, ``tex`` or ``html``."""
+        return f"{self.root}/tables/{name}.{kind}"
+
+    def figure(self, name: str, kind: str) -> str:
+        """Return a figure as ``png`` or ``pdf``."""
+        return f"{self.root}/figures/{name}.{kind}"
+
+    def claims(self, kind: str) -> str:
+        """Return the paper's claims and their verdicts as ``csv`` or ``md``."""
+        return f"{self.root}/claims.{kind}"
+
+    def log(self, job: str) -> str:
+        """Return a job's log."""
+        return f"{self.root}/logs/{job}.log"
+
+    def benchmark(self, job: str) -> str:
+        """Return what Snakemake measured of a job."""
+        return f"{self.root}/benchmarks/{job}.tsv"
+
+    @property
+    def logs(self) -> str:
+        """The folder of all logs."""
+        return f"{self.root}/logs"
+
+    @property
+    def last_error(self) -> str:
+        """The line that the last failed job ended with."""
+        return f"{self.root}/logs/last_error.txt"
+
+    @property
+    def configuration(self) -> str:
+        """The resolved configuration."""
+        return f"{self.root}/configuration.yaml"
+
+    @property
+    def provenance(self) -> str:
+        """Commit and versions."""
+        return f"{self.root}/provenance.json"
+
+    @property
+    def report(self) -> str:
+        """The page that shows everything."""
+        return f"{self.root}/report.html"
+
+    def _of_fold(
+        self, stage: str, category: str, elevation: int | str, fold: int | str, name: str
+    ) -> str:
+        return f"{self.root}/{stage}/{fold_folder(category, elevation, fold)}/{name}"
+
+
+def unit_folder(category: str, elevation: int | str) -> str:
+    """Return ``<category>/el<EE>``."""
+    degrees = elevation if isinstance(elevation, str) else f"{elevation:02d}"
+    return f"{category}/el{degrees}"
+
+
+def fold_folder(category: str, elevation: int | str, fold: int | str) -> str:
+    """Return ``<category>/el<EE>/fold<k>``."""
+    return f"{unit_folder(category, elevation)}/fold{fold}"

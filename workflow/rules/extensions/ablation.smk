@@ -1,0 +1,60 @@
+# What each choice in the paper's method brings. Nothing is rendered or trained again.
+
+from snakemake.utils import Paramspace
+
+from nbv.experiments.ablation import ablation_space
+
+ABLATIONS = Paramspace(
+    ablation_space(), filename_params="*", filename_sep=",", single_wildcard="setting"
+)
+
+
+rule evaluate_ablation:
+    input:
+        sources("evaluate_ablation"),
+        calibration=[
+            LAYOUT.estimates(*fold, "calibration") for fold in folds_of([FOCUS_UNIT])
+        ],
+        test=[LAYOUT.estimates(*fold, "test") for fold in folds_of([FOCUS_UNIT])],
+    output:
+        LAYOUT.ablation(ABLATIONS.wildcard_pattern),
+    log:
+        LAYOUT.log(f"evaluate_ablation/{ABLATIONS.wildcard_pattern}"),
+    benchmark:
+        LAYOUT.benchmark(f"evaluate_ablation/{ABLATIONS.wildcard_pattern}")
+    wildcard_constraints:
+        setting="[^/]+",
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1500,
+        runtime=10,
+    params:
+        instance=ABLATIONS.instance,
+        density=DECISION,
+        folds=list(FOLDS),
+    script:
+        "../../scripts/evaluate_ablation.py"
+
+
+rule ablation:
+    input:
+        sources("tabulate_ablation"),
+        rows=[LAYOUT.ablation(setting) for setting in ABLATIONS.instance_patterns],
+    output:
+        [LAYOUT.table("ablation", kind) for kind in ("csv", "md", "tex")],
+    log:
+        LAYOUT.log("ablation"),
+    benchmark:
+        LAYOUT.benchmark("ablation")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        category=FOCUS,
+        n_resamples=CONFIG["n_resamples"],
+        seed=CONFIG["seed"],
+    script:
+        "../../scripts/tabulate_ablation.py"

@@ -1,0 +1,50 @@
+# Methods beyond the paper, on the same estimates: each with the density that suits it best.
+
+EXTENSION_LOOKUPS = [
+    name
+    for name, method in EXTENSIONS.items()
+    if method["policy"] in CRITERIA and method["fusion"] != "product"
+]
+
+
+rule evaluate_extensions:
+    input:
+        sources("evaluate_extensions"),
+        **{
+            f"{role}_posteriors": rules.estimate.output[f"{role}_posteriors"]
+            for role in ("calibration", "test")
+            if CONFIG["gives_distributions"]
+        },
+        splits=rules.splits.output[0],
+        calibration=rules.estimate.output.calibration,
+        test=rules.estimate.output.test,
+        methods=[LAYOUT.evaluation(*FOLD, name) for name in METHODS],
+    output:
+        evaluations=[LAYOUT.evaluation(*FOLD, name) for name in EXTENSIONS],
+        lookups=[LAYOUT.lookup(*FOLD, name) for name in EXTENSION_LOOKUPS],
+        choices=LAYOUT.extension(*FOLD, "choices"),
+        objects=LAYOUT.extension(*FOLD, "objects"),
+        travel=LAYOUT.extension(*FOLD, "travel"),
+    log:
+        LAYOUT.log(f"evaluate_extensions/{fold_folder(*FOLD)}"),
+    benchmark:
+        LAYOUT.benchmark(f"evaluate_extensions/{fold_folder(*FOLD)}")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        methods=list(METHODS),
+        extensions=EXTENSIONS,
+        lookups=EXTENSION_LOOKUPS,
+        density=DECISION,
+        seed=CONFIG["seed"],
+    script:
+        "../../scripts/evaluate_extensions.py"
+
+
+rule extension_evaluations:
+    input:
+        rules.settings.output,
+        [LAYOUT.extension(*fold, "objects") for fold in folds_of(UNITS)],

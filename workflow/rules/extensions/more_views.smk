@@ -1,0 +1,51 @@
+# More than two views: error and travel against the number of views.
+
+
+rule evaluate_more_views:
+    input:
+        sources("evaluate_more_views"),
+        splits=rules.splits.output[0],
+        calibration=rules.estimate.output.calibration,
+        test=rules.estimate.output.test,
+        choices=rules.evaluate_extensions.output.choices,
+    output:
+        LAYOUT.extension(*FOLD, "more_views"),
+    log:
+        LAYOUT.log(f"evaluate_more_views/{fold_folder(*FOLD)}"),
+    benchmark:
+        LAYOUT.benchmark(f"evaluate_more_views/{fold_folder(*FOLD)}")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        density=DECISION,
+        more_views=CONFIG["more_views"],
+        seed=CONFIG["seed"],
+    script:
+        "../../scripts/evaluate_more_views.py"
+
+
+rule more_views:
+    input:
+        sources("tabulate_more_views"),
+        rows=[LAYOUT.extension(*fold, "more_views") for fold in folds_of(REFERENCE_UNITS)],
+    output:
+        table=[LAYOUT.table("more_views", kind) for kind in ("csv", "md", "tex")],
+        figure=[LAYOUT.figure("more_views", kind) for kind in ("png", "pdf")],
+    log:
+        LAYOUT.log("more_views"),
+    benchmark:
+        LAYOUT.benchmark("more_views")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        folds=folds_of(REFERENCE_UNITS),
+        n_resamples=CONFIG["n_resamples"],
+        seed=CONFIG["seed"],
+    script:
+        "../../scripts/tabulate_more_views.py"

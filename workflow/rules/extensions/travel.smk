@@ -1,0 +1,39 @@
+# Error against travel, as the cost of a degree rises.
+
+# Of all extensions those whose curves differ: one criterion with each fusion, and the paper's.
+TRAVEL_CURVES = [
+    *("either_way_average", "either_way_posterior"),
+    *(
+        name
+        for name in (
+            "entropy_posterior",
+            "gain_posterior",
+            "error_average",
+            "error_posterior",
+        )
+        if name in EXTENSIONS
+    ),
+]
+
+
+rule travel:
+    input:
+        sources("tabulate_travel"),
+        rows=[LAYOUT.extension(*fold, "travel") for fold in folds_of(REFERENCE_UNITS)],
+    output:
+        table=LAYOUT.table("travel", "csv"),
+        figure=[LAYOUT.figure("travel", kind) for kind in ("png", "pdf")],
+    log:
+        LAYOUT.log("travel"),
+    benchmark:
+        LAYOUT.benchmark("travel")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        folds=folds_of(REFERENCE_UNITS),
+        methods=TRAVEL_CURVES,
+    script:
+        "../../scripts/tabulate_travel.py"

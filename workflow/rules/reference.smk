@@ -1,0 +1,52 @@
+# Reference results under version control: one rule compares a run with them, one makes them.
+# Both run only where somebody asks for them.
+
+import os
+
+from nbv.reference.store import find_reference
+
+REFERENCES = Path(os.path.relpath(BASE / "docs/reference"))
+
+
+def reference_of_run(wildcards):
+    """The reference to compare with, found before anything is run."""
+    try:
+        return str(find_reference(REFERENCES, CONFIG) / "configuration.yaml")
+    except UserError as error:
+        stop(error)
+
+
+rule compare:
+    input:
+        sources("compare_with_reference"),
+        reference=reference_of_run,
+        report=rules.report.output[0],
+    log:
+        LAYOUT.log("compare"),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        run=LAYOUT.root,
+    script:
+        "../scripts/compare_with_reference.py"
+
+
+rule reference:
+    input:
+        sources("keep_reference"),
+        report=rules.report.output[0],
+    log:
+        LAYOUT.log("reference"),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        run=LAYOUT.root,
+        reference=str(REFERENCES / CONFIG["name"]),
+    script:
+        "../scripts/keep_reference.py"

@@ -1,0 +1,233 @@
+# What people read of the paper: tables, claims, figures, and the page that holds them all.
+
+from nbv.reporting.paper.figures import FIGURES
+from nbv.reporting.paper.tables import TABLES
+from nbv.reporting.settings import (
+    ReportSettings,
+    focus_category,
+    focus_unit,
+    reference_units,
+)
+
+SETTINGS = ReportSettings(focus_category=CONFIG["focus_category"])
+FOCUS = focus_category(UNITS, SETTINGS)
+FOCUS_UNIT = focus_unit(UNITS, SETTINGS)
+REFERENCE_UNITS = reference_units(UNITS, SETTINGS)
+# Of the focus category at every elevation, or at the reference elevation alone. All other tables
+# and figures compare the categories.
+OF_ELEVATIONS = {"table2", "table4", "figure6"}
+OF_FOCUS = {
+    *("table5", "table6", "table7"),
+    *("figure2", "figure3", "figure7", "figure8", "heatmaps"),
+}
+# Figures show no intervals.
+SHOWN = {"methods": list(METHODS)}
+RESAMPLED = SHOWN | {"n_resamples": CONFIG["n_resamples"], "seed": CONFIG["seed"]}
+# Some figures show the lookup table of Proposed, which another policy does not have.
+PROPOSED_LOOKUP = METHODS.get(SETTINGS.subject, {}).get("policy")
+SHOWN_FIGURES = [
+    name
+    for name, kind in FIGURES.items()
+    if PROPOSED_LOOKUP in LOOKUP_CRITERIA or "lookup" not in kind.needs
+]
+
+
+def units_of(name):
+    if name in OF_ELEVATIONS:
+        return [unit for unit in UNITS if unit[0] == FOCUS]
+    return [FOCUS_UNIT] if name in OF_FOCUS else REFERENCE_UNITS
+
+
+def settings_of(settings, name):
+    """The report settings that a table or figure depends on."""
+    of_focus = name in OF_ELEVATIONS | OF_FOCUS
+    return settings | ({"focus_category": FOCUS} if of_focus else {})
+
+
+def figure_inputs(wildcards):
+    units, needs = units_of(wildcards.figure), FIGURES[wildcards.figure].needs
+    found = {"evaluations": paths(LAYOUT.evaluation, evaluations_of(units))}
+    if "depth" in needs:
+        found["depth"] = paths(LAYOUT.depth, units)
+    if "splits" in needs:
+        found["splits"] = [LAYOUT.splits(category) for category, _ in units]
+    if "lookup" in needs:
+        found["lookups"] = [
+            LAYOUT.lookup(*fold, PROPOSED_LOOKUP) for fold in folds_of(units)
+        ]
+    return found
+
+
+def counted_jobs():
+    """Rule and name of every job that the running time counts."""
+    by_rule = {
+        "meshes": CATEGORIES,
+        "splits": CATEGORIES,
+        "render": [unit_folder(*unit) for unit in UNITS],
+        "train": [fold_folder(*fold) for fold in folds_of(UNITS)],
+        "train_part": [
+            f"{fold_folder(*fold)}/{part}" for fold in folds_of(UNITS) for part in PARTS
+        ],
+        "estimate": [fold_folder(*fold) for fold in folds_of(UNITS)],
+        "lookup": [
+            f"{fold_folder(*fold)}/{criterion}"
+            for fold in folds_of(UNITS)
+            for criterion in LOOKUP_CRITERIA
+        ],
+        "evaluate_baselines": [fold_folder(*fold) for fold in folds_of(UNITS)],
+        "evaluate_recommended": [
+            f"{fold_folder(*fold)}/{method}"
+            for fold in folds_of(UNITS)
+            for method in LOOKUP_METHODS
+        ],
+        "table": TABLES,
+        "figure": SHOWN_FIGURES,
+    }
+    jobs = [(rule, f"{rule}/{name}") for rule, names in by_rule.items() for name in names]
+    return [*jobs, ("claims", "claims"), ("settings", "settings")]
+
+
+JOBS = counted_jobs()
+
+
+rule table:
+    input:
+        sources("tabulate_paper"),
+        evaluations=lambda wildcards: paths(
+            LAYOUT.evaluation, evaluations_of(units_of(wildcards.table))
+        ),
+    output:
+        csv=LAYOUT.table("{table}", "csv"),
+        md=LAYOUT.table("{table}", "md"),
+        tex=LAYOUT.table("{table}", "tex"),
+        html=LAYOUT.table("{table}", "html"),
+    log:
+        LAYOUT.log("table/{table}"),
+    benchmark:
+        LAYOUT.benchmark("table/{table}")
+    wildcard_constraints:
+        table="|".join(TABLES),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        settings=lambda wildcards: settings_of(RESAMPLED, wildcards.table),
+        evaluations=lambda wildcards: evaluations_of(units_of(wildcards.table)),
+    script:
+        "../scripts/tabulate_paper.py"
+
+
+rule figure:
+    input:
+        sources("plot_paper"),
+        unpack(figure_inputs),
+    output:
+        png=LAYOUT.figure("{figure}", "png"),
+        pdf=LAYOUT.figure("{figure}", "pdf"),
+    log:
+        LAYOUT.log("figure/{figure}"),
+    benchmark:
+        LAYOUT.benchmark("figure/{figure}")
+    wildcard_constraints:
+        figure="|".join(FIGURES),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1500,
+        runtime=10,
+    params:
+        settings=lambda wildcards: settings_of(SHOWN, wildcards.figure),
+        evaluations=lambda wildcards: evaluations_of(units_of(wildcards.figure)),
+        units=lambda wildcards: units_of(wildcards.figure),
+        folds=lambda wildcards: folds_of(units_of(wildcards.figure)),
+    script:
+        "../scripts/plot_paper.py"
+
+
+rule claims:
+    input:
+        sources("judge_claims"),
+        evaluations=paths(LAYOUT.evaluation, evaluations_of(UNITS)),
+    output:
+        csv=LAYOUT.claims("csv"),
+        md=LAYOUT.claims("md"),
+    log:
+        LAYOUT.log("claims"),
+    benchmark:
+        LAYOUT.benchmark("claims")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        evaluations=evaluations_of(UNITS),
+        n_resamples=CONFIG["n_resamples"],
+        seed=CONFIG["seed"],
+    script:
+        "../scripts/judge_claims.py"
+
+
+rule runtime:
+    input:
+        sources("tabulate_runtime"),
+        benchmarks=[LAYOUT.benchmark(job) for _, job in JOBS],
+        logs=[LAYOUT.log(job) for _, job in JOBS],
+    output:
+        csv=LAYOUT.table("runtime", "csv"),
+        md=LAYOUT.table("runtime", "md"),
+        html=LAYOUT.table("runtime", "html"),
+    log:
+        LAYOUT.log("runtime"),
+    benchmark:
+        LAYOUT.benchmark("runtime")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        rules=[rule for rule, _ in JOBS],
+    script:
+        "../scripts/tabulate_runtime.py"
+
+
+rule report:
+    input:
+        sources("build_report"),
+        configuration=rules.settings.output.configuration,
+        provenance=rules.settings.output.provenance,
+        claims=rules.claims.output.csv,
+        runtime=rules.runtime.output.html,
+        splits=[LAYOUT.splits(category) for category in CATEGORIES],
+        tables=[LAYOUT.table(name, "html") for name in TABLES],
+        figures=[LAYOUT.figure(name, "png") for name in SHOWN_FIGURES],
+    output:
+        LAYOUT.report,
+    log:
+        LAYOUT.log("report"),
+    benchmark:
+        LAYOUT.benchmark("report")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        categories=CATEGORIES,
+        tables=list(TABLES),
+        figures=SHOWN_FIGURES,
+    script:
+        "../scripts/build_report.py"
+
+
+rule tables:
+    input:
+        rules.report.input.tables,
+
+
+rule figures:
+    input:
+        rules.report.input.figures,

@@ -1,0 +1,21 @@
+"""Show claims, tables, figures, settings and running time on one page."""
+
+from pathlib import Path
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.files import write_text
+    from nbv.reporting.report import build_report
+
+    given, params = snakemake.input, snakemake.params
+    page = build_report(
+        claims=Path(given.claims),
+        configuration=Path(given.configuration),
+        provenance=Path(given.provenance),
+        runtime=Path(given.runtime),
+        splits=dict(zip(params.categories, map(Path, given.splits), strict=True)),
+        tables=dict(zip(params.tables, map(Path, given.tables), strict=True)),
+        figures=dict(zip(params.figures, map(Path, given.figures), strict=True)),
+    )
+    write_text(snakemake.output[0], page)

@@ -1,0 +1,31 @@
+"""Estimate every view of the calibration and the test objects of one fold."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.calibration.estimates import write_estimates
+    from nbv.calibration.posteriors import write_posteriors
+    from nbv.calibration.splits import read_splits
+    from nbv.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.estimation.weights import load_estimator
+    from nbv.experiments.held_out import estimate_fold
+    from nbv.files import open_array
+
+    params, given, output = snakemake.params, snakemake.input, snakemake.output
+    use_one_thread()
+    hardware = choose_hardware(params.device, params.precision)
+    answers = estimate_fold(
+        open_array(given.depth),
+        read_splits(given.splits),
+        int(snakemake.wildcards.fold),
+        load_estimator(given.estimator, hardware),
+        [load_estimator(path, hardware) for path in given.of_parts],
+        hardware,
+        distributions="test_posteriors" in output.keys(),
+    )
+    for role, found in answers.items():
+        write_estimates(output[role], found.object_ids, found.estimate_deg)
+        if found.temperature is not None:
+            write_posteriors(
+                output[f"{role}_posteriors"], found.object_ids, found.outputs, found.temperature
+            )

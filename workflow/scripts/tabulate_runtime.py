@@ -1,0 +1,15 @@
+"""Sum up the running time of the jobs."""
+
+from pathlib import Path
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.reporting.runtime import load_jobs, runtime_table
+    from nbv.reporting.table import write_table
+
+    given = snakemake.input
+    files = zip(
+        snakemake.params.rules, map(Path, given.benchmarks), map(Path, given.logs), strict=True
+    )
+    write_table(runtime_table(load_jobs(list(files))), dict(snakemake.output.items()))
