@@ -1,6 +1,6 @@
 # make reproduce   the paper, end to end        make quick   the same graph, small
-# make test        the test suite               make check   lint, types, workflow lint
-# make bench       the speed benchmarks         make compare a finished run against docs/reference
+# make test        the test suite               make check   lint, types, imports, workflow lint
+# make bench       the speed benchmarks         make compare a finished run with docs/reference
 
 PYTHON ?= python3
 CORES ?= 2
@@ -35,6 +35,7 @@ check: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint
 
@@ -46,4 +47,4 @@ $(READY): requirements.lock pyproject.toml
 	touch $@
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -1,3 +1,41 @@
-"""Best next-viewpoint recommendation for category-level object pose estimation."""
+"""Best next-viewpoint recommendation for category-level object pose estimation.
+
+The names in `__all__` are the public API; everything else is internal and may change::
+
+    import nbv
+
+    table = nbv.load_lookup("results/paper/lookup/mug/el00/fold1/pose_ambiguity.npz")
+    delta_deg = table.recommend(first_deg)  # turn the camera, estimate again: second_deg
+    pose_deg = nbv.average(first_deg, second_deg, delta_deg)
+
+`build_lookup` makes a table of the evidence that `gather_evidence` makes of calibration estimates.
+"""
+
+from importlib import import_module
+from typing import Any
 
 __version__ = "0.1.0"
+
+# Names and not imports: `import nbv` stays quick, and no job depends on all of these modules.
+_MODULES = {
+    "Conditionals": "nbv.calibration.density",
+    "conditionals": "nbv.calibration.density",
+    "UserError": "nbv.errors",
+    "Evidence": "nbv.recommendation.evidence",
+    "gather_evidence": "nbv.recommendation.evidence",
+    "average": "nbv.recommendation.fusion",
+    "posterior": "nbv.recommendation.fusion",
+    "LookupTable": "nbv.recommendation.lookup",
+    "build_lookup": "nbv.recommendation.lookup",
+    "load_lookup": "nbv.recommendation.lookup",
+    "save_lookup": "nbv.recommendation.lookup",
+}
+
+__all__ = list(_MODULES)
+
+
+def __getattr__(name: str) -> Any:
+    """Import what the public API names when it is first asked for."""
+    if name not in _MODULES:
+        raise AttributeError(f"module 'nbv' has no attribute {name!r}")
+    return getattr(import_module(_MODULES[name]), name)

@@ -16,25 +16,25 @@ def wrap_deg(angle_deg: ArrayLike) -> Angles:
 
 
 def signed_difference_deg(a_deg: ArrayLike, b_deg: ArrayLike) -> Angles:
-    """Return the turn from b to a, the shorter way round, in [-180, 180)."""
+    """Return the shorter turn from b to a, in [-180, 180)."""
     difference = np.asarray(a_deg, dtype=np.float64) - np.asarray(b_deg, dtype=np.float64)
     return wrap_deg(difference + 180.0) - 180.0
 
 
 def circular_distance_deg(a_deg: ArrayLike, b_deg: ArrayLike) -> Angles:
-    """Return the angle between two directions, in [0, 180] (Eq. 9, its cases put right)."""
+    """Return the angle between two directions, in [0, 180] (Eq. 9 with its cases corrected)."""
     return np.abs(signed_difference_deg(a_deg, b_deg))
 
 
 def travel_deg(delta_deg: ArrayLike) -> Angles:
-    """Return how far the camera goes for a rotation delta, the shorter way, in [0, 180]."""
+    """Return how far the camera travels for a rotation delta, the shorter way, in [0, 180]."""
     return circular_distance_deg(delta_deg, 0.0)
 
 
 def midpoint_deg(first_deg: ArrayLike, second_deg: ArrayLike) -> Angles:
     """Return the circular mean of two directions, in [0, 360).
 
-    Antipodal directions have no mean; the first is returned for them.
+    Opposite directions have no mean; the result is then the first direction.
     """
     turn = signed_difference_deg(second_deg, first_deg)
     antipodal = turn == -180.0

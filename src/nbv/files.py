@@ -1,4 +1,4 @@
-"""Writing files whole or not at all, with the same bytes for the same content."""
+"""Files are written whole or not at all, and the same content gives the same bytes."""
 
 from __future__ import annotations
 
@@ -6,21 +6,23 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path` that takes its place when the block succeeds.
+    """Yield a temporary path in the folder of `path`; it replaces `path` when the block succeeds.
 
-    The suffix of `path` is kept, for writers that choose a format by it. On any error the
-    temporary file is removed and `path` is left as it was.
+    The temporary path keeps the suffix, for writers that choose a format by it. An error removes
+    the temporary file and leaves `path` as it was.
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -44,30 +46,32 @@ def write_json(path: str | Path, value: Any) -> None:
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
-    """Write a table without its index; floats are rounded to `decimals`, absent values empty."""
+    """Write a frame without its index; round floats to `decimals`, leave absent values empty."""
     with replacing(path) as temporary:
         frame.round(decimals).to_csv(temporary, index=False, lineterminator="\n")
 
 
 def read_csv(path: str | Path) -> pd.DataFrame:
-    """Read a table written by `write_csv`.
+    """Read what `write_csv` wrote.
 
-    Object ids stay the text they are (``007``, ``NA``, ``null``); in other columns empty cells are
-    absent values and nothing else is.
+    Object ids stay text as written (``007``, ``NA``, ``null``). In other columns an empty cell,
+    and nothing else, is an absent value.
     """
+    import pandas as pd  # here, so that loading a lookup table costs no import of pandas
+
     columns = pd.read_csv(path, nrows=0).columns
     empty = {name: [""] for name in columns if name != "object_id"}
     return pd.read_csv(path, dtype={"object_id": str}, keep_default_na=False, na_values=empty)
 
 
 def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write named arrays as a compressed `.npz` (deterministic: numpy dates members 1980)."""
+    """Write named arrays as a compressed `.npz` (same bytes: numpy dates its members 1980)."""
     with replacing(path) as temporary:
         np.savez_compressed(temporary, allow_pickle=False, **arrays)
 
 
 def open_array(path: str | Path) -> NDArray[Any]:
-    """Open an array stored as `.npy`, read-only and without reading it into memory."""
+    """Map an array stored as `.npy` into memory, read-only."""
     stored: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
     return stored
 
@@ -79,12 +83,12 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
 
 
 def existing(path: Path) -> Path:
-    """Return the path of a file that has to be there.
+    """Return `path`.
 
     Raises
     ------
     UserError
-        If it is not.
+        If no file is there.
     """
     if not path.is_file():
         raise UserError(f"{path} does not exist; finish the run first, or is it another folder?")

@@ -1,4 +1,4 @@
-"""What every workflow job does besides its work: say how it goes, and fail in one clear line."""
+"""Every job of the workflow logs its progress, and an error ends it with one clear line."""
 
 from __future__ import annotations
 
@@ -19,20 +19,19 @@ log = logging.getLogger(__name__)
 
 @contextmanager
 def job(snakemake: Any) -> Iterator[None]:
-    """Log a job's progress to the terminal and to its log file, and end it cleanly on errors.
+    """Log a job's progress to the terminal and to its log file; end it with one line on an error.
 
     Parameters
     ----------
     snakemake : object
-        What Snakemake gives a script. Lines are labelled with rule and wildcards, since jobs run
-        side by side. The log file also receives the traceback of an unexpected error, which the
-        terminal is spared; the error's one line goes to `last_error.txt` in the folder ``logs`` as
-        well, for the workflow's last words.
+        What Snakemake gives a script. Rule and wildcards label each line, since several jobs run
+        at a time. The traceback of an unexpected error goes to the log file alone. The error's one
+        line goes to ``logs/last_error.txt`` too, which the workflow prints when it stops.
 
     Raises
     ------
     SystemExit
-        With status 1 after an error has been reported.
+        With status 1, after it has reported an error.
     """
     path = Path(snakemake.log[0])
     label = " ".join([snakemake.rule, "/".join(snakemake.wildcards)]).strip()
@@ -45,7 +44,7 @@ def job(snakemake: Any) -> Iterator[None]:
         handler.setFormatter(logging.Formatter(f"[%(asctime)s {label}] %(message)s", "%H:%M:%S"))
         root.addHandler(handler)
     root.setLevel(logging.INFO)
-    # A log that cannot be written to is no reason to fill the terminal with tracebacks.
+    # A full disk makes every write to the log fail; logging would print a traceback for each.
     logging.raiseExceptions = False
     for noisy in ("matplotlib", "fontTools", "trimesh", "OpenGL"):
         logging.getLogger(noisy).setLevel(logging.ERROR)
@@ -56,20 +55,20 @@ def job(snakemake: Any) -> Iterator[None]:
     except OSError as error:
         if error.errno != errno.ENOSPC:
             _fail_unexpectedly(error, path)
-        # Writing to an open file does not say which; it can only be one of the job's own.
+        # An error from an open file names no file; only the job's own outputs are open.
         where = error.filename or snakemake.output[0]
         _fail(f"{where}: no space left on the disk; free some and run the same command again", path)
     except Exception as error:
         _fail_unexpectedly(error, path)
     else:
-        # What Snakemake's benchmark only samples; `nbv.reporting.runtime` reads it back.
+        # Snakemake's benchmark only samples it; `nbv.reporting.runtime` reads this line.
         log.info("processor time %.2f s", sum(os.times()[:4]), extra={"log_only": True})
 
 
 def _fail(message: str, log_file: Path) -> None:
     log.error("error: %s", message)
     logs = next((folder for folder in log_file.parents if folder.name == "logs"), log_file.parent)
-    # On a full disk not even this line may fit; it has been said on the terminal.
+    # A full disk may not even take this line; the terminal has it already.
     with contextlib.suppress(OSError):
         (logs / "last_error.txt").write_text(f"error: {message}\n", encoding="utf-8")
     raise SystemExit(1)

@@ -1,4 +1,4 @@
-"""Random numbers that depend on what they are for, and on nothing else."""
+"""Random numbers depend on the run's seed and on their labels, and on nothing else."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 def seed_for(seed: int, *labels: str | int) -> int:
-    """Return a 32-bit seed, a function of the run's seed and the labels alone."""
+    """Return a 32-bit seed for the run's seed and the labels; other labels give another seed."""
     words = [zlib.crc32(str(label).encode()) for label in labels]
     return int(np.random.SeedSequence([seed, *words]).generate_state(1)[0])
 

@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from itertools import permutations
+from pathlib import Path
+
+import grimp
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "nbv"
+PACKAGES = sorted(path.name for path in PACKAGE.iterdir() if (path / "__init__.py").is_file())
+CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+
+
+def n_lines(folder: Path) -> int:
+    return sum(len(path.read_text().splitlines()) for path in folder.rglob("*.py"))
+
+
+def test_the_import_contracts_are_kept():
+    # In a process of its own: import-linter turns off the loggers that other tests watch.
+    lint = "from importlinter.cli import lint_imports; sys.exit(lint_imports(no_cache=True))"
+    command = [sys.executable, "-c", f"import sys; {lint}"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_no_package_holds_more_than_a_quarter_of_the_lines(name):
+    assert n_lines(PACKAGE / name) <= 0.25 * n_lines(PACKAGE)
+
+
+def test_the_drawing_shows_every_import_between_packages_and_all_go_down():
+    *layers, _ground = CONTRACTS["contracts"][0]["layers"]
+    graph = grimp.build_graph("nbv", cache_dir=None)
+    for layer in layers:
+        graph.squash_module(f"nbv.{layer}")
+    found = {
+        (upper, lower)
+        for upper, lower in permutations(layers, 2)
+        if graph.direct_import_exists(importer=f"nbv.{upper}", imported=f"nbv.{lower}")
+    }
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    drawn = re.findall(r"^ +(\w+) --> (\w+)$", text, re.MULTILINE)
+    assert set(drawn) == found, "run the command above the drawing in docs/architecture.md again"
+    assert all(layers.index(upper) < layers.index(lower) for upper, lower in drawn)
