@@ -159,9 +159,11 @@ def banner(*lines):
 def lift_rate_limit():
     """Let local jobs start as they can.
 
-    With its default limit of 100 jobs a second, Snakemake 9.27 looks at the schedule again once a
-    second for every job that has been started so far (as its pull request 3744 describes): a
-    fifth of a core at the end of the paper's run. The limit exists once the run starts.
+    Snakemake 9.27's rate limit starts a timer after each round of scheduling, and each timer
+    starts another round while jobs are ready: 10,153 rounds instead of 303 for 302 jobs, 12.6 s
+    of processor time instead of 6.1 s. No setting avoids it: a larger limit changes little
+    (9,688 rounds), a longer time span delays the end by its length. The limit exists once the
+    run starts.
     """
     if workflow.local_exec:
         workflow.scheduler.job_rate_limiter = None
