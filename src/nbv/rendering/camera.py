@@ -135,7 +135,7 @@ def viewpoint_frames(
     Returns
     -------
     right, up, forward : (k, 3) float
-        Orthonormal; the camera stands at −distance · forward.
+        Orthonormal; the camera is at −distance · forward.
     """
     azimuth = np.radians(np.atleast_1d(np.asarray(azimuths_deg, dtype=np.float64)))
     elevation = np.radians(elevation_deg)
