@@ -82,8 +82,8 @@ class Views:
     position : (k, 3) float
         Of the pinholes, in the object frame.
     right, up, forward : (k, 3) float
-        The axes of each image, orthonormal: columns grow along `right`, rows against `up`, depth
-        along `forward`.
+        The axes of each image, orthonormal: columns grow along `right`, rows opposite to `up`,
+        depth along `forward`.
     outline : (k, 4) float
         Bounds of the projected vertices in normalised image coordinates: x_min, x_max, y_min,
         y_max.
