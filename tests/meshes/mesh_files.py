@@ -9,6 +9,7 @@ import pytest
 import trimesh
 import yaml
 
+from nbv.errors import UserError
 from nbv.meshes.sources import open_source
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -48,3 +49,13 @@ def put(path, mesh=None):
     path.parent.mkdir(parents=True, exist_ok=True)
     (mesh or pointer()).export(path)
     return path
+
+
+def refused(call, *named):
+    with pytest.raises(UserError) as caught:
+        call()
+    message = str(caught.value)
+    assert "\n" not in message
+    for part in named:
+        assert str(part) in message
+    return message

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
+import time
 
 import numpy as np
 import pytest
@@ -10,7 +12,6 @@ import trimesh
 from mesh_files import put, source_of
 
 from nbv.errors import UserError
-from nbv.meshes import preparation
 from nbv.meshes.preparation import prepare_meshes
 
 
@@ -45,7 +46,7 @@ def test_every_bad_file_is_logged_and_the_first_is_raised(root, caplog):
 
 
 def test_progress_is_logged(root, caplog, monkeypatch):
-    monkeypatch.setattr(preparation, "_SECONDS_BETWEEN_LINES", 0.0)
+    monkeypatch.setattr(time, "monotonic", itertools.count(step=10.0).__next__)
     source = source_of("folder", root=str(root))
     with caplog.at_level(logging.INFO, logger="nbv"):
         prepare_meshes(source, "mug", source.object_ids("mug"))

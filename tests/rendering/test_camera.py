@@ -40,7 +40,7 @@ def pixels(views, points):
 
 
 @given(elevation=st.floats(-90, 90))
-def test_frames_are_right_handed_and_look_at_the_origin(elevation):
+def test_frames_are_right_handed_and_directed_at_the_origin(elevation):
     right, up, forward = viewpoint_frames(elevation, AZIMUTHS)
     frames = np.stack([right, up, -forward], axis=1)
     assert np.allclose(frames @ frames.transpose(0, 2, 1), np.eye(3))

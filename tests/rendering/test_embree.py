@@ -1,4 +1,4 @@
-"""Embree's depths against what they must be, worked out without it."""
+"""Embree's depths, compared with depths computed without it."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_depths_are_those_of_a_brute_force_caster(embree, shape, elevation, fram
     assert 0.05 < (depth > 0).mean() < 0.95
 
 
-def test_a_sphere_looks_the_same_from_everywhere_and_as_large_as_it_must(embree):
+def test_a_sphere_has_the_same_image_from_everywhere_and_the_right_size(embree):
     sphere = shape_of(trimesh.creation.icosphere(subdivisions=5))
     radius = 0.5 / np.sqrt(3.0)
     for framing in ("silhouette", "axis"):

@@ -1,4 +1,4 @@
-"""OpenGL's depths against Embree's: two independent roads to the same image."""
+"""OpenGL's depths, compared with Embree's: two independent ways to the same image."""
 
 from __future__ import annotations
 

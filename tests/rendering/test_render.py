@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
+import time
 
 import numpy as np
 import pytest
@@ -12,7 +14,6 @@ from rendering_shapes import procedural, shape_of
 from nbv.errors import UserError
 from nbv.files import open_array
 from nbv.rendering import open_renderer
-from nbv.rendering import render as room
 from nbv.rendering.camera import Camera
 from nbv.rendering.depth_codes import decode_depth, encode_depth
 from nbv.rendering.render import render_objects, write_depth
@@ -57,7 +58,7 @@ def test_fewer_azimuths_are_every_so_many_of_all(embree, meshes):
     assert np.array_equal(few, many[:, ::3])
 
 
-def test_a_sensor_stands_between_depth_and_code(embree, meshes):
+def test_a_sensor_measures_before_depth_is_encoded(embree, meshes):
     camera = Camera(image_side=16, framing="axis")
 
     def nearer(depth, object_id):
@@ -83,7 +84,7 @@ def test_an_object_that_does_not_fit_is_named_and_nothing_is_left(tmp_path, embr
 
 
 def test_progress_is_logged_with_rate_and_time_left(tmp_path, embree, meshes, caplog, monkeypatch):
-    monkeypatch.setattr(room, "_SECONDS_BETWEEN_LINES", 0.0)
+    monkeypatch.setattr(time, "monotonic", itertools.count(step=10.0).__next__)
     many = {f"{name}{i}": mesh for i in range(10) for name, mesh in meshes.items()}
     with caplog.at_level(logging.INFO, logger="nbv"):
         write_depth(tmp_path / "el00.npy", many, 0.0, CAMERA, embree, n_azimuths=2)

@@ -1,1 +1,1 @@
-"""Meshes: where they come from, and the one frame and size that all of them are brought to."""
+"""Meshes: their sources, and the one frame and size that all of them get."""

@@ -1,8 +1,8 @@
 """The object frame: z up, front +x, unit bounding-box diagonal.
 
-Sets of meshes disagree about which way is up and which way is forward. Both are said in the
-configuration as axes of the file ("+y", "-z") or as vectors ("0,0,1"), and the rotation follows
-from them; it is always proper, so nothing is ever mirrored.
+Data sets disagree about which way is up and which way is forward. The configuration names both as
+axes of the file ("+y", "-z") or as vectors ("0,0,1"), and the rotation follows from them. It is
+always proper: no mesh is ever mirrored.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ Centre = Literal["box", "origin"]
 CENTRES = ("box", "origin")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
-# Directions given as numbers may be rounded; 0.02 is about one degree.
+# Vectors may be rounded numbers; 0.02 is about one degree.
 _PERPENDICULAR_WITHIN = 0.02
 
 
 def direction(axis: str, key: str) -> NDArray[np.float64]:
-    """Return the unit vector that an axis of the file names.
+    """Return the unit vector of an axis of the file.
 
     Parameters
     ----------
     axis : str
         One of ±x, ±y, ±z (a missing sign is +), or three numbers with commas, as in "0,-1,0".
-        Backslashes before the commas, as ShapeNetSem's metadata has them, are ignored.
+        Backslashes before the commas, which ShapeNetSem's metadata has, are ignored.
     key : str
-        Names the setting in an error.
+        Name of the setting, for the error.
 
     Raises
     ------
     UserError
-        If it is neither.
+        If the text is neither.
     """
     text = axis.strip().replace("\\", "").lower()
     signed = text if text[:1] in ("+", "-") else f"+{text}"
@@ -64,14 +64,14 @@ def frame_rotation(up: str, front: str, turn_deg: float) -> NDArray[np.float64]:
     Parameters
     ----------
     up, front : str
-        Axes of the file that become +z and (before the turn) +x; see `direction`.
+        Axes of the file that become +z and, before the turn, +x; see `direction`.
     turn_deg : float
-        Turn about +z afterwards, counter-clockwise: the azimuth at which `front` ends.
+        Turn about +z after that, counter-clockwise: the final azimuth of `front`.
 
     Returns
     -------
     (3, 3) float
-        Proper (determinant 1); to be applied to column vectors.
+        Proper (determinant 1); it multiplies column vectors.
 
     Raises
     ------
@@ -92,19 +92,19 @@ def frame_rotation(up: str, front: str, turn_deg: float) -> NDArray[np.float64]:
 
 
 def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
-    """Make sure that a mesh can be rendered.
+    """Check that a mesh can be rendered.
 
     Parameters
     ----------
     mesh : trimesh.Trimesh
     origin : str
-        Where it came from, to be named in the error.
+        Its place of origin, for the error.
 
     Raises
     ------
     UserError
-        If it has no face, a face index out of range, a vertex that is not finite (among those that
-        faces use), or no extent.
+        If it has no face, a face index out of range, a used vertex that is not finite, or no
+        extent.
     """
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     if len(faces) == 0:
@@ -127,23 +127,23 @@ def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
 def normalise(
     mesh: trimesh.Trimesh, up: str, front: str, turn_deg: float, centre: Centre
 ) -> trimesh.Trimesh:
-    """Return a mesh in the object frame, at unit size.
+    """Return a mesh in the object frame, with unit size.
 
     Parameters
     ----------
     mesh : trimesh.Trimesh
-        Checked by `check_mesh`.
+        `check_mesh` accepts it.
     up, front, turn_deg
         See `frame_rotation`.
     centre : {"box", "origin"}
-        The turning axis x = y = 0: through the middle of the bounding box, or where the file has
-        it. The height is always centred on the box.
+        The turning axis x = y = 0 passes through the middle of the bounding box, or through the
+        file's own origin. The height is always centred on the box.
 
     Returns
     -------
     trimesh.Trimesh
-        Faces in their old order; only vertices that they use, in their old order. The diagonal of
-        the axis-aligned bounding box has length 1.
+        The faces, and the vertices that they use, in their old order. The diagonal of the
+        axis-aligned bounding box has length 1.
 
     Raises
     ------

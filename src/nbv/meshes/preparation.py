@@ -1,4 +1,4 @@
-"""All meshes of a category, ready to be stored, or one message about those that cannot be."""
+"""All meshes of a category, loaded, checked and normalised; one message names the bad ones."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str])
     Raises
     ------
     UserError
-        After all have been tried: the first mesh that cannot be used, and how many more there are.
-        Each of them is logged as an error.
+        After all meshes are tried. It names the first bad one and the number of others; the log
+        has an error for each.
     """
     prepared: dict[str, Mesh] = {}
     bad: list[str] = []
@@ -45,7 +45,7 @@ def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str])
         try:
             prepared[object_id] = as_mesh(source.load(category, object_id))
         except UserError as error:
-            # All are tried, so that one run names every file there is to mend.
+            # The loop goes on, so that one run names every file to mend.
             logger.error("%s", error)
             bad.append(str(error))
         now = time.monotonic()

@@ -1,4 +1,4 @@
-"""Normalised meshes of one category in one file, without pickle."""
+"""One file for the normalised meshes of a category, without pickle."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Surface(Protocol):
 
 
 class Mesh(NamedTuple):
-    """A triangle mesh as it is stored.
+    """A triangle mesh in the types of the file.
 
     Attributes
     ----------
@@ -40,14 +40,14 @@ class Mesh(NamedTuple):
 
 
 def as_mesh(surface: Surface) -> Mesh:
-    """Return a mesh in the types in which it is stored."""
+    """Return a mesh in the types of the file."""
     vertices = np.ascontiguousarray(surface.vertices, dtype=np.float32).reshape(-1, 3)
     faces = np.ascontiguousarray(surface.faces, dtype=np.int32).reshape(-1, 3)
     return Mesh(vertices, faces)
 
 
 def save_meshes(path: str | Path, meshes: Mapping[str, Surface]) -> None:
-    """Write meshes to an `.npz`: the same meshes make the same bytes.
+    """Write meshes to an `.npz`; the same meshes make the same bytes.
 
     Its arrays are `ids` (n,) str, `vertices` (sum of n, 3) float32 and `faces` (sum of m, 3) int32
     one mesh after the other, faces counting from their own mesh's first vertex, and
@@ -67,13 +67,13 @@ def save_meshes(path: str | Path, meshes: Mapping[str, Surface]) -> None:
 
 
 def stored_ids(path: str | Path) -> list[str]:
-    """Return the ids in a file of `save_meshes`, in its order, without reading the meshes."""
+    """Return the ids in a file of `save_meshes`, in its order, without loading the meshes."""
     with np.load(path, allow_pickle=False) as stored:
         return [str(object_id) for object_id in stored["ids"]]
 
 
 def load_meshes(path: str | Path) -> dict[str, Mesh]:
-    """Read what `save_meshes` wrote, in its order."""
+    """Return the meshes in a file of `save_meshes`, in its order."""
     arrays = read_arrays(path)
     vertex_at, face_at = arrays["vertex_offsets"], arrays["face_offsets"]
     meshes: dict[str, Mesh] = {}

@@ -1,7 +1,7 @@
-"""Depth images of meshes from every azimuth: cameras, renderers, and what a sensor keeps of them.
+"""Depth images of meshes from every azimuth: camera, renderers, sensors and depth codes.
 
-A renderer is chosen by name and imported only then, so that nobody needs the libraries of the
-one that they do not use.
+The configuration names a renderer, and only that one is imported: nobody needs the libraries of
+the other.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ RENDERERS: Mapping[str, str] = {
 
 
 class Renderer(Protocol):
-    """What every renderer offers."""
+    """The interface of a renderer."""
 
     def render(
         self,
@@ -48,7 +48,7 @@ class Renderer(Protocol):
         azimuths_deg : (k,) float
             One image each.
         camera : Camera
-            Where the camera stands and what it sees.
+            Its place, its field of view and its framing.
 
         Returns
         -------
@@ -59,13 +59,13 @@ class Renderer(Protocol):
         Raises
         ------
         UserError
-            Where the object does not lie wholly before the camera and within the image.
+            Where part of the object lies behind the camera or outside the image.
         """
         ...
 
 
 def open_renderer(name: str) -> Renderer:
-    """Return the renderer of that name, ready for use.
+    """Return the renderer of a name, ready for use.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""The pinhole camera: where it stands, which way it looks, and where the object falls in its image.
+"""The pinhole camera: its place, its direction, and where the object falls in its image.
 
 Normalised image coordinates (x, y) are tangents: a point at depth d on the ray (x, y) lies d·x to
-the right of the optical axis and d·y above it. Everything that depends on the viewpoint is worked
-out here once, so that all renderers see the same views.
+the right of the optical axis and d·y above it. This module computes everything that depends on
+the viewpoint, once, so that all renderers see the same views.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 FRAMINGS = ("silhouette", "axis")
 
-# Below this a hull costs more than it saves.
+# For fewer vertices a hull costs more than it saves.
 _FEW_VERTICES = 64
 # How far, in pixels, rounding may push an outline that touches the image's edge.
 _EDGE_TOLERANCE = 1e-6
@@ -43,13 +43,17 @@ class Camera:
     framing : {"silhouette", "axis"}
         What lies in the middle of the image: the centre of the bounding box of what is visible, as
         a detector would crop it, or the origin of the object frame. Framing shifts the principal
-        point, continuously; it neither rescales nor turns anything.
+        point; it neither rescales nor turns anything.
+    whole_pixels : bool
+        Framing shifts by whole pixels only. The pixels then lie where they lie without framing,
+        as those of a sensor do, which no crop moves.
     """
 
     distance: float = 2.5
     fov_deg: float = 25.0
     image_side: int = 64
     framing: str = "silhouette"
+    whole_pixels: bool = False
 
     def __post_init__(self) -> None:
         if self.framing not in FRAMINGS:
@@ -78,8 +82,8 @@ class Views:
     position : (k, 3) float
         Of the pinholes, in the object frame.
     right, up, forward : (k, 3) float
-        The axes of each image, orthonormal: columns grow along `right`, rows against `up`, depth
-        along `forward`.
+        The axes of each image, orthonormal: columns grow along `right`, rows opposite to `up`,
+        depth along `forward`.
     outline : (k, 4) float
         Bounds of the projected vertices in normalised image coordinates: x_min, x_max, y_min,
         y_max.
@@ -119,7 +123,7 @@ class Views:
 def viewpoint_frames(
     elevation_deg: float, azimuths_deg: ArrayLike
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the image axes (right, up, forward) of cameras that look at the origin, z up.
+    """Return the image axes (right, up, forward) of cameras directed at the origin, z up.
 
     Parameters
     ----------
@@ -131,7 +135,7 @@ def viewpoint_frames(
     Returns
     -------
     right, up, forward : (k, 3) float
-        Orthonormal; the camera stands at −distance · forward.
+        Orthonormal; the camera is at −distance · forward.
     """
     azimuth = np.radians(np.atleast_1d(np.asarray(azimuths_deg, dtype=np.float64)))
     elevation = np.radians(elevation_deg)
@@ -144,9 +148,9 @@ def viewpoint_frames(
 
 
 def hull_vertices(vertices: ArrayLike, faces: ArrayLike) -> Floats:
-    """Return vertices whose convex hull is that of the surface, (h, 3): all that outlines need.
+    """Return the vertices that an outline depends on, (h, 3): those of the convex hull.
 
-    Vertices that no face uses are left out. Surfaces with no volume keep all others.
+    Vertices that no face uses are left out. A surface without volume keeps all others.
     """
     points = np.asarray(vertices, dtype=np.float64)
     is_used = np.zeros(len(points), dtype=bool)
@@ -165,7 +169,7 @@ def object_views(
     azimuths_deg: ArrayLike,
     camera: Camera,
 ) -> Views:
-    """Return the views of an object, framed.
+    """Return the framed views of an object.
 
     Parameters
     ----------
@@ -206,7 +210,7 @@ def object_views(
 
 
 def principal_shift(outline: Floats, camera: Camera) -> Floats:
-    """Return the normalised coordinates (x, y) that each view's middle looks at, (k, 2).
+    """Return the normalised coordinates (x, y) of the middle of each image, (k, 2).
 
     Parameters
     ----------
@@ -216,17 +220,18 @@ def principal_shift(outline: Floats, camera: Camera) -> Floats:
     """
     if camera.framing == "axis":
         return np.zeros((len(outline), 2))
-    return (outline[:, 0::2] + outline[:, 1::2]) / 2.0
+    centre: Floats = (outline[:, 0::2] + outline[:, 1::2]) / 2.0
+    return np.rint(centre * camera.focal_px) / camera.focal_px if camera.whole_pixels else centre
 
 
 def _check_within(views: Views, elevation_deg: float, azimuths_deg: Floats) -> None:
     side = views.camera.image_side
     bounds = views.outline_px
-    beyond = np.maximum(-bounds[:, 0::2].min(axis=1), bounds[:, 1::2].max(axis=1) - side)
-    worst = int(beyond.argmax())
-    if beyond[worst] > _EDGE_TOLERANCE:
+    excess = np.maximum(-bounds[:, 0::2].min(axis=1), bounds[:, 1::2].max(axis=1) - side)
+    worst = int(excess.argmax())
+    if excess[worst] > _EDGE_TOLERANCE:
         raise UserError(
-            f"the object leaves the image by {beyond[worst]:.2g} pixels at azimuth "
+            f"the object leaves the image by {excess[worst]:.2g} pixels at azimuth "
             f"{azimuths_deg[worst]:g}, elevation {elevation_deg:g} (framing="
             f"{views.camera.framing}): raise fov_deg={views.camera.fov_deg:g} or "
             f"distance={views.camera.distance:g}"

@@ -1,4 +1,4 @@
-"""What is kept of a depth image: one byte a pixel, in steps of 0.5 % of the object's size."""
+"""Depth images as bytes: one byte a pixel, in steps of 0.5 % of the object's size."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ ZERO_CODE = 128
 
 
 def reference_depth(depth: Depths, camera: Camera) -> NDArray[np.float32]:
-    """Return the depth of each image that code 128 stands for.
+    """Return the depth that code 128 stands for, one for each image.
 
-    With ``framing="silhouette"`` it is the median of the visible pixels, which is all that a
-    detector's crop can know; with ``framing="axis"`` the distance of the object's origin is known.
+    With ``framing="silhouette"`` it is the median of the visible pixels: a detector's crop knows
+    no more. With ``framing="axis"`` it is the distance of the object's origin, which is then known.
 
     Parameters
     ----------
@@ -59,11 +59,11 @@ def encode_depth(depth: Depths, camera: Camera) -> Codes:
     Returns
     -------
     (k, side, side) uint8
-        ``round((reference - depth) / STEP) + 128``, kept within 1..255: offsets beyond −0.635 and
-        0.635 diagonals saturate.
+        ``round((reference - depth) / STEP) + 128``, kept within 1..255: offsets saturate at −0.635
+        and 0.635 diagonals.
     """
     codes = np.zeros(depth.shape, dtype=np.uint8)
-    # One image at a time and in place: what is visible of one stays in the processor's cache.
+    # One image at a time and in place, so that its pixels stay in the processor's cache.
     for image, code in zip(depth, codes, strict=True):
         seen = image > 0
         visible = image[seen]
@@ -87,8 +87,8 @@ def decode_depth(codes: Codes) -> Depths:
     Returns
     -------
     (...) float32
-        Object diagonals, positive towards the camera, NaN for background. Within half a step of
-        what was encoded, where that did not saturate.
+        Object diagonals, positive towards the camera, NaN for background. It differs from what
+        was encoded by at most half a step, unless that saturated.
     """
     offsets = (codes.astype(np.float32) - ZERO_CODE) * np.float32(STEP)
     return np.where(codes > 0, offsets, np.float32(np.nan))

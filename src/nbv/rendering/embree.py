@@ -1,7 +1,7 @@
-"""Depth by casting one ray through each pixel centre with Embree: no GL, the same on any CPU.
+"""Depth from one ray through each pixel centre, cast with Embree: no GL, the same on any CPU.
 
-Embree is called directly rather than through trimesh, which shifts and scales vertices, splits
-rays that it need not, and falls back without a word on a caster a thousand times slower.
+We call Embree directly. Trimesh's interface to it shifts and scales vertices, splits rays without
+need, and changes silently to a caster a thousand times slower where Embree is missing.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.errors import UserError
 from nbv.rendering.camera import Camera, Views, object_views
 
-# Rays handed to Embree at once: enough to make the call's own cost vanish, few enough to stay in
+# Rays in one call of Embree: enough that the call's own cost vanishes, few enough that they stay in
 # the processor's cache.
 _RAYS_PER_CALL = 65_536
-# Embree leaves a ray that meets nothing at this length or beyond.
+# Embree gives a ray that meets nothing at least this length.
 _NOTHING = 1e30
 
 

@@ -1,13 +1,13 @@
-"""Depth through OpenGL with pyrender, on EGL: a second opinion on every image, and the GPU's way.
+"""Depth through OpenGL with pyrender, on EGL: it runs on a GPU and checks Embree's images.
 
 It draws the same views as Embree. Three of pyrender's habits need care:
 
-- It draws into a multisampled buffer and keeps one sample of each pixel, off the pixel's centre
-  wherever the driver has it. Drawing with its segmentation flag switches multisampling off: depth
-  is then that of the pixel's centre, by OpenGL's definition, and comes two or three times faster.
-- Whatever the material says, depth is drawn of front faces alone. Meshes from the wild have faces
-  either way round, so each face is handed over both ways.
-- Depth comes back through a 24-bit buffer, so the near and far planes stand close to the object.
+- It draws into a multisampled buffer and keeps one sample of each pixel, which the driver places
+  off the pixel's centre. Its segmentation flag switches multisampling off: OpenGL then defines the
+  depth at the pixel's centre, and drawing is two or three times faster.
+- It draws the depth of front faces only, whatever the material says. Collected meshes have faces
+  either way round, so it gets each face both ways.
+- Depth passes through a 24-bit buffer, so the near and far planes lie close to the object.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class PyrenderRenderer:
             raise UserError(
                 f"renderer=pyrender: PYOPENGL_PLATFORM={platform} is set; unset it or set it to egl"
             )
-        # Loaders and drivers fail in ways of their own: no list of what they raise is complete.
+        # No list of what loaders and drivers may raise is complete.
         try:
             self._offscreen = _offscreen()
         except Exception as error:

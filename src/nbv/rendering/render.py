@@ -1,4 +1,4 @@
-"""Depth images of many objects, written straight to one array on disk."""
+"""Depth images of many objects, written directly to one array on disk."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from nbv.files import replacing
 from nbv.meshes.store import Surface
 from nbv.rendering import Renderer
 from nbv.rendering.camera import Camera
+from nbv.rendering.crop import crop_measured, sensor_camera
 from nbv.rendering.depth_codes import Codes, encode_depth
-from nbv.rendering.noise import Measure, ideal
+from nbv.rendering.noise import Measure
 
 logger = logging.getLogger(__name__)
 
-# Progress is logged at each tenth of the work, but no more often than this.
+# Progress is logged at each tenth of the work, but not more often than this.
 _SECONDS_BETWEEN_LINES = 5.0
 
 
@@ -28,10 +29,10 @@ def render_objects(
     elevation_deg: float,
     camera: Camera,
     renderer: Renderer,
-    measure: Measure = ideal,
+    measure: Measure | None = None,
     n_azimuths: int = 360,
 ) -> Iterator[Codes]:
-    """Yield the encoded depth images of each object in turn.
+    """Yield the encoded depth images of each object.
 
     Parameters
     ----------
@@ -41,9 +42,9 @@ def render_objects(
         In [-90, 90].
     camera : Camera
     renderer : Renderer
-    measure : callable, optional
-        From `nbv.rendering.noise.open_sensor`: what is read of one object's images before they
-        are encoded.
+    measure : callable or None
+        The sensor, from `nbv.rendering.noise.open_sensor`. It measures the images, and the crop
+        follows what it measures (`nbv.rendering.crop`). None keeps the true depth.
     n_azimuths : int
         View k is at azimuth 360 k / n_azimuths degrees.
 
@@ -57,13 +58,16 @@ def render_objects(
     UserError
         Naming the object that does not fit the image.
     """
+    drawn = camera if measure is None else sensor_camera(camera)
     azimuths_deg = np.arange(n_azimuths) * (360.0 / n_azimuths)
     for object_id, mesh in meshes.items():
         try:
-            depth = renderer.render(mesh.vertices, mesh.faces, elevation_deg, azimuths_deg, camera)
+            depth = renderer.render(mesh.vertices, mesh.faces, elevation_deg, azimuths_deg, drawn)
         except UserError as error:
             raise UserError(f"{object_id}: {error}") from error
-        yield encode_depth(measure(depth, object_id), camera)
+        if measure is not None:
+            depth = crop_measured(measure(depth, object_id), camera)
+        yield encode_depth(depth, camera)
 
 
 def write_depth(
@@ -72,7 +76,7 @@ def write_depth(
     elevation_deg: float,
     camera: Camera,
     renderer: Renderer,
-    measure: Measure = ideal,
+    measure: Measure | None = None,
     n_azimuths: int = 360,
 ) -> None:
     """Render all objects into one `.npy` file, (n_objects, n_azimuths, side, side) uint8.
@@ -88,7 +92,7 @@ def write_depth(
     }
     images = render_objects(meshes, elevation_deg, camera, renderer, measure, n_azimuths)
     progress = _Progress(str(path), len(meshes), n_azimuths)
-    # Written, not mapped: a full disk is then an error that can be told, not a fatal signal.
+    # Written, not mapped: a full disk then raises an error instead of a fatal signal.
     with replacing(path) as temporary, temporary.open("wb") as file:
         np.lib.format.write_array_header_1_0(file, header)
         for index, codes in enumerate(images):

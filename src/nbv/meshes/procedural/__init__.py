@@ -1,7 +1,7 @@
-"""The data set that needs no download: five categories of generated objects.
+"""Generated objects of five categories: the data set without a download.
 
-An object is a pure function of (seed, category, index). Its frame is the project's: z up,
-front +x, turning axis x = y = 0, and a mug's handle at azimuth 270 degrees. Scale is free.
+An object is a pure function of (seed, category, index). Its frame is the object frame: z up,
+front +x, turning axis x = y = 0, a mug's handle at azimuth 270 degrees. Its scale is arbitrary.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ def generate(category: str, seed: int, index: int) -> trimesh.Trimesh:
     category : str
         A key of :data:`CATEGORIES`.
     seed : int
-        Of the whole data set, >= 0.
+        Seed of the whole data set, >= 0.
     index : int
-        Of the object, >= 0. Objects do not depend on how many others are generated, or when.
+        Number of the object, >= 0. An object does not depend on other objects or their order.
 
     Returns
     -------
     trimesh.Trimesh
-        A concatenation of watertight parts with outward faces, 1,000 to 20,000 of them in all.
+        A concatenation of watertight parts with outward faces, 1,000 to 20,000 faces in all.
 
     Raises
     ------
@@ -54,6 +54,6 @@ def generate(category: str, seed: int, index: int) -> trimesh.Trimesh:
     if seed < 0 or index < 0:
         message = f"procedural {category}: seed {seed} and index {index} must not be negative"
         raise UserError(message)
-    # crc32, not hash(): Python's hash of a string differs from one process to the next.
+    # crc32, not hash(): Python's hash of a string differs between processes.
     rng = np.random.default_rng([seed, zlib.crc32(category.encode()), index])
     return CATEGORIES[category](rng)

@@ -1,4 +1,4 @@
-"""What airplanes are assembled from: wing panels, engine pods, propellers, wheels and stores."""
+"""Parts of airplanes: wing panels, engine pods, propellers, wheels and stores."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from nbv.meshes.procedural.assembly import both_sides, moved, turned
-from nbv.meshes.procedural.solids import box, loft, revolve, superellipse, tube
-
-Solids = list[trimesh.Trimesh]
+from nbv.meshes.procedural.solids import Solids, box, loft, revolve, superellipse, tube
 
 
 def panel(leading: ArrayLike, chords: ArrayLike, thickness: float) -> trimesh.Trimesh:
@@ -20,7 +18,7 @@ def panel(leading: ArrayLike, chords: ArrayLike, thickness: float) -> trimesh.Tr
     Parameters
     ----------
     leading : array_like
-        (m, 3): points of the leading edge, in one line when seen along x.
+        (m, 3): points of the leading edge, in one line as seen along x.
     chords : array_like
         (m,): from the leading edge towards -x.
     thickness : float

@@ -12,7 +12,6 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from nbv.meshes.procedural.airframe import (
-    Solids,
     bubble,
     floats,
     hung_jet,
@@ -25,17 +24,17 @@ from nbv.meshes.procedural.airframe import (
     wing_propeller,
 )
 from nbv.meshes.procedural.assembly import both_sides, centred, join
-from nbv.meshes.procedural.solids import Points, box, stack_outlines, superellipse, tube
+from nbv.meshes.procedural.solids import Points, Solids, box, stack_outlines, superellipse, tube
 
 Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """Ranges a body plan draws its numbers from, and the kinds of tail and engine it may have.
+    """Ranges of a body plan's numbers, and the kinds of its tail and engines.
 
-    `wing_x` is where the wing's leading edge leaves the fuselage, `wing_heights` in fuselage
-    radii; a repeated kind is as much more likely.
+    `wing_x` is the place where the wing's leading edge leaves the fuselage; `wing_heights` are in
+    fuselage radii. A kind listed twice is twice as likely.
     """
 
     weight: float
@@ -149,7 +148,7 @@ def _fuselage(
 def _wings(
     rng: np.random.Generator, plan: _Plan, radius: float, name: str, engines: str
 ) -> tuple[Solids, Points]:
-    """Return the wings and what hangs on them; and where the left one's leading edge ends."""
+    """Return the wings with their loads, and the outer end of the left one's leading edge."""
     half_span, chord = rng.uniform(*plan.span) / 2, rng.uniform(*plan.chord)
     taper, sweep = rng.uniform(*plan.taper), np.tan(np.radians(rng.uniform(*plan.sweep_deg)))
     z = float(rng.choice(plan.wing_heights)) * radius
@@ -238,7 +237,7 @@ def _tail(
 
 
 def _cockpit(rng: np.random.Generator, name: str, radius: float) -> Solids:
-    """Return the canopy of what one or two people fly."""
+    """Return the canopy of an airplane for one or two people."""
     if name in ("airliner", "business jet", "twin propeller", "twin boom"):
         return []
     x, length = 0.5 - rng.uniform(0.22, 0.33), rng.uniform(0.09, 0.16)

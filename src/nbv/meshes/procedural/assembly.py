@@ -1,4 +1,4 @@
-"""Putting solids in their places and together. Nothing here changes a solid it is given."""
+"""Moving and joining solids; no function changes its arguments."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nbv.meshes.procedural.solids import FROM_Z, Axis
 
 
 def mirrored(solid: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the solid reflected in the plane y = 0, its faces still outwards."""
+    """Return the solid reflected in the plane y = 0, with outward faces."""
     vertices = np.asarray(solid.vertices) * (1.0, -1.0, 1.0)
     return trimesh.Trimesh(vertices, np.asarray(solid.faces)[:, ::-1], process=False)
 
@@ -54,6 +54,6 @@ def join(solids: Iterable[trimesh.Trimesh]) -> trimesh.Trimesh:
 
 
 def centred(solid: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the solid with its bounding box centred on the z axis and standing on z = 0."""
+    """Return the solid with its bounding box centred on the z axis, its lower face at z = 0."""
     low, high = np.asarray(solid.bounds)
     return moved(solid, [-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])

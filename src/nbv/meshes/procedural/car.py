@@ -1,4 +1,4 @@
-"""Cars: hatchbacks to vans, roadsters, veterans; with :mod:`.lorry`, every road vehicle.
+"""Cars from hatchbacks to vans, roadsters and veterans; lorries and buses are in :mod:`.lorry`.
 
 Lengths are in metres; the road is z = 0 and the front bumper near x = length / 2.
 """
@@ -13,7 +13,6 @@ import trimesh
 from nbv.meshes.procedural.assembly import both_sides, centred, join, turned
 from nbv.meshes.procedural.coachwork import (
     Range,
-    Solids,
     bed_walls,
     bumper,
     cabin,
@@ -24,14 +23,15 @@ from nbv.meshes.procedural.coachwork import (
     wheels,
 )
 from nbv.meshes.procedural.lorry import bus, lorry
-from nbv.meshes.procedural.solids import box, loft, revolve, superellipse
+from nbv.meshes.procedural.solids import Solids, box, loft, revolve, superellipse
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """Ranges a body plan draws its numbers from; runs along x are in car lengths.
+    """Ranges of a body plan's numbers; lengths along x are in car lengths.
 
-    From the front: bonnet, windscreen seen from the side, roof, rear window likewise, boot.
+    From the front: bonnet, windscreen seen from the side, roof, rear window seen from the side,
+    boot.
     """
 
     weight: float
@@ -88,7 +88,7 @@ def _motor_car(rng: np.random.Generator, name: str, plan: _Plan) -> Solids:
     rear_foot = -front + rng.uniform(*plan.boot) * length
     rear_top = min(rear_foot + rng.uniform(*plan.rear_glass) * length, top - 0.16 * length)
     axles = (front - rng.uniform(0.15, 0.21) * length, -front + rng.uniform(0.15, 0.22) * length)
-    # The ranges overlap: what tells front from back is the whole, not one number.
+    # The ranges overlap: no single number tells front from back.
     nose, back, deck = belt * rng.uniform((0.74, 0.82, 0.93), (0.97, 1.0, 1.03))
     if name == "pick-up":
         back = deck = belt * rng.uniform(0.62, 0.72)
@@ -114,7 +114,7 @@ def _motor_car(rng: np.random.Generator, name: str, plan: _Plan) -> Solids:
 
 
 def _open_top(rng: np.random.Generator, ends: Range, heights: Range, half_width: float) -> Solids:
-    """Return a windscreen, seat backs and now and then a roll bar."""
+    """Return a windscreen, seat backs and sometimes a roll bar."""
     belt, height = heights
     tilt, x = -rng.uniform(15.0, 45.0), ends[1] - 0.05
     glass = box((x, 0.0, (belt + height) / 2 - 0.04),
@@ -155,7 +155,7 @@ def _fittings(
     levels: tuple[float, float, float],
     half_width: float,
 ) -> Solids:
-    """Return bumpers, and now and then a rack, a spoiler or a spare wheel.
+    """Return bumpers, and sometimes a rack, a spoiler or a spare wheel.
 
     `places` along x: rear end, rear end of the roof, foot of the windscreen, front end;
     `levels`: underside, belt line, roof.

@@ -1,6 +1,6 @@
 """Chairs: dining, office and tube chairs, stools, shells and armchairs; bases in :mod:`.joinery`.
 
-Lengths are in metres; the sitter looks towards +x and the floor is z = 0.
+Lengths are in metres; the sitter faces +x and the floor is z = 0.
 """
 
 from __future__ import annotations
@@ -9,15 +9,25 @@ import numpy as np
 import trimesh
 
 from nbv.meshes.procedural.assembly import both_sides, centred, join, turned
-from nbv.meshes.procedural.joinery import Seat, Solids, base
-from nbv.meshes.procedural.solids import Points, box, fillet, loft, slab, superellipse, sweep, tube
+from nbv.meshes.procedural.joinery import Seat, base
+from nbv.meshes.procedural.solids import (
+    Points,
+    Solids,
+    box,
+    fillet,
+    loft,
+    slab,
+    superellipse,
+    sweep,
+    tube,
+)
 
 _KINDS = {"dining": 0.38, "office": 0.12, "armchair": 0.18, "stool": 0.12, "tube": 0.1,
           "shell": 0.1}  # fmt: skip
 
 
 def chair(rng: np.random.Generator) -> trimesh.Trimesh:
-    """Return a chair, its back towards -x; symmetric in y = 0 but for a rare writing tablet."""
+    """Return a chair, its back towards -x; only a rare writing tablet breaks the symmetry in y."""
     kind = str(rng.choice(list(_KINDS), p=list(_KINDS.values())))
     if kind == "armchair":
         return centred(join(_armchair(rng)))
@@ -46,7 +56,7 @@ def _seat(rng: np.random.Generator, seat: Seat, *, disc: bool) -> trimesh.Trimes
 
 
 def _shell(rng: np.random.Generator, seat: Seat) -> trimesh.Trimesh:
-    """Return seat and back bent from one sheet."""
+    """Return seat and back bent from one piece."""
     thick, height = rng.uniform(0.012, 0.04), rng.uniform(0.25, 0.7)
     back = -seat.half_depth - height * np.tan(np.radians(rng.uniform(2.0, 35.0)))
     z = seat.under + thick / 2
@@ -67,7 +77,7 @@ def _arc(half_width: float, bulge: float, x: float, z: float) -> Points:
 
 
 def _rail(path: Points, height: float, thick: float, exponent: float = 6.0) -> trimesh.Trimesh:
-    """Return a board standing on edge along a level path."""
+    """Return an upright board along a level path."""
     return sweep(path, superellipse(height / 2, thick / 2, exponent, n=16), (0.0, 0.0, 1.0))
 
 
@@ -141,7 +151,7 @@ def _filling(
 
 
 def _arms(rng: np.random.Generator, seat: Seat) -> Solids:
-    """Return arm rests on one post each or on a loop of tube, now and then with a tablet."""
+    """Return arm rests on one post each or on a loop of tube, sometimes with a tablet."""
     z, y = seat.top + rng.uniform(0.15, 0.27), seat.half_width + rng.uniform(0.0, 0.05)
     front, back = seat.half_depth * rng.uniform(0.3, 1.1), -seat.half_depth * rng.uniform(0.7, 1.1)
     extents = (front - back, rng.uniform(0.03, 0.08), 0.025)
@@ -194,7 +204,7 @@ def _tub(
     levels: tuple[float, float, float],
     thick: float,
 ) -> trimesh.Trimesh:
-    """Return a wall that goes round the seat and rises from the arms to the back."""
+    """Return a wall around the seat that rises from the arms to the back."""
     foot, arm, back = levels
     sweep_deg = rng.uniform(90.0, 135.0)
     angle = np.radians(np.linspace(180.0 - sweep_deg, 180.0 + sweep_deg, 33))

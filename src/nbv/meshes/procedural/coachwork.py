@@ -1,4 +1,4 @@
-"""What road vehicles are assembled from: hull, cabin, wheels, bed walls and small fittings.
+"""Parts of road vehicles: hull, cabin, wheels, bed walls and small fittings.
 
 Lengths are in metres; the road is z = 0, the front is +x, and x = 0 is the middle.
 """
@@ -10,9 +10,8 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from nbv.meshes.procedural.assembly import both_sides, turned
-from nbv.meshes.procedural.solids import box, revolve, stack_outlines, superellipse
+from nbv.meshes.procedural.solids import Solids, box, revolve, stack_outlines, superellipse
 
-Solids = list[trimesh.Trimesh]
 Range = tuple[float, float]
 
 
@@ -29,15 +28,15 @@ def hull(
     Parameters
     ----------
     rng : numpy.random.Generator
-        Decides how the ends are rounded.
+        For the roundness of the ends.
     line : array_like
         (m, 2) of (x, height) along the upper edge, from the rear end at -x to the front at x.
     half_width, clearance : float
-        Of the body, and of its underside above the road.
+        Half the body's width, and its height above the road.
     axles : tuple of float
-        Where the wheels are along x.
+        Places of the wheels along x.
     wheel : float
-        Their radius.
+        Radius of the wheels.
     """
     edge = np.asarray(line, dtype=np.float64)
     front = edge[-1, 0]
@@ -65,13 +64,13 @@ def cabin(
     Parameters
     ----------
     rng : numpy.random.Generator
-        Decides how it leans in and how round its edges are.
+        For the lean of the walls and the roundness of the edges.
     feet, tops : (float, float)
         Rear and front end along x, at the belt line and at the roof.
     heights : (float, float)
-        Of belt line and roof.
+        Heights of belt line and roof.
     half_width : float
-        Of the body.
+        Half the body's width.
     """
     level = np.array([-0.12, 0.0, 0.5, 0.86, 0.96, 1.0])
     lean = np.clip(level, 0.0, None)

@@ -1,6 +1,6 @@
-"""What chairs stand on: legs, stars, pedestals, bent tube, side panels, rockers.
+"""Bases of chairs: legs, stars, pedestals, bent tubes, side panels, rockers.
 
-Lengths are in metres; the sitter looks towards +x and the floor is z = 0.
+Lengths are in metres; the sitter faces +x and the floor is z = 0.
 """
 
 from __future__ import annotations
@@ -8,12 +8,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 
 from nbv.meshes.procedural.assembly import both_sides, mirrored, turned
-from nbv.meshes.procedural.solids import Points, box, fillet, revolve, superellipse, sweep, tube
-
-Solids = list[trimesh.Trimesh]
+from nbv.meshes.procedural.solids import (
+    Points,
+    Solids,
+    box,
+    fillet,
+    revolve,
+    superellipse,
+    sweep,
+    tube,
+)
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,7 @@ class Seat:
 
 
 def base(rng: np.random.Generator, kind: str, seat: Seat) -> Solids:
-    """Return what carries the seat of a chair of this kind."""
+    """Return the base of a chair of a kind."""
     if kind == "office":
         return _star(rng, seat)
     if kind == "tube":

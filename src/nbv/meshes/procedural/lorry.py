@@ -6,7 +6,6 @@ import numpy as np
 
 from nbv.meshes.procedural.assembly import both_sides
 from nbv.meshes.procedural.coachwork import (
-    Solids,
     bed_walls,
     bumper,
     cabin,
@@ -14,7 +13,7 @@ from nbv.meshes.procedural.coachwork import (
     mirrors,
     wheels,
 )
-from nbv.meshes.procedural.solids import box, revolve
+from nbv.meshes.procedural.solids import Solids, box, revolve
 
 
 def lorry(rng: np.random.Generator) -> Solids:
@@ -53,7 +52,7 @@ def _load(
     floor: float,
     cab: float,
 ) -> Solids:
-    """Return what the lorry carries, from the rear end to `start` behind the cab."""
+    """Return the lorry's load, from the rear end to `start` behind the cab."""
     run, middle, low = start + front, (start - front) / 2, floor + 0.1
     kind = rng.choice(["box", "tank", "bed"], p=[0.6, 0.15, 0.25])
     if kind == "box":
@@ -71,7 +70,7 @@ def _load(
 
 
 def bus(rng: np.random.Generator) -> Solids:
-    """Return a bus or coach: one box, whose ends differ only in their rake and what they bear."""
+    """Return a bus or coach: one box, whose ends differ only in rake and fittings."""
     length, half_width = rng.uniform(6.0, 9.5), rng.uniform(1.05, 1.2)
     height, clearance, wheel = rng.uniform(2.6, 3.3), rng.uniform(0.25, 0.4), rng.uniform(0.42, 0.5)
     front, belt = length / 2, rng.uniform(0.42, 0.52) * height

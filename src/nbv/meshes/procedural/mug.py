@@ -8,14 +8,14 @@ import trimesh
 from nbv.meshes.procedural.assembly import join
 from nbv.meshes.procedural.solids import Points, fillet, revolve, superellipse, sweep
 
-# Fine enough that the facets of the body do not tell a camera where it stands.
+# So many that the facets of the body do not reveal the viewpoint.
 _AROUND = 96
-# How far a handle's centre line stands out: small, usual and large, in heights of the mug.
+# Distance of a handle's centre line from the wall, in heights of the mug: small, usual, large.
 _REACHES = ((0.08, 0.15), (0.16, 0.3), (0.3, 0.52))
 
 
 def mug(rng: np.random.Generator) -> trimesh.Trimesh:
-    """Return a mug of height 1 standing on z = 0, its handle towards -y."""
+    """Return a mug of height 1 on z = 0, its handle towards -y."""
     outer = _body_curve(rng)
     wall = rng.uniform(0.025, 0.06)
     handle = _handle(rng, outer, wall)
@@ -23,7 +23,7 @@ def mug(rng: np.random.Generator) -> trimesh.Trimesh:
 
 
 def _body_curve(rng: np.random.Generator) -> Points:
-    """Return the outer wall as (m, 2) of (radius, height), heights rising from 0 to 1."""
+    """Return the outer wall as (m, 2) of (radius, height), with heights from 0 to 1."""
     height = np.linspace(0.0, 1.0, 25)
     radius = rng.uniform(0.28, 0.6) * np.ones_like(height)
     plan = rng.choice(
@@ -62,7 +62,7 @@ def _cup(outer: Points, wall: float, floor: float) -> trimesh.Trimesh:
 
 def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Trimesh:
     """Return the handle, its ends buried in the wall; a hook has its lower end free."""
-    # From a finger ring to a tankard's: this alone sets how wide a range the body hides.
+    # From a finger ring to a tankard's: only this sets the range of azimuths that the body hides.
     low, high = _REACHES[rng.choice(3, p=[0.15, 0.45, 0.4])]
     reach = rng.uniform(low, high)
     span = float(np.clip(rng.uniform(1.2, 2.6) * reach + rng.uniform(0.0, 0.2), 0.24, 0.76))
@@ -72,7 +72,7 @@ def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Tri
     style = str(rng.choice(["round", "square", "d", "ear"], p=[0.3, 0.25, 0.2, 0.25]))
     side = _handle_curve(rng, style, reach, span)
     ends = radii - 0.5 * wall
-    # Straight between the two ends of the wall, plus how far the handle stands out from it.
+    # Straight between the two ends of the wall, plus the handle's distance from it.
     t = np.linspace(0.0, 1.0, len(side))[:, None]
     along = (side[:, 1:] - side[:1, 1:]) / (side[-1:, 1:] - side[:1, 1:])
     out = ends[0] + (ends[1] - ends[0]) * np.clip(along, 0.0, 1.0) + side[:, :1]

@@ -1,7 +1,7 @@
-"""Closed solids from rings of points: everything the five categories are built of.
+"""Closed solids from rings of points: the building blocks of all five categories.
 
-Every function returns one watertight :class:`trimesh.Trimesh` whose faces point outwards.
-They all end in :func:`loft`, which joins a stack of rings of equally many points.
+Every solid is one watertight :class:`trimesh.Trimesh` whose faces point outwards. Each comes from
+:func:`loft`, which joins a stack of rings of equally many points.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Points = NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
+Solids = list[trimesh.Trimesh]
 
 # Cyclic permutations keep a right-handed frame right-handed.
 FROM_Z: dict[str, list[int]] = {"x": [2, 0, 1], "y": [1, 2, 0], "z": [0, 1, 2]}
@@ -27,8 +28,8 @@ def loft(rings: ArrayLike, *, closed: bool = False) -> trimesh.Trimesh:
     rings : array_like
         (m, k, 3): m rings of k points each, point j of one ring joined to point j of the next.
     closed : bool
-        Join the last ring to the first, as in a torus; otherwise both ends are closed by a fan
-        about the ring's centroid, so end rings must be star-shaped from there.
+        Join the last ring to the first, as in a torus. Otherwise a fan about the ring's centroid
+        closes each end, so end rings must be star-shaped from there.
 
     Returns
     -------
@@ -95,7 +96,7 @@ def stack_outlines(outlines: ArrayLike, heights: ArrayLike, axis: Axis = "z") ->
     heights : array_like
         (m,), strictly monotonic where neighbouring outlines are equal.
     axis : {"x", "y", "z"}
-        What the heights run along.
+        Direction of the heights.
 
     Returns
     -------
@@ -114,7 +115,7 @@ def stack_outlines(outlines: ArrayLike, heights: ArrayLike, axis: Axis = "z") ->
 def slab(
     outline: ArrayLike, low: float, high: float, *, bevel: float = 0.0, axis: Axis = "z"
 ) -> trimesh.Trimesh:
-    """Return a prism over an outline, its edges bevelled if asked.
+    """Return a prism over an outline, with bevelled edges for a positive `bevel`.
 
     Parameters
     ----------
@@ -180,7 +181,7 @@ def revolve(
     axis : {"x", "y", "z"}
         Direction of the axis of revolution.
     centre : array_like
-        (3,): where height 0 on the axis comes to lie.
+        (3,): place of height 0 on the axis.
 
     Returns
     -------
@@ -202,7 +203,7 @@ def fillet(corners: ArrayLike, radius: float, n: int = 5) -> Points:
     corners : array_like
         (m, 3) points, neighbours distinct.
     radius : float
-        How far from a corner its arc begins, at most 0.45 of the shorter adjoining edge.
+        Distance from a corner to the start of its arc, at most 0.45 of the shorter adjoining edge.
     n : int
         Points per arc.
 
@@ -246,7 +247,7 @@ def sweep(
     points, flat = np.asarray(path, dtype=np.float64), np.asarray(outline, dtype=np.float64)
     steps = np.diff(points, axis=0)
     steps /= np.linalg.norm(steps, axis=1, keepdims=True)
-    # A ring stands in the plane that bisects its two edges, so straight runs keep their thickness.
+    # A ring lies in the plane that bisects its two edges, so straight runs keep their thickness.
     tangents = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     upright = np.asarray(normal, dtype=np.float64)
@@ -278,8 +279,8 @@ def tube(path: ArrayLike, radius: float, *, n: int = 12, taper: float = 1.0) -> 
         The solid, its ends closed.
     """
     points = np.asarray(path, dtype=np.float64)
-    # From the edges by hand: of a straight path's many normals, a decomposition would return one
-    # that the rounding of the linear algebra library chose.
+    # From the edges by hand: for a straight path a decomposition would return a normal that depends
+    # on the rounding of the linear algebra library.
     edges = np.diff(points, axis=0)
     bends = np.cross(edges[:1], edges)
     sharpest = bends[np.argmax(np.abs(bends).max(axis=1))]

@@ -1,6 +1,6 @@
 """Toilets: a bowl on a foot, a seat and lid, and a cistern behind, above or in the wall.
 
-Lengths are in metres; the sitter looks towards +x and the floor is z = 0.
+Lengths are in metres; the sitter faces +x and the floor is z = 0.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import trimesh
 from nbv.meshes.procedural.assembly import both_sides, centred, join, turned
 from nbv.meshes.procedural.solids import (
     Points,
+    Solids,
     box,
     fillet,
     loft,
@@ -23,7 +24,6 @@ from nbv.meshes.procedural.solids import (
     tube,
 )
 
-Solids = list[trimesh.Trimesh]
 _POINTS = 56
 _KINDS = {"two-piece": 0.42, "one-piece": 0.2, "high cistern": 0.11, "no cistern": 0.11,
           "wall-hung": 0.11, "chest": 0.05}  # fmt: skip
@@ -31,7 +31,7 @@ _KINDS = {"two-piece": 0.42, "one-piece": 0.2, "high cistern": 0.11, "no cistern
 
 @dataclass(frozen=True)
 class _Bowl:
-    """The rim's outline: its rear and front end, half width and squareness; and its height."""
+    """Rear and front end, half width and squareness of the rim's outline, and the rim's height."""
 
     back: float
     front: float
@@ -40,7 +40,7 @@ class _Bowl:
     rim: float
 
     def outline(self, grow: float = 0.0) -> Points:
-        """Return the rim, (n, 2), grown outwards by so much: blunt behind, oval in front."""
+        """Return the rim, (n, 2), grown outwards by `grow`: blunt behind, oval in front."""
         half = (self.front - self.back) / 2
         shape = superellipse(half + grow, self.half_width + grow, self.square, n=_POINTS)
         behind = superellipse(half + grow, self.half_width + grow, self.square + 2.5, n=_POINTS)
@@ -68,7 +68,7 @@ def toilet(rng: np.random.Generator) -> trimesh.Trimesh:
 
 
 def _pedestal(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
-    """Return the bowl and its foot, and what stands behind it."""
+    """Return the bowl, its foot and the block behind it."""
     skirted = rng.random() < 0.3
     t = np.linspace(0.0, 1.0, 17)
     if skirted:
@@ -79,7 +79,7 @@ def _pedestal(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
         swell = np.clip((t - 0.25) / 0.75, 0.0, 1.0) ** rng.uniform(0.55, 1.0)
     foot = flare * np.clip(1.0 - t / 0.25, 0.0, 1.0) ** 1.5
     scale = (waist + (1.0 - waist) * swell) * (1.0 + foot)
-    # A bowl that narrows downwards stands towards its back, under the sitter.
+    # The foot of a bowl that narrows downwards lies towards the back, under the sitter.
     shift = (bowl.back - bowl.front) * rng.uniform(0.05, 0.16) * (1.0 - swell)
     outside = scale[:, None, None] * bowl.outline(-0.008)
     outside[..., 0] += shift[:, None]
@@ -91,7 +91,7 @@ def _pedestal(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
     inner = bowl.outline(-rng.uniform(0.035, 0.05))
     up = base + (bowl.rim - thick - base) * t
     down = bowl.rim - np.array([0.6 * thick, 0.0, 0.0, 0.5 * depth, depth, depth + 0.005])
-    # The hollow keeps within the outside, which may draw in and back faster than it.
+    # The hollow stays within the outside, which may draw in and back faster.
     room = np.minimum([0.85, 0.45, 0.2], 0.75 * np.interp(down[3:], up, scale))
     hollow = room[:, None, None] * inner
     hollow[..., 0] += np.interp(down[3:], up, shift)[:, None]
@@ -119,7 +119,7 @@ def _seat(rng: np.random.Generator, bowl: _Bowl, *, has_cistern: bool) -> Solids
     lid = slab(outer, z + thick + 0.003, z + 2 * thick, bevel=0.006)
     pivot = (hinge, 0.0, z + thick)
     up = -rng.uniform(92.0, 104.0)
-    # Without a cistern to name it, a toilet shows what it is by its open lid.
+    # Without a cistern, an open lid shows that this is a toilet.
     shares = [0.45, 0.3, 0.1, 0.15] if has_cistern else [0.2, 0.5, 0.2, 0.1]
     state = rng.choice(["down", "lid up", "both up", "none"], p=shares)
     pins = both_sides([tube([(hinge, 0.05, z + thick / 2), (hinge, 0.1, z + thick / 2)], 0.014)])
@@ -165,7 +165,7 @@ def _tank(
 
 
 def _cistern(rng: np.random.Generator, bowl: _Bowl, kind: str) -> Solids:
-    """Return what holds the water, or the wall that hides it."""
+    """Return the cistern, or the wall that hides it."""
     front, rim = bowl.back + rng.uniform(-0.05, 0.02), bowl.rim
     if kind == "two-piece":
         low = rim + rng.uniform(-0.01, 0.03)

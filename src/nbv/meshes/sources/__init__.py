@@ -1,7 +1,7 @@
-"""Where meshes come from: one module a source, chosen by name.
+"""Sources of meshes: one module for each, named in the configuration.
 
-Listing objects reads no mesh and imports no mesh library: the workflow does it each time it is
-parsed.
+Snakemake lists the objects each time it parses the workflow. Listing therefore loads no mesh and
+imports no mesh library.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ SOURCES: Mapping[str, str] = {
 
 
 class MeshSource(Protocol):
-    """What every source offers.
+    """The interface of a source.
 
     Attributes
     ----------
     name : str
         Its name in the configuration.
     seed : int
-        Decides which objects are chosen where there are more than needed.
+        Decides which objects are selected where there are more than needed.
     endless : bool
-        Whether it makes objects as they are asked for: the first N are then as good as any.
+        Whether it makes objects on demand; the first N then serve as well as any others.
     """
 
     name: str
@@ -42,17 +42,17 @@ class MeshSource(Protocol):
     endless: bool
 
     def object_ids(self, category: str) -> list[str]:
-        """Return the ids of all objects, sorted, exclusions removed, without reading any.
+        """Return the sorted ids of all objects without the excluded ones; load no object.
 
         Raises
         ------
         UserError
-            If the data are not where the configuration says, or lack the category.
+            If the configured place lacks the data or the category.
         """
         ...
 
     def whereabouts(self, category: str) -> str:
-        """Return the place that a category's objects come from, for messages."""
+        """Return the place of a category's objects, for messages."""
         ...
 
     def load(self, category: str, object_id: str) -> trimesh.Trimesh:
@@ -61,25 +61,25 @@ class MeshSource(Protocol):
         Raises
         ------
         UserError
-            Naming the file, if it cannot be read or rendered.
+            Naming the file that cannot be loaded or rendered.
         """
         ...
 
 
 def open_source(settings: Mapping[str, Any], seed: int) -> MeshSource:
-    """Return the source that the configuration names.
+    """Return the source named in the configuration.
 
     Parameters
     ----------
     settings : mapping
-        The configuration's group `dataset`, as `nbv.config.DatasetConfig` has it.
+        The configuration's group `dataset`.
     seed : int
         See `MeshSource`.
 
     Raises
     ------
     UserError
-        For an unknown source, or a setting without sense.
+        For an unknown source or an invalid setting.
     """
     name = settings["source"]
     if name not in SOURCES:
@@ -89,17 +89,17 @@ def open_source(settings: Mapping[str, Any], seed: int) -> MeshSource:
 
 
 def select_objects(source: MeshSource, category: str, n_objects: int | None) -> list[str]:
-    """Choose objects of a category.
+    """Select objects of a category.
 
-    The choice depends on the seed and the ids alone. Adding files to a folder displaces no more
-    objects than come to be chosen in their place.
+    The selection depends only on the seed and the ids. A file added to a folder displaces at most
+    one selected object, whose place it takes.
 
     Parameters
     ----------
     source : MeshSource
     category : str
     n_objects : int or None
-        None takes all there are.
+        None selects all.
 
     Returns
     -------

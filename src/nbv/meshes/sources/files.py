@@ -1,4 +1,4 @@
-"""What all sources of mesh files share: the root, exclusions, reading, and honest messages."""
+"""The common part of all sources of mesh files: root, exclusions, loading and messages."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ EXTENSIONS = (".obj", ".ply", ".off", ".stl", ".glb")
 class FileSource(ABC):
     """A source of mesh files below one folder.
 
-    A list of exclusions may serve several categories, so an entry that is not in the one asked for
-    is no error. If others of the list are, though, it is probably misspelt, and a warning says so.
+    A list of exclusions may serve several categories, so an entry without a file in this category
+    is no error. If other entries have files in it, that one is probably misspelt; a warning says
+    so.
     """
 
     name: str
@@ -41,18 +42,18 @@ class FileSource(ABC):
 
     @abstractmethod
     def find(self, category: str) -> dict[str, Path]:
-        """Return the mesh files of a category by object id, found by name alone."""
+        """Return the mesh files of a category by object id; open none of them."""
 
     @abstractmethod
     def whereabouts(self, category: str) -> str:
-        """Return the place that a category's files come from, for messages."""
+        """Return the place of a category's files, for messages."""
 
     def orientation(self, category: str, object_id: str) -> tuple[str, str]:
         """Return the axes of a file that point up and to the front."""
         return self.settings["up"], self.settings["front"]
 
     def object_ids(self, category: str) -> list[str]:
-        """Return the ids of all files, sorted, less the excluded."""
+        """Return the sorted ids of all files without the excluded ones."""
         found = self.files(category)
         unknown = sorted(self._excluded - found.keys())
         if unknown and len(unknown) < len(self._excluded):
@@ -71,7 +72,7 @@ class FileSource(ABC):
         return chosen
 
     def load(self, category: str, object_id: str) -> trimesh.Trimesh:
-        """Read, check and normalise one file."""
+        """Load, check and normalise one file."""
         files = self.files(category)
         if object_id not in files:
             raise UserError(f"dataset={self.name}: {self.whereabouts(category)}: no {object_id}")
@@ -85,26 +86,26 @@ class FileSource(ABC):
             raise UserError(f"dataset={self.name}, {files[object_id]}: {error}") from error
 
     def files(self, category: str) -> dict[str, Path]:
-        """Return what `find` found, looked for once."""
+        """Return what `find` returns; search only once."""
         if category not in self._found:
             self.need_folder(self.root, "the data set (dataset.root)")
             self._found[category] = self.find(category)
         return self._found[category]
 
     def label(self, category: str) -> str:
-        """Return what the data set calls a category."""
+        """Return the data set's own name of a category."""
         label: str = self.settings["categories"].get(category, category)
         return label
 
     def need_folder(self, folder: Path, meaning: str) -> Path:
-        """Return `folder`, or say that there is none."""
+        """Return `folder`; raise UserError where it is not a folder."""
         if not folder.is_dir():
             what = "is not a folder" if folder.exists() else "does not exist"
             raise UserError(f"dataset={self.name}: {folder} {what}; it should hold {meaning}")
         return folder
 
     def by_stem(self, paths: Iterable[Path]) -> dict[str, Path]:
-        """Return files by their stem, which must name one file alone."""
+        """Return files by their stem; raise UserError where two files share one."""
         files: dict[str, Path] = {}
         for path in sorted(paths):
             if path.stem in files:
@@ -117,7 +118,7 @@ class FileSource(ABC):
 
 
 def exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
-    """Return the ids that `exclude` and `exclude_file` list.
+    """Return the ids in `exclude` and `exclude_file`.
 
     Raises
     ------
@@ -137,14 +138,14 @@ def exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
 
 
 def read_mesh(path: Path) -> trimesh.Trimesh:
-    """Read a mesh file as it is: vertices neither merged nor reordered, materials left aside.
+    """Load a mesh file unchanged: vertices are not merged or reordered, materials are left out.
 
-    The parts of a scene are joined, each where its transform puts it.
+    The parts of a scene are joined; each is placed by its transform.
 
     Raises
     ------
     UserError
-        With the path and the reader's reason.
+        With the path and the reason.
     """
     import trimesh
 
@@ -155,7 +156,7 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
         with _only_errors(trimesh.util.log):
             mesh = trimesh.load_mesh(path, process=False, **options)
         _need_whole_text(path)
-    # A reader meets arbitrary bytes, and no list of what it may raise on them is complete.
+    # No list of what a loader may raise on arbitrary bytes is complete.
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise UserError(f"{path}: cannot be read as a mesh ({reason})") from error
@@ -165,9 +166,9 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
 
 
 def _need_whole_text(path: Path) -> None:
-    """Raise ValueError for a text file cut short: trimesh takes what is left of its faces.
+    """Raise ValueError for a text file cut short: trimesh accepts what is left of its faces.
 
-    Binary files are found out by trimesh. OBJ files do not say how much is in them.
+    Trimesh refuses a binary file cut short. An OBJ file does not say how much it holds.
     """
     extension = path.suffix.lower()
     if extension == ".off":

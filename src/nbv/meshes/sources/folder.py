@@ -1,4 +1,4 @@
-"""Any meshes of one's own: `<root>/<category>/*.{obj,ply,off,stl,glb}`."""
+"""A folder of one's own meshes: `<root>/<category>/*.{obj,ply,off,stl,glb}`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from nbv.meshes.sources.files import EXTENSIONS, FileSource
 
 
 class FolderSource(FileSource):
-    """A folder for each category; `dataset.categories` may name it otherwise. Ids are stems."""
+    """A folder for each category; `dataset.categories` may rename it. Ids are stems."""
 
     name = "folder"
 
@@ -18,5 +18,5 @@ class FolderSource(FileSource):
         return self.by_stem(p for p in folder.iterdir() if p.suffix.lower() in EXTENSIONS)
 
     def whereabouts(self, category: str) -> str:
-        """Return the folder and the kinds of file looked for."""
+        """Return the folder and the kinds of file in it."""
         return f"{self.root / self.label(category)} ({' '.join(EXTENSIONS)})"

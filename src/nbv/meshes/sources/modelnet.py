@@ -7,12 +7,12 @@ from pathlib import Path
 from nbv.errors import UserError
 from nbv.meshes.sources.files import FileSource
 
-# The data set's own split is for classification; folds are made from all objects.
+# The data set's own split is for classification; our folds use all objects.
 _PARTS = ("train", "test")
 
 
 class ModelNetSource(FileSource):
-    """Both of a category's parts together. Ids are stems, such as "chair_0001"."""
+    """Both parts of a category together. Ids are stems, such as "chair_0001"."""
 
     name = "modelnet"
 
@@ -28,5 +28,5 @@ class ModelNetSource(FileSource):
         return self.by_stem(path for part in parts for path in part.glob("*.off"))
 
     def whereabouts(self, category: str) -> str:
-        """Return the folders looked in."""
+        """Return the folders of a category's parts."""
         return f"{self.root / self.label(category)}/{{train,test}}/*.off"

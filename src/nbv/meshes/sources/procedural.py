@@ -1,4 +1,4 @@
-"""The data set that needs no download: see `nbv.meshes.procedural`."""
+"""The generated objects as a source: see `nbv.meshes.procedural`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nbv.meshes.sources.files import exclusions
 if TYPE_CHECKING:
     import trimesh
 
-# The keys of nbv.meshes.procedural.CATEGORIES, which cannot be asked without importing trimesh.
+# The keys of nbv.meshes.procedural.CATEGORIES, whose import would import trimesh.
 CATEGORIES = ("airplane", "car", "chair", "mug", "toilet")
 
 # Ids have four digits.
@@ -20,7 +20,7 @@ _N_OBJECTS = 10_000
 
 
 class ProceduralSource:
-    """Objects "mug-0000", "mug-0001", … made from the seed; `dataset.root` plays no part."""
+    """Objects "mug-0000", "mug-0001", … made from the seed; `dataset.root` does not matter."""
 
     name = "procedural"
     endless = True
@@ -30,7 +30,7 @@ class ProceduralSource:
         self._settings = settings
 
     def object_ids(self, category: str) -> list[str]:
-        """Return all ids that there can be, less the excluded."""
+        """Return all possible ids without the excluded ones."""
         if category not in CATEGORIES:
             raise UserError(
                 f"dataset=procedural has no category {category}; {nearest(category, CATEGORIES)}"
@@ -44,7 +44,7 @@ class ProceduralSource:
         return f"the generator of {category} meshes"
 
     def load(self, category: str, object_id: str) -> trimesh.Trimesh:
-        """Make one object; it depends on the seed, the category and its number alone."""
+        """Make one object; it depends only on the seed, the category and its number."""
         from nbv.meshes.procedural import generate
 
         number = object_id.removeprefix(f"{category}-")

@@ -9,10 +9,10 @@ sem     `<root>/metadata.csv`, `<root>/models/<id>.obj`         of each model,  
         (or `<root>/models-OBJ/models/<id>.obj`)                else +z, -y         synsets
 ======  ======================================================  ==================  ==========
 
-``dataset.layout=auto`` tells them apart by these files. ``up: auto`` and ``front: auto`` take the
-axes of the layout. ShapeNetSem's models keep the frame in which they were drawn, and the columns
-`up` and `front` of its metadata say which that is; there, axes set in the configuration replace
-the default alone.
+``dataset.layout=auto`` recognises the layout by these files. ``up: auto`` and ``front: auto`` take
+the axes of the layout. A ShapeNetSem model keeps the frame in which it was drawn; the columns `up`
+and `front` of the metadata name that frame. There, axes in the configuration replace only the
+default.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _SEM_FOLDERS = (Path("models"), Path("models-OBJ", "models"))
 
 
 def open_shapenet(settings: Mapping[str, Any], seed: int) -> FileSource:
-    """Return the source for `settings["layout"]`, as the registry wants it."""
+    """Return the source of the layout in `settings`."""
     layout, layouts = settings["layout"], ("auto", *_AXES)
     if layout not in layouts:
         raise UserError(f"dataset.layout={layout}: no such layout; {nearest(layout, layouts)}")
@@ -47,7 +47,7 @@ class _ShapeNetSource(FileSource):
     name = "shapenet"
 
     def axes(self, layout: str) -> tuple[str, str]:
-        """Return the up and front axes of the configuration, or of the layout."""
+        """Return the up and front axes: the configuration's, or the layout's for `auto`."""
         chosen = (self.settings["up"], self.settings["front"])
         up, front = (
             default if axis == "auto" else axis
@@ -57,7 +57,7 @@ class _ShapeNetSource(FileSource):
 
 
 class ShapeNetCoreSource(_ShapeNetSource):
-    """ShapeNetCore, v1 or v2. Ids are the names of the models' folders."""
+    """ShapeNetCore, v1 or v2. An id is the name of a model's folder."""
 
     def find(self, category: str) -> dict[str, Path]:
         """Return the models of a category's synset."""
@@ -73,7 +73,7 @@ class ShapeNetCoreSource(_ShapeNetSource):
         return str(self._synset(category))
 
     def orientation(self, category: str, object_id: str) -> tuple[str, str]:
-        """Return the axes of the configuration, or of the layout that the file is in."""
+        """Return the up and front axes: the configuration's, or the layout's for `auto`."""
         is_v1 = self.files(category)[object_id].name == _MODEL["v1"].name
         return self.axes("v1" if is_v1 else "v2")
 
@@ -88,14 +88,14 @@ class ShapeNetCoreSource(_ShapeNetSource):
 
 
 class ShapeNetSemSource(_ShapeNetSource):
-    """ShapeNetSem. Ids are those of the metadata's `fullId` without its source's prefix."""
+    """ShapeNetSem. An id is the metadata's `fullId` without the prefix of its source."""
 
     def __init__(self, settings: Mapping[str, Any], seed: int) -> None:
         super().__init__(settings, seed)
         self._rows: dict[str, dict[str, str]] = {}
 
     def find(self, category: str) -> dict[str, Path]:
-        """Return the models that the metadata put into a category."""
+        """Return the models of a category by the metadata."""
         rows = self._metadata()
         wanted = {_plain(category), _plain(self.label(category))}
         members = [model for model, row in rows.items() if wanted & _labels(row)]
@@ -117,7 +117,7 @@ class ShapeNetSemSource(_ShapeNetSource):
         return f"category {category} of {self.root / _METADATA}"
 
     def orientation(self, category: str, object_id: str) -> tuple[str, str]:
-        """Return the axes of the metadata, else of the configuration."""
+        """Return the up and front axes: the metadata's, or else the configuration's."""
         row = self._metadata()[object_id]
         up, front = self.axes("sem")
         return row.get("up") or up, row.get("front") or front
@@ -137,7 +137,7 @@ class ShapeNetSemSource(_ShapeNetSource):
 
 
 def _plain(label: str) -> str:
-    """Return a category or synset so that its spellings are equal: 03797390, n03797390, 3797390."""
+    """Return one spelling of a category or synset: 03797390, n03797390 and 3797390 are the same."""
     label = label.strip().lower()
     digits = label.removeprefix("n")
     return digits.lstrip("0") if digits.isdecimal() else label

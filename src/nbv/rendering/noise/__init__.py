@@ -1,14 +1,14 @@
-"""Depth sensors: what becomes of true depth before it is encoded.
+"""Depth sensors: they turn true depth into measured depth.
 
-A sensor is a class in a file of its own: its fields are its parameters, and an instance is one
-function from the depth images of one object to what the sensor reads. It is chosen by name and
-imported only then, so that an edit of one sensor renders nothing of another again. `IDEAL` is the
-name of having none.
+A sensor is a class in a file of its own. Its fields are its parameters, and an instance maps the
+depth images of one object to what the sensor measures. The configuration names a sensor, and only
+that one is imported: an edit of one sensor renders no image of another again. `IDEAL` is the name
+of no sensor.
 
 A sensor has a size and a resolution, so the object needs a size in metres: `diagonal_m` is the
-bounding box's diagonal, the unit of all depths. The camera stands at ``distance`` diagonals and
-thus scales with the object, and its image is a crop of the sensor's, resized to the nearest
-reading: an angle covers ``camera.focal_px / focal_px of the sensor`` times as many pixels.
+diagonal of its bounding box, the unit of all depths. The camera's distance, in diagonals, scales
+with the object. Its image is a part of the sensor's image, resized to the nearest value: an angle
+covers ``camera.focal_px / focal_px of the sensor`` times as many pixels.
 """
 
 from __future__ import annotations
@@ -32,29 +32,29 @@ SENSORS: Mapping[str, str] = {
 }
 
 Measure = Callable[[Depths, str], Depths]
-"""From the depth images of one object and its id to what is read of them."""
+"""From the depth images of one object and its id to the measured images."""
 
 
 class Sensor(Protocol):
-    """What every noisy sensor offers."""
+    """The interface of a noisy sensor."""
 
     @property
     def nearest_m(self) -> float:
-        """The shortest distance that it can read, in metres."""
+        """The shortest distance that it can measure, in metres."""
         ...
 
     def __call__(
         self, depth: Depths, camera: Camera, diagonal_m: float, rng: np.random.Generator
     ) -> Depths:
-        """Return what the sensor reads of one object.
+        """Return what the sensor measures of one object.
 
         Parameters
         ----------
         depth : (k, side, side) float32
             Distance along the optical axis, in object diagonals; 0 where there is nothing.
         camera : Camera
-            Where the sensor stands, and which part of its field of view the images are. A
-            silhouette in the middle of the image is taken for the sensor being aimed at it.
+            Its ``focal_px`` tells how many of the sensor's pixels one pixel covers. The sensor's
+            optical axis is taken to pass through the middle of the image.
         diagonal_m : float
             Metres per object diagonal.
         rng : numpy.random.Generator
@@ -63,18 +63,13 @@ class Sensor(Protocol):
         Returns
         -------
         (k, side, side) float32
-            Object diagonals; 0 where nothing is read. An image may be left without any reading.
+            Object diagonals; 0 where nothing is measured, which may be a whole image.
         """
         ...
 
 
-def ideal(depth: Depths, object_id: str) -> Depths:
-    """Return the depth as it is."""
-    return depth
-
-
 def sensor_settings(sensor: Mapping[str, Any], category: str, seed: int) -> dict[str, Any]:
-    """Return what of the configuration's ``sensor`` the images of one category depend on.
+    """Return the settings of ``sensor`` that the images of one category depend on.
 
     Parameters
     ----------
@@ -87,12 +82,12 @@ def sensor_settings(sensor: Mapping[str, Any], category: str, seed: int) -> dict
     Returns
     -------
     dict
-        As `open_sensor` takes it. Without a sensor neither sizes nor seed matter.
+        The argument of `open_sensor`. Without a sensor neither sizes nor seed matter.
 
     Raises
     ------
     UserError
-        Where a noisy sensor is not told the category's size.
+        Where the category's size is missing and the sensor needs it.
     """
     if sensor["name"] == IDEAL:
         return {"name": IDEAL}
@@ -117,8 +112,8 @@ def check_sensor(sensor: Mapping[str, Any], categories: Iterable[str]) -> None:
             _build(settings["name"], settings["parameters"])
 
 
-def open_sensor(settings: Mapping[str, Any], camera: Camera, *place: str | int) -> Measure:
-    """Return a sensor, ready for the objects of one category at one elevation.
+def open_sensor(settings: Mapping[str, Any], camera: Camera, *place: str | int) -> Measure | None:
+    """Return a sensor for the objects of one category at one elevation, or None for `IDEAL`.
 
     Parameters
     ----------
@@ -126,23 +121,23 @@ def open_sensor(settings: Mapping[str, Any], camera: Camera, *place: str | int) 
         From `sensor_settings`.
     camera : Camera
     *place : str or int
-        Category and elevation. With the seed and an object's id they decide the object's noise,
-        which so depends on no other object and on no order.
+        Category and elevation. Together with the seed and an object's id they determine the
+        object's noise, which depends neither on other objects nor on their order.
 
     Raises
     ------
     UserError
-        For an unknown sensor or parameter, and where the object stands too near to be read.
+        For an unknown sensor or parameter, and where the object is too near to be measured.
     """
     name = settings["name"]
     if name == IDEAL:
-        return ideal
+        return None
     sensor, diagonal_m = _build(name, settings["parameters"]), settings["diagonal_m"]
-    stands_m = camera.distance * diagonal_m
-    if stands_m < sensor.nearest_m:
+    distance_m = camera.distance * diagonal_m
+    if distance_m < sensor.nearest_m:
         raise UserError(
-            f"sensor.diagonal_m={diagonal_m:g} puts the camera {stands_m:.2f} m from the object, "
-            f"and {name} reads nothing nearer than {sensor.nearest_m:.2f} m: raise it, or "
+            f"sensor.diagonal_m={diagonal_m:g} puts the camera {distance_m:.2f} m from the object, "
+            f"and {name} measures nothing nearer than {sensor.nearest_m:.2f} m: raise it, or "
             f"camera.distance={camera.distance:g}"
         )
 

@@ -1,4 +1,4 @@
-"""The first Kinect: structured light, as it was measured.
+"""The first Kinect: structured light, with the noise that others measured.
 
 - C. V. Nguyen, S. Izadi, D. Lovell: Modeling Kinect Sensor Noise for Improved 3D Reconstruction
   and Tracking. 3DIMPVT 2012. Axial and lateral noise over distance and incidence.
@@ -38,7 +38,7 @@ def axial_m(z: Metres, incidence: Metres) -> Metres:
     """Return the standard deviation of depth, in metres (Nguyen et al.).
 
     ``0.0012 + 0.0019 (z - 0.4)²``, and from 60° of incidence on ``0.0001 θ² / (√z (π/2 - θ)²)``
-    more; beyond `STEEPEST_DEG`, where hardly anything is read, as there.
+    more. Above `STEEPEST_DEG`, where the sensor hardly measures anything, it is constant.
     """
     axial: Metres = np.float32(0.0012) + np.float32(0.0019) * np.square(z - np.float32(0.4))
     root: Metres = np.sqrt(z)
@@ -57,27 +57,27 @@ def _slant(incidence: Metres) -> Metres:
 
 
 def step_m(z: Metres) -> Metres:
-    """Return the distance between neighbouring depths that can be read, in metres."""
+    """Return the distance between neighbouring depths that can be measured, in metres."""
     return np.float32(STEP_PER_M) * z**2
 
 
 def quantised(z: Metres) -> Metres:
-    """Return the nearest depth that can be read, in metres; 0 out of range."""
+    """Return the nearest depth that can be measured, in metres; 0 out of range."""
     level = np.rint((np.float32(NEAREST_PER_M) - 1 / z) / np.float32(STEP_PER_M))
     inverse = np.float32(NEAREST_PER_M) - np.float32(STEP_PER_M) * level
-    readable = (level >= 0) & (inverse > 0)
-    depth: Metres = np.divide(1, inverse, out=np.zeros_like(z), where=readable)
+    in_range = (level >= 0) & (inverse > 0)
+    depth: Metres = np.divide(1, inverse, out=np.zeros_like(z), where=in_range)
     return depth
 
 
 @dataclass(frozen=True)
 class Kinect:
-    """The sensor.
+    """A Kinect of the first kind.
 
     Attributes
     ----------
     focal_px : float
-        Focal length, in the pixels that lateral noise and window are given in.
+        Focal length in the sensor's pixels, the unit of lateral noise and window.
     baseline_m : float
         From the camera to the projector, which casts shadows.
     window_px : float
@@ -90,13 +90,13 @@ class Kinect:
 
     @property
     def nearest_m(self) -> float:
-        """The shortest distance that it can read, in metres."""
+        """The shortest distance that it can measure, in metres."""
         return 1 / NEAREST_PER_M
 
     def __call__(
         self, depth: Depths, camera: Camera, diagonal_m: float, rng: np.random.Generator
     ) -> Depths:
-        """Return what is read: see `nbv.rendering.noise.Sensor`."""
+        """Return measured depth: see `nbv.rendering.noise.Sensor`."""
         z = depth * np.float32(diagonal_m)
         focal = camera.focal_px
         per_pixel = focal / self.focal_px
@@ -104,13 +104,13 @@ class Kinect:
         incidence = incidence_rad(z, focal)
         seen = z > 0
         there = z[seen]
-        # The noise was measured on readings, steps included.
+        # The published noise is that of quantised depth and includes the steps.
         variance = np.square(axial_m(there, incidence[seen])) - np.square(step_m(there)) / 12
         sigma: Metres = np.sqrt(variance)
         noise = window_noise(z.shape, window, rng)[seen]
-        readings = np.zeros_like(z)
-        readings[seen] = quantised(there + sigma * noise)
-        readings[is_lost(z, incidence, window, focal, rng)] = 0
-        readings[is_hidden(z, focal, self.baseline_m)] = 0
+        measured = np.zeros_like(z)
+        measured[seen] = quantised(there + sigma * noise)
+        measured[is_lost(z, incidence, window, focal, rng)] = 0
+        measured[is_hidden(z, focal, self.baseline_m)] = 0
         lateral = lateral_px(incidence) * np.float32(per_pixel)
-        return displaced(readings, z, lateral, focal, rng) / np.float32(diagonal_m)
+        return displaced(measured, z, lateral, focal, rng) / np.float32(diagonal_m)

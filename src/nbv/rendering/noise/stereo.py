@@ -1,4 +1,4 @@
-"""An active stereo camera such as the RealSense D435.
+"""Active stereo: a camera such as the RealSense D435.
 
 - L. Keselman, J. I. Woodfill, A. Grunnet-Jepsen, A. Bhowmik: Intel RealSense Stereoscopic Depth
   Cameras. CVPR Workshops 2017. An error that is constant in disparity; the R200's windows.
@@ -20,17 +20,17 @@ from nbv.rendering.noise.triangulation import incidence_rad, is_hidden, is_lost,
 
 STEPS_PER_PX = 32
 LARGEST_PX = 126
-"""Disparities beyond this are not searched for."""
+"""The largest disparity that the camera searches."""
 
 
 @dataclass(frozen=True)
 class Stereo:
-    """The sensor.
+    """An active stereo camera.
 
     Attributes
     ----------
     focal_px : float
-        Focal length, in the pixels that noise and window are given in.
+        Focal length in the sensor's pixels, the unit of noise and window.
     baseline_m : float
         From the left camera, whose image it is, to the right one.
     disparity_noise_px : float
@@ -47,13 +47,13 @@ class Stereo:
 
     @property
     def nearest_m(self) -> float:
-        """The shortest distance that it can read, in metres."""
+        """The shortest distance that it can measure, in metres."""
         return self.focal_px * self.baseline_m / LARGEST_PX
 
     def __call__(
         self, depth: Depths, camera: Camera, diagonal_m: float, rng: np.random.Generator
     ) -> Depths:
-        """Return what is read: see `nbv.rendering.noise.Sensor`."""
+        """Return measured depth: see `nbv.rendering.noise.Sensor`."""
         z = depth * np.float32(diagonal_m)
         focal = camera.focal_px
         window = self.window_px * focal / self.focal_px
@@ -62,9 +62,9 @@ class Stereo:
         noise = window_noise(z.shape, window, rng)[seen]
         disparity = product / z[seen] + np.float32(self.disparity_noise_px) * noise
         disparity = np.rint(disparity * STEPS_PER_PX) / np.float32(STEPS_PER_PX)
-        readable = (disparity > 0) & (disparity <= LARGEST_PX)
-        readings: Depths = np.zeros_like(z)
-        readings[seen] = np.divide(product, disparity, out=np.zeros_like(disparity), where=readable)
-        readings[is_lost(z, incidence_rad(z, focal), window, focal, rng)] = 0
-        readings[is_hidden(z, focal, self.baseline_m)] = 0
-        return readings / np.float32(diagonal_m)
+        in_range = (disparity > 0) & (disparity <= LARGEST_PX)
+        measured: Depths = np.zeros_like(z)
+        measured[seen] = np.divide(product, disparity, out=np.zeros_like(disparity), where=in_range)
+        measured[is_lost(z, incidence_rad(z, focal), window, focal, rng)] = 0
+        measured[is_hidden(z, focal, self.baseline_m)] = 0
+        return measured / np.float32(diagonal_m)

@@ -1,9 +1,9 @@
-"""What a reading of a triangulating depth camera depends on, whatever its light.
+"""Noise, losses and shadows of depth cameras that triangulate: Kinect and stereo alike.
 
-Such a camera finds, for a small window of its image, the same window in the view of a second eye:
-another camera, or the projector's pattern. Hence what Kinect and stereo share: noise that
-neighbours share because their windows overlap, readings lost where the window holds something
-else besides the surface, and a shadow where the second eye does not see the surface.
+Such a camera takes a small window of its image and finds the same window in the image of a second
+eye: another camera, or the projector's pattern. Three effects follow. Neighbours share noise
+because their windows overlap. Values are lost where the window shows more than one surface. The
+surface has a shadow where the second eye does not see it.
 
 Throughout, z are depth images (k, rows, columns) float32 in metres, 0 where there is nothing, and
 ``focal_px`` is the focal length in pixels of these images.
@@ -25,14 +25,14 @@ STEEPEST_DEG = 80.0
 """Neighbours further apart in depth than on a surface at this incidence lie on two surfaces."""
 
 FAINTEST_DEG = 60.0
-"""Up to this incidence no reading is lost to it; see `is_lost`."""
+"""Up to this incidence no value is lost to incidence; see `is_lost`."""
 
 
 def incidence_rad(z: Metres, focal_px: float) -> Metres:
     """Return the angle between the surface's normal and the ray, in [0, π/2]; 0 for background.
 
-    Slopes are the gentler of the two differences to a neighbour, so that an edge does not make
-    the surface beside it look steep.
+    A slope is the gentler of the differences to the two neighbours, so that an edge does not make
+    the surface next to it steep.
     """
     down, across = _slope(z, -2), _slope(z, -1)
     row, column = (
@@ -63,7 +63,7 @@ def same_surface(z: Metres, there: Metres, apart_px: float | Metres, focal_px: f
 
 
 def window_weights(width_px: float) -> NDArray[np.float64]:
-    """Return how much of each pixel a window of that width covers, from end to end."""
+    """Return the share of each pixel that a window of a width covers, from end to end."""
     reach = max(math.ceil(width_px / 2 - 0.5), 0)
     return np.clip(width_px / 2 + 0.5 - np.abs(np.arange(-reach, reach + 1)), 0, 1)
 
@@ -87,7 +87,7 @@ def window_share(z: Metres, width_px: float, focal_px: float) -> Metres:
 def window_noise(
     shape: tuple[int, ...], width_px: float, rng: np.random.Generator
 ) -> NDArray[np.float32]:
-    """Return standard normal noise that neighbours share as far as their windows overlap."""
+    """Return standard normal noise; neighbours share it as far as their windows overlap."""
     weights = window_weights(width_px)
     weights /= np.sqrt((weights**2).sum())
     noise = rng.standard_normal(shape, dtype=np.float32)
@@ -100,13 +100,12 @@ def window_noise(
 def is_lost(
     z: Metres, incidence: Metres, width_px: float, focal_px: float, rng: np.random.Generator
 ) -> Mask:
-    """Draw which readings fail because their window holds too little of the surface.
+    """Draw the pixels without a value because their window shows too little of the surface.
 
-    A reading succeeds with a probability that is the product of two shares: that of the window
-    which shows the surface (less at silhouettes, least on thin parts), and the surface's apparent
-    breadth, the cosine of its incidence, as a share of that at `FAINTEST_DEG` (at most 1). Losses
-    come in patches as large as a window. That readings fail for these reasons is known; that the
-    probability is this product is an assumption of ours.
+    A pixel keeps its value with a probability that is the product of two shares. One is the share
+    of the window that shows the surface: less at silhouettes, least on thin parts. The other is
+    the cosine of the incidence divided by that at `FAINTEST_DEG`, at most 1. Losses come in
+    patches as large as a window. These causes of loss are known; the product is our assumption.
     """
     breadth = np.cos(incidence) / np.float32(math.cos(math.radians(FAINTEST_DEG)))
     kept = window_share(z, width_px, focal_px) * np.minimum(breadth, 1)
@@ -116,8 +115,8 @@ def is_lost(
 def is_hidden(z: Metres, focal_px: float, baseline_m: float) -> Mask:
     """Say which pixels a second eye, `baseline_m` to the right, does not see.
 
-    A pixel is hidden where another one of its row, more than one pixel of disparity nearer, falls
-    on the same pixel of the second eye's image. Shadows so lie to the left of what casts them.
+    A pixel is hidden where another one of its row, nearer by more than one pixel of disparity,
+    falls on the same pixel of the second eye's image. A shadow lies to the left of what casts it.
     """
     seen = np.flatnonzero(z > 0)
     hidden = np.zeros(z.size, dtype=bool)
@@ -134,20 +133,20 @@ def is_hidden(z: Metres, focal_px: float, baseline_m: float) -> Mask:
 
 
 def displaced(
-    readings: Metres, z: Metres, sigma_px: Metres, focal_px: float, rng: np.random.Generator
+    measured: Metres, z: Metres, sigma_px: Metres, focal_px: float, rng: np.random.Generator
 ) -> Metres:
-    """Return readings at positions off by a normal error, which shows at edges alone.
+    """Return measured depth with a normal error of position, which shows only at edges.
 
-    Within a surface a displacement is part of the axial noise as it was measured. Where a pixel
-    lies between an edge and the next pixel is not known, so displacements are rounded at random,
-    in proportion: an edge is crossed as often as one that lies anywhere in between.
+    Within a surface the published axial noise includes such errors. The place of an edge between
+    two pixel centres is unknown, so displacements are rounded at random, in proportion: on average
+    an edge then moves as far as one that lies anywhere in between.
 
     Parameters
     ----------
-    readings : (k, rows, columns) float32
-        What is read in each pixel, 0 for nothing.
+    measured : (k, rows, columns) float32
+        Measured depth of each pixel, 0 for nothing.
     z : (k, rows, columns) float32
-        What is there.
+        True depth.
     sigma_px : (k, rows, columns) float32
         Standard deviation of the displacement along rows and along columns.
     focal_px, rng
@@ -167,6 +166,6 @@ def displaced(
     )
     apart = np.hypot(source[1] - row, source[2] - column).astype(np.float32)
     crosses = ~same_surface(z[moved], z[source], apart, focal_px)
-    out = readings.copy()
-    out[image[crosses], row[crosses], column[crosses]] = readings[source][crosses]
+    out = measured.copy()
+    out[image[crosses], row[crosses], column[crosses]] = measured[source][crosses]
     return out

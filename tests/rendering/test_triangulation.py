@@ -1,0 +1,94 @@
+"""Incidence, shared noise, shadows and moved edges, compared with geometry and statistics."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from sensor_images import CAMERA, plane, plate
+
+from nbv.rendering.camera import Camera
+from nbv.rendering.noise.triangulation import displaced, incidence_rad, is_hidden, window_noise
+
+
+def test_noise_is_shared_by_neighbours_and_by_nobody_else():
+    noise = window_noise((200, 64, 64), 2.2, np.random.default_rng(0))
+    assert noise.std() == pytest.approx(1, abs=0.01)
+
+    def correlation(pixels, axis):
+        return float((noise * np.roll(noise, pixels, axis)).mean())
+
+    weights = np.array([0.6, 1.0, 0.6])
+    expected = np.correlate(weights, weights, "full")[2:] / (weights**2).sum()
+    for axis in (1, 2):
+        found = [correlation(pixels, axis) for pixels in (1, 2, 3)]
+        assert found == pytest.approx([*expected[1:], 0.0], abs=0.01)
+    assert correlation(1, 0) == pytest.approx(0, abs=0.01)
+
+
+@pytest.mark.parametrize("tilt_deg", [0, 20, 45, 60, 75])
+def test_incidence_on_a_tilted_plane(tilt_deg):
+    z = plane(1.0, tilt_deg)
+    tangent = (np.arange(64) + 0.5 - 32) / CAMERA.focal_px
+    tilt = math.radians(tilt_deg)
+    normal = np.array([-math.sin(tilt), 0, math.cos(tilt)])
+    x, y = np.meshgrid(tangent, tangent)
+    rays = np.stack([x, y, np.ones_like(x)], axis=-1)
+    cosine = rays @ normal / np.linalg.norm(rays, axis=-1)
+    found = np.degrees(incidence_rad(z, CAMERA.focal_px)[0])
+    assert np.abs(found - np.degrees(np.arccos(np.clip(cosine, -1, 1)))).max() < 0.6
+
+
+def test_an_edge_is_not_steep():
+    z = plate(1.0, k=1)
+    z[0, 20:40, 20:40] = 0.8
+    found = np.degrees(incidence_rad(z, CAMERA.focal_px)[z > 0])
+    assert found.max() < 13  # the ray's own angle at the edge of the plate
+
+
+def test_a_straight_edge_moves_as_far_as_measured():
+    """What is crossed at random is, on average, the edge's mean displacement."""
+    sigma = 0.4
+    z = plate(1.0, k=200)
+    moved = displaced(z, z, np.full_like(z, sigma), CAMERA.focal_px, np.random.default_rng(0))
+    rows = slice(16, 48)
+    outside, inside = moved[:, rows, 11], moved[:, rows, 12]
+    # An edge halfway, give or take half a pixel, is crossed with E[max(shift, 0)] from each side.
+    expected = sigma / math.sqrt(2 * math.pi)
+    assert (outside > 0).mean() == pytest.approx(expected, abs=0.01)
+    assert (inside == 0).mean() == pytest.approx(expected, abs=0.01)
+    assert np.array_equal(moved[:, 20:44, 20:44], z[:, 20:44, 20:44])
+
+
+def test_a_step_casts_its_shadow_to_the_left():
+    """As wide as the difference of disparities, whatever the distance."""
+    far, near, baseline = 1.0, 0.8, 0.2
+    z = plane(far).copy()
+    z[:, :, 30:40] = near
+    hidden = is_hidden(z, CAMERA.focal_px, baseline)
+    width = CAMERA.focal_px * baseline * (1 / near - 1 / far)
+    columns = np.flatnonzero(hidden[0, 32])
+    assert columns.max() == 29 or columns.max() == 28
+    assert len(columns) == pytest.approx(min(width, 10), abs=1)
+    assert (hidden == hidden[:, :1]).all()
+    assert not is_hidden(plane(far), CAMERA.focal_px, baseline).any()
+
+
+def test_a_surface_that_turns_away_from_the_second_eye_is_hidden():
+    """Nothing of a cylinder's side is seen by the second eye behind the tangent from there."""
+    side, radius, away, baseline = 256, 0.2, 1.0, 0.3
+    focal = Camera(image_side=side).focal_px
+    tangent = (np.arange(side) + 0.5 - side / 2) / focal
+    # Where the ray (x, 1) first meets the circle around (0, away).
+    root = away**2 - (1 + tangent**2) * (away**2 - radius**2)
+    depth = np.where(root > 0, (away - np.sqrt(np.maximum(root, 0))) / (1 + tangent**2), 0)
+    z = np.broadcast_to(depth.astype(np.float32), (1, 4, side))
+    hidden = is_hidden(z, focal, baseline)[0, 0]
+    eye = np.array([baseline, 0.0])
+    points = np.stack([tangent * depth, depth], axis=1)
+    normals = (points - [0, away]) / radius
+    faces_away = ((eye - points) * normals).sum(axis=1) < 0
+    seen = depth > 0
+    assert (hidden != faces_away)[seen].mean() < 0.05
+    assert faces_away[seen].mean() > 0.02
