@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -146,3 +148,21 @@ def unit_folder(category: str, elevation: int | str) -> str:
 def fold_folder(category: str, elevation: int | str, fold: int | str) -> str:
     """Return ``<category>/el<EE>/fold<k>``."""
     return f"{unit_folder(category, elevation)}/fold{fold}"
+
+
+def files_by_run(
+    keys: Sequence[tuple[Any, ...]], paths: Iterable[str]
+) -> dict[str, dict[tuple[Any, ...], str]]:
+    """Return the files of each run by the rest of their key.
+
+    Parameters
+    ----------
+    keys : sequence of tuple
+        A run's name, and what the file is about: category, elevation, fold, ….
+    paths : iterable of str
+        One for each key.
+    """
+    files: dict[str, dict[tuple[Any, ...], str]] = {}
+    for (run, *rest), path in zip(keys, paths, strict=True):
+        files.setdefault(run, {})[tuple(rest)] = path
+    return files

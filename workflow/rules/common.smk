@@ -136,6 +136,13 @@ def run_settings(run):
         stop(error)
 
 
+def run_file(run, path, key):
+    """A file of a run, named at that configuration key; only this run's are made here."""
+    if run != CONFIG["name"] and not Path(path).exists():
+        stop(f"{key}: {path} does not exist; finish the run {run} first")
+    return path
+
+
 def folds_of(units):
     """Category, elevation and fold of every fold of some units."""
     return [(*unit, fold) for unit in units for fold in FOLDS]

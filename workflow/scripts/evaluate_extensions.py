@@ -1,34 +1,38 @@
-"""Let methods beyond the paper contend on one fold."""
-
-from pathlib import Path
+"""Evaluate the methods beyond the paper on the test objects of one fold."""
 
 from nbv.jobs import job
 
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
+    from nbv.calibration.posteriors import read_posteriors
     from nbv.calibration.splits import assert_role, read_splits
-    from nbv.experiments.travel import travel_rows
-    from nbv.experiments.two_views import evaluate_entry
+    from nbv.experiments.extensions import evaluate_extensions
     from nbv.files import read_csv, write_csv
     from nbv.recommendation.lookup import save_lookup
-    from nbv.recommendation.method_selection import choices_frame, enter
     from nbv.seeds import rng_for
     from nbv.statistics.object_means import object_means
 
+    given, output = snakemake.input, snakemake.output
     params, wildcards = snakemake.params, snakemake.wildcards
-    splits = read_splits(snakemake.input.splits)
-    estimates = {role: read_estimates(snakemake.input[role]) for role in ("calibration", "test")}
+    splits, posteriors = read_splits(given.splits), {}
+    estimates = {role: read_estimates(given[role]) for role in ("calibration", "test")}
     for role, found in estimates.items():
         assert_role(splits, int(wildcards.fold), role, found.object_ids)
-    entries = enter(estimates["calibration"], params.contenders, params.density)
-    frames = {Path(path).stem: read_csv(path) for path in snakemake.input.paper}
-    for path in snakemake.output.evaluations:
-        name = Path(path).stem
-        rng = rng_for(params.seed, name, *wildcards)
-        frames[name] = evaluate_entry(entries[name], estimates["test"], rng)
-        write_csv(path, frames[name])
-    for path in snakemake.output.lookups:
-        save_lookup(path, entries[Path(path).stem].lookup)
-    write_csv(snakemake.output.choices, choices_frame(entries))
-    write_csv(snakemake.output.objects, object_means(frames))
-    write_csv(snakemake.output.travel, travel_rows(entries, estimates["test"]), decimals=6)
+        if path := given.get(f"{role}_posteriors"):
+            posteriors[f"{role}_posteriors"] = read_posteriors(path, found.object_ids)
+    made = evaluate_extensions(
+        estimates["calibration"],
+        estimates["test"],
+        params.extensions,
+        params.density,
+        lambda name: rng_for(params.seed, name, *wildcards),
+        **posteriors,
+    )
+    for name, path in zip(params.extensions, output.evaluations, strict=True):
+        write_csv(path, made.frames[name])
+    for name, path in zip(params.lookups, output.lookups, strict=True):
+        save_lookup(path, made.lookups[name])
+    write_csv(output.choices, made.choices)
+    methods = dict(zip(params.methods, map(read_csv, given.methods), strict=True))
+    write_csv(output.objects, object_means(methods | made.frames))
+    write_csv(output.travel, made.travel, decimals=6)

@@ -24,4 +24,4 @@ with job(snakemake):
         lookups=files("lookups", params.folds),
     )
     figure = build_figure(snakemake.wildcards.figure, inputs)
-    save_figure(figure, snakemake.output.png, snakemake.output.pdf)
+    save_figure(figure, dict(snakemake.output.items()))

@@ -1,6 +1,4 @@
-"""Set the ablation's settings side by side."""
-
-from pathlib import Path
+"""Tabulate what each choice in the paper's method brings."""
 
 from nbv.jobs import job
 
@@ -9,12 +7,12 @@ with job(snakemake):
 
     from nbv.experiments.ablation import ablation_space
     from nbv.files import read_csv
-    from nbv.reporting.extensions.ablation import ablation_sheet
-    from nbv.reporting.sheets import save_sheet
+    from nbv.reporting.extensions.ablation import ablation_table
+    from nbv.reporting.table import write_table
     from nbv.statistics.paired import Resampler
 
     params = snakemake.params
-    found = {row: read_csv(path) for row, path in enumerate(snakemake.input.found)}
+    rows = {row: read_csv(path) for row, path in enumerate(snakemake.input.rows)}
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
-    sheet = ablation_sheet(ablation_space(), found, params.category, resampler)
-    save_sheet(sheet, Path(snakemake.output[0]).with_suffix(""))
+    table = ablation_table(ablation_space(), rows, params.category, resampler)
+    write_table(table, dict(snakemake.output.items()))

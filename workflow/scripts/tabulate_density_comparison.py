@@ -1,22 +1,28 @@
-"""Say how well each density of this run, and of those beside it, knows the azimuth."""
-
-from pathlib import Path
+"""Compare how well the densities of several runs know the azimuth."""
 
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.files import write_csv, write_text
-    from nbv.reporting.extensions.densities import (
-        likelihood_cells,
-        likelihoods_markdown,
-        temperature_notes,
-    )
-    from nbv.reporting.settings import ReadingSettings
+    from nbv.experiments.results import load_evaluations
+    from nbv.layout import files_by_run
+    from nbv.reporting.extensions.densities import DensityRun, density_comparison
+    from nbv.reporting.settings import ReportSettings
+    from nbv.reporting.table import write_table
 
-    params, results = snakemake.params, Path(snakemake.output.csv).parents[2]
-    runs = {name: (results / name, classes) for name, classes in params.runs.items()}
-    settings = ReadingSettings(**params.reading)
-    cells = likelihood_cells(runs, params.units, params.n_folds, settings)
-    write_csv(snakemake.output.csv, cells)
-    notes = temperature_notes(runs, params.units, params.n_folds)
-    write_text(snakemake.output.md, likelihoods_markdown(cells, notes))
+    given, params = snakemake.input, snakemake.params
+    files = {
+        name: files_by_run(params[name], given.get(name, []))
+        for name in ("evaluations", "estimates", "lookups", "posteriors")
+    }
+    runs = {
+        run: DensityRun(
+            load_evaluations(evaluations),
+            *(
+                {fold[:3]: path for fold, path in files[name].get(run, {}).items()}
+                for name in ("estimates", "lookups", "posteriors")
+            ),
+        )
+        for run, evaluations in files["evaluations"].items()
+    }
+    table = density_comparison(runs, ReportSettings(**params.settings))
+    write_table(table, dict(snakemake.output.items()))

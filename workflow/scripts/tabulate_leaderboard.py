@@ -1,26 +1,20 @@
-"""Rank all methods on one run or on several, and say what going beyond the paper gains."""
-
-from pathlib import Path
+"""Rank all methods on one run or on several."""
 
 from nbv.jobs import job
 
 with job(snakemake):
     import numpy as np
 
-    from nbv.reporting.extensions.leaderboard import beyond, blocks_of, favoured, leaderboard
-    from nbv.reporting.sheets import save_sheet
-    from nbv.statistics.object_means import load_choices, load_object_means
+    from nbv.layout import files_by_run
+    from nbv.reporting.extensions.blocks import blocks_of
+    from nbv.reporting.extensions.leaderboard import leaderboard_table
+    from nbv.reporting.table import write_table
+    from nbv.statistics.object_means import load_object_means
     from nbv.statistics.paired import Resampler
 
     params = snakemake.params
-    runs = {run: load_object_means(paths) for run, paths in params.objects.items()}
-    blocks = blocks_of(runs)
+    files = files_by_run(params.keys, snakemake.input.objects)
+    blocks = blocks_of({run: load_object_means(found) for run, found in files.items()})
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
-    choices = {run: load_choices(paths) for run, paths in params.objects.items()}
-    pairs = {
-        run: (best, f"opposite_{params.contenders[best]['fusion']}")
-        for run, best in favoured(choices).items()
-    }
-    sheets = leaderboard(blocks, resampler), beyond(blocks, pairs, resampler)
-    for path, sheet in zip(snakemake.output[::3], sheets, strict=True):
-        save_sheet(sheet, Path(path).with_suffix(""))
+    table = leaderboard_table(blocks, params.methods, resampler)
+    write_table(table, dict(snakemake.output.items()))

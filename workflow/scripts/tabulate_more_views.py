@@ -1,6 +1,4 @@
-"""Error and travel against the number of views, as a table and a figure."""
-
-from pathlib import Path
+"""Tabulate and draw error and travel against the number of views."""
 
 from nbv.jobs import job
 
@@ -9,17 +7,18 @@ with job(snakemake):
     import pandas as pd
 
     from nbv.files import read_csv
-    from nbv.reporting.extensions.curves import sequences
-    from nbv.reporting.paper.figures import save_figure
-    from nbv.reporting.sheets import save_sheet, sequence_sheet
+    from nbv.reporting.extensions.curves import more_views_figure
+    from nbv.reporting.extensions.more_views import more_views_table
+    from nbv.reporting.style import save_figure
+    from nbv.reporting.table import write_table
     from nbv.statistics.paired import Resampler
 
-    params = snakemake.params
-    rows = {
-        category: pd.concat([read_csv(path).assign(fold=fold) for fold, path in paths.items()])
-        for category, paths in params.files.items()
-    }
+    params, output = snakemake.params, snakemake.output
+    parts: dict[str, list[pd.DataFrame]] = {}
+    for (category, _, fold), path in zip(params.folds, snakemake.input.rows, strict=True):
+        parts.setdefault(category, []).append(read_csv(path).assign(fold=fold))
+    rows = {category: pd.concat(found) for category, found in parts.items()}
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
-    sheet = sequence_sheet(rows, resampler)
-    save_sheet(sheet, Path(snakemake.output.table[0]).with_suffix(""))
-    save_figure(sequences(sheet.cells), Path(snakemake.output.figure[0]).with_suffix(""))
+    table = more_views_table(rows, resampler)
+    write_table(table, {kind: output[kind] for kind in ("csv", "md", "tex")})
+    save_figure(more_views_figure(table.cells), {kind: output[kind] for kind in ("png", "pdf")})

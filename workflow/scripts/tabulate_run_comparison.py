@@ -1,17 +1,16 @@
-"""Hold the methods' errors in this run against those in the runs beside it."""
-
-from pathlib import Path
+"""Compare the errors of the same methods in several runs."""
 
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.files import write_csv, write_text
-    from nbv.reporting.extensions.runs import sidebyside_cells, sidebyside_markdown
-    from nbv.reporting.settings import ReadingSettings
+    from nbv.experiments.results import load_evaluations
+    from nbv.layout import files_by_run
+    from nbv.reporting.extensions.runs import run_comparison
+    from nbv.reporting.settings import ReportSettings
+    from nbv.reporting.table import write_table
 
-    params, results = snakemake.params, Path(snakemake.output.csv).parents[2]
-    runs = {name: (results / name, methods) for name, methods in params.runs.items()}
-    settings = ReadingSettings(**params.reading)
-    cells = sidebyside_cells(runs, params.units, params.n_folds, settings)
-    write_csv(snakemake.output.csv, cells)
-    write_text(snakemake.output.md, sidebyside_markdown(cells))
+    params = snakemake.params
+    files = files_by_run(params.evaluations, snakemake.input.evaluations)
+    runs = {run: load_evaluations(found) for run, found in files.items()}
+    table = run_comparison(runs, ReportSettings(**params.settings))
+    write_table(table, dict(snakemake.output.items()))

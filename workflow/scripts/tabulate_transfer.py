@@ -1,18 +1,15 @@
-"""Build the table of estimators trained under one condition and tested under another."""
-
-from pathlib import Path
+"""Tabulate the errors of estimators trained under one condition and tested under another."""
 
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.reporting.extensions.transfer import build_transfer, load_transfer
-    from nbv.reporting.paper.layout import save_table
-    from nbv.reporting.settings import ReadingSettings
+    from nbv.reporting.extensions.transfer import load_transfer, transfer_table
+    from nbv.reporting.settings import ReportSettings
+    from nbv.reporting.table import write_table
 
-    params, results = snakemake.params, Path(snakemake.output[0]).parents[1]
-    settings = ReadingSettings(**params.reading)
-    evaluations = load_transfer(
-        results, list(params.conditions), params.unit, params.folds, settings.methods
-    )
-    table = build_transfer(evaluations, params.conditions, params.unit, settings)
-    save_table(table, Path(snakemake.output[0]).with_suffix(""))
+    params = snakemake.params
+    files = dict(zip(params.keys, snakemake.input.evaluations, strict=True))
+    evaluations = load_transfer(files, params.unit)
+    settings = ReportSettings(**params.settings)
+    table = transfer_table(evaluations, params.conditions, params.unit, settings)
+    write_table(table, dict(snakemake.output.items()))

@@ -1,6 +1,4 @@
-"""What choosing the elevation with the rotation gains, as a table."""
-
-from pathlib import Path
+"""Tabulate what it brings to choose the elevation with the rotation."""
 
 from nbv.jobs import job
 
@@ -9,11 +7,13 @@ with job(snakemake):
     import pandas as pd
 
     from nbv.files import read_csv
-    from nbv.reporting.sheets import save_sheet, sphere_sheet
+    from nbv.reporting.extensions.view_sphere import view_sphere_table
+    from nbv.reporting.table import write_table
     from nbv.statistics.paired import Resampler
 
     params = snakemake.params
-    rows = pd.concat([read_csv(path).assign(fold=fold) for fold, path in params.files.items()])
+    files = zip(params.folds, snakemake.input.rows, strict=True)
+    rows = pd.concat([read_csv(path).assign(fold=fold) for fold, path in files])
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
-    sheet = sphere_sheet(rows, params.category, resampler)
-    save_sheet(sheet, Path(snakemake.output[0]).with_suffix(""))
+    table = view_sphere_table(rows, params.category, resampler)
+    write_table(table, dict(snakemake.output.items()))

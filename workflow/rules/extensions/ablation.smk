@@ -42,7 +42,9 @@ rule ablation:
         sources("tabulate_ablation"),
         rows=[LAYOUT.ablation(setting) for setting in ABLATIONS.instance_patterns],
     output:
-        [LAYOUT.table("ablation", kind) for kind in ("csv", "md", "tex")],
+        csv=LAYOUT.table("ablation", "csv"),
+        md=LAYOUT.table("ablation", "md"),
+        tex=LAYOUT.table("ablation", "tex"),
     log:
         LAYOUT.log("ablation"),
     benchmark:

@@ -16,19 +16,15 @@ def leaderboard_keys(wildcards):
 
 
 def leaderboard_files(name):
-    """The extension files of that name, of every run; other runs' have to be there."""
+    """The extension files of that name, of every run."""
 
     def files(wildcards):
-        found = []
-        for run, *fold in leaderboard_keys(wildcards):
-            path = Layout(f"results/{run}").extension(*fold, name)
-            if run != CONFIG["name"] and not Path(path).exists():
-                stop(
-                    f"leaderboard_runs: {path} does not exist: make it first, with the "
-                    "target extension_evaluations and that run's configuration"
-                )
-            found.append(path)
-        return found
+        return [
+            run_file(
+                run, Layout(f"results/{run}").extension(*fold, name), "leaderboard_runs"
+            )
+            for run, *fold in leaderboard_keys(wildcards)
+        ]
 
     return files
 
@@ -37,10 +33,10 @@ rule leaderboard:
     input:
         sources("tabulate_leaderboard"),
         objects=leaderboard_files("objects"),
-        choices=leaderboard_files("choices"),
     output:
-        leaderboard=[LAYOUT.table("leaderboard", kind) for kind in ("csv", "md", "tex")],
-        gains=[LAYOUT.table("extension_gains", kind) for kind in ("csv", "md", "tex")],
+        csv=LAYOUT.table("leaderboard", "csv"),
+        md=LAYOUT.table("leaderboard", "md"),
+        tex=LAYOUT.table("leaderboard", "tex"),
     log:
         LAYOUT.log("leaderboard"),
     benchmark:
@@ -57,3 +53,30 @@ rule leaderboard:
         seed=CONFIG["seed"],
     script:
         "../../scripts/tabulate_leaderboard.py"
+
+
+rule extension_gains:
+    input:
+        sources("tabulate_extension_gains"),
+        objects=leaderboard_files("objects"),
+        choices=leaderboard_files("choices"),
+    output:
+        csv=LAYOUT.table("extension_gains", "csv"),
+        md=LAYOUT.table("extension_gains", "md"),
+        tex=LAYOUT.table("extension_gains", "tex"),
+    log:
+        LAYOUT.log("extension_gains"),
+    benchmark:
+        LAYOUT.benchmark("extension_gains")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        keys=leaderboard_keys,
+        methods=METHODS | EXTENSIONS,
+        n_resamples=CONFIG["n_resamples"],
+        seed=CONFIG["seed"],
+    script:
+        "../../scripts/tabulate_extension_gains.py"

@@ -32,8 +32,11 @@ rule more_views:
         sources("tabulate_more_views"),
         rows=[LAYOUT.extension(*fold, "more_views") for fold in folds_of(REFERENCE_UNITS)],
     output:
-        table=[LAYOUT.table("more_views", kind) for kind in ("csv", "md", "tex")],
-        figure=[LAYOUT.figure("more_views", kind) for kind in ("png", "pdf")],
+        csv=LAYOUT.table("more_views", "csv"),
+        md=LAYOUT.table("more_views", "md"),
+        tex=LAYOUT.table("more_views", "tex"),
+        png=LAYOUT.figure("more_views", "png"),
+        pdf=LAYOUT.figure("more_views", "pdf"),
     log:
         LAYOUT.log("more_views"),
     benchmark:

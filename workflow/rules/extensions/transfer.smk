@@ -169,7 +169,9 @@ rule transfer_table:
             for trained, tested, fold, method in TRANSFER_KEYS
         ],
     output:
-        [LAYOUT.table("transfer", kind) for kind in ("csv", "md", "tex")],
+        csv=LAYOUT.table("transfer", "csv"),
+        md=LAYOUT.table("transfer", "md"),
+        tex=LAYOUT.table("transfer", "tex"),
     log:
         LAYOUT.log("transfer/table"),
     benchmark:

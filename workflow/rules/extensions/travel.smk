@@ -21,8 +21,9 @@ rule travel:
         sources("tabulate_travel"),
         rows=[LAYOUT.extension(*fold, "travel") for fold in folds_of(REFERENCE_UNITS)],
     output:
-        table=LAYOUT.table("travel", "csv"),
-        figure=[LAYOUT.figure("travel", kind) for kind in ("png", "pdf")],
+        csv=LAYOUT.table("travel", "csv"),
+        png=LAYOUT.figure("travel", "png"),
+        pdf=LAYOUT.figure("travel", "pdf"),
     log:
         LAYOUT.log("travel"),
     benchmark:

@@ -52,7 +52,9 @@ rule view_sphere:
             for fold in FOLDS
         ],
     output:
-        [LAYOUT.table("view_sphere", kind) for kind in ("csv", "md", "tex")],
+        csv=LAYOUT.table("view_sphere", "csv"),
+        md=LAYOUT.table("view_sphere", "md"),
+        tex=LAYOUT.table("view_sphere", "tex"),
     log:
         LAYOUT.log("view_sphere"),
     benchmark:
