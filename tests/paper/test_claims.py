@@ -24,7 +24,7 @@ from nbv.paper.statements import (
 from nbv.paper.verdicts import evaluate_claims
 from nbv.reporting.paper.claims import claims_markdown
 from nbv.reporting.paper.tables import build_table
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings
 
 N_OBJECTS = 40
 MUG = ("mug", 0)
@@ -225,7 +225,7 @@ def test_claims_and_tables_state_the_same_intervals(evaluations):
     part = claims.query(
         "id == 'mae-75-opposite' and subject == 'Proposed (Mug 0°)' and statistic == 'mae'"
     ).iloc[0]
-    table = build_table("table2", evaluations, ReadingSettings(n_resamples=300, seed=3))
+    table = build_table("table2", evaluations, ReportSettings(n_resamples=300, seed=3))
     row = table.cells.query("row == '0' and method == 'proposed'").iloc[0]
     assert (part["difference"], part["ci_low"], part["ci_high"]) == pytest.approx(
         (row["difference"], row["difference_low"], row["difference_high"])

@@ -75,7 +75,7 @@ def evaluate_claims(
         Frames of `results.load_unit`; what is absent is reported as ``not run``.
     rng : numpy.random.Generator
         Seeds the object resamples, which all comparisons share. ``default_rng(seed)`` gives the
-        same intervals as the tables of ``ReadingSettings(seed=seed)``.
+        same intervals as the tables of ``ReportSettings(seed=seed)``.
     n_resamples : int
         Number of resamples.
     claims : sequence of Claim

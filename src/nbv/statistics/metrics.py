@@ -29,6 +29,14 @@ class Interval:
     low: float
     high: float
 
+    def columns(self, name: str, ends: str = "") -> dict[str, float]:
+        """Return the columns of a tidy table: ``name``, ``<ends>_low`` and ``<ends>_high``.
+
+        The ends are called after `name` unless `ends` says otherwise (``ci`` for a value).
+        """
+        ends = ends or name
+        return {name: self.value, f"{ends}_low": self.low, f"{ends}_high": self.high}
+
 
 def mae_deg(errors_deg: ArrayLike) -> float:
     """Return the mean absolute error over images, in degrees (Eq. 8).

@@ -93,12 +93,12 @@ def paired_objects(means: pd.DataFrame, category: str) -> PairedErrors:
     )
 
 
-def standing(sample: PairedErrors, method: str, resampler: Resampler) -> Interval:
+def mae_interval(sample: PairedErrors, method: str, resampler: Resampler) -> Interval:
     """Return a method's MAE in degrees with its 95 % interval over objects."""
     return estimate("mae", sample, method, resampler).interval()
 
 
-def gap(sample: PairedErrors, method: str, other: str, resampler: Resampler) -> Interval:
+def mae_difference(sample: PairedErrors, method: str, other: str, resampler: Resampler) -> Interval:
     """Return the paired difference of two methods' MAE in degrees, with its 95 % interval."""
     mine = estimate("mae", sample, method, resampler)
     return mine.minus(estimate("mae", sample, other, resampler))
