@@ -22,7 +22,6 @@ from nbv.paper.statements import (
     combine,
 )
 from nbv.paper.verdicts import evaluate_claims
-from nbv.reporting.paper.claims import claims_markdown
 from nbv.reporting.paper.tables import build_table
 from nbv.reporting.settings import ReportSettings
 
@@ -324,14 +323,3 @@ def test_the_table_of_claims_is_tidy_and_repeatable(evaluations):
     pd.testing.assert_frame_equal(once, again)
     assert not once.duplicated(["id", "part"]).any()
     assert len(once.drop_duplicates(["id", "verdict"])) == len(CLAIMS)
-
-
-def test_markdown_has_one_row_for_each_claim(evaluations, rng):
-    text = claims_markdown(evaluate_claims(evaluations, rng, 100))
-    run, absent = text.split("### Not run")
-    rows = [[line for line in part.splitlines() if line.startswith("|")] for part in (run, absent)]
-    assert len(rows[0]) + len(rows[1]) == 4 + len(CLAIMS)
-    assert not any("**not run**" in row for row in rows[0][2:])
-    assert all("**not run**" in row for row in rows[1][2:])
-    assert len({row.count("|") for row in rows[0] + rows[1]}) == 1
-    assert "nan" not in text
