@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nbv.paper import statements as comparisons
+from nbv.paper import statements
 from nbv.paper.claims import CATEGORIES, CLAIMS, ELEVATIONS_DEG, best, ranked
 from nbv.paper.statements import (
     FAILS,
@@ -265,7 +265,7 @@ def test_ids_are_unique_and_quotes_name_their_section():
     assert len(ids) == len(set(ids))
     assert {claim.section for claim in CLAIMS} == {"3.3.1", "3.3.2", "3.3.3", "3.3.4", "4"}
     for claim in CLAIMS:
-        leaves = comparisons.leaves(claim.statement)
+        leaves = statements.leaves(claim.statement)
         assert leaves, claim.id
         for leaf in leaves:
             assert isinstance(leaf, FreeOfOutliers) or leaf.a != leaf.b, claim.id

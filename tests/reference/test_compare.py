@@ -19,7 +19,7 @@ from nbv.reference.compare import (
     OUTSIDE,
     UNJUDGED,
     WITHIN,
-    _judge,
+    judge_cell,
     compare_runs,
     sigma_ratio,
 )
@@ -30,9 +30,9 @@ from nbv.reference.store import (
     find_reference,
     read_cells,
 )
-from nbv.reporting.paper.layout import save_table
 from nbv.reporting.paper.tables import TABLES, build_table
 from nbv.reporting.settings import ReportSettings
+from nbv.reporting.table import write_table
 
 CONFIGURATION = f"""\
 experiment: synthetic
@@ -53,7 +53,8 @@ def finished(evaluations, tmp_path_factory):
     root = tmp_path_factory.mktemp("compare") / "synthetic"
     settings = ReportSettings(n_resamples=100)
     for name in TABLES:
-        save_table(build_table(name, evaluations, settings), root / "tables" / name)
+        paths = {kind: root / f"tables/{name}.{kind}" for kind in ("csv", "md", "tex", "html")}
+        write_table(build_table(name, evaluations, settings), paths)
     claims = evaluate_claims(evaluations, np.random.default_rng(0), 100)
     write_csv(root / "claims.csv", claims)
     (root / "claims.md").write_text("claims\n")
@@ -162,7 +163,7 @@ def test_figures_agree_by_the_intervals_of_both(finished, shift, below, above):
     mine = theirs | moved
     for name, figure in (("ci", "value"), ("difference", "difference")):
         mine |= {f"{name}_low": moved[figure] - below, f"{name}_high": moved[figure] + above}
-    judged = _judge(theirs, mine, 3.0)
+    judged = judge_cell(theirs, mine, 3.0)
     found = {row["quantity"]: row["status"] != OUTSIDE for row in judged}
     # Whether one value lies in the other's interval, whether two intervals have a common point.
     here_in_theirs = theirs["ci_low"] <= mine["value"] <= theirs["ci_high"]
@@ -289,7 +290,7 @@ def test_other_settings_come_first_and_speak_against_agreement(finished, run):
 
 
 def test_a_key_that_is_younger_than_the_reference_has_its_default_there():
-    assert differing_settings({}, {"calibration": "holdout", "beside": ["other"]}) == ()
+    assert differing_settings({}, {"calibration": "holdout", "compared_runs": ["other"]}) == ()
     changed = ("calibration", "holdout", "crossfit")
     assert differing_settings({}, {"calibration": "crossfit"}) == (changed,)
     younger = {"estimator": {"n_classes": 72}}
