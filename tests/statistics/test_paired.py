@@ -72,9 +72,20 @@ def test_draws_by_fold_keep_each_folds_size(evaluations):
 def test_statistics_of_pooled_images(evaluations, statistic, expected):
     sample = paired.pair_methods(evaluations["mug", 0], "mug")
     found = paired.estimate(statistic, sample, "random", paired.Resampler(0, 200))
-    assert found.value == pytest.approx(expected(sample.errors_deg["random"]))
+    errors = sample.errors_deg["random"]
+    assert found.value == pytest.approx(expected(errors))
+    documented = {"mae": metrics.mae_deg, "median": metrics.median_deg, "pauc": metrics.pauc}
+    assert found.value == documented[statistic](errors)
     interval = found.interval()
     assert interval.low < interval.value < interval.high
+
+
+@pytest.mark.parametrize("statistic", ["mae", "median", "pauc"])
+def test_no_images_have_no_statistic(evaluations, statistic):
+    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+    nothing = sample.select(sample.folds == 9)
+    with pytest.raises(ValueError, match="no errors"):
+        paired.estimate(statistic, nothing, "single", paired.Resampler(0, 10))
 
 
 def test_sigma_is_over_fold_means(evaluations):

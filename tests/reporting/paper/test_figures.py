@@ -17,7 +17,7 @@ from nbv.reporting.paper import examples
 from nbv.reporting.paper.figures import FIGURES, FigureInputs, build_figure, save_figure
 from nbv.reporting.paper.figures.depth import depth_limits, shade
 from nbv.reporting.paper.figures.inputs import example_view
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings as ReadingSettings
 
 
 @pytest.fixture(scope="module")

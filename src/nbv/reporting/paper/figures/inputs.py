@@ -16,7 +16,8 @@ from nbv.experiments.results import Unit
 from nbv.files import existing
 from nbv.recommendation.lookup import LookupTable, load_lookup
 from nbv.reporting.paper.examples import Example, choose_example, example_row, hardest_azimuth_deg
-from nbv.reporting.settings import ReadingSettings, focus_unit
+from nbv.reporting.settings import ReportSettings as ReadingSettings
+from nbv.reporting.settings import focus_unit
 
 Codes = NDArray[np.uint8]
 
