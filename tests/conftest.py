@@ -24,7 +24,7 @@ def tree(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def evaluations(tree):
-    return load_evaluations(tree, UNITS, N_FOLDS, synthetic.METHODS)
+    return load_evaluations(synthetic.evaluation_files(tree, UNITS, N_FOLDS))
 
 
 @pytest.fixture

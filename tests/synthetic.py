@@ -50,6 +50,37 @@ def build_tree(
     return root
 
 
+def evaluation_files(root, units, n_folds, methods=METHODS):
+    """The files of errors by category, elevation, fold and method."""
+    return {
+        (category, elevation, fold, method): root
+        / f"evaluation/{category}/el{elevation:02d}/fold{fold}/{method}.csv"
+        for category, elevation in units
+        for method in methods
+        for fold in range(1, n_folds + 1)
+    }
+
+
+def lookup_files(root, units, n_folds, criterion="pose_ambiguity"):
+    """The lookup tables by category, elevation and fold."""
+    return {
+        (category, elevation, fold): root
+        / f"lookup/{category}/el{elevation:02d}/fold{fold}/{criterion}.npz"
+        for category, elevation in units
+        for fold in range(1, n_folds + 1)
+    }
+
+
+def depth_files(root, units):
+    """The depth images by category and elevation."""
+    return {unit: root / f"depth/{unit[0]}/el{unit[1]:02d}.npy" for unit in units}
+
+
+def split_files(root, units):
+    """The splits by category."""
+    return {category: root / f"splits/{category}.csv" for category, _ in units}
+
+
 def _write_splits(root, category, ids, n_folds):
     rows = []
     for fold in range(1, n_folds + 1):
@@ -96,22 +127,23 @@ def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0, delta_s
     joint = _smooth(counts, bandwidth_deg) + pseudo_observations / N_VIEWS
     viewpoint = joint / joint.sum(axis=1, keepdims=True)
     estimate = (joint / joint.sum(axis=0, keepdims=True)).T
-    ambiguity = np.empty((N_VIEWS, N_VIEWS))
+    cost = np.empty((N_VIEWS, N_VIEWS))
     for delta in range(0, N_VIEWS, delta_step):
         second = np.roll(viewpoint, (-delta, -delta), axis=(0, 1))
         both = viewpoint * second
         pose = viewpoint @ (both / both.sum(axis=1, keepdims=True))
         spread = -(pose * np.log(pose)).sum(axis=1)
-        ambiguity[:, delta : delta + delta_step] = spread[:, None]
+        cost[:, delta : delta + delta_step] = spread[:, None]
     return {
         "viewpoint_likelihood": viewpoint.astype(np.float32),
         "estimate_likelihood": estimate.astype(np.float32),
-        "ambiguity": ambiguity.astype(np.float32),
-        "recommended_delta_deg": ambiguity.argmin(axis=1),
+        "cost": cost.astype(np.float32),
+        "recommended_delta_deg": cost.argmin(axis=1),
         "bandwidth_deg": np.array(bandwidth_deg),
         "pseudo_observations": np.array(pseudo_observations),
-        "reading": np.array("given_estimate"),
+        "pose_likelihood": np.array("given_estimate"),
         "spread": np.array("entropy"),
+        "criterion": np.array("pose_ambiguity"),
     }
 
 
@@ -122,7 +154,9 @@ def _write_folds(root, category, elevation, ids, estimates, n_folds, rng, delta_
         arrays = lookup_arrays(estimates[~test], delta_step=delta_step)
         target = root / "lookup" / unit / f"fold{fold}"
         target.mkdir(parents=True, exist_ok=True)
-        np.savez_compressed(target / "entropy.npz", **arrays)
+        # The names that lookup tables have in nbv.recommendation until its renaming is merged.
+        old = {"ambiguity": arrays["cost"], "reading": arrays["pose_likelihood"]}
+        np.savez_compressed(target / "pose_ambiguity.npz", **arrays, **old)
         names = [name for name, tested in zip(ids, test, strict=True) if tested]
         for method in METHODS:
             frame = evaluate(names, estimates[test], method, arrays["recommended_delta_deg"], rng)

@@ -7,31 +7,60 @@ import synthetic
 from conftest import N_FOLDS
 from nbv.errors import UserError
 from nbv.experiments import results
-from nbv.experiments import two_views as methods
+from nbv.experiments.two_views import COLUMNS
 from nbv.files import write_csv
+
+MUG = ("mug", 0)
+
+
+def load(path):
+    return results.load_evaluations({(*MUG, 1, "single"): path})[MUG]
 
 
 def test_a_unit_has_every_method_fold_object_and_view(evaluations):
-    frame = evaluations["mug", 0]
-    assert list(frame.columns) == ["method", "fold", *methods.COLUMNS]
+    frame = evaluations[MUG]
+    assert list(frame.columns) == ["method", "fold", *COLUMNS]
     assert len(frame) == 4 * 9 * synthetic.N_VIEWS
     assert list(frame["method"].cat.categories) == list(synthetic.METHODS)
     assert set(frame["object_id"]) == {f"{index:04d}" for index in range(9)}
     assert frame.loc[frame["method"] == "single", "delta_deg"].isna().all()
 
 
+def test_what_a_file_is_about_is_told_and_not_read_from_its_path(tree, tmp_path):
+    path = synthetic.evaluation_files(tree, [MUG], 1)[*MUG, 1, "single"]
+    copy = tmp_path / "anything.csv"
+    copy.write_bytes(path.read_bytes())
+    units = results.load_evaluations({("spoon", 45, 7, "other"): copy, (*MUG, 1, "single"): path})
+    assert list(units) == [("spoon", 45), MUG]
+    assert set(units["spoon", 45]["fold"]) == {7}
+    assert set(units["spoon", 45]["method"]) == {"other"}
+    pd.testing.assert_frame_equal(
+        units["spoon", 45][list(COLUMNS)], units[MUG][list(COLUMNS)], check_exact=True
+    )
+
+
+def test_units_and_methods_keep_the_order_of_the_files(tree):
+    methods = synthetic.METHODS[::-1]
+    files = synthetic.evaluation_files(tree, [("chair", 0), MUG], N_FOLDS, methods)
+    units = results.load_evaluations(files)
+    assert list(units) == [("chair", 0), MUG]
+    assert list(units[MUG]["method"].cat.categories) == list(methods)
+    assert list(units[MUG]["method"].unique()) == list(methods)
+
+
 def test_objects_come_in_the_order_of_the_depth_images(tree):
-    assert results.load_object_ids(tree, "mug") == tuple(f"{index:04d}" for index in range(9))
-    assert results.load_depth(tree, "mug", 0).shape[:2] == (9, 360)
+    ids = results.load_object_ids(synthetic.split_files(tree, [MUG])["mug"])
+    assert ids == tuple(f"{index:04d}" for index in range(9))
+    assert results.load_depth(synthetic.depth_files(tree, [MUG])[MUG]).shape[:2] == (9, 360)
 
 
 def test_a_missing_file_is_named(tree):
     with pytest.raises(UserError, match=r"el00/fold4/single\.csv does not exist"):
-        results.load_unit(tree, "mug", 0, N_FOLDS + 1, synthetic.METHODS)
+        results.load_evaluations(synthetic.evaluation_files(tree, [MUG], N_FOLDS + 1))
     with pytest.raises(UserError, match=r"el45\.npy does not exist"):
-        results.load_depth(tree, "mug", 45)
+        results.load_depth(tree / "depth/mug/el45.npy")
     with pytest.raises(UserError, match=r"spoon\.csv does not exist"):
-        results.load_object_ids(tree, "spoon")
+        results.load_object_ids(tree / "splits/spoon.csv")
 
 
 @pytest.mark.parametrize(
@@ -39,34 +68,24 @@ def test_a_missing_file_is_named(tree):
     [
         ("", "no column 'object_id'"),
         ("object_id,initial_deg\n", "no column 'initial_estimate_deg'"),
+        (",".join(COLUMNS) + "\n", "holds no rows"),
     ],
 )
 def test_a_broken_file_is_named(tmp_path, text, message):
-    path = results.evaluation_path(tmp_path, "mug", 0, 1, "single")
-    path.parent.mkdir(parents=True)
+    path = tmp_path / "single.csv"
     path.write_text(text)
-    with pytest.raises(UserError, match=message):
-        results.load_unit(tmp_path, "mug", 0, 1, ["single"])
-
-
-def test_an_empty_table_is_named(tmp_path):
-    path = results.evaluation_path(tmp_path, "mug", 0, 1, "single")
-    path.parent.mkdir(parents=True)
-    path.write_text(",".join(methods.COLUMNS) + "\n")
-    with pytest.raises(UserError, match="holds no rows"):
-        results.load_unit(tmp_path, "mug", 0, 1, ["single"])
+    with pytest.raises(UserError, match=rf"single\.csv: {message}"):
+        load(path)
 
 
 def test_object_ids_are_names_whatever_they_look_like(tree, tmp_path):
     names = ["0007", "NA", "null", "None", "nan", "1e3", "inf", "-", "true"]
-    path = results.evaluation_path(tree, "mug", 0, 1, "single")
+    path = synthetic.evaluation_files(tree, [MUG], 1)[*MUG, 1, "single"]
     frame = pd.read_csv(path, dtype={"object_id": str})
-    short = frame.groupby("object_id").head(len(names)).head(len(names))
-    target = results.evaluation_path(tmp_path, "mug", 0, 1, "single")
-    write_csv(target, short.assign(object_id=names))
-    unit = results.load_unit(tmp_path, "mug", 0, 1, ["single"])
+    write_csv(tmp_path / "single.csv", frame.head(len(names)).assign(object_id=names))
+    unit = load(tmp_path / "single.csv")
     assert unit["object_id"].tolist() == names
     assert unit["delta_deg"].isna().all()
     splits = pd.DataFrame({"object_id": names, "fold": 1, "role": "test"})
-    write_csv(results.splits_path(tmp_path, "mug"), splits)
-    assert results.load_object_ids(tmp_path, "mug") == tuple(names)
+    write_csv(tmp_path / "mug.csv", splits)
+    assert results.load_object_ids(tmp_path / "mug.csv") == tuple(names)

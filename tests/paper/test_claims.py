@@ -24,7 +24,7 @@ from nbv.paper.statements import (
 from nbv.paper.verdicts import evaluate_claims
 from nbv.reporting.paper.claims import claims_markdown
 from nbv.reporting.paper.tables import build_table
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings
 
 N_OBJECTS = 40
 MUG = ("mug", 0)
@@ -185,9 +185,30 @@ def test_a_method_that_wins_everywhere_bears_out_what_it_should():
         "pauc-folds",
     ):
         assert verdicts[name] == HOLDS, name
-    for name in ("mae-chair-third", "mae-75-opposite", "median-chair", "mae-75-comparable"):
+    not_the_best = ("mae-75-comparable", "pauc-75-comparable")
+    for name in ("mae-chair-third", "mae-75-opposite", "median-chair", *not_the_best):
         assert verdicts[name] == FAILS, name
     assert NOT_RUN not in set(verdicts)
+
+
+@pytest.mark.parametrize(
+    ("proposed", "expected"),
+    [
+        (10.6, HOLDS),  # behind Opposite, and close to it
+        (9.4, FAILS),  # close to Opposite, and the best
+        (14.0, FAILS),  # behind Opposite, and far from it
+    ],
+)
+def test_not_the_best_but_comparable_is_both(proposed, expected):
+    means = {"single": 16.0, "random": 15.0, "opposite": 10.0, "proposed": proposed}
+    frames = {("mug", 75): unit(means, noise=0.3)}
+    claims = [claim for claim in CLAIMS if claim.id.endswith("75-comparable")]
+    found = evaluate_claims(frames, np.random.default_rng(0), 500, claims)
+    each = found.drop_duplicates("id")
+    assert list(each["id"]) == ["mae-75-comparable", "pauc-75-comparable"]
+    assert list(each["verdict"]) == list(each["point_verdict"]) == [expected] * 2
+    for summary in each["summary"]:
+        assert all(f"{name} " in summary for name in ("Single", "Random", "Opposite", "Proposed"))
 
 
 def test_what_was_not_run_is_reported_as_such(evaluations, rng):
@@ -225,7 +246,7 @@ def test_claims_and_tables_state_the_same_intervals(evaluations):
     part = claims.query(
         "id == 'mae-75-opposite' and subject == 'Proposed (Mug 0°)' and statistic == 'mae'"
     ).iloc[0]
-    table = build_table("table2", evaluations, ReadingSettings(n_resamples=300, seed=3))
+    table = build_table("table2", evaluations, ReportSettings(n_resamples=300, seed=3))
     row = table.cells.query("row == '0' and method == 'proposed'").iloc[0]
     assert (part["difference"], part["ci_low"], part["ci_high"]) == pytest.approx(
         (row["difference"], row["difference_low"], row["difference_high"])

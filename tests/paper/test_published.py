@@ -1,4 +1,4 @@
-"""The reading notes on the paper, recomputed from its own figures."""
+"""The notes on the paper, recomputed from its own figures."""
 
 from __future__ import annotations
 
@@ -77,14 +77,21 @@ def test_table_6_errors_follow_from_its_estimates_but_for_one_slip():
 
 
 def test_the_published_pauc_cannot_be_the_exact_integral_everywhere():
-    # 100 - MAE is the least that an exact pAUC can be.
-    below = [
-        (category, method)
-        for category, row in PUBLISHED["table1"].values["mae"].items()
-        for method, mae in zip(METHODS, row, strict=True)
-        if published_value("table3", "pauc", category, method) < 100 - mae - 0.005
-    ]
-    assert ("car", "random") in below
+    # 100 - MAE is the least that an exact pAUC can be: no error counts for more than itself.
+    below = {
+        (table, row, method): round(100 - mae - published_value(table, "pauc", row, method), 2)
+        for table, of_mae in (("table3", "table1"), ("table4", "table2"))
+        for row, values in PUBLISHED[of_mae].values["mae"].items()
+        for method, mae in zip(METHODS, values, strict=True)
+    }
+    lower = [amount for amount in below.values() if amount > 0]
+    assert (len(below), len(lower), max(lower)) == (44, 32, 0.53)
+    assert sum(0.45 < amount < 0.55 for amount in lower) == 10
+    # All but one of them by more than rounding MAE and pAUC to two decimals can do.
+    assert sum(amount > 0.011 for amount in lower) == 31
+    for table in ("table3", "table4", "table7"):
+        (note,) = (note.text for note in PUBLISHED[table].notes if "integral" in note.text)
+        assert "in 32 of the 44 cells of Tables 3 and 4, by 0.53 at most" in note
 
 
 def test_what_the_paper_does_not_print_is_none():

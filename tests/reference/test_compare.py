@@ -32,7 +32,7 @@ from nbv.reference.store import (
 )
 from nbv.reporting.paper.layout import save_table
 from nbv.reporting.paper.tables import TABLES, build_table
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings
 
 CONFIGURATION = f"""\
 experiment: synthetic
@@ -51,7 +51,7 @@ estimator:
 def finished(evaluations, tmp_path_factory):
     """A run as far as it is compared or kept."""
     root = tmp_path_factory.mktemp("compare") / "synthetic"
-    settings = ReadingSettings(n_resamples=100)
+    settings = ReportSettings(n_resamples=100)
     for name in TABLES:
         save_table(build_table(name, evaluations, settings), root / "tables" / name)
     claims = evaluate_claims(evaluations, np.random.default_rng(0), 100)

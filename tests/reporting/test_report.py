@@ -16,7 +16,7 @@ from nbv.reporting.paper.figures import FIGURES, FigureInputs, build_figure, sav
 from nbv.reporting.paper.layout import save_table
 from nbv.reporting.paper.tables import TABLES, build_table
 from nbv.reporting.report import build_report
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings
 
 VOID = {"meta", "img", "br", "link", "hr"}
 
@@ -49,7 +49,7 @@ class Page(HTMLParser):
 def root(tree, evaluations, tmp_path_factory):
     root = tmp_path_factory.mktemp("report") / "synthetic"
     shutil.copytree(tree, root)
-    settings = ReadingSettings(n_resamples=100)
+    settings = ReportSettings(n_resamples=100)
     for name in TABLES:
         save_table(build_table(name, evaluations, settings), root / "tables" / name)
     for name in FIGURES:

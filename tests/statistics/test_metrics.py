@@ -30,7 +30,7 @@ def test_pauc_is_the_integral_of_pea(errors):
 
 
 def test_pauc_by_whole_degrees_lies_half_a_degree_lower():
-    # The reading note on the published pAUC: a left sum over whole degrees loses about 0.5.
+    # The note on the published pAUC: a left sum over whole degrees loses about 0.5.
     errors = np.random.default_rng(0).gamma(2.0, 5.0, 200_000)
     published_way = float(np.mean(metrics.pea(errors, np.arange(100)))) * 100
     assert metrics.pauc(errors) - published_way == pytest.approx(0.5, abs=0.02)
@@ -51,10 +51,20 @@ def test_fold_std_is_the_sample_one():
     assert np.isnan(metrics.fold_std([3.0]))
 
 
-@pytest.mark.parametrize("function", [metrics.mae_deg, metrics.pauc])
+@pytest.mark.parametrize("function", [metrics.mae_deg, metrics.median_deg, metrics.pauc])
 def test_no_errors_is_an_error(function):
     with pytest.raises(ValueError, match="no errors"):
         function([])
+
+
+def test_an_interval_gives_its_columns():
+    found = metrics.Interval(1.0, 0.5, 2.0)
+    assert found.columns("difference") == {
+        "difference": 1.0,
+        "difference_low": 0.5,
+        "difference_high": 2.0,
+    }
+    assert found.columns("value", "ci") == {"value": 1.0, "ci_low": 0.5, "ci_high": 2.0}
 
 
 def _uneven_objects(rng, n_objects=7):

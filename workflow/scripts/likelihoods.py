@@ -11,7 +11,7 @@ with job(snakemake):
         likelihoods_markdown,
         temperature_notes,
     )
-    from nbv.reporting.settings import ReadingSettings
+    from nbv.reporting.settings import ReportSettings as ReadingSettings
 
     params, results = snakemake.params, Path(snakemake.output.csv).parents[2]
     runs = {name: (results / name, classes) for name, classes in params.runs.items()}

@@ -7,7 +7,7 @@ from nbv.jobs import job
 with job(snakemake):
     from nbv.files import write_csv, write_text
     from nbv.reporting.extensions.runs import sidebyside_cells, sidebyside_markdown
-    from nbv.reporting.settings import ReadingSettings
+    from nbv.reporting.settings import ReportSettings as ReadingSettings
 
     params, results = snakemake.params, Path(snakemake.output.csv).parents[2]
     runs = {name: (results / name, methods) for name, methods in params.runs.items()}

@@ -8,7 +8,7 @@ with job(snakemake):
     from nbv.experiments.results import load_evaluations
     from nbv.reporting.paper.layout import save_table
     from nbv.reporting.paper.tables import build_table
-    from nbv.reporting.settings import ReadingSettings
+    from nbv.reporting.settings import ReportSettings as ReadingSettings
 
     params, results = snakemake.params, Path(snakemake.output[0]).parents[1]
     evaluations = load_evaluations(results, params.units, params.n_folds, params.reading["methods"])

@@ -7,7 +7,7 @@ from nbv.jobs import job
 with job(snakemake):
     from nbv.reporting.extensions.transfer import build_transfer, load_transfer
     from nbv.reporting.paper.layout import save_table
-    from nbv.reporting.settings import ReadingSettings
+    from nbv.reporting.settings import ReportSettings as ReadingSettings
 
     params, results = snakemake.params, Path(snakemake.output[0]).parents[1]
     settings = ReadingSettings(**params.reading)

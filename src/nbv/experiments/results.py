@@ -1,11 +1,11 @@
-"""Reading a results tree: which files a unit has, and what they hold.
+"""Reading what a run wrote, file by file: errors, objects and depth images.
 
 A *unit* is one category at one elevation: what a row of Tables 1 to 4 is made of.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -20,103 +20,60 @@ from nbv.files import existing, open_array, read_csv
 Unit = tuple[str, int]
 """A category and an elevation in degrees."""
 
-
-def unit_dir(root: str | Path, stage: str, category: str, elevation_deg: int) -> Path:
-    """Return the directory of one stage's files for a unit."""
-    return Path(root) / stage / category / f"el{elevation_deg:02d}"
+EvaluationFile = tuple[str, int, int, str]
+"""What a file of errors is about: category, elevation in degrees, fold (from 1) and method."""
 
 
-def evaluation_path(
-    root: str | Path, category: str, elevation_deg: int, fold: int, method: str
-) -> Path:
-    """Return where one method's errors of one fold (counted from 1) are."""
-    return unit_dir(root, "evaluation", category, elevation_deg) / f"fold{fold}" / f"{method}.csv"
-
-
-def lookup_path(
-    root: str | Path, category: str, elevation_deg: int, fold: int, criterion: str
-) -> Path:
-    """Return where one criterion's lookup table of one fold (counted from 1) is."""
-    return unit_dir(root, "lookup", category, elevation_deg) / f"fold{fold}" / f"{criterion}.npz"
-
-
-def depth_path(root: str | Path, category: str, elevation_deg: int) -> Path:
-    """Return where the depth images of a unit are."""
-    return Path(root) / "depth" / category / f"el{elevation_deg:02d}.npy"
-
-
-def splits_path(root: str | Path, category: str) -> Path:
-    """Return where the folds of a category are written."""
-    return Path(root) / "splits" / f"{category}.csv"
-
-
-def load_unit(
-    root: str | Path, category: str, elevation_deg: int, n_folds: int, methods: Sequence[str]
-) -> pd.DataFrame:
-    """Read every method's errors of one category and elevation.
+def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.DataFrame]:
+    """Read the errors of each unit.
 
     Parameters
     ----------
-    root : path
-        ``results/<experiment>``.
-    category : str
-        Object category.
-    elevation_deg : int
-        Elevation in degrees.
-    n_folds : int
-        Folds 1 to n_folds are read.
-    methods : sequence of str
-        Methods, in the order in which tables show them.
+    files : mapping of (category, elevation_deg, fold, method) to path
 
     Returns
     -------
-    pandas.DataFrame
-        ``method, fold`` and `methods.COLUMNS`; one row per method, test object and initial
-        viewpoint. `method` is categorical, its categories in the order given.
+    dict of (category, elevation_deg) to pandas.DataFrame
+        Units in the order of their first file. Columns are ``method, fold`` and
+        `two_views.COLUMNS`, with one row for each method, test object and initial viewpoint.
+        Methods come in the order of their first file, which is the order of the categories of
+        ``method`` as well.
 
     Raises
     ------
     UserError
         If a file is missing, empty, or lacks a column.
     """
-    parts = []
-    for method in methods:
-        for fold in range(1, n_folds + 1):
-            path = evaluation_path(root, category, elevation_deg, fold, method)
-            frame = read_evaluation(path)
-            parts.append(frame.assign(method=method, fold=fold))
-    unit = pd.concat(parts, ignore_index=True)
-    unit["method"] = pd.Categorical(unit["method"], categories=list(methods), ordered=True)
+    parts: dict[Unit, dict[str, list[pd.DataFrame]]] = {}
+    for (category, elevation_deg, fold, method), path in files.items():
+        frame = read_evaluation(path).assign(method=method, fold=fold)
+        parts.setdefault((category, elevation_deg), {}).setdefault(method, []).append(frame)
+    return {unit: _join(by_method) for unit, by_method in parts.items()}
+
+
+def _join(by_method: Mapping[str, list[pd.DataFrame]]) -> pd.DataFrame:
+    frames = [frame for of_method in by_method.values() for frame in of_method]
+    unit = pd.concat(frames, ignore_index=True)
+    unit["method"] = pd.Categorical(unit["method"], categories=list(by_method), ordered=True)
     return unit[["method", "fold", *COLUMNS]]
 
 
-def load_evaluations(
-    root: str | Path, units: Iterable[Unit], n_folds: int, methods: Sequence[str]
-) -> dict[Unit, pd.DataFrame]:
-    """Read several units with `load_unit`, in the order given."""
-    return {
-        (category, elevation): load_unit(root, category, elevation, n_folds, methods)
-        for category, elevation in units
-    }
+def load_object_ids(splits: Path) -> tuple[str, ...]:
+    """Return a category's objects in the order of the depth images, from its splits."""
+    read = read_splits(existing(splits))
+    return tuple(read.loc[read["fold"] == read["fold"].min(), "object_id"])
 
 
-def load_object_ids(root: str | Path, category: str) -> tuple[str, ...]:
-    """Return the category's objects in the order of the depth images."""
-    splits = read_splits(existing(splits_path(root, category)))
-    first = splits[splits["fold"] == splits["fold"].min()]
-    return tuple(first["object_id"])
-
-
-def load_depth(root: str | Path, category: str, elevation_deg: int) -> NDArray[np.uint8]:
+def load_depth(path: Path) -> NDArray[np.uint8]:
     """Map a unit's depth codes into memory: (n_objects, n_viewpoints, side, side) uint8.
 
     0 is background; nearer is a larger code. The file is read as far as it is indexed.
     """
-    return open_array(existing(depth_path(root, category, elevation_deg)))
+    return open_array(existing(path))
 
 
 def read_evaluation(path: Path) -> pd.DataFrame:
-    """Read one method's errors of one fold: `methods.COLUMNS`.
+    """Read one method's errors of one fold: `two_views.COLUMNS`.
 
     Raises
     ------

@@ -72,10 +72,10 @@ def evaluate_claims(
     Parameters
     ----------
     evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
-        Frames of `results.load_unit`; what is absent is reported as ``not run``.
+        Frames of `results.load_evaluations`; what is absent is reported as ``not run``.
     rng : numpy.random.Generator
         Seeds the object resamples, which all comparisons share. ``default_rng(seed)`` gives the
-        same intervals as the tables of ``ReadingSettings(seed=seed)``.
+        same intervals as the tables of ``ReportSettings(seed=seed)``.
     n_resamples : int
         Number of resamples.
     claims : sequence of Claim
@@ -85,8 +85,8 @@ def evaluate_claims(
     -------
     pandas.DataFrame
         Tidy: one row per comparison, `CLAIM_COLUMNS` (the same for all parts of a claim) and
-        `PART_COLUMNS`. ``point_verdict`` judges our figures as they stand, without intervals, as
-        the paper judges its own. ``difference`` is subject minus versus, in degrees or percent,
+        `PART_COLUMNS`. ``point_verdict`` judges our figures without their intervals, as the paper
+        judges its own. ``difference`` is subject minus versus, in degrees or percent,
         with its 95 % interval over objects, whatever direction the claim asks for.
     """
     evaluator = _Evaluator(evaluations, Resampler.seeded(rng, n_resamples))
@@ -136,23 +136,23 @@ class _Evaluator:
         }
         if a is None or b is None:
             return row
-        gap = a.minus(b)
+        found = a.minus(b)
         if isinstance(part, Comparable):
-            verdict = comparisons.comparable_verdict(gap.low, gap.high, part.margin)
+            verdict = comparisons.comparable_verdict(found.low, found.high, part.margin)
         else:
-            verdict = comparisons.better_verdict(part.statistic, gap.low, gap.high)
+            verdict = comparisons.better_verdict(part.statistic, found.low, found.high)
         fewest = min(
             paired.fewest_resampled(part.statistic, self._sample(term)) for term in (part.a, part.b)
         )
-        return row | {
-            "value": a.value,
-            "versus_value": b.value,
-            "difference": gap.value,
-            "ci_low": gap.low,
-            "ci_high": gap.high,
-            "part_verdict": comparisons.if_enough(verdict, fewest),
-            "n_objects": self._sample(part.a).n_objects,
-        }
+        return (
+            row
+            | {"value": a.value, "versus_value": b.value}
+            | found.columns("difference", "ci")
+            | {
+                "part_verdict": comparisons.if_enough(verdict, fewest),
+                "n_objects": self._sample(part.a).n_objects,
+            }
+        )
 
     def _measure_outliers(self, part: FreeOfOutliers) -> dict[str, Any]:
         row: dict[str, Any] = {

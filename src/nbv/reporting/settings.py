@@ -15,7 +15,7 @@ TRANSFER = "transfer"
 
 
 @dataclass(frozen=True)
-class ReadingSettings:
+class ReportSettings:
     """Choices that no result depends on, only what is shown of it.
 
     Attributes
@@ -50,7 +50,7 @@ class ReadingSettings:
     seed: int = 0
 
 
-def focus_category(units: Iterable[Unit], settings: ReadingSettings) -> str:
+def focus_category(units: Iterable[Unit], settings: ReportSettings) -> str:
     """Return the category that the detailed tables and figures are about.
 
     Raises
@@ -72,7 +72,7 @@ def focus_category(units: Iterable[Unit], settings: ReadingSettings) -> str:
     return wanted
 
 
-def reference_units(units: Iterable[Unit], settings: ReadingSettings) -> list[Unit]:
+def reference_units(units: Iterable[Unit], settings: ReportSettings) -> list[Unit]:
     """Return the units that categories are compared by: one of each, in the order given.
 
     Each category at the reference elevation, or where it was not run, at its lowest one.
@@ -84,7 +84,7 @@ def reference_units(units: Iterable[Unit], settings: ReadingSettings) -> list[Un
     ]
 
 
-def common_elevation_deg(units: Iterable[Unit], settings: ReadingSettings) -> int:
+def common_elevation_deg(units: Iterable[Unit], settings: ReportSettings) -> int:
     """Return the elevation that a heading over `reference_units` names; see `unit_label`."""
     elevations = {elevation for _, elevation in units}
     wanted = settings.reference_elevation_deg
@@ -98,14 +98,14 @@ def unit_label(unit: Unit, common_deg: int) -> str:
     return label if elevation == common_deg else f"{label} ({elevation}°)"
 
 
-def focus_unit(units: Iterable[Unit], settings: ReadingSettings) -> Unit:
+def focus_unit(units: Iterable[Unit], settings: ReportSettings) -> Unit:
     """Return the focus category at the reference elevation, or at its lowest one."""
     present = list(units)
     category = focus_category(present, settings)
     return category, _reference_elevation_deg(present, category, settings)
 
 
-def _reference_elevation_deg(units: list[Unit], category: str, settings: ReadingSettings) -> int:
+def _reference_elevation_deg(units: list[Unit], category: str, settings: ReportSettings) -> int:
     elevations = [elevation for name, elevation in units if name == category]
     wanted = settings.reference_elevation_deg
     return wanted if wanted in elevations else min(elevations)

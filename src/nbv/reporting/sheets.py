@@ -11,7 +11,9 @@ import pandas as pd
 from nbv.files import write_csv, write_text
 from nbv.labels import category_label, interval_text, method_label, number
 from nbv.reporting.grid import Cell, Grid, grid_latex, grid_markdown
-from nbv.statistics.object_means import gap, paired_objects, standing
+from nbv.statistics.object_means import mae_difference as gap
+from nbv.statistics.object_means import mae_interval as standing
+from nbv.statistics.object_means import paired_objects
 from nbv.statistics.paired import PairedErrors, Resampler
 
 

@@ -29,6 +29,14 @@ class Interval:
     low: float
     high: float
 
+    def columns(self, name: str, ends: str = "") -> dict[str, float]:
+        """Return the columns of a tidy table: ``name``, ``<ends>_low`` and ``<ends>_high``.
+
+        The ends are called after `name` unless `ends` says otherwise (``ci`` for a value).
+        """
+        ends = ends or name
+        return {name: self.value, f"{ends}_low": self.low, f"{ends}_high": self.high}
+
 
 def mae_deg(errors_deg: ArrayLike) -> float:
     """Return the mean absolute error over images, in degrees (Eq. 8).
@@ -48,6 +56,22 @@ def mae_deg(errors_deg: ArrayLike) -> float:
         If there is no error at all.
     """
     return float(np.mean(_non_empty(errors_deg)))
+
+
+def median_deg(errors_deg: ArrayLike) -> float:
+    """Return the median error over images, in degrees (Fig. 9). Lower is better.
+
+    Parameters
+    ----------
+    errors_deg : (n_images,) float
+        Circular distances in [0, 180].
+
+    Raises
+    ------
+    ValueError
+        If there is no error at all.
+    """
+    return float(np.median(_non_empty(errors_deg)))
 
 
 def pea(errors_deg: ArrayLike, thresholds_deg: ArrayLike) -> Floats:
@@ -78,14 +102,19 @@ def pauc(errors_deg: ArrayLike) -> float:
     """Return the area under PEA from 0 to 100 degrees, in percent of its largest value.
 
     Exactly ``100 - mean(min(error, 100))``: integrating the step of one image from 0 to 100
-    leaves the part of the range above its error. It is thus an MAE that counts no error beyond
+    leaves the part of the range above its error. It is thus an MAE that counts no error above
     100 degrees, and says little that the MAE does not unless half-turns are common. Higher is
-    better. The published values lie about 0.5 lower in most cells (a sum over whole degrees).
+    better. Many published values are lower than this can be (`nbv.paper.published`).
 
     Parameters
     ----------
     errors_deg : (n_images,) float
         Circular distances in [0, 180].
+
+    Raises
+    ------
+    ValueError
+        If there is no error at all.
     """
     return float(np.mean(accuracy_area(_non_empty(errors_deg))))
 

@@ -1,8 +1,8 @@
-"""How methods stand: the mean error of each object, and differences with their intervals."""
+"""The mean error of each object, and what methods differ by over objects."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,9 @@ from nbv.angles import travel_deg
 from nbv.files import existing, read_csv
 from nbv.statistics.metrics import Interval
 from nbv.statistics.paired import PairedErrors, Resampler, estimate
+
+FoldFile = tuple[str, int, int]
+"""What a file is about: category, elevation in degrees and fold (from 1)."""
 
 OBJECT_COLUMNS = ("method", "object_id", "n_images", "error_deg", "travel_deg")
 
@@ -39,19 +42,19 @@ def object_means(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)[list(OBJECT_COLUMNS)]
 
 
-def load_object_means(paths: Iterable[str | Path]) -> pd.DataFrame:
-    """Read `contest/<category>/el<EE>/fold<k>/objects.csv` files into one frame.
+def load_object_means(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
+    """Read what `object_means` gave for each unit and fold into one frame.
 
     Returns
     -------
     DataFrame
         ``category, elevation_deg, fold`` and `OBJECT_COLUMNS`.
     """
-    return _with_places(map(Path, paths))
+    return _load_folds(files)
 
 
-def load_choices(paths: Iterable[str | Path]) -> pd.DataFrame:
-    """Read the `choices.csv` that lie beside `objects.csv` files into one frame.
+def load_choices(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
+    """Read which policy and fusion each method has in each unit and fold into one frame.
 
     Returns
     -------
@@ -59,17 +62,15 @@ def load_choices(paths: Iterable[str | Path]) -> pd.DataFrame:
         ``category, elevation_deg, fold`` and the columns of
         `nbv.recommendation.method_selection.choices_frame`.
     """
-    return _with_places(Path(path).with_name("choices.csv") for path in paths)
+    return _load_folds(files)
 
 
-def _with_places(paths: Iterable[Path]) -> pd.DataFrame:
+def _load_folds(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
     parts = []
-    for path in paths:
-        category, elevation, fold = path.parts[-4:-1]
+    for place, path in files.items():
         rows = read_csv(existing(path))
-        rows.insert(0, "fold", int(fold.removeprefix("fold")))
-        rows.insert(0, "elevation_deg", int(elevation.removeprefix("el")))
-        rows.insert(0, "category", category)
+        for index, name in enumerate(("category", "elevation_deg", "fold")):
+            rows.insert(index, name, place[index])
         parts.append(rows)
     return pd.concat(parts, ignore_index=True)
 
@@ -93,12 +94,12 @@ def paired_objects(means: pd.DataFrame, category: str) -> PairedErrors:
     )
 
 
-def standing(sample: PairedErrors, method: str, resampler: Resampler) -> Interval:
+def mae_interval(sample: PairedErrors, method: str, resampler: Resampler) -> Interval:
     """Return a method's MAE in degrees with its 95 % interval over objects."""
     return estimate("mae", sample, method, resampler).interval()
 
 
-def gap(sample: PairedErrors, method: str, other: str, resampler: Resampler) -> Interval:
+def mae_difference(sample: PairedErrors, method: str, other: str, resampler: Resampler) -> Interval:
     """Return the paired difference of two methods' MAE in degrees, with its 95 % interval."""
     mine = estimate("mae", sample, method, resampler)
     return mine.minus(estimate("mae", sample, other, resampler))

@@ -1,13 +1,12 @@
 """Errors of several methods on the same images, and statistics with paired intervals.
 
-Everything that the tables and the claims say about a number goes through here, so that both
-state the same value and the same interval.
+Tables and claims take their figures from here, so both state the same value and interval.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,7 +46,7 @@ class PairedErrors:
     initial_deg : (n_images,) float
         Azimuth of the initial viewpoint.
     category_of : (n_objects,) tuple of str
-        Each object's category; objects of one category stand together, sorted by name.
+        Each object's category; the objects of one category follow one another, sorted by name.
     """
 
     errors_deg: Mapping[str, Floats]
@@ -78,7 +77,7 @@ class PairedErrors:
 
 
 def pair_methods(frame: pd.DataFrame, category: str) -> PairedErrors:
-    """Line up the methods of one unit (a frame of `results.load_unit`) image by image.
+    """Line up the methods of one unit (of `results.load_evaluations`) image by image.
 
     Raises
     ------
@@ -229,31 +228,43 @@ def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resam
     resampler : Resampler
         Source of the shared resamples.
     """
-    errors = sample.errors_deg[method]
+    errors, pooled = sample.errors_deg[method], statistic.removesuffix("_sigma")
+    if pooled != statistic:
+        return _estimate_sigma(pooled, sample, method, resampler)
+    drawn = resampler.multiplicities(sample)
     if statistic == "median":
-        drawn = resampler.multiplicities(sample)
-        medians = metrics.resampled_medians(errors, sample.objects, drawn)
-        return Estimate(float(np.median(errors)), medians)
-    per_image = metrics.accuracy_area(errors) if statistic.startswith("pauc") else errors
-    if not statistic.endswith("_sigma"):
-        drawn = resampler.multiplicities(sample)
-        means = metrics.resampled_means(per_image, sample.objects, drawn)
-        return Estimate(float(np.mean(per_image)), means)
-    drawn = resampler.multiplicities_by_fold(sample)
-    values, means_by_fold = [], []
-    for fold in np.unique(sample.folds):
-        mask = sample.folds == fold
-        values.append(float(np.mean(per_image[mask])))
-        means_by_fold.append(metrics.resampled_means(per_image[mask], sample.objects[mask], drawn))
-    if len(values) < 2:
-        return Estimate(float("nan"), np.full(resampler.n_resamples, np.nan))
-    return Estimate(metrics.fold_std(values), np.std(means_by_fold, axis=0, ddof=1))
+        samples = metrics.resampled_medians(errors, sample.objects, drawn)
+    else:
+        samples = metrics.resampled_means(_per_image(statistic, errors), sample.objects, drawn)
+    return Estimate(_METRICS[statistic](errors), samples)
 
 
 def fold_sigma(statistic: str, sample: PairedErrors, method: str) -> float:
     """Return σ over folds of the statistic (``mae`` or ``pauc``) of one method."""
-    errors = sample.errors_deg[method]
-    per_image = metrics.accuracy_area(errors) if statistic == "pauc" else errors
-    return metrics.fold_std(
-        [float(np.mean(per_image[sample.folds == fold])) for fold in np.unique(sample.folds)]
-    )
+    errors, metric = sample.errors_deg[method], _METRICS[statistic]
+    folds = np.unique(sample.folds)
+    return metrics.fold_std([metric(errors[sample.folds == fold]) for fold in folds])
+
+
+def _estimate_sigma(
+    statistic: str, sample: PairedErrors, method: str, resampler: Resampler
+) -> Estimate:
+    folds = [sample.folds == fold for fold in np.unique(sample.folds)]
+    if len(folds) < 2:
+        return Estimate(float("nan"), np.full(resampler.n_resamples, np.nan))
+    values = _per_image(statistic, sample.errors_deg[method])
+    drawn = resampler.multiplicities_by_fold(sample)
+    means = [metrics.resampled_means(values[f], sample.objects[f], drawn) for f in folds]
+    return Estimate(fold_sigma(statistic, sample, method), np.std(means, axis=0, ddof=1))
+
+
+def _per_image(statistic: str, errors_deg: Floats) -> Floats:
+    """Return what each image adds to a statistic that is a mean over images."""
+    return metrics.accuracy_area(errors_deg) if statistic == "pauc" else errors_deg
+
+
+_METRICS: Mapping[str, Callable[[Floats], float]] = {
+    "mae": metrics.mae_deg,
+    "median": metrics.median_deg,
+    "pauc": metrics.pauc,
+}

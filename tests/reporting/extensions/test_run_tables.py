@@ -17,7 +17,7 @@ from nbv.reporting.extensions.densities import (
     temperature_notes,
 )
 from nbv.reporting.extensions.runs import sidebyside_cells, sidebyside_markdown
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings as ReadingSettings
 
 UNITS = [("mug", 0)]
 N_FOLDS = 3

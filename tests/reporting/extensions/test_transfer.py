@@ -14,7 +14,7 @@ from nbv.reference.store import read_cells
 from nbv.reporting.extensions.transfer import build_transfer, load_transfer
 from nbv.reporting.paper.cells import CELL_COLUMNS
 from nbv.reporting.paper.layout import save_table, to_markdown
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings as ReadingSettings
 
 CONDITIONS = {
     "clean": {"sensor": "ideal", "framing": "silhouette"},

@@ -14,9 +14,9 @@ from nbv.reporting.grid import escape_latex
 from nbv.reporting.markdown import markdown_to_html, pipe_row
 from nbv.reporting.paper.layout import save_table, to_latex, to_markdown
 from nbv.reporting.paper.tables import TABLES, build_table
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings
 
-QUICK = ReadingSettings(n_resamples=100)
+QUICK = ReportSettings(n_resamples=100)
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,9 @@ import synthetic
 from nbv.errors import UserError
 from nbv.paper.published import PUBLISHED
 from nbv.reporting.paper.tables import TABLES, build_table
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings
 
-QUICK = ReadingSettings(n_resamples=200)
+QUICK = ReportSettings(n_resamples=200)
 
 
 @pytest.fixture(scope="module")
@@ -217,6 +217,6 @@ def test_mistakes_are_named(evaluations):
     with pytest.raises(UserError, match="no table 'tabel1'; did you mean 'table1'"):
         build_table("tabel1", evaluations)
     with pytest.raises(UserError, match="focus_category 'mugg' was not evaluated; did you mean"):
-        build_table("table2", evaluations, ReadingSettings(focus_category="mugg"))
+        build_table("table2", evaluations, ReportSettings(focus_category="mugg"))
     with pytest.raises(UserError, match="no evaluated category"):
         build_table("table1", {})

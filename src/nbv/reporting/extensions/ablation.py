@@ -11,7 +11,8 @@ import pandas as pd
 from nbv.labels import interval_text, number
 from nbv.reporting.grid import Cell, Grid
 from nbv.reporting.sheets import Sheet
-from nbv.statistics.object_means import gap, standing
+from nbv.statistics.object_means import mae_difference as gap
+from nbv.statistics.object_means import mae_interval as standing
 from nbv.statistics.paired import PairedErrors, Resampler
 
 

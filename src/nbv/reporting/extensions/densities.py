@@ -25,7 +25,8 @@ from nbv.recommendation.criteria.spreads import circular_variance, entropy
 from nbv.recommendation.lookup import load_lookup
 from nbv.reporting.markdown import pipe_row
 from nbv.reporting.paper.cells import CELL_COLUMNS, method_cells, shared_resampler
-from nbv.reporting.settings import ReadingSettings, common_elevation_deg, unit_label
+from nbv.reporting.settings import ReportSettings as ReadingSettings
+from nbv.reporting.settings import common_elevation_deg, unit_label
 from nbv.statistics.paired import pair_methods
 
 DENSITIES: Mapping[str, str] = {

@@ -13,7 +13,9 @@ from nbv.labels import category_label, interval_text, number
 from nbv.reporting.grid import Cell, Grid
 from nbv.reporting.sheets import Sheet
 from nbv.statistics.metrics import Interval
-from nbv.statistics.object_means import gap, indistinct_from_best, paired_objects, standing
+from nbv.statistics.object_means import indistinct_from_best, paired_objects
+from nbv.statistics.object_means import mae_difference as gap
+from nbv.statistics.object_means import mae_interval as standing
 from nbv.statistics.paired import PairedErrors, Resampler
 
 Block = tuple[str, str]

@@ -18,7 +18,8 @@ from nbv.experiments.results import Unit, load_unit
 from nbv.labels import method_label, number
 from nbv.reporting.markdown import pipe_row
 from nbv.reporting.paper.cells import CELL_COLUMNS, method_cells, shared_resampler
-from nbv.reporting.settings import ReadingSettings, common_elevation_deg, unit_label
+from nbv.reporting.settings import ReportSettings as ReadingSettings
+from nbv.reporting.settings import common_elevation_deg, unit_label
 from nbv.statistics.paired import pair_methods
 
 Runs = Mapping[str, tuple[Path, Sequence[str]]]

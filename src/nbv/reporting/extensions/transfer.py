@@ -16,7 +16,8 @@ import pandas as pd
 from nbv.experiments.results import Unit, read_evaluation, unit_dir
 from nbv.labels import category_label
 from nbv.reporting.paper.cells import Table, cell, shared_resampler
-from nbv.reporting.settings import TRANSFER, ReadingSettings
+from nbv.reporting.settings import TRANSFER
+from nbv.reporting.settings import ReportSettings as ReadingSettings
 from nbv.statistics import paired
 from nbv.statistics.paired import pair_methods
 

@@ -12,7 +12,7 @@ import pandas as pd
 from nbv.labels import method_label
 from nbv.paper import published
 from nbv.paper.published import Note
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings
 from nbv.statistics import paired
 from nbv.statistics.paired import PairedErrors, Resampler
 
@@ -44,10 +44,10 @@ class Table:
     row_header: str
     cells: pd.DataFrame
     notes: tuple[str, ...]
-    settings: ReadingSettings
+    settings: ReportSettings
 
 
-def shared_resampler(settings: ReadingSettings) -> Resampler:
+def shared_resampler(settings: ReportSettings) -> Resampler:
     """Return the object resamples that the tables and claims of one seed share."""
     return Resampler.seeded(np.random.default_rng(settings.seed), settings.n_resamples)
 
@@ -67,7 +67,7 @@ def assemble(
     title: str,
     row_header: str,
     cells: Iterable[dict[str, Any]],
-    settings: ReadingSettings,
+    settings: ReportSettings,
     *notes: str,
 ) -> Table:
     """Return the table of some cells, its notes followed by those on what it shows."""
@@ -94,7 +94,7 @@ def _applies(note: Note, cells: pd.DataFrame) -> bool:
     return bool(explained.any())
 
 
-def shows_difference(cells: pd.DataFrame, settings: ReadingSettings) -> bool:
+def shows_difference(cells: pd.DataFrame, settings: ReportSettings) -> bool:
     """Say whether the two methods of the paired difference are both among the cells."""
     return {settings.subject, settings.reference} <= set(cells["method"])
 
@@ -106,7 +106,7 @@ def method_cells(
     metric: str,
     sample: PairedErrors,
     resampler: Resampler,
-    settings: ReadingSettings,
+    settings: ReportSettings,
     comparable: bool,
 ) -> list[dict[str, Any]]:
     """Return one row's cells: a statistic of each method on the same images."""

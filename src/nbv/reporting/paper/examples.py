@@ -9,7 +9,7 @@ import pandas as pd
 
 from nbv.angles import circular_distance_deg
 from nbv.labels import method_label
-from nbv.reporting.settings import ReadingSettings
+from nbv.reporting.settings import ReportSettings
 
 _BASELINE = "single"
 _SMOOTHING_DEG = 15.0
@@ -24,7 +24,7 @@ class Example:
     reason: str
 
 
-def choose_example(frame: pd.DataFrame, settings: ReadingSettings) -> Example:
+def choose_example(frame: pd.DataFrame, settings: ReportSettings) -> Example:
     """Return the test object with the median single-view error in the example fold.
 
     The lower median where their number is even; the first by name where errors tie. The middle
@@ -35,7 +35,7 @@ def choose_example(frame: pd.DataFrame, settings: ReadingSettings) -> Example:
     ----------
     frame : pandas.DataFrame
         One unit, from `results.load_unit`.
-    settings : ReadingSettings
+    settings : ReportSettings
         Gives the fold.
     """
     folds = sorted(frame["fold"].unique())

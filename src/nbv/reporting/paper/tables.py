@@ -23,7 +23,7 @@ from nbv.paper import published
 from nbv.reporting.paper.cells import Table, assemble, cell, method_cells, shared_resampler
 from nbv.reporting.paper.examples import choose_example, example_row
 from nbv.reporting.settings import (
-    ReadingSettings,
+    ReportSettings,
     common_elevation_deg,
     focus_category,
     focus_unit,
@@ -37,7 +37,7 @@ Evaluations = Mapping[Unit, pd.DataFrame]
 
 
 def build_table(
-    name: str, evaluations: Evaluations, settings: ReadingSettings | None = None
+    name: str, evaluations: Evaluations, settings: ReportSettings | None = None
 ) -> Table:
     """Build one of the paper's tables from whatever of it was run.
 
@@ -47,7 +47,7 @@ def build_table(
         ``table1`` to ``table7``.
     evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
         Frames of `results.load_unit`. Tables have rows for what is present only.
-    settings : ReadingSettings, optional
+    settings : ReportSettings, optional
         Defaults are the paper's.
 
     Raises
@@ -57,13 +57,13 @@ def build_table(
     """
     if name not in _BUILDERS:
         raise UserError(f"no table {name!r}; {nearest(name, _BUILDERS)}")
-    chosen = settings or ReadingSettings()
+    chosen = settings or ReportSettings()
     if not evaluations:
         raise UserError(f"{name}: no evaluated category and elevation; run the workflow first")
     return _BUILDERS[name](name, evaluations, chosen)
 
 
-def _by_category(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
     metric = "mae" if name == "table1" else "pauc"
     units = reference_units(evaluations, settings)
     elevation = common_elevation_deg(units, settings)
@@ -79,7 +79,7 @@ def _by_category(name: str, evaluations: Evaluations, settings: ReadingSettings)
     return assemble(name, title, "Category", cells, settings)
 
 
-def _by_elevation(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+def _by_elevation(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
     metric = "mae" if name == "table2" else "pauc"
     category = focus_category(evaluations, settings)
     resampler = shared_resampler(settings)
@@ -100,7 +100,7 @@ def _by_elevation(name: str, evaluations: Evaluations, settings: ReadingSettings
     return assemble(name, title, "Elevation", cells, settings)
 
 
-def _by_group(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+def _by_group(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
     category, elevation = focus_unit(evaluations, settings)
     resampler = shared_resampler(settings)
     everything = pair_methods(evaluations[category, elevation], category)
@@ -125,7 +125,7 @@ def _by_group(name: str, evaluations: Evaluations, settings: ReadingSettings) ->
     return assemble(name, title, "Viewpoint group", cells, settings)
 
 
-def _examples(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+def _examples(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
     unit = focus_unit(evaluations, settings)
     frame = evaluations[unit]
     example = choose_example(frame, settings)
@@ -158,7 +158,7 @@ def _examples(name: str, evaluations: Evaluations, settings: ReadingSettings) ->
     return assemble(name, title, "Initial azimuth", cells, settings, note)
 
 
-def _by_fold(name: str, evaluations: Evaluations, settings: ReadingSettings) -> Table:
+def _by_fold(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
     category, elevation = focus_unit(evaluations, settings)
     resampler = shared_resampler(settings)
     everything = pair_methods(evaluations[category, elevation], category)
@@ -197,7 +197,7 @@ def _by_fold(name: str, evaluations: Evaluations, settings: ReadingSettings) -> 
 
 _METRIC_TITLES: Mapping[str, str] = {"mae": "MAE", "pauc": "pAUC"}
 
-_BUILDERS: Mapping[str, Callable[[str, Evaluations, ReadingSettings], Table]] = {
+_BUILDERS: Mapping[str, Callable[[str, Evaluations, ReportSettings], Table]] = {
     "table1": _by_category,
     "table2": _by_elevation,
     "table3": _by_category,
