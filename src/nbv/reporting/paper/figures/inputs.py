@@ -18,12 +18,7 @@ from nbv.files import existing
 from nbv.recommendation.criteria import cost_unit
 from nbv.recommendation.lookup import LookupTable, load_lookup
 from nbv.reporting.paper.examples import Example, choose_example, example_row, hardest_azimuth_deg
-<<<<<<< HEAD
 from nbv.reporting.settings import ReportSettings, focus_unit
-=======
-from nbv.reporting.settings import ReportSettings as ReadingSettings
-from nbv.reporting.settings import focus_unit
->>>>>>> reporting
 
 Codes = NDArray[np.uint8]
 Key = TypeVar("Key")
