@@ -1,4 +1,4 @@
-"""Curves beyond the paper: error against travel, and against the number of views."""
+"""Curves of extensions: error against travel, and against the number of views."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from nbv.experiments.travel import ANY_DIRECTION
 from nbv.labels import category_label, method_label
 from nbv.reporting.style import RC, method_style, new_figure
+from nbv.reporting.table import Table
 
 _COLUMNS = 3
 _BASELINES: Mapping[str, str] = {
@@ -58,13 +59,13 @@ def _legend(figure: Figure, panels: list[Axes]) -> None:
 
 
 @mpl.rc_context(RC)
-def sequences(cells: pd.DataFrame) -> Figure:
+def more_views_figure(cells: pd.DataFrame) -> Figure:
     """Draw the error against the number of views, a panel for each category.
 
     Parameters
     ----------
     cells : DataFrame
-        Of `nbv.reporting.sheets.sequence_sheet`.
+        Of `nbv.reporting.extensions.more_views.more_views_table`.
     """
     categories = list(dict.fromkeys(cells["category"]))
     methods = tuple(dict.fromkeys(cells["method"]))
@@ -84,7 +85,7 @@ def sequences(cells: pd.DataFrame) -> Figure:
 
 
 @mpl.rc_context(RC)
-def travel(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
+def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
     """Draw the error against the mean travel as its price rises, a panel for each category.
 
     Parameters
@@ -109,3 +110,16 @@ def travel(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figu
         axes.set_ylabel("MAE (°)")
     _legend(figure, panels)
     return figure
+
+
+def travel_table(curves: Mapping[str, pd.DataFrame]) -> Table:
+    """Return the curves as a table that has a CSV file only.
+
+    Parameters
+    ----------
+    curves : mapping of str to DataFrame
+        By category, of `nbv.experiments.travel.pooled_travel`.
+    """
+    cells = pd.concat([curve.assign(category=category) for category, curve in curves.items()])
+    title = "Error against travel"
+    return Table("travel", title, title, cells, header=(), rows=(), decimals=6)
