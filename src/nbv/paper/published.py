@@ -64,8 +64,8 @@ class PublishedTable:
 
 _PAUC_NOTE = Note(
     "The published pAUC is below 100 − MAE, the least that the exact integral can be, in 32 of the "
-    "44 cells of Tables 3 and 4, by 0.53 at most. A sum over whole degrees would be about 0.5 below "
-    "the integral. Ours is exact.",
+    "44 cells of Tables 3 and 4, by 0.53 at most. A sum over whole degrees would be about 0.5 "
+    "below the integral. Ours is exact.",
     metric="pauc",
 )
 

@@ -45,7 +45,7 @@ from nbv.reference.store import (
     read_verdicts,
     table_files,
 )
-from nbv.reporting.paper.cells import CELL_COLUMNS
+from nbv.reporting.cells import CELL_COLUMNS
 from nbv.reporting.settings import TRANSFER
 
 IDENTICAL, WITHIN, OUTSIDE, UNJUDGED = "identical", "within", "outside", "not judged"

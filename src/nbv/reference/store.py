@@ -13,7 +13,7 @@ from nbv.errors import UserError
 from nbv.files import existing, read_csv, replacing
 from nbv.provenance import read_provenance
 from nbv.rendering.noise import IDEAL
-from nbv.reporting.paper.cells import CELL_COLUMNS
+from nbv.reporting.cells import CELL_COLUMNS
 from nbv.reporting.settings import TRANSFER
 from nbv.schema import default_of
 

@@ -43,7 +43,7 @@ class ReportSettings:
     reference_elevation_deg: int = 0
     example_fold: int = 2
     example_initial_deg: tuple[int, ...] = (0, 30, 210, 330)
-    criterion: str = "entropy"
+    criterion: str = "pose_ambiguity"
     subject: str = "proposed"
     reference: str = "opposite"
     n_resamples: int = 2000

@@ -142,7 +142,7 @@ def test_the_example_is_the_median_object_of_fold_2(evaluations, rows):
         assert [cell(table, str(azimuth), "proposed", "error")["value"]] == expected
 
 
-def test_published_figures_stand_beside_the_same_category_and_elevation_only(evaluations):
+def test_published_figures_are_shown_for_the_same_category_and_elevation_only(evaluations):
     table = build_table("table1", evaluations, QUICK)
     assert cell(table, "mug", "opposite", "mae")["published"] == 11.03
     assert cell(table, "chair", "single", "mae")["published"] == 10.88
@@ -158,7 +158,8 @@ def test_every_category_has_a_row(evaluations):
         table = build_table(name, units, QUICK)
         labels = table.cells.drop_duplicates("row").set_index("row")["row_label"]
         assert labels.to_dict() == {"mug": "Mug (30°)", "chair": "Chair"}
-        assert "elevation 0°" in table.title
+        assert table.heading.endswith("by category at elevation 0°")
+        assert table.heading == f"Table {name[-1]}: {table.caption}"
         shown = table.cells.groupby("row")["published"].agg(lambda printed: printed.notna().any())
         assert shown.to_dict() == {"mug": False, "chair": True}
 
@@ -198,7 +199,7 @@ def test_tables_work_with_what_is_present(evaluations, name):
     assert table.cells["value"].notna().all() or name == "table7"
 
 
-def test_methods_beyond_the_papers_become_columns(evaluations):
+def test_further_methods_become_columns(evaluations):
     frame = evaluations["mug", 0].astype({"method": str})
     extra = frame[frame["method"] == "proposed"].assign(method="expected_error")
     joined = {("mug", 0): pd.concat([frame, extra], ignore_index=True)}

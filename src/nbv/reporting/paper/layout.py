@@ -1,183 +1,168 @@
-"""Tables as people read them: Markdown and LaTeX twins, laid out as in the paper.
+"""The rows and notes of the paper's tables, laid out as in the paper.
 
-Each cell reads ``ours [published]``, the best method of a row in bold. A last column gives the
-paired difference to the reference method with its interval, so that a gap can be told from noise
-without another table.
+A cell shows ``ours [published]``, the best method of a row in bold. Tables 1 to 5 close with the
+paired difference to the reference method and its interval, so that a difference can be told from
+noise without another table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
 
-from nbv.files import write_csv, write_text
 from nbv.labels import MINUS, interval_text, method_label, number
-from nbv.paper import published
-from nbv.reporting.grid import Cell, Grid, grid_latex, grid_markdown
-from nbv.reporting.paper.cells import Table, shows_difference
-from nbv.reporting.settings import TRANSFER
+from nbv.paper.published import PUBLISHED, SIGMA_ROW, Note
+from nbv.reporting.settings import ReportSettings
+from nbv.reporting.table import Cell, Row
 
-_METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}
+Body = tuple[list[str], list[Row]]
+"""The titles of the columns after the first, and the rows."""
 
-
-def save_table(table: Table, stem: str | Path) -> list[Path]:
-    """Write ``<stem>.csv`` (tidy), ``<stem>.md`` and ``<stem>.tex``; return the three paths."""
-    stem = Path(stem)
-    paths = [stem.with_name(f"{stem.name}{suffix}") for suffix in (".csv", ".md", ".tex")]
-    write_csv(paths[0], table.cells)
-    write_text(paths[1], to_markdown(table))
-    write_text(paths[2], to_latex(table))
-    return paths
+METRIC_TITLES = {"mae": "MAE", "pauc": "pAUC"}
 
 
-def to_markdown(table: Table) -> str:
-    """Return the table as a heading, a pipe table and its notes as a list."""
-    return grid_markdown(heading(table), _grid(table), _notes(table))
-
-
-def to_latex(table: Table) -> str:
-    """Return the table as LaTeX; see `nbv.reporting.grid.grid_latex`."""
-    return grid_latex(table.name, table.title, _grid(table), _notes(table))
-
-
-def heading(table: Table) -> str:
-    """Return the table's number, where it has one, and title."""
-    if table.name == TRANSFER:
-        return table.title
-    return f"Table {table.name.removeprefix('table')}: {table.title}"
-
-
-def _notes(table: Table) -> list[str]:
-    cells = table.cells
-    objects = cells.groupby("row_label", sort=False)["n_objects"].max()
-    if objects.min() == objects.max() or table.name == "table7":
-        counts = (
-            f"{int(objects.max())} test objects, {int(cells['n_images'].max()):,} initial views"
-        )
-        counts += " in each row" if table.name != "table7" else ""
-    else:
-        counts = "Test objects: " + ", ".join(f"{row} {int(n)}" for row, n in objects.items())
-    shown = [] if table.name == "table6" else [f"{counts}."]
-    if table.name == TRANSFER:
-        shown.insert(0, "The best of each column in bold, for each method.")
-    elif cells["published"].notna().any() and table.name != "table6":
-        shown.insert(0, "Ours [published]; our best of each row in bold.")
-    elif table.name != "table6":
-        shown.insert(0, "The best of each row in bold; the paper prints no such figures.")
-    return [*shown, *table.notes]
-
-
-def _grid(table: Table) -> Grid:
-    if table.name == TRANSFER:
-        return _transfer_grid(table)
-    if table.name == "table6":
-        return _example_grid(table)
-    if table.name == "table7":
-        return _fold_grid(table)
-    return _comparison_grid(table)
-
-
-def _comparison_grid(table: Table) -> Grid:
+def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
     """Rows by methods, then the difference of the subject to the reference (Tables 1 to 5)."""
-    cells, settings = table.cells, table.settings
-    methods = list(dict.fromkeys(cells["method"]))
-    degrees = "°" if cells["metric"].iloc[0] == "mae" else ""
-    gap = f"{method_label(settings.subject)} {MINUS} {method_label(settings.reference)}"
-    shows_gap = shows_difference(cells, settings)
+    methods, unit = _methods(cells), _unit(cells)
+    differs = _shows_difference(cells, settings)
     rows = []
     for label, part in cells.groupby("row_label", sort=False):
-        row = [Cell(str(label))]
-        row += _method_cells(part, methods, degrees)
-        if shows_gap:
-            row.append(Cell(_gap_text(part[part["method"] == settings.subject].iloc[0])))
+        row = [Cell(str(label)), *_values(part, methods, unit)]
+        if differs:
+            subject = part[part["method"] == settings.subject].iloc[0]
+            ends = subject["difference_low"], subject["difference_high"]
+            row.append(Cell(interval_text(subject["difference"], *ends)))
         rows.append(tuple(row))
-    header = [table.row_header, *map(method_label, methods)] + ([gap] if shows_gap else [])
-    return Grid(tuple(header), tuple(rows))
+    titles = [method_label(method) for method in methods]
+    return titles + ([_difference_title(settings)] if differs else []), rows
 
 
-def _fold_grid(table: Table) -> Grid:
-    """Folds by (method, metric), as the paper's Table 7."""
-    cells = table.cells
-    methods = list(dict.fromkeys(cells["method"]))
+def fold_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
+    """Folds by methods and, for each, MAE and pAUC (Table 7)."""
+    methods = _methods(cells)
     rows = []
     for label, part in cells.groupby("row_label", sort=False):
-        by_metric = {
-            metric: _method_cells(part[part["metric"] == metric], methods, degrees)
-            for metric, degrees in (("mae", "°"), ("pauc", ""))
-        }
-        row = [Cell(str(label))]
-        for position in range(len(methods)):
-            row += [by_metric["mae"][position], by_metric["pauc"][position]]
-        rows.append(tuple(row))
-    header = [table.row_header]
-    for method in methods:
-        header += [f"{method_label(method)} {label}" for label in _METRIC_LABELS.values()]
-    return Grid(tuple(header), tuple(rows))
+        of_metric = [part[part["metric"] == metric] for metric in METRIC_TITLES]
+        columns = [_values(found, methods, _unit(found)) for found in of_metric]
+        pairs = zip(*columns, strict=True)
+        rows.append((Cell(str(label)), *(cell for pair in pairs for cell in pair)))
+    titles = METRIC_TITLES.values()
+    return [f"{method_label(method)} {title}" for method in methods for title in titles], rows
 
 
-def _transfer_grid(table: Table) -> Grid:
-    """Methods and conditions trained on by conditions tested on; the best of each column."""
-    cells = table.cells
-    tested = list(dict.fromkeys(cells["tested_on"]))
-    lowest = cells.groupby(["method", "tested_on"])["value"].min().round(2).to_dict()
-    rows = []
-    for (method, trained), part in cells.groupby(["method", "trained_on"], sort=False):
-        row = [Cell(method_label(str(method))), Cell(str(trained))]
-        for cell in part.to_dict("records"):
-            value = round(cell["value"], 2)
-            interval = f"({number(cell['ci_low'])} to {number(cell['ci_high'])})"
-            is_best = value == lowest[method, cell["tested_on"]]
-            row.append(Cell(f"{number(value)}°", bool(is_best), interval))
-        rows.append(tuple(row))
-    return Grid(("Method", table.row_header, *tested), tuple(rows))
-
-
-def _example_grid(table: Table) -> Grid:
-    """Ours and the published example in paired rows: they are different objects (Table 6)."""
-    cells = table.cells
-    methods = list(dict.fromkeys(cells["method"]))
-    rows = []
+def example_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
+    """Ours and the published example in pairs of rows: they are different objects (Table 6)."""
+    methods = _methods(cells)
+    rows: list[Row] = []
     for label, part in cells.groupby("row_label", sort=False):
         errors = part[part["metric"] == "error"].set_index("method")
         estimates = part[part["metric"] == "estimate"].set_index("method")
         for column, suffix in (("value", ""), ("published", ", published")):
-            if errors[column].isna().all():
-                continue
-            lowest = errors[column].round(1).min()
-            row = [Cell(f"{label}{suffix}")]
-            for method in methods:
-                estimate, error = estimates[column].get(method), errors[column].get(method)
-                if estimate is None or error is None or not np.isfinite(error):
-                    row.append(Cell("–"))
-                    continue
-                turned = number(round(estimate, 1) % 360, 1)  # 359.96 reads 0.0, not 360.0
-                text = f"{turned}° ({number(error, 1)}°)"
-                row.append(Cell(text, bool(round(error, 1) == lowest)))
-            rows.append(tuple(row))
-    return Grid((table.row_header, *map(method_label, methods)), tuple(rows))
+            found = errors[column].reindex(methods)
+            if found.notna().any():
+                shown = _examples(estimates[column].reindex(methods), found)
+                rows.append((Cell(f"{label}{suffix}"), *shown))
+    return [method_label(method) for method in methods], rows
 
 
-def _method_cells(part: pd.DataFrame, methods: Sequence[str], degrees: str) -> list[Cell]:
-    """Return ``ours [published]`` per method; the best, as printed, is marked."""
-    values = part.set_index("method")["value"].round(2)
-    is_sigma = (part["row"] == published.SIGMA_ROW).all()
-    lower = is_sigma or (part["metric"] == "mae").all()
-    best = values.min() if lower else values.max()
+def comparison_notes(name: str, cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
+    """Say what is shown, how many objects it rests on, and what the difference is."""
+    yield _legend(cells)
+    objects = cells.groupby("row_label", sort=False)["n_objects"].max()
+    if objects.min() == objects.max():
+        yield f"{_counts(cells)} in each row."
+    else:
+        yield f"Test objects: {', '.join(f'{row} {int(n)}' for row, n in objects.items())}."
+    if _shows_difference(cells, settings):
+        yield (
+            f"{_difference_title(settings)} is the paired difference with its 95 % interval over "
+            f"objects ({settings.n_resamples} resamples)."
+        )
+    yield from _published_notes(name, cells)
+
+
+def fold_notes(name: str, cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
+    """Say what is shown, and how many objects all folds together rest on."""
+    yield _legend(cells)
+    yield f"{_counts(cells)}."
+    yield "The average is over the pooled images of all folds."
+    yield from _published_notes(name, cells)
+
+
+def example_notes(name: str, cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
+    """Say what is to be known about the published examples."""
+    yield from _published_notes(name, cells)
+
+
+def _methods(cells: pd.DataFrame) -> list[str]:
+    return list(dict.fromkeys(cells["method"]))
+
+
+def _unit(cells: pd.DataFrame) -> str:
+    return "°" if (cells["metric"] == "mae").all() else ""
+
+
+def _values(row: pd.DataFrame, methods: list[str], unit: str) -> list[Cell]:
+    """Return ``ours [published]`` per method; the best of the row, as printed, is bold."""
+    by_method = row.set_index("method").reindex(methods)
+    values = by_method["value"].round(2)
+    lower_is_better = (row["row"] == SIGMA_ROW).all() or (row["metric"] == "mae").all()
+    best = values.min() if lower_is_better else values.max()
     cells = []
-    for method in methods:
-        row = part[part["method"] == method]
-        if row.empty or not np.isfinite(values[method]):
+    for value, published in zip(values, by_method["published"], strict=True):
+        if np.isfinite(value):
+            after = f"[{number(published)}{unit}]" if np.isfinite(published) else ""
+            cells.append(Cell(f"{number(value)}{unit}", bool(value == best), after))
+        else:
             cells.append(Cell("–"))
-            continue
-        text = f"{number(values[method])}{degrees}"
-        printed = float(row["published"].iloc[0])
-        beside = f"[{number(printed)}{degrees}]" if np.isfinite(printed) else ""
-        cells.append(Cell(text, bool(values[method] == best), beside))
     return cells
 
 
-def _gap_text(cell: pd.Series) -> str:
-    return interval_text(cell["difference"], cell["difference_low"], cell["difference_high"])
+def _examples(estimates: pd.Series, errors: pd.Series) -> Iterator[Cell]:
+    """Yield ``estimate (error)`` per method; the least error, as printed, is bold."""
+    least = errors.round(1).min()
+    for estimate, error in zip(estimates, errors, strict=True):
+        if np.isfinite(error):
+            turned = number(round(estimate, 1) % 360, 1)  # 359.96 is shown as 0.0, not as 360.0
+            yield Cell(f"{turned}° ({number(error, 1)}°)", bool(round(error, 1) == least))
+        else:
+            yield Cell("–")
+
+
+def _shows_difference(cells: pd.DataFrame, settings: ReportSettings) -> bool:
+    return {settings.subject, settings.reference} <= set(cells["method"])
+
+
+def _difference_title(settings: ReportSettings) -> str:
+    return f"{method_label(settings.subject)} {MINUS} {method_label(settings.reference)}"
+
+
+def _legend(cells: pd.DataFrame) -> str:
+    if cells["published"].notna().any():
+        return "Ours [published]; our best of each row in bold."
+    return "The best of each row in bold; the paper prints no such figures."
+
+
+def _counts(cells: pd.DataFrame) -> str:
+    objects, images = int(cells["n_objects"].max()), int(cells["n_images"].max())
+    return f"{objects} test objects, {images:,} initial views"
+
+
+def _published_notes(name: str, cells: pd.DataFrame) -> Iterator[str]:
+    for note in PUBLISHED[name].notes:
+        if _explains(note, cells):
+            yield note.text
+
+
+def _explains(note: Note, cells: pd.DataFrame) -> bool:
+    """Say whether a figure that the note explains is among the cells."""
+    explained = pd.Series(True, index=cells.index) if note.ours else cells["published"].notna()
+    if note.metric:
+        explained &= cells["metric"] == note.metric
+    if note.rows:
+        explained &= cells["row"].isin(note.rows)
+    if note.method:
+        explained &= cells["method"] == note.method
+    return bool(explained.any())

@@ -1,17 +1,13 @@
-"""The paper's Tables 1 to 7 from our results, tidy: one row per cell.
+"""The paper's Tables 1 to 7 from our results, laid out as in the paper.
 
-Columns of `cells.Table.cells`: ``table, row, row_label, method, metric, value, sigma, published,
-ci_low, ci_high, difference, difference_low, difference_high, n_objects, n_images``.
-
-``value`` is in degrees (``mae``, ``estimate``, ``error``) or percent (``pauc``), pooled over the
-images of all folds; ``sigma`` is the sample standard deviation of the cell's figure per fold;
-``ci_*`` its 95 % interval over objects; ``difference*`` the paired difference to the reference
-method (Opposite, unless set otherwise).
+Their CSV files are tidy, one row per cell; see `nbv.reporting.cells` for the columns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,8 +16,10 @@ from nbv.errors import UserError, nearest
 from nbv.experiments.results import Unit
 from nbv.labels import category_label
 from nbv.paper import published
-from nbv.reporting.paper.cells import Table, assemble, cell, method_cells, shared_resampler
+from nbv.reporting.cells import CELL_COLUMNS, cell, method_cells, shared_resampler
+from nbv.reporting.paper import layout
 from nbv.reporting.paper.examples import choose_example, example_row
+from nbv.reporting.paper.layout import METRIC_TITLES, Body
 from nbv.reporting.settings import (
     ReportSettings,
     common_elevation_deg,
@@ -30,10 +28,12 @@ from nbv.reporting.settings import (
     reference_units,
     unit_label,
 )
+from nbv.reporting.table import Table
 from nbv.statistics import paired
-from nbv.statistics.paired import pair_methods
+from nbv.statistics.paired import PairedErrors, pair_methods
 
 Evaluations = Mapping[Unit, pd.DataFrame]
+"""Frames of `results.load_evaluations` by category and elevation."""
 
 
 def build_table(
@@ -46,7 +46,7 @@ def build_table(
     name : str
         ``table1`` to ``table7``.
     evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
-        Frames of `results.load_unit`. Tables have rows for what is present only.
+        Frames of `results.load_evaluations`. Tables have rows for what is present only.
     settings : ReportSettings, optional
         Defaults are the paper's.
 
@@ -55,15 +55,45 @@ def build_table(
     UserError
         If there is no such table, or nothing was evaluated.
     """
-    if name not in _BUILDERS:
-        raise UserError(f"no table {name!r}; {nearest(name, _BUILDERS)}")
-    chosen = settings or ReportSettings()
+    if name not in _KINDS:
+        raise UserError(f"no table {name!r}; {nearest(name, _KINDS)}")
     if not evaluations:
         raise UserError(f"{name}: no evaluated category and elevation; run the workflow first")
-    return _BUILDERS[name](name, evaluations, chosen)
+    kind, chosen = _KINDS[name], settings or ReportSettings()
+    made = kind.measure(name, evaluations, chosen)
+    cells = pd.DataFrame(made.cells, columns=list(CELL_COLUMNS))
+    header, rows = kind.body(cells, chosen)
+    return Table(
+        name,
+        f"Table {name.removeprefix('table')}: {made.title}",
+        made.title,
+        cells,
+        (made.row_title, *header),
+        tuple(rows),
+        (*made.notes, *kind.notes(name, cells, chosen)),
+    )
 
 
-def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
+@dataclass(frozen=True)
+class _Measured:
+    """The figures of a table, and the words that depend on what was evaluated."""
+
+    title: str
+    row_title: str
+    cells: list[dict[str, Any]]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """How a table is measured and laid out."""
+
+    measure: Callable[[str, Evaluations, ReportSettings], _Measured]
+    body: Callable[[pd.DataFrame, ReportSettings], Body] = layout.comparison_body
+    notes: Callable[[str, pd.DataFrame, ReportSettings], Iterator[str]] = layout.comparison_notes
+
+
+def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
     metric = "mae" if name == "table1" else "pauc"
     units = reference_units(evaluations, settings)
     elevation = common_elevation_deg(units, settings)
@@ -72,140 +102,113 @@ def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) 
     for unit in units:
         sample = pair_methods(evaluations[unit], unit[0])
         label = unit_label(unit, elevation)
-        cells += method_cells(
-            name, unit[0], label, metric, sample, resampler, settings, unit[1] == 0
-        )
-    title = f"{_METRIC_TITLES[metric]} by category at elevation {elevation}°"
-    return assemble(name, title, "Category", cells, settings)
+        made = method_cells(name, unit[0], label, metric, sample, resampler, settings)
+        cells += _with_published(made) if unit[1] == 0 else made
+    title = f"{METRIC_TITLES[metric]} by category at elevation {elevation}°"
+    return _Measured(title, "Category", cells)
 
 
-def _by_elevation(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
+def _by_elevation(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
     metric = "mae" if name == "table2" else "pauc"
     category = focus_category(evaluations, settings)
     resampler = shared_resampler(settings)
     cells = []
-    for elevation in sorted(elevation for name_, elevation in evaluations if name_ == category):
+    for elevation in sorted(degrees for one, degrees in evaluations if one == category):
         sample = pair_methods(evaluations[category, elevation], category)
-        cells += method_cells(
-            name,
-            str(elevation),
-            f"{elevation}°",
-            metric,
-            sample,
-            resampler,
-            settings,
-            category == published.FOCUS_CATEGORY,
-        )
-    title = f"{_METRIC_TITLES[metric]} of {category_label(category)} by elevation"
-    return assemble(name, title, "Elevation", cells, settings)
+        row = str(elevation), f"{elevation}°"
+        cells += method_cells(name, *row, metric, sample, resampler, settings)
+    if category == published.FOCUS_CATEGORY:
+        cells = _with_published(cells)
+    title = f"{METRIC_TITLES[metric]} of {category_label(category)} by elevation"
+    return _Measured(title, "Elevation", cells)
 
 
-def _by_group(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
-    category, elevation = focus_unit(evaluations, settings)
+def _by_group(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
+    unit, everything = _focus_sample(evaluations, settings)
     resampler = shared_resampler(settings)
-    everything = pair_methods(evaluations[category, elevation], category)
     groups = paired.viewpoint_group(everything.initial_deg)
     cells = []
     for group, (start, stop) in paired.VIEWPOINT_GROUPS.items():
-        mask = groups == group
-        if not mask.any():
-            continue
-        span = f"{start}–359°, 0–{stop - 1}°" if start > stop else f"{start}–{stop - 1}°"
-        cells += method_cells(
-            name,
-            str(group),
-            f"{group} ({span})",
-            "mae",
-            everything.select(mask),
-            resampler,
-            settings,
-            (category, elevation) == (published.FOCUS_CATEGORY, 0),
-        )
-    title = f"MAE of {category_label(category)} by viewpoint group at elevation {elevation}°"
-    return assemble(name, title, "Viewpoint group", cells, settings)
+        if (groups == group).any():
+            span = f"{start}–359°, 0–{stop - 1}°" if start > stop else f"{start}–{stop - 1}°"
+            sample = everything.select(groups == group)
+            row = str(group), f"{group} ({span})"
+            cells += method_cells(name, *row, "mae", sample, resampler, settings)
+    title = f"MAE of {_of_focus(unit, 'by viewpoint group')}"
+    return _Measured(title, "Viewpoint group", _published_of_focus(unit, cells))
 
 
-def _examples(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
-    unit = focus_unit(evaluations, settings)
-    frame = evaluations[unit]
-    example = choose_example(frame, settings)
-    comparable = unit == (published.FOCUS_CATEGORY, 0)
-    cells = []
-    for azimuth in settings.example_initial_deg:
-        for method in settings.methods:
-            row = example_row(frame, example, method, azimuth)
-            if row is None:
-                continue
-            for metric, column in (("estimate", "pose_estimate_deg"), ("error", "error_deg")):
-                printed = published.published_value(name, metric, str(azimuth), method)
-                cells.append(
-                    cell(
-                        name,
-                        str(azimuth),
-                        f"{azimuth}°",
-                        method=method,
-                        metric=metric,
-                        value=float(row[column]),
-                        published=np.nan if printed is None or not comparable else printed,
-                        n_objects=1,
-                        n_images=1,
-                    )
-                )
-    title = (
-        f"Examples of estimates (and errors) for {category_label(unit[0])} at elevation {unit[1]}°"
-    )
-    note = f"Object {example.object_id} of fold {example.fold}: {example.reason}."
-    return assemble(name, title, "Initial azimuth", cells, settings, note)
-
-
-def _by_fold(name: str, evaluations: Evaluations, settings: ReportSettings) -> Table:
-    category, elevation = focus_unit(evaluations, settings)
+def _by_fold(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
+    unit, everything = _focus_sample(evaluations, settings)
     resampler = shared_resampler(settings)
-    everything = pair_methods(evaluations[category, elevation], category)
-    comparable = (category, elevation) == (published.FOCUS_CATEGORY, 0)
     rows = [
         (str(fold), f"Fold {fold}", everything.select(everything.folds == fold))
         for fold in np.unique(everything.folds)
     ]
     rows.append((published.AVERAGE_ROW, "Average", everything))
     cells = []
-    for metric in ("mae", "pauc"):
+    for metric in METRIC_TITLES:
         for row, label, sample in rows:
-            cells += method_cells(name, row, label, metric, sample, resampler, settings, comparable)
-        cells += [
-            found | {"metric": metric}
-            for found in method_cells(
-                name,
-                published.SIGMA_ROW,
-                "σ",
-                f"{metric}_sigma",
-                everything,
-                resampler,
-                settings,
-                comparable=False,
-            )
-        ]
-    for one in cells:
-        if one["row"] == published.SIGMA_ROW:
-            one["sigma"] = np.nan
-            printed = published.published_value(name, one["metric"], one["row"], one["method"])
-            one["published"] = np.nan if printed is None or not comparable else printed
-    title = f"MAE and pAUC of {category_label(category)} by fold at elevation {elevation}°"
-    note = "The average is over the pooled images of all folds."
-    return assemble(name, title, "Fold", cells, settings, note)
+            cells += method_cells(name, row, label, metric, sample, resampler, settings)
+        over_folds = name, published.SIGMA_ROW, "σ", f"{metric}_sigma"
+        made = method_cells(*over_folds, everything, resampler, settings)
+        cells += [found | {"metric": metric} for found in made]
+    title = f"MAE and pAUC of {_of_focus(unit, 'by fold')}"
+    return _Measured(title, "Fold", _published_of_focus(unit, cells))
 
 
-_METRIC_TITLES: Mapping[str, str] = {"mae": "MAE", "pauc": "pAUC"}
+def _examples(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
+    unit = focus_unit(evaluations, settings)
+    frame = evaluations[unit]
+    example = choose_example(frame, settings)
+    cells = []
+    for azimuth in settings.example_initial_deg:
+        for method in settings.methods:
+            found = example_row(frame, example, method, azimuth)
+            if found is None:
+                continue
+            shared = {"method": method, "n_objects": 1, "n_images": 1}
+            for metric, column in (("estimate", "pose_estimate_deg"), ("error", "error_deg")):
+                figure = {"metric": metric, "value": float(found[column])}
+                cells.append(cell(name, str(azimuth), f"{azimuth}°", **shared, **figure))
+    title = f"Examples of estimates (and errors) for {_of_focus(unit)}"
+    note = f"Object {example.object_id} of fold {example.fold}: {example.reason}."
+    return _Measured(title, "Initial azimuth", _published_of_focus(unit, cells), (note,))
 
-_BUILDERS: Mapping[str, Callable[[str, Evaluations, ReportSettings], Table]] = {
-    "table1": _by_category,
-    "table2": _by_elevation,
-    "table3": _by_category,
-    "table4": _by_elevation,
-    "table5": _by_group,
-    "table6": _examples,
-    "table7": _by_fold,
+
+def _focus_sample(evaluations: Evaluations, settings: ReportSettings) -> tuple[Unit, PairedErrors]:
+    unit = focus_unit(evaluations, settings)
+    return unit, pair_methods(evaluations[unit], unit[0])
+
+
+def _of_focus(unit: Unit, by: str = "") -> str:
+    return f"{category_label(unit[0])} {by}".rstrip() + f" at elevation {unit[1]}°"
+
+
+def _published_of_focus(unit: Unit, cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Add what the paper prints, which is about one category at elevation 0° alone."""
+    return _with_published(cells) if unit == (published.FOCUS_CATEGORY, 0) else cells
+
+
+def _with_published(cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return cells with what the paper prints in the same place."""
+    place = ("table", "metric", "row", "method")
+    found = [published.published_value(*(one[key] for key in place)) for one in cells]
+    return [
+        one | {"published": np.nan if figure is None else figure}
+        for one, figure in zip(cells, found, strict=True)
+    ]
+
+
+_KINDS: Mapping[str, _Kind] = {
+    "table1": _Kind(_by_category),
+    "table2": _Kind(_by_elevation),
+    "table3": _Kind(_by_category),
+    "table4": _Kind(_by_elevation),
+    "table5": _Kind(_by_group),
+    "table6": _Kind(_examples, layout.example_body, layout.example_notes),
+    "table7": _Kind(_by_fold, layout.fold_body, layout.fold_notes),
 }
 
-TABLES = tuple(_BUILDERS)
+TABLES = tuple(_KINDS)
 """Names of the tables that `build_table` knows."""

@@ -1,0 +1,98 @@
+"""Tidy cells: one statistic of each method on the same images, with its uncertainty.
+
+``value`` is in degrees (``mae``, ``estimate``, ``error``) or percent (``pauc``), pooled over the
+images of all folds; ``sigma`` is the sample standard deviation of the cell's figure per fold;
+``ci_*`` its 95 % interval over objects; ``difference*`` the paired difference to the reference
+method with its interval; ``published`` what the paper prints in the same place.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from nbv.reporting.settings import ReportSettings
+from nbv.statistics import paired
+from nbv.statistics.paired import PairedErrors, Resampler
+
+CELL_COLUMNS = (
+    "table",
+    "row",
+    "row_label",
+    "method",
+    "metric",
+    "value",
+    "sigma",
+    "published",
+    "ci_low",
+    "ci_high",
+    "difference",
+    "difference_low",
+    "difference_high",
+    "n_objects",
+    "n_images",
+)
+
+
+def shared_resampler(settings: ReportSettings) -> Resampler:
+    """Return the object resamples that the tables and claims of one seed share."""
+    return Resampler.seeded(np.random.default_rng(settings.seed), settings.n_resamples)
+
+
+def cell(table: str, row: str, row_label: str, **rest: Any) -> dict[str, Any]:
+    """Return one cell; columns that are not given are absent."""
+    return dict.fromkeys(CELL_COLUMNS, np.nan) | {
+        "table": table,
+        "row": row,
+        "row_label": row_label,
+        **rest,
+    }
+
+
+def method_cells(
+    table: str,
+    row: str,
+    row_label: str,
+    metric: str,
+    sample: PairedErrors,
+    resampler: Resampler,
+    settings: ReportSettings,
+) -> list[dict[str, Any]]:
+    """Return one row's cells: a statistic of each of the settings' methods on the same images.
+
+    Parameters
+    ----------
+    table, row, row_label : str
+        Where the cells are.
+    metric : str
+        A statistic of `nbv.statistics.paired.estimate`.
+    sample : PairedErrors
+        The images; methods that it lacks are left out.
+    resampler : Resampler
+    settings : ReportSettings
+        ``methods``, and the ``reference`` of the differences.
+    """
+    estimates = {
+        method: paired.estimate(metric, sample, method, resampler)
+        for method in settings.methods
+        if method in sample.errors_deg
+    }
+    reference = estimates.get(settings.reference)
+    cells = []
+    for method, found in estimates.items():
+        made = cell(
+            table,
+            row,
+            row_label,
+            method=method,
+            metric=metric,
+            n_objects=sample.n_objects,
+            n_images=sample.n_images,
+        ) | found.interval().columns("value", "ci")
+        if not metric.endswith("_sigma"):
+            made["sigma"] = paired.fold_sigma(metric, sample, method)
+        if reference and method != settings.reference:
+            made |= found.minus(reference).columns("difference")
+        cells.append(made)
+    return cells
