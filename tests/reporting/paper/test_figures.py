@@ -29,13 +29,9 @@ FOLD = 2  # of the examples
 def inputs(tree, evaluations):
     return FigureInputs(
         evaluations,
-        depth={(c, e): tree / f"depth/{c}/el{e:02d}.npy" for c, e in UNITS},
-        splits={c: tree / f"splits/{c}.csv" for c, _ in UNITS},
-        lookups={
-            (c, e, fold): tree / f"lookup/{c}/el{e:02d}/fold{fold}/pose_ambiguity.npz"
-            for c, e in UNITS
-            for fold in range(1, N_FOLDS + 1)
-        },
+        depth=synthetic.depth_files(tree, UNITS),
+        splits=synthetic.split_files(tree, UNITS),
+        lookups=synthetic.lookup_files(tree, UNITS, N_FOLDS),
     )
 
 

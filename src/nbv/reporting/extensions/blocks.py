@@ -7,6 +7,7 @@ The configuration's methods and extensions come as one mapping of a name to its 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -82,7 +83,7 @@ def method_with(methods: Methods, policy: str, fusion: str) -> str | None:
 
 def block_cell(
     block: Block, method: str, sample: PairedErrors, resampler: Resampler
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Return the tidy cell of a method's MAE in a block."""
     run, category = block
     return (

@@ -98,7 +98,7 @@ def extension_gains_table(
                 row.append(Cell(number(sample.errors_deg[method].mean())))
             else:
                 found = mae_difference(sample, method, versus, resampler)
-                made |= {"versus": versus} | found.columns("difference")
+                made |= {"versus": versus, **found.columns("difference")}
                 row.append(difference_cell(found))
             cells.append(made)
         rows.append(tuple(row))

@@ -52,7 +52,7 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
             versus = opposite if method != opposite else SUBJECT
             if versus in shown:
                 found = mae_difference(sample, method, versus, resampler)
-                made |= {"versus": versus} | found.columns("difference")
+                made |= {"versus": versus, **found.columns("difference")}
             cells.append(made)
             alone = best == [method]
             mark = "*" if method in best and not alone else ""
@@ -90,7 +90,7 @@ def _rank_notes(
     ]
     selected = method_with(methods, SELECTED, SELECTED)
     for versus in (method_with(methods, "opposite", SELECTED), SUBJECT):
-        if selected in ranked and versus in ranked:
+        if selected and versus and {selected, versus}.issubset(ranked):
             gaps = [
                 s.errors_deg[selected].mean() - s.errors_deg[versus].mean() for s in blocks.values()
             ]

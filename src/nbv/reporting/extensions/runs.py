@@ -73,9 +73,9 @@ def _row(label: str, part: pd.DataFrame, runs: list[str]) -> Row:
     values = [f"{number(found[run]['value'])}°" if run in found else "–" for run in runs]
     differences = []
     for run in runs[1:]:
-        ends = [
+        value, low, high = (
             found[run][name] if run in found else np.nan
             for name in ("difference", "difference_low", "difference_high")
-        ]
-        differences.append(interval_text(*ends) if np.isfinite(ends[0]) else "–")
+        )
+        differences.append(interval_text(value, low, high) if np.isfinite(value) else "–")
     return tuple(map(Cell, (label, *values, *differences)))
