@@ -10,67 +10,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import N_FOLDS
-from nbv.config import read_configuration
 from nbv.errors import UserError
-from nbv.files import write_csv
-from nbv.paper.verdicts import evaluate_claims
 from nbv.reference.compare import (
     IDENTICAL,
     OUTSIDE,
     UNJUDGED,
     WITHIN,
-    _judge,
     compare_runs,
+    judge_cell,
     sigma_ratio,
 )
 from nbv.reference.store import (
     UNSET,
-    collect_reference,
-    differing_settings,
-    find_reference,
     read_cells,
 )
-from nbv.reporting.paper.layout import save_table
-from nbv.reporting.paper.tables import TABLES, build_table
-from nbv.reporting.settings import ReportSettings
-
-CONFIGURATION = f"""\
-experiment: synthetic
-name: synthetic
-n_folds: {N_FOLDS}
-dataset:
-  source: procedural
-  root: null
-estimator:
-  epochs: 8
-  precision: auto
-"""
-
-
-@pytest.fixture(scope="module")
-def finished(evaluations, tmp_path_factory):
-    """A run as far as it is compared or kept."""
-    root = tmp_path_factory.mktemp("compare") / "synthetic"
-    settings = ReportSettings(n_resamples=100)
-    for name in TABLES:
-        save_table(build_table(name, evaluations, settings), root / "tables" / name)
-    claims = evaluate_claims(evaluations, np.random.default_rng(0), 100)
-    write_csv(root / "claims.csv", claims)
-    (root / "claims.md").write_text("claims\n")
-    (root / "configuration.yaml").write_text(CONFIGURATION)
-    packages = {"numpy": "2.4.0", "torch": "2.13.0"}
-    (root / "provenance.json").write_text(json.dumps({"commit": "0123", "packages": packages}))
-    (root / "figures").mkdir()
-    for name in ("pea.png", "pea.pdf", "figure8.png"):
-        (root / "figures" / name).write_bytes(name.encode())
-    for kind in ("csv", "md"):
-        (root / "tables" / f"runtime.{kind}").write_text("rule,jobs\n")
-    return root
-
-
-@pytest.fixture
-def run(finished, tmp_path):
-    return shutil.copytree(finished, tmp_path / "run")
+from nbv.reporting.paper.tables import TABLES
 
 
 def change(run, table, row, method, **columns):
@@ -116,16 +70,6 @@ def test_a_table_made_on_request_may_be_missing(finished, run):
     assert comparison.remarks == ("transfer: missing",)
 
 
-def test_settings_that_no_table_of_every_run_depends_on():
-    sizes = {"parameters": {}, "diagonal_m": {"mug": 0.17}}
-    before = {"sensor": {"name": "ideal"}}
-    after = {"sensor": {"name": "ideal", **sizes}, "transfer": {"folds": [1]}}
-    assert differing_settings(before, after) == ()
-    kinect = {"sensor": {"name": "kinect", **sizes}}
-    other = {"sensor": {"name": "kinect", **sizes, "diagonal_m": {"mug": 0.2}}}
-    assert differing_settings(kinect, other) == (("sensor.diagonal_m.mug", 0.17, 0.2),)
-
-
 @pytest.mark.parametrize("side", ["ci_low", "ci_high"])
 def test_a_value_may_move_within_its_interval(finished, run, side):
     change(run, "table1", "mug", "proposed", value=lambda cell: cell[side])
@@ -162,7 +106,7 @@ def test_figures_agree_by_the_intervals_of_both(finished, shift, below, above):
     mine = theirs | moved
     for name, figure in (("ci", "value"), ("difference", "difference")):
         mine |= {f"{name}_low": moved[figure] - below, f"{name}_high": moved[figure] + above}
-    judged = _judge(theirs, mine, 3.0)
+    judged = judge_cell(theirs, mine, 3.0)
     found = {row["quantity"]: row["status"] != OUTSIDE for row in judged}
     # Whether one value lies in the other's interval, whether two intervals have a common point.
     here_in_theirs = theirs["ci_low"] <= mine["value"] <= theirs["ci_high"]
@@ -276,7 +220,9 @@ def test_a_claim_that_is_missing_is_named(finished, run):
 
 
 def test_other_settings_come_first_and_speak_against_agreement(finished, run):
-    text = CONFIGURATION.replace("epochs: 8", "epochs: 4") + "seed: 3\n"
+    text = (finished / "configuration.yaml").read_text().replace(
+        "epochs: 8", "epochs: 4"
+    ) + "seed: 3\n"
     (run / "configuration.yaml").write_text(text)
     comparison = compare_runs(finished, run)
     assert not comparison.agrees
@@ -288,16 +234,8 @@ def test_other_settings_come_first_and_speak_against_agreement(finished, run):
     assert "cells identical" in comparison.lines()[1]
 
 
-def test_a_key_that_is_younger_than_the_reference_has_its_default_there():
-    assert differing_settings({}, {"calibration": "holdout", "beside": ["other"]}) == ()
-    changed = ("calibration", "holdout", "crossfit")
-    assert differing_settings({}, {"calibration": "crossfit"}) == (changed,)
-    younger = {"estimator": {"n_classes": 72}}
-    assert differing_settings({"estimator": {}}, younger) == (("estimator.n_classes", None, 72),)
-
-
 def test_names_paths_hardware_and_versions_are_only_mentioned(finished, run):
-    text = CONFIGURATION.replace("name: synthetic", "name: other")
+    text = (run / "configuration.yaml").read_text().replace("name: synthetic", "name: other")
     text = text.replace("root: null", "root: /data").replace("auto", "float32")
     (run / "configuration.yaml").write_text(text)
     packages = {"numpy": "2.5.0", "torch": "2.13.0"}
@@ -308,18 +246,6 @@ def test_names_paths_hardware_and_versions_are_only_mentioned(finished, run):
         "made with: name=other (reference: synthetic), dataset.root=/data (reference: None), "
         "estimator.precision=float32 (reference: auto), numpy=2.5.0 (reference: 2.4.0)",
     )
-
-
-@given(
-    st.dictionaries(st.sampled_from("abc"), st.integers(0, 2)),
-    st.dictionaries(st.sampled_from("abc"), st.integers(0, 2)),
-)
-def test_settings_differ_where_either_side_says_otherwise(a, b):
-    found = {key: (x, y) for key, x, y in differing_settings({"in": a}, {"in": b})}
-    for key in "abc":
-        x, y = a.get(key, UNSET), b.get(key, UNSET)
-        assert (f"in.{key}" in found) == (x != y)
-        assert found.get(f"in.{key}", (x, y)) == (x, y)
 
 
 @pytest.mark.parametrize("name", ["configuration.yaml", "claims.csv"])
@@ -334,81 +260,10 @@ def test_a_broken_reference_is_named(finished, run):
     (run / "configuration.yaml").write_text("n_folds: 1\n")
     with pytest.raises(UserError, match="n_folds has to be 2 or more"):
         compare_runs(run, finished)
-    (run / "configuration.yaml").write_text(CONFIGURATION)
+    shutil.copy(finished / "configuration.yaml", run)
     (run / "tables" / "table1.csv").write_text("row,method\n")
     with pytest.raises(UserError, match=r"table1\.csv: no column 'table'"):
         compare_runs(run, finished)
     shutil.rmtree(run / "tables")
     with pytest.raises(UserError, match="holds no tables"):
         compare_runs(run, finished)
-
-
-def files(folder):
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
-
-
-def test_a_reference_keeps_what_a_reviewer_reads(finished, tmp_path):
-    reference = tmp_path / "docs" / "reference" / "synthetic"
-    written = collect_reference(finished, reference)
-    kept, run = files(reference), files(finished)
-    assert {str(path.relative_to(reference)) for path in written} == set(kept)
-    expected = {f"tables/{name}.{kind}" for name in TABLES for kind in ("csv", "md", "tex")}
-    expected |= {"figures/pea.png", "figures/figure8.png", "claims.csv", "claims.md"}
-    expected |= {"runtime.csv", "runtime.md", "configuration.yaml", "provenance.json"}
-    assert set(kept) == expected
-    for name, content in kept.items():
-        assert content == run[f"tables/{name}" if name.startswith("runtime") else name]
-    assert compare_runs(reference, finished).agrees
-
-
-def test_a_reference_made_again_loses_what_the_run_has_not(run, tmp_path, caplog):
-    reference = tmp_path / "reference"
-    (run.parent / "bench.json").write_text("[]\n")
-    collect_reference(run, reference)
-    assert (reference.parent / "bench.json").read_text() == "[]\n"
-    assert "clean commit" not in caplog.text
-    (run.parent / "bench.json").unlink()
-    (reference / "README.md").write_text("kept\n")
-    for kind in ("csv", "md", "tex"):
-        (run / "tables" / f"table7.{kind}").unlink()
-    (run / "figures" / "pea.png").unlink()
-    (run / "provenance.json").write_text(json.dumps({"commit": "0123-dirty"}))
-    collect_reference(run, reference)
-    kept = files(reference)
-    assert not any("table7" in name or "pea" in name for name in kept)
-    assert {"README.md", "tables/table1.csv"} <= set(kept)
-    assert "not made at a clean commit but at 0123-dirty" in caplog.text
-
-
-@pytest.mark.parametrize("name", ["claims.md", "tables/runtime.csv", "figures/*.png"])
-def test_an_unfinished_run_leaves_the_reference_as_it_was(run, finished, tmp_path, name):
-    reference = tmp_path / "reference"
-    collect_reference(finished, reference)
-    before = files(reference)
-    (run / "claims.csv").write_text("other\n")
-    for path in run.glob(name):
-        path.unlink()
-    with pytest.raises(UserError, match="finish the run first"):
-        collect_reference(run, reference)
-    assert files(reference) == before
-
-
-def test_a_name_without_a_reference_is_told_those_there_are(finished, tmp_path):
-    with pytest.raises(UserError, match="there is none yet"):
-        find_reference(tmp_path / "reference", {"name": "quick"})
-    collect_reference(finished, tmp_path / "reference" / "paper")
-    with pytest.raises(UserError, match=r"'quick' cannot be compared \(there are: paper\)"):
-        find_reference(tmp_path / "reference", {"name": "quick"})
-
-
-def test_other_settings_are_told_before_a_run_is_made(finished, tmp_path):
-    reference = tmp_path / "synthetic"
-    collect_reference(finished, reference)
-    configuration = read_configuration(finished)
-    assert find_reference(tmp_path, configuration) == reference
-    with pytest.raises(UserError, match=r"other settings than .*: seed=3 \(reference: not set\)$"):
-        find_reference(tmp_path, configuration | {"seed": 3})

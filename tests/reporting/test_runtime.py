@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.files import write_csv
-from nbv.reporting.report import _runtime
 from nbv.reporting.runtime import (
     JOB_COLUMNS,
     PAUSE_S,
@@ -17,15 +16,28 @@ from nbv.reporting.runtime import (
     TOTAL_ROW,
     efficiency,
     load_jobs,
-    load_runtime,
-    runtime_markdown,
+    runtime_table,
     summarise_jobs,
 )
+from nbv.reporting.table import table_markdown
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 START_S = 1_700_000_000.0
 
-SETTINGS = {"categories": ["mug"], "elevations_deg": {"mug": [0, 30]}, "n_folds": 1}
+
+def job_files(root):
+    """(rule, benchmark, log) of every job that left a benchmark, as the workflow names them."""
+    for path in sorted((root / "benchmarks").rglob("*.tsv")):
+        name = path.relative_to(root / "benchmarks").with_suffix("")
+        yield name.parts[0], path, root / "logs" / name.with_suffix(".log")
+
+
+def load_runtime(root):
+    return summarise_jobs(load_jobs(job_files(root)))
+
+
+def runtime_markdown(root):
+    return table_markdown(runtime_table(load_jobs(job_files(root))))
 
 
 def add_job(root, job, start_s, wall_s, cpu_s, rss_mib, told_s=None):
@@ -42,7 +54,7 @@ def add_job(root, job, start_s, wall_s, cpu_s, rss_mib, told_s=None):
 
 @pytest.fixture
 def root(tmp_path):
-    """Two lanes: a training and two renders beside it, then a table."""
+    """Two lanes: a training and two renders at the same time, then a table."""
     add_job(tmp_path, "train/mug/el00/fold1", 0, 50.0, 15.25, 800.0)
     add_job(tmp_path, "render/mug/el00", 0, 10.0, 9.5, 150.0)
     add_job(tmp_path, "render/mug/el30", 10, 30.0, 25.5, 160.5)
@@ -75,31 +87,32 @@ def test_the_total_is_of_all_jobs(root):
 def test_the_larger_of_what_was_sampled_and_what_the_job_told(root):
     add_job(root, "train/mug/el00/fold1", 0, 50.0, 15.25, 800.0, told_s=48.75)
     add_job(root, "train/mug/el00/fold2", 50, 5.0, 4.5, 800.0, told_s=4.25)
-    assert list(load_jobs(root)["cpu_s"]) == [9.5, 25.5, 0.0, 48.75, 4.5]
+    assert list(load_jobs(job_files(root))["cpu_s"]) == [9.5, 25.5, 0.0, 48.75, 4.5]
     (root / "benchmarks/train/mug/el00/fold2.tsv").unlink()
     runtime = load_runtime(root).set_index("rule")
     assert runtime.loc[TOTAL_ROW, "cpu_s"] == 83.75
     assert list(runtime["sampled_jobs"]) == [0, 2, 1, 3]
-    assert "Processor times of 3 jobs are Snakemake's samples" in runtime_markdown(
-        load_runtime(root)
-    )
+    assert "Processor times of 3 jobs are Snakemake's samples" in runtime_markdown(root)
 
 
-def test_readers_of_the_results_do_not_count(root):
+def test_only_the_jobs_that_are_named_count(root):
     before = load_runtime(root)
-    for job in ("runtime", "report", "compare", "reference"):
-        add_job(root, job, 60, 5.0, 5.0, 100.0)
-    pd.testing.assert_frame_equal(load_runtime(root), before)
+    files = list(job_files(root))
+    add_job(root, "train/car/el00/fold1", 60, 5.0, 5.0, 100.0)
+    pd.testing.assert_frame_equal(summarise_jobs(load_jobs(files)), before)
+    assert load_runtime(root).iloc[-1]["jobs"] == 5
 
 
-def test_jobs_of_another_configuration_are_passed_over(root):
+def test_a_job_that_was_not_timed_is_passed_over(root):
     before = load_runtime(root)
-    add_job(root, "train/mug/el00/fold4", 60, 5.0, 5.0, 100.0)
-    add_job(root, "train/mug/el75/fold1", 60, 5.0, 5.0, 100.0)
-    add_job(root, "lookup/car/el00/fold1/entropy", 60, 5.0, 5.0, 100.0)
-    assert load_runtime(root).iloc[-1]["jobs"] == 7
-    kept = load_runtime(root, units=[("mug", 0), ("mug", 30)], n_folds=3)
-    pd.testing.assert_frame_equal(kept, before)
+    absent = ("train", root / "benchmarks/train/absent.tsv", root / "logs/train/absent.log")
+    after = summarise_jobs(load_jobs([*job_files(root), absent]))
+    pd.testing.assert_frame_equal(after, before)
+
+
+def test_the_rule_is_told_and_not_read_from_the_path(root):
+    files = [("other", *paths) for _, *paths in job_files(root)]
+    assert list(summarise_jobs(load_jobs(files))["rule"]) == ["other", TOTAL_ROW]
 
 
 def test_a_long_pause_is_no_part_of_the_run(root):
@@ -132,7 +145,7 @@ def test_elapsed_and_concurrency_by_brute_force(jobs):
 
 
 def test_the_page_for_people(root, tmp_path):
-    text = runtime_markdown(load_runtime(root))
+    text = runtime_markdown(root)
     assert "| train | 1 | 15.2 | 50.0 | 50.0 | 50.0 | 800 |" in text
     assert "| settings | 1 | 0.0 | 0.5 | 0.5 | 0.5 | – |" in text
     assert "| all | 4 | 50.2 | 90.5 | 20.0 | 50.0 | 800 |" in text
@@ -144,7 +157,7 @@ def test_the_page_for_people(root, tmp_path):
 
 def test_nothing_is_called_a_sample_where_every_job_told_its_time(tmp_path):
     add_job(tmp_path, "claims", 0, 4000.0, 1.0, 90.0, told_s=4000.0)
-    text = runtime_markdown(load_runtime(tmp_path))
+    text = runtime_markdown(tmp_path)
     assert "Processor times are Snakemake's samples" not in text
     assert "at least" not in text
     assert "1 h 7 min" in text
@@ -162,15 +175,5 @@ def test_no_benchmarks_is_an_empty_table(tmp_path):
     runtime = load_runtime(tmp_path)
     assert runtime.empty
     assert tuple(runtime.columns) == RUNTIME_COLUMNS
-    assert tuple(load_jobs(tmp_path).columns) == JOB_COLUMNS
-    assert "No job was timed" in runtime_markdown(runtime)
-
-
-def test_the_report_shows_the_table_that_was_written(root):
-    computed = _runtime(root, SETTINGS)
-    assert "<strong>" not in computed[0]
-    assert '<th scope="row">train</th>' in computed[0]
-    (root / "tables").mkdir()
-    (root / "tables" / "runtime.md").write_text(runtime_markdown(load_runtime(root)))
-    add_job(root, "claims", 51, 4.0, 1.0, 90.0)
-    assert _runtime(root, SETTINGS) == computed
+    assert tuple(load_jobs([]).columns) == JOB_COLUMNS
+    assert "No job was timed" in runtime_markdown(tmp_path)

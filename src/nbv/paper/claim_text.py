@@ -1,4 +1,4 @@
-"""The words of the claims: what was compared, the figures, and a table for people."""
+"""The words of the claims: what was compared, the figures, and how verdicts are reached."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 
 import pandas as pd
 
-from nbv.labels import category_label, method_label, number
-from nbv.paper import statements as comparisons
+from nbv.labels import category_label, interval_text, method_label, number
+from nbv.paper import statements
 from nbv.paper.statements import (
     AtLeast,
     Better,
@@ -29,11 +29,11 @@ VERDICT_RULES = (
     "side; otherwise it is undecided.",
     "“Comparable” holds where the interval lies inside the margin, does not hold where it lies "
     "outside altogether.",
-    f"With fewer than {comparisons.FEWEST_OBJECTS} test objects (of a category; of a fold, where σ "
+    f"With fewer than {statements.FEWEST_OBJECTS} test objects (of a category; of a fold, where σ "
     "over folds is compared) a comparison is undecided whatever its interval.",
     "A compound claim is decided only where no undecided or unevaluated part could change it.",
     "“By point estimates” judges ours as the paper judges its own figures: as they stand, without "
-    "intervals. Intervals are not corrected for the number of comparisons.",
+    "intervals. Intervals are not corrected for the number of statements.",
     "Our figures: each competitor with the paired difference to the claim's subject and its "
     "interval; of compound claims, the closest competitor of each part.",
 )
@@ -43,7 +43,7 @@ VERDICT_RULES = (
 def by_run(claims: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return one row per claim: those that were run, decided or not, and those that were not."""
     each = claims.drop_duplicates("id")
-    absent = each["verdict"] == comparisons.NOT_RUN
+    absent = each["verdict"] == statements.NOT_RUN
     return each[~absent], each[absent]
 
 
@@ -62,11 +62,11 @@ def summarise(statement: Statement, measured: Measured) -> str:
         for part in statement.parts:
             label = part.label if isinstance(part, AtLeast) else ""
             verdict = combine_statement(part, verdicts)
-            found = [leaf for leaf in comparisons.leaves(part) if "value" in measured[leaf]]
+            found = [leaf for leaf in statements.leaves(part) if "value" in measured[leaf]]
             closest = _competition([_closest(found, measured)], measured, False) if found else ""
             texts.append(f"{label}: {verdict}" + (f" ({closest})" if closest else ""))
         return "; ".join(texts)
-    return _competition(comparisons.leaves(statement), measured)
+    return _competition(statements.leaves(statement), measured)
 
 
 def _competition(leaves: Sequence[Comparison], measured: Measured, place: bool = True) -> str:
@@ -91,9 +91,9 @@ def _competition(leaves: Sequence[Comparison], measured: Measured, place: bool =
         subject = f"{name}, {_STATISTIC_LABELS[leaf.statistic]} {number(row['value'])}{unit}"
         same_images = _where(leaf.a) == _where(leaf.b)
         rival = method_label(leaf.b.method) if same_images else term_text(leaf.b)
+        difference = interval_text(row["difference"], row["ci_low"], row["ci_high"])
         rivals.setdefault(subject, []).append(
-            f"{rival} {number(row['versus_value'])}{unit}, difference "
-            f"{number(row['difference'])} ({number(row['ci_low'])} to {number(row['ci_high'])})"
+            f"{rival} {number(row['versus_value'])}{unit}, difference {difference}"
         )
     return "; ".join(
         f"{subject}, against {', '.join(others)}" if others else subject

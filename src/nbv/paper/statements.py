@@ -127,7 +127,7 @@ def all_of(parts: Sequence[Statement], label: str = "") -> AtLeast:
 
 
 def leaves(statement: Statement) -> list[Comparison]:
-    """Return the comparisons of a statement, in reading order."""
+    """Return the comparisons of a statement, in their order."""
     if isinstance(statement, AtLeast):
         return [leaf for part in statement.parts for leaf in leaves(part)]
     return [statement]

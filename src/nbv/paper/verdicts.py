@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from nbv.experiments.results import Unit
-from nbv.paper import published
-from nbv.paper import statements as comparisons
+from nbv.paper import published, statements
 from nbv.paper.claim_text import summarise, term_text
 from nbv.paper.claims import CLAIMS
 from nbv.paper.statements import (
@@ -27,10 +26,10 @@ from nbv.statistics import paired
 from nbv.statistics.paired import Estimate, PairedErrors, Resampler
 
 PAPER_VERDICTS: Mapping[Verdict, str] = {
-    comparisons.HOLDS: "bear it out",
-    comparisons.FAILS: "contradict it",
-    comparisons.UNDECIDED: "leave it open",
-    comparisons.NOT_RUN: "not printed",
+    statements.HOLDS: "bear it out",
+    statements.FAILS: "contradict it",
+    statements.UNDECIDED: "leave it open",
+    statements.NOT_RUN: "not printed",
 }
 
 CLAIM_COLUMNS = (
@@ -67,7 +66,7 @@ def evaluate_claims(
     n_resamples: int = 2000,
     claims: Sequence[Claim] = CLAIMS,
 ) -> pd.DataFrame:
-    """Evaluate every claim; see `comparisons` for when one holds.
+    """Evaluate every claim; see `nbv.paper.statements` for when one holds.
 
     Parameters
     ----------
@@ -92,7 +91,7 @@ def evaluate_claims(
     evaluator = _Evaluator(evaluations, Resampler.seeded(rng, n_resamples))
     rows: list[dict[str, Any]] = []
     for claim in claims:
-        parts = comparisons.leaves(claim.statement)
+        parts = statements.leaves(claim.statement)
         measured = {part: evaluator.measure(part) for part in parts}
         verdicts = {leaf: row["part_verdict"] for leaf, row in measured.items()}
         points = {part: _point_verdict(part, row) for part, row in measured.items()}
@@ -130,7 +129,7 @@ class _Evaluator:
             "statistic": part.statistic,
             "subject": term_text(part.a),
             "versus": term_text(part.b),
-            "part_verdict": comparisons.NOT_RUN,
+            "part_verdict": statements.NOT_RUN,
             "published_value": _published(part.statistic, part.a),
             "published_versus_value": _published(part.statistic, part.b),
         }
@@ -138,9 +137,9 @@ class _Evaluator:
             return row
         found = a.minus(b)
         if isinstance(part, Comparable):
-            verdict = comparisons.comparable_verdict(found.low, found.high, part.margin)
+            verdict = statements.comparable_verdict(found.low, found.high, part.margin)
         else:
-            verdict = comparisons.better_verdict(part.statistic, found.low, found.high)
+            verdict = statements.better_verdict(part.statistic, found.low, found.high)
         fewest = min(
             paired.fewest_resampled(part.statistic, self._sample(term)) for term in (part.a, part.b)
         )
@@ -149,7 +148,7 @@ class _Evaluator:
             | {"value": a.value, "versus_value": b.value}
             | found.columns("difference", "ci")
             | {
-                "part_verdict": comparisons.if_enough(verdict, fewest),
+                "part_verdict": statements.if_enough(verdict, fewest),
                 "n_objects": self._sample(part.a).n_objects,
             }
         )
@@ -158,22 +157,22 @@ class _Evaluator:
         row: dict[str, Any] = {
             "statistic": "outliers_percent",
             "subject": term_text(part.a),
-            "versus": f"upper quartile + {comparisons.TUKEY_FACTOR} × interquartile range",
-            "part_verdict": comparisons.NOT_RUN,
+            "versus": f"upper quartile + {statements.TUKEY_FACTOR} × interquartile range",
+            "part_verdict": statements.NOT_RUN,
         }
         if not self._present(part.a):
             return row
         sample = self._sample(part.a)
         errors = sample.errors_deg[part.a.method]
         lower, upper = np.quantile(errors, [0.25, 0.75])
-        fence = float(upper + comparisons.TUKEY_FACTOR * (upper - lower))
+        fence = float(upper + statements.TUKEY_FACTOR * (upper - lower))
         percent = 100.0 * float(np.mean(errors > fence))
         verdict = _outlier_verdict(percent)
         fewest = paired.fewest_resampled("outliers_percent", sample)
         return row | {
             "value": percent,
             "versus_value": fence,
-            "part_verdict": comparisons.if_enough(verdict, fewest),
+            "part_verdict": statements.if_enough(verdict, fewest),
             "n_objects": sample.n_objects,
         }
 
@@ -240,14 +239,14 @@ def _published_unit(statistic: str, term: Term, unit: Unit) -> float | None:
 
 def _published_verdict(part: Comparison) -> Verdict:
     if isinstance(part, FreeOfOutliers):
-        return comparisons.NOT_RUN
+        return statements.NOT_RUN
     a, b = _published(part.statistic, part.a), _published(part.statistic, part.b)
-    return comparisons.NOT_RUN if a is None or b is None else _as_it_stands(part, a - b)
+    return statements.NOT_RUN if a is None or b is None else _as_it_stands(part, a - b)
 
 
 def _point_verdict(part: Comparison, row: Mapping[str, Any]) -> Verdict:
     verdict: Verdict = row["part_verdict"]
-    if verdict == comparisons.NOT_RUN:
+    if verdict == statements.NOT_RUN:
         return verdict
     if isinstance(part, FreeOfOutliers):
         return _outlier_verdict(row["value"])
@@ -255,11 +254,11 @@ def _point_verdict(part: Comparison, row: Mapping[str, Any]) -> Verdict:
 
 
 def _outlier_verdict(percent: float) -> Verdict:
-    return comparisons.FAILS if percent > 0 else comparisons.HOLDS
+    return statements.FAILS if percent > 0 else statements.HOLDS
 
 
 def _as_it_stands(part: Better | Comparable, difference: float) -> Verdict:
     """Judge a difference without regard to its uncertainty."""
     if isinstance(part, Comparable):
-        return comparisons.comparable_verdict(difference, difference, part.margin)
-    return comparisons.better_verdict(part.statistic, difference, difference)
+        return statements.comparable_verdict(difference, difference, part.margin)
+    return statements.better_verdict(part.statistic, difference, difference)

@@ -1,9 +1,9 @@
-"""Holding a run against reference results.
+"""Comparing a run with reference results.
 
 Two runs of one configuration have the same objects, folds and seeds. On one machine they give the
 same bytes. On two, floating point differs, and so every estimator is a retrained one: the figures
-move, though mostly less than they would with other objects, which is what the intervals stored
-beside them are about. Hence the tolerances, cell by cell of the tables' tidy CSV files:
+move, though mostly less than they would with other objects, which is what their intervals are
+about. Hence the tolerances, cell by cell of the tables' tidy CSV files:
 
 ===================  ===============================================================================
 a statistic          the new value lies in the reference's 95 % interval, or the reference's value
@@ -75,7 +75,7 @@ class Comparison:
     problems : tuple of str
         One line for everything that speaks against agreement.
     remarks : tuple of str
-        One line for every other difference worth knowing.
+        One line for every other difference.
     n_claims : int
         Number of claims whose verdicts were compared.
     """
@@ -126,7 +126,7 @@ class Comparison:
 
 
 def compare_runs(reference: Path, run: Path) -> Comparison:
-    """Hold a run's tables and claims against a reference's.
+    """Compare a run's tables and claims with a reference's.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def compare_runs(reference: Path, run: Path) -> Comparison:
         ]
         pairs = [(cell, mine[key]) for key, cell in theirs.items() if key in mine]
         problems += _differing_counts(pairs)
-        judged += [row for pair in pairs for row in _judge(*pair, factor)]
+        judged += [row for pair in pairs for row in judge_cell(*pair, factor)]
     problems += [_outside_text(row) for row in judged if row["status"] == OUTSIDE]
     verdicts = read_verdicts(reference), read_verdicts(run)
     flipped, changed = _changed_verdicts(*verdicts)
@@ -216,8 +216,21 @@ def _differing_counts(pairs: Iterable[tuple[Cell, Cell]]) -> list[str]:
     )
 
 
-def _judge(theirs: Cell, mine: Cell, factor: float) -> list[Cell]:
-    """Judge the figures that a cell has: its value, its paired difference, its σ."""
+def judge_cell(theirs: Cell, mine: Cell, factor: float) -> list[Cell]:
+    """Judge the figures that a cell has: its value, its paired difference, its σ.
+
+    Parameters
+    ----------
+    theirs, mine : mapping
+        The reference's cell and the run's: `nbv.reporting.cells.CELL_COLUMNS`.
+    factor : float
+        From `sigma_ratio`.
+
+    Returns
+    -------
+    list of mapping
+        `JUDGED_COLUMNS`, one for each figure that either of them has.
+    """
     rows = []
     is_sigma = theirs["row"] == SIGMA_ROW
     # A difference of two σ says nothing that the two, each judged, do not.

@@ -30,13 +30,13 @@ Cell = dict[str, Any]
 CELL_KEY = ("row", "method", "metric")
 """What tells the cells of one table apart."""
 
-# They say where files lie, what is shown beside, and on what hardware and in which precision an
-# estimator is trained: that, too, is a retrained estimator and no other experiment.
+# They say where files are, which other runs are shown, and on what hardware and in which precision
+# an estimator is trained: that, too, is a retrained estimator and no other experiment.
 _SURROUNDINGS = frozenset(
     {
         "experiment",
         "name",
-        "beside",
+        "compared_runs",
         "dataset.root",
         "dataset.exclude_file",
         "estimator.device",
@@ -44,7 +44,7 @@ _SURROUNDINGS = frozenset(
     }
 )
 # What the paper's own tables do not depend on.
-_BEYOND = frozenset({TRANSFER, "contenders", "leaderboard_runs", "sequence"})
+_OF_EXTENSIONS = frozenset({TRANSFER, "extensions", "leaderboard_runs", "more_views"})
 _FREE_TRAVEL = {"travel_cost": 0.0, "max_travel_deg": 180.0}
 _KEPT = ("tables/*.csv", "tables/*.md", "tables/*.tex", "figures/*.png")
 _REQUIRED = (
@@ -61,9 +61,9 @@ def collect_reference(run: Path, reference: Path) -> list[Path]:
     """Copy what a reviewer reads of a run, byte for byte, to be committed as a reference.
 
     Tables, figures as PNG, claims, runtime, configuration and provenance: a few MB. The runtime
-    goes beside the tables rather than among them. ``bench.json``, which ``python -m performance``
-    writes beside the runs, goes beside the references where there is one. Tables and figures that
-    the reference had and the run has not are removed; whatever else lies there is left alone.
+    goes to the folder above the tables. ``bench.json``, which ``python -m performance`` writes to
+    the folder of the runs, goes to that of the references where there is one. Tables and figures
+    that the reference had and the run has not are removed; whatever else is there is left alone.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def _kept_as(name: Path) -> Path:
 
 
 def find_reference(folder: Path, configuration: Mapping[str, Any]) -> Path:
-    """Return the reference that a run can be held against, known before the run is made.
+    """Return the reference to compare a run with, known before the run is made.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def differing_settings(
 
 def _telling(configuration: Mapping[str, Any]) -> dict[str, Any]:
     """Leave out what no table that every run has depends on."""
-    kept = {key: value for key, value in configuration.items() if key not in _BEYOND}
+    kept = {key: value for key, value in configuration.items() if key not in _OF_EXTENSIONS}
     if kept.get("recommendation") == _FREE_TRAVEL:
         del kept["recommendation"]
     if kept.get("sensor", {}).get("name") == IDEAL:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from nbv.experiments.results import Unit
 from nbv.labels import number
-from nbv.reporting.markdown import pipe_row
+from nbv.reporting.table import Cell, Row, Table
 
 RUNTIME_COLUMNS = (
     "rule",
@@ -31,9 +30,6 @@ TOTAL_ROW = "all"
 PAUSE_S = 60.0
 """A gap between jobs that is longer than this is a pause of the run, not a part of it."""
 
-# They read the results, some of them this very table: with them it would never be the same twice.
-# Or they belong to a target of its own.
-_NOT_COUNTED = frozenset({"runtime", "report", "compare", "reference", "transfer"})
 _PROCESSOR_TIME = re.compile(r"processor time (\d+\.\d+) s$", re.MULTILINE)
 # Benchmark files round to hundredths of a second, so that neighbours in time may seem to overlap.
 _ROUNDING_S = 0.01
@@ -48,17 +44,8 @@ _HEADER = (
 )
 
 
-def load_runtime(
-    root: str | Path, units: Iterable[Unit] | None = None, n_folds: int | None = None
-) -> pd.DataFrame:
-    """Read the jobs of a results tree and sum them up; see `load_jobs` and `summarise_jobs`."""
-    return summarise_jobs(load_jobs(root, units, n_folds))
-
-
-def load_jobs(
-    root: str | Path, units: Iterable[Unit] | None = None, n_folds: int | None = None
-) -> pd.DataFrame:
-    """Read ``benchmarks/<rule>/**/*.tsv``, and of the log file beside each its processor time.
+def load_jobs(files: Iterable[tuple[str, Path, Path]]) -> pd.DataFrame:
+    """Read what each job cost from its benchmark, and its processor time from its log.
 
     Snakemake samples a script's process and its children: 31 times half a second apart, then
     every 30 seconds, and keeps the last processor time that it saw. A job of 45 seconds may so be
@@ -68,12 +55,9 @@ def load_jobs(
 
     Parameters
     ----------
-    root : path
-        ``results/<experiment>``. The files' times say when a job ended: a copy must keep them.
-    units : iterable of (category, elevation_deg), optional
-        Jobs of another category and elevation, left by an earlier configuration, are passed over.
-    n_folds : int, optional
-        Likewise jobs of higher folds.
+    files : iterable of (rule, benchmark file, log file)
+        A job without a benchmark file is passed over: it was not timed. The file's time says when
+        the job ended: a copy must keep it.
 
     Returns
     -------
@@ -83,19 +67,15 @@ def load_jobs(
         ``max_rss``; NaN for a job that ended before a sample), and the time of its end in seconds
         since the epoch.
     """
-    folder = Path(root)
-    wanted = None if units is None else {(name, f"el{degrees:02d}") for name, degrees in units}
     jobs = []
-    for path in sorted((folder / "benchmarks").rglob("*.tsv")):
-        relative = path.relative_to(folder / "benchmarks").with_suffix("")
-        rule, *place = relative.parts
-        if rule in _NOT_COUNTED or not _belongs(place, wanted, n_folds):
+    for rule, benchmark, log in files:
+        if not benchmark.is_file():
             continue
-        told = _told_cpu_s(folder / "logs" / relative.with_suffix(".log"))
-        table = pd.read_csv(path, sep="\t", na_values=["-"])
+        told = _told_cpu_s(log)
+        table = pd.read_csv(benchmark, sep="\t", na_values=["-"])
         for row in table.reindex(columns=["s", "cpu_time", "max_rss"]).to_dict("records"):
             cpu_s = max(told or 0.0, float(np.nan_to_num(row["cpu_time"])))
-            ended_s = path.stat().st_mtime
+            ended_s = benchmark.stat().st_mtime
             jobs.append((rule, cpu_s, told is None, row["s"], row["max_rss"], ended_s))
     return pd.DataFrame(jobs, columns=list(JOB_COLUMNS))
 
@@ -128,17 +108,19 @@ def summarise_jobs(jobs: pd.DataFrame) -> pd.DataFrame:
     return summary.astype({"side_by_side": "Int64"})
 
 
-def runtime_markdown(runtime: pd.DataFrame) -> str:
-    """Return the table of `summarise_jobs` for people, with what to bear in mind as notes."""
-    lines = ["## Running time", ""]
-    if runtime.empty:
-        return "\n".join([*lines, "No job was timed in this run."]) + "\n"
-    lines += [pipe_row(_HEADER), pipe_row(["---"] + ["---:"] * (len(_HEADER) - 1))]
-    for row in runtime.to_dict("records"):
-        seconds = [f"{row[name]:,.1f}" for name in ("cpu_s", "wall_s", "median_s", "max_s")]
-        memory = f"{row['peak_mib']:,.0f}" if np.isfinite(row["peak_mib"]) else "–"
-        lines.append(pipe_row([row["rule"], f"{row['jobs']:,}", *seconds, memory]))
-    return "\n".join([*lines, "", *(f"- {note}" for note in _notes(runtime))]) + "\n"
+def runtime_table(jobs: pd.DataFrame) -> Table:
+    """Return the table of what a run cost, rule by rule.
+
+    Parameters
+    ----------
+    jobs : pandas.DataFrame
+        From `load_jobs`.
+    """
+    runtime = summarise_jobs(jobs)
+    rows = tuple(_row(row) for row in runtime.to_dict("records"))
+    notes = ("No job was timed in this run.",) if runtime.empty else tuple(_notes(runtime))
+    title = "Running time"
+    return Table("runtime", title, title, runtime, _HEADER, rows, notes)
 
 
 def efficiency(runtime: pd.DataFrame) -> float:
@@ -147,22 +129,19 @@ def efficiency(runtime: pd.DataFrame) -> float:
     return float(total["cpu_s"] / (total["side_by_side"] * total["elapsed_s"]))
 
 
-def _belongs(place: list[str], units: set[tuple[str, str]] | None, n_folds: int | None) -> bool:
-    """Say whether a job's ``category, el<EE>, fold<k>, ...`` are of the configuration."""
-    if len(place) < 2 or not re.fullmatch(r"el\d+", place[1]):
-        return True
-    if units is not None and (place[0], place[1]) not in units:
-        return False
-    fold = re.fullmatch(r"fold(\d+)", place[2]) if len(place) > 2 else None
-    return n_folds is None or fold is None or int(fold.group(1)) <= n_folds
-
-
 def _told_cpu_s(log_file: Path) -> float | None:
     """Return the processor time that a job wrote at the end of its log, if it did."""
     if not log_file.is_file():
         return None
     told = _PROCESSOR_TIME.findall(log_file.read_text(encoding="utf-8", errors="replace"))
     return float(told[-1]) if told else None
+
+
+def _row(summary: Mapping[Hashable, Any]) -> Row:
+    seconds = [f"{summary[name]:,.1f}" for name in ("cpu_s", "wall_s", "median_s", "max_s")]
+    memory = f"{summary['peak_mib']:,.0f}" if np.isfinite(summary["peak_mib"]) else "–"
+    texts = (summary["rule"], f"{summary['jobs']:,}", *seconds, memory)
+    return tuple(Cell(text) for text in texts)
 
 
 def _summary(rule: str, jobs: pd.DataFrame) -> dict[str, Any]:
@@ -193,12 +172,12 @@ def _on_the_clock(jobs: pd.DataFrame) -> tuple[float, int]:
 def _notes(runtime: pd.DataFrame) -> list[str]:
     total = runtime.iloc[-1]
     jobs, sampled = int(total["jobs"]), int(total["sampled_jobs"])
-    beside, busy = int(total["side_by_side"]), number(100 * efficiency(runtime), 0)
+    at_once, busy = int(total["side_by_side"]), number(100 * efficiency(runtime), 0)
     at_least = "at least " if sampled else ""
     notes = [
         f"From the first job's start to the last one's end: {_duration(total['elapsed_s'])}, "
-        f"leaving out pauses of more than {PAUSE_S:.0f} s in which no job ran. At most {beside} "
-        f"{'job' if beside == 1 else 'jobs'} ran at once; the jobs' own work kept as many "
+        f"leaving out pauses of more than {PAUSE_S:.0f} s in which no job ran. At most {at_once} "
+        f"{'job' if at_once == 1 else 'jobs'} ran at once; the jobs' own work kept as many "
         f"processors busy for {at_least}{busy} % of that time. Other work on the machine lowers "
         "that figure and lengthens every time here but the processors'.",
         "Processor and wall-clock times are sums over jobs, some of which ran side by side. A job "

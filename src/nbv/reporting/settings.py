@@ -1,4 +1,4 @@
-"""What a reader may choose about tables, claims and figures, and the words they share."""
+"""What tables, claims and figures show, and the units and words that they share."""
 
 from __future__ import annotations
 

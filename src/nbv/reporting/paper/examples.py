@@ -1,4 +1,4 @@
-"""Which object and viewpoint stand as the example, chosen by rule so that nobody picked it."""
+"""Which object and viewpoint are the example, chosen by rule so that nobody picked them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def choose_example(frame: pd.DataFrame, settings: ReportSettings) -> Example:
     Parameters
     ----------
     frame : pandas.DataFrame
-        One unit, from `results.load_unit`.
+        One unit, from `results.load_evaluations`.
     settings : ReportSettings
         Gives the fold.
     """
