@@ -3,7 +3,13 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from nbv.reporting.extensions.curves import more_views_figure, travel_figure, travel_table
+from nbv.errors import UserError
+from nbv.reporting.extensions.curves import (
+    more_views_figure,
+    travel_curves,
+    travel_figure,
+    travel_table,
+)
 from nbv.reporting.table import write_table
 
 METHODS = ("either_way_average", "gain_posterior")
@@ -43,6 +49,22 @@ def test_a_curve_for_each_price_and_none_for_limits():
     assert list(priced.get_xdata()) == [70, 120, 170]
     assert list(priced.get_ydata()) == [5, 4, 3]
     assert figure.axes[0].get_xlabel() == "Mean travel (°)"
+
+
+def test_folds_are_pooled_by_category(tmp_path):
+    files = {}
+    for fold, shift in ((1, 0.0), (2, 2.0)):
+        rows = travelled().assign(error_deg=lambda f, shift=shift: f["error_deg"] + shift)
+        for category in ("mug", "car"):
+            files[category, fold] = tmp_path / f"{category}{fold}.csv"
+            rows.to_csv(files[category, fold], index=False)
+    curves = travel_curves(files)
+    assert list(curves) == ["mug", "car"]
+    pooled = curves["car"]
+    assert list(pooled.columns) == list(travelled().columns)
+    assert pooled["error_deg"].tolist() == [error + 1 for error in travelled()["error_deg"]]
+    with pytest.raises(UserError, match=r"no\.csv does not exist"):
+        travel_curves({("mug", 1): tmp_path / "no.csv"})
 
 
 def test_the_travel_table_holds_every_point_to_six_decimals(tmp_path):

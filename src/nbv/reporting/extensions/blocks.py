@@ -7,11 +7,13 @@ The configuration's methods and extensions come as one mapping of a name to its 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from nbv.files import existing, read_csv
 from nbv.labels import interval_text
 from nbv.reporting.table import Cell
 from nbv.statistics.metrics import Interval
@@ -64,6 +66,14 @@ def blocks_of(
             at = rows[rows["elevation_deg"] == taken]
             blocks[run, str(category)] = paired_objects(at, str(category))
     return blocks
+
+
+def rows_by_category(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFrame]:
+    """Read rows by category and fold; return each category's, with their ``fold``."""
+    parts: dict[str, list[pd.DataFrame]] = {}
+    for (category, fold), path in files.items():
+        parts.setdefault(category, []).append(read_csv(existing(path)).assign(fold=fold))
+    return {category: pd.concat(found) for category, found in parts.items()}
 
 
 def shared_methods(blocks: Blocks, methods: Methods) -> list[str]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import matplotlib as mpl
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nbv.experiments.travel import ANY_DIRECTION
+from nbv.experiments.travel import ANY_DIRECTION, pooled_travel
 from nbv.labels import category_label, method_label
+from nbv.reporting.extensions.blocks import rows_by_category
 from nbv.reporting.style import RC, method_style, new_figure
 from nbv.reporting.table import Table
 
@@ -84,6 +86,20 @@ def more_views_figure(cells: pd.DataFrame) -> Figure:
     return figure
 
 
+def travel_curves(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFrame]:
+    """Return error against travel of each category, all folds pooled.
+
+    Parameters
+    ----------
+    files : mapping of (category, fold) to Path
+        Rows of `nbv.experiments.travel.travel_rows`.
+    """
+    return {
+        category: pooled_travel({int(str(fold)): part for fold, part in rows.groupby("fold")})
+        for category, rows in rows_by_category(files).items()
+    }
+
+
 @mpl.rc_context(RC)
 def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
     """Draw the error against the mean travel as its price rises, a panel for each category.
@@ -91,7 +107,7 @@ def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) 
     Parameters
     ----------
     curves : mapping of str to DataFrame
-        By category, of `nbv.experiments.travel.pooled_travel`.
+        By category, of `travel_curves`.
     methods : tuple of str
         The methods to draw.
     """
@@ -118,7 +134,7 @@ def travel_table(curves: Mapping[str, pd.DataFrame]) -> Table:
     Parameters
     ----------
     curves : mapping of str to DataFrame
-        By category, of `nbv.experiments.travel.pooled_travel`.
+        By category, of `travel_curves`.
     """
     cells = pd.concat([curve.assign(category=category) for category, curve in curves.items()])
     title = "Error against travel"

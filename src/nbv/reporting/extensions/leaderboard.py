@@ -56,7 +56,7 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
             cells.append(made)
             alone = best == [method]
             mark = "*" if method in best and not alone else ""
-            texts[method].append(Cell(f"{number(sample.errors_deg[method].mean())}{mark}", alone))
+            texts[method].append(Cell(f"{number(made['value'])}{mark}", alone))
     ranks = _ranks(blocks, ranked)
     mean_rank = dict(zip(ranked, ranks.mean(axis=0), strict=True))
     order = sorted(shown, key=lambda method: mean_rank.get(method, np.inf))
