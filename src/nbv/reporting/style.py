@@ -1,15 +1,19 @@
-"""How every figure looks: colours that survive colour blindness, marks that survive grey print."""
+"""One style for every figure: colours for the colour-blind, marks that survive grey print."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.typing import LineStyleType
+
+from nbv.files import replacing
 
 RC: Any = {
     "font.family": "DejaVu Sans",
@@ -30,6 +34,11 @@ RC: Any = {
     "svg.hashsalt": "nbv",
 }
 """Matplotlib settings in force while a figure is built and saved."""
+
+_SAVED: Mapping[str, Mapping[str, Any]] = {
+    "png": {"dpi": 150, "metadata": {"Software": None}},
+    "pdf": {"metadata": {"CreationDate": None}},
+}
 
 INK = "#222222"
 MUTED = "#666666"
@@ -61,7 +70,7 @@ _FURTHER = (
 
 
 def method_style(method: str, methods: tuple[str, ...]) -> MethodStyle:
-    """Return a method's style; those beyond the paper's take the next ones in turn."""
+    """Return a method's style; extensions take the next ones in turn."""
     if method in _STYLES:
         return _STYLES[method]
     others = [name for name in methods if name not in _STYLES]
@@ -86,3 +95,23 @@ def azimuth_axis(axes: Axes, label: str, vertical: bool = False) -> None:
         axes.set_xlim(0, 360)
         axes.set_xticks(ticks)
         axes.set_xlabel(label)
+
+
+def save_figure(figure: Figure, paths: Mapping[str, Path]) -> None:
+    """Write a figure as ``png`` (150 dpi) and ``pdf``; the same figure gives the same bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+    paths : mapping of str to Path
+        By format.
+
+    Raises
+    ------
+    KeyError
+        If a format is neither.
+    """
+    with mpl.rc_context(RC):
+        for kind, path in paths.items():
+            with replacing(path) as temporary:
+                figure.savefig(temporary, format=kind, **_SAVED[kind])

@@ -11,10 +11,10 @@ import pytest
 from nbv.errors import UserError
 from nbv.experiments.two_views import COLUMNS
 from nbv.reference.store import read_cells
-from nbv.reporting.extensions.transfer import build_transfer, load_transfer
-from nbv.reporting.paper.cells import CELL_COLUMNS
-from nbv.reporting.paper.layout import save_table, to_markdown
-from nbv.reporting.settings import ReportSettings as ReadingSettings
+from nbv.reporting.cells import CELL_COLUMNS
+from nbv.reporting.extensions.transfer import load_transfer, transfer_table
+from nbv.reporting.settings import ReportSettings
+from nbv.reporting.table import write_table
 
 CONDITIONS = {
     "clean": {"sensor": "ideal", "framing": "silhouette"},
@@ -23,35 +23,36 @@ CONDITIONS = {
 UNIT = ("mug", 15)
 METHODS = ("single", "proposed")
 FOLDS = (1, 3)
-SETTINGS = ReadingSettings(methods=METHODS, n_resamples=200, seed=5)
+SETTINGS = ReportSettings(methods=METHODS, n_resamples=200, seed=5)
 PAIRS = list(itertools.product(CONDITIONS, CONDITIONS))
 
 
 @pytest.fixture(scope="module")
-def root(tmp_path_factory):
+def files(tmp_path_factory):
     """Errors of three objects a fold; those of `noisy` under `clean` are the largest."""
     folder = tmp_path_factory.mktemp("transfer")
     rng = np.random.default_rng(0)
+    found = {}
     for (trained, tested), fold, method in itertools.product(PAIRS, FOLDS, METHODS):
         scale = 20 if (trained, tested) == ("noisy", "clean") else 10
         frame = pd.DataFrame(0.0, index=range(12), columns=list(COLUMNS))
         frame["object_id"] = np.repeat([f"{fold}{name}" for name in "abc"], 4)
         frame["initial_deg"] = np.tile([0, 90, 180, 270], 3)
         frame["error_deg"] = rng.uniform(0, scale, 12).round(4)
-        place = folder / f"transfer/evaluation/{trained}/{tested}/mug/el15/fold{fold}"
-        place.mkdir(parents=True, exist_ok=True)
-        frame.to_csv(place / f"{method}.csv", index=False)
-    return folder
+        path = folder / f"{trained}-{tested}-{fold}-{method}.csv"
+        frame.to_csv(path, index=False)
+        found[trained, tested, fold, method] = path
+    return found
 
 
 @pytest.fixture(scope="module")
-def evaluations(root):
-    return load_transfer(root, list(CONDITIONS), UNIT, FOLDS, METHODS)
+def evaluations(files):
+    return load_transfer(files, UNIT)
 
 
 @pytest.fixture(scope="module")
 def table(evaluations):
-    return build_transfer(evaluations, CONDITIONS, UNIT, SETTINGS)
+    return transfer_table(evaluations, CONDITIONS, UNIT, SETTINGS)
 
 
 def errors(evaluations, trained, tested, method):
@@ -96,10 +97,11 @@ def test_differences_are_paired_with_the_matched_estimator(evaluations, table):
 
 
 def test_written_as_other_tables_are(table, tmp_path):
-    csv, md, tex = save_table(table, tmp_path / "transfer")
-    assert len(read_cells(csv)) == len(table.cells)
-    assert list(pd.read_csv(csv).columns) == [*CELL_COLUMNS, "trained_on", "tested_on"]
-    rows = [line for line in md.read_text().splitlines() if line.startswith("|")]
+    paths = {kind: tmp_path / f"transfer.{kind}" for kind in ("csv", "md", "tex")}
+    write_table(table, paths)
+    assert len(read_cells(paths["csv"])) == len(table.cells)
+    assert list(pd.read_csv(paths["csv"]).columns) == [*CELL_COLUMNS, "trained_on", "tested_on"]
+    rows = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
     assert rows[0] == "| Method | Trained on | clean | noisy |"
     assert len(rows) == 2 + len(METHODS) * len(CONDITIONS)
     single, noisy = (row.split(" | ") for row in rows[2:4])
@@ -107,10 +109,11 @@ def test_written_as_other_tables_are(table, tmp_path):
     value = cell(table, "clean", "clean", "single")
     assert single[2].startswith(f"**{value['value']:.2f}°** ({value['ci_low']:.2f} to ")
     assert not noisy[2].startswith("**")
-    assert "\\begin{tabular}{lrrr}" in tex.read_text()
-    assert "24 initial views" in to_markdown(table)
+    assert "\\begin{tabular}{lrrr}" in paths["tex"].read_text()
+    assert "6 test objects, 24 initial views in each row." in table.notes
 
 
-def test_a_missing_file_is_named(root):
-    with pytest.raises(UserError, match=r"el15/fold2/single\.csv does not exist"):
-        load_transfer(root, list(CONDITIONS), UNIT, (2,), METHODS)
+def test_a_missing_file_is_named(files, tmp_path):
+    absent = files | {("clean", "noisy", 3, "single"): tmp_path / "single.csv"}
+    with pytest.raises(UserError, match=r"single\.csv does not exist"):
+        load_transfer(absent, UNIT)

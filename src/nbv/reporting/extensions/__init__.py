@@ -1,1 +1,1 @@
-"""Tables and figures of what goes beyond the paper."""
+"""Tables and figures of extensions."""

@@ -5,58 +5,42 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from nbv.labels import interval_text, number
-from nbv.reporting.grid import Cell, Grid
-from nbv.reporting.sheets import Sheet
-from nbv.statistics.object_means import mae_difference as gap
-from nbv.statistics.object_means import mae_interval as standing
-from nbv.statistics.paired import PairedErrors, Resampler
+from nbv.labels import number
+from nbv.reporting.extensions.blocks import difference_cell
+from nbv.reporting.table import Cell, Table
+from nbv.statistics.object_means import mae_difference, mae_interval, paired_objects
+from nbv.statistics.paired import Resampler
 
 
-def ablation_sheet(
+def ablation_table(
     space: pd.DataFrame, found: Mapping[int, pd.DataFrame], category: str, resampler: Resampler
-) -> Sheet:
-    """Return the table of all rows of the space, each held against the first.
+) -> Table:
+    """Return the table of all rows of the space, each compared with the first.
 
     Parameters
     ----------
     space : DataFrame
-        From `ablation_space`.
+        From `nbv.experiments.ablation.ablation_space`.
     found : mapping of int to DataFrame
         By row: ``fold, object_id, error_deg`` of all folds.
     category : str
     resampler : Resampler
     """
-    wide = pd.concat(
-        {row: frame.set_index(["object_id", "fold"])["error_deg"] for row, frame in found.items()},
-        axis=1,
-    ).sort_index()
-    sample = PairedErrors(
-        {str(row): wide[row].to_numpy(dtype=np.float64) for row in wide.columns},
-        np.arange(len(wide), dtype=np.int64),
-        wide.index.get_level_values("fold").to_numpy(dtype=np.int64),
-        np.zeros(len(wide)),
-        (category,) * len(wide),
-    )
+    named = [frame.assign(method=str(row)) for row, frame in found.items()]
+    sample = paired_objects(pd.concat(named), category)
     cells, printed = [], []
     for row, instance in enumerate(space.to_dict("records")):
-        value = standing(sample, str(row), resampler)
-        less = gap(sample, str(row), "0", resampler)
-        cells.append(
-            instance
-            | {"value": value.value, "ci_low": value.low, "ci_high": value.high}
-            | {"difference": less.value, "difference_low": less.low, "difference_high": less.high}
-        )
-        difference = interval_text(less.value, less.low, less.high) if row else "–"
+        value = mae_interval(sample, str(row), resampler)
+        less = mae_difference(sample, str(row), "0", resampler)
+        cells.append(instance | value.columns("value", "ci") | less.columns("difference"))
         printed.append(
             (
                 Cell(instance["varied"].replace("_", " ")),
                 Cell(_described(instance)),
                 Cell(number(value.value)),
-                Cell(difference, best=bool(row) and less.high < 0),
+                difference_cell(less) if row else Cell("–"),
             )
         )
     header = ("Varied", "Setting", "MAE", "Difference")
@@ -67,7 +51,7 @@ def ablation_sheet(
         "change is better and the interval excludes 0.",
     )
     title = f"Ablation: {category}"
-    return Sheet("ablation", title, pd.DataFrame(cells), Grid(header, tuple(printed)), notes)
+    return Table("ablation", title, title, pd.DataFrame(cells), header, tuple(printed), notes)
 
 
 def _described(instance: Mapping[Hashable, Any]) -> str:
@@ -78,7 +62,7 @@ def _described(instance: Mapping[Hashable, Any]) -> str:
         )
     named = {
         "chosen_by": instance["chosen_by"],
-        "reading": f"{instance['reading']}, {instance['spread']}",
+        "pose_likelihood": f"{instance['pose_likelihood']}, {instance['spread']}",
         "bins": str(instance["n_bins"]),
         "calibration_objects": str(instance["n_calibration"]),
         "criterion_and_fusion": f"{instance['criterion']}, {instance['fusion']}",

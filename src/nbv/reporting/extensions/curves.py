@@ -1,17 +1,20 @@
-"""Curves beyond the paper: error against travel, and against the number of views."""
+"""Curves of extensions: error against travel, and against the number of views."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import matplotlib as mpl
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nbv.experiments.travel import ANY_DIRECTION
+from nbv.experiments.travel import ANY_DIRECTION, pooled_travel
 from nbv.labels import category_label, method_label
+from nbv.reporting.extensions.blocks import rows_by_category
 from nbv.reporting.style import RC, method_style, new_figure
+from nbv.reporting.table import Table
 
 _COLUMNS = 3
 _BASELINES: Mapping[str, str] = {
@@ -58,13 +61,13 @@ def _legend(figure: Figure, panels: list[Axes]) -> None:
 
 
 @mpl.rc_context(RC)
-def sequences(cells: pd.DataFrame) -> Figure:
+def more_views_figure(cells: pd.DataFrame) -> Figure:
     """Draw the error against the number of views, a panel for each category.
 
     Parameters
     ----------
     cells : DataFrame
-        Of `nbv.reporting.sheets.sequence_sheet`.
+        Of `nbv.reporting.extensions.more_views.more_views_table`.
     """
     categories = list(dict.fromkeys(cells["category"]))
     methods = tuple(dict.fromkeys(cells["method"]))
@@ -83,14 +86,28 @@ def sequences(cells: pd.DataFrame) -> Figure:
     return figure
 
 
+def travel_curves(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFrame]:
+    """Return error against travel of each category, all folds pooled.
+
+    Parameters
+    ----------
+    files : mapping of (category, fold) to Path
+        Rows of `nbv.experiments.travel.travel_rows`.
+    """
+    return {
+        category: pooled_travel({int(str(fold)): part for fold, part in rows.groupby("fold")})
+        for category, rows in rows_by_category(files).items()
+    }
+
+
 @mpl.rc_context(RC)
-def travel(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
+def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
     """Draw the error against the mean travel as its price rises, a panel for each category.
 
     Parameters
     ----------
     curves : mapping of str to DataFrame
-        By category, of `nbv.experiments.travel.pooled_travel`.
+        By category, of `travel_curves`.
     methods : tuple of str
         The methods to draw.
     """
@@ -109,3 +126,16 @@ def travel(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figu
         axes.set_ylabel("MAE (°)")
     _legend(figure, panels)
     return figure
+
+
+def travel_table(curves: Mapping[str, pd.DataFrame]) -> Table:
+    """Return the curves as a table that has a CSV file only.
+
+    Parameters
+    ----------
+    curves : mapping of str to DataFrame
+        By category, of `travel_curves`.
+    """
+    cells = pd.concat([curve.assign(category=category) for category, curve in curves.items()])
+    title = "Error against travel"
+    return Table("travel", title, title, cells, header=(), rows=(), decimals=6)

@@ -6,93 +6,76 @@ Columns of the tidy table are `cells.CELL_COLUMNS`: ``method`` is the run, ``row
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from nbv.experiments.results import Unit, load_unit
-from nbv.labels import method_label, number
+from nbv.experiments.results import Unit
+from nbv.labels import MINUS, interval_text, method_label, number
 from nbv.reporting.cells import CELL_COLUMNS, method_cells, shared_resampler
-from nbv.reporting.markdown import pipe_row
-from nbv.reporting.settings import ReportSettings as ReadingSettings
-from nbv.reporting.settings import common_elevation_deg, unit_label
+from nbv.reporting.settings import ReportSettings, common_elevation_deg, unit_label
+from nbv.reporting.table import Cell, Row, Table
 from nbv.statistics.paired import pair_methods
 
-Runs = Mapping[str, tuple[Path, Sequence[str]]]
-"""A run's folder and its methods, by the run's name."""
+_NAME = "run_comparison"
 
 
-def sidebyside_cells(
-    runs: Runs, units: Iterable[Unit], n_folds: int, settings: ReadingSettings
-) -> pd.DataFrame:
+def run_comparison(
+    runs: Mapping[str, Mapping[Unit, pd.DataFrame]], settings: ReportSettings
+) -> Table:
     """Return the MAE of every method in every run, with paired differences to the first run.
 
     Parameters
     ----------
-    runs : mapping
-        All were tested on the same images. A method needs to be in one of them alone.
-    units : iterable of (category, elevation_deg)
-    n_folds : int
-    settings : ReadingSettings
+    runs : mapping of str to mapping
+        By run, frames of `nbv.experiments.results.load_evaluations` for the same units. All were
+        tested on the same images. A method needs to be in one of them alone.
+    settings : ReportSettings
         ``n_resamples`` and ``seed``.
 
     Raises
     ------
     UserError
-        Where a file is missing, or runs were tested on different images.
+        Where runs were tested on different images.
     """
-    units = list(units)
-    elevation = common_elevation_deg(units, settings)
+    first = next(iter(runs))
+    elevation = common_elevation_deg(runs[first], settings)
     resampler = shared_resampler(settings)
-    shown = replace(settings, methods=tuple(runs), reference=next(iter(runs)))
+    shown = replace(settings, methods=tuple(runs), reference=first)
     cells = []
-    for unit in units:
-        frames = [
-            load_unit(root, *unit, n_folds, methods).assign(run=run)
-            for run, (root, methods) in runs.items()
-        ]
+    for unit in runs[first]:
+        frames = [evaluations[unit].assign(run=run) for run, evaluations in runs.items()]
         errors = pd.concat(frames).astype({"method": str})
         for method, part in errors.groupby("method", sort=False):
             by_run = part.drop(columns="method").rename(columns={"run": "method"})
+            row = f"{unit[0]} {method}"
             label = f"{unit_label(unit, elevation)}: {method_label(str(method))}"
-            cells += method_cells(
-                "sidebyside",
-                f"{unit[0]} {method}",
-                label,
-                "mae",
-                pair_methods(by_run, unit[0]),
-                resampler,
-                shown,
-                comparable=False,
-            )
-    return pd.DataFrame(cells, columns=list(CELL_COLUMNS))
-
-
-def sidebyside_markdown(cells: pd.DataFrame) -> str:
-    """Return the table of `sidebyside_cells` for people."""
-    runs = list(dict.fromkeys(cells["method"]))
-    differing = [f"{run} \u2212 {runs[0]}" for run in runs[1:]]
-    lines = ["## The same methods in several runs", ""]
-    lines.append(pipe_row(["MAE", *runs, *differing]))
-    lines.append(pipe_row(["---"] + ["---:"] * (len(runs) + len(differing))))
-    for label, part in cells.groupby("row_label", sort=False):
-        found = {cell["method"]: cell for cell in part.to_dict("records")}
-        values = [f"{number(found[run]['value'])}°" if run in found else "–" for run in runs]
-        differences = [_difference(found[run]) if run in found else "–" for run in runs[1:]]
-        lines.append(pipe_row([str(label), *values, *differences]))
+            sample = pair_methods(by_run, unit[0])
+            cells += method_cells(_NAME, row, label, "mae", sample, resampler, shown)
+    frame = pd.DataFrame(cells, columns=list(CELL_COLUMNS))
+    rows = [
+        _row(str(label), part, list(runs)) for label, part in frame.groupby("row_label", sort=False)
+    ]
+    header = ("MAE", *runs, *(f"{run} {MINUS} {first}" for run in list(runs)[1:]))
     note = (
-        "- Mean absolute errors over test images. Differences are paired image by image, with 95 % "
+        "Mean absolute errors over test images. Differences are paired image by image, with 95 % "
         "intervals over objects; those do not contain the chance of training."
     )
-    return "\n".join([*lines, "", note]) + "\n"
+    title = "The same methods in several runs"
+    return Table(_NAME, title, title, frame, header, tuple(rows), (note,))
 
 
-def _difference(cell: Mapping[Hashable, Any]) -> str:
-    if not np.isfinite(cell["difference"]):
-        return "–"
-    low, high = cell["difference_low"], cell["difference_high"]
-    return f"{number(cell['difference'])} ({number(low)} to {number(high)})"
+def _row(label: str, part: pd.DataFrame, runs: list[str]) -> Row:
+    """Return a method's errors run by run, then the differences; a dash where there is none."""
+    found = {cell["method"]: cell for cell in part.to_dict("records")}
+    values = [f"{number(found[run]['value'])}°" if run in found else "–" for run in runs]
+    differences = []
+    for run in runs[1:]:
+        value, low, high = (
+            found[run][name] if run in found else np.nan
+            for name in ("difference", "difference_low", "difference_high")
+        )
+        differences.append(interval_text(value, low, high) if np.isfinite(value) else "–")
+    return tuple(map(Cell, (label, *values, *differences)))

@@ -1,4 +1,4 @@
-"""Trained on × tested on: what an estimator is worth under conditions that it was not trained for.
+"""Trained on × tested on: what an estimator brings in conditions that it was not trained for.
 
 A condition is a sensor and a framing. Each estimator calibrates and tests on the same objects
 under every condition, so that a column of the table compares estimators on the same images, and
@@ -8,64 +8,52 @@ what a mismatch costs is a paired difference.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import pandas as pd
 
-from nbv.experiments.results import Unit, read_evaluation, unit_dir
-from nbv.labels import category_label
-from nbv.reporting.paper.cells import Table, cell, shared_resampler
-from nbv.reporting.settings import TRANSFER
-from nbv.reporting.settings import ReportSettings as ReadingSettings
+from nbv.experiments.results import Unit, load_evaluations
+from nbv.labels import category_label, method_label, number
+from nbv.reporting.cells import cell, shared_resampler
+from nbv.reporting.settings import ReportSettings
+from nbv.reporting.table import Cell, Row, Table
 from nbv.statistics import paired
 from nbv.statistics.paired import pair_methods
 
-Evaluations = Mapping[tuple[str, str], pd.DataFrame]
-"""By the condition trained on and the one tested on: ``method, fold`` and `methods.COLUMNS`."""
+Pair = tuple[str, str]
+"""The condition trained on and the one tested on."""
+
+TransferFile = tuple[str, str, int, str]
+"""What a file of errors is about: trained on, tested on, fold (from 1) and method."""
+
+_NAME = "transfer"
 
 
-def load_transfer(
-    root: str | Path,
-    conditions: Sequence[str],
-    unit: Unit,
-    folds: Sequence[int],
-    methods: Sequence[str],
-) -> dict[tuple[str, str], pd.DataFrame]:
+def load_transfer(files: Mapping[TransferFile, Path], unit: Unit) -> dict[Pair, pd.DataFrame]:
     """Read every method's errors under every pair of conditions.
 
     Parameters
     ----------
-    root : path
-        ``results/<name>``.
-    conditions : sequence of str
+    files : mapping of (trained on, tested on, fold, method) to path
     unit : (category, elevation_deg)
-    folds : sequence of int
-    methods : sequence of str
 
     Raises
     ------
     UserError
         If a file is missing, empty, or lacks a column.
     """
-    evaluations = {}
-    for trained, tested in itertools.product(conditions, conditions):
-        folder = unit_dir(Path(root) / TRANSFER, f"evaluation/{trained}/{tested}", *unit)
-        parts = [
-            read_evaluation(folder / f"fold{fold}" / f"{method}.csv").assign(
-                method=method, fold=fold
-            )
-            for method, fold in itertools.product(methods, folds)
-        ]
-        evaluations[trained, tested] = pd.concat(parts, ignore_index=True)
-    return evaluations
+    of_pair: dict[Pair, dict[tuple[str, int, int, str], Path]] = {}
+    for (trained, tested, fold, method), path in files.items():
+        of_pair.setdefault((trained, tested), {})[*unit, fold, method] = path
+    return {pair: load_evaluations(of_unit)[unit] for pair, of_unit in of_pair.items()}
 
 
-def build_transfer(
-    evaluations: Evaluations,
+def transfer_table(
+    evaluations: Mapping[Pair, pd.DataFrame],
     conditions: Mapping[str, Mapping[str, str]],
     unit: Unit,
-    settings: ReadingSettings,
+    settings: ReportSettings,
 ) -> Table:
     """Return the table of MAEs, one cell for each method and pair of conditions.
 
@@ -76,61 +64,76 @@ def build_transfer(
     conditions : mapping
         ``sensor`` and ``framing`` of each condition.
     unit : (category, elevation_deg)
-    settings : ReadingSettings
+    settings : ReportSettings
         ``methods``, and the object bootstrap.
 
     Returns
     -------
     Table
-        Its cells have the columns ``trained_on`` and ``tested_on`` besides `cells.CELL_COLUMNS`;
-        ``difference*`` is the paired difference to the estimator that was trained on what is
-        tested.
+        Its cells have `cells.CELL_COLUMNS`, ``trained_on`` and ``tested_on``; ``difference*`` is
+        the paired difference to the estimator that was trained on what is tested.
     """
     category, elevation = unit
     resampler = shared_resampler(settings)
     cells = []
     for tested in conditions:
         frames = {trained: evaluations[trained, tested] for trained in conditions}
-        named = [f.assign(method=f"{trained}/" + f["method"]) for trained, f in frames.items()]
+        named = [
+            frame.assign(method=f"{trained}/" + frame["method"].astype(str))
+            for trained, frame in frames.items()
+        ]
         sample = pair_methods(pd.concat(named, ignore_index=True), category)
         for method, trained in itertools.product(settings.methods, conditions):
             name = f"{trained}/{method}"
             found = paired.estimate("mae", sample, name, resampler)
-            matched = paired.estimate("mae", sample, f"{tested}/{method}", resampler)
-            interval, gap = found.interval(), found.minus(matched)
             made = cell(
-                TRANSFER,
+                _NAME,
                 f"{trained} on {tested}",
                 f"{trained} on {tested}",
                 method=method,
                 metric="mae",
-                value=interval.value,
                 sigma=paired.fold_sigma("mae", sample, name),
-                ci_low=interval.low,
-                ci_high=interval.high,
                 n_objects=sample.n_objects,
                 n_images=sample.n_images,
-            )
+            ) | found.interval().columns("value", "ci")
             if trained != tested:
-                made |= {
-                    "difference": gap.value,
-                    "difference_low": gap.low,
-                    "difference_high": gap.high,
-                }
+                matched = paired.estimate("mae", sample, f"{tested}/{method}", resampler)
+                made |= found.minus(matched).columns("difference")
             cells.append(made | {"trained_on": trained, "tested_on": tested})
     frame = pd.DataFrame(cells)
     title = f"MAE of {category_label(category)} at elevation {elevation}°, trained on × tested on"
-    return Table(TRANSFER, title, "Trained on", frame, _notes(conditions, settings), settings)
+    header = ("Method", "Trained on", *conditions)
+    return Table(
+        _NAME, title, title, frame, header, _rows(frame), _notes(frame, conditions, settings)
+    )
+
+
+def _rows(cells: pd.DataFrame) -> tuple[Row, ...]:
+    """Return methods and conditions trained on by conditions tested on; the best of each column."""
+    lowest = cells.groupby(["method", "tested_on"])["value"].min().round(2).to_dict()
+    rows = []
+    for (method, trained), part in cells.groupby(["method", "trained_on"], sort=False):
+        row = [Cell(method_label(str(method))), Cell(str(trained))]
+        for found in part.to_dict("records"):
+            value = round(found["value"], 2)
+            interval = f"({number(found['ci_low'])} to {number(found['ci_high'])})"
+            is_best = bool(value == lowest[method, found["tested_on"]])
+            row.append(Cell(f"{number(value)}°", is_best, interval))
+        rows.append(tuple(row))
+    return tuple(rows)
 
 
 def _notes(
-    conditions: Mapping[str, Mapping[str, str]], settings: ReadingSettings
+    cells: pd.DataFrame, conditions: Mapping[str, Mapping[str, str]], settings: ReportSettings
 ) -> tuple[str, ...]:
     named = "; ".join(
         f"{name}: sensor {one['sensor']}, framing {one['framing']}"
         for name, one in conditions.items()
     )
     return (
+        "The best of each column in bold, for each method.",
+        f"{int(cells['n_objects'].max())} test objects, {int(cells['n_images'].max()):,} initial "
+        "views in each row.",
         f"{named}.",
         "Columns are tested on; in brackets the 95 % interval over objects "
         f"({settings.n_resamples} resamples). The CSV file has the paired differences to the "

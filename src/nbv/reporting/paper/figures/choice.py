@@ -1,4 +1,4 @@
-"""How a next viewpoint is chosen: ambiguity (Fig. 2), the idea (3), and each method's pick (7)."""
+"""How a next viewpoint is selected: its cost (Fig. 2), the idea (3), each method's own (7)."""
 
 from __future__ import annotations
 
@@ -14,26 +14,25 @@ from nbv.reporting.paper.figures.depth import depth_limits, draw_depth
 from nbv.reporting.paper.figures.inputs import (
     ExampleView,
     FigureInputs,
+    cost_words,
     example_view,
-    focus_lookup,
-    spread_unit,
 )
 from nbv.reporting.style import INK, MUTED, azimuth_axis, method_style, new_figure
 
 Likelihood = NDArray[np.float32]
 
 
-def ambiguity(inputs: FigureInputs) -> Figure:
-    """Fig. 2: an initial view of the hidden range, three next views, and their ambiguities."""
+def selection(inputs: FigureInputs) -> Figure:
+    """Fig. 2: an initial view of the hidden range, three next views, and their costs."""
     shown = example_view(inputs)
-    lookup = focus_lookup(inputs, shown.example.fold)
-    n_bins = len(lookup.ambiguity)
+    lookup = inputs.lookup(shown.example.fold)
+    n_bins = len(lookup.cost)
     first = int(nearest_bin(shown.estimate_deg, n_bins))
-    row = lookup.ambiguity[first].astype(np.float64)
+    row = lookup.cost[first].astype(np.float64)
     step = 360 / n_bins
     best = round(int(lookup.recommended_delta_deg[first]) / step)
     worst = int(np.argmax(row))
-    unit = spread_unit(lookup.spread)
+    words = cost_words(lookup)
     candidates = [
         (best, "recommended"),
         (round(180 / step), "opposite"),
@@ -70,7 +69,7 @@ def ambiguity(inputs: FigureInputs) -> Figure:
     bars.set_xticks(range(3), [name for _, name in candidates])
     bars.set_xlim(-0.6, 2.6)
     bars.set_ylim(0, max(values) * 1.18)
-    bars.set_ylabel(f"Ambiguity A[e, δ] ({unit})")
+    bars.set_ylabel(f"{words.cost} A[e, δ] ({words.unit})")
     bars.grid(visible=False, axis="x")
     curve = figure.add_subplot(grid[1, 0])
     curve.plot(np.arange(row.size) * step, row, color=INK, linewidth=1.3)
@@ -85,23 +84,23 @@ def ambiguity(inputs: FigureInputs) -> Figure:
             clip_on=False,
         )
     azimuth_axis(curve, "Rotation δ (degrees)")
-    curve.set_ylabel(f"A[e, δ] ({unit})")
-    figure.suptitle(f"Ambiguity selects the next view: {shown.title}", fontsize=10)
+    curve.set_ylabel(f"A[e, δ] ({words.unit})")
+    figure.suptitle(f"{words.selects} selects the next view: {shown.title}", fontsize=10)
     return figure
 
 
 def idea(inputs: FigureInputs) -> Figure:
-    """Fig. 3: the spread of the pose after one view, before a second look, and after it."""
+    """Fig. 3: the spread of the pose after one view, before a second view, and after it."""
     shown = example_view(inputs)
-    lookup = focus_lookup(inputs, shown.example.fold)
+    lookup = inputs.lookup(shown.example.fold)
     viewpoint, answers = lookup.viewpoint_likelihood, lookup.estimate_likelihood
     n_bins = len(viewpoint)
     step = 360 / n_bins
     first = int(nearest_bin(shown.estimate_deg, n_bins))
     one = viewpoint[first]
     best = round(int(lookup.recommended_delta_deg[first]) / step)
-    worst = int(np.argmax(lookup.ambiguity[first]))
-    given = viewpoint if lookup.reading == "given_estimate" else answers
+    worst = int(np.argmax(lookup.cost[first]))
+    given = viewpoint if lookup.pose_likelihood == "given_estimate" else answers
     curves: list[list[tuple[Likelihood, str, str, str]]] = [
         [(one, "p(φ | e)", "#E69F00", "solid")],
         [
@@ -117,7 +116,7 @@ def idea(inputs: FigureInputs) -> Figure:
         delta = round(float(seen["delta_deg"]) / step)
         second = int(nearest_bin(float(seen["next_estimate_deg"]), n_bins))
         belief = one * np.roll(answers[:, second], -delta)
-        # As before a second look: two answers that exclude each other say nothing.
+        # As before the second view: two answers that exclude each other say nothing.
         belief = belief if belief.any() else np.ones_like(one)
         curves.append([(belief / belief.sum(), "p(θ | e₁, e₂, δ)", "#D55E00", "solid")])
         titles.append(f"After the second look at δ = {delta * step:.0f}°")

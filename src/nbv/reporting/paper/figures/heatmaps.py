@@ -1,4 +1,4 @@
-"""The lookup table as a picture: how spread the truth is, and where looking again helps."""
+"""The lookup table as a picture: how spread the truth is, and which rotation costs least."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from nbv.reporting.paper.figures.inputs import FigureInputs, focus_lookup, spread_unit
+from nbv.reporting.paper.figures.inputs import FigureInputs, cost_words
 from nbv.reporting.style import azimuth_axis, new_figure
 
 _DECADES = 3.0
@@ -18,9 +18,10 @@ def lookup_maps(inputs: FigureInputs) -> Figure:
     folds = sorted(inputs.evaluations[unit]["fold"].unique())
     wanted = inputs.settings.example_fold
     fold = int(wanted if wanted in folds else folds[0])
-    lookup = focus_lookup(inputs, fold)
+    lookup = inputs.lookup(fold)
+    words = cost_words(lookup)
     likelihood = np.asarray(lookup.viewpoint_likelihood, dtype=np.float64)
-    table = np.asarray(lookup.ambiguity, dtype=np.float64)
+    cost = np.asarray(lookup.cost, dtype=np.float64)
     figure = new_figure(8.6, 4.1)
     left, right = figure.subplots(1, 2)
     half = 180 / likelihood.shape[0]
@@ -40,14 +41,14 @@ def lookup_maps(inputs: FigureInputs) -> Figure:
     azimuth_axis(left, "True viewpoint φ (degrees)", vertical=True)
     figure.colorbar(shown, ax=left, label="Probability per bin (log scale)", extend="min")
     shown = right.imshow(
-        table.T,
+        cost.T,
         origin="lower",
         extent=extent,
         cmap="cividis",
         interpolation="nearest",
         aspect="auto",
     )
-    n_bins = table.shape[0]
+    n_bins = cost.shape[0]
     right.plot(
         np.arange(n_bins) * 360 / n_bins,
         lookup.recommended_delta_deg,
@@ -58,11 +59,9 @@ def lookup_maps(inputs: FigureInputs) -> Figure:
         markeredgecolor="black",
         markeredgewidth=0.3,
     )
-    name = lookup.spread.replace("_", " ").capitalize()
-    right.set_title(f"{name} A[e, δ], dots: recommended")
+    right.set_title(f"{words.table} A[e, δ], dots: recommended")
     azimuth_axis(right, "Rotation δ (degrees)", vertical=True)
-    label = f"Ambiguity ({spread_unit(lookup.spread)}); lower is better"
-    figure.colorbar(shown, ax=right, label=label)
+    figure.colorbar(shown, ax=right, label=f"{words.cost} ({words.unit}); lower is better")
     for axes in (left, right):
         azimuth_axis(axes, "Estimate e (degrees)")
         axes.grid(visible=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
@@ -14,33 +15,40 @@ from nbv.errors import UserError
 from nbv.experiments import results
 from nbv.experiments.results import Unit
 from nbv.files import existing
+from nbv.recommendation.criteria import cost_unit
 from nbv.recommendation.lookup import LookupTable, load_lookup
 from nbv.reporting.paper.examples import Example, choose_example, example_row, hardest_azimuth_deg
-from nbv.reporting.settings import ReportSettings as ReadingSettings
-from nbv.reporting.settings import focus_unit
+from nbv.reporting.settings import ReportSettings, focus_unit
 
 Codes = NDArray[np.uint8]
+Key = TypeVar("Key")
 
 _LONGEST_NAME = 16
 
 
 @dataclass(frozen=True)
 class FigureInputs:
-    """Everything a figure may read.
+    """Everything that figures are drawn from; `FigureKind.needs` says what each of them reads.
 
     Attributes
     ----------
-    root : Path
-        ``results/<experiment>``; depth images, lookup tables and splits are read from it.
     evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
-        Frames of `results.load_unit`.
-    settings : ReadingSettings
+        Frames of `results.load_evaluations`.
+    settings : ReportSettings
         What to show.
+    depth : mapping of (category, elevation_deg) to Path
+        Depth images.
+    splits : mapping of str to Path
+        By category; they name the objects of the depth images.
+    lookups : mapping of (category, elevation_deg, fold) to Path
+        Lookup tables that the method ``settings.subject`` follows.
     """
 
-    root: Path
     evaluations: Mapping[Unit, pd.DataFrame]
-    settings: ReadingSettings = field(default_factory=ReadingSettings)
+    settings: ReportSettings = field(default_factory=ReportSettings)
+    depth: Mapping[Unit, Path] = field(default_factory=dict)
+    splits: Mapping[str, Path] = field(default_factory=dict)
+    lookups: Mapping[tuple[str, int, int], Path] = field(default_factory=dict)
 
     @property
     def focus(self) -> Unit:
@@ -53,16 +61,27 @@ class FigureInputs:
         Raises
         ------
         UserError
-            If the unit was not rendered or has no such object.
+            If a file is missing or the unit has no such object.
         """
-        images = results.load_depth(self.root, *unit)
+        images = results.load_depth(_given(self.depth, unit, "depth images"))
         if object_id is None:
             return np.asarray(images[0])
-        ids = results.load_object_ids(self.root, unit[0])
+        path = _given(self.splits, unit[0], "splits")
+        ids = results.load_object_ids(path)
         if object_id not in ids:
-            path = results.splits_path(self.root, unit[0])
             raise UserError(f"{path}: no object {object_id!r}; evaluate the category again")
         return np.asarray(images[ids.index(object_id)])
+
+    def lookup(self, fold: int) -> LookupTable:
+        """Return the lookup table of the focus unit in one fold.
+
+        Raises
+        ------
+        UserError
+            If the subject follows none, or its file is missing.
+        """
+        name = f"lookup table of {self.settings.subject}"
+        return load_lookup(existing(_given(self.lookups, (*self.focus, fold), name)))
 
     def methods(self, unit: Unit) -> tuple[str, ...]:
         """Return the methods to show that were evaluated for a unit, in order."""
@@ -129,12 +148,45 @@ def example_view(inputs: FigureInputs) -> ExampleView:
     return ExampleView(unit, example, azimuth, estimate, views, outcomes)
 
 
-def focus_lookup(inputs: FigureInputs, fold: int) -> LookupTable:
-    """Return the focus category's lookup table of one fold."""
-    path = results.lookup_path(inputs.root, *inputs.focus, fold, inputs.settings.criterion)
-    return load_lookup(existing(path))
+@dataclass(frozen=True)
+class CostWords:
+    """How figures name what a criterion gives.
+
+    Attributes
+    ----------
+    selects : str
+        What selects the next view: the paper's ambiguity, or another criterion.
+    cost, unit : str
+        What a cell of the lookup table holds.
+    table : str
+        The lookup table: the paper's goes by the spread that its ambiguity is.
+    """
+
+    selects: str
+    cost: str
+    unit: str
+    table: str
 
 
-def spread_unit(spread: str) -> str:
-    """Return the unit of an ambiguity that is a spread of that name."""
-    return "nats" if spread == "entropy" else "0–1"
+def cost_words(lookup: LookupTable) -> CostWords:
+    """Return the words for a lookup table, whatever its criterion."""
+    unit = cost_unit(lookup.criterion, {"spread": lookup.spread})
+    if lookup.criterion == "pose_ambiguity":
+        spread = lookup.spread.replace("_", " ").capitalize()
+        return CostWords("Ambiguity", "Ambiguity", unit, spread)
+    name = lookup.criterion.replace("_", " ").capitalize()
+    return CostWords(name, "Cost", unit, f"{name}: cost")
+
+
+def _given(files: Mapping[Key, Path], key: Key, kind: str) -> Path:
+    """Return the file of a key.
+
+    Raises
+    ------
+    UserError
+        If there is none.
+    """
+    if key not in files:
+        place = " ".join(map(str, key)) if isinstance(key, tuple) else key
+        raise UserError(f"no {kind} for {place}; run that stage first")
+    return files[key]

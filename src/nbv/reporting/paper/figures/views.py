@@ -22,7 +22,7 @@ def categories(inputs: FigureInputs) -> Figure:
     common = common_elevation_deg(units, inputs.settings)
     labels = [unit_label(unit, common) for unit in units]
     title = f"First object of each category, elevation {common}°, by azimuth"
-    return _sheet(inputs, units, labels, title)
+    return _view_rows(inputs, units, labels, title)
 
 
 def elevations(inputs: FigureInputs) -> Figure:
@@ -31,10 +31,10 @@ def elevations(inputs: FigureInputs) -> Figure:
     units = sorted(unit for unit in inputs.evaluations if unit[0] == category)
     labels = [f"{elevation}°" for _, elevation in units]
     title = f"First {category} by elevation (rows) and azimuth (columns)"
-    return _sheet(inputs, units, labels, title)
+    return _view_rows(inputs, units, labels, title)
 
 
-def _sheet(
+def _view_rows(
     inputs: FigureInputs, units: list[tuple[str, int]], labels: list[str], title: str
 ) -> Figure:
     columns = len(_AZIMUTHS_DEG)
