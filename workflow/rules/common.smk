@@ -150,7 +150,9 @@ def folds_of(units):
 
 def evaluations_of(units):
     """Category, elevation, fold and method of every evaluation in the paper's tables."""
-    return [(*fold, method) for fold in folds_of(units) for method in METHODS]
+    return [
+        (*unit, fold, method) for unit in units for method in METHODS for fold in FOLDS
+    ]
 
 
 def paths(path, keys):

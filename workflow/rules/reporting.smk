@@ -87,7 +87,7 @@ def counted_jobs():
     return [*jobs, ("claims", "claims"), ("settings", "settings")]
 
 
-JOBS = counted_jobs()
+JOBS = sorted(counted_jobs(), key=lambda job: Path(job[1]).parts)
 
 
 rule table:

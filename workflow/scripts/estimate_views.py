@@ -21,7 +21,7 @@ with job(snakemake):
         load_estimator(given.estimator, hardware),
         [load_estimator(path, hardware) for path in given.of_parts],
         hardware,
-        distributions="test_posteriors" in output.keys(),
+        distributions=bool(output.get("test_posteriors")),
     )
     for role, found in answers.items():
         write_estimates(output[role], found.object_ids, found.estimate_deg)

@@ -12,16 +12,19 @@ with job(snakemake):
 
     given, params = snakemake.input, snakemake.params
 
-    def files(name, keys):
-        found = given.get(name)
-        return dict(zip(keys, map(Path, found), strict=True)) if found else {}
-
-    inputs = FigureInputs(
-        evaluations=load_evaluations(files("evaluations", params.evaluations)),
-        settings=ReportSettings(**params.settings),
-        depth=files("depth", params.units),
-        splits=files("splits", [category for category, _ in params.units]),
-        lookups=files("lookups", params.folds),
-    )
+    keys = {
+        "evaluations": params.evaluations,
+        "depth": params.units,
+        "splits": [category for category, _ in params.units],
+        "lookups": params.folds,
+    }
+    # A figure's rule declares what the figure needs, and nothing else.
+    files = {
+        name: dict(zip(keys[name], map(Path, found), strict=True))
+        for name, found in given.items()
+        if name in keys
+    }
+    evaluations = load_evaluations(files.pop("evaluations"))
+    inputs = FigureInputs(evaluations, ReportSettings(**params.settings), **files)
     figure = build_figure(snakemake.wildcards.figure, inputs)
     save_figure(figure, dict(snakemake.output.items()))
