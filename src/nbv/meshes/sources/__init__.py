@@ -72,7 +72,7 @@ def open_source(settings: Mapping[str, Any], seed: int) -> MeshSource:
     Parameters
     ----------
     settings : mapping
-        The configuration's group `dataset`, as `nbv.config.DatasetConfig` has it.
+        The configuration's group `dataset`, as `nbv.config.schema.Dataset` has it.
     seed : int
         See `MeshSource`.
 
