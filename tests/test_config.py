@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from nbv.config import (
     default_of,
-    equal_cost_epochs,
     load_condition,
     load_config,
     read_configuration,
     snakemake_overrides,
 )
+from nbv.config.compose import equal_cost_epochs
 from nbv.errors import UserError
 from nbv.estimation import hardware, networks
 from nbv.recommendation.criteria.pose_ambiguity import READINGS

@@ -30,8 +30,8 @@ PACKAGES = (
 def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
     """Return the modules of nbv that a script imports, directly or not, wherever it does so.
 
-    Found by reading, not by running, and so without the optional modules that a registry names in
-    strings: those that a configuration chooses are given in `chosen`.
+    Files are parsed and not run. A registry names optional modules in strings, which no import
+    shows: `chosen` gives those that a configuration chooses.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
     Returns
     -------
     list of str
-        Sorted paths, those of the packages that the modules lie in among them.
+        Sorted paths, with the ``__init__`` files of the packages that hold the modules.
     """
     imports = _imports()
     found: set[str] = set()

@@ -9,13 +9,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from nbv.config.keys import one_line, with_new_names
-from nbv.config.overrides import check_choice, checked_override
+from nbv.config.keys import one_line, type_of, with_new_names
 from nbv.config.schema import Config
-from nbv.errors import UserError
+from nbv.errors import UserError, nearest
 from nbv.files import existing
 
-# Each names a file of its group.
+GROUPS = ("experiment", "dataset", "renderer", "sensor", "estimator", "density")
+# The key of a group that names one of its files.
 _FILE_NAMES = {"dataset": "source", "renderer": "name", "sensor": "name", "estimator": "kind"}
 
 
@@ -41,7 +41,7 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
         One line that names the key, the value and what the key takes.
     """
     folder = Path(directory).resolve()
-    composed = _composed(folder, [checked_override(folder, override) for override in overrides])
+    composed = _composed(folder, [_checked(folder, override) for override in overrides])
     try:
         settings = Config.model_validate(composed).model_dump()
     except ValidationError as error:
@@ -50,9 +50,9 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
     estimator = {key: value for key, value in settings["estimator"].items() if value is not None}
     settings["estimator"] = estimator
     for group, key in _FILE_NAMES.items():
-        check_choice(folder, group, settings[group][key], f"{group}.{key}")
+        _check_choice(folder, group, settings[group][key], f"{group}.{key}")
     for name, condition in settings["transfer"]["conditions"].items():
-        check_choice(folder, "sensor", condition["sensor"], f"transfer.conditions.{name}.sensor")
+        _check_choice(folder, "sensor", condition["sensor"], f"transfer.conditions.{name}.sensor")
     settings["name"] = settings["name"] or _name(settings)
     if settings["calibration"] == "crossfit" and settings["crossfit_epochs"] is None:
         settings["crossfit_epochs"] = equal_cost_epochs(
@@ -62,7 +62,31 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
         raise UserError(
             "crossfit_epochs=0 is out of range: 1 or more; null needs more estimator.epochs"
         )
-    return settings | {"gives_distributions": _gives_distributions(settings)}
+    return settings | {"gives_distributions": "n_classes" in estimator}
+
+
+def _checked(directory: Path, override: str) -> str:
+    """Return an override as Hydra takes it, after a check of its key or its choice."""
+    key, separator, value = override.partition("=")
+    bare = key.lstrip("+~")
+    if not separator and not key.startswith("~"):
+        raise UserError(f"override {override!r} is not of the form key=value")
+    if bare in GROUPS:
+        _check_choice(directory, bare, value, bare)
+        return override
+    kind, _ = type_of(bare.split("."))
+    if kind is str and value not in ("null", "") and value[0] not in "'\"":
+        # Quoted, for Hydra's grammar has no place for ~, = or brackets in plain text.
+        escaped = value.replace("'", "\\'")
+        override = f"{key}='{escaped}'"
+    # What may be there is for the schema to say, not for the files that are composed.
+    return f"++{override}" if key == bare else override
+
+
+def _check_choice(directory: Path, group: str, choice: str, key: str) -> None:
+    choices = [path.stem for path in (directory / group).glob("*.yaml")]
+    if choice not in choices:
+        raise UserError(f"{key}={choice} is unknown: {nearest(choice, choices)}")
 
 
 def _composed(folder: Path, overrides: list[str]) -> Any:
@@ -141,6 +165,53 @@ def load_condition(
     return load_config(directory, [*kept, *chosen])
 
 
+def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
+    """Turn what came with Snakemake's ``--config`` into Hydra overrides.
+
+    Parameters
+    ----------
+    given : mapping
+        ``key=value`` pairs such as ``experiment=quick``, and ``overrides``, a list (or one string)
+        of Hydra overrides for keys that Snakemake's command line cannot spell.
+
+    Raises
+    ------
+    UserError
+        For a value that is neither text nor a number.
+    """
+    overrides = []
+    for key, value in given.items():
+        if key == "overrides":
+            continue
+        if not isinstance(value, str | int | float) and value is not None:
+            raise UserError(f'--config {key}: write it as overrides="[{key}=...]"')
+        overrides.append(f"{key}={'null' if value is None else value}")
+    extra = given.get("overrides") or []
+    return overrides + _items(extra if isinstance(extra, str) else ",".join(map(str, extra)))
+
+
+def _items(text: str) -> list[str]:
+    """Split ``[a=1,b=[2,3]]`` or ``a=1,b='2,3'`` at commas outside brackets and quotes.
+
+    Snakemake hands over as text what YAML cannot read, such as a list within an item, and as a
+    list that is cut at every comma what YAML can.
+    """
+    inner = text[1:-1] if text.startswith("[") and text.endswith("]") else text
+    items, depth, quote = [""], 0, ""
+    for character in inner:
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "'\"":
+            quote = character
+        else:
+            depth += (character in "[{(") - (character in "]})")
+        if character == "," and depth == 0 and not quote:
+            items.append("")
+        else:
+            items[-1] += character
+    return [item.strip() for item in items if item.strip()]
+
+
 def read_configuration(root: Path) -> dict[str, Any]:
     """Read ``configuration.yaml`` of a run or reference as plain values, under today's names.
 
@@ -158,9 +229,4 @@ def read_configuration(root: Path) -> dict[str, Any]:
     if not isinstance(configuration.get("n_folds"), int) or configuration["n_folds"] < 2:
         raise UserError(f"{path}: n_folds has to be 2 or more")
     settings = with_new_names({str(key): value for key, value in configuration.items()})
-    return settings | {"gives_distributions": _gives_distributions(settings)}
-
-
-def _gives_distributions(settings: Mapping[str, Any]) -> bool:
-    """Say whether an estimator gives a distribution over azimuths, as those with classes do."""
-    return "n_classes" in settings.get("estimator", {})
+    return settings | {"gives_distributions": "n_classes" in settings.get("estimator", {})}

@@ -13,6 +13,13 @@ from nbv.config.schema import RENAMED_KEYS, RENAMED_VALUES, Config
 from nbv.errors import UserError, nearest
 
 _BOUNDS = ("ge", "gt", "le", "lt", "min_length")
+_RANGES = {
+    ("ge",): "{ge} or more",
+    ("gt",): "above {gt}",
+    ("ge", "le"): "{ge} to {le}",
+    ("gt", "lt"): "between {gt} and {lt}",
+    ("min_length",): "one or more",
+}
 _TYPES = {int: "a whole number", float: "a number", str: "text", list: "a list"}
 
 
@@ -22,7 +29,7 @@ def fields_of(kind: Any) -> dict[str, FieldInfo]:
 
 
 def type_of(parts: Sequence[str | int]) -> tuple[Any, list[Any]]:
-    """Return the type of a key, and the marks that bound its values.
+    """Return the type of a key, and the marks that give its range.
 
     Parameters
     ----------
@@ -51,7 +58,8 @@ def _opened(kind: Any, marks: Sequence[Any]) -> tuple[Any, list[Any]]:
     """Take a type out of its annotations, and out of what null may replace."""
     if get_origin(kind) is Annotated:
         inner, *more = get_args(kind)
-        return _opened(inner, [*marks, *more])
+        inside = [each for mark in more for each in getattr(mark, "metadata", [mark])]
+        return _opened(inner, [*marks, *inside])
     if type(None) in get_args(kind):
         return _opened(get_args(kind)[0], marks)
     return kind, list(marks)
@@ -106,39 +114,26 @@ def one_line(error: ValidationError) -> str:
     mistake = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
     place = [part for part in mistake["loc"] if part != "[key]"]
     kind, marks = type_of(place)
-    key, context = _dotted(place), mistake.get("ctx", {})
-    written = f"{key}={mistake['input']}"
-    if mistake["type"] == "missing":
-        return f"{key} is missing"
-    if mistake["type"] == "literal_error":
-        return f"{written} is unknown: {nearest(str(mistake['input']), get_args(kind))}"
-    if mistake["type"] == "finite_number":
-        return f"{written} is out of range: a finite number"
-    if mistake["type"] == "string_pattern_mismatch":
-        return f"{written}: use letters, digits, '.', '_' and '-'"
-    if "error" in context:
-        return f"{key}: {context['error']}"
+    key, context, value = _dotted(place), mistake.get("ctx", {}), mistake["input"]
+    match mistake["type"]:
+        case "missing":
+            return f"{key} is missing"
+        case "value_error":
+            return f"{key}: {context['error']}"
+        case "string_pattern_mismatch":
+            return f"{key}={value}: use letters, digits, '.', '_' and '-'"
+        case "literal_error":
+            return f"{key}={value} is unknown: {nearest(str(value), get_args(kind))}"
+        case "finite_number":
+            return f"{key}={value} is out of range: a finite number"
     if any(bound in context for bound in _BOUNDS):
-        return f"{written} is out of range: {_range_text(marks)}"
-    return f"{written} is not {_TYPES.get(get_origin(kind) or kind, 'a mapping')}"
+        return f"{key}={value} is out of range: {_range_text(marks)}"
+    return f"{key}={value} is not {_TYPES.get(get_origin(kind) or kind, 'a mapping')}"
 
 
 def _range_text(marks: Sequence[Any]) -> str:
     bounds = {
-        name: getattr(mark, name)
-        for mark in marks
-        for name in _BOUNDS
-        if getattr(mark, name, None) is not None
+        name: getattr(mark, name) for name in _BOUNDS for mark in marks if hasattr(mark, name)
     }
-    match bounds:
-        case {"ge": low, "le": high}:
-            text = f"{low} to {high}"
-        case {"gt": low, "lt": high}:
-            text = f"between {low} and {high}"
-        case {"ge": low}:
-            text = f"{low} or more"
-        case {"gt": low}:
-            text = f"above {low}"
-        case _:
-            text = "one or more"
-    return ", ".join([text, *(mark for mark in marks if isinstance(mark, str))])
+    notes = [mark for mark in marks if isinstance(mark, str)]
+    return ", ".join([_RANGES[tuple(bounds)].format(**bounds), *notes])

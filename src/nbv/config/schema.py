@@ -4,27 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from annotated_types import Ge, Gt, Interval, MinLen
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Strict,
-    StringConstraints,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from nbv.errors import UserError, nearest
 from nbv.fold_sizes import enough_objects
 
-Whole = Annotated[int, Strict()]
-Count = Annotated[int, Strict(), Ge(1)]
-Number = Annotated[float, Strict()]
-Positive = Annotated[float, Strict(), Gt(0)]
-NotNegative = Annotated[float, Strict(), Ge(0)]
-Elevation = Annotated[int, Strict(), Interval(ge=0, le=89)]
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9._-]+$")]
+Whole = Annotated[int, Field(strict=True)]
+Number = Annotated[float, Field(strict=True)]
+Count = Annotated[Whole, Field(ge=1)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Elevation = Annotated[Whole, Field(ge=0, le=89)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$")]
 Framing = Literal["silhouette", "axis"]
 
 RENAMED_KEYS = {
@@ -34,17 +25,17 @@ RENAMED_KEYS = {
     "reading": "pose_likelihood",
     "rotation": "policy",
 }
-"""Earlier keys: each stands for its new name in a section that has the new and not the earlier."""
+"""New names of earlier keys, in sections that have the new key and not the earlier one."""
 
 RENAMED_VALUES = {
     "policy": {"entropy": "pose_ambiguity", "chosen": "selected"},
     "fusion": {"chosen": "selected"},
 }
-"""Earlier values, by the key that holds them."""
+"""New names of earlier values, by their key."""
 
 
 class Section(BaseModel):
-    """Keys that belong together. No other key may stand among them."""
+    """Keys that belong together. Another key is a mistake."""
 
     # So that a name of digits needs no quotes.
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, coerce_numbers_to_str=True)
@@ -74,9 +65,9 @@ class Renderer(Section):
 class Camera(Section):
     """The depth camera; see `nbv.rendering.camera`."""
 
-    distance: Annotated[Number, Gt(1), "in object diagonals"]
-    fov_deg: Annotated[Number, Interval(gt=0, lt=180)]
-    image_side: Annotated[Whole, Ge(8)]
+    distance: Annotated[Number, Field(gt=1), "in object diagonals"]
+    fov_deg: Annotated[Number, Field(gt=0, lt=180)]
+    image_side: Annotated[Whole, Field(ge=8)]
     framing: Framing
 
 
@@ -92,15 +83,15 @@ class Estimator(Section):
     """The single-view estimator; see `nbv.estimation`. A kind omits what it does not have."""
 
     kind: str
-    channels: Annotated[list[Count], MinLen(1)]
+    channels: Annotated[list[Count], Field(min_length=1)]
     hidden: Count
     epochs: Count
-    batch_size: Annotated[Whole, Ge(2)]
+    batch_size: Annotated[Whole, Field(ge=2)]
     learning_rate: Positive
     weight_decay: NotNegative
     device: Literal["auto", "cpu", "cuda", "mps"]
     precision: Literal["auto", "bfloat16", "float32"]
-    n_classes: Annotated[Whole, Ge(8), "a divisor of 360"] | None = None
+    n_classes: Annotated[Whole, Field(ge=8), "a divisor of 360"] | None = None
     target_bandwidth_deg: Positive | None = None
 
     @model_validator(mode="after")
@@ -121,24 +112,24 @@ class Density(Section):
 
     pose_likelihood: Literal["given_estimate", "given_truth"]
     spread: Literal["entropy", "circular_variance"]
-    bandwidths_deg: Annotated[list[NotNegative], MinLen(1)]
-    pseudo_observations: Annotated[list[NotNegative], MinLen(1)]
-    n_parts: Annotated[Whole, Ge(2)]
+    bandwidths_deg: Annotated[list[NotNegative], Field(min_length=1)]
+    pseudo_observations: Annotated[list[NotNegative], Field(min_length=1)]
+    n_parts: Annotated[Whole, Field(ge=2)]
 
 
 class Recommendation(Section):
     """What travel costs; see `nbv.recommendation.lookup.least_ambiguous_delta`."""
 
     travel_cost: Annotated[NotNegative, "in the criterion's unit per degree"]
-    max_travel_deg: Annotated[Number, Interval(ge=0, le=180)]
+    max_travel_deg: Annotated[Number, Field(ge=0, le=180)]
 
 
 class MoreViews(Section):
     """More than two views; see `nbv.experiments.more_views`."""
 
-    n_views: Annotated[Whole, Interval(ge=2, le=8)]
-    start_every_deg: Annotated[Whole, Interval(ge=1, le=180)]
-    min_separation_deg: Annotated[Number, Interval(ge=0, le=45)]
+    n_views: Annotated[Whole, Field(ge=2, le=8)]
+    start_every_deg: Annotated[Whole, Field(ge=1, le=180)]
+    min_separation_deg: Annotated[Number, Field(ge=0, le=45)]
 
 
 class Method(Section):
@@ -168,8 +159,8 @@ class Transfer(Section):
 
     category: str | None
     elevation_deg: Elevation
-    folds: Annotated[list[Whole], MinLen(1)] | None
-    conditions: Annotated[dict[Name, Condition], MinLen(1)]
+    folds: Annotated[list[Whole], Field(min_length=1)] | None
+    conditions: Annotated[dict[Name, Condition], Field(min_length=1)]
 
 
 class Config(Section):
@@ -177,21 +168,21 @@ class Config(Section):
 
     experiment: Name
     name: Name | None
-    seed: Annotated[Whole, Ge(0)]
-    categories: Annotated[list[str], MinLen(1)]
+    seed: Annotated[Whole, Field(ge=0)]
+    categories: Annotated[list[str], Field(min_length=1)]
     focus_category: str | None
-    elevations_deg: dict[str, Annotated[list[Elevation], MinLen(1)]]
+    elevations_deg: dict[str, Annotated[list[Elevation], Field(min_length=1)]]
     n_objects: Whole | None
-    n_folds: Annotated[Whole, Ge(2)]
+    n_folds: Annotated[Whole, Field(ge=2)]
     calibration: Literal["holdout", "crossfit"] = "holdout"
-    calibration_fraction: Annotated[Number, Interval(gt=0, lt=1)]
-    crossfit_parts: Annotated[Whole, Ge(2)] = 2
+    calibration_fraction: Annotated[Number, Field(gt=0, lt=1)]
+    crossfit_parts: Annotated[Whole, Field(ge=2)] = 2
     crossfit_epochs: Count | None = None
     methods: dict[Name, Method]
     extensions: dict[Name, Method]
     compared_runs: list[str] = []
     leaderboard_runs: list[str]
-    n_resamples: Annotated[Whole, Ge(100)]
+    n_resamples: Annotated[Whole, Field(ge=100)]
     dataset: Dataset
     renderer: Renderer
     camera: Camera
