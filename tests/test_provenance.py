@@ -1,43 +1,60 @@
 from __future__ import annotations
 
+import subprocess
+import sys
+import tomllib
 from pathlib import Path
 
+from omegaconf import OmegaConf
+
+import nbv
 from nbv import provenance
+from nbv.meshes.sources import SOURCES
+from nbv.rendering import RENDERERS
 
 ROOT = Path(__file__).parents[1]
-SOURCE = ROOT / "src"
 
 
 def names(script: str, *chosen: str) -> set[str]:
-    found = provenance.source_files(ROOT / "workflow/scripts" / script, SOURCE, chosen)
-    return {str(Path(path).relative_to(SOURCE / "nbv")) for path in found}
+    (path,) = (ROOT / "workflow/scripts").glob(script)
+    package = Path(nbv.__file__).parent
+    return {str(Path(p).relative_to(package)) for p in provenance.source_files(path, chosen)}
 
 
 def test_training_depends_on_the_network_and_not_on_rendering_or_criteria():
-    found = names("train.py")
+    found = names("train*.py")
     assert {"estimation/networks.py", "estimation/training.py", "errors.py"} <= found
     assert not any(name.startswith(("rendering/", "recommendation/")) for name in found)
 
 
 def test_only_the_chosen_renderer_counts():
-    found = names("render.py", "nbv.rendering.embree:EmbreeRenderer")
+    found = names("render*.py", RENDERERS["embree"])
     assert "rendering/embree.py" in found
     assert "rendering/pyrender.py" not in found
 
 
-def test_imports_are_followed_through_modules_and_packages(tmp_path):
-    package = tmp_path / "nbv"
-    (package / "inner").mkdir(parents=True)
-    (package / "__init__.py").write_text("")
-    (package / "a.py").write_text("def f():\n    from nbv.inner import b\n")
-    (package / "inner" / "__init__.py").write_text("import nbv.c\n")
-    (package / "inner" / "b.py").write_text("")
-    (package / "c.py").write_text("import json\n")
-    (package / "unused.py").write_text("")
+def test_an_import_within_a_function_counts():
+    generators = "meshes/procedural/__init__.py"
+    assert generators in names("*meshes.py", SOURCES["procedural"])
+    assert generators not in names("*meshes.py", SOURCES["folder"])
+
+
+def test_an_edit_of_the_schema_does_not_rerun_the_splits():
+    found = names("*splits.py")
+    assert "fold_sizes.py" in found
+    assert not any(name.startswith("config") for name in found)
+
+
+def test_imports_are_followed_to_their_end_and_with_packages(tmp_path):
+    """The files are those that a fresh Python loads, for modules that import nothing later."""
     script = tmp_path / "script.py"
-    script.write_text("import nbv.a\n")
-    found = [Path(p).name for p in provenance.source_files(script, tmp_path)]
-    assert found == ["__init__.py", "a.py", "c.py", "__init__.py", "b.py"]
+    script.write_text("with open(__file__):\n    from nbv.calibration.splits import make_splits\n")
+    program = (
+        f"import runpy, sys; runpy.run_path({str(script)!r})\n"
+        "print(*sorted(m.__file__ for n, m in sys.modules.items() if n.split('.')[0] == 'nbv'))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert provenance.source_files(script) == done.stdout.split()
 
 
 def test_versions_name_every_package_results_depend_on():
@@ -48,3 +65,10 @@ def test_versions_name_every_package_results_depend_on():
 
 def test_outside_a_checkout_the_commit_is_unknown(tmp_path):
     assert provenance.git_commit(tmp_path) == "unknown"
+
+
+def test_the_version_stands_in_the_package_alone_and_the_citation_agrees():
+    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert "version" not in pyproject["project"]
+    assert pyproject["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "nbv.__version__"}
+    assert OmegaConf.load(ROOT / "CITATION.cff").version == nbv.__version__

@@ -27,59 +27,56 @@ PACKAGES = (
 )
 
 
-def source_files(
-    script: str | Path, source_root: str | Path, chosen: Iterable[str] = ()
-) -> list[str]:
+def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
     """Return the modules of nbv that a script imports, directly or not, wherever it does so.
 
-    Found by reading, not by running, and so without the optional modules that a registry names in
-    strings: those that a configuration chooses are given in `chosen`.
+    Files are parsed and not run. A registry names optional modules in strings, which no import
+    shows: `chosen` gives those that a configuration chooses.
 
     Parameters
     ----------
     script : path
         A Python file.
-    source_root : path
-        The folder that holds the package ``nbv``.
     chosen : iterable of str
         Registry entries such as ``nbv.rendering.embree:EmbreeRenderer``.
 
     Returns
     -------
     list of str
-        Sorted paths below `source_root`.
+        Sorted paths, with the ``__init__`` files of the packages that hold the modules.
     """
-    root = Path(source_root)
-    found = {path for entry in chosen for path in _files_of(entry.partition(":")[0], root)}
-    waiting = [Path(script), *found]
+    imports = _imports()
+    found: set[str] = set()
+    waiting = [*_imported_names(script), *(entry.partition(":")[0] for entry in chosen)]
     while waiting:
-        for module in _imported_modules(waiting.pop()):
-            for path in _files_of(module, root):
-                if path not in found:
-                    found.add(path)
-                    waiting.append(path)
-    return sorted(str(path) for path in found)
+        module = waiting.pop()
+        if module in imports and module not in found:
+            found.add(module)
+            waiting += [module.rpartition(".")[0], *imports[module]]
+    return sorted(map(_file_of, found))
 
 
 @functools.cache
-def _imported_modules(path: Path) -> frozenset[str]:
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+def _imports() -> dict[str, set[str]]:
+    """Return what each module of nbv imports of nbv."""
+    import grimp
+
+    graph = grimp.build_graph("nbv", cache_dir=None)
+    return {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+
+
+def _imported_names(script: str | Path) -> Iterator[str]:
+    """Yield the modules that a script imports, and names in them that may be modules."""
+    for node in ast.walk(ast.parse(Path(script).read_text(encoding="utf-8"), str(script))):
         if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
-            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return frozenset(name for name in names if name == "nbv" or name.startswith("nbv."))
+            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
 
 
-def _files_of(module: str, root: Path) -> Iterator[Path]:
-    """Yield the file of a module and the `__init__` files of the packages it lies in."""
-    parts = module.split(".")
-    for depth in range(1, len(parts) + 1):
-        package = root.joinpath(*parts[:depth])
-        for path in (package / "__init__.py", package.with_suffix(".py")):
-            if path.is_file():
-                yield path
+def _file_of(module: str) -> str:
+    path = Path(__file__).parents[1].joinpath(*module.split("."))
+    return str(path / "__init__.py" if path.is_dir() else path.with_suffix(".py"))
 
 
 def git_commit(directory: str | Path = Path(__file__).parent) -> str:

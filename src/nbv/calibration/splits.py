@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.amounts import enough_objects
 from nbv.errors import UserError
 from nbv.files import read_csv
+from nbv.fold_sizes import enough_objects
 
 ROLES = ("train", "calibration", "test")
 _PART = re.compile(r"part([1-9]\d*)")

@@ -8,14 +8,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from nbv.config import read_configuration
+from nbv.config import default_of, read_configuration
 from nbv.errors import UserError
 from nbv.files import existing, read_csv, replacing
 from nbv.provenance import read_provenance
 from nbv.rendering.noise import IDEAL
 from nbv.reporting.cells import CELL_COLUMNS
 from nbv.reporting.settings import TRANSFER
-from nbv.schema import default_of
 
 log = logging.getLogger(__name__)
 

@@ -1,4 +1,4 @@
-"""How many objects an experiment needs. Apart from the schema, whose every edit is none of it."""
+"""How many objects folds need. Apart, so that an edit of the schema does not rerun the splits."""
 
 from __future__ import annotations
 

@@ -1,77 +1,26 @@
-"""The configuration: one Hydra tree, validated against dataclasses, handed on as plain dicts."""
+"""A configuration as one plain dict: composed and checked, or read from a finished run."""
 
 from __future__ import annotations
 
-import dataclasses
 import re
-import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
+from nbv.config.keys import one_line, type_of, with_new_names
+from nbv.config.schema import Config
 from nbv.errors import UserError, nearest
 from nbv.files import existing
-from nbv.schema import Config
-from nbv.validation import validate
 
-# The key of each group that names what its files configure: valid are the names they hold.
-_NAMING_KEYS = {
-    "dataset": "source",
-    "renderer": "name",
-    "sensor": "name",
-    "estimator": "kind",
-}
 GROUPS = ("experiment", "dataset", "renderer", "sensor", "estimator", "density")
-
-
-def _dataclass_of(annotation: Any) -> type | None:
-    return annotation if dataclasses.is_dataclass(annotation) else None  # type: ignore[return-value]
-
-
-def _check_key(key: str) -> Any:
-    """Return a dotted key's type, None below a dict; raise UserError for an unknown key."""
-    schema: type | None = Config
-    annotation: Any = Config
-    for depth, part in enumerate(parts := key.split(".")):
-        if schema is None:
-            return None  # its keys are data
-        hints = typing.get_type_hints(schema)
-        if part not in hints:
-            meant = [".".join([*parts[:depth], name]) for name in hints]
-            written = ".".join(parts[: depth + 1])
-            raise UserError(f"configuration key {written!r} is unknown: {nearest(written, meant)}")
-        annotation = hints[part]
-        schema = _dataclass_of(annotation)
-    return annotation
-
-
-def _check_choice(directory: Path, group: str, choice: str, key: str | None = None) -> None:
-    choices = [path.stem for path in (directory / group).glob("*.yaml")]
-    if choice not in choices:
-        raise UserError(f"{key or group}={choice} is unknown: {nearest(choice, choices)}")
-
-
-def _checked(directory: Path, override: str) -> str:
-    """Return an override as Hydra takes it, after checking its key and its choice."""
-    key, separator, value = override.partition("=")
-    bare = key.lstrip("+~")
-    if not separator and not key.startswith("~"):
-        raise UserError(f"override {override!r} is not of the form key=value")
-    if bare in GROUPS:
-        _check_choice(directory, bare, value)
-        return override
-    annotation = _check_key(bare)
-    if annotation in (str, str | None) and value not in ("null", "") and value[0] not in "'\"":
-        # Quoted, for Hydra's grammar has no place for ~, = or brackets in plain text.
-        escaped = value.replace("'", "\\'")
-        override = f"{key}='{escaped}'"
-    below_dict = annotation is None or typing.get_origin(annotation) is dict
-    # What is data may have new keys, which Hydra calls adding and otherwise refuses.
-    return f"++{override}" if below_dict and key == bare else override
+# The key of a group that names one of its files.
+_FILE_NAMES = {"dataset": "source", "renderer": "name", "sensor": "name", "estimator": "kind"}
 
 
 def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[str, Any]:
-    """Compose, validate and resolve the configuration.
+    """Compose, resolve and check the configuration.
 
     Parameters
     ----------
@@ -83,51 +32,82 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
     Returns
     -------
     dict
-        Plain Python values only, keys in the order of the dataclasses: what Snakemake can compare.
+        Plain Python values only, keys in the schema's order: what Snakemake can compare. Last
+        comes ``gives_distributions``: whether the estimator gives each image's own distribution.
 
     Raises
     ------
     UserError
-        One line that names the key, the value and the nearest valid name.
+        One line that names the key, the value and what the key takes.
     """
+    folder = Path(directory).resolve()
+    composed = _composed(folder, [_checked(folder, override) for override in overrides])
+    try:
+        settings = Config.model_validate(composed).model_dump()
+    except ValidationError as error:
+        raise UserError(one_line(error)) from error
+    # So that a key of one kind of estimator is no setting of another.
+    estimator = {key: value for key, value in settings["estimator"].items() if value is not None}
+    settings["estimator"] = estimator
+    for group, key in _FILE_NAMES.items():
+        _check_choice(folder, group, settings[group][key], f"{group}.{key}")
+    for name, condition in settings["transfer"]["conditions"].items():
+        _check_choice(folder, "sensor", condition["sensor"], f"transfer.conditions.{name}.sensor")
+    settings["name"] = settings["name"] or _name(settings)
+    if settings["calibration"] == "crossfit" and settings["crossfit_epochs"] is None:
+        settings["crossfit_epochs"] = equal_cost_epochs(
+            estimator["epochs"], settings["calibration_fraction"], settings["crossfit_parts"]
+        )
+    if settings["crossfit_epochs"] == 0:
+        raise UserError(
+            "crossfit_epochs=0 is out of range: 1 or more; null needs more estimator.epochs"
+        )
+    return settings | {"gives_distributions": "n_classes" in estimator}
+
+
+def _checked(directory: Path, override: str) -> str:
+    """Return an override as Hydra takes it, after a check of its key or its choice."""
+    key, separator, value = override.partition("=")
+    bare = key.lstrip("+~")
+    if not separator and not key.startswith("~"):
+        raise UserError(f"override {override!r} is not of the form key=value")
+    if bare in GROUPS:
+        _check_choice(directory, bare, value, bare)
+        return override
+    kind, _ = type_of(bare.split("."))
+    if kind is str and value not in ("null", "") and value[0] not in "'\"":
+        # Quoted, for Hydra's grammar has no place for ~, = or brackets in plain text.
+        escaped = value.replace("'", "\\'")
+        override = f"{key}='{escaped}'"
+    # What may be there is for the schema to say, not for the files that are composed.
+    return f"++{override}" if key == bare else override
+
+
+def _check_choice(directory: Path, group: str, choice: str, key: str) -> None:
+    choices = [path.stem for path in (directory / group).glob("*.yaml")]
+    if choice not in choices:
+        raise UserError(f"{key}={choice} is unknown: {nearest(choice, choices)}")
+
+
+def _composed(folder: Path, overrides: list[str]) -> Any:
     from hydra import compose, initialize_config_dir
     from hydra.errors import HydraException
     from omegaconf import OmegaConf
     from omegaconf.errors import OmegaConfBaseException
 
-    folder = Path(directory).resolve()
-    checked = [_checked(folder, override) for override in overrides]
     try:
         with initialize_config_dir(str(folder), version_base="1.3"):
-            composed = compose("config", overrides=checked)
-        typed = OmegaConf.merge(OmegaConf.structured(Config), composed)
-        plain = OmegaConf.to_container(typed, resolve=True, throw_on_missing=True)
+            composed = compose("config", overrides=overrides)
+        return OmegaConf.to_container(composed, resolve=True, throw_on_missing=True)
     except (HydraException, OmegaConfBaseException) as error:
-        raise UserError(_one_line(error)) from error
-    assert isinstance(plain, dict)
-    settings = typing.cast(dict[str, Any], plain)
-    # So that a key of one kind of estimator is no setting of another.
-    estimator = {key: value for key, value in settings["estimator"].items() if value is not None}
-    settings["estimator"] = estimator
-    if settings["name"] is None:
-        settings["name"] = _name(settings)
-    _check_names(folder, settings)
-    if settings["calibration"] == "crossfit" and settings["crossfit_epochs"] is None:
-        settings["crossfit_epochs"] = equal_cost_epochs(
-            estimator["epochs"], settings["calibration_fraction"], settings["crossfit_parts"]
-        )
-    validate(settings)
-    return settings
+        raise UserError(f"configuration: {str(error).strip().splitlines()[0]}") from error
 
 
 def _name(settings: Mapping[str, Any]) -> str:
     """Return the experiment's name and what sets a run apart from the experiment's own."""
-    apart = {
-        settings["dataset"]["source"]: "procedural",
-        settings["estimator"]["kind"]: "regressor",
-        settings["calibration"]: "holdout",
-    }
-    return "-".join([settings["experiment"], *(name for name, own in apart.items() if name != own)])
+    own = ("procedural", "regressor", "holdout")
+    names = (settings["dataset"]["source"], settings["estimator"]["kind"], settings["calibration"])
+    return "-".join([settings["experiment"], *(name for name in names if name not in own)])
 
 
 def equal_cost_epochs(epochs: int, calibration_fraction: float, parts: int) -> int:
@@ -152,20 +132,6 @@ def equal_cost_epochs(epochs: int, calibration_fraction: float, parts: int) -> i
     """
     # Rounded first, for 10 * (1 - 0.4) / 2 falls short of 3.
     return int(round(epochs * (1.0 - calibration_fraction) / parts, 9))
-
-
-def _check_names(directory: Path, settings: Mapping[str, Any]) -> None:
-    from omegaconf import OmegaConf
-
-    for group, key in _NAMING_KEYS.items():
-        value = settings[group][key]
-        files = (directory / group).glob("*.yaml")
-        valid = [str(OmegaConf.select(OmegaConf.load(path), key)) for path in files]
-        if value not in valid:
-            raise UserError(f"{group}.{key}={value} is unknown: {nearest(value, valid)}")
-    for name, condition in settings["transfer"]["conditions"].items():
-        key = f"transfer.conditions.{name}.sensor"
-        _check_choice(directory, "sensor", condition["sensor"], key)
 
 
 def load_condition(
@@ -197,12 +163,6 @@ def load_condition(
     kept = [o for o in overrides if not re.fullmatch(replaced, o.partition("=")[0].lstrip("+~"))]
     chosen = [f"sensor={condition['sensor']}", f"camera.framing={condition['framing']}"]
     return load_config(directory, [*kept, *chosen])
-
-
-def _one_line(error: Exception) -> str:
-    full_key = getattr(error, "full_key", None)
-    text = re.split(r"\n", str(error).strip())[0]
-    return f"configuration key {full_key!r}: {text}" if full_key else f"configuration: {text}"
 
 
 def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
@@ -253,7 +213,7 @@ def _items(text: str) -> list[str]:
 
 
 def read_configuration(root: Path) -> dict[str, Any]:
-    """Read ``configuration.yaml`` of a run or reference as plain values.
+    """Read ``configuration.yaml`` of a run or reference as plain values, under today's names.
 
     Raises
     ------
@@ -268,4 +228,5 @@ def read_configuration(root: Path) -> dict[str, Any]:
         raise UserError(f"{path}: holds no settings; make it again")
     if not isinstance(configuration.get("n_folds"), int) or configuration["n_folds"] < 2:
         raise UserError(f"{path}: n_folds has to be 2 or more")
-    return {str(key): value for key, value in configuration.items()}
+    settings = with_new_names({str(key): value for key, value in configuration.items()})
+    return settings | {"gives_distributions": "n_classes" in settings.get("estimator", {})}
