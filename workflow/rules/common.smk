@@ -28,7 +28,6 @@ from nbv.rendering import RENDERERS
 from nbv.rendering.noise import SENSORS, check_sensor, sensor_settings
 
 BASE = Path(workflow.basedir)
-SOURCE_ROOT = Path(nbv.__file__).parents[1]
 
 
 def stop(message):
@@ -112,7 +111,7 @@ def sources(script, settings=CONFIG):
         ],
     }
     path = BASE / "workflow/scripts" / f"{script}.py"
-    files = provenance.source_files(path, SOURCE_ROOT, chosen.get(script, []))
+    files = provenance.source_files(path, chosen.get(script, []))
     here = Path.cwd()
     return [
         str(Path(file).relative_to(here)) if Path(file).is_relative_to(here) else file

@@ -8,10 +8,6 @@ def compared_runs():
     return list(dict.fromkeys([CONFIG["name"], *CONFIG["compared_runs"]]))
 
 
-def gives_distributions(run):
-    return run_settings(run).get("gives_distributions", False)
-
-
 def methods_in(run):
     """All methods of a run whose second estimates do not depend on other extensions."""
     settings = run_settings(run)
@@ -20,12 +16,12 @@ def methods_in(run):
         for name, method in settings["extensions"].items()
         if method["fusion"] == "product"
     ]
-    return [*settings["methods"], *(own if gives_distributions(run) else [])]
+    return [*settings["methods"], *(own if run_settings(run)["gives_distributions"] else [])]
 
 
 def density_methods(run):
     """The methods whose errors tell what a density brings."""
-    kinds = ["estimate", *(["posterior"] if gives_distributions(run) else [])]
+    kinds = ["estimate", *(["posterior"] if run_settings(run)["gives_distributions"] else [])]
     return sorted({name for kind in kinds for name in DENSITY_METHODS[kind].values()})
 
 
@@ -60,7 +56,7 @@ def test_estimates(run):
 
 
 def test_posteriors(run):
-    return ["test"] if gives_distributions(run) else []
+    return ["test"] if run_settings(run)["gives_distributions"] else []
 
 
 rule density_comparison:
