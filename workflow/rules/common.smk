@@ -23,7 +23,8 @@ from nbv.layout import Layout, fold_folder, unit_folder
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
 from nbv.recommendation.criteria import CRITERIA
-from nbv.recommendation.policies import check_methods, needs_lookup
+from nbv.recommendation.method_selection import check_methods
+from nbv.recommendation.policies import needs_lookup
 from nbv.rendering import RENDERERS
 from nbv.rendering.noise import SENSORS, check_sensor, sensor_settings
 

@@ -83,7 +83,9 @@ def counted_jobs():
         "table": TABLES,
         "figure": SHOWN_FIGURES,
     }
-    jobs = [(rule, f"{rule}/{name}") for rule, names in by_rule.items() for name in names]
+    jobs = [
+        (rule, f"{rule}/{name}") for rule, names in by_rule.items() for name in names
+    ]
     return [*jobs, ("claims", "claims"), ("settings", "settings")]
 
 

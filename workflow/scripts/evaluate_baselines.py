@@ -1,7 +1,5 @@
 """Evaluate the methods that need no lookup table on the test objects of one fold."""
 
-from pathlib import Path
-
 from nbv.jobs import job
 
 with job(snakemake):
@@ -15,7 +13,6 @@ with job(snakemake):
     test = read_estimates(snakemake.input.test)
     splits = read_splits(snakemake.input.splits)
     assert_role(splits, int(wildcards.fold), "test", test.object_ids)
-    for path in snakemake.output:
-        method = Path(path).stem
-        rng = rng_for(params.seed, method, *wildcards)
-        write_csv(path, evaluate_method(params.methods[method], test, rng))
+    for (name, method), path in zip(params.methods.items(), snakemake.output, strict=True):
+        rng = rng_for(params.seed, name, *wildcards)
+        write_csv(path, evaluate_method(method, test, rng))

@@ -1,11 +1,11 @@
-"""Look again and again at the test objects of one fold, by every rule."""
+"""Take more than two views of the test objects of one fold, by every policy."""
 
 from nbv.jobs import job
 
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
     from nbv.calibration.splits import assert_role, read_splits
-    from nbv.experiments.more_views import sequence_rows
+    from nbv.experiments.more_views import more_views_rows
     from nbv.files import write_csv
     from nbv.recommendation.method_selection import read_choices, stored_evidence
     from nbv.seeds import rng_for
@@ -18,5 +18,5 @@ with job(snakemake):
     choices = read_choices(snakemake.input.choices)
     evidences = stored_evidence(calibration, choices, params.density)
     rng = rng_for(params.seed, "sequence", *wildcards)
-    rows = sequence_rows(test, evidences, params.sequence, rng)
+    rows = more_views_rows(test, evidences, params.more_views, rng)
     write_csv(snakemake.output[0], rows)

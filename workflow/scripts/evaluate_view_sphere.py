@@ -1,11 +1,11 @@
-"""Choose rotation and elevation of the second view jointly, for one category and fold."""
+"""Choose rotation and elevation of the second view together, for one category and fold."""
 
 from nbv.jobs import job
 
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
     from nbv.calibration.splits import assert_role, read_splits
-    from nbv.experiments.view_sphere import sphere_rows
+    from nbv.experiments.view_sphere import view_sphere_rows
     from nbv.files import write_csv
     from nbv.recommendation.method_selection import read_choices, stored_evidence
 
@@ -19,4 +19,4 @@ with job(snakemake):
         assert_role(splits, fold, "test", tests[elevation].object_ids)
         choices = read_choices(snakemake.input.choices[position])
         evidences[elevation] = stored_evidence(calibration, choices, params.density)
-    write_csv(snakemake.output[0], sphere_rows(tests, evidences, params.sequence))
+    write_csv(snakemake.output[0], view_sphere_rows(tests, evidences, params.more_views))

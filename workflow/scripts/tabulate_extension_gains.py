@@ -13,8 +13,8 @@ with job(snakemake):
     from nbv.statistics.paired import Resampler
 
     given, params = snakemake.input, snakemake.params
-    objects = files_by_run(params.keys, given.objects)
-    choices = files_by_run(params.keys, given.choices)
+    objects = files_by_run(params.folds, given.objects)
+    choices = files_by_run(params.folds, given.choices)
     blocks = blocks_of({run: load_object_means(found) for run, found in objects.items()})
     choices = {run: load_choices(found) for run, found in choices.items()}
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)

@@ -13,7 +13,7 @@ with job(snakemake):
     from nbv.statistics.paired import Resampler
 
     params = snakemake.params
-    files = files_by_run(params.keys, snakemake.input.objects)
+    files = files_by_run(params.folds, snakemake.input.objects)
     blocks = blocks_of({run: load_object_means(found) for run, found in files.items()})
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
     table = leaderboard_table(blocks, params.methods, resampler)

@@ -8,7 +8,7 @@ with job(snakemake):
     from nbv.reporting.table import write_table
 
     params = snakemake.params
-    files = dict(zip(params.keys, snakemake.input.evaluations, strict=True))
+    files = dict(zip(params.evaluations, snakemake.input.evaluations, strict=True))
     evaluations = load_transfer(files, params.unit)
     settings = ReportSettings(**params.settings)
     table = transfer_table(evaluations, params.conditions, params.unit, settings)

@@ -32,8 +32,10 @@ class LookupTable:
         The rotation of least cost for each estimate, degrees in [0, 360), travel considered.
     bandwidth_deg, pseudo_observations : float
         The density's settings.
+    criterion : str
+        A name in `nbv.recommendation.criteria.CRITERIA`.
     pose_likelihood, spread : str
-        The criterion's settings; see `nbv.recommendation.criteria.pose_ambiguity`.
+        Settings of the pose ambiguity; see `nbv.recommendation.criteria.pose_ambiguity`.
     """
 
     viewpoint_likelihood: NDArray[np.float32]
@@ -42,6 +44,7 @@ class LookupTable:
     recommended_delta_deg: NDArray[np.int64]
     bandwidth_deg: float
     pseudo_observations: float
+    criterion: str
     pose_likelihood: str
     spread: str
 
@@ -118,6 +121,7 @@ def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") ->
         recommended_delta_deg=recommended_delta(cost, evidence.settings),
         bandwidth_deg=evidence.bandwidth_deg,
         pseudo_observations=evidence.pseudo_observations,
+        criterion=criterion,
         pose_likelihood=evidence.settings["pose_likelihood"],
         spread=evidence.settings["spread"],
     )
@@ -138,6 +142,7 @@ def load_lookup(path: str | Path) -> LookupTable:
         recommended_delta_deg=stored["recommended_delta_deg"],
         bandwidth_deg=float(stored["bandwidth_deg"]),
         pseudo_observations=float(stored["pseudo_observations"]),
+        criterion=str(stored["criterion"]),
         pose_likelihood=str(stored["pose_likelihood"]),
         spread=str(stored["spread"]),
     )

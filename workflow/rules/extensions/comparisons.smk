@@ -16,12 +16,18 @@ def methods_in(run):
         for name, method in settings["extensions"].items()
         if method["fusion"] == "product"
     ]
-    return [*settings["methods"], *(own if run_settings(run)["gives_distributions"] else [])]
+    return [
+        *settings["methods"],
+        *(own if run_settings(run)["gives_distributions"] else []),
+    ]
 
 
 def density_methods(run):
     """The methods whose errors tell what a density brings."""
-    kinds = ["estimate", *(["posterior"] if run_settings(run)["gives_distributions"] else [])]
+    kinds = [
+        "estimate",
+        *(["posterior"] if run_settings(run)["gives_distributions"] else []),
+    ]
     return sorted({name for kind in kinds for name in DENSITY_METHODS[kind].values()})
 
 

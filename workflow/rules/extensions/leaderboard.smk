@@ -1,7 +1,7 @@
 # All methods ranked, over this run or several, and what the extensions gain.
 
 
-def leaderboard_keys(wildcards):
+def leaderboard_folds(wildcards):
     """Run, category, elevation and fold of everything that the leaderboard ranks."""
     keys = []
     for run in CONFIG["leaderboard_runs"] or [CONFIG["name"]]:
@@ -23,7 +23,7 @@ def leaderboard_files(name):
             run_file(
                 run, Layout(f"results/{run}").extension(*fold, name), "leaderboard_runs"
             )
-            for run, *fold in leaderboard_keys(wildcards)
+            for run, *fold in leaderboard_folds(wildcards)
         ]
 
     return files
@@ -47,7 +47,7 @@ rule leaderboard:
         mem_mb=1000,
         runtime=10,
     params:
-        keys=leaderboard_keys,
+        folds=leaderboard_folds,
         methods=METHODS | EXTENSIONS,
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
@@ -74,7 +74,7 @@ rule extension_gains:
         mem_mb=1000,
         runtime=10,
     params:
-        keys=leaderboard_keys,
+        folds=leaderboard_folds,
         methods=METHODS | EXTENSIONS,
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],

@@ -185,7 +185,7 @@ rule transfer_table:
         settings=RESAMPLED,
         conditions=TRANSFER["conditions"],
         unit=TRANSFER_UNIT,
-        keys=TRANSFER_KEYS,
+        evaluations=TRANSFER_KEYS,
     script:
         "../../scripts/tabulate_transfer.py"
 
