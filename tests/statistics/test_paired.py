@@ -80,6 +80,14 @@ def test_statistics_of_pooled_images(evaluations, statistic, expected):
     assert interval.low < interval.value < interval.high
 
 
+@pytest.mark.parametrize("statistic", ["mae", "median", "pauc"])
+def test_no_images_have_no_statistic(evaluations, statistic):
+    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+    nothing = sample.select(sample.folds == 9)
+    with pytest.raises(ValueError, match="no errors"):
+        paired.estimate(statistic, nothing, "single", paired.Resampler(0, 10))
+
+
 def test_sigma_is_over_fold_means(evaluations):
     frame = evaluations["mug", 0]
     means = frame[frame["method"] == "proposed"].groupby("fold")["error_deg"].mean()

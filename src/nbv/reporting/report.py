@@ -40,6 +40,7 @@ _BADGES = {
     UNDECIDED: {"sign": "?", "kind": "open"},
     NOT_RUN: {"sign": "–", "kind": "none"},
 }
+_UNKNOWN = "not recorded"
 
 
 def build_report(
@@ -84,7 +85,7 @@ def build_report(
         title=f"Best next viewpoint: experiment {settings['name']}",
         sections=_SECTIONS,
         badges=_BADGES,
-        run_facts=[*_run_facts(settings, splits), ("Commit", made_with.get("commit", _UNKNOWN))],
+        run_facts=[*_run_facts(settings, splits), ("Commit", made_with.get("commit") or _UNKNOWN)],
         claims_run=run.to_dict("records"),
         claims_not_run=not_run.to_dict("records"),
         tally=_tally(each["verdict"]),
@@ -99,9 +100,6 @@ def build_report(
         configuration=configuration.read_text(encoding="utf-8").strip(),
         runtime=_fragment(runtime),
     )
-
-
-_UNKNOWN = "not recorded"
 
 
 def _run_facts(

@@ -227,16 +227,21 @@ def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resam
         Whose errors.
     resampler : Resampler
         Source of the shared resamples.
+
+    Raises
+    ------
+    ValueError
+        If there is no image.
     """
     errors, pooled = sample.errors_deg[method], statistic.removesuffix("_sigma")
     if pooled != statistic:
         return _estimate_sigma(pooled, sample, method, resampler)
-    drawn = resampler.multiplicities(sample)
+    value, drawn = _METRICS[statistic](errors), resampler.multiplicities(sample)
     if statistic == "median":
         samples = metrics.resampled_medians(errors, sample.objects, drawn)
     else:
         samples = metrics.resampled_means(_per_image(statistic, errors), sample.objects, drawn)
-    return Estimate(_METRICS[statistic](errors), samples)
+    return Estimate(value, samples)
 
 
 def fold_sigma(statistic: str, sample: PairedErrors, method: str) -> float:
