@@ -31,7 +31,6 @@ def run(quick: bool) -> list[Figure]:
     test = Estimates(
         tuple(f"object{i:02d}" for i in range(n_objects)),
         np.round(calibration_estimates(n_objects, 360), 4),
-        np.ones((n_objects, 360)),
     )
     table = build_lookup(
         gather_evidence(
@@ -40,9 +39,9 @@ def run(quick: bool) -> list[Figure]:
             bandwidth_deg=8.0,
             pseudo_observations=30.0,
         ),
-        "entropy",
+        "pose_ambiguity",
     )
-    method = configuration()["methods"]["proposed"]
+    method = {"policy": "pose_ambiguity", "fusion": "average"}
     works: list[Callable[[], pd.DataFrame]] = [
         lambda: loop_over_images(test, table),
         lambda: loop_over_numbers(test, table),

@@ -71,7 +71,7 @@ def _step(side: int) -> Work:
 
 def _chosen(n_objects: int) -> Work:
     estimate_deg = calibration_estimates(n_objects, N_VIEWS)
-    return lambda: chosen_lookup(estimate_deg, "entropy", configuration()["density"])
+    return lambda: chosen_lookup(estimate_deg, "pose_ambiguity", configuration()["density"])
 
 
 def _lookup(n_bins: int) -> Work:
@@ -84,7 +84,7 @@ def _lookup(n_bins: int) -> Work:
             pseudo_observations=30.0,
             n_bins=n_bins,
         ),
-        "entropy",
+        "pose_ambiguity",
     )
 
 

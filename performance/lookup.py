@@ -71,7 +71,7 @@ def _own(estimate_deg: NDArray[np.float64], n_bins: int) -> LookupTable:
             pseudo_observations=PSEUDO_OBSERVATIONS,
             n_bins=n_bins,
         ),
-        "entropy",
+        "pose_ambiguity",
     )
 
 
@@ -102,7 +102,7 @@ def _loops(
         each = (done - prepared) / len(sample.estimates) * n_bins
         total += (prepared - begun + each) / len(sample.deltas) * n_bins
         np.testing.assert_allclose(
-            table.ambiguity[list(sample.estimates), delta], ambiguities, rtol=1e-3
+            table.cost[list(sample.estimates), delta], ambiguities, rtol=1e-3
         )
     return total
 

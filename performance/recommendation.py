@@ -43,14 +43,14 @@ def run(quick: bool) -> list[Figure]:
             bandwidth_deg=8.0,
             pseudo_observations=30.0,
         ),
-        "entropy",
+        "pose_ambiguity",
     )
     mug = normalise(generate("mug", 0, 0), "+z", "+x", 0.0, "box")
     depth = open_renderer("embree").render(mug.vertices, mug.faces, 0.0, [40.0], camera)
     ready = to_input(encode_depth(depth, camera), hardware)
 
     def recommend() -> None:
-        estimate_deg, _ = estimate_azimuth(estimator, encode_depth(depth, camera), hardware)
+        estimate_deg = estimate_azimuth(estimator, encode_depth(depth, camera), hardware)
         table.recommend(estimate_deg)
 
     def forward() -> None:

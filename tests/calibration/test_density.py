@@ -36,12 +36,12 @@ def test_smoothing_is_the_double_sum_over_the_torus():
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 99), st.integers(0, B - 1), st.sampled_from([0.0, 10.0, 40.0]))
-def test_turning_the_object_rolls_both_likelihoods(seed, k, bandwidth):
+def test_turning_the_object_rolls_both_conditionals(seed, k, bandwidth):
     estimate, truth = random_pairs(seed)
     kwargs = {"bandwidth_deg": bandwidth, "pseudo_observations": 5.0, "n_bins": B}
-    before = density.likelihoods(estimate, truth, **kwargs)
+    before = density.conditionals(estimate, truth, **kwargs)
     turn = k * 360 / B
-    after = density.likelihoods((estimate + turn) % 360, (truth + turn) % 360, **kwargs)
+    after = density.conditionals((estimate + turn) % 360, (truth + turn) % 360, **kwargs)
     for one, two in ((before.viewpoint, after.viewpoint), (before.estimate, after.estimate)):
         np.testing.assert_allclose(np.roll(one, (k, k), (0, 1)), two, atol=1e-12)
 
@@ -49,7 +49,7 @@ def test_turning_the_object_rolls_both_likelihoods(seed, k, bandwidth):
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 99), st.floats(0.5, 60), st.floats(0, 100))
 def test_rows_are_distributions(seed, bandwidth, alpha):
-    pair = density.likelihoods(
+    pair = density.conditionals(
         *random_pairs(seed, 20), bandwidth_deg=bandwidth, pseudo_observations=alpha, n_bins=B
     )
     for rows in (pair.viewpoint, pair.estimate):
@@ -83,7 +83,7 @@ def test_kernel_is_continuous_across_zero_and_even():
 
 def test_no_smoothing_and_no_pseudo_observations_are_the_plain_frequencies():
     estimate, truth = [10.0, 10.0, 10.0, 200.0], [10.0, 20.0, 20.0, 200.0]
-    pair = density.likelihoods(estimate, truth, bandwidth_deg=0, pseudo_observations=0, n_bins=36)
+    pair = density.conditionals(estimate, truth, bandwidth_deg=0, pseudo_observations=0, n_bins=36)
     assert pair.viewpoint[1, 1] == pytest.approx(1 / 3)
     assert pair.viewpoint[1, 2] == pytest.approx(2 / 3)
     assert pair.estimate[2, 1] == 1.0
@@ -93,7 +93,7 @@ def test_no_smoothing_and_no_pseudo_observations_are_the_plain_frequencies():
 def test_pseudo_observations_weigh_the_same_at_any_number_of_bins():
     estimate, truth = random_pairs(3, 4000)
     fine, coarse = (
-        density.likelihoods(
+        density.conditionals(
             estimate, truth, bandwidth_deg=20, pseudo_observations=30, n_bins=n
         ).viewpoint
         for n in (360, 120)
@@ -107,4 +107,4 @@ def test_pseudo_observations_weigh_the_same_at_any_number_of_bins():
 def test_negative_settings_are_refused(kwargs):
     full = {"bandwidth_deg": 5.0, "pseudo_observations": 1.0} | kwargs
     with pytest.raises(ValueError, match="0 or more"):
-        density.likelihoods([1.0], [2.0], **full)
+        density.conditionals([1.0], [2.0], **full)

@@ -11,7 +11,7 @@ def test_estimates_come_back_to_four_decimals(tmp_path):
     rng = np.random.default_rng(0)
     estimate = rng.uniform(0, 360, (3, 360))
     estimate[0, 0] = 359.99999  # would be printed as 360.0
-    write_estimates(tmp_path / "e.csv", ["null", "NA", "007"], estimate, rng.random((3, 360)))
+    write_estimates(tmp_path / "e.csv", ["null", "NA", "007"], estimate)
     read = read_estimates(tmp_path / "e.csv")
     assert read.object_ids == ("null", "NA", "007")
     assert read.estimate_deg[0, 0] == 0.0
@@ -21,7 +21,7 @@ def test_estimates_come_back_to_four_decimals(tmp_path):
 
 def test_a_missing_view_is_refused(tmp_path):
     path = tmp_path / "e.csv"
-    write_estimates(path, ["a"], np.zeros((1, 360)), np.ones((1, 360)))
+    write_estimates(path, ["a"], np.zeros((1, 360)))
     lines = path.read_text().splitlines()
     path.write_text("\n".join(lines[:50] + lines[51:]) + "\n")
     with pytest.raises(UserError, match="full turn"):
@@ -30,5 +30,14 @@ def test_a_missing_view_is_refused(tmp_path):
 
 def test_a_missing_column_is_refused(tmp_path):
     (tmp_path / "e.csv").write_text("object_id,azimuth_deg\na,0\n")
-    with pytest.raises(UserError, match="'concentration' is missing"):
+    with pytest.raises(UserError, match="'estimate_deg' is missing"):
         read_estimates(tmp_path / "e.csv")
+
+
+def test_further_columns_of_older_files_are_ignored(tmp_path):
+    path = tmp_path / "e.csv"
+    write_estimates(path, ["a"], np.full((1, 4), 7.0))
+    header, *rows = path.read_text().splitlines()
+    older = [f"{header},concentration", *(f"{row},0.5" for row in rows)]
+    path.write_text("\n".join(older) + "\n")
+    np.testing.assert_array_equal(read_estimates(path).estimate_deg, np.full((1, 4), 7.0))

@@ -62,22 +62,20 @@ def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():
     first, again, other = (
         train_network(faces[:10], SETTINGS | {"epochs": 12}, CPU, seed) for seed in (1, 1, 2)
     )
-    estimate, concentration = estimate_azimuth(Estimator(first, SETTINGS, 16, []), faces[10:], CPU)
+    estimate = estimate_azimuth(Estimator(first, SETTINGS, 16, []), faces[10:], CPU)
     truth = np.arange(72) * 5.0
     assert circular_distance_deg(estimate, truth).mean() < 6
-    assert 0.7 < concentration.mean() < 1.2
     states = [network.state_dict() for network in (first, again, other)]
     assert all(torch.equal(states[0][name], states[1][name]) for name in states[0])
     assert not torch.equal(states[0]["4.weight"], states[2]["4.weight"])
 
 
-def test_a_classifier_learns_to_read_a_clock_and_knows_how_well():
+def test_a_classifier_learns_to_read_a_clock():
     faces = clock_faces(12)
     settings = CLASSES | {"epochs": 12}
     trained = train_estimator(faces, np.arange(10), ["x"] * 10, settings, CPU, 1)
-    estimate, concentration = estimate_azimuth(trained, faces[10:], CPU)
+    estimate = estimate_azimuth(trained, faces[10:], CPU)
     assert circular_distance_deg(estimate, np.arange(72) * 5.0).mean() < 6
-    assert 0.7 < concentration.mean() < 1.0
 
 
 def test_outputs_do_not_depend_on_the_batch():
@@ -90,22 +88,20 @@ def test_outputs_do_not_depend_on_the_batch():
 @given(st.integers(0, 99), st.integers(0, 23), st.floats(0.1, 10))
 def test_decoding_turns_with_the_classes_and_is_the_mean_direction(seed, k, scale):
     logits = scale * np.random.default_rng(seed).normal(size=24)
-    estimate, length = decode_classes(logits)
-    turned, same = decode_classes(np.roll(logits, k))
+    estimate, turned = decode_classes(logits), decode_classes(np.roll(logits, k))
     weights = np.exp(logits) / np.exp(logits).sum()
     mean = sum(w * np.exp(2j * np.pi * c / 24) for c, w in enumerate(weights))
-    assert length == pytest.approx(abs(mean))
-    assert same == pytest.approx(length)
     assert circular_distance_deg(turned, estimate + 15 * k) < 1e-6
     assert circular_distance_deg(estimate, np.degrees(np.angle(mean))) < 1e-6
 
 
-def test_a_temperature_widens_a_classifier_and_leaves_a_regressors_angle():
+def test_a_temperature_moves_a_classifiers_mean_and_leaves_a_regressors_angle():
     outputs = np.random.default_rng(0).normal(size=(5, 24))
-    lengths = [decode(untrained(CLASSES), outputs, t)[1] for t in (0.5, 1.0, 2.0)]
-    assert (lengths[0] > lengths[1]).all()
-    assert (lengths[1] > lengths[2]).all()
-    cold, warm = (decode(untrained(), outputs[:, :2], t)[0] for t in (1.0, 3.0))
+    cold, warm = (decode(untrained(CLASSES), outputs, t) for t in (0.001, 2.0))
+    # The coldest distribution is its likeliest class alone.
+    assert circular_distance_deg(cold, outputs.argmax(axis=1) * 15.0).max() < 1e-6
+    assert circular_distance_deg(cold, warm).min() > 0.1
+    cold, warm = (decode(untrained(), outputs[:, :2], t) for t in (1.0, 3.0))
     np.testing.assert_allclose(cold, warm)
 
 
@@ -186,8 +182,8 @@ def test_any_image_side_fits_the_network(side):
 def test_bfloat16_and_float32_answer_alike():
     faces = clock_faces(8)
     trained = train_estimator(faces, np.arange(7), ["x"] * 7, SETTINGS, CPU, 0)
-    full, _ = estimate_azimuth(trained, faces[7:], CPU)
-    half, _ = estimate_azimuth(trained, faces[7:], hw.Hardware(torch.device("cpu"), torch.bfloat16))
+    full = estimate_azimuth(trained, faces[7:], CPU)
+    half = estimate_azimuth(trained, faces[7:], hw.Hardware(torch.device("cpu"), torch.bfloat16))
     assert np.median(circular_distance_deg(full, half)) < 1.0
 
 

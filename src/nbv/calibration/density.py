@@ -16,7 +16,7 @@ Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Likelihoods:
+class Conditionals:
     """The two conditionals of one joint density, each (B, B) float64 with rows that sum to 1.
 
     Attributes
@@ -101,8 +101,8 @@ def smooth(counts: Matrix, bandwidth_deg: float) -> Matrix:
 def conditional(joint: Matrix, pseudo_observations: float) -> Matrix:
     """Return the rows of a joint density as distributions.
 
-    `pseudo_observations` (alpha of the design) observations spread uniformly are added to every
-    row, so that a row that was hardly ever seen is wide and not sharp. A row without any
+    `pseudo_observations` (alpha) uniform observations are added to every row, so that a row that
+    was hardly ever seen is wide and not sharp. A row without any
     observation is uniform.
 
     Parameters
@@ -124,15 +124,15 @@ def conditional(joint: Matrix, pseudo_observations: float) -> Matrix:
     return rows
 
 
-def likelihoods(
+def conditionals(
     estimate_deg: ArrayLike,
     azimuth_deg: ArrayLike,
     *,
     bandwidth_deg: float,
     pseudo_observations: float,
     n_bins: int = 360,
-) -> Likelihoods:
-    """Return V and L of calibration pairs (design, section 3).
+) -> Conditionals:
+    """Return V and L of calibration pairs (docs/method.md).
 
     Parameters
     ----------
@@ -148,4 +148,4 @@ def likelihoods(
     """
     joint = smooth(pair_counts(estimate_deg, azimuth_deg, n_bins), bandwidth_deg)
     alpha = pseudo_observations * 360.0 / n_bins
-    return Likelihoods(conditional(joint, alpha), conditional(joint.T, alpha))
+    return Conditionals(conditional(joint, alpha), conditional(joint.T, alpha))

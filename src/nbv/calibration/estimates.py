@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from nbv.errors import UserError
 from nbv.files import read_csv, write_csv
 
-COLUMNS = ("object_id", "azimuth_deg", "estimate_deg", "concentration")
+COLUMNS = ("object_id", "azimuth_deg", "estimate_deg")
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,10 @@ class Estimates:
         n objects.
     estimate_deg : ndarray (n, n_views) float64
         In [0, 360); view k has the azimuth 360 k / n_views.
-    concentration : ndarray (n, n_views) float64
-        How sure the estimator was, in its own terms.
     """
 
     object_ids: tuple[str, ...]
     estimate_deg: NDArray[np.float64]
-    concentration: NDArray[np.float64]
 
     @property
     def azimuth_deg(self) -> NDArray[np.float64]:
@@ -42,10 +39,7 @@ class Estimates:
 
 
 def write_estimates(
-    path: str | Path,
-    object_ids: Sequence[str],
-    estimate_deg: NDArray[np.float64],
-    concentration: NDArray[np.float64],
+    path: str | Path, object_ids: Sequence[str], estimate_deg: NDArray[np.float64]
 ) -> None:
     """Write estimates (n_objects, n_views) as a table with the columns `COLUMNS`."""
     n_objects, n_views = estimate_deg.shape
@@ -56,7 +50,6 @@ def write_estimates(
             "object_id": np.repeat(np.asarray(object_ids, dtype=object), n_views),
             "azimuth_deg": np.tile(np.arange(n_views) * (360.0 / n_views), n_objects),
             "estimate_deg": rounded.ravel(),
-            "concentration": concentration.ravel(),
         }
     )
     frame["azimuth_deg"] = frame["azimuth_deg"].astype(int)
@@ -64,7 +57,7 @@ def write_estimates(
 
 
 def read_estimates(path: str | Path) -> Estimates:
-    """Read what `write_estimates` wrote.
+    """Read what `write_estimates` wrote; further columns, as older files have, are ignored.
 
     Raises
     ------
@@ -80,9 +73,5 @@ def read_estimates(path: str | Path) -> Estimates:
     azimuth = np.tile(np.arange(n_views) * (360.0 / max(n_views, 1)), len(object_ids))
     if odd or not np.array_equal(frame["azimuth_deg"].to_numpy(), azimuth):
         raise UserError(f"{path}: not a full turn of equally spaced views of each object")
-    shape = (len(object_ids), n_views)
-    return Estimates(
-        object_ids,
-        frame["estimate_deg"].to_numpy(dtype=np.float64).reshape(shape),
-        frame["concentration"].to_numpy(dtype=np.float64).reshape(shape),
-    )
+    estimate_deg = frame["estimate_deg"].to_numpy(dtype=np.float64)
+    return Estimates(object_ids, estimate_deg.reshape(len(object_ids), n_views))

@@ -45,6 +45,11 @@ class Posteriors:
     temperature: float
 
     @property
+    def distributions(self) -> Floats:
+        """p(class | image), (n, n_views, k)."""
+        return np.asarray(np.exp(self.log_posterior.astype(np.float64)))
+
+    @property
     def as_trained(self) -> Floats:
         """The log of the distributions at a temperature of 1, (n, n_views, k)."""
         logits = self.log_posterior.astype(np.float64) * self.temperature
@@ -120,7 +125,7 @@ def answer_likelihood(posteriors: Posteriors) -> Floats:
         L[viewpoint, answer].
     """
     _, n_views, n_classes = posteriors.log_posterior.shape
-    of_view = np.exp(posteriors.log_posterior.astype(np.float64)).mean(axis=0)
+    of_view = posteriors.distributions.mean(axis=0)
     viewpoint = nearest_bin(np.arange(n_views) * (360.0 / n_views), n_classes)
     sums = np.zeros((n_classes, n_classes))
     np.add.at(sums, viewpoint, of_view)

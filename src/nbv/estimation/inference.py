@@ -103,10 +103,8 @@ def network_outputs(
     return np.concatenate(outputs).reshape(*codes.shape[:-2], -1)
 
 
-def decode(
-    estimator: Estimator, outputs: Outputs, temperature: float = 1.0
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the azimuth that outputs tell (Eq. 4), and how sure it is.
+def decode(estimator: Estimator, outputs: Outputs, temperature: float = 1.0) -> NDArray[np.float64]:
+    """Return the azimuth that outputs tell (Eq. 4).
 
     Parameters
     ----------
@@ -118,16 +116,14 @@ def decode(
 
     Returns
     -------
-    estimate_deg : ndarray (...)
-        In [0, 360).
-    concentration : ndarray (...)
-        The length of the (cos, sin) output, or the resultant length of a classifier's distribution.
+    ndarray (...)
+        Degrees in [0, 360).
     """
     return kind_of(estimator.settings).decode(outputs / temperature)
 
 
 def estimate_azimuth(
     estimator: Estimator, codes: NDArray[np.uint8], hardware: Hardware, temperature: float = 1.0
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> NDArray[np.float64]:
     """Estimate the azimuth that each image was taken from: `network_outputs`, then `decode`."""
     return decode(estimator, network_outputs(estimator, codes, hardware), temperature)

@@ -86,13 +86,13 @@ class Kind:
     loss : callable
         ``loss(outputs, targets)``, a scalar tensor.
     decode : callable
-        ``decode(outputs)``: the angle (degrees in [0, 360)) and how sure it is, of (..., k) each.
+        ``decode(outputs)``: the angle of outputs (..., k), degrees in [0, 360).
     """
 
     network: Callable[[Settings, int], nn.Module]
     targets: Callable[[Settings, int], Targets]
     loss: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
-    decode: Callable[[Outputs], tuple[Outputs, Outputs]]
+    decode: Callable[[Outputs], Outputs]
 
 
 KINDS: dict[str, Kind] = {

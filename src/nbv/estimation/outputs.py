@@ -45,18 +45,15 @@ def class_targets(settings: Settings, n_views: int) -> Targets:
     return np.asarray(softmax(narrowness * (np.cos(apart) - 1.0), axis=1), dtype=np.float32)
 
 
-def decode_directions(outputs: Outputs) -> tuple[Outputs, Outputs]:
-    """Return direction (degrees in [0, 360)) and length of (cos, sin) outputs (..., 2)."""
-    cosine, sine = outputs[..., 0], outputs[..., 1]
-    return direction_deg(cosine, sine), np.hypot(cosine, sine)
+def decode_directions(outputs: Outputs) -> Outputs:
+    """Return the direction of (cos, sin) outputs (..., 2), degrees in [0, 360)."""
+    return direction_deg(outputs[..., 0], outputs[..., 1])
 
 
-def decode_classes(outputs: Outputs) -> tuple[Outputs, Outputs]:
-    """Return the mean direction and the resultant length of the softmax of logits (..., k).
+def decode_classes(outputs: Outputs) -> Outputs:
+    """Return the mean direction of the softmax of logits (..., k), degrees in [0, 360).
 
-    The direction, degrees in [0, 360), is that of the mean of exp(i theta): of all answers the one
-    of least expected 1 - cos(error). The length is 1 for a single class, 0 for a uniform
-    distribution.
+    It is the direction of the mean of exp(i theta): the answer of least expected 1 - cos(error).
     """
     n_classes = outputs.shape[-1]
     angles = 2 * np.pi * np.arange(n_classes) / n_classes

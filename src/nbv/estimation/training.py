@@ -87,7 +87,7 @@ def train_network(
         Training images; view k of n has the azimuth 360 k / n.
     settings : mapping
         ``kind, channels, hidden, epochs, batch_size, learning_rate, weight_decay``, and what the
-        kind needs besides.
+        kind also needs.
     hardware : Hardware
     seed : int
         Of the weights and of the order of the images: the same seed on the same machine gives the

@@ -1,9 +1,8 @@
-"""Looking again and again: error and travel against the number of views."""
+"""More views than two: error and travel against the number of views."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,92 +11,24 @@ from numpy.typing import NDArray
 
 from nbv.angles import circular_distance_deg, travel_deg
 from nbv.calibration.estimates import Estimates
-from nbv.recommendation.belief import (
-    BELIEF_CRITERIA,
-    Beliefs,
-    coarser,
-    first_beliefs,
-    mean_direction_deg,
-    updated,
-    worth,
-)
+from nbv.recommendation.belief import first_belief, mean_direction_deg, updated
+from nbv.recommendation.criteria import FOR_MORE_VIEWS
 from nbv.recommendation.evidence import Evidence
-from nbv.recommendation.fusion import Rotations
-from nbv.recommendation.lookup import least_ambiguous_delta
+from nbv.recommendation.next_views import (
+    COARSE_BINS,
+    NextView,
+    Progress,
+    bisecting_next,
+    evenly_spaced_next,
+    random_next,
+    recommended_next,
+)
 
 COLUMNS = ("method", "n_views", "object_id", "error_deg", "travel_deg")
-BISECTING_DEG = (180, 90, 270, 45, 225, 135, 315)
-COARSE_BINS = 120
-
-
-@dataclass(frozen=True)
-class Walk:
-    """What is known when the next view is chosen.
-
-    Attributes
-    ----------
-    beliefs : ndarray (n, B)
-        Of the pose in the first view.
-    taken_deg : ndarray (n, t) int
-        Rotations of the views so far, counted from the first, which is 0.
-    """
-
-    beliefs: Beliefs
-    taken_deg: Rotations
-
-
-Step = Callable[[Walk, np.random.Generator], Rotations]
-
-
-def recommended_step(criterion: str, coarse: Evidence, min_separation_deg: float) -> Step:
-    """Return the step that a criterion over beliefs recommends.
-
-    Parameters
-    ----------
-    criterion : str
-        A name in `nbv.recommendation.belief.BELIEF_CRITERIA`.
-    coarse : Evidence
-        Of fewer bins than the beliefs; rotations are multiples of its bin.
-    min_separation_deg : float
-        From every view so far: an estimator errs alike from nearly the same place, and no
-        criterion that takes looks as independent can know.
-    """
-
-    def step(walk: Walk, rng: np.random.Generator) -> Rotations:
-        gain = worth(criterion, coarser(walk.beliefs, coarse.n_bins), coarse)
-        rotations = np.arange(coarse.n_bins) * (360.0 / coarse.n_bins)
-        apart = circular_distance_deg(walk.taken_deg[:, :, None], rotations).min(axis=1)
-        return least_ambiguous_delta(np.where(apart < min_separation_deg, np.inf, gain))
-
-    return step
-
-
-def random_step(walk: Walk, rng: np.random.Generator) -> Rotations:
-    """Return a whole degree that was not looked from before, all equally likely."""
-    free = np.ones((len(walk.beliefs), 360), dtype=bool)
-    np.put_along_axis(free, walk.taken_deg, values=False, axis=1)
-    drawn = np.where(free, rng.random(free.shape), -1.0)
-    return np.asarray(drawn.argmax(axis=1), dtype=np.int64)
-
-
-def bisecting_step(walk: Walk, rng: np.random.Generator) -> Rotations:
-    """Return the opposite view, then the quarters, then the eighths."""
-    n, taken = walk.taken_deg.shape
-    return np.full(n, BISECTING_DEG[taken - 1], dtype=np.int64)
-
-
-def even_step(n_views: int) -> Step:
-    """Return the step to the next of `n_views` views spaced evenly."""
-
-    def step(walk: Walk, rng: np.random.Generator) -> Rotations:
-        n, taken = walk.taken_deg.shape
-        return np.full(n, round(taken * 360 / n_views), dtype=np.int64)
-
-    return step
 
 
 def follow(
-    step: Step,
+    policy: NextView,
     test: Estimates,
     evidence: Evidence,
     *,
@@ -105,27 +36,27 @@ def follow(
     start_every: int,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Follow a rule from several first views of each object.
+    """Follow a policy from several first views of each object.
 
     Parameters
     ----------
-    step : callable
-        Chooses the next view.
+    policy : callable
+        Chooses every next view.
     test : Estimates
         360 views an object.
     evidence : Evidence
         360 bins; for the beliefs.
     n_views : int
-        Looks in all.
+        Views in all.
     start_every : int
         Degrees between first views.
     rng : numpy.random.Generator
-        Where a rule draws.
+        Where a policy draws.
 
     Returns
     -------
     ndarray (2, n_objects, n_starts, n_views)
-        Error and total travel after each look, degrees.
+        Error and total travel after each view, degrees.
     """
     estimate_deg = test.estimate_deg
     n_objects, n_azimuths = estimate_deg.shape
@@ -135,38 +66,40 @@ def follow(
             np.arange(n_objects), np.arange(0, n_azimuths, start_every), indexing="ij"
         )
     )
-    beliefs = first_beliefs(estimate_deg[objects, starts], evidence)
+    belief = first_belief(estimate_deg[objects, starts], evidence)
     taken = np.zeros((len(objects), 1), dtype=np.int64)
     travelled = np.zeros(len(objects))
     reached = np.empty((2, len(objects), n_views))
-    for look in range(n_views):
-        if look:
-            delta = step(Walk(beliefs, taken), rng)
+    for view in range(n_views):
+        if view:
+            delta = policy(Progress(belief, taken), rng)
             seen = estimate_deg[objects, (starts + delta) % n_azimuths]
-            beliefs = updated(beliefs, seen, delta, evidence)
+            belief = updated(belief, seen, delta, evidence)
             travelled = travelled + travel_deg(delta - taken[:, -1])
             taken = np.column_stack([taken, delta])
-        reached[0, :, look] = circular_distance_deg(mean_direction_deg(beliefs), starts)
-        reached[1, :, look] = travelled
+        pose_deg = mean_direction_deg(belief.probabilities)
+        reached[0, :, view] = circular_distance_deg(pose_deg, starts)
+        reached[1, :, view] = travelled
     return reached.reshape(2, n_objects, -1, n_views)
 
 
-def sequence_rows(
+def more_views_rows(
     test: Estimates,
     evidences: Mapping[str, Callable[[int], Evidence]],
     settings: Mapping[str, Any],
     rng: np.random.Generator,
 ) -> pd.DataFrame:
-    """Return error and travel of every rule, after each number of views, object by object.
+    """Return error and travel of every policy, after each number of views, object by object.
 
     Parameters
     ----------
     test : Estimates
         Test objects, 360 views each.
     evidences : mapping of str to callable
-        For ``random``, ``opposite`` and each criterion: its evidence for a number of bins.
+        For ``random``, ``opposite`` and each criterion: its evidence for a number of bins. The
+        pose ambiguity, which is defined for two views alone, is left out.
     settings : mapping
-        The configuration's ``sequence``: ``n_views, start_every_deg, min_separation_deg``.
+        The configuration's ``more_views``: ``n_views, start_every_deg, min_separation_deg``.
     rng : numpy.random.Generator
 
     Returns
@@ -177,35 +110,37 @@ def sequence_rows(
     n_views = settings["n_views"]
     rows: list[pd.DataFrame] = []
 
-    def add(method: str, step: Step, name: str, looks: int, *, only_last: bool = False) -> None:
+    def add(
+        method: str, policy: NextView, name: str, last: int, *, only_last: bool = False
+    ) -> None:
         reached = follow(
-            step,
+            policy,
             test,
             evidences[name](test.estimate_deg.shape[1]),
-            n_views=looks,
+            n_views=last,
             start_every=settings["start_every_deg"],
             rng=rng,
         ).mean(axis=2)
-        for look in range(looks - 1 if only_last else 0, looks):
+        for view in range(last - 1 if only_last else 0, last):
             rows.append(
                 pd.DataFrame(
                     {
                         "method": method,
-                        "n_views": look + 1,
+                        "n_views": view + 1,
                         "object_id": test.object_ids,
-                        "error_deg": reached[0, :, look],
-                        "travel_deg": reached[1, :, look],
+                        "error_deg": reached[0, :, view],
+                        "travel_deg": reached[1, :, view],
                     }
                 )
             )
 
-    add("random", random_step, "random", n_views)
-    add("bisecting", bisecting_step, "opposite", n_views)
-    for looks in range(1, n_views + 1):
-        add("evenly_spaced", even_step(looks), "opposite", looks, only_last=True)
-    for criterion in BELIEF_CRITERIA:
+    add("random", random_next, "random", n_views)
+    add("bisecting", bisecting_next, "opposite", n_views)
+    for last in range(1, n_views + 1):
+        add("evenly_spaced", evenly_spaced_next(last), "opposite", last, only_last=True)
+    for criterion in FOR_MORE_VIEWS:
         if criterion in evidences:
             coarse = evidences[criterion](COARSE_BINS)
-            step = recommended_step(criterion, coarse, settings["min_separation_deg"])
-            add(criterion, step, criterion, n_views)
+            policy = recommended_next(criterion, coarse, settings["min_separation_deg"])
+            add(criterion, policy, criterion, n_views)
     return pd.concat(rows, ignore_index=True)[list(COLUMNS)]

@@ -1,4 +1,4 @@
-"""What less travel costs in error: each table read again with a price on degrees, or a limit."""
+"""What less travel costs in error: each table with a price on degrees, or with a limit."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from nbv.angles import nearest_bin, travel_deg
 from nbv.calibration.estimates import Estimates
-from nbv.recommendation.fusion import Rotations, rotation_errors_deg, two_view_error_deg
-from nbv.recommendation.lookup import least_ambiguous_delta
-from nbv.recommendation.method_selection import Entry
+from nbv.recommendation.fusion import ESTIMATE_FUSIONS, Rotations, rotation_errors_deg
+from nbv.recommendation.lookup import least_cost_delta
+from nbv.recommendation.method_selection import SelectedMethod
+from nbv.recommendation.policies import Turns, take_second_views
 
 # Multiples of the price at which the camera would, for the average estimate, rather stay.
 RELATIVE_COSTS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0)
@@ -22,13 +23,13 @@ ANY_DIRECTION = "either_way"
 COLUMNS = ("method", "rule", "setting", "travel_deg", "error_deg", "n_images")
 
 
-def travel_rows(entries: Mapping[str, Entry], test: Estimates) -> pd.DataFrame:
-    """Return error against travel for every contender that follows a table.
+def travel_rows(selected: Mapping[str, SelectedMethod], test: Estimates) -> pd.DataFrame:
+    """Return error against travel for every extension that follows a table.
 
     Parameters
     ----------
-    entries : mapping of str to Entry
-        Contenders in one fold.
+    selected : mapping of str to SelectedMethod
+        Extensions in one fold.
     test : Estimates
         Its test objects.
 
@@ -42,17 +43,19 @@ def travel_rows(entries: Mapping[str, Entry], test: Estimates) -> pd.DataFrame:
         or the other, whatever the estimate.
     """
     rows = []
-    fusions: dict[str, Entry] = {}
-    for name, entry in entries.items():
-        fusions.setdefault(entry.fusion, entry)
-        if entry.lookup is None:
+    by_fusion: dict[str, SelectedMethod] = {}
+    for name, method in selected.items():
+        if method.fusion in ESTIMATE_FUSIONS:
+            by_fusion.setdefault(method.fusion, method)
+        if method.lookup is None:
             continue
-        for rule, setting, by_bin in _rereadings(entry.lookup.ambiguity):
+        turns = Turns(test.estimate_deg, method.evidence)
+        for rule, setting, by_bin in _restricted(method.lookup.cost):
             delta = by_bin[nearest_bin(test.estimate_deg, len(by_bin))]
-            error = two_view_error_deg(test.estimate_deg, delta, entry.fusion, entry.evidence)
+            error = take_second_views(delta, method.fusion, turns).error_deg
             rows.append((name, rule, setting, travel_deg(delta).mean(), error.mean(), error.size))
-    for fusion, entry in fusions.items():
-        errors = rotation_errors_deg(test.estimate_deg, entry.evidence, fusion)
+    for fusion, method in by_fusion.items():
+        errors = rotation_errors_deg(test.estimate_deg, method.evidence, fusion)
         by_delta = errors.reshape(len(errors), -1).mean(axis=1)
         for limit in (0, *LIMITS_DEG):
             either = (by_delta[limit] + by_delta[-limit % len(by_delta)]) / 2
@@ -61,13 +64,14 @@ def travel_rows(entries: Mapping[str, Entry], test: Estimates) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _rereadings(ambiguity: NDArray[np.float32]) -> Iterator[tuple[str, float, Rotations]]:
-    worth_going = float(np.ptp(ambiguity, axis=1).mean()) / 180.0
+def _restricted(cost: NDArray[np.float32]) -> Iterator[tuple[str, float, Rotations]]:
+    """Yield a rule, its setting and the rotation for each estimate under it."""
+    per_degree = float(np.ptp(cost, axis=1).mean()) / 180.0
     for relative in RELATIVE_COSTS:
-        price = relative * worth_going
-        yield "cost", price, least_ambiguous_delta(ambiguity, travel_cost=price)
+        price = relative * per_degree
+        yield "cost", price, least_cost_delta(cost, travel_cost=price)
     for limit in LIMITS_DEG:
-        yield "limit", limit, least_ambiguous_delta(ambiguity, max_travel_deg=limit)
+        yield "limit", limit, least_cost_delta(cost, max_travel_deg=limit)
 
 
 def pooled_travel(frames: Mapping[int, pd.DataFrame]) -> pd.DataFrame:

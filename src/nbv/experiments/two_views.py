@@ -1,28 +1,23 @@
-"""Choosing a second view, looking again and fusing: one row of results for every test image."""
+"""A second view from every test image: one row of results for each."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import circular_distance_deg
 from nbv.calibration.estimates import Estimates
-from nbv.errors import UserError
-from nbv.recommendation.fusion import FUSIONS, Rotations, second_look
+from nbv.calibration.posteriors import Posteriors
+from nbv.experiments.travel import travel_rows
+from nbv.recommendation.evidence import Evidence
+from nbv.recommendation.fusion import OF_DISTRIBUTIONS
 from nbv.recommendation.lookup import LookupTable
-from nbv.recommendation.method_selection import Entry
-from nbv.recommendation.policies import (
-    BASELINES,
-    ORACLE,
-    SINGLE,
-    check_names,
-    needs_lookup,
-    rotate,
-)
+from nbv.recommendation.method_selection import Methods, choices_frame, select_methods
+from nbv.recommendation.policies import Turns, TwoViews, two_views
 
 COLUMNS = (
     "object_id",
@@ -35,18 +30,26 @@ COLUMNS = (
 )
 
 
-def check_method(name: str, method: Mapping[str, Any]) -> None:
-    """Check what a configuration says about one of the paper's columns.
+@dataclass(frozen=True)
+class ExtensionEvaluations:
+    """What extensions make of the test objects of one fold.
 
-    Raises
-    ------
-    UserError
-        Where its rotation or fusion is unknown, or is none that `evaluate_method` can do.
+    Attributes
+    ----------
+    frames : dict of DataFrame
+        By extension, as of `evaluate_method`.
+    lookups : dict of LookupTable
+        Of the extensions that follow one.
+    choices : DataFrame
+        Of `nbv.recommendation.method_selection.choices_frame`.
+    travel : DataFrame
+        Of `nbv.experiments.travel.travel_rows`.
     """
-    key = f"methods.{name}"
-    check_names(key, method)
-    if method["rotation"] == ORACLE or method["fusion"] != "average":
-        raise UserError(f"{key}: oracles and fusion other than average belong under contenders")
+
+    frames: dict[str, pd.DataFrame]
+    lookups: dict[str, LookupTable]
+    choices: pd.DataFrame
+    travel: pd.DataFrame
 
 
 def evaluate_method(
@@ -54,81 +57,90 @@ def evaluate_method(
     test: Estimates,
     rng: np.random.Generator | None = None,
     lookup: LookupTable | None = None,
+    evidence: Evidence | None = None,
+    posteriors: Posteriors | None = None,
 ) -> pd.DataFrame:
     """Evaluate one method on every view of every test object.
 
     Parameters
     ----------
     method : mapping
-        ``rotation``: ``none`` (one view alone), a name in `BASELINES`, or a criterion; ``fusion``:
-        a name in `nbv.recommendation.fusion.FUSIONS`.
+        ``policy`` and ``fusion``; see `nbv.recommendation.policies.two_views`.
     test : Estimates
         360 / n_views must be a whole number of degrees.
     rng : numpy.random.Generator, optional
         Where the rotation is drawn.
     lookup : LookupTable, optional
-        Where the rotation is a criterion.
+        Where the policy follows one.
+    evidence : Evidence, optional
+        Where the policy or the fusion needs it.
+    posteriors : Posteriors, optional
+        Of the test objects, where the fusion is of distributions.
 
     Returns
     -------
     DataFrame
         Columns `COLUMNS`; ``delta_deg`` and ``next_estimate_deg`` are absent for ``none``.
     """
-    first = test.estimate_deg
-    rotation = method["rotation"]
-    if rotation == SINGLE:
-        return results_frame(test, None, None, first)
-    if needs_lookup(rotation):
-        if lookup is None:
-            raise ValueError(f"rotation {rotation!r} needs a lookup table")
-        delta = lookup.recommend(first)
-    else:
-        if rng is None:
-            raise ValueError(f"rotation {rotation!r} needs a generator")
-        delta = BASELINES[rotation](first, rng)
-    second = second_look(first, delta)
-    return results_frame(test, delta, second, FUSIONS[method["fusion"]](first, second, delta, None))
+    distributions = None if posteriors is None else posteriors.distributions
+    turns = Turns(test.estimate_deg, evidence, rng, lookup, distributions)
+    return _frame(test, two_views(method["policy"], method["fusion"], turns))
 
 
-def evaluate_entry(entry: Entry, test: Estimates, rng: np.random.Generator) -> pd.DataFrame:
-    """Evaluate a contender on every view of every test object.
-
-    Returns
-    -------
-    DataFrame
-        As of `nbv.experiments.two_views.evaluate_method`.
-    """
-    first = test.estimate_deg
-    if entry.lookup is not None:
-        delta = entry.lookup.recommend(first)
-    else:
-        delta = rotate(entry.rotation, entry.fusion, first, entry.evidence, rng)
-    second = second_look(first, delta)
-    fused = FUSIONS[entry.fusion](first, second, delta, entry.evidence)
-    return results_frame(test, delta, second, fused)
-
-
-def results_frame(
+def evaluate_extensions(
+    calibration: Estimates,
     test: Estimates,
-    delta_deg: Rotations | None,
-    next_estimate_deg: ArrayLike | None,
-    pose_estimate_deg: NDArray[np.float64],
-) -> pd.DataFrame:
-    """Return the rows of `evaluation/.../<method>.csv`."""
+    extensions: Methods,
+    settings: Mapping[str, Any],
+    rng_of: Callable[[str], np.random.Generator],
+    calibration_posteriors: Posteriors | None = None,
+    test_posteriors: Posteriors | None = None,
+) -> ExtensionEvaluations:
+    """Choose what each extension needs by calibration objects, and evaluate it on test objects.
+
+    Parameters
+    ----------
+    calibration, test : Estimates
+        Of one fold.
+    extensions : mapping
+        ``policy`` and ``fusion`` by name; see
+        `nbv.recommendation.method_selection.select_methods`.
+    settings : mapping
+        The configuration's ``density`` and ``travel``.
+    rng_of : callable
+        The generator of an extension, by name.
+    calibration_posteriors, test_posteriors : Posteriors, optional
+        Of the same objects, where an extension fuses distributions.
+    """
+    selected = select_methods(calibration, extensions, settings, calibration_posteriors)
+    frames = {}
+    for name, one in selected.items():
+        method = {"policy": one.policy, "fusion": one.fusion}
+        of_images = test_posteriors if one.fusion in OF_DISTRIBUTIONS else None
+        frames[name] = evaluate_method(
+            method, test, rng_of(name), one.lookup, one.evidence, of_images
+        )
+    return ExtensionEvaluations(
+        frames,
+        {name: one.lookup for name, one in selected.items() if one.lookup is not None},
+        choices_frame(selected),
+        travel_rows(selected, test),
+    )
+
+
+def _frame(test: Estimates, made: TwoViews) -> pd.DataFrame:
     n_objects, n_views = test.estimate_deg.shape
     # Rounded before the error is taken, so that the columns of a row agree with each other.
-    pose = np.round(pose_estimate_deg, 4) % 360.0
+    pose = np.round(made.pose_deg, 4) % 360.0
     return pd.DataFrame(
         {
             "object_id": np.repeat(np.asarray(test.object_ids, dtype=object), n_views),
             "initial_deg": np.tile(test.azimuth_deg.astype(int), n_objects),
             "initial_estimate_deg": test.estimate_deg.ravel(),
             "delta_deg": pd.array([pd.NA] * (n_objects * n_views), dtype="Int64")
-            if delta_deg is None
-            else delta_deg.ravel(),
-            "next_estimate_deg": np.nan
-            if next_estimate_deg is None
-            else np.ravel(next_estimate_deg),
+            if made.delta_deg is None
+            else made.delta_deg.ravel(),
+            "next_estimate_deg": np.nan if made.second_deg is None else made.second_deg.ravel(),
             "pose_estimate_deg": pose.ravel(),
             "error_deg": circular_distance_deg(pose, test.azimuth_deg).ravel(),
         }

@@ -14,16 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import circular_distance_deg
 from nbv.calibration.estimates import Estimates
-from nbv.recommendation.belief import (
-    BELIEF_CRITERIA,
-    coarser,
-    first_beliefs,
-    mean_direction_deg,
-    updated,
-    worth,
-)
+from nbv.recommendation.belief import coarser, first_belief, mean_direction_deg, updated
+from nbv.recommendation.criteria import CRITERIA, FOR_TWO_ESTIMATORS
 from nbv.recommendation.evidence import Evidence
-from nbv.recommendation.lookup import least_ambiguous_delta
+from nbv.recommendation.next_views import COARSE_BINS, best_view
 
 COLUMNS = (
     "method",
@@ -33,7 +27,6 @@ COLUMNS = (
     "travel_deg",
     "next_elevation_deg",
 )
-COARSE_BINS = 120
 
 Ints = NDArray[np.int64]
 Evidences = Mapping[str, Callable[[int], Evidence]]
@@ -50,22 +43,7 @@ def sphere_travel_deg(
     return np.asarray(np.degrees(2 * np.arcsin(np.sqrt(np.clip(chord, 0.0, 1.0)))))
 
 
-def best_view(worths: Mapping[int, NDArray[np.floating[Any]]]) -> tuple[Ints, Ints]:
-    """Return the rotation and the elevation of least worth, (n,) each.
-
-    Parameters
-    ----------
-    worths : mapping of int to ndarray (n, B)
-        By elevation; of equals the first elevation, there the smallest travel.
-    """
-    deltas = np.stack([least_ambiguous_delta(worth) for worth in worths.values()])
-    least = np.stack([worth.min(axis=1) for worth in worths.values()])
-    chosen = least.argmin(axis=0)
-    rows = np.arange(chosen.size)
-    return deltas[chosen, rows], np.array(list(worths))[chosen].astype(np.int64)
-
-
-def sphere_rows(
+def view_sphere_rows(
     tests: Mapping[int, Estimates],
     evidences: Mapping[int, Evidences],
     settings: Mapping[str, Any],
@@ -79,7 +57,7 @@ def sphere_rows(
     evidences : mapping of int to mapping
         By elevation.
     settings : mapping
-        The configuration's ``sequence``: ``start_every_deg``.
+        The configuration's ``more_views``: ``start_every_deg``.
 
     Returns
     -------
@@ -99,7 +77,7 @@ def _from_elevation(
     evidences: Mapping[int, Evidences],
     settings: Mapping[str, Any],
 ) -> pd.DataFrame:
-    """Return a row for every rule and first view at one elevation."""
+    """Return a row for every method and first view at one elevation."""
     test, mine = tests[elevation], evidences[elevation]
     n_objects, n_views = test.estimate_deg.shape
     starts = np.tile(np.arange(0, n_views, settings["start_every_deg"]), n_objects)
@@ -107,19 +85,19 @@ def _from_elevation(
     first_deg = test.estimate_deg[objects, starts]
 
     def reach(name: str, method: str, delta: Ints, upon: Ints) -> pd.DataFrame:
-        beliefs = first_beliefs(first_deg, mine[name](n_views))
+        first = first_belief(first_deg, mine[name](n_views))
+        pose_deg = np.empty(len(starts))
         for other in np.unique(upon):
-            at = upon == other
-            views = (starts[at] + delta[at]) % n_views
-            seen = tests[int(other)].estimate_deg[objects[at], views]
-            second = evidences[int(other)][name](n_views)
-            beliefs[at] = updated(beliefs[at], seen, delta[at], second)
+            views = (starts + delta) % n_views
+            seen = tests[int(other)].estimate_deg[objects, views]
+            after = updated(first, seen, delta, evidences[int(other)][name](n_views))
+            pose_deg[upon == other] = mean_direction_deg(after.probabilities)[upon == other]
         return pd.DataFrame(
             {
                 "method": method,
                 "elevation_deg": elevation,
                 "object_id": np.array(test.object_ids)[objects],
-                "error_deg": circular_distance_deg(mean_direction_deg(beliefs), starts),
+                "error_deg": circular_distance_deg(pose_deg, starts),
                 "travel_deg": sphere_travel_deg(delta, elevation, upon),
                 "next_elevation_deg": upon,
             }
@@ -127,15 +105,18 @@ def _from_elevation(
 
     here = np.full(len(starts), elevation)
     parts = [reach("opposite", "opposite", np.full(len(starts), 180), here)]
-    for criterion in BELIEF_CRITERIA:
+    for criterion in FOR_TWO_ESTIMATORS:
         if criterion not in mine:
             continue
-        coarse = coarser(first_beliefs(first_deg, mine[criterion](n_views)), COARSE_BINS)
-        worths = {
-            other: worth(criterion, coarse, evidences[other][criterion](COARSE_BINS))
+        first = first_belief(first_deg, mine[criterion](n_views))
+        coarse = coarser(first, mine[criterion](COARSE_BINS))
+        costs = {
+            other: CRITERIA[criterion](
+                coarse, evidences[other][criterion](COARSE_BINS), "posterior"
+            )
             for other in (elevation, *(e for e in tests if e != elevation))
         }
-        circle = best_view({elevation: worths[elevation]})
+        circle = best_view({elevation: costs[elevation]})
         parts.append(reach(criterion, f"{criterion}_circle", *circle))
-        parts.append(reach(criterion, f"{criterion}_sphere", *best_view(worths)))
+        parts.append(reach(criterion, f"{criterion}_sphere", *best_view(costs)))
     return pd.concat(parts, ignore_index=True)

@@ -1,1 +1,1 @@
-"""Where to look next: arrays in, arrays out."""
+"""Which view to take next: arrays in, arrays out."""

@@ -2,7 +2,8 @@
 
 The density's own likelihood prefers sharp rows where estimates hardly ever occur, and an argmin
 finds just those. So each candidate is judged by the two-view error of its decisions on
-calibration objects that its tables were not built from; test objects are never seen.
+calibration objects that its tables were not built from; test objects are never seen. What the
+likelihood would have chosen is there for comparison.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.angles import nearest_bin
 from nbv.recommendation.evidence import Evidence, gather_evidence
-from nbv.recommendation.fusion import two_view_error_deg
 from nbv.recommendation.lookup import LookupTable, build_lookup
-from nbv.recommendation.policies import rotate
+from nbv.recommendation.policies import Turns, two_views
 
 log = logging.getLogger(__name__)
 
@@ -54,8 +55,8 @@ class Choice:
     @property
     def error_deg(self) -> float:
         """The cross-validated error of what was chosen, NaN where nothing was compared."""
-        chosen = (self.bandwidth_deg, self.pseudo_observations)
-        return self.candidate_error_deg.get(chosen, float("nan"))
+        candidate = (self.bandwidth_deg, self.pseudo_observations)
+        return self.candidate_error_deg.get(candidate, float("nan"))
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ def choose_densities(
     estimate_deg : ndarray (n_objects, n_views)
         Calibration estimates.
     methods : mapping
-        ``rotation`` (see `nbv.recommendation.policies.rotate`) and ``fusion`` by name.
+        ``policy`` (a name in `nbv.recommendation.policies.POLICIES`) and ``fusion`` by name.
     settings : mapping
         The configuration's ``density``. Candidates are all pairs of its ``bandwidths_deg`` and
         ``pseudo_observations``; where there is but one, nothing is computed. The objects are
@@ -144,11 +145,10 @@ def choose_densities(
         for name, method in methods.items():
             # The same draws for every candidate.
             rng = np.random.default_rng(trial.part)
-            rotation, fusion = method["rotation"], method["fusion"]
-            delta = rotate(rotation, fusion, held_out, trial.evidence, rng)
-            made = two_view_error_deg(held_out, delta, fusion, trial.evidence)
+            turns = Turns(held_out, trial.evidence, rng)
+            error = two_views(method["policy"], method["fusion"], turns).error_deg
             of_objects = errors[name].setdefault(trial.candidate, np.empty(len(estimate_deg)))
-            of_objects[trial.held_out] = made.mean(axis=1)
+            of_objects[trial.held_out] = error.mean(axis=1)
     widest = density_candidates(settings)[0]
     return {
         name: _best(name, tried) if tried else Choice(*widest, candidate_error_deg={})
@@ -167,6 +167,36 @@ def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
         max(mean.values()),
     )
     return Choice(*best, candidate_error_deg=mean, object_error_deg=tuple(errors[best].tolist()))
+
+
+def most_likely_density(
+    estimate_deg: NDArray[np.float64], settings: Mapping[str, Any], *, n_bins: int = COARSE_BINS
+) -> Choice:
+    """Cross-validate the log-likelihood of V over calibration objects.
+
+    Parameters
+    ----------
+    estimate_deg : ndarray (n_objects, n_views)
+        Calibration estimates.
+    settings : mapping
+        The configuration's ``density``, as in `choose_densities`.
+    n_bins : int
+        Of the densities compared.
+
+    Returns
+    -------
+    Choice
+        The candidate under which held-out viewpoints are likeliest given their estimates; of
+        equals the widest. No two-view error is known of it.
+    """
+    n_views = estimate_deg.shape[1]
+    azimuth = nearest_bin(np.arange(n_views) * (360.0 / n_views), n_bins)
+    found = dict.fromkeys(density_candidates(settings), 0.0)
+    for trial in density_trials(estimate_deg, settings, n_bins):
+        rows = nearest_bin(estimate_deg[trial.held_out], n_bins)
+        chance = trial.evidence.conditionals.viewpoint[rows, azimuth]
+        found[trial.candidate] += np.log(np.maximum(chance, np.finfo(float).tiny)).sum()
+    return Choice(*max(found, key=found.__getitem__), candidate_error_deg={})
 
 
 def chosen_evidence(
@@ -198,6 +228,6 @@ def chosen_lookup(
     settings : mapping
         The configuration's ``density``; see `choose_densities`.
     """
-    method = {"rotation": criterion, "fusion": fusion}
+    method = {"policy": criterion, "fusion": fusion}
     choice = choose_densities(estimate_deg, {criterion: method}, settings)[criterion]
     return build_lookup(chosen_evidence(estimate_deg, choice, settings), criterion, fusion)

@@ -1,4 +1,4 @@
-"""What is known of one estimator: its answers on calibration objects, and the densities of them."""
+"""What is known of one estimator: its calibration estimates, and the conditionals made of them."""
 
 from __future__ import annotations
 
@@ -10,21 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.calibration.density import Likelihoods, likelihoods
+from nbv.calibration.density import Conditionals, conditionals
+from nbv.calibration.posteriors import Posteriors, answer_likelihood
 
 Table = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What every criterion and every fusion rule may draw on.
+    """What every criterion and every fusion rule may use.
 
     Attributes
     ----------
     estimate_deg : ndarray (n_objects, n_views)
-        Calibration estimates; view k of n has the azimuth 360 k / n.
-    likelihoods : Likelihoods
-        V and L made of them, B bins; n must be a multiple of B where a criterion rotates views.
+        Calibration estimates; view k of n has the azimuth 360 k / n. No objects where the
+        conditionals are made of distributions.
+    conditionals : Conditionals
+        V and L, B bins; n must be a multiple of B where a criterion rotates views.
     bandwidth_deg, pseudo_observations : float
         The density's settings.
     settings : mapping
@@ -34,7 +36,7 @@ class Evidence:
     """
 
     estimate_deg: NDArray[np.float64]
-    likelihoods: Likelihoods
+    conditionals: Conditionals
     bandwidth_deg: float
     pseudo_observations: float
     settings: Mapping[str, Any]
@@ -49,35 +51,56 @@ class Evidence:
     @property
     def n_bins(self) -> int:
         """B, the number of bins round the circle."""
-        return self.likelihoods.n_bins
+        return self.conditionals.n_bins
 
     @cached_property
     def viewpoint(self) -> Table:
         """V[estimate, viewpoint], (B, B) float32."""
-        return self.likelihoods.viewpoint.astype(np.float32)
+        return self.conditionals.viewpoint.astype(np.float32)
 
     @cached_property
     def second(self) -> Table:
         """L twice over, (2 B, B) float32: its rows delta to delta + B are L[theta + delta]."""
-        return np.tile(self.likelihoods.estimate.astype(np.float32), (2, 1))
+        return np.tile(self.conditionals.estimate.astype(np.float32), (2, 1))
 
     @cached_property
     def moments(self) -> Table:
-        """The posterior's first moment after any two estimates, (B, 2, B, B) float32.
+        """`first_moments` of the rows of V after every rotation, (B, 2, B, B) float32.
 
-        ``moments[delta, :, e1, e2]`` are the real and the imaginary part of
-        sum_theta V[e1, theta] L[theta + delta, e2] exp(i theta): its direction is the posterior
-        mean pose, its length the resultant length times p(e2 | e1, delta).
+        ``moments[delta, :, e1, e2]``: its direction is the posterior mean pose, its length the
+        resultant length times p(e2 | e1, delta).
         """
-        n_bins = self.n_bins
+        return self.first_moments(self.viewpoint, range(self.n_bins))
+
+    def first_moments(self, probabilities: Table, deltas: range) -> Table:
+        """Return the posterior's first moment after each next estimate.
+
+        Parameters
+        ----------
+        probabilities : ndarray (n, B)
+            Distributions b of the pose.
+        deltas : range
+            Rotations of the next view, in bins.
+
+        Returns
+        -------
+        ndarray (n_deltas, 2, n, B) float32
+            The real and the imaginary part of sum_theta b(theta) L[theta + delta, e] exp(i theta).
+        """
+        n, n_bins = probabilities.shape
         angles = 2 * np.pi * np.arange(n_bins) / n_bins
-        parts = [self.viewpoint * np.cos(angles), self.viewpoint * np.sin(angles)]
+        parts = [probabilities * np.cos(angles), probabilities * np.sin(angles)]
         # Stacked, one product of matrices serves both parts.
-        stacked = np.concatenate(parts).astype(np.float32)
-        moments = np.empty((n_bins, 2 * n_bins, n_bins), dtype=np.float32)
-        for delta in range(n_bins):
-            np.matmul(stacked, self.second[delta : delta + n_bins], out=moments[delta])
-        return moments.reshape(n_bins, 2, n_bins, n_bins)
+        found = self.predicted(np.concatenate(parts).astype(np.float32), deltas)
+        return found.reshape(len(deltas), 2, n, n_bins)
+
+    def predicted(self, weights: Table, deltas: range) -> Table:
+        """Return sum_theta w(theta) L[theta + delta, e], (n_deltas, n, B), of weights (n, B)."""
+        n, n_bins = weights.shape
+        found = np.empty((len(deltas), n, n_bins), dtype=np.float32)
+        for place, delta in enumerate(deltas):
+            np.matmul(weights, self.second[delta : delta + n_bins], out=found[place])
+        return found
 
 
 def gather_evidence(
@@ -97,11 +120,11 @@ def gather_evidence(
     settings : mapping
         Kept for the criteria.
     bandwidth_deg, pseudo_observations, n_bins
-        See `nbv.calibration.density.likelihoods`.
+        See `nbv.calibration.density.conditionals`.
     """
     n_views = estimate_deg.shape[1]
     azimuth_deg = np.broadcast_to(np.arange(n_views) * (360.0 / n_views), estimate_deg.shape)
-    pair = likelihoods(
+    pair = conditionals(
         estimate_deg,
         azimuth_deg,
         bandwidth_deg=bandwidth_deg,
@@ -109,3 +132,14 @@ def gather_evidence(
         n_bins=n_bins,
     )
     return Evidence(estimate_deg, pair, bandwidth_deg, pseudo_observations, settings)
+
+
+def posterior_evidence(calibration: Posteriors, settings: Mapping[str, Any]) -> Evidence:
+    """Make evidence of a classifier's distributions of calibration images.
+
+    Bins are the classes. Nothing is smoothed, for the distributions are smooth already; without
+    calibration estimates no criterion in `nbv.recommendation.criteria.OF_ERRORS` is defined.
+    """
+    answers = answer_likelihood(calibration)
+    pair = Conditionals(answers.T / answers.sum(axis=0)[:, None], answers)
+    return Evidence(np.empty((0, len(answers))), pair, np.nan, np.nan, settings)

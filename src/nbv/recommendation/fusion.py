@@ -1,4 +1,4 @@
-"""One pose from two looks."""
+"""One pose from two views."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ Rotations = NDArray[np.int64]
 _CHUNK = 1024
 
 
-def second_look(estimate_deg: NDArray[np.float64], delta_deg: Rotations) -> NDArray[np.float64]:
-    """Return the estimate from the view that each rotation leads to.
+def at_second_view(of_views: NDArray[np.float64], delta_deg: Rotations) -> NDArray[np.float64]:
+    """Return what belongs to the view that each rotation leads to.
 
     Parameters
     ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        View k of n has the azimuth 360 k / n.
+    of_views : ndarray (n_objects, n_views, ...)
+        An estimate or a distribution of each view; view k of n has the azimuth 360 k / n.
     delta_deg : ndarray (n_objects, n_views) int
         The rotation taken from each view, a multiple of 360 / n.
 
     Returns
     -------
-    ndarray (n_objects, n_views)
+    ndarray (n_objects, n_views, ...)
     """
-    n_views = estimate_deg.shape[1]
+    n_objects, n_views = delta_deg.shape
     views = np.arange(n_views) + np.rint(delta_deg * (n_views / 360.0)).astype(np.intp)
-    return np.take_along_axis(estimate_deg, views % n_views, axis=1)
+    return np.asarray(of_views[np.arange(n_objects)[:, None], views % n_views])
 
 
 def average(
@@ -68,10 +68,10 @@ def posterior(
     delta_deg: ArrayLike,
     evidence: Evidence | None = None,
 ) -> Angles:
-    """Return the mean direction of the pose given both estimates (design, section 3).
+    """Return the mean direction of the pose given both estimates (docs/method.md).
 
     The direction of sum_theta V[e1, theta] L[theta + delta, e2] exp(i theta): of all answers the
-    one of least expected 1 - cos(error), where the two looks err independently.
+    one of least expected 1 - cos(error), where the errors of two views are independent.
 
     Parameters
     ----------
@@ -117,37 +117,53 @@ def _posterior_one_by_one(first: Bins, second: Bins, turn: Bins, evidence: Evide
     return fused.reshape(first.shape)
 
 
-Fusion = Callable[[ArrayLike, ArrayLike, ArrayLike, Evidence | None], Angles]
-FUSIONS: dict[str, Fusion] = {"average": average, "posterior": posterior}
-
-
-def two_view_error_deg(
-    estimate_deg: Angles,
-    delta_deg: Rotations,
-    fusion: str = "average",
+def product(
+    first: ArrayLike,
+    second: ArrayLike,
+    delta_deg: ArrayLike,
     evidence: Evidence | None = None,
 ) -> Angles:
-    """Return the error after fusing two views.
+    """Return the mean direction of the pose given the distributions of both images.
+
+    The direction of sum_theta b1(theta) b2(theta + delta) / p0 exp(i theta), the prior p0 of the
+    pose being uniform. Bayes' rule gives this posterior where the two images are independent given
+    the pose. They are not quite: both show the same object, and what is unusual about it misleads
+    both alike, so the product is surer than it should be.
 
     Parameters
     ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        View k of n has the azimuth 360 k / n.
-    delta_deg : ndarray (n_objects, n_views) int
-        The rotation taken from each view; a multiple of 360 / n.
-    fusion : str
-        A name in `FUSIONS`.
+    first, second : array-like (..., B), rows summing to 1
+        Distributions from each image alone, each in the frame of its own view.
+    delta_deg : array-like (...)
+        The rotations between them, multiples of 360 / B.
     evidence : Evidence, optional
-        Where the fusion needs it.
+        Not used.
 
     Returns
     -------
-    ndarray (n_objects, n_views), degrees in [0, 180]
+    ndarray (...)
+        In [0, 360), in the frame of the first view; its own mean direction where the two exclude
+        each other.
     """
-    n_views = estimate_deg.shape[1]
-    second = second_look(estimate_deg, delta_deg)
-    fused = FUSIONS[fusion](estimate_deg, second, delta_deg, evidence)
-    return circular_distance_deg(fused, np.arange(n_views) * (360.0 / n_views))
+    delta = np.asarray(delta_deg)
+    n_bins = np.shape(first)[-1]
+    bins = np.arange(n_bins)
+    seen = (bins + nearest_bin(delta, n_bins).reshape(-1, 1)) % n_bins
+    own = np.asarray(first, dtype=np.float64).reshape(-1, n_bins)
+    other = np.asarray(second, dtype=np.float64).reshape(-1, n_bins)
+    both = own * np.take_along_axis(other, seen, axis=1)
+    both = np.where(both.sum(axis=1, keepdims=True) > 0, both, own)
+    angles = 2 * np.pi * bins / n_bins
+    return direction_deg(both @ np.cos(angles), both @ np.sin(angles)).reshape(delta.shape)
+
+
+Fusion = Callable[[ArrayLike, ArrayLike, ArrayLike, Evidence | None], Angles]
+FUSIONS: dict[str, Fusion] = {"average": average, "posterior": posterior, "product": product}
+
+OF_DISTRIBUTIONS = frozenset({"product"})
+"""Fusion rules of two distributions; the others fuse two estimates."""
+
+ESTIMATE_FUSIONS = tuple(name for name in FUSIONS if name not in OF_DISTRIBUTIONS)
 
 
 def calibration_errors_deg(evidence: Evidence, fusion: str) -> NDArray[np.float32]:
@@ -175,7 +191,7 @@ def rotation_errors_deg(
     evidence : Evidence
         For the fusion rule.
     fusion : str
-        A name in `FUSIONS`.
+        A name in `ESTIMATE_FUSIONS`.
 
     Returns
     -------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -25,42 +26,45 @@ class LookupTable:
         V[estimate, viewpoint].
     estimate_likelihood : ndarray (B, B) float32
         L[viewpoint, estimate].
-    ambiguity : ndarray (B, B) float32
-        A[estimate, delta].
+    cost : ndarray (B, B) float32
+        A[estimate, delta], in the unit of `nbv.recommendation.criteria.cost_unit`.
     recommended_delta_deg : ndarray (B,) int64
-        The rotation of least ambiguity for each estimate, degrees in [0, 360), travel considered.
+        The rotation of least cost for each estimate, degrees in [0, 360), travel considered.
     bandwidth_deg, pseudo_observations : float
         The density's settings.
-    reading, spread : str
+    criterion : str
+        A name in `nbv.recommendation.criteria.CRITERIA`.
+    pose_likelihood, spread : str
         The criterion's settings; see `nbv.recommendation.criteria.pose_ambiguity`.
     """
 
     viewpoint_likelihood: NDArray[np.float32]
     estimate_likelihood: NDArray[np.float32]
-    ambiguity: NDArray[np.float32]
+    cost: NDArray[np.float32]
     recommended_delta_deg: NDArray[np.int64]
     bandwidth_deg: float
     pseudo_observations: float
-    reading: str
+    pose_likelihood: str
     spread: str
+    criterion: str
 
     def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
         """Return the recommended rotation for each estimate, degrees in [0, 360)."""
-        bins = nearest_bin(estimate_deg, len(self.ambiguity))
+        bins = nearest_bin(estimate_deg, len(self.cost))
         return np.asarray(self.recommended_delta_deg[bins])
 
 
-def least_ambiguous_delta(
-    ambiguity: NDArray[np.floating[Any]],
+def least_cost_delta(
+    cost: NDArray[np.floating[Any]],
     *,
     travel_cost: float = 0.0,
     max_travel_deg: float = 180.0,
 ) -> NDArray[np.int64]:
-    """Return the argmin of each row of A[estimate, delta] (Eq. 2), in degrees.
+    """Return the argmin of each row of A[belief, delta] (Eq. 2), in degrees.
 
     Parameters
     ----------
-    ambiguity : ndarray (n, B)
+    cost : ndarray (n, B)
     travel_cost : float, 0 or more
         Added to A for every degree that the camera travels, in A's own unit.
     max_travel_deg : float in [0, 180]
@@ -71,17 +75,25 @@ def least_ambiguous_delta(
     ndarray (n,) int64
         In [0, 360). Of equal minima the one of smallest travel is taken, then the smaller delta.
     """
-    n_bins = ambiguity.shape[1]
+    n_bins = cost.shape[1]
     deltas = np.arange(n_bins) * (360.0 / n_bins)
     travel = travel_deg(deltas)
     order = np.lexsort((deltas, travel))
     order = order[travel[order] <= max_travel_deg]
-    worth = ambiguity[:, order]
+    candidates = cost[:, order]
     if travel_cost:
-        worth = worth + travel_cost * travel[order]
-    best = order[np.argmin(worth, axis=1)]
+        candidates = candidates + travel_cost * travel[order]
+    best = order[np.argmin(candidates, axis=1)]
     recommended: NDArray[np.int64] = np.rint(deltas[best]).astype(np.int64)
     return recommended
+
+
+def recommended_delta(
+    cost: NDArray[np.floating[Any]], settings: Mapping[str, Any]
+) -> NDArray[np.int64]:
+    """Return `least_cost_delta` with the ``travel_cost`` and ``max_travel_deg`` of settings."""
+    limits = {key: settings[key] for key in ("travel_cost", "max_travel_deg") if key in settings}
+    return least_cost_delta(cost, **limits)
 
 
 def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") -> LookupTable:
@@ -94,27 +106,24 @@ def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") ->
     criterion : str
         A name in `nbv.recommendation.criteria.CRITERIA`.
     fusion : str
-        A name in `nbv.recommendation.fusion.FUSIONS`.
+        A name in `nbv.recommendation.fusion.ESTIMATE_FUSIONS`.
 
     Raises
     ------
     UserError
         For an unknown criterion.
     """
-    ambiguity = tabulate(criterion, evidence, fusion)
+    cost = tabulate(criterion, evidence, fusion)
     return LookupTable(
-        viewpoint_likelihood=evidence.likelihoods.viewpoint.astype(np.float32),
-        estimate_likelihood=evidence.likelihoods.estimate.astype(np.float32),
-        ambiguity=ambiguity,
-        recommended_delta_deg=least_ambiguous_delta(
-            ambiguity,
-            travel_cost=evidence.settings.get("travel_cost", 0.0),
-            max_travel_deg=evidence.settings.get("max_travel_deg", 180.0),
-        ),
+        viewpoint_likelihood=evidence.conditionals.viewpoint.astype(np.float32),
+        estimate_likelihood=evidence.conditionals.estimate.astype(np.float32),
+        cost=cost,
+        recommended_delta_deg=recommended_delta(cost, evidence.settings),
         bandwidth_deg=evidence.bandwidth_deg,
         pseudo_observations=evidence.pseudo_observations,
-        reading=evidence.settings["reading"],
+        pose_likelihood=evidence.settings["pose_likelihood"],
         spread=evidence.settings["spread"],
+        criterion=criterion,
     )
 
 
@@ -129,10 +138,11 @@ def load_lookup(path: str | Path) -> LookupTable:
     return LookupTable(
         viewpoint_likelihood=stored["viewpoint_likelihood"],
         estimate_likelihood=stored["estimate_likelihood"],
-        ambiguity=stored["ambiguity"],
+        cost=stored["cost"],
         recommended_delta_deg=stored["recommended_delta_deg"],
         bandwidth_deg=float(stored["bandwidth_deg"]),
         pseudo_observations=float(stored["pseudo_observations"]),
-        reading=str(stored["reading"]),
+        pose_likelihood=str(stored["pose_likelihood"]),
         spread=str(stored["spread"]),
+        criterion=str(stored["criterion"]),
     )

@@ -1,4 +1,4 @@
-"""Methods beyond the paper, on equal terms: each with the density that serves it best."""
+"""Extensions on equal terms: each with the density that serves it best."""
 
 from __future__ import annotations
 
@@ -13,23 +13,30 @@ import pandas as pd
 from scipy import stats
 
 from nbv.calibration.estimates import Estimates
-from nbv.errors import UserError
+from nbv.calibration.posteriors import Posteriors
+from nbv.errors import UserError, nearest
 from nbv.files import read_csv
-from nbv.recommendation.criteria import CRITERIA
+from nbv.recommendation.criteria import CRITERIA, OF_ERRORS
 from nbv.recommendation.density_selection import Choice, choose_densities, chosen_evidence
-from nbv.recommendation.evidence import Evidence, gather_evidence
-from nbv.recommendation.fusion import FUSIONS
+from nbv.recommendation.evidence import Evidence, gather_evidence, posterior_evidence
+from nbv.recommendation.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
 from nbv.recommendation.lookup import LookupTable, build_lookup
-from nbv.recommendation.policies import ORACLE, SINGLE, check_names, needs_lookup
+from nbv.recommendation.policies import ORACLE, SINGLE, needs_lookup
 
-CHOSEN = "chosen"
-"""As a rotation and a fusion: those of the pair that calibration objects favour."""
+SELECTED = "selected"
+"""As a policy and a fusion: those of the pair that calibration objects favour."""
 
-Contenders = Mapping[str, Mapping[str, Any]]
+OPPOSITE = {"policy": "opposite", "fusion": "average"}
+"""The paper's baseline: the most cautious candidate to be selected."""
+
+NO_DENSITY = Choice(float("nan"), float("nan"), candidate_error_deg={})
+"""Of methods that go by distributions of images."""
+
+Methods = Mapping[str, Mapping[str, Any]]
 
 CHOICE_COLUMNS = (
     "method",
-    "rotation",
+    "policy",
     "fusion",
     "bandwidth_deg",
     "pseudo_observations",
@@ -38,126 +45,176 @@ CHOICE_COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One contender in one fold.
+class SelectedMethod:
+    """One extension in one fold.
 
     Attributes
     ----------
-    rotation, fusion : str
-        What it does; never `CHOSEN`, but what was chosen.
+    policy, fusion : str
+        What it does; never `SELECTED`, but what was selected.
     choice : Choice
         Its density's settings.
     evidence : Evidence
         Made with them of all calibration objects.
     lookup : LookupTable or None
-        None for a rotation that follows no table.
+        None for a policy that follows no table.
     """
 
-    rotation: str
+    policy: str
     fusion: str
     choice: Choice
     evidence: Evidence
     lookup: LookupTable | None
 
 
-def check_contenders(contenders: Contenders, methods: Contenders) -> None:
-    """Check what a configuration says about contenders, and that their files have free names.
+def check_methods(methods: Methods, extensions: Methods, gives_distributions: bool) -> None:
+    """Check what a configuration says about the paper's methods and about extensions.
+
+    Parameters
+    ----------
+    methods, extensions : mapping
+        ``policy`` and ``fusion`` by name.
+    gives_distributions : bool
+        Whether the estimator gives p(azimuth | image).
 
     Raises
     ------
     UserError
-        Where a rotation or a fusion is unknown, or a name stands for something else already.
+        Where a policy or a fusion is unknown or cannot be had, where an extension's name stands
+        for something else already, or where an extension repeats a method of the paper.
     """
-    taken = {*methods, *(method["rotation"] for method in methods.values())}
-    for name, method in contenders.items():
+    for name, method in methods.items():
+        key = f"methods.{name}"
+        _check_names(key, method)
+        if method["policy"] == ORACLE or method["fusion"] != "average":
+            raise UserError(f"{key}: oracles and fusion other than average belong under extensions")
+    taken = {*methods, *(method["policy"] for method in methods.values())}
+    paper = {(method["policy"], method["fusion"]): name for name, method in methods.items()}
+    for name, method in extensions.items():
+        key, policy, fusion = f"extensions.{name}", method["policy"], method["fusion"]
         if name in taken:
-            raise UserError(f"contenders.{name}: the name is taken by a method; choose another")
-        plain = {
-            "rotation": "fixed" if method["rotation"] == CHOSEN else method["rotation"],
-            "fusion": "average" if method["fusion"] == CHOSEN else method["fusion"],
-        }
-        check_names(f"contenders.{name}", plain)
-        if plain["rotation"] == SINGLE:
-            raise UserError(f"contenders.{name}.rotation={SINGLE}: it takes no second view")
-        alike = [m for m in contenders.values() if m["fusion"] == plain["fusion"]]
-        if plain["rotation"] == ORACLE and all(m["rotation"] == ORACLE for m in alike):
-            raise UserError(f"contenders.{name}: no other contender fuses by {plain['fusion']}")
-        if CHOSEN in method.values() and not _candidates(contenders):
-            raise UserError(f"contenders.{name}: there is none to be chosen")
+            raise UserError(f"{key}: the name is taken by a method; choose another")
+        if (policy, fusion) in paper:
+            raise UserError(f"{key}: it repeats methods.{paper[policy, fusion]}; remove it")
+        _check_names(key, {k: v for k, v in method.items() if v != SELECTED})
+        if policy == SINGLE:
+            raise UserError(f"{key}.policy={SINGLE}: it takes no second view")
+        if SELECTED in (policy, fusion) and not _candidates(extensions):
+            raise UserError(f"{key}: there is none to be selected")
+        if fusion in OF_DISTRIBUTIONS:
+            _check_distributions(key, method, gives_distributions)
+        elif policy == ORACLE and fusion == "posterior":
+            alike = {m["policy"] for m in extensions.values() if m["fusion"] == fusion}
+            if alike <= {ORACLE, SELECTED}:
+                raise UserError(f"{key}: no other extension fuses by {fusion}")
 
 
-def _candidates(contenders: Contenders) -> list[str]:
-    """Return the contenders that may be chosen: Opposite or a criterion, with a fusion rule."""
+def _check_names(key: str, method: Mapping[str, Any]) -> None:
+    if "policy" in method:
+        needs_lookup(method["policy"])
+    if method.get("fusion", "average") not in FUSIONS:
+        given = f"{key}.fusion={method['fusion']}"
+        raise UserError(f"{given} is unknown: {nearest(method['fusion'], FUSIONS)}")
+
+
+def _check_distributions(key: str, method: Mapping[str, Any], gives_distributions: bool) -> None:
+    policy, fusion = method["policy"], method["fusion"]
+    if not gives_distributions:
+        raise UserError(
+            f"{key}.fusion={fusion}: this estimator gives no distributions of the azimuth; "
+            "choose estimator=classifier, which does"
+        )
+    if policy in (ORACLE, SELECTED, *OF_ERRORS):
+        raise UserError(
+            f"{key}.policy={policy}: it is not defined for distributions; choose random, opposite, "
+            f"{', '.join(name for name in CRITERIA if name not in OF_ERRORS)}"
+        )
+
+
+def _candidates(extensions: Methods) -> list[str]:
+    """Return the extensions that may be selected: Opposite or a criterion, fusing estimates."""
     return [
         name
-        for name, method in contenders.items()
-        if method["rotation"] in ("opposite", *CRITERIA) and method["fusion"] in FUSIONS
+        for name, method in extensions.items()
+        if method["policy"] in ("opposite", *CRITERIA) and method["fusion"] in ESTIMATE_FUSIONS
     ]
 
 
-def enter(
-    calibration: Estimates, contenders: Contenders, settings: Mapping[str, Any]
-) -> dict[str, Entry]:
-    """Choose each contender's density, and build its table, from calibration estimates alone.
+def select_methods(
+    calibration: Estimates,
+    extensions: Methods,
+    settings: Mapping[str, Any],
+    posteriors: Posteriors | None = None,
+) -> dict[str, SelectedMethod]:
+    """Choose each extension's density, and build its table, from calibration objects alone.
 
     Parameters
     ----------
     calibration : Estimates
         Of objects that the estimator was not trained on.
-    contenders : mapping
-        ``rotation`` and ``fusion`` by name; either may be `CHOSEN`: that of the first contender
-        listed, Opposite or a criterion, whose cross-validated error is not surely above the least.
+    extensions : mapping
+        ``policy`` and ``fusion`` by name; either may be `SELECTED`: that of the first candidate
+        whose cross-validated error is not surely above the least. Candidates are the paper's
+        Opposite, then Opposite and criteria in the order of the extensions.
     settings : mapping
         The configuration's ``density`` and ``travel``.
+    posteriors : Posteriors, optional
+        The calibration objects' distributions, where an extension fuses distributions. They are
+        its evidence; it has no density to choose and is no candidate.
     """
     estimate_deg = calibration.estimate_deg
-    own = {n: dict(m) for n, m in contenders.items() if CHOSEN not in m.values()}
-    bounds = {n: m for n, m in own.items() if m["rotation"] == ORACLE}
-    fair = {n: m for n, m in own.items() if n not in bounds}
+    of_images = {n: m for n, m in extensions.items() if m["fusion"] in OF_DISTRIBUTIONS}
+    own = {n: dict(m) for n, m in extensions.items() if SELECTED not in m.values()}
+    bounds = {n: m for n, m in own.items() if m["policy"] == ORACLE}
+    fair = {n: m for n, m in own.items() if n not in bounds and n not in of_images}
+    baseline = {} if OPPOSITE in fair.values() else {"opposite (average)": OPPOSITE}
+    candidates = [*baseline, *_candidates(extensions)]
+    fair = baseline | fair
     choices = choose_densities(estimate_deg, fair, settings)
     for name, method in bounds.items():
-        choices[name] = _lent(method["fusion"], fair, choices)
-    led = [name for name, method in contenders.items() if CHOSEN in method.values()]
+        alike = [choices[other] for other, m in fair.items() if m["fusion"] == method["fusion"]]
+        # An oracle chooses no density; it takes that of the best method that fuses alike.
+        choices[name] = min(alike, key=lambda choice: choice.error_deg)
+    led = [name for name, method in extensions.items() if SELECTED in method.values()]
     if led:
-        winner = _winner(contenders, choices)
-        followers = {name: _resolved(contenders[name], own[winner]) for name in led}
-        new = {n: m for n, m in followers.items() if m not in own.values()}
+        winner = fair[_first_not_surely_worse({name: choices[name] for name in candidates})]
+        followers = {name: _resolved(extensions[name], winner) for name in led}
+        new = {n: m for n, m in followers.items() if m not in fair.values()}
         choices |= choose_densities(estimate_deg, new, settings) if new else {}
         for name, method in followers.items():
-            same = next(other for other, plain in (own | new).items() if plain == method)
+            same = next(other for other, plain in (fair | new).items() if plain == method)
             choices[name] = choices[same]
         own |= followers
     made: dict[tuple[float, float], Evidence] = {}
-    entries = {}
-    for name in contenders:
-        choice, method = choices[name], own[name]
+    of_distributions = None if posteriors is None else posterior_evidence(posteriors, settings)
+    selected = {}
+    for name in extensions:
+        policy, fusion = own[name]["policy"], own[name]["fusion"]
+        if name in of_images:
+            if of_distributions is None:
+                raise ValueError(f"extension {name!r} needs posteriors")
+            selected[name] = SelectedMethod(policy, fusion, NO_DENSITY, of_distributions, None)
+            continue
+        choice = choices[name]
         key = (choice.bandwidth_deg, choice.pseudo_observations)
         if key not in made:
             made[key] = chosen_evidence(estimate_deg, choice, settings)
-        rotation, fusion = method["rotation"], method["fusion"]
-        lookup = build_lookup(made[key], rotation, fusion) if needs_lookup(rotation) else None
-        entries[name] = Entry(rotation, fusion, choice, made[key], lookup)
-    return entries
+        lookup = build_lookup(made[key], policy, fusion) if needs_lookup(policy) else None
+        selected[name] = SelectedMethod(policy, fusion, choice, made[key], lookup)
+    return selected
 
 
-def _lent(fusion: str, fair: Contenders, choices: Mapping[str, Choice]) -> Choice:
-    """Return the density of the best contender that fuses alike: an oracle chooses none."""
-    alike = [choices[name] for name, method in fair.items() if method["fusion"] == fusion]
-    return min(alike, key=lambda choice: choice.error_deg)
-
-
-def _winner(contenders: Contenders, choices: Mapping[str, Choice]) -> str:
-    """Return the first candidate, as listed, that the best is not surely better than.
+def _first_not_surely_worse(choices: Mapping[str, Choice]) -> str:
+    """Return the first candidate, in the order given, that the best is not surely better than.
 
     The rule of one standard error (Breiman et al., 1984): what few calibration objects cannot
     tell apart is decided by the order of caution in which the configuration lists them.
     """
-    names = _candidates(contenders)
-    errors = [choices[name].error_deg for name in names]
+    errors = [choice.error_deg for choice in choices.values()]
     if np.isnan(errors).any():
-        return names[0]
-    best = choices[names[int(np.argmin(errors))]]
-    return next(name for name in names if not surely_better(best, choices[name]))
+        return next(iter(choices))
+    best = list(choices.values())[int(np.argmin(errors))]
+    return next(name for name, choice in choices.items() if not surely_better(best, choice))
 
 
 def surely_better(one: Choice, other: Choice) -> bool:
@@ -174,21 +231,24 @@ def surely_better(one: Choice, other: Choice) -> bool:
 
 
 def _resolved(method: Mapping[str, Any], winner: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: winner[key] if value == CHOSEN else value for key, value in method.items()}
+    return {key: winner[key] if value == SELECTED else value for key, value in method.items()}
 
 
-def choices_frame(entries: Mapping[str, Entry]) -> pd.DataFrame:
-    """Return what was chosen for each contender, columns `CHOICE_COLUMNS`."""
+def choices_frame(selected: Mapping[str, SelectedMethod]) -> pd.DataFrame:
+    """Return what was chosen for each extension, columns `CHOICE_COLUMNS`.
+
+    The density's columns are empty for methods that go by distributions of images.
+    """
     rows = [
         (
             name,
-            entry.rotation,
-            entry.fusion,
-            entry.choice.bandwidth_deg,
-            entry.choice.pseudo_observations,
-            round(entry.choice.error_deg, 4),
+            method.policy,
+            method.fusion,
+            method.choice.bandwidth_deg,
+            method.choice.pseudo_observations,
+            round(method.choice.error_deg, 4),
         )
-        for name, entry in entries.items()
+        for name, method in selected.items()
     ]
     return pd.DataFrame(rows, columns=list(CHOICE_COLUMNS))
 
@@ -201,7 +261,7 @@ def read_choices(path: str | Path) -> pd.DataFrame:
 def stored_evidence(
     calibration: Estimates, choices: pd.DataFrame, settings: Mapping[str, Any]
 ) -> dict[str, Callable[[int], Evidence]]:
-    """Return the evidence that each rotation with posterior fusion was found to need.
+    """Return the evidence that each policy with posterior fusion was found to need.
 
     Parameters
     ----------
@@ -215,9 +275,11 @@ def stored_evidence(
     Returns
     -------
     dict of str to callable
-        By rotation; called with a number of bins. The same call returns the same object.
+        By policy; called with a number of bins. The same call returns the same object. Where no
+        extension chooses by ``bayes_error`` it takes the density of ``expected_error``: both are
+        errors after posterior fusion.
     """
-    posterior = choices[choices["fusion"] == "posterior"].drop_duplicates("rotation")
+    posterior = choices[choices["fusion"] == "posterior"].drop_duplicates("policy")
 
     def maker(bandwidth_deg: float, pseudo_observations: float) -> Callable[[int], Evidence]:
         return cache(
@@ -230,7 +292,10 @@ def stored_evidence(
             )
         )
 
-    return {
-        str(row["rotation"]): maker(row["bandwidth_deg"], row["pseudo_observations"])
+    makers = {
+        str(row["policy"]): maker(row["bandwidth_deg"], row["pseudo_observations"])
         for row in posterior.to_dict("records")
     }
+    if "expected_error" in makers:
+        makers.setdefault("bayes_error", makers["expected_error"])
+    return makers

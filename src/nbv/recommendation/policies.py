@@ -1,18 +1,32 @@
-"""Choosing the next view: the baselines, and the one way to ask either them or a criterion."""
+"""How the second view is chosen, and the one way to choose it, take it and fuse both."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.angles import circular_distance_deg
 from nbv.errors import UserError, nearest
+from nbv.recommendation.belief import Belief
 from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.evidence import Evidence
-from nbv.recommendation.fusion import FUSIONS, Rotations, rotation_errors_deg
-from nbv.recommendation.lookup import build_lookup, least_ambiguous_delta
+from nbv.recommendation.fusion import (
+    FUSIONS,
+    OF_DISTRIBUTIONS,
+    Rotations,
+    at_second_view,
+    rotation_errors_deg,
+)
+from nbv.recommendation.lookup import (
+    LookupTable,
+    build_lookup,
+    least_cost_delta,
+    recommended_delta,
+)
 
 Angles = NDArray[np.float64]
 
@@ -20,91 +34,146 @@ SINGLE = "none"
 ORACLE = "oracle"
 
 
-def _random(estimate_deg: Angles, rng: np.random.Generator) -> Rotations:
+@dataclass(frozen=True)
+class Turns:
+    """Full turns of objects, and what a method may know when it chooses and fuses views.
+
+    Attributes
+    ----------
+    estimate_deg : ndarray (n_objects, n_views)
+        View k of n has the azimuth 360 k / n; 360 / n is a whole number.
+    evidence : Evidence, optional
+        Of calibration objects; needed by criteria without `lookup`, by ``oracle`` and by the
+        fusion ``posterior``.
+    rng : numpy.random.Generator, optional
+        Needed by ``random``.
+    lookup : LookupTable, optional
+        The table of the policy, where it is made already.
+    distributions : ndarray (n_objects, n_views, B), optional
+        p(azimuth | image) of each view; a criterion then goes by them instead of the estimates.
+    """
+
+    estimate_deg: Angles
+    evidence: Evidence | None = None
+    rng: np.random.Generator | None = None
+    lookup: LookupTable | None = None
+    distributions: Angles | None = None
+
+
+@dataclass(frozen=True)
+class TwoViews:
+    """What comes of a second view from every first one, (n_objects, n_views) each.
+
+    Attributes
+    ----------
+    delta_deg : ndarray of int64, or None
+        The rotation to the second view; None where none was taken.
+    second_deg : ndarray, or None
+        The estimate from there.
+    pose_deg : ndarray
+        The fused pose in the frame of the first view.
+    """
+
+    delta_deg: Rotations | None
+    second_deg: Angles | None
+    pose_deg: Angles
+
+    @property
+    def error_deg(self) -> Angles:
+        """The distance between fused and true pose, degrees in [0, 180]."""
+        n_views = self.pose_deg.shape[1]
+        return circular_distance_deg(self.pose_deg, np.arange(n_views) * (360.0 / n_views))
+
+
+def _random(turns: Turns, fusion: str) -> Rotations:
     """Return a view other than the first, all equally likely."""
-    n_views = estimate_deg.shape[1]
-    return np.asarray(rng.integers(1, n_views, estimate_deg.shape) * (360 // n_views))
+    if turns.rng is None:
+        raise ValueError("policy 'random' needs a generator")
+    shape = turns.estimate_deg.shape
+    return np.asarray(turns.rng.integers(1, shape[1], shape) * (360 // shape[1]))
 
 
-def _opposite(estimate_deg: Angles, rng: np.random.Generator) -> Rotations:
-    return np.full(estimate_deg.shape, 180, dtype=np.int64)
+def _opposite(turns: Turns, fusion: str) -> Rotations:
+    return np.full(turns.estimate_deg.shape, 180, dtype=np.int64)
 
 
-BASELINES: dict[str, Callable[[Angles, np.random.Generator], Rotations]] = {
+def _oracle(turns: Turns, fusion: str) -> Rotations:
+    """Return the rotation of least error from each view, as only the truth can tell.
+
+    The bound of all methods that fuse alike. Of equals the smallest travel.
+    """
+    if turns.evidence is None:
+        raise ValueError("policy 'oracle' needs evidence")
+    errors = rotation_errors_deg(turns.estimate_deg, turns.evidence, fusion)
+    by_view = errors.reshape(len(errors), -1).T
+    return least_cost_delta(by_view).reshape(turns.estimate_deg.shape)
+
+
+def _recommended(criterion: str, turns: Turns, fusion: str) -> Rotations:
+    """Return the rotation of least cost at each image's distribution, or at each estimate."""
+    if turns.lookup is not None:
+        return turns.lookup.recommend(turns.estimate_deg)
+    if turns.evidence is None:
+        raise ValueError(f"policy {criterion!r} needs a lookup table or evidence")
+    if turns.distributions is None:
+        return build_lookup(turns.evidence, criterion, fusion).recommend(turns.estimate_deg)
+    rows = turns.distributions.reshape(-1, turns.evidence.n_bins).astype(np.float32)
+    cost = CRITERIA[criterion](Belief(rows, turns.evidence), turns.evidence, fusion)
+    return recommended_delta(cost, turns.evidence.settings).reshape(turns.estimate_deg.shape)
+
+
+Policy = Callable[[Turns, str], Rotations]
+POLICIES: dict[str, Policy] = {
     "random": _random,
     "opposite": _opposite,
+    **{criterion: partial(_recommended, criterion) for criterion in CRITERIA},
+    ORACLE: _oracle,
 }
+"""Rotations from every view, given the turns and the name of the fusion rule."""
 
 
-def needs_lookup(rotation: str) -> bool:
-    """Say whether a method's ``rotation`` is recommended by a lookup table.
+def needs_lookup(policy: str) -> bool:
+    """Say whether a policy follows a lookup table, where it goes by estimates.
 
     Raises
     ------
     UserError
-        Where it is neither a baseline nor a criterion.
+        Where there is no such policy.
     """
-    if rotation in (SINGLE, ORACLE) or rotation in BASELINES:
-        return False
-    if rotation in CRITERIA:
-        return True
-    known = [SINGLE, *BASELINES, *CRITERIA, ORACLE]
-    raise UserError(f"methods: rotation {rotation!r} is unknown: {nearest(rotation, known)}")
+    if policy != SINGLE and policy not in POLICIES:
+        known = [SINGLE, *POLICIES]
+        raise UserError(f"methods: policy {policy!r} is unknown: {nearest(policy, known)}")
+    return policy in CRITERIA
 
 
-def check_names(key: str, method: Mapping[str, Any]) -> None:
-    """Raise UserError where the rotation or the fusion that stands at `key` is unknown."""
-    needs_lookup(method["rotation"])
-    if method["fusion"] not in FUSIONS:
-        given = f"{key}.fusion={method['fusion']}"
-        raise UserError(f"{given} is unknown: {nearest(method['fusion'], FUSIONS)}")
-
-
-def oracle(estimate_deg: Angles, evidence: Evidence, fusion: str) -> Rotations:
-    """Return the rotation of least error from each view, as only the truth can tell.
-
-    The bound of all methods that fuse alike, and no competitor. Of equals the smallest travel.
+def two_views(policy: str, fusion: str, turns: Turns) -> TwoViews:
+    """Choose a second view from every first one, take it, and fuse the two.
 
     Parameters
     ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        View k of n has the azimuth 360 k / n.
-    evidence, fusion
-        See `nbv.recommendation.fusion.rotation_errors_deg`.
-    """
-    errors = rotation_errors_deg(estimate_deg, evidence, fusion)
-    by_view = errors.reshape(len(errors), -1).T
-    return least_ambiguous_delta(by_view).reshape(estimate_deg.shape)
-
-
-def rotate(
-    rotation: str,
-    fusion: str,
-    estimate_deg: Angles,
-    evidence: Evidence,
-    rng: np.random.Generator,
-) -> Rotations:
-    """Return the rotation that is taken from each view.
-
-    Parameters
-    ----------
-    rotation : str
-        A name in `BASELINES`, in `nbv.recommendation.criteria.CRITERIA`, or `ORACLE`.
+    policy : str
+        ``none`` (one view alone) or a name in `POLICIES`.
     fusion : str
         A name in `nbv.recommendation.fusion.FUSIONS`.
-    estimate_deg : ndarray (n_objects, n_views)
-        First estimates; view k of n has the azimuth 360 k / n.
-    evidence : Evidence
-        Of other objects.
-    rng : numpy.random.Generator
-        Where the rotation is drawn.
+    turns : Turns
+        Of the objects; evidence is of others.
 
-    Returns
-    -------
-    ndarray (n_objects, n_views) int64, degrees in [0, 360)
+    Raises
+    ------
+    ValueError
+        Where the policy or the fusion needs what `turns` has not.
     """
-    if rotation in BASELINES:
-        return BASELINES[rotation](estimate_deg, rng)
-    if rotation == ORACLE:
-        return oracle(estimate_deg, evidence, fusion)
-    return build_lookup(evidence, rotation, fusion).recommend(estimate_deg)
+    if policy == SINGLE:
+        return TwoViews(None, None, turns.estimate_deg)
+    return take_second_views(POLICIES[policy](turns, fusion), fusion, turns)
+
+
+def take_second_views(delta_deg: Rotations, fusion: str, turns: Turns) -> TwoViews:
+    """Take the views that rotations (n_objects, n_views) lead to, and fuse them with the first."""
+    first = turns.estimate_deg
+    second = seen = at_second_view(first, delta_deg)
+    if fusion in OF_DISTRIBUTIONS:
+        if turns.distributions is None:
+            raise ValueError(f"fusion {fusion!r} needs distributions")
+        first, seen = turns.distributions, at_second_view(turns.distributions, delta_deg)
+    return TwoViews(delta_deg, second, FUSIONS[fusion](first, seen, delta_deg, turns.evidence))

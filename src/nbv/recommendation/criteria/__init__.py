@@ -1,15 +1,19 @@
-"""What a rotation is worth: ambiguity tables A[estimate, delta], lower is better.
+"""What the next view costs: criteria A[belief, delta], lower is better.
 
-Every criterion is ``criterion(evidence, fusion) -> A``, (B, B) float32: `evidence` holds the
-calibration estimates and the densities of them, `fusion` names the rule by which the two answers
-will be made one. All axis shifts are cyclic: turning the object by k bins rolls the tables by k.
+Every criterion is ``criterion(belief, evidence, fusion) -> A``, (n, B) float32: `belief` is what is
+known of n poses, `evidence` belongs to the estimator that takes the next view, and `fusion` names
+the rule that makes one pose of the estimates. A lookup table is the criterion at the rows of V. All
+axis shifts are cyclic: turning the object by k bins rolls the rows of a table by k.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from nbv.errors import UserError, nearest
+from nbv.recommendation.belief import Belief, every_belief
+from nbv.recommendation.criteria.bayes_error import bayes_error
 from nbv.recommendation.criteria.expected_dispersion import expected_dispersion
 from nbv.recommendation.criteria.expected_error import expected_error
 from nbv.recommendation.criteria.fixed import fixed
@@ -17,18 +21,44 @@ from nbv.recommendation.criteria.information_gain import information_gain
 from nbv.recommendation.criteria.pose_ambiguity import pose_ambiguity
 from nbv.recommendation.evidence import Evidence, Table
 
-Criterion = Callable[[Evidence, str], Table]
+Criterion = Callable[[Belief, Evidence, str], Table]
 
 CRITERIA: dict[str, Criterion] = {
-    "entropy": pose_ambiguity,
+    "pose_ambiguity": pose_ambiguity,
     "information_gain": information_gain,
     "expected_dispersion": expected_dispersion,
+    "bayes_error": bayes_error,
     "expected_error": expected_error,
     "fixed": fixed,
 }
 
 FOR_A_FUSION = frozenset({"expected_error", "fixed"})
-"""Criteria whose table depends on the fusion rule; of the others one serves all rules."""
+"""Criteria that depend on the fusion rule and are of one estimator; the others serve all rules."""
+
+OF_ERRORS = frozenset({"bayes_error", *FOR_A_FUSION})
+"""Criteria in degrees: they need calibration estimates."""
+
+FOR_MORE_VIEWS = ("information_gain", "expected_dispersion", "bayes_error")
+"""Criteria that are defined after any number of views."""
+
+FOR_TWO_ESTIMATORS = ("pose_ambiguity", *FOR_MORE_VIEWS)
+"""Criteria that are defined where another estimator takes the next view."""
+
+
+def cost_unit(criterion: str, settings: Mapping[str, Any]) -> str:
+    """Return the unit of a criterion's cost: ``nats``, ``degrees`` or ``1``.
+
+    Parameters
+    ----------
+    criterion : str
+        A name in `CRITERIA`.
+    settings : mapping
+        The configuration's ``density``: its ``spread`` decides on the pose ambiguity's unit.
+    """
+    if criterion in OF_ERRORS:
+        return "degrees"
+    in_nats = {"information_gain": True, "pose_ambiguity": settings["spread"] == "entropy"}
+    return "nats" if in_nats.get(criterion, False) else "1"
 
 
 def tabulate(criterion: str, evidence: Evidence, fusion: str) -> Table:
@@ -42,4 +72,4 @@ def tabulate(criterion: str, evidence: Evidence, fusion: str) -> Table:
     if criterion not in CRITERIA:
         raise UserError(f"criterion {criterion!r} is unknown: {nearest(criterion, CRITERIA)}")
     key = (criterion, fusion if criterion in FOR_A_FUSION else None)
-    return evidence.once(key, lambda: CRITERIA[criterion](evidence, fusion))
+    return evidence.once(key, lambda: CRITERIA[criterion](every_belief(evidence), evidence, fusion))

@@ -1,32 +1,44 @@
-"""Expected circular dispersion of the pose after the second look: a Bayes risk."""
+"""Expected circular dispersion of the pose after the next view: a Bayes risk."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from nbv.recommendation.belief import Belief
+from nbv.recommendation.criteria.rotations import rotation_groups
 from nbv.recommendation.evidence import Evidence, Table
 
 
-def expected_dispersion(evidence: Evidence, fusion: str) -> Table:
-    """Return the Bayes risk of the posterior mean direction (design, section 3).
+def expected_dispersion(belief: Belief, evidence: Evidence, fusion: str) -> Table:
+    """Return the Bayes risk of the posterior mean direction (docs/method.md).
 
-    Under the loss 1 - cos(error)::
+    Under the loss 1 - cos(error), with the belief b (V[e] after one view)::
 
-        A[e, delta] = 1 - sum_e2 |sum_theta V[e, theta] L[theta + delta, e2] exp(i theta)|
+        A[b, delta] = 1 - sum_e |sum_theta b(theta) L[theta + delta, e] exp(i theta)|
 
     Parameters
     ----------
+    belief : Belief
+        n beliefs in B bins.
     evidence : Evidence
-        B bins.
+        Of the estimator that takes the next view, B bins.
     fusion : str
         Not used.
 
     Returns
     -------
-    ndarray (B, B) float32
-        A[estimate, delta] in [0, 1].
+    ndarray (n, B) float32
+        A[belief, delta] in [0, 1].
     """
-    risk = np.empty((evidence.n_bins, evidence.n_bins), dtype=np.float32)
-    for delta, (real, imaginary) in enumerate(evidence.moments):
-        risk[:, delta] = 1.0 - np.sqrt(real**2 + imaginary**2).sum(axis=1)
+    rows = belief.probabilities
+    cached = evidence.moments if belief.is_tabulated and belief.evidence is evidence else None
+    risk = np.empty(rows.shape, dtype=np.float32)
+    for deltas in rotation_groups(evidence.n_bins, 2 * rows.size):
+        moments = (
+            evidence.first_moments(rows, deltas)
+            if cached is None
+            else cached[deltas.start : deltas.stop]
+        )
+        length = np.sqrt(moments[:, 0] ** 2 + moments[:, 1] ** 2).sum(axis=-1)
+        risk[:, deltas.start : deltas.stop] = (1.0 - length).T
     return risk

@@ -1,4 +1,4 @@
-"""The error that looking twice really made on calibration objects."""
+"""The error that fusing two views really made on calibration objects."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from nbv.angles import nearest_bin
 from nbv.calibration.density import von_mises_kernel
+from nbv.recommendation.belief import Belief
 from nbv.recommendation.evidence import Evidence, Table
 from nbv.recommendation.fusion import calibration_errors_deg
 
@@ -24,27 +25,48 @@ def kernel_weights(evidence: Evidence) -> NDArray[np.float64]:
     return np.asarray(kernel[(np.arange(n_bins)[:, None] - bins) % n_bins])
 
 
-def expected_error(evidence: Evidence, fusion: str) -> Table:
+def first_estimate_bins(belief: Belief, evidence: Evidence) -> NDArray[np.intp]:
+    """Return the bins of the first estimates, all that errors of two views depend on.
+
+    Raises
+    ------
+    ValueError
+        After more than one view, without an estimate, or where another estimator takes the next
+        view: nothing is known of the error there.
+    """
+    if belief.first_bin is None or belief.n_views != 1 or belief.evidence is not evidence:
+        raise ValueError("errors of two views need one first estimate by the same estimator")
+    return belief.first_bin
+
+
+def expected_error(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     """Return a kernel regression of the error on the first estimate, for each rotation.
 
     For each calibration object o and view phi (one for each bin) the error of the rotation delta is
-    ``l(o, phi, delta) = d(fuse(e(o, phi), e(o, phi + delta), delta), phi)``. It assumes nothing
-    about the independence of two looks at one object. Each row is shrunk towards the mean over
-    all estimates by pseudo-observations, so that where little is known the best fixed rotation
-    is taken (design, section 3).
+    ``l(o, phi, delta) = d(fuse(e(o, phi), e(o, phi + delta), delta), phi)``. It does not take views
+    of one object as independent. Each row is shrunk towards the mean over all estimates by
+    pseudo-observations, so that where little is known the best fixed rotation is taken
+    (docs/method.md).
 
     Parameters
     ----------
+    belief : Belief
+        After one view; n first estimates.
     evidence : Evidence
-        B bins.
+        Of the same estimator, B bins.
     fusion : str
-        A name in `nbv.recommendation.fusion.FUSIONS`.
+        A name in `nbv.recommendation.fusion.ESTIMATE_FUSIONS`.
 
     Returns
     -------
-    ndarray (B, B) float32
-        A[estimate, delta], degrees.
+    ndarray (n, B) float32
+        A[belief, delta], degrees.
     """
+    bins = first_estimate_bins(belief, evidence)
+    return evidence.once(("regression", fusion), lambda: _regression(evidence, fusion))[bins]
+
+
+def _regression(evidence: Evidence, fusion: str) -> Table:
     n_bins = evidence.n_bins
     errors = calibration_errors_deg(evidence, fusion).reshape(n_bins, -1)
     weights = kernel_weights(evidence)

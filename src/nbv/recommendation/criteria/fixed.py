@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from nbv.recommendation.belief import Belief
+from nbv.recommendation.criteria.expected_error import first_estimate_bins
 from nbv.recommendation.evidence import Evidence, Table
 from nbv.recommendation.fusion import calibration_errors_deg
 
 
-def fixed(evidence: Evidence, fusion: str) -> Table:
+def fixed(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     """Return the mean error of each rotation over all calibration views, the same in every row.
 
     What `nbv.recommendation.criteria.expected_error.expected_error` tends to with ever more
@@ -16,9 +18,9 @@ def fixed(evidence: Evidence, fusion: str) -> Table:
 
     Returns
     -------
-    ndarray (B, B) float32
-        A[estimate, delta], degrees.
+    ndarray (n, B) float32
+        A[belief, delta], degrees.
     """
     errors = calibration_errors_deg(evidence, fusion)
     mean = errors.reshape(evidence.n_bins, -1).mean(axis=1)
-    return np.tile(mean, (evidence.n_bins, 1)).astype(np.float32)
+    return np.tile(mean, (len(first_estimate_bins(belief, evidence)), 1)).astype(np.float32)

@@ -1,40 +1,47 @@
-"""Expected entropy of the pose after the second look: the less is left, the more was gained."""
+"""Expected entropy of the pose after the next view: the less is left, the more was gained."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from nbv.recommendation.belief import Belief
+from nbv.recommendation.criteria.rotations import rotation_groups
 from nbv.recommendation.criteria.spreads import entropy
 from nbv.recommendation.evidence import Evidence, Table
 
 
-def information_gain(evidence: Evidence, fusion: str) -> Table:
-    """Return the expected entropy of the pose's posterior (design, section 3).
+def information_gain(belief: Belief, evidence: Evidence, fusion: str) -> Table:
+    """Return the expected entropy of the pose's posterior (docs/method.md).
 
-    With the pose theta, distributed as V[e], and the second estimate e2, distributed as
-    L[theta + delta], the chain rule of entropy gives exactly ::
+    The pose theta is distributed as the belief b (V[e] after one view), the next estimate as
+    L[theta + delta]. The chain rule of entropy gives exactly ::
 
-        A[e, delta] = H(V[e]) + sum_theta V[e, theta] H(L[theta + delta])
-                      - H(sum_theta V[e, theta] L[theta + delta, .])
+        A[b, delta] = H(b) + sum_theta b(theta) H(L[theta + delta])
+                      - H(sum_theta b(theta) L[theta + delta, .])
 
     so that no posterior has to be formed.
 
     Parameters
     ----------
+    belief : Belief
+        n beliefs in B bins.
     evidence : Evidence
-        B bins.
+        Of the estimator that takes the next view, B bins.
     fusion : str
         Not used.
 
     Returns
     -------
-    ndarray (B, B) float32
-        A[estimate, delta] in nats.
+    ndarray (n, B) float32
+        A[belief, delta] in nats.
     """
-    n_bins, first = evidence.n_bins, evidence.viewpoint
-    prior, noise = entropy(first), entropy(evidence.second)
-    left = np.empty((n_bins, n_bins), dtype=np.float32)
-    for delta in range(n_bins):
-        seen = slice(delta, delta + n_bins)
-        left[:, delta] = prior + first @ noise[seen] - entropy(first @ evidence.second[seen])
+    rows, n_bins = belief.probabilities, evidence.n_bins
+    prior = entropy(rows)
+    noise = evidence.once("entropy of L", lambda: entropy(evidence.second))
+    left = np.empty(rows.shape, dtype=np.float32)
+    for deltas in rotation_groups(n_bins, rows.size):
+        predicted = evidence.predicted(rows, deltas)
+        known = entropy(predicted.reshape(-1, n_bins)).reshape(len(deltas), len(rows))
+        for place, delta in enumerate(deltas):
+            left[:, delta] = prior + rows @ noise[delta : delta + n_bins] - known[place]
     return left

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from nbv.calibration.density import Likelihoods
+from nbv.calibration.density import Conditionals
 from nbv.errors import UserError, nearest
+from nbv.recommendation.belief import Belief
+from nbv.recommendation.criteria.rotations import rotation_groups
 from nbv.recommendation.criteria.spreads import SPREADS
 from nbv.recommendation.evidence import Evidence, Table
 
-READINGS = ("given_estimate", "given_truth")
+POSE_LIKELIHOODS = ("given_estimate", "given_truth")
 
 
-def pose_likelihood(likelihoods: Likelihoods, reading: str) -> Table:
-    """Return T[viewpoint, pose] = p(pose | viewpoint) under one of its two readings.
+def pose_likelihood(conditionals: Conditionals, name: str) -> Table:
+    """Return T[viewpoint, pose] = p(pose | viewpoint) under one of its two interpretations.
 
     ``given_estimate``: how spread the truth is when the estimator answers the viewpoint (T = V).
     ``given_truth``: how spread the answers are when the viewpoint is the truth (T = L).
     """
-    if reading not in READINGS:
-        raise UserError(f"density.reading={reading}: {nearest(reading, READINGS)}")
-    chosen = likelihoods.viewpoint if reading == "given_estimate" else likelihoods.estimate
-    return chosen.astype(np.float32)
+    if name not in POSE_LIKELIHOODS:
+        raise UserError(f"density.pose_likelihood={name}: {nearest(name, POSE_LIKELIHOODS)}")
+    of_name = conditionals.viewpoint if name == "given_estimate" else conditionals.estimate
+    return of_name.astype(np.float32)
 
 
 def two_view_poses(viewpoint: Table, pose: Table, delta_bins: int) -> Table:
@@ -29,56 +31,77 @@ def two_view_poses(viewpoint: Table, pose: Table, delta_bins: int) -> Table:
 
     Parameters
     ----------
-    viewpoint : ndarray (B, B) float32
+    viewpoint : ndarray (n, B) float32
         V[estimate, viewpoint].
     pose : ndarray (B, B) float32
-        T[viewpoint, pose].
+        T[viewpoint, pose] of the estimator that takes both views.
     delta_bins : int
         The rotation, in bins.
 
     Returns
     -------
-    ndarray (B, B) float32
+    ndarray (n, B) float32
         Rows are distributions. Two answers that exclude each other say nothing about the pose.
     """
-    product = pose * np.roll(pose, (-delta_bins, -delta_bins), axis=(0, 1))
+    return _mixed(viewpoint, pose, np.roll(pose, (-delta_bins, -delta_bins), axis=(0, 1)))
+
+
+def _mixed(viewpoint: Table, first: Table, second: Table) -> Table:
+    """Return Eq. 6 of both factors in the frame of the first view, mixed by Eq. 3."""
+    product = first * second
     total = product.sum(axis=1)
     impossible = total <= 0
     if impossible.any():
-        product[impossible] = 1.0 / len(pose)
+        product[impossible] = 1.0 / len(product)
         total[impossible] = 1.0
     return np.asarray((viewpoint / total) @ product)
 
 
-def pose_ambiguity(evidence: Evidence, fusion: str) -> Table:
+def pose_ambiguity(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     """Return the paper's ambiguity of the pose seen from two viewpoints (Eqs. 1 to 6).
 
-    ::
+    With T of the estimator that took the first view, T' of the one that takes the second, and the
+    belief b (V[e] for an estimate e) ::
 
-        p(theta | phi, delta) = T[phi, theta] T[phi + delta, theta + delta] / Z(phi, delta)
-        p(theta | e, delta)   = sum_phi V[e, phi] p(theta | phi, delta)
-        A[e, delta]           = G(p(. | e, delta))
+        p(theta | phi, delta) = T[phi, theta] T'[phi + delta, theta + delta] / Z(phi, delta)
+        p(theta | b, delta)   = sum_phi b(phi) p(theta | phi, delta)
+        A[b, delta]           = G(p(. | b, delta))
 
     Parameters
     ----------
+    belief : Belief
+        After one view; n beliefs in B bins.
     evidence : Evidence
-        B bins. Its settings' ``reading`` is described in `pose_likelihood`; ``spread`` is the name
-        of G: ``entropy`` (nats) or ``circular_variance``.
+        Of the estimator that takes the second view, B bins. Its settings' ``pose_likelihood`` is
+        described in `pose_likelihood`; ``spread`` is the name of G: ``entropy`` (nats) or
+        ``circular_variance``.
     fusion : str
         Not used.
 
     Returns
     -------
-    ndarray (B, B) float32
-        A[estimate, delta].
+    ndarray (n, B) float32
+        A[belief, delta].
+
+    Raises
+    ------
+    ValueError
+        After more than one view: Eq. 6 has one factor for each of two views.
     """
-    name = evidence.settings["spread"]
+    if belief.n_views != 1:
+        raise ValueError(f"pose_ambiguity is defined for two views, not {belief.n_views + 1}")
+    name, of_what = evidence.settings["spread"], evidence.settings["pose_likelihood"]
     spread = SPREADS.get(name)
     if spread is None:
         raise UserError(f"density.spread={name}: {nearest(name, SPREADS)}")
-    n_bins = evidence.n_bins
-    first = pose_likelihood(evidence.likelihoods, evidence.settings["reading"])
-    ambiguity = np.empty((n_bins, n_bins), dtype=np.float32)
-    for delta in range(n_bins):
-        ambiguity[:, delta] = spread(two_view_poses(evidence.viewpoint, first, delta))
+    rows, n_bins = belief.probabilities, evidence.n_bins
+    first = pose_likelihood(belief.evidence.conditionals, of_what)
+    second = pose_likelihood(evidence.conditionals, of_what)
+    # Twice over, every rotation is a view of it; unlike np.tile this keeps the order in memory.
+    twice = np.concatenate([np.concatenate([second, second])] * 2, axis=1)
+    ambiguity = np.empty(rows.shape, dtype=np.float32)
+    for deltas in rotation_groups(n_bins, rows.size):
+        poses = [_mixed(rows, first, twice[d : d + n_bins, d : d + n_bins]) for d in deltas]
+        spreads = spread(np.concatenate(poses)).reshape(len(deltas), len(rows))
+        ambiguity[:, deltas.start : deltas.stop] = spreads.T
     return ambiguity

@@ -1,0 +1,105 @@
+"""How every next view is chosen after any number of views, and over several elevations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.angles import circular_distance_deg
+from nbv.recommendation.belief import Belief, coarser
+from nbv.recommendation.criteria import CRITERIA
+from nbv.recommendation.evidence import Evidence
+from nbv.recommendation.fusion import Rotations
+from nbv.recommendation.lookup import least_cost_delta
+
+BISECTING_DEG = (180, 90, 270, 45, 225, 135, 315)
+COARSE_BINS = 120
+"""Of the beliefs that criteria are asked about: 27 times faster than 360, and as good."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What is known when the next view is chosen.
+
+    Attributes
+    ----------
+    belief : Belief
+        Of n poses in their first views.
+    taken_deg : ndarray (n, t) int
+        Rotations of the views so far, counted from the first, which is 0.
+    """
+
+    belief: Belief
+    taken_deg: Rotations
+
+
+NextView = Callable[[Progress, np.random.Generator], Rotations]
+"""A policy for any number of views: the next rotation (n,), counted from the first view."""
+
+
+def recommended_next(criterion: str, coarse: Evidence, min_separation_deg: float) -> NextView:
+    """Return the policy that takes the view of least cost.
+
+    Parameters
+    ----------
+    criterion : str
+        A name in `nbv.recommendation.criteria.FOR_MORE_VIEWS`.
+    coarse : Evidence
+        Of fewer bins than the beliefs; rotations are multiples of its bin.
+    min_separation_deg : float
+        From every view so far: an estimator errs alike from nearly the same place, and no
+        criterion that takes views as independent can know.
+    """
+
+    def next_view(progress: Progress, rng: np.random.Generator) -> Rotations:
+        cost = CRITERIA[criterion](coarser(progress.belief, coarse), coarse, "posterior")
+        rotations = np.arange(coarse.n_bins) * (360.0 / coarse.n_bins)
+        apart = circular_distance_deg(progress.taken_deg[:, :, None], rotations).min(axis=1)
+        return least_cost_delta(np.where(apart < min_separation_deg, np.inf, cost))
+
+    return next_view
+
+
+def random_next(progress: Progress, rng: np.random.Generator) -> Rotations:
+    """Return a whole degree from which no view was taken, all equally likely."""
+    free = np.ones((len(progress.taken_deg), 360), dtype=bool)
+    np.put_along_axis(free, progress.taken_deg, values=False, axis=1)
+    drawn = np.where(free, rng.random(free.shape), -1.0)
+    return np.asarray(drawn.argmax(axis=1), dtype=np.int64)
+
+
+def bisecting_next(progress: Progress, rng: np.random.Generator) -> Rotations:
+    """Return the opposite view, then the quarters, then the eighths."""
+    n, taken = progress.taken_deg.shape
+    return np.full(n, BISECTING_DEG[taken - 1], dtype=np.int64)
+
+
+def evenly_spaced_next(n_views: int) -> NextView:
+    """Return the policy that takes the next of `n_views` views spaced evenly."""
+
+    def next_view(progress: Progress, rng: np.random.Generator) -> Rotations:
+        n, taken = progress.taken_deg.shape
+        return np.full(n, round(taken * 360 / n_views), dtype=np.int64)
+
+    return next_view
+
+
+def best_view(
+    costs: Mapping[int, NDArray[np.floating[Any]]],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rotation and the elevation of least cost, (n,) each.
+
+    Parameters
+    ----------
+    costs : mapping of int to ndarray (n, B)
+        By elevation; of equals the first elevation, there the smallest travel.
+    """
+    deltas = np.stack([least_cost_delta(cost) for cost in costs.values()])
+    least = np.stack([cost.min(axis=1) for cost in costs.values()])
+    best = least.argmin(axis=0)
+    rows = np.arange(best.size)
+    return deltas[best, rows], np.array(list(costs))[best].astype(np.int64)

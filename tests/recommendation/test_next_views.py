@@ -1,0 +1,38 @@
+"""Every next view after any number of views, and over elevations."""
+
+from __future__ import annotations
+
+import numpy as np
+from tests.recommendation.made import evidence_of, objects
+
+from nbv.angles import circular_distance_deg
+from nbv.recommendation.belief import Belief
+from nbv.recommendation.next_views import Progress, best_view, random_next, recommended_next
+
+
+def test_recommended_views_keep_their_distance():
+    fine, coarse = (evidence_of(objects(6, 0).estimate_deg, n_bins=n) for n in (360, 120))
+    next_view = recommended_next("information_gain", coarse, 15)
+    belief = Belief(fine.viewpoint[::20], fine)
+    taken = np.zeros((len(belief.probabilities), 1), dtype=np.int64)
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        delta = next_view(Progress(belief, taken), rng)
+        assert circular_distance_deg(taken, delta[:, None]).min() >= 15
+        taken = np.column_stack([taken, delta])
+
+
+def test_random_views_never_repeat():
+    rng, evidence = np.random.default_rng(0), evidence_of()
+    taken = np.tile(np.arange(359), (50, 1))
+    progress = Progress(Belief(np.zeros((50, 360), dtype=np.float32), evidence), taken)
+    assert (random_next(progress, rng) == 359).all()
+
+
+def test_the_best_view_is_the_least_cost_of_all_elevations():
+    """Of equals the first elevation, and there the smallest travel."""
+    costs = {30: np.ones((3, 8)), 0: np.ones((3, 8)), 60: np.ones((3, 8))}
+    costs[0][1, 6] = costs[60][2, 3] = 0.5
+    delta, elevation = best_view(costs)
+    assert elevation.tolist() == [30, 0, 60]
+    assert delta.tolist() == [0, 270, 135]
