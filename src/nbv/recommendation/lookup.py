@@ -47,6 +47,7 @@ class LookupTable:
     criterion: str
     pose_likelihood: str
     spread: str
+    criterion: str
 
     def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
         """Return the recommended rotation for each estimate, degrees in [0, 360)."""
@@ -124,6 +125,7 @@ def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") ->
         criterion=criterion,
         pose_likelihood=evidence.settings["pose_likelihood"],
         spread=evidence.settings["spread"],
+        criterion=criterion,
     )
 
 
@@ -145,4 +147,5 @@ def load_lookup(path: str | Path) -> LookupTable:
         criterion=str(stored["criterion"]),
         pose_likelihood=str(stored["pose_likelihood"]),
         spread=str(stored["spread"]),
+        criterion=str(stored["criterion"]),
     )

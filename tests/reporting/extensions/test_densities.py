@@ -40,7 +40,6 @@ def made(tree, evaluations, tmp_path_factory):
                 "object_id": rows["object_id"],
                 "azimuth_deg": rows["initial_deg"],
                 "estimate_deg": rows["initial_estimate_deg"],
-                "concentration": 1.0,
             }
         ).to_csv(estimates[place], index=False)
         logits = np.random.default_rng(fold).normal(size=(len(ids), 360, 24))

@@ -171,6 +171,7 @@ class CostWords:
 def cost_words(lookup: LookupTable) -> CostWords:
     """Return the words for a lookup table, whatever its criterion."""
     unit = cost_unit(lookup.criterion, {"spread": lookup.spread})
+    unit = "0–1" if unit == "1" else unit  # the range says more than that there is no unit
     if lookup.criterion == "pose_ambiguity":
         spread = lookup.spread.replace("_", " ").capitalize()
         return CostWords("Ambiguity", "Ambiguity", unit, spread)
