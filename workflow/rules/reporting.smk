@@ -28,7 +28,7 @@ PROPOSED_LOOKUP = METHODS.get(SETTINGS.subject, {}).get("policy")
 SHOWN_FIGURES = [
     name
     for name, kind in FIGURES.items()
-    if PROPOSED_LOOKUP in LOOKUP_CRITERIA or "lookup" not in kind.needs
+    if PROPOSED_LOOKUP in LOOKUP_CRITERIA or "lookups" not in kind.needs
 ]
 
 
@@ -51,7 +51,7 @@ def figure_inputs(wildcards):
         found["depth"] = paths(LAYOUT.depth, units)
     if "splits" in needs:
         found["splits"] = [LAYOUT.splits(category) for category, _ in units]
-    if "lookup" in needs:
+    if "lookups" in needs:
         found["lookups"] = [
             LAYOUT.lookup(*fold, PROPOSED_LOOKUP) for fold in folds_of(units)
         ]

@@ -4,9 +4,8 @@ from nbv.jobs import job
 
 with job(snakemake):
     import numpy as np
-    import pandas as pd
 
-    from nbv.files import read_csv
+    from nbv.reporting.extensions.blocks import rows_by_category
     from nbv.reporting.extensions.curves import more_views_figure
     from nbv.reporting.extensions.more_views import more_views_table
     from nbv.reporting.style import save_figure
@@ -14,11 +13,8 @@ with job(snakemake):
     from nbv.statistics.paired import Resampler
 
     params, output = snakemake.params, snakemake.output
-    parts: dict[str, list[pd.DataFrame]] = {}
-    for (category, _, fold), path in zip(params.folds, snakemake.input.rows, strict=True):
-        parts.setdefault(category, []).append(read_csv(path).assign(fold=fold))
-    rows = {category: pd.concat(found) for category, found in parts.items()}
+    files = dict(zip(params.folds, snakemake.input.rows, strict=True))
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
-    table = more_views_table(rows, resampler)
+    table = more_views_table(rows_by_category(files), resampler)
     write_table(table, {kind: output[kind] for kind in ("csv", "md", "tex")})
     save_figure(more_views_figure(table.cells), {kind: output[kind] for kind in ("png", "pdf")})

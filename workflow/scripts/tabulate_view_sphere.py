@@ -4,16 +4,15 @@ from nbv.jobs import job
 
 with job(snakemake):
     import numpy as np
-    import pandas as pd
 
-    from nbv.files import read_csv
+    from nbv.reporting.extensions.blocks import rows_by_category
     from nbv.reporting.extensions.view_sphere import view_sphere_table
     from nbv.reporting.table import write_table
     from nbv.statistics.paired import Resampler
 
     params = snakemake.params
     files = zip(params.folds, snakemake.input.rows, strict=True)
-    rows = pd.concat([read_csv(path).assign(fold=fold) for fold, path in files])
+    rows = rows_by_category({(params.category, fold): path for fold, path in files})
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
-    table = view_sphere_table(rows, params.category, resampler)
+    table = view_sphere_table(rows[params.category], params.category, resampler)
     write_table(table, dict(snakemake.output.items()))

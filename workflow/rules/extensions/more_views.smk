@@ -49,7 +49,7 @@ rule more_views:
         mem_mb=1000,
         runtime=10,
     params:
-        folds=folds_of(REFERENCE_UNITS),
+        folds=[(category, fold) for category, _, fold in folds_of(REFERENCE_UNITS)],
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
     script:

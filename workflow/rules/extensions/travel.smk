@@ -34,7 +34,7 @@ rule travel:
         mem_mb=1000,
         runtime=10,
     params:
-        folds=folds_of(REFERENCE_UNITS),
+        folds=[(category, fold) for category, _, fold in folds_of(REFERENCE_UNITS)],
         methods=TRAVEL_CURVES,
     script:
         "../../scripts/tabulate_travel.py"
