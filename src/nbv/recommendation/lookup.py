@@ -35,7 +35,7 @@ class LookupTable:
     criterion : str
         A name in `nbv.recommendation.criteria.CRITERIA`.
     pose_likelihood, spread : str
-        Settings of the pose ambiguity; see `nbv.recommendation.criteria.pose_ambiguity`.
+        The criterion's settings; see `nbv.recommendation.criteria.pose_ambiguity`.
     """
 
     viewpoint_likelihood: NDArray[np.float32]
@@ -44,7 +44,6 @@ class LookupTable:
     recommended_delta_deg: NDArray[np.int64]
     bandwidth_deg: float
     pseudo_observations: float
-    criterion: str
     pose_likelihood: str
     spread: str
     criterion: str
@@ -122,7 +121,6 @@ def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") ->
         recommended_delta_deg=recommended_delta(cost, evidence.settings),
         bandwidth_deg=evidence.bandwidth_deg,
         pseudo_observations=evidence.pseudo_observations,
-        criterion=criterion,
         pose_likelihood=evidence.settings["pose_likelihood"],
         spread=evidence.settings["spread"],
         criterion=criterion,
@@ -144,7 +142,6 @@ def load_lookup(path: str | Path) -> LookupTable:
         recommended_delta_deg=stored["recommended_delta_deg"],
         bandwidth_deg=float(stored["bandwidth_deg"]),
         pseudo_observations=float(stored["pseudo_observations"]),
-        criterion=str(stored["criterion"]),
         pose_likelihood=str(stored["pose_likelihood"]),
         spread=str(stored["spread"]),
         criterion=str(stored["criterion"]),
