@@ -157,7 +157,7 @@ def select_methods(
         whose cross-validated error is not surely above the least. Candidates are the paper's
         Opposite, then Opposite and criteria in the order of the extensions.
     settings : mapping
-        The configuration's ``density`` and ``travel``.
+        The configuration's ``density`` and ``recommendation``.
     posteriors : Posteriors, optional
         The calibration objects' distributions, where an extension fuses distributions. They are
         its evidence; it has no density to choose and is no candidate.
