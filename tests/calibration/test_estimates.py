@@ -12,6 +12,8 @@ def test_estimates_come_back_to_four_decimals(tmp_path):
     estimate = rng.uniform(0, 360, (3, 360))
     estimate[0, 0] = 359.99999  # would be printed as 360.0
     write_estimates(tmp_path / "e.csv", ["null", "NA", "007"], estimate)
+    header = (tmp_path / "e.csv").read_text().splitlines()[0]
+    assert header == "object_id,azimuth_deg,estimate_deg"
     read = read_estimates(tmp_path / "e.csv")
     assert read.object_ids == ("null", "NA", "007")
     assert read.estimate_deg[0, 0] == 0.0

@@ -142,7 +142,7 @@ def test_images_of_another_size_are_refused():
 
 def test_a_file_that_is_no_estimator_is_named(tmp_path):
     path = tmp_path / "estimator.safetensors"
-    path.write_bytes(b"not weights at all, but long enough to look")
+    path.write_bytes(b"not weights at all, but long enough for some")
     with pytest.raises(UserError, match=r"estimator\.safetensors: not an estimator"):
         load_estimator(path, CPU)
 

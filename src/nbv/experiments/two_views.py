@@ -106,7 +106,7 @@ def evaluate_extensions(
         ``policy`` and ``fusion`` by name; see
         `nbv.recommendation.method_selection.select_methods`.
     settings : mapping
-        The configuration's ``density`` and ``travel``.
+        The configuration's ``density`` and ``recommendation``.
     rng_of : callable
         The generator of an extension, by name.
     calibration_posteriors, test_posteriors : Posteriors, optional

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy import stats
 
 from nbv.calibration.estimates import Estimates
@@ -157,51 +158,61 @@ def select_methods(
         whose cross-validated error is not surely above the least. Candidates are the paper's
         Opposite, then Opposite and criteria in the order of the extensions.
     settings : mapping
-        The configuration's ``density`` and ``travel``.
+        The configuration's ``density`` and ``recommendation``.
     posteriors : Posteriors, optional
         The calibration objects' distributions, where an extension fuses distributions. They are
         its evidence; it has no density to choose and is no candidate.
     """
     estimate_deg = calibration.estimate_deg
-    of_images = {n: m for n, m in extensions.items() if m["fusion"] in OF_DISTRIBUTIONS}
-    own = {n: dict(m) for n, m in extensions.items() if SELECTED not in m.values()}
-    bounds = {n: m for n, m in own.items() if m["policy"] == ORACLE}
-    fair = {n: m for n, m in own.items() if n not in bounds and n not in of_images}
-    baseline = {} if OPPOSITE in fair.values() else {"opposite (average)": OPPOSITE}
-    candidates = [*baseline, *_candidates(extensions)]
-    fair = baseline | fair
-    choices = choose_densities(estimate_deg, fair, settings)
-    for name, method in bounds.items():
-        alike = [choices[other] for other, m in fair.items() if m["fusion"] == method["fusion"]]
-        # An oracle chooses no density; it takes that of the best method that fuses alike.
-        choices[name] = min(alike, key=lambda choice: choice.error_deg)
-    led = [name for name, method in extensions.items() if SELECTED in method.values()]
-    if led:
-        winner = fair[_first_not_surely_worse({name: choices[name] for name in candidates})]
-        followers = {name: _resolved(extensions[name], winner) for name in led}
-        new = {n: m for n, m in followers.items() if m not in fair.values()}
-        choices |= choose_densities(estimate_deg, new, settings) if new else {}
-        for name, method in followers.items():
-            same = next(other for other, plain in (fair | new).items() if plain == method)
-            choices[name] = choices[same]
-        own |= followers
+    of_estimates = {n: m for n, m in extensions.items() if m["fusion"] not in OF_DISTRIBUTIONS}
+    resolved, choices = _resolve(estimate_deg, of_estimates, settings)
     made: dict[tuple[float, float], Evidence] = {}
     of_distributions = None if posteriors is None else posterior_evidence(posteriors, settings)
     selected = {}
-    for name in extensions:
-        policy, fusion = own[name]["policy"], own[name]["fusion"]
-        if name in of_images:
-            if of_distributions is None:
-                raise ValueError(f"extension {name!r} needs posteriors")
-            selected[name] = SelectedMethod(policy, fusion, NO_DENSITY, of_distributions, None)
-            continue
-        choice = choices[name]
-        key = (choice.bandwidth_deg, choice.pseudo_observations)
-        if key not in made:
-            made[key] = chosen_evidence(estimate_deg, choice, settings)
-        lookup = build_lookup(made[key], policy, fusion) if needs_lookup(policy) else None
-        selected[name] = SelectedMethod(policy, fusion, choice, made[key], lookup)
+    for name, method in {**extensions, **resolved}.items():
+        policy, fusion, lookup = method["policy"], method["fusion"], None
+        choice, evidence = choices.get(name, NO_DENSITY), of_distributions
+        if name in resolved:
+            key = (choice.bandwidth_deg, choice.pseudo_observations)
+            if key not in made:
+                made[key] = chosen_evidence(estimate_deg, choice, settings)
+            evidence = made[key]
+            lookup = build_lookup(evidence, policy, fusion) if needs_lookup(policy) else None
+        if evidence is None:
+            raise ValueError(f"extension {name!r} needs posteriors")
+        selected[name] = SelectedMethod(policy, fusion, choice, evidence, lookup)
     return selected
+
+
+def _resolve(
+    estimate_deg: NDArray[np.float64], extensions: Methods, settings: Mapping[str, Any]
+) -> tuple[dict[str, Mapping[str, Any]], dict[str, Choice]]:
+    """Return each extension's policy and fusion, `SELECTED` replaced, and its density."""
+    led = [name for name, method in extensions.items() if SELECTED in method.values()]
+    bounds = [n for n, m in extensions.items() if n not in led and m["policy"] == ORACLE]
+    own = {n: m for n, m in extensions.items() if n not in (*led, *bounds)}
+    if (led or bounds) and OPPOSITE not in own.values():
+        own = {"opposite (average)": OPPOSITE} | own
+    choices = choose_densities(estimate_deg, own, settings)
+    for name in bounds:
+        fusion = extensions[name]["fusion"]
+        alike = [choices[other] for other, method in own.items() if method["fusion"] == fusion]
+        # An oracle chooses no density; it takes that of the best method that fuses alike.
+        choices[name] = min(alike, key=lambda choice: choice.error_deg)
+    if not led:
+        return dict(extensions), choices
+    winner = own[_first_not_surely_worse({name: choices[name] for name in _candidates(own)})]
+    followers = {
+        name: {key: winner[key] if value == SELECTED else value for key, value in method.items()}
+        for name, method in extensions.items()
+        if name in led
+    }
+    new = {n: m for n, m in followers.items() if m not in own.values()}
+    choices |= choose_densities(estimate_deg, new, settings) if new else {}
+    for name, method in followers.items():
+        same = next(other for other, plain in (own | new).items() if plain == method)
+        choices[name] = choices[same]
+    return {**extensions, **followers}, choices
 
 
 def _first_not_surely_worse(choices: Mapping[str, Choice]) -> str:
@@ -228,10 +239,6 @@ def surely_better(one: Choice, other: Choice) -> bool:
         return False
     quantile = stats.t.ppf(stats.norm.cdf(1.0), gaps.size - 1)
     return bool(gaps.mean() < -quantile * gaps.std(ddof=1) / np.sqrt(gaps.size))
-
-
-def _resolved(method: Mapping[str, Any], winner: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: winner[key] if value == SELECTED else value for key, value in method.items()}
 
 
 def choices_frame(selected: Mapping[str, SelectedMethod]) -> pd.DataFrame:

@@ -1,9 +1,23 @@
 """What the next view costs: criteria A[belief, delta], lower is better.
 
-Every criterion is ``criterion(belief, evidence, fusion) -> A``, (n, B) float32: `belief` is what is
-known of n poses, `evidence` belongs to the estimator that takes the next view, and `fusion` names
-the rule that makes one pose of the estimates. A lookup table is the criterion at the rows of V. All
-axis shifts are cyclic: turning the object by k bins rolls the rows of a table by k.
+Every criterion is ``criterion(belief, evidence, fusion) -> A``. A lookup table is the criterion at
+the rows of V. All axis shifts are cyclic: turning the object by k bins rolls the rows of a table
+by k.
+
+Parameters
+----------
+belief : Belief
+    What is known of n poses, in B bins.
+evidence : Evidence
+    Of the estimator that takes the next view, B bins.
+fusion : str
+    The rule that will make one pose of the estimates: a name in
+    `nbv.recommendation.fusion.FUSIONS`.
+
+Returns
+-------
+ndarray (n, B) float32
+    A[belief, delta] in the unit of `cost_unit`.
 """
 
 from __future__ import annotations

@@ -25,19 +25,7 @@ def bayes_error(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     `expected_error` it takes views of one object as independent given the pose, and is defined
     after any number of views.
 
-    Parameters
-    ----------
-    belief : Belief
-        n beliefs in B bins.
-    evidence : Evidence
-        Of the estimator that takes the next view, B bins.
-    fusion : str
-        Not used.
-
-    Returns
-    -------
-    ndarray (n, B) float32
-        A[belief, delta], degrees.
+    Parameters as in `nbv.recommendation.criteria`; `fusion` is not used. A is in degrees.
     """
     rows, n_bins = belief.probabilities, evidence.n_bins
     n_objects, n_views = evidence.estimate_deg.shape

@@ -16,19 +16,7 @@ def expected_dispersion(belief: Belief, evidence: Evidence, fusion: str) -> Tabl
 
         A[b, delta] = 1 - sum_e |sum_theta b(theta) L[theta + delta, e] exp(i theta)|
 
-    Parameters
-    ----------
-    belief : Belief
-        n beliefs in B bins.
-    evidence : Evidence
-        Of the estimator that takes the next view, B bins.
-    fusion : str
-        Not used.
-
-    Returns
-    -------
-    ndarray (n, B) float32
-        A[belief, delta] in [0, 1].
+    Parameters as in `nbv.recommendation.criteria`; `fusion` is not used. A is in [0, 1].
     """
     rows = belief.probabilities
     cached = evidence.moments if belief.is_tabulated and belief.evidence is evidence else None

@@ -48,19 +48,8 @@ def expected_error(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     pseudo-observations, so that where little is known the best fixed rotation is taken
     (docs/method.md).
 
-    Parameters
-    ----------
-    belief : Belief
-        After one view; n first estimates.
-    evidence : Evidence
-        Of the same estimator, B bins.
-    fusion : str
-        A name in `nbv.recommendation.fusion.ESTIMATE_FUSIONS`.
-
-    Returns
-    -------
-    ndarray (n, B) float32
-        A[belief, delta], degrees.
+    Parameters as in `nbv.recommendation.criteria`; `belief` is of one estimate by the estimator of
+    `evidence`, or ValueError is raised. A is in degrees.
     """
     bins = first_estimate_bins(belief, evidence)
     return evidence.once(("regression", fusion), lambda: _regression(evidence, fusion))[bins]

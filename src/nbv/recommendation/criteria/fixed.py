@@ -14,12 +14,7 @@ def fixed(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     """Return the mean error of each rotation over all calibration views, the same in every row.
 
     What `nbv.recommendation.criteria.expected_error.expected_error` tends to with ever more
-    pseudo-observations; parameters as there.
-
-    Returns
-    -------
-    ndarray (n, B) float32
-        A[belief, delta], degrees.
+    pseudo-observations; parameters, errors and unit as there.
     """
     errors = calibration_errors_deg(evidence, fusion)
     mean = errors.reshape(evidence.n_bins, -1).mean(axis=1)

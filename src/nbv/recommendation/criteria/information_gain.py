@@ -21,19 +21,7 @@ def information_gain(belief: Belief, evidence: Evidence, fusion: str) -> Table:
 
     so that no posterior has to be formed.
 
-    Parameters
-    ----------
-    belief : Belief
-        n beliefs in B bins.
-    evidence : Evidence
-        Of the estimator that takes the next view, B bins.
-    fusion : str
-        Not used.
-
-    Returns
-    -------
-    ndarray (n, B) float32
-        A[belief, delta] in nats.
+    Parameters as in `nbv.recommendation.criteria`; `fusion` is not used. A is in nats.
     """
     rows, n_bins = belief.probabilities, evidence.n_bins
     prior = entropy(rows)

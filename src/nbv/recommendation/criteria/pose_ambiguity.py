@@ -67,21 +67,9 @@ def pose_ambiguity(belief: Belief, evidence: Evidence, fusion: str) -> Table:
         p(theta | b, delta)   = sum_phi b(phi) p(theta | phi, delta)
         A[b, delta]           = G(p(. | b, delta))
 
-    Parameters
-    ----------
-    belief : Belief
-        After one view; n beliefs in B bins.
-    evidence : Evidence
-        Of the estimator that takes the second view, B bins. Its settings' ``pose_likelihood`` is
-        described in `pose_likelihood`; ``spread`` is the name of G: ``entropy`` (nats) or
-        ``circular_variance``.
-    fusion : str
-        Not used.
-
-    Returns
-    -------
-    ndarray (n, B) float32
-        A[belief, delta].
+    Parameters as in `nbv.recommendation.criteria`; `fusion` is not used. The evidence's settings
+    are ``pose_likelihood`` (see `pose_likelihood`) and ``spread``, the name of G: ``entropy``
+    (nats) or ``circular_variance`` (0 to 1).
 
     Raises
     ------
