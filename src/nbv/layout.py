@@ -50,33 +50,23 @@ class Layout:
             "estimators", category, elevation, fold, f"without_part{part}.safetensors"
         )
 
-    def estimates(
-        self, category: str, elevation: int | str, fold: int | str, role: str
-    ) -> str:
+    def estimates(self, category: str, elevation: int | str, fold: int | str, role: str) -> str:
         """Return the estimates of a fold's ``calibration`` or ``test`` objects."""
         return self._of_fold("estimates", category, elevation, fold, f"{role}.csv")
 
-    def posteriors(
-        self, category: str, elevation: int | str, fold: int | str, role: str
-    ) -> str:
+    def posteriors(self, category: str, elevation: int | str, fold: int | str, role: str) -> str:
         """Return the distributions that a classifier gives for the same images."""
         return self._of_fold("estimates", category, elevation, fold, f"{role}_posteriors.npz")
 
-    def lookup(
-        self, category: str, elevation: int | str, fold: int | str, name: str
-    ) -> str:
+    def lookup(self, category: str, elevation: int | str, fold: int | str, name: str) -> str:
         """Return a lookup table: of a criterion, or of an extension by its name."""
         return self._of_fold("lookup", category, elevation, fold, f"{name}.npz")
 
-    def evaluation(
-        self, category: str, elevation: int | str, fold: int | str, method: str
-    ) -> str:
+    def evaluation(self, category: str, elevation: int | str, fold: int | str, method: str) -> str:
         """Return what one method made of every view of a fold's test objects."""
         return self._of_fold("evaluation", category, elevation, fold, f"{method}.csv")
 
-    def extension(
-        self, category: str, elevation: int | str, fold: int | str, name: str
-    ) -> str:
+    def extension(self, category: str, elevation: int | str, fold: int | str, name: str) -> str:
         """Return one of a fold's files on extensions: ``choices``, ``objects``, ``travel``, …."""
         return self._of_fold("extensions", category, elevation, fold, f"{name}.csv")
 

@@ -5,7 +5,7 @@ import pytest
 from tests.recommendation.made import FEW_DENSITIES, objects
 
 from nbv.experiments.ablation import PAPER, ablate, ablation_space
-from nbv.experiments.two_views import evaluate_extensions
+from nbv.experiments.extensions import evaluate_extensions
 
 
 def test_the_first_row_is_the_papers_method_and_every_other_changes_it():

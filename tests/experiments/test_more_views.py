@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from tests.recommendation.made import EXTENSIONS, FEW_DENSITIES, objects
 
+from nbv.experiments.extensions import choices_frame, stored_evidence
 from nbv.experiments.more_views import more_views_rows
-from nbv.recommendation.method_selection import choices_frame, select_methods, stored_evidence
+from nbv.recommendation.method_selection import select_methods
 
 SETTINGS = {"n_views": 4, "start_every_deg": 60, "min_separation_deg": 15}
 WITH_THE_PAPERS = EXTENSIONS | {

@@ -7,7 +7,8 @@ from tests.recommendation.made import EXTENSIONS, FEW_DENSITIES, objects
 from nbv.angles import circular_distance_deg
 from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors
-from nbv.experiments.two_views import COLUMNS, evaluate_extensions, evaluate_method
+from nbv.experiments.extensions import evaluate_extensions
+from nbv.experiments.two_views import COLUMNS, evaluate_method
 from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.fusion import FUSIONS
 from nbv.recommendation.lookup import build_lookup

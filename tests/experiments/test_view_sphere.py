@@ -5,8 +5,9 @@ import pytest
 from tests.recommendation.made import EXTENSIONS, FEW_DENSITIES, objects
 
 from nbv.calibration.estimates import Estimates
+from nbv.experiments.extensions import choices_frame, stored_evidence
 from nbv.experiments.view_sphere import sphere_travel_deg, view_sphere_rows
-from nbv.recommendation.method_selection import choices_frame, select_methods, stored_evidence
+from nbv.recommendation.method_selection import select_methods
 
 
 def test_great_circles():

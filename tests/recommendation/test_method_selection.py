@@ -8,12 +8,11 @@ from tests.recommendation.made import EXTENSIONS, FEW_DENSITIES, objects
 
 from nbv.calibration.posteriors import Posteriors
 from nbv.errors import UserError
+from nbv.experiments.extensions import choices_frame, stored_evidence
 from nbv.recommendation.density_selection import Choice
 from nbv.recommendation.method_selection import (
     check_methods,
-    choices_frame,
     select_methods,
-    stored_evidence,
     surely_better,
 )
 

@@ -5,9 +5,9 @@ from nbv.jobs import job
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
     from nbv.calibration.splits import assert_role, read_splits
+    from nbv.experiments.extensions import stored_evidence
     from nbv.experiments.more_views import more_views_rows
-    from nbv.files import write_csv
-    from nbv.recommendation.method_selection import read_choices, stored_evidence
+    from nbv.files import read_csv, write_csv
     from nbv.seeds import rng_for
 
     params, wildcards = snakemake.params, snakemake.wildcards
@@ -15,7 +15,7 @@ with job(snakemake):
     calibration, test = (read_estimates(snakemake.input[r]) for r in ("calibration", "test"))
     assert_role(splits, int(wildcards.fold), "calibration", calibration.object_ids)
     assert_role(splits, int(wildcards.fold), "test", test.object_ids)
-    choices = read_choices(snakemake.input.choices)
+    choices = read_csv(snakemake.input.choices)
     evidences = stored_evidence(calibration, choices, params.density)
     rng = rng_for(params.seed, "sequence", *wildcards)
     rows = more_views_rows(test, evidences, params.more_views, rng)

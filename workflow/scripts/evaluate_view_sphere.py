@@ -5,9 +5,9 @@ from nbv.jobs import job
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
     from nbv.calibration.splits import assert_role, read_splits
+    from nbv.experiments.extensions import stored_evidence
     from nbv.experiments.view_sphere import view_sphere_rows
-    from nbv.files import write_csv
-    from nbv.recommendation.method_selection import read_choices, stored_evidence
+    from nbv.files import read_csv, write_csv
 
     params, fold = snakemake.params, int(snakemake.wildcards.fold)
     splits = read_splits(snakemake.input.splits)
@@ -17,6 +17,6 @@ with job(snakemake):
         tests[elevation] = read_estimates(snakemake.input.test[position])
         assert_role(splits, fold, "calibration", calibration.object_ids)
         assert_role(splits, fold, "test", tests[elevation].object_ids)
-        choices = read_choices(snakemake.input.choices[position])
+        choices = read_csv(snakemake.input.choices[position])
         evidences[elevation] = stored_evidence(calibration, choices, params.density)
     write_csv(snakemake.output[0], view_sphere_rows(tests, evidences, params.more_views))

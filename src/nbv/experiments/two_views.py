@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,11 +11,8 @@ import pandas as pd
 from nbv.angles import circular_distance_deg
 from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors
-from nbv.experiments.travel import travel_rows
 from nbv.recommendation.evidence import Evidence
-from nbv.recommendation.fusion import OF_DISTRIBUTIONS
 from nbv.recommendation.lookup import LookupTable
-from nbv.recommendation.method_selection import Methods, choices_frame, select_methods
 from nbv.recommendation.policies import Turns, TwoViews, two_views
 
 COLUMNS = (
@@ -28,28 +24,6 @@ COLUMNS = (
     "pose_estimate_deg",
     "error_deg",
 )
-
-
-@dataclass(frozen=True)
-class ExtensionEvaluations:
-    """What extensions make of the test objects of one fold.
-
-    Attributes
-    ----------
-    frames : dict of DataFrame
-        By extension, as of `evaluate_method`.
-    lookups : dict of LookupTable
-        Of the extensions that follow one.
-    choices : DataFrame
-        Of `nbv.recommendation.method_selection.choices_frame`.
-    travel : DataFrame
-        Of `nbv.experiments.travel.travel_rows`.
-    """
-
-    frames: dict[str, pd.DataFrame]
-    lookups: dict[str, LookupTable]
-    choices: pd.DataFrame
-    travel: pd.DataFrame
 
 
 def evaluate_method(
@@ -85,47 +59,6 @@ def evaluate_method(
     distributions = None if posteriors is None else posteriors.distributions
     turns = Turns(test.estimate_deg, evidence, rng, lookup, distributions)
     return _frame(test, two_views(method["policy"], method["fusion"], turns))
-
-
-def evaluate_extensions(
-    calibration: Estimates,
-    test: Estimates,
-    extensions: Methods,
-    settings: Mapping[str, Any],
-    rng_of: Callable[[str], np.random.Generator],
-    calibration_posteriors: Posteriors | None = None,
-    test_posteriors: Posteriors | None = None,
-) -> ExtensionEvaluations:
-    """Choose what each extension needs by calibration objects, and evaluate it on test objects.
-
-    Parameters
-    ----------
-    calibration, test : Estimates
-        Of one fold.
-    extensions : mapping
-        ``policy`` and ``fusion`` by name; see
-        `nbv.recommendation.method_selection.select_methods`.
-    settings : mapping
-        The configuration's ``density`` and ``recommendation``.
-    rng_of : callable
-        The generator of an extension, by name.
-    calibration_posteriors, test_posteriors : Posteriors, optional
-        Of the same objects, where an extension fuses distributions.
-    """
-    selected = select_methods(calibration, extensions, settings, calibration_posteriors)
-    frames = {}
-    for name, one in selected.items():
-        method = {"policy": one.policy, "fusion": one.fusion}
-        of_images = test_posteriors if one.fusion in OF_DISTRIBUTIONS else None
-        frames[name] = evaluate_method(
-            method, test, rng_of(name), one.lookup, one.evidence, of_images
-        )
-    return ExtensionEvaluations(
-        frames,
-        {name: one.lookup for name, one in selected.items() if one.lookup is not None},
-        choices_frame(selected),
-        travel_rows(selected, test),
-    )
 
 
 def _frame(test: Estimates, made: TwoViews) -> pd.DataFrame:

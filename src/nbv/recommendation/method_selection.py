@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
 from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors
 from nbv.errors import UserError, nearest
-from nbv.files import read_csv
 from nbv.recommendation.criteria import CRITERIA, OF_ERRORS
 from nbv.recommendation.density_selection import Choice, choose_densities, chosen_evidence
-from nbv.recommendation.evidence import Evidence, gather_evidence, posterior_evidence
+from nbv.recommendation.evidence import Evidence, posterior_evidence
 from nbv.recommendation.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
 from nbv.recommendation.lookup import LookupTable, build_lookup
 from nbv.recommendation.policies import ORACLE, SINGLE, needs_lookup
@@ -34,15 +30,6 @@ NO_DENSITY = Choice(float("nan"), float("nan"), candidate_error_deg={})
 """Of methods that go by distributions of images."""
 
 Methods = Mapping[str, Mapping[str, Any]]
-
-CHOICE_COLUMNS = (
-    "method",
-    "policy",
-    "fusion",
-    "bandwidth_deg",
-    "pseudo_observations",
-    "validated_error_deg",
-)
 
 
 @dataclass(frozen=True)
@@ -239,70 +226,3 @@ def surely_better(one: Choice, other: Choice) -> bool:
         return False
     quantile = stats.t.ppf(stats.norm.cdf(1.0), gaps.size - 1)
     return bool(gaps.mean() < -quantile * gaps.std(ddof=1) / np.sqrt(gaps.size))
-
-
-def choices_frame(selected: Mapping[str, SelectedMethod]) -> pd.DataFrame:
-    """Return what was chosen for each extension, columns `CHOICE_COLUMNS`.
-
-    The density's columns are empty for methods that go by distributions of images.
-    """
-    rows = [
-        (
-            name,
-            method.policy,
-            method.fusion,
-            method.choice.bandwidth_deg,
-            method.choice.pseudo_observations,
-            round(method.choice.error_deg, 4),
-        )
-        for name, method in selected.items()
-    ]
-    return pd.DataFrame(rows, columns=list(CHOICE_COLUMNS))
-
-
-def read_choices(path: str | Path) -> pd.DataFrame:
-    """Read what `choices_frame` returned."""
-    return read_csv(path)
-
-
-def stored_evidence(
-    calibration: Estimates, choices: pd.DataFrame, settings: Mapping[str, Any]
-) -> dict[str, Callable[[int], Evidence]]:
-    """Return the evidence that each policy with posterior fusion was found to need.
-
-    Parameters
-    ----------
-    calibration : Estimates
-        The objects that the choices were made with.
-    choices : DataFrame
-        Columns `CHOICE_COLUMNS`.
-    settings : mapping
-        The configuration's ``density``.
-
-    Returns
-    -------
-    dict of str to callable
-        By policy; called with a number of bins. The same call returns the same object. Where no
-        extension chooses by ``bayes_error`` it takes the density of ``expected_error``: both are
-        errors after posterior fusion.
-    """
-    posterior = choices[choices["fusion"] == "posterior"].drop_duplicates("policy")
-
-    def maker(bandwidth_deg: float, pseudo_observations: float) -> Callable[[int], Evidence]:
-        return cache(
-            lambda n_bins: gather_evidence(
-                calibration.estimate_deg,
-                settings,
-                bandwidth_deg=bandwidth_deg,
-                pseudo_observations=pseudo_observations,
-                n_bins=n_bins,
-            )
-        )
-
-    makers = {
-        str(row["policy"]): maker(row["bandwidth_deg"], row["pseudo_observations"])
-        for row in posterior.to_dict("records")
-    }
-    if "expected_error" in makers:
-        makers.setdefault("bayes_error", makers["expected_error"])
-    return makers

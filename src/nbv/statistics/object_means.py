@@ -60,7 +60,7 @@ def load_choices(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
     -------
     DataFrame
         ``category, elevation_deg, fold`` and the columns of
-        `nbv.recommendation.method_selection.choices_frame`.
+        `nbv.experiments.extensions.choices_frame`.
     """
     return _load_folds(files)
 
