@@ -3,7 +3,7 @@
 #   snakemake --cores 2                                                  the paper
 #   snakemake --cores 2 --config experiment=quick                        the same graph, small
 #   snakemake --cores 2 tables                                           one stage
-#   snakemake --cores 2 extensions                                       methods beyond the paper
+#   snakemake --cores 2 extensions                                       the extensions
 #   snakemake --cores 2 transfer                                         trained on × tested on
 #   snakemake --cores 2 results/paper/evaluation/mug/el00/fold3/proposed.csv   one file
 

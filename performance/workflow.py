@@ -1,10 +1,14 @@
-"""How busy the paper run kept its cores, read from what that run left behind; nothing is run."""
+"""How busy the paper run kept its cores, from its table of running times; nothing is run."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from nbv.reporting.runtime import efficiency, load_runtime
+import pandas as pd
+
+from nbv.files import read_csv
+from nbv.layout import Layout
+from nbv.reporting.runtime import efficiency
 from performance.figures import Figure, Target
 from performance.settings import ROOT
 
@@ -22,8 +26,9 @@ def utilisation(results: Path) -> Figure:
     last samples, which lack up to 30 s of a job, the share is a lower bound: a figure if it reaches
     the target, and otherwise none.
     """
-    runtime = load_runtime(results)
-    if runtime.empty or not (results / "report.html").exists():
+    table = Path(Layout(str(results)).table("runtime", "csv"))
+    runtime = read_csv(table) if table.is_file() else pd.DataFrame()
+    if runtime.empty:
         return Figure(
             NAME, None, TARGET, f"not run: {results.name} is not finished; make reproduce"
         )

@@ -154,9 +154,7 @@ def _write_folds(root, category, elevation, ids, estimates, n_folds, rng, delta_
         arrays = lookup_arrays(estimates[~test], delta_step=delta_step)
         target = root / "lookup" / unit / f"fold{fold}"
         target.mkdir(parents=True, exist_ok=True)
-        # The names that lookup tables have in nbv.recommendation until its renaming is merged.
-        old = {"ambiguity": arrays["cost"], "reading": arrays["pose_likelihood"]}
-        np.savez_compressed(target / "pose_ambiguity.npz", **arrays, **old)
+        np.savez_compressed(target / "pose_ambiguity.npz", **arrays)
         names = [name for name, tested in zip(ids, test, strict=True) if tested]
         for method in METHODS:
             frame = evaluate(names, estimates[test], method, arrays["recommended_delta_deg"], rng)

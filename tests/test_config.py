@@ -18,7 +18,7 @@ from nbv.config import (
 from nbv.config.compose import equal_cost_epochs
 from nbv.errors import UserError
 from nbv.estimation import hardware, networks
-from nbv.recommendation.criteria.pose_ambiguity import READINGS
+from nbv.recommendation.criteria.pose_ambiguity import POSE_LIKELIHOODS
 from nbv.recommendation.criteria.spreads import SPREADS
 from nbv.rendering.camera import FRAMINGS
 
@@ -44,7 +44,7 @@ def test_the_default_is_the_paper():
     ("key", "names"),
     [
         ("camera.framing", FRAMINGS),
-        ("density.pose_likelihood", READINGS),
+        ("density.pose_likelihood", POSE_LIKELIHOODS),
         ("density.spread", SPREADS),
         ("estimator.device", hardware.DEVICES),
         ("estimator.precision", hardware.PRECISIONS),

@@ -11,6 +11,9 @@ from performance.solids import object_with_faces
 from performance.timing import Turns, growth_exponent, median_ratio, take_turns
 from performance.workflow import utilisation
 
+from nbv.files import write_csv
+from nbv.reporting.runtime import load_jobs, summarise_jobs
+
 
 def test_a_quick_run_writes_a_list_of_figures(tmp_path, capsys):
     path = tmp_path / "bench.json"
@@ -111,6 +114,7 @@ def test_objects_have_the_faces_they_say(category, n_faces):
 
 
 def job(results, name, start, seconds, cpu_time, told=None):
+    """Write what a job leaves, and the table of all jobs so far."""
     tsv = results / "benchmarks" / f"{name}.tsv"
     log = results / "logs" / f"{name}.log"
     for path in (tsv, log):
@@ -118,7 +122,10 @@ def job(results, name, start, seconds, cpu_time, told=None):
     tsv.write_text(f"s\th:m:s\tmax_rss\tcpu_time\n{seconds}\t0:00:00\t1.0\t{cpu_time}\n")
     log.write_text("" if told is None else f"[12:00:00 train] processor time {told:.1f} s\n")
     os.utime(tsv, (start + seconds, start + seconds))
-    (results / "report.html").touch()
+    jobs = [
+        ("train", path, results / f"logs/train/{path.stem}.log") for path in results.rglob("*.tsv")
+    ]
+    write_csv(results / "tables/runtime.csv", summarise_jobs(load_jobs(jobs)))
 
 
 def test_utilisation_is_the_jobs_processor_time_over_the_cores_time(tmp_path):
@@ -128,7 +135,7 @@ def test_utilisation_is_the_jobs_processor_time_over_the_cores_time(tmp_path):
     figure = utilisation(tmp_path)
     assert figure.ratio == pytest.approx((48 + 30 + 19) / (2 * 50))
     assert figure.reached is True
-    (tmp_path / "report.html").unlink()
+    (tmp_path / "tables/runtime.csv").unlink()
     assert utilisation(tmp_path).ratio is None
 
 

@@ -36,7 +36,7 @@ def write_meshes(folder, n: int) -> None:
         ("methods.proposed.policy=pose_ambigity", "did you mean 'pose_ambiguity'?"),
         ("methods.proposed.rotation=opposite", "methods.proposed.policy"),
         ("contenders={}", "extensions"),
-        ("estimator.epochs=three", "'estimator.epochs': Value 'three'"),
+        ("estimator.epochs=three", "estimator.epochs=three is not a whole number"),
     ],
 )
 def test_a_wrong_setting(fresh, override, message):

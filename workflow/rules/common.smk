@@ -1,5 +1,6 @@
-# The configuration, and what the other rule files share.
+# The configuration, and all functions of the rule files.
 
+import functools
 import re
 import sys
 from pathlib import Path
@@ -158,6 +159,200 @@ def evaluations_of(units):
 def paths(path, keys):
     """The path of each key: an input list that a script pairs with the keys."""
     return [path(*key) for key in keys]
+
+
+# What tables and figures are about, and the files that they need.
+
+
+def units_of(name):
+    if name in OF_ELEVATIONS:
+        return [unit for unit in UNITS if unit[0] == FOCUS]
+    return [FOCUS_UNIT] if name in OF_FOCUS else REFERENCE_UNITS
+
+
+def settings_of(settings, name):
+    """The report settings that a table or figure depends on."""
+    of_focus = name in OF_ELEVATIONS | OF_FOCUS
+    return settings | ({"focus_category": FOCUS} if of_focus else {})
+
+
+def figure_inputs(wildcards):
+    units, needs = units_of(wildcards.figure), FIGURES[wildcards.figure].needs
+    found = {"evaluations": paths(LAYOUT.evaluation, evaluations_of(units))}
+    if "depth" in needs:
+        found["depth"] = paths(LAYOUT.depth, units)
+    if "splits" in needs:
+        found["splits"] = [LAYOUT.splits(category) for category, _ in units]
+    if "lookups" in needs:
+        found["lookups"] = [
+            LAYOUT.lookup(*fold, PROPOSED_LOOKUP) for fold in folds_of(units)
+        ]
+    return found
+
+
+def counted_jobs():
+    """Rule and name of every job that the running time counts."""
+    by_rule = {
+        "meshes": CATEGORIES,
+        "splits": CATEGORIES,
+        "render": [unit_folder(*unit) for unit in UNITS],
+        "train": [fold_folder(*fold) for fold in folds_of(UNITS)],
+        "train_part": [
+            f"{fold_folder(*fold)}/{part}" for fold in folds_of(UNITS) for part in PARTS
+        ],
+        "estimate": [fold_folder(*fold) for fold in folds_of(UNITS)],
+        "lookup": [
+            f"{fold_folder(*fold)}/{criterion}"
+            for fold in folds_of(UNITS)
+            for criterion in LOOKUP_CRITERIA
+        ],
+        "evaluate_baselines": [fold_folder(*fold) for fold in folds_of(UNITS)],
+        "evaluate_recommended": [
+            f"{fold_folder(*fold)}/{method}"
+            for fold in folds_of(UNITS)
+            for method in LOOKUP_METHODS
+        ],
+        "table": TABLES,
+        "figure": SHOWN_FIGURES,
+    }
+    jobs = [
+        (rule, f"{rule}/{name}") for rule, names in by_rule.items() for name in names
+    ]
+    return [*jobs, ("claims", "claims"), ("settings", "settings")]
+
+
+# The reference that a run is compared with.
+
+
+def reference_of_run(wildcards):
+    """The reference to compare with, found before anything is run."""
+    try:
+        return str(find_reference(REFERENCES, CONFIG) / "configuration.yaml")
+    except UserError as error:
+        stop(error)
+
+
+# The runs that the leaderboard ranks.
+
+
+def leaderboard_folds(wildcards):
+    """Run, category, elevation and fold of everything that the leaderboard ranks."""
+    keys = []
+    for run in CONFIG["leaderboard_runs"] or [CONFIG["name"]]:
+        settings = run_settings(run)
+        keys += [
+            (run, category, elevation, fold)
+            for category in settings["categories"]
+            for elevation in settings["elevations_deg"][category]
+            for fold in range(1, settings["n_folds"] + 1)
+        ]
+    return keys
+
+
+def leaderboard_files(name):
+    """The extension files of that name, of every run."""
+
+    def files(wildcards):
+        return [
+            run_file(
+                run, Layout(f"results/{run}").extension(*fold, name), "leaderboard_runs"
+            )
+            for run, *fold in leaderboard_folds(wildcards)
+        ]
+
+    return files
+
+
+# Files of every elevation.
+
+
+def at_every_elevation(path):
+    return lambda wildcards: [
+        path(wildcards.category, elevation, wildcards.fold)
+        for elevation in CONFIG["elevations_deg"][wildcards.category]
+    ]
+
+
+# Conditions of transfer, and the files made under them.
+
+
+@functools.cache
+def condition_settings(name):
+    try:
+        settings = load_condition(
+            BASE / "config", OVERRIDES, CONFIG, TRANSFER["conditions"][name]
+        )
+        check_sensor(settings["sensor"], [TRANSFER_UNIT[0]])
+    except UserError as error:
+        stop(error)
+    return settings
+
+
+def layout_of(name):
+    """The run's own files where it was made under that very condition."""
+    settings = condition_settings(name)
+    is_run = TRANSFER_UNIT in UNITS and all(
+        settings[key] == CONFIG[key] for key in ("camera", "sensor")
+    )
+    return LAYOUT if is_run else LAYOUT.below("transfer", name)
+
+
+# The runs that this one is compared with.
+
+
+def compared_runs():
+    """This run's name, then those that it is compared with."""
+    return list(dict.fromkeys([CONFIG["name"], *CONFIG["compared_runs"]]))
+
+
+def methods_in(run):
+    """The paper's methods, and those that multiply an estimator's distributions."""
+    extensions = run_settings(run)["extensions"].items()
+    own = [name for name, method in extensions if method["fusion"] == "product"]
+    return [*run_settings(run)["methods"], *own]
+
+
+def density_methods(run):
+    """The methods whose errors tell what a density brings."""
+    kinds = [
+        "estimate",
+        *(["posterior"] if run_settings(run)["gives_distributions"] else []),
+    ]
+    return sorted({name for kind in kinds for name in DENSITY_METHODS[kind].values()})
+
+
+def compared_keys(names_of):
+    """Run, category, elevation, fold, and one of the names that a run has, of every file."""
+    return [
+        (run, *fold, name)
+        for run in compared_runs()
+        for fold in folds_of(REFERENCE_UNITS)
+        for name in names_of(run)
+    ]
+
+
+def compared(path, names_of):
+    """The files of all runs. Those of other runs are not made here; they have to be there."""
+
+    def files(wildcards):
+        return [
+            run_file(run, path(Layout(f"results/{run}"), *place), "compared_runs")
+            for run, *place in compared_keys(names_of)
+        ]
+
+    return files
+
+
+def proposed_lookup(run):
+    return [run_settings(run)["methods"][SETTINGS.subject]["policy"]]
+
+
+def test_estimates(run):
+    return ["test"]
+
+
+def test_posteriors(run):
+    return ["test"] if run_settings(run)["gives_distributions"] else []
 
 
 def banner(*lines):

@@ -8,14 +8,6 @@ from nbv.reference.store import find_reference
 REFERENCES = Path(os.path.relpath(BASE / "docs/reference"))
 
 
-def reference_of_run(wildcards):
-    """The reference to compare with, found before anything is run."""
-    try:
-        return str(find_reference(REFERENCES, CONFIG) / "configuration.yaml")
-    except UserError as error:
-        stop(error)
-
-
 rule compare:
     input:
         sources("compare_with_reference"),
@@ -29,7 +21,7 @@ rule compare:
         mem_mb=500,
         runtime=5,
     params:
-        run=LAYOUT.root,
+        run=lambda wildcards, input: str(Path(input.report).parent),
     script:
         "../scripts/compare_with_reference.py"
 
@@ -46,7 +38,7 @@ rule reference:
         mem_mb=500,
         runtime=5,
     params:
-        run=LAYOUT.root,
+        run=lambda wildcards, input: str(Path(input.report).parent),
         reference=str(REFERENCES / CONFIG["name"]),
     script:
         "../scripts/keep_reference.py"

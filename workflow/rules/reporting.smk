@@ -32,63 +32,6 @@ SHOWN_FIGURES = [
 ]
 
 
-def units_of(name):
-    if name in OF_ELEVATIONS:
-        return [unit for unit in UNITS if unit[0] == FOCUS]
-    return [FOCUS_UNIT] if name in OF_FOCUS else REFERENCE_UNITS
-
-
-def settings_of(settings, name):
-    """The report settings that a table or figure depends on."""
-    of_focus = name in OF_ELEVATIONS | OF_FOCUS
-    return settings | ({"focus_category": FOCUS} if of_focus else {})
-
-
-def figure_inputs(wildcards):
-    units, needs = units_of(wildcards.figure), FIGURES[wildcards.figure].needs
-    found = {"evaluations": paths(LAYOUT.evaluation, evaluations_of(units))}
-    if "depth" in needs:
-        found["depth"] = paths(LAYOUT.depth, units)
-    if "splits" in needs:
-        found["splits"] = [LAYOUT.splits(category) for category, _ in units]
-    if "lookups" in needs:
-        found["lookups"] = [
-            LAYOUT.lookup(*fold, PROPOSED_LOOKUP) for fold in folds_of(units)
-        ]
-    return found
-
-
-def counted_jobs():
-    """Rule and name of every job that the running time counts."""
-    by_rule = {
-        "meshes": CATEGORIES,
-        "splits": CATEGORIES,
-        "render": [unit_folder(*unit) for unit in UNITS],
-        "train": [fold_folder(*fold) for fold in folds_of(UNITS)],
-        "train_part": [
-            f"{fold_folder(*fold)}/{part}" for fold in folds_of(UNITS) for part in PARTS
-        ],
-        "estimate": [fold_folder(*fold) for fold in folds_of(UNITS)],
-        "lookup": [
-            f"{fold_folder(*fold)}/{criterion}"
-            for fold in folds_of(UNITS)
-            for criterion in LOOKUP_CRITERIA
-        ],
-        "evaluate_baselines": [fold_folder(*fold) for fold in folds_of(UNITS)],
-        "evaluate_recommended": [
-            f"{fold_folder(*fold)}/{method}"
-            for fold in folds_of(UNITS)
-            for method in LOOKUP_METHODS
-        ],
-        "table": TABLES,
-        "figure": SHOWN_FIGURES,
-    }
-    jobs = [
-        (rule, f"{rule}/{name}") for rule, names in by_rule.items() for name in names
-    ]
-    return [*jobs, ("claims", "claims"), ("settings", "settings")]
-
-
 JOBS = sorted(counted_jobs(), key=lambda job: Path(job[1]).parts)
 
 

@@ -1,13 +1,12 @@
-"""Evaluate the methods beyond the paper on the test objects of one fold."""
+"""Evaluate the extensions on the test objects of one fold."""
 
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.experiments.extensions import evaluate_extensions
-
     from nbv.calibration.estimates import read_estimates
     from nbv.calibration.posteriors import read_posteriors
     from nbv.calibration.splits import assert_role, read_splits
+    from nbv.experiments.extensions import evaluate_extensions
     from nbv.files import read_csv, write_csv
     from nbv.recommendation.lookup import save_lookup
     from nbv.seeds import rng_for

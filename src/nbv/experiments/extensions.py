@@ -1,4 +1,4 @@
-"""Methods beyond the paper on the test objects of one fold."""
+"""Extensions on the test objects of one fold."""
 
 from __future__ import annotations
 

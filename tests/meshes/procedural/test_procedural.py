@@ -151,7 +151,7 @@ def test_left_mirrors_right(category):
 
 
 @each_category
-def test_no_object_looks_the_same_after_half_a_turn(category):
+def test_no_object_is_the_same_after_half_a_turn(category):
     for mesh in objects(category):
         assert farthest_from_image(mesh, (-1, -1, 1)) > 0.02
 

@@ -1,34 +1,6 @@
 # All methods ranked, over this run or several, and what the extensions gain.
 
 
-def leaderboard_folds(wildcards):
-    """Run, category, elevation and fold of everything that the leaderboard ranks."""
-    keys = []
-    for run in CONFIG["leaderboard_runs"] or [CONFIG["name"]]:
-        settings = run_settings(run)
-        keys += [
-            (run, category, elevation, fold)
-            for category in settings["categories"]
-            for elevation in settings["elevations_deg"][category]
-            for fold in range(1, settings["n_folds"] + 1)
-        ]
-    return keys
-
-
-def leaderboard_files(name):
-    """The extension files of that name, of every run."""
-
-    def files(wildcards):
-        return [
-            run_file(
-                run, Layout(f"results/{run}").extension(*fold, name), "leaderboard_runs"
-            )
-            for run, *fold in leaderboard_folds(wildcards)
-        ]
-
-    return files
-
-
 rule leaderboard:
     input:
         sources("tabulate_leaderboard"),

@@ -1,4 +1,4 @@
-# Methods beyond the paper, on the same estimates: each with the density that suits it best.
+# Extensions on the same estimates: each with the density that suits it best.
 
 EXTENSION_LOOKUPS = [
     name

@@ -1,6 +1,5 @@
 # Trained on × tested on: the same objects and folds, under other sensors or framings.
 
-import functools
 import itertools
 
 TRANSFER = CONFIG["transfer"]
@@ -23,27 +22,6 @@ wildcard_constraints:
     condition="|".join(CONDITIONS),
     trained="|".join(CONDITIONS),
     tested="|".join(CONDITIONS),
-
-
-@functools.cache
-def condition_settings(name):
-    try:
-        settings = load_condition(
-            BASE / "config", OVERRIDES, CONFIG, TRANSFER["conditions"][name]
-        )
-        check_sensor(settings["sensor"], [TRANSFER_UNIT[0]])
-    except UserError as error:
-        stop(error)
-    return settings
-
-
-def layout_of(name):
-    """The run's own files where it was made under that very condition."""
-    settings = condition_settings(name)
-    is_run = TRANSFER_UNIT in UNITS and all(
-        settings[key] == CONFIG[key] for key in ("camera", "sensor")
-    )
-    return LAYOUT if is_run else LAYOUT.below("transfer", name)
 
 
 use rule render as transfer_render with:

@@ -8,13 +8,6 @@ SPHERE_CATEGORIES = [
 ][:1]
 
 
-def at_every_elevation(path):
-    return lambda wildcards: [
-        path(wildcards.category, elevation, wildcards.fold)
-        for elevation in CONFIG["elevations_deg"][wildcards.category]
-    ]
-
-
 rule evaluate_view_sphere:
     input:
         sources("evaluate_view_sphere"),

@@ -108,7 +108,7 @@ def idea(inputs: FigureInputs) -> Figure:
             (two_view_poses(viewpoint, given, worst)[first], "worst", MUTED, "dashed"),
         ],
     ]
-    titles = ["After one view", "Before a second look: p(θ | e, δ)"]
+    titles = ["After one view", "Before a second view: p(θ | e, δ)"]
     turns = [0, worst, best]
     captions = ["first view", "worst second", "recommended"]
     seen = shown.outcomes.get(inputs.settings.subject)
@@ -119,7 +119,7 @@ def idea(inputs: FigureInputs) -> Figure:
         # As before the second view: two answers that exclude each other say nothing.
         belief = belief if belief.any() else np.ones_like(one)
         curves.append([(belief / belief.sum(), "p(θ | e₁, e₂, δ)", "#D55E00", "solid")])
-        titles.append(f"After the second look at δ = {delta * step:.0f}°")
+        titles.append(f"After the second view at δ = {delta * step:.0f}°")
     figure = new_figure(7.6, 2.1 * len(curves) + 0.4)
     grid = figure.add_gridspec(len(curves), 2, width_ratios=(1, 2.9))
     limits = depth_limits(shown.views)
