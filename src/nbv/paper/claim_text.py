@@ -33,7 +33,7 @@ VERDICT_RULES = (
     "over folds is compared) a comparison is undecided whatever its interval.",
     "A compound claim is decided only where no undecided or unevaluated part could change it.",
     "“By point estimates” judges ours as the paper judges its own figures: as they stand, without "
-    "intervals. Intervals are not corrected for the number of statements.",
+    "intervals. Intervals are not corrected for the number of comparisons.",
     "Our figures: each competitor with the paired difference to the claim's subject and its "
     "interval; of compound claims, the closest competitor of each part.",
 )
