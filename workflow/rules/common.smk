@@ -90,7 +90,7 @@ UNITS = [
 UNIT = ("{category}", "{elevation}")
 FOLD = (*UNIT, "{fold}")
 # Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
-ENVIRONMENT = "../environment.yaml"
+ENVIRONMENT = str(BASE / "workflow/environment.yaml")
 
 
 wildcard_constraints:
