@@ -9,7 +9,7 @@ from nbv.recommendation.criteria import CRITERIA, FOR_TWO_ESTIMATORS
 from nbv.recommendation.evidence import Evidence, gather_evidence
 from nbv.recommendation.fusion import ESTIMATE_FUSIONS
 from nbv.recommendation.lookup import build_lookup
-from nbv.recommendation.next_views import COARSE_BINS, Progress, recommended_next
+from nbv.recommendation.next_views import COARSE_BINS, recommended_next
 from performance.figures import Figure, Target
 from performance.lookup import calibration_estimates
 from performance.settings import configuration
@@ -67,7 +67,7 @@ def _steps(quick: bool) -> list[Figure]:
         next_view = recommended_next(criterion, coarse, 15.0)
 
         def one_more_view(next_view=next_view) -> None:  # type: ignore[no-untyped-def]
-            delta = next_view(Progress(first, taken), rng)
+            delta = next_view(first, taken, rng)
             updated(first, np.array([200.0]), delta, fine)
 
         milliseconds = 1e3 * take_turns([one_more_view], 3 if quick else 50).typical(0)

@@ -9,15 +9,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Layout:
-    """The paths below one results folder.
+    """The paths below `root`, a results folder such as ``results/<name>``.
 
     A method takes values (``elevation=15``, ``fold=2``) or Snakemake's wildcards
     (``elevation="{elevation}"``), and returns a path as text.
-
-    Attributes
-    ----------
-    root : str
-        ``results/<name>``.
     """
 
     root: str
@@ -145,12 +140,7 @@ def files_by_run(
 ) -> dict[str, dict[tuple[Any, ...], str]]:
     """Return the files of each run by the rest of their key.
 
-    Parameters
-    ----------
-    keys : sequence of tuple
-        A run's name, and what the file is about: category, elevation, fold, ….
-    paths : iterable of str
-        One for each key.
+    A key is a run's name and what the file is about: category, elevation, fold, ….
     """
     files: dict[str, dict[tuple[Any, ...], str]] = {}
     for (run, *rest), path in zip(keys, paths, strict=True):

@@ -31,19 +31,9 @@ def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
     """Return the modules of nbv that a script imports, directly or not, wherever it does so.
 
     Files are parsed and not run. A registry names optional modules in strings, which no import
-    shows: `chosen` gives those that a configuration chooses.
-
-    Parameters
-    ----------
-    script : path
-        A Python file.
-    chosen : iterable of str
-        Registry entries such as ``nbv.rendering.embree:EmbreeRenderer``.
-
-    Returns
-    -------
-    list of str
-        Sorted paths, with the ``__init__`` files of the packages that hold the modules.
+    shows: `chosen` gives those that a configuration chooses, as entries such as
+    ``nbv.rendering.embree:EmbreeRenderer``. Paths are sorted, with the ``__init__`` files of the
+    packages that hold the modules.
     """
     imports = _imports()
     found: set[str] = set()

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nbv.calibration.estimates import read_estimates, write_estimates
+from nbv.calibration.estimates import Estimates, read_estimates, write_estimates
 from nbv.errors import UserError
 
 
@@ -11,7 +11,7 @@ def test_estimates_come_back_to_four_decimals(tmp_path):
     rng = np.random.default_rng(0)
     estimate = rng.uniform(0, 360, (3, 360))
     estimate[0, 0] = 359.99999  # would be printed as 360.0
-    write_estimates(tmp_path / "e.csv", ["null", "NA", "007"], estimate)
+    write_estimates(tmp_path / "e.csv", Estimates(("null", "NA", "007"), estimate))
     header = (tmp_path / "e.csv").read_text().splitlines()[0]
     assert header == "object_id,azimuth_deg,estimate_deg"
     read = read_estimates(tmp_path / "e.csv")
@@ -23,7 +23,7 @@ def test_estimates_come_back_to_four_decimals(tmp_path):
 
 def test_a_missing_view_is_refused(tmp_path):
     path = tmp_path / "e.csv"
-    write_estimates(path, ["a"], np.zeros((1, 360)))
+    write_estimates(path, Estimates(("a",), np.zeros((1, 360))))
     lines = path.read_text().splitlines()
     path.write_text("\n".join(lines[:50] + lines[51:]) + "\n")
     with pytest.raises(UserError, match="full turn"):
@@ -38,7 +38,7 @@ def test_a_missing_column_is_refused(tmp_path):
 
 def test_further_columns_of_older_files_are_ignored(tmp_path):
     path = tmp_path / "e.csv"
-    write_estimates(path, ["a"], np.full((1, 4), 7.0))
+    write_estimates(path, Estimates(("a",), np.full((1, 4), 7.0)))
     header, *rows = path.read_text().splitlines()
     older = [f"{header},concentration", *(f"{row},0.5" for row in rows)]
     path.write_text("\n".join(older) + "\n")

@@ -75,7 +75,8 @@ def test_answers_are_the_mean_distribution_of_each_viewpoint():
 
 def test_posteriors_come_back_with_their_temperature(tmp_path):
     logits = random_logits(3, (2, 5, 24))
-    posteriors.write_posteriors(tmp_path / "p.npz", ["007", "NA"], logits, 1.7)
+    made = posteriors.posteriors_of(["007", "NA"], logits, 1.7)
+    posteriors.write_posteriors(tmp_path / "p.npz", made)
     read = posteriors.read_posteriors(tmp_path / "p.npz", ["007", "NA"])
     assert (read.object_ids, read.temperature) == (("007", "NA"), 1.7)
     np.testing.assert_allclose(read.log_posterior, log_softmax(logits / 1.7, axis=-1), atol=1e-5)

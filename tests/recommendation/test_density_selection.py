@@ -4,27 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.recommendation.made import FEW_DENSITIES, SETTINGS, hidden_range_estimates, objects
+from tests.recommendation.made import (
+    FEW_DENSITIES,
+    SETTINGS,
+    evidence_of,
+    hidden_range_estimates,
+    objects,
+)
 
-from nbv.recommendation import lookup
 from nbv.recommendation.density_selection import (
     choose_densities,
     chosen_lookup,
     most_likely_density,
 )
-from nbv.recommendation.evidence import gather_evidence
+from nbv.recommendation.lookup import build_lookup
 from nbv.recommendation.policies import Turns, take_second_views
 
 
-def build_lookup(estimate_deg, criterion, settings, **density):
-    return lookup.build_lookup(gather_evidence(estimate_deg, settings, **density), criterion)
-
-
-def choose_density(estimate_deg, criterion, settings, **grid):
-    method = {"policy": criterion, "fusion": "average"}
-    return choose_densities(estimate_deg, {criterion: method}, settings | {"n_parts": 5} | grid)[
-        criterion
-    ]
+def choose_density(estimate_deg, **grid):
+    methods = {"paper": {"policy": "pose_ambiguity", "fusion": "average"}}
+    return choose_densities(estimate_deg, methods, SETTINGS | {"n_parts": 5} | grid)["paper"]
 
 
 def two_view_error_deg(estimate_deg, delta_deg):
@@ -34,7 +33,7 @@ def two_view_error_deg(estimate_deg, delta_deg):
 def test_the_chosen_density_decides_best_on_objects_it_has_not_seen():
     estimate = hidden_range_estimates(10)
     grid = {"bandwidths_deg": [2.0, 8.0, 16.0], "pseudo_observations": [1.0, 30.0]}
-    choice = choose_density(estimate, "pose_ambiguity", SETTINGS, **grid)
+    choice = choose_density(estimate, **grid)
     assert len(choice.candidate_error_deg) == 6
     chosen = choice.candidate_error_deg[choice.bandwidth_deg, choice.pseudo_observations]
     assert chosen == min(choice.candidate_error_deg.values())
@@ -42,14 +41,7 @@ def test_the_chosen_density_decides_best_on_objects_it_has_not_seen():
     total = 0.0
     for part in range(5):
         held_out = np.arange(10) % 5 == part
-        table = build_lookup(
-            estimate[~held_out],
-            "pose_ambiguity",
-            SETTINGS,
-            bandwidth_deg=8.0,
-            pseudo_observations=30.0,
-            n_bins=120,
-        )
+        table = build_lookup(evidence_of(estimate[~held_out], 8.0, 30.0, 120), "pose_ambiguity")
         error = two_view_error_deg(estimate[held_out], table.recommend(estimate[held_out]))
         total += error.sum()
     assert choice.candidate_error_deg[8.0, 30.0] == pytest.approx(total / estimate.size)
@@ -61,14 +53,7 @@ def test_coarse_tables_decide_like_fine_ones():
     errors = [
         two_view_error_deg(
             unseen,
-            build_lookup(
-                estimate,
-                "pose_ambiguity",
-                SETTINGS,
-                bandwidth_deg=8,
-                pseudo_observations=30,
-                n_bins=n,
-            ).recommend(unseen),
+            build_lookup(evidence_of(estimate, 8, 30, n), "pose_ambiguity").recommend(unseen),
         ).mean()
         for n in (120, 360)
     ]
@@ -76,12 +61,8 @@ def test_coarse_tables_decide_like_fine_ones():
 
 
 def test_recommending_beats_staying_where_the_handle_is_hidden():
-    table = chosen_lookup(
-        hidden_range_estimates(10),
-        "pose_ambiguity",
-        SETTINGS
-        | {"bandwidths_deg": [6.0, 12.0], "pseudo_observations": [10.0, 30.0], "n_parts": 5},
-    )
+    grid = {"bandwidths_deg": [6.0, 12.0], "pseudo_observations": [10.0, 30.0], "n_parts": 5}
+    table = chosen_lookup(hidden_range_estimates(10), "pose_ambiguity", SETTINGS | grid)
     unseen = hidden_range_estimates(10, seed=5)
     recommended = two_view_error_deg(unseen, table.recommend(unseen))
     stayed = two_view_error_deg(unseen, np.zeros(unseen.shape, dtype=np.int64))
@@ -89,20 +70,10 @@ def test_recommending_beats_staying_where_the_handle_is_hidden():
 
 
 def test_one_candidate_or_one_object_needs_no_choice():
-    one = choose_density(
-        hidden_range_estimates(3),
-        "pose_ambiguity",
-        SETTINGS,
-        bandwidths_deg=[7],
-        pseudo_observations=[9],
-    )
+    one = choose_density(hidden_range_estimates(3), bandwidths_deg=[7], pseudo_observations=[9])
     assert (one.bandwidth_deg, one.pseudo_observations) == (7, 9)
     alone = choose_density(
-        hidden_range_estimates(1),
-        "pose_ambiguity",
-        SETTINGS,
-        bandwidths_deg=[7, 12],
-        pseudo_observations=[9, 3],
+        hidden_range_estimates(1), bandwidths_deg=[7, 12], pseudo_observations=[9, 3]
     )
     assert (alone.bandwidth_deg, alone.pseudo_observations) == (12, 9)
 
@@ -131,13 +102,8 @@ def test_the_most_likely_density_is_found_by_trying_all():
         for alpha in (1, 100):
             total = 0.0
             for part in range(2):
-                evidence = gather_evidence(
-                    calibration[np.arange(4) % 2 != part],
-                    SETTINGS,
-                    bandwidth_deg=bandwidth,
-                    pseudo_observations=alpha,
-                    n_bins=60,
-                )
+                others = calibration[np.arange(4) % 2 != part]
+                evidence = evidence_of(others, bandwidth, alpha, 60)
                 for row in calibration[np.arange(4) % 2 == part]:
                     for view, estimate in enumerate(row):
                         e, g = (int(x / 6 + 0.5) % 60 for x in (estimate, view))

@@ -2,15 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.recommendation.made import SETTINGS, hidden_range_estimates
+from tests.recommendation.made import evidence_of, hidden_range_estimates
 
 from nbv.errors import UserError
 from nbv.recommendation import lookup
-from nbv.recommendation.evidence import gather_evidence
-
-
-def build_lookup(estimate_deg, criterion, settings, **density):
-    return lookup.build_lookup(gather_evidence(estimate_deg, settings, **density), criterion)
 
 
 def test_ties_go_to_the_smallest_travel_and_then_to_the_smaller_delta():
@@ -23,14 +18,7 @@ def test_ties_go_to_the_smallest_travel_and_then_to_the_smaller_delta():
 
 
 def test_a_stored_table_comes_back_whole(tmp_path):
-    table = build_lookup(
-        hidden_range_estimates(4),
-        "pose_ambiguity",
-        SETTINGS,
-        bandwidth_deg=8,
-        pseudo_observations=10,
-        n_bins=36,
-    )
+    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     lookup.save_lookup(tmp_path / "pose_ambiguity.npz", table)
     read = lookup.load_lookup(tmp_path / "pose_ambiguity.npz")
     for name, value in vars(table).items():
@@ -39,12 +27,8 @@ def test_a_stored_table_comes_back_whole(tmp_path):
 
 
 def test_recommendations_are_read_at_the_nearest_bin():
-    table = build_lookup(
-        hidden_range_estimates(4),
-        "pose_ambiguity",
-        SETTINGS,
-        bandwidth_deg=8,
-        pseudo_observations=10,
+    table = lookup.build_lookup(
+        evidence_of(hidden_range_estimates(4), 8, 10, 360), "pose_ambiguity"
     )
     assert table.recommend([359.6, 0.2, 89.5]).tolist() == [
         table.recommended_delta_deg[k] for k in (0, 0, 90)
@@ -53,9 +37,7 @@ def test_recommendations_are_read_at_the_nearest_bin():
 
 def test_an_unknown_criterion():
     with pytest.raises(UserError, match="did you mean 'pose_ambiguity'"):
-        build_lookup(
-            np.zeros((1, 360)), "pose_ambigity", SETTINGS, bandwidth_deg=1, pseudo_observations=1
-        )
+        lookup.build_lookup(evidence_of(), "pose_ambigity")
 
 
 def test_travel_that_costs_is_avoided_and_limits_are_kept():

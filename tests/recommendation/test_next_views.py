@@ -7,7 +7,7 @@ from tests.recommendation.made import evidence_of, objects
 
 from nbv.angles import circular_distance_deg
 from nbv.recommendation.belief import Belief
-from nbv.recommendation.next_views import Progress, best_view, random_next, recommended_next
+from nbv.recommendation.next_views import best_view, random_next, recommended_next
 
 
 def test_recommended_views_keep_their_distance():
@@ -17,7 +17,7 @@ def test_recommended_views_keep_their_distance():
     taken = np.zeros((len(belief.probabilities), 1), dtype=np.int64)
     rng = np.random.default_rng(0)
     for _ in range(4):
-        delta = next_view(Progress(belief, taken), rng)
+        delta = next_view(belief, taken, rng)
         assert circular_distance_deg(taken, delta[:, None]).min() >= 15
         taken = np.column_stack([taken, delta])
 
@@ -25,8 +25,8 @@ def test_recommended_views_keep_their_distance():
 def test_random_views_never_repeat():
     rng, evidence = np.random.default_rng(0), evidence_of()
     taken = np.tile(np.arange(359), (50, 1))
-    progress = Progress(Belief(np.zeros((50, 360), dtype=np.float32), evidence), taken)
-    assert (random_next(progress, rng) == 359).all()
+    belief = Belief(np.zeros((50, 360), dtype=np.float32), evidence)
+    assert (random_next(belief, taken, rng) == 359).all()
 
 
 def test_the_best_view_is_the_least_cost_of_all_elevations():

@@ -14,7 +14,7 @@ with job(snakemake):
     params, given, output = snakemake.params, snakemake.input, snakemake.output
     use_one_thread()
     hardware = choose_hardware(params.device, params.precision)
-    answers = estimate_fold(
+    found = estimate_fold(
         open_array(given.depth),
         read_splits(given.splits),
         int(snakemake.wildcards.fold),
@@ -23,9 +23,7 @@ with job(snakemake):
         hardware,
         distributions=bool(output.get("test_posteriors")),
     )
-    for role, found in answers.items():
-        write_estimates(output[role], found.object_ids, found.estimate_deg)
-        if found.temperature is not None:
-            write_posteriors(
-                output[f"{role}_posteriors"], found.object_ids, found.outputs, found.temperature
-            )
+    for role, (estimates, posteriors) in found.items():
+        write_estimates(output[role], estimates)
+        if posteriors is not None:
+            write_posteriors(output[f"{role}_posteriors"], posteriors)

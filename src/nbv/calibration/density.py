@@ -17,7 +17,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Conditionals:
-    """The two conditionals of one joint density, each (B, B) float64 with rows that sum to 1.
+    """The two conditionals of one joint density, float64 with rows that sum to 1.
 
     Attributes
     ----------
@@ -37,20 +37,7 @@ class Conditionals:
 
 
 def pair_counts(estimate_deg: ArrayLike, azimuth_deg: ArrayLike, n_bins: int) -> Matrix:
-    """Count calibration pairs.
-
-    Parameters
-    ----------
-    estimate_deg, azimuth_deg : array-like, same shape
-        Estimates and true azimuths, degrees.
-    n_bins : int
-        B.
-
-    Returns
-    -------
-    ndarray (B, B) float64
-        N[estimate, viewpoint], summing to the number of pairs.
-    """
+    """Count pairs of estimates and true azimuths (same shape): N[estimate, viewpoint], (B, B)."""
     rows = nearest_bin(np.ravel(estimate_deg), n_bins)
     columns = nearest_bin(np.ravel(azimuth_deg), n_bins)
     flat = np.bincount(rows * n_bins + columns, minlength=n_bins * n_bins)
@@ -75,19 +62,10 @@ def von_mises_kernel(n_bins: int, bandwidth_deg: float) -> NDArray[np.float64]:
 
 
 def smooth(counts: Matrix, bandwidth_deg: float) -> Matrix:
-    """Smooth counts by the same von Mises kernel along both axes of the torus.
+    """Smooth counts (B, B) by `von_mises_kernel` along both axes of the torus.
 
-    A product of two circulants, hence a product in the Fourier domain. The sum is kept.
-
-    Parameters
-    ----------
-    counts : ndarray (B, B)
-    bandwidth_deg : float
-        See `von_mises_kernel`.
-
-    Returns
-    -------
-    ndarray (B, B), not negative
+    A product of two circulants, hence a product in the Fourier domain. The sum is kept, and nothing
+    is negative.
     """
     if bandwidth_deg == 0:
         return counts.copy()
@@ -99,20 +77,10 @@ def smooth(counts: Matrix, bandwidth_deg: float) -> Matrix:
 
 
 def conditional(joint: Matrix, pseudo_observations: float) -> Matrix:
-    """Return the rows of a joint density as distributions.
+    """Return the rows of a joint density (B, B) as distributions.
 
-    `pseudo_observations` (alpha) uniform observations are added to every row, so that a row that
-    was hardly ever seen is wide and not sharp. A row without any
-    observation is uniform.
-
-    Parameters
-    ----------
-    joint : ndarray (B, B), not negative
-    pseudo_observations : float, 0 or more
-
-    Returns
-    -------
-    ndarray (B, B), rows summing to 1
+    `pseudo_observations` (0 or more) uniform observations are added to every row, so that a row
+    that was hardly ever seen is wide and not sharp. A row without any observation is uniform.
     """
     if pseudo_observations < 0:
         raise ValueError(f"pseudo_observations must be 0 or more, not {pseudo_observations}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,22 +37,16 @@ class Estimates:
         return np.asarray(np.arange(n_views) * (360.0 / n_views))
 
 
-def write_estimates(
-    path: str | Path, object_ids: Sequence[str], estimate_deg: NDArray[np.float64]
-) -> None:
-    """Write estimates (n_objects, n_views) as a table with the columns `COLUMNS`."""
-    n_objects, n_views = estimate_deg.shape
-    # Rounding to 4 decimals may turn 359.99999 into 360.0, which is 0.
-    rounded = np.round(estimate_deg, 4) % 360.0
-    frame = pd.DataFrame(
-        {
-            "object_id": np.repeat(np.asarray(object_ids, dtype=object), n_views),
-            "azimuth_deg": np.tile(np.arange(n_views) * (360.0 / n_views), n_objects),
-            "estimate_deg": rounded.ravel(),
-        }
+def write_estimates(path: str | Path, estimates: Estimates) -> None:
+    """Write estimates as a table with the columns `COLUMNS`."""
+    n_objects, n_views = estimates.estimate_deg.shape
+    columns = (
+        np.repeat(np.asarray(estimates.object_ids, dtype=object), n_views),
+        np.tile(estimates.azimuth_deg.astype(int), n_objects),
+        # Rounding to 4 decimals may turn 359.99999 into 360.0, which is 0.
+        (np.round(estimates.estimate_deg, 4) % 360.0).ravel(),
     )
-    frame["azimuth_deg"] = frame["azimuth_deg"].astype(int)
-    write_csv(path, frame)
+    write_csv(path, pd.DataFrame(dict(zip(COLUMNS, columns, strict=True))))
 
 
 def read_estimates(path: str | Path) -> Estimates:

@@ -57,18 +57,9 @@ class Posteriors:
 
 
 def on_degrees(posterior: Floats, n_bins: int = 360) -> Floats:
-    """Return distributions over bins from distributions over classes.
+    """Return distributions over bins (..., B) from distributions over classes (..., k).
 
-    Parameters
-    ----------
-    posterior : ndarray (..., k), rows summing to 1
-        k divides `n_bins`.
-    n_bins : int
-        B; bin b is centred on 360 b / B degrees.
-
-    Returns
-    -------
-    ndarray (..., B), rows summing to 1
+    k divides B; bin b is centred on 360 b / B degrees.
     """
     n_classes = posterior.shape[-1]
     below, part = _neighbours(np.arange(n_bins) * (360.0 / n_bins), n_classes)
@@ -78,17 +69,13 @@ def on_degrees(posterior: Floats, n_bins: int = 360) -> Floats:
 
 
 def log_likelihood(log_posterior: NDArray[np.floating], azimuth_deg: ArrayLike) -> Floats:
-    """Return the log density at an azimuth, in nats per degree.
+    """Return the log densities (...) at azimuths, in nats per degree.
 
     Parameters
     ----------
     log_posterior : ndarray (..., k)
         Logs of distributions over classes.
     azimuth_deg : array-like, broadcasting to (...)
-
-    Returns
-    -------
-    ndarray (...)
     """
     n_classes = log_posterior.shape[-1]
     below, part = _neighbours(np.broadcast_to(azimuth_deg, log_posterior.shape[:-1]), n_classes)
@@ -109,20 +96,11 @@ def _neighbours(azimuth_deg: ArrayLike, n_classes: int) -> tuple[NDArray[np.intp
 
 
 def answer_likelihood(posteriors: Posteriors) -> Floats:
-    """Return how a class that is drawn from an image's distribution depends on the viewpoint.
+    """Return L[viewpoint, answer] (k, k) of answers that are drawn from images' distributions.
 
-    The mean of p(class | image) over all images of a viewpoint: an L of answers that are drawn
-    rather than averaged to a point, which is as smooth as the distributions and has no setting.
-
-    Parameters
-    ----------
-    posteriors : Posteriors
-        Of objects that the network was not trained on; at least k views of each.
-
-    Returns
-    -------
-    ndarray (k, k), rows summing to 1
-        L[viewpoint, answer].
+    The mean of p(class | image) over all images of a viewpoint, which is as smooth as the
+    distributions and has no setting. The posteriors are of objects that the network was not trained
+    on, with at least k views each.
     """
     _, n_views, n_classes = posteriors.log_posterior.shape
     of_view = posteriors.distributions.mean(axis=0)
@@ -135,17 +113,14 @@ def answer_likelihood(posteriors: Posteriors) -> Floats:
 def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:
     """Return the T of softmax(logits / T) under which the true azimuths are likeliest.
 
+    It lies within `TEMPERATURES`; above 1 the network was too sure of itself.
+
     Parameters
     ----------
     logits : ndarray (..., k)
         Of images that the network was not trained on.
     azimuth_deg : array-like, broadcasting to (...)
         The truth.
-
-    Returns
-    -------
-    float
-        Within `TEMPERATURES`. Above 1 the network was too sure of itself.
     """
 
     def loss(log_temperature: float) -> float:
@@ -156,16 +131,19 @@ def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:
     return float(np.exp(minimize_scalar(loss, bounds=bounds, method="bounded").x))
 
 
-def write_posteriors(
-    path: str | Path, object_ids: Sequence[str], logits: Floats, temperature: float
-) -> None:
-    """Write the distributions softmax(logits / temperature) of full turns (n, n_views, k)."""
+def posteriors_of(object_ids: Sequence[str], logits: Floats, temperature: float) -> Posteriors:
+    """Return the distributions softmax(logits / temperature) of full turns (n, n_views, k)."""
+    return Posteriors(tuple(object_ids), log_softmax(logits / temperature, axis=-1), temperature)
+
+
+def write_posteriors(path: str | Path, posteriors: Posteriors) -> None:
+    """Write distributions, their logs as float32."""
     write_arrays(
         path,
         {
-            "object_ids": np.asarray(object_ids, dtype=np.str_),
-            "log_posterior": log_softmax(logits / temperature, axis=-1).astype(np.float32),
-            "temperature": np.asarray(temperature),
+            "object_ids": np.asarray(posteriors.object_ids, dtype=np.str_),
+            "log_posterior": posteriors.log_posterior.astype(np.float32),
+            "temperature": np.asarray(posteriors.temperature),
         },
     )
 

@@ -100,10 +100,8 @@ def read_splits(path: str | Path) -> pd.DataFrame:
     splits = read_csv(path)
     if list(splits.columns) != ["object_id", "fold", "role"]:
         raise UserError(f"{path}: the columns must be object_id, fold, role")
-    unknown = sorted(
-        role for role in set(splits["role"]) if role not in ROLES and not _PART.fullmatch(str(role))
-    )
-    if unknown:
+    others = set(splits["role"]) - set(ROLES)
+    if unknown := sorted(role for role in others if not _PART.fullmatch(str(role))):
         raise UserError(f"{path}: role {unknown[0]!r} is none of {', '.join(ROLES)}, part1, …")
     return splits
 
@@ -120,11 +118,7 @@ def calibration_roles(splits: pd.DataFrame) -> tuple[str, ...]:
 def training_roles(splits: pd.DataFrame, without: int | None = None) -> tuple[str, ...]:
     """Return the roles that an estimator trains on.
 
-    Parameters
-    ----------
-    splits : DataFrame
-    without : int, optional
-        The part that the estimator is to calibrate; None for the one that test objects meet.
+    `without` is the part that it is to calibrate; None for the estimator that test objects meet.
     """
     roles = calibration_roles(splits)
     if roles == ("calibration",):

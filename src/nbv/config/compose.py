@@ -113,22 +113,9 @@ def _name(settings: Mapping[str, Any]) -> str:
 def equal_cost_epochs(epochs: int, calibration_fraction: float, parts: int) -> int:
     """Return the epochs of cross-fitting that see as many images as the hold-out does, or fewer.
 
-    Of n objects that are not tested, the hold-out trains on (1 - f) n. Cross-fitting trains k
-    estimators on (1 - 1/k) n and one on n, which is k n in every epoch.
-
-    Parameters
-    ----------
-    epochs : int
-        Of the hold-out.
-    calibration_fraction : float
-        f.
-    parts : int
-        k.
-
-    Returns
-    -------
-    int
-        The largest whole number e with e k <= epochs (1 - f); 0 where a single epoch is too much.
+    Of n objects that are not tested, the hold-out trains on (1 - f) n, f being the calibration
+    fraction. Cross-fitting in k parts trains k estimators on (1 - 1/k) n and one on n, which is
+    k n in every epoch: e k <= epochs (1 - f). 0 where a single epoch is too much.
     """
     # Rounded first, for 10 * (1 - 0.4) / 2 falls short of 3.
     return int(round(epochs * (1.0 - calibration_fraction) / parts, 9))
@@ -140,22 +127,17 @@ def load_condition(
     run: Mapping[str, Any],
     condition: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Return a run's configuration with the sensor and the framing of another condition.
+    """Return a run's configuration, as of `load_config`, with another sensor and framing.
 
     Parameters
     ----------
     directory, overrides
-        What the run was composed of; see `load_config`.
+        What the run was composed of. Its overrides hold here too, but its sensor's parameters are
+        no other sensor's.
     run : mapping
         Its configuration.
     condition : mapping
         ``sensor`` and ``framing``, from ``transfer.conditions``.
-
-    Returns
-    -------
-    dict
-        As from `load_config`. The run's overrides hold here too, but its sensor's parameters are
-        no other sensor's.
     """
     replaced = r"sensor|camera\.framing"
     if condition["sensor"] != run["sensor"]["name"]:
@@ -168,11 +150,8 @@ def load_condition(
 def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
     """Turn what came with Snakemake's ``--config`` into Hydra overrides.
 
-    Parameters
-    ----------
-    given : mapping
-        ``key=value`` pairs such as ``experiment=quick``, and ``overrides``, a list (or one string)
-        of Hydra overrides for keys that Snakemake's command line cannot spell.
+    That is ``key=value`` pairs such as ``experiment=quick``, and ``overrides``, a list (or one
+    string) of Hydra overrides for keys that Snakemake's command line cannot spell.
 
     Raises
     ------

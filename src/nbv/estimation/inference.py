@@ -48,18 +48,13 @@ def outputs_of_parts(
     names: list[str] = []
     outputs = []
     for estimator, (object_ids, rows) in zip(estimators, parts, strict=True):
-        _refuse_objects_seen(estimator, object_ids)
+        if seen := sorted(set(object_ids) & set(estimator.trained_on)):
+            raise UserError(
+                f"object {seen[0]!r} was trained on: its estimates say nothing; train again"
+            )
         names += object_ids
         outputs.append(network_outputs(estimator, depth[rows], hardware))
     return names, np.concatenate(outputs)
-
-
-def _refuse_objects_seen(estimator: Estimator, object_ids: Sequence[str]) -> None:
-    seen = sorted(set(object_ids) & set(estimator.trained_on))
-    if seen:
-        raise UserError(
-            f"object {seen[0]!r} was trained on: its estimates say nothing; train again"
-        )
 
 
 def network_outputs(
@@ -73,7 +68,6 @@ def network_outputs(
     Parameters
     ----------
     estimator : Estimator
-        Its network in evaluation mode.
     codes : ndarray (..., side, side) uint8
         Depth codes.
     hardware : Hardware
@@ -104,26 +98,15 @@ def network_outputs(
 
 
 def decode(estimator: Estimator, outputs: Outputs, temperature: float = 1.0) -> NDArray[np.float64]:
-    """Return the azimuth that outputs tell (Eq. 4).
+    """Return the azimuths that an estimator's outputs (..., k) tell, in [0, 360) (Eq. 4).
 
-    Parameters
-    ----------
-    estimator : Estimator
-        Whose outputs they are.
-    outputs : ndarray (..., k)
-    temperature : float
-        Divides the outputs; a regressor's angle does not depend on it.
-
-    Returns
-    -------
-    ndarray (...)
-        Degrees in [0, 360).
+    `temperature` divides the outputs; a regressor's angle does not depend on it.
     """
     return kind_of(estimator.settings).decode(outputs / temperature)
 
 
 def estimate_azimuth(
-    estimator: Estimator, codes: NDArray[np.uint8], hardware: Hardware, temperature: float = 1.0
+    estimator: Estimator, codes: NDArray[np.uint8], hardware: Hardware
 ) -> NDArray[np.float64]:
     """Estimate the azimuth that each image was taken from: `network_outputs`, then `decode`."""
-    return decode(estimator, network_outputs(estimator, codes, hardware), temperature)
+    return decode(estimator, network_outputs(estimator, codes, hardware))

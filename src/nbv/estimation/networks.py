@@ -21,29 +21,22 @@ from nbv.estimation.outputs import (
 )
 
 
-def _strided_trunk(channels: list[int]) -> nn.Sequential:
+def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.Module:
+    channels = settings["channels"]
     # The first layer's maps are the largest: normalising them too took a sixth of the time of
     # training, and estimates were no better for it.
-    layers: list[nn.Module] = [
-        nn.Conv2d(1, channels[0], 5, stride=2, padding=2),
-        nn.ReLU(inplace=True),
-    ]
+    layers = [nn.Conv2d(1, channels[0], 5, stride=2, padding=2), nn.ReLU(inplace=True)]
     for before, after in pairwise(channels):
         layers += [
             nn.Conv2d(before, after, 3, stride=2, padding=1, bias=False),
             nn.BatchNorm2d(after),
             nn.ReLU(inplace=True),
         ]
-    return nn.Sequential(*layers)
-
-
-def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.Module:
-    channels = list(settings["channels"])
     side = image_side
     for _ in channels:
         side = (side + 1) // 2
     return nn.Sequential(
-        _strided_trunk(channels),
+        nn.Sequential(*layers),
         nn.Flatten(),
         nn.Linear(channels[-1] * side * side, settings["hidden"]),
         nn.ReLU(inplace=True),
@@ -116,14 +109,9 @@ def kind_of(settings: Settings) -> Kind:
 
 
 def build_network(settings: Settings, image_side: int) -> nn.Module:
-    """Return an untrained network of the kind that ``settings["kind"]`` names.
+    """Return an untrained network of the kind that `kind_of` finds.
 
     Its weights come from torch's global generator; seed that first.
-
-    Raises
-    ------
-    UserError
-        For an unknown kind.
     """
     network = kind_of(settings).network(settings, image_side)
     # torch's annotations lack this form of `to`, which works in place.

@@ -56,18 +56,9 @@ def train_estimator(
     hardware: Hardware,
     seed: int,
 ) -> Estimator:
-    """Train an estimator on some objects of a depth file.
+    """Train an estimator on the objects `rows` of a depth file.
 
-    Parameters
-    ----------
-    depth : ndarray (n_objects, n_views, side, side) uint8
-        All objects of a category, memory-mapped or not.
-    rows : ndarray of int
-        Which of them to train on.
-    object_ids : sequence of str
-        Their names, kept with the weights.
-    settings, hardware, seed
-        As in `train_network`.
+    Parameters as of `train_network`; `object_ids` name those objects, kept with the weights.
     """
     network = train_network(depth[rows], settings, hardware, seed)
     return Estimator(network, settings, depth.shape[-1], object_ids)

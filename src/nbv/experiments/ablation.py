@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from nbv.calibration.estimates import Estimates
 from nbv.recommendation.criteria import CRITERIA
-from nbv.recommendation.density_selection import Choice, choose_densities, most_likely_density
-from nbv.recommendation.evidence import gather_evidence
+from nbv.recommendation.density_selection import (
+    Choice,
+    choose_densities,
+    chosen_evidence,
+    most_likely_density,
+)
 from nbv.recommendation.fusion import ESTIMATE_FUSIONS
 from nbv.recommendation.policies import Turns, two_views
 
@@ -71,7 +74,7 @@ def ablate(
     instance: Mapping[str, Any],
     settings: Mapping[str, Any],
 ) -> pd.DataFrame:
-    """Return each test object's mean error in one fold under one row of the space.
+    """Return each test object's mean error in one fold, columns ``object_id, error_deg``.
 
     Parameters
     ----------
@@ -81,36 +84,17 @@ def ablate(
         A row of `ablation_space`.
     settings : mapping
         The configuration's ``density``.
-
-    Returns
-    -------
-    DataFrame
-        Columns ``object_id, error_deg``.
     """
     wanted = instance["n_calibration"]
     estimate_deg = calibration.estimate_deg[: wanted if wanted != ALL else None]
     own = dict(settings) | {key: instance[key] for key in ("pose_likelihood", "spread")}
-    choice = _choice(estimate_deg, instance, own)
-    evidence = gather_evidence(
-        estimate_deg,
-        own,
-        bandwidth_deg=choice.bandwidth_deg,
-        pseudo_observations=choice.pseudo_observations,
-        n_bins=instance["n_bins"],
-    )
-    turns = Turns(test.estimate_deg, evidence)
-    error = two_views(instance["criterion"], instance["fusion"], turns).error_deg
-    return pd.DataFrame({"object_id": test.object_ids, "error_deg": error.mean(axis=1)})
-
-
-def _choice(
-    estimate_deg: np.ndarray[Any, np.dtype[np.float64]],
-    instance: Mapping[str, Any],
-    settings: Mapping[str, Any],
-) -> Choice:
-    if instance["chosen_by"] == "given":
-        return Choice(instance["bandwidth_deg"], instance["pseudo_observations"], {})
-    if instance["chosen_by"] == "likelihood":
-        return most_likely_density(estimate_deg, settings)
     method = {"policy": instance["criterion"], "fusion": instance["fusion"]}
-    return choose_densities(estimate_deg, {"ablated": method}, settings)["ablated"]
+    if instance["chosen_by"] == "given":
+        choice = Choice(instance["bandwidth_deg"], instance["pseudo_observations"])
+    elif instance["chosen_by"] == "likelihood":
+        choice = most_likely_density(estimate_deg, own)
+    else:
+        choice = choose_densities(estimate_deg, {"ablated": method}, own)["ablated"]
+    evidence = chosen_evidence(estimate_deg, choice, own, instance["n_bins"])
+    error = two_views(**method, turns=Turns(test.estimate_deg, evidence)).error_deg
+    return pd.DataFrame({"object_id": test.object_ids, "error_deg": error.mean(axis=1)})

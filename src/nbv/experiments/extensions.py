@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors
 from nbv.experiments.travel import travel_rows
 from nbv.experiments.two_views import evaluate_method
-from nbv.recommendation.evidence import Evidence, gather_evidence
+from nbv.recommendation.density_selection import Choice, chosen_evidence
+from nbv.recommendation.evidence import Evidence
 from nbv.recommendation.fusion import OF_DISTRIBUTIONS
 from nbv.recommendation.lookup import LookupTable
 from nbv.recommendation.method_selection import Methods, SelectedMethod, select_methods
@@ -35,14 +36,10 @@ class ExtensionEvaluations:
 
     Attributes
     ----------
-    frames : dict of DataFrame
-        By extension, as of `evaluate_method`.
-    lookups : dict of LookupTable
-        Of the extensions that follow one.
-    choices : DataFrame
-        Of `choices_frame`.
-    travel : DataFrame
-        Of `nbv.experiments.travel.travel_rows`.
+    frames, lookups : dict
+        By extension: of `evaluate_method`, and the table of those that follow one.
+    choices, travel : DataFrame
+        Of `choices_frame` and of `nbv.experiments.travel.travel_rows`.
     """
 
     frames: dict[str, pd.DataFrame]
@@ -66,24 +63,25 @@ def evaluate_extensions(
     ----------
     calibration, test : Estimates
         Of one fold.
-    extensions : mapping
-        ``policy`` and ``fusion`` by name; see
-        `nbv.recommendation.method_selection.select_methods`.
-    settings : mapping
-        The configuration's ``density`` and ``recommendation``.
+    extensions, settings : mapping
+        See `nbv.recommendation.method_selection.select_methods`.
     rng_of : callable
         The generator of an extension, by name.
     calibration_posteriors, test_posteriors : Posteriors, optional
         Of the same objects, where an extension fuses distributions.
     """
     selected = select_methods(calibration, extensions, settings, calibration_posteriors)
-    frames = {}
-    for name, one in selected.items():
-        method = {"policy": one.policy, "fusion": one.fusion}
-        of_images = test_posteriors if one.fusion in OF_DISTRIBUTIONS else None
-        frames[name] = evaluate_method(
-            method, test, rng_of(name), one.lookup, one.evidence, of_images
+    frames = {
+        name: evaluate_method(
+            {"policy": one.policy, "fusion": one.fusion},
+            test,
+            rng_of(name),
+            one.lookup,
+            one.evidence,
+            test_posteriors if one.fusion in OF_DISTRIBUTIONS else None,
         )
+        for name, one in selected.items()
+    }
     return ExtensionEvaluations(
         frames,
         {name: one.lookup for name, one in selected.items() if one.lookup is not None},
@@ -97,17 +95,11 @@ def choices_frame(selected: Mapping[str, SelectedMethod]) -> pd.DataFrame:
 
     The density's columns are empty for methods that go by distributions of images.
     """
-    rows = [
-        (
-            name,
-            method.policy,
-            method.fusion,
-            method.choice.bandwidth_deg,
-            method.choice.pseudo_observations,
-            round(method.choice.error_deg, 4),
-        )
-        for name, method in selected.items()
-    ]
+    rows = []
+    for name, method in selected.items():
+        choice = method.choice
+        density = choice.bandwidth_deg, choice.pseudo_observations, round(choice.error_deg, 4)
+        rows.append((name, method.policy, method.fusion, *density))
     return pd.DataFrame(rows, columns=list(CHOICE_COLUMNS))
 
 
@@ -133,21 +125,12 @@ def stored_evidence(
         errors after posterior fusion.
     """
     posterior = choices[choices["fusion"] == "posterior"].drop_duplicates("policy")
-
-    def maker(bandwidth_deg: float, pseudo_observations: float) -> Callable[[int], Evidence]:
-        return cache(
-            lambda n_bins: gather_evidence(
-                calibration.estimate_deg,
-                settings,
-                bandwidth_deg=bandwidth_deg,
-                pseudo_observations=pseudo_observations,
-                n_bins=n_bins,
-            )
+    density = posterior.set_index("policy")[["bandwidth_deg", "pseudo_observations"]]
+    makers: dict[str, Callable[[int], Evidence]] = {
+        str(policy): cache(
+            partial(chosen_evidence, calibration.estimate_deg, Choice(*chosen), settings)
         )
-
-    makers = {
-        str(row["policy"]): maker(row["bandwidth_deg"], row["pseudo_observations"])
-        for row in posterior.to_dict("records")
+        for policy, *chosen in density.itertuples()
     }
     if "expected_error" in makers:
         makers.setdefault("bayes_error", makers["expected_error"])

@@ -3,39 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.calibration.posteriors import fit_temperature
+from nbv.calibration.estimates import Estimates
+from nbv.calibration.posteriors import Posteriors, fit_temperature, posteriors_of
 from nbv.calibration.splits import calibration_roles, objects_with_role
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.inference import decode, outputs_of_parts
 from nbv.estimation.weights import Estimator
-
-
-@dataclass(frozen=True)
-class Answers:
-    """What an estimator says of every view of some objects.
-
-    Attributes
-    ----------
-    object_ids : tuple of str
-        n objects.
-    estimate_deg : ndarray (n, n_views) float64
-        In [0, 360).
-    outputs : ndarray (n, n_views, k) float64
-        The network's outputs.
-    temperature : float or None
-        What a classifier's outputs are divided by; None where there are no distributions.
-    """
-
-    object_ids: tuple[str, ...]
-    estimate_deg: NDArray[np.float64]
-    outputs: NDArray[np.float64]
-    temperature: float | None
 
 
 def estimate_fold(
@@ -47,7 +25,7 @@ def estimate_fold(
     hardware: Hardware,
     *,
     distributions: bool,
-) -> dict[str, Answers]:
+) -> dict[str, tuple[Estimates, Posteriors | None]]:
     """Estimate every view of a fold's calibration and test objects.
 
     Parameters
@@ -68,13 +46,13 @@ def estimate_fold(
 
     Returns
     -------
-    dict of str to Answers
-        For ``calibration`` and ``test``.
+    dict of str to tuple
+        For ``calibration`` and ``test``; without posteriors where outputs are no logits.
 
     Raises
     ------
     UserError
-        Where an estimator has seen one of its objects, or images of another size.
+        As of `nbv.estimation.inference.outputs_of_parts`.
     """
     parts = [objects_with_role(splits, fold, role) for role in calibration_roles(splits)]
     test = [objects_with_role(splits, fold, "test")]
@@ -82,13 +60,13 @@ def estimate_fold(
         "calibration": outputs_of_parts(of_parts or [tested], depth, parts, hardware),
         "test": outputs_of_parts([tested], depth, test, hardware),
     }
-    temperature = None
+    temperature, posteriors = 1.0, None
     if distributions:
         azimuth_deg = np.linspace(0, 360, depth.shape[1], endpoint=False)
         temperature = fit_temperature(outputs["calibration"][1], azimuth_deg)
-    return {
-        role: Answers(
-            tuple(object_ids), decode(tested, output, temperature or 1.0), output, temperature
-        )
-        for role, (object_ids, output) in outputs.items()
-    }
+    found = {}
+    for role, (object_ids, output) in outputs.items():
+        if distributions:
+            posteriors = posteriors_of(object_ids, output, temperature)
+        found[role] = Estimates(tuple(object_ids), decode(tested, output, temperature)), posteriors
+    return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from nbv.recommendation.evidence import Evidence
 from nbv.recommendation.next_views import (
     COARSE_BINS,
     NextView,
-    Progress,
     bisecting_next,
     evenly_spaced_next,
     random_next,
@@ -60,19 +59,15 @@ def follow(
     """
     estimate_deg = test.estimate_deg
     n_objects, n_azimuths = estimate_deg.shape
-    objects, starts = (
-        axis.ravel()
-        for axis in np.meshgrid(
-            np.arange(n_objects), np.arange(0, n_azimuths, start_every), indexing="ij"
-        )
-    )
+    starts = np.tile(np.arange(0, n_azimuths, start_every), n_objects)
+    objects = np.repeat(np.arange(n_objects), len(starts) // n_objects)
     belief = first_belief(estimate_deg[objects, starts], evidence)
     taken = np.zeros((len(objects), 1), dtype=np.int64)
     travelled = np.zeros(len(objects))
     reached = np.empty((2, len(objects), n_views))
     for view in range(n_views):
         if view:
-            delta = policy(Progress(belief, taken), rng)
+            delta = policy(belief, taken, rng)
             seen = estimate_deg[objects, (starts + delta) % n_azimuths]
             belief = updated(belief, seen, delta, evidence)
             travelled = travelled + travel_deg(delta - taken[:, -1])
@@ -107,40 +102,29 @@ def more_views_rows(
     DataFrame
         Columns `COLUMNS`: means over first views. Travel goes from view to view, the shorter way.
     """
-    n_views = settings["n_views"]
     rows: list[pd.DataFrame] = []
 
-    def add(
-        method: str, policy: NextView, name: str, last: int, *, only_last: bool = False
-    ) -> None:
+    def add(method: str, policy: NextView, name: str, views: Sequence[int]) -> None:
         reached = follow(
             policy,
             test,
             evidences[name](test.estimate_deg.shape[1]),
-            n_views=last,
+            n_views=views[-1],
             start_every=settings["start_every_deg"],
             rng=rng,
         ).mean(axis=2)
-        for view in range(last - 1 if only_last else 0, last):
-            rows.append(
-                pd.DataFrame(
-                    {
-                        "method": method,
-                        "n_views": view + 1,
-                        "object_id": test.object_ids,
-                        "error_deg": reached[0, :, view],
-                        "travel_deg": reached[1, :, view],
-                    }
-                )
-            )
+        for n in views:
+            values = (method, n, test.object_ids, *reached[:, :, n - 1])
+            rows.append(pd.DataFrame(dict(zip(COLUMNS, values, strict=True))))
 
-    add("random", random_next, "random", n_views)
-    add("bisecting", bisecting_next, "opposite", n_views)
-    for last in range(1, n_views + 1):
-        add("evenly_spaced", evenly_spaced_next(last), "opposite", last, only_last=True)
+    every = range(1, settings["n_views"] + 1)
+    add("random", random_next, "random", every)
+    add("bisecting", bisecting_next, "opposite", every)
+    for last in every:
+        add("evenly_spaced", evenly_spaced_next(last), "opposite", [last])
     for criterion in FOR_MORE_VIEWS:
         if criterion in evidences:
             coarse = evidences[criterion](COARSE_BINS)
             policy = recommended_next(criterion, coarse, settings["min_separation_deg"])
-            add(criterion, policy, criterion, n_views)
-    return pd.concat(rows, ignore_index=True)[list(COLUMNS)]
+            add(criterion, policy, criterion, every)
+    return pd.concat(rows, ignore_index=True)

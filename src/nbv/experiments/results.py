@@ -73,13 +73,7 @@ def load_depth(path: Path) -> NDArray[np.uint8]:
 
 
 def read_evaluation(path: Path) -> pd.DataFrame:
-    """Read one method's errors of one fold: `two_views.COLUMNS`.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, empty, or lacks a column.
-    """
+    """Read one method's errors of one fold; errors as of `load_evaluations`."""
     try:
         frame = read_csv(existing(path))
     except pd.errors.EmptyDataError:

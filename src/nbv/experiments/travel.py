@@ -24,23 +24,13 @@ COLUMNS = ("method", "rule", "setting", "travel_deg", "error_deg", "n_images")
 
 
 def travel_rows(selected: Mapping[str, SelectedMethod], test: Estimates) -> pd.DataFrame:
-    """Return error against travel for every extension that follows a table.
+    """Return error against travel for every extension of a fold that follows a table.
 
-    Parameters
-    ----------
-    selected : mapping of str to SelectedMethod
-        Extensions in one fold.
-    test : Estimates
-        Its test objects.
-
-    Returns
-    -------
-    DataFrame
-        Columns `COLUMNS`, means over images. Rule ``cost``: `setting` is the price in the
-        criterion's unit per degree, at each of `RELATIVE_COSTS` times the table's mean range over
-        180 degrees. Rule ``limit``: `setting` is the longest travel allowed, degrees. Under the
-        name `ANY_DIRECTION` with its fusion, rule ``fixed``: travel by `setting` degrees one way
-        or the other, whatever the estimate.
+    Columns are `COLUMNS`, means over test images. Rule ``cost``: `setting` is the price in the
+    criterion's unit per degree, at each of `RELATIVE_COSTS` times the table's mean range over 180
+    degrees. Rule ``limit``: `setting` is the longest travel allowed, degrees. Under the name
+    `ANY_DIRECTION` with its fusion, rule ``fixed``: travel by `setting` degrees one way or the
+    other, whatever the estimate.
     """
     rows = []
     by_fusion: dict[str, SelectedMethod] = {}

@@ -13,7 +13,7 @@ from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors
 from nbv.recommendation.evidence import Evidence
 from nbv.recommendation.lookup import LookupTable
-from nbv.recommendation.policies import Turns, TwoViews, two_views
+from nbv.recommendation.policies import Turns, two_views
 
 COLUMNS = (
     "object_id",
@@ -42,12 +42,8 @@ def evaluate_method(
         ``policy`` and ``fusion``; see `nbv.recommendation.policies.two_views`.
     test : Estimates
         360 / n_views must be a whole number of degrees.
-    rng : numpy.random.Generator, optional
-        Where the rotation is drawn.
-    lookup : LookupTable, optional
-        Where the policy follows one.
-    evidence : Evidence, optional
-        Where the policy or the fusion needs it.
+    rng, lookup, evidence : optional
+        What the policy or the fusion needs; see `nbv.recommendation.policies.Turns`.
     posteriors : Posteriors, optional
         Of the test objects, where the fusion is of distributions.
 
@@ -58,10 +54,7 @@ def evaluate_method(
     """
     distributions = None if posteriors is None else posteriors.distributions
     turns = Turns(test.estimate_deg, evidence, rng, lookup, distributions)
-    return _frame(test, two_views(method["policy"], method["fusion"], turns))
-
-
-def _frame(test: Estimates, made: TwoViews) -> pd.DataFrame:
+    made = two_views(method["policy"], method["fusion"], turns)
     n_objects, n_views = test.estimate_deg.shape
     # Rounded before the error is taken, so that the columns of a row agree with each other.
     pose = np.round(made.pose_deg, 4) % 360.0

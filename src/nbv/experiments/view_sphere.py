@@ -52,10 +52,8 @@ def view_sphere_rows(
 
     Parameters
     ----------
-    tests : mapping of int to Estimates
-        The same test objects at each elevation.
-    evidences : mapping of int to mapping
-        By elevation.
+    tests, evidences : mapping of int
+        By elevation; the test objects are the same at each.
     settings : mapping
         The configuration's ``more_views``: ``start_every_deg``.
 

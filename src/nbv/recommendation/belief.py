@@ -40,11 +40,6 @@ class Belief:
     first_bin: NDArray[np.intp] | None = None
     n_views: int = 1
 
-    @property
-    def is_tabulated(self) -> bool:
-        """Whether the beliefs are the rows of V."""
-        return self.probabilities is self.evidence.viewpoint
-
 
 def every_belief(evidence: Evidence) -> Belief:
     """Return the belief after each possible first estimate: the rows of V."""
@@ -60,22 +55,17 @@ def first_belief(estimate_deg: Angles, evidence: Evidence) -> Belief:
 def updated(
     belief: Belief, estimate_deg: Angles, delta_deg: NDArray[np.int64], evidence: Evidence
 ) -> Belief:
-    """Return the belief after another view.
+    """Return the belief after another view, by Bayes' rule.
+
+    Views are taken as independent given the pose.
 
     Parameters
     ----------
     belief : Belief
-    estimate_deg : ndarray (n,)
-        The estimate from that view.
-    delta_deg : ndarray (n,) int
-        The rotation from the first view to that one.
+    estimate_deg, delta_deg : ndarray (n,)
+        The estimate from that view, and the rotation from the first view to it, degrees.
     evidence : Evidence
         Of the estimator that took it; B bins.
-
-    Returns
-    -------
-    Belief
-        By Bayes' rule, the views taken as independent given the pose.
     """
     n_bins = evidence.n_bins
     turn = nearest_bin(delta_deg, n_bins)[:, None] + np.arange(n_bins)
@@ -92,14 +82,9 @@ def mean_direction_deg(probabilities: NDArray[np.floating[Any]]) -> Angles:
 
 
 def coarser(belief: Belief, evidence: Evidence) -> Belief:
-    """Return the same belief in fewer bins.
+    """Return the same belief in the bins of evidence of the same estimator.
 
-    Parameters
-    ----------
-    belief : Belief
-        B bins.
-    evidence : Evidence
-        Of the same estimator; its number of bins divides B with an odd quotient.
+    Their number divides that of the belief with an odd quotient.
     """
     width = belief.probabilities.shape[1] // evidence.n_bins
     centred = np.roll(belief.probabilities, width // 2, axis=1)

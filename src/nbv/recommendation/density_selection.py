@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import logging
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,6 @@ log = logging.getLogger(__name__)
 # well above 3 degrees, and costs 27 times less.
 COARSE_BINS = 120
 
-
 Candidate = tuple[float, float]
 """A bandwidth (degrees) and a number of pseudo-observations."""
 
@@ -40,16 +39,15 @@ class Choice:
     Attributes
     ----------
     bandwidth_deg, pseudo_observations : float
-    candidate_error_deg : dict
-        Cross-validated two-view error by (bandwidth, pseudo-observations); empty where there was
-        nothing to choose from.
+    candidate_error_deg : mapping
+        Cross-validated two-view error of each candidate; empty where none was compared.
     object_error_deg : tuple of float
         That of the chosen candidate on each calibration object, or empty.
     """
 
     bandwidth_deg: float
     pseudo_observations: float
-    candidate_error_deg: dict[Candidate, float]
+    candidate_error_deg: Mapping[Candidate, float] = field(default_factory=dict)
     object_error_deg: tuple[float, ...] = ()
 
     @property
@@ -59,55 +57,28 @@ class Choice:
         return self.candidate_error_deg.get(candidate, float("nan"))
 
 
-@dataclass(frozen=True)
-class Trial:
-    """What one candidate makes of all calibration objects but one part.
-
-    Attributes
-    ----------
-    candidate : tuple of float
-    part : int
-    held_out : ndarray (n_objects,) bool
-        The objects of that part.
-    evidence : Evidence
-        Of all others.
-    """
-
-    candidate: Candidate
-    part: int
-    held_out: NDArray[np.bool_]
-    evidence: Evidence
-
-
-def density_candidates(settings: Mapping[str, Any]) -> list[Candidate]:
+def _candidates(settings: Mapping[str, Any]) -> list[Candidate]:
     """Return the pairs of ``bandwidths_deg`` and ``pseudo_observations``, the widest first."""
     pairs = itertools.product(settings["bandwidths_deg"], settings["pseudo_observations"])
     return sorted(pairs, reverse=True)
 
 
-def density_trials(
+def _trials(
     estimate_deg: NDArray[np.float64], settings: Mapping[str, Any], n_bins: int
-) -> Iterator[Trial]:
-    """Yield every candidate for every part of the calibration objects, the widest candidate first.
+) -> Iterator[tuple[Candidate, int, NDArray[np.bool_], Evidence]]:
+    """Yield candidate, part, which objects are of that part, and the evidence of all others.
 
-    Nothing is yielded where there is but one candidate, or one object.
+    The widest candidate comes first. One candidate alone, or one object, makes no trial.
     """
-    candidates = density_candidates(settings)
+    candidates = _candidates(settings)
     n_objects = len(estimate_deg)
     parts = min(settings["n_parts"], n_objects)
     if len(candidates) == 1 or parts < 2:
         return
     part_of = np.arange(n_objects) % parts
-    for candidate in candidates:
-        for part in range(parts):
-            evidence = gather_evidence(
-                estimate_deg[part_of != part],
-                settings,
-                bandwidth_deg=candidate[0],
-                pseudo_observations=candidate[1],
-                n_bins=n_bins,
-            )
-            yield Trial(candidate, part, part_of == part, evidence)
+    for candidate, part in itertools.product(candidates, range(parts)):
+        others, choice = estimate_deg[part_of != part], Choice(*candidate)
+        yield candidate, part, part_of == part, chosen_evidence(others, choice, settings, n_bins)
 
 
 def choose_densities(
@@ -140,20 +111,15 @@ def choose_densities(
         then the most pseudo-observations.
     """
     errors: dict[str, dict[Candidate, NDArray[np.float64]]] = {name: {} for name in methods}
-    for trial in density_trials(estimate_deg, settings, n_bins):
-        held_out = estimate_deg[trial.held_out]
+    for candidate, part, held_out, evidence in _trials(estimate_deg, settings, n_bins):
         for name, method in methods.items():
             # The same draws for every candidate.
-            rng = np.random.default_rng(trial.part)
-            turns = Turns(held_out, trial.evidence, rng)
+            turns = Turns(estimate_deg[held_out], evidence, np.random.default_rng(part))
             error = two_views(method["policy"], method["fusion"], turns).error_deg
-            of_objects = errors[name].setdefault(trial.candidate, np.empty(len(estimate_deg)))
-            of_objects[trial.held_out] = error.mean(axis=1)
-    widest = density_candidates(settings)[0]
-    return {
-        name: _best(name, tried) if tried else Choice(*widest, candidate_error_deg={})
-        for name, tried in errors.items()
-    }
+            of_objects = errors[name].setdefault(candidate, np.empty(len(estimate_deg)))
+            of_objects[held_out] = error.mean(axis=1)
+    widest = Choice(*_candidates(settings)[0])
+    return {name: _best(name, tried) if tried else widest for name, tried in errors.items()}
 
 
 def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
@@ -174,60 +140,39 @@ def most_likely_density(
 ) -> Choice:
     """Cross-validate the log-likelihood of V over calibration objects.
 
-    Parameters
-    ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        Calibration estimates.
-    settings : mapping
-        The configuration's ``density``, as in `choose_densities`.
-    n_bins : int
-        Of the densities compared.
-
-    Returns
-    -------
-    Choice
-        The candidate under which held-out viewpoints are likeliest given their estimates; of
-        equals the widest. No two-view error is known of it.
+    Parameters as in `choose_densities`. The choice is the candidate under which held-out viewpoints
+    are likeliest given their estimates, of equals the widest; no two-view error is known of it.
     """
     n_views = estimate_deg.shape[1]
     azimuth = nearest_bin(np.arange(n_views) * (360.0 / n_views), n_bins)
-    found = dict.fromkeys(density_candidates(settings), 0.0)
-    for trial in density_trials(estimate_deg, settings, n_bins):
-        rows = nearest_bin(estimate_deg[trial.held_out], n_bins)
-        chance = trial.evidence.conditionals.viewpoint[rows, azimuth]
-        found[trial.candidate] += np.log(np.maximum(chance, np.finfo(float).tiny)).sum()
-    return Choice(*max(found, key=found.__getitem__), candidate_error_deg={})
+    found = dict.fromkeys(_candidates(settings), 0.0)
+    for candidate, _, held_out, evidence in _trials(estimate_deg, settings, n_bins):
+        rows = nearest_bin(estimate_deg[held_out], n_bins)
+        chance = evidence.conditionals.viewpoint[rows, azimuth]
+        found[candidate] += np.log(np.maximum(chance, np.finfo(float).tiny)).sum()
+    return Choice(*max(found, key=found.__getitem__))
 
 
 def chosen_evidence(
-    estimate_deg: NDArray[np.float64], choice: Choice, settings: Mapping[str, Any]
+    estimate_deg: NDArray[np.float64],
+    choice: Choice,
+    settings: Mapping[str, Any],
+    n_bins: int = 360,
 ) -> Evidence:
-    """Return the evidence of all calibration estimates with the density settings chosen."""
+    """Return `gather_evidence` of calibration estimates with the density settings chosen."""
     return gather_evidence(
         estimate_deg,
         settings,
         bandwidth_deg=choice.bandwidth_deg,
         pseudo_observations=choice.pseudo_observations,
+        n_bins=n_bins,
     )
 
 
 def chosen_lookup(
-    estimate_deg: NDArray[np.float64],
-    criterion: str,
-    settings: Mapping[str, Any],
-    fusion: str = "average",
+    estimate_deg: NDArray[np.float64], criterion: str, settings: Mapping[str, Any]
 ) -> LookupTable:
-    """Build a lookup table with the density settings that decide best.
-
-    Parameters
-    ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        Calibration estimates.
-    criterion, fusion : str
-        See `nbv.recommendation.lookup.build_lookup`.
-    settings : mapping
-        The configuration's ``density``; see `choose_densities`.
-    """
-    method = {"policy": criterion, "fusion": fusion}
+    """Return `build_lookup` with the density settings of `choose_densities`, fused by averages."""
+    method = {"policy": criterion, "fusion": "average"}
     choice = choose_densities(estimate_deg, {criterion: method}, settings)[criterion]
-    return build_lookup(chosen_evidence(estimate_deg, choice, settings), criterion, fusion)
+    return build_lookup(chosen_evidence(estimate_deg, choice, settings), criterion)

@@ -73,19 +73,10 @@ class Evidence:
         return self.first_moments(self.viewpoint, range(self.n_bins))
 
     def first_moments(self, probabilities: Table, deltas: range) -> Table:
-        """Return the posterior's first moment after each next estimate.
+        """Return the posteriors' first moments after each next estimate, (n_deltas, 2, n, B).
 
-        Parameters
-        ----------
-        probabilities : ndarray (n, B)
-            Distributions b of the pose.
-        deltas : range
-            Rotations of the next view, in bins.
-
-        Returns
-        -------
-        ndarray (n_deltas, 2, n, B) float32
-            The real and the imaginary part of sum_theta b(theta) L[theta + delta, e] exp(i theta).
+        The real and the imaginary part of sum_theta b(theta) L[theta + delta, e] exp(i theta), of
+        distributions b (n, B) and rotations of the next view in bins.
         """
         n, n_bins = probabilities.shape
         angles = 2 * np.pi * np.arange(n_bins) / n_bins
@@ -115,10 +106,8 @@ def gather_evidence(
 
     Parameters
     ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        The estimate for every view; view k of n has the azimuth 360 k / n.
-    settings : mapping
-        Kept for the criteria.
+    estimate_deg, settings
+        See `Evidence`.
     bandwidth_deg, pseudo_observations, n_bins
         See `nbv.calibration.density.conditionals`.
     """

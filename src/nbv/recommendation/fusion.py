@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import circular_distance_deg, direction_deg, midpoint_deg, nearest_bin, wrap_deg
+from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.evidence import Evidence
 
 Angles = NDArray[np.float64]
@@ -51,7 +52,7 @@ def average(
     ----------
     first_deg, second_deg, delta_deg : array-like, broadcasting
         Estimates phi_1 and phi_2 and the rotation between the views, degrees.
-    evidence : Evidence, optional
+    evidence
         Not used.
 
     Returns
@@ -136,7 +137,7 @@ def product(
         Distributions from each image alone, each in the frame of its own view.
     delta_deg : array-like (...)
         The rotations between them, multiples of 360 / B.
-    evidence : Evidence, optional
+    evidence
         Not used.
 
     Returns
@@ -147,14 +148,12 @@ def product(
     """
     delta = np.asarray(delta_deg)
     n_bins = np.shape(first)[-1]
-    bins = np.arange(n_bins)
-    seen = (bins + nearest_bin(delta, n_bins).reshape(-1, 1)) % n_bins
+    seen = (np.arange(n_bins) + nearest_bin(delta, n_bins).reshape(-1, 1)) % n_bins
     own = np.asarray(first, dtype=np.float64).reshape(-1, n_bins)
     other = np.asarray(second, dtype=np.float64).reshape(-1, n_bins)
     both = own * np.take_along_axis(other, seen, axis=1)
     both = np.where(both.sum(axis=1, keepdims=True) > 0, both, own)
-    angles = 2 * np.pi * bins / n_bins
-    return direction_deg(both @ np.cos(angles), both @ np.sin(angles)).reshape(delta.shape)
+    return mean_direction_deg(both).reshape(delta.shape)
 
 
 Fusion = Callable[[ArrayLike, ArrayLike, ArrayLike, Evidence | None], Angles]
@@ -167,13 +166,7 @@ ESTIMATE_FUSIONS = tuple(name for name in FUSIONS if name not in OF_DISTRIBUTION
 
 
 def calibration_errors_deg(evidence: Evidence, fusion: str) -> NDArray[np.float32]:
-    """Return the error after every rotation from calibration views, one view for each bin.
-
-    Returns
-    -------
-    ndarray (B, n_objects, B) float32
-        ``l[delta, object, view]`` of `rotation_errors_deg`, view k being at bin k.
-    """
+    """Return `rotation_errors_deg` (B, n_objects, B) of calibration views, one for each bin."""
     step = evidence.estimate_deg.shape[1] // evidence.n_bins
     views = evidence.estimate_deg[:, ::step]
     return evidence.once(("errors", fusion), lambda: rotation_errors_deg(views, evidence, fusion))

@@ -97,22 +97,7 @@ def recommended_delta(
 
 
 def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") -> LookupTable:
-    """Tabulate a criterion.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        Of B bins.
-    criterion : str
-        A name in `nbv.recommendation.criteria.CRITERIA`.
-    fusion : str
-        A name in `nbv.recommendation.fusion.ESTIMATE_FUSIONS`.
-
-    Raises
-    ------
-    UserError
-        For an unknown criterion.
-    """
+    """Tabulate a criterion; parameters and errors as of `nbv.recommendation.criteria.tabulate`."""
     cost = tabulate(criterion, evidence, fusion)
     return LookupTable(
         viewpoint_likelihood=evidence.conditionals.viewpoint.astype(np.float32),
@@ -135,14 +120,8 @@ def save_lookup(path: str | Path, table: LookupTable) -> None:
 def load_lookup(path: str | Path) -> LookupTable:
     """Read what `save_lookup` wrote."""
     stored = read_arrays(path)
-    return LookupTable(
-        viewpoint_likelihood=stored["viewpoint_likelihood"],
-        estimate_likelihood=stored["estimate_likelihood"],
-        cost=stored["cost"],
-        recommended_delta_deg=stored["recommended_delta_deg"],
-        bandwidth_deg=float(stored["bandwidth_deg"]),
-        pseudo_observations=float(stored["pseudo_observations"]),
-        pose_likelihood=str(stored["pose_likelihood"]),
-        spread=str(stored["spread"]),
-        criterion=str(stored["criterion"]),
-    )
+    # An array without axes holds a number or a text.
+    values: dict[str, Any] = {
+        name: array if array.ndim else array.item() for name, array in stored.items()
+    }
+    return LookupTable(**{item.name: values[item.name] for item in fields(LookupTable)})

@@ -26,7 +26,7 @@ SELECTED = "selected"
 OPPOSITE = {"policy": "opposite", "fusion": "average"}
 """The paper's baseline: the most cautious candidate to be selected."""
 
-NO_DENSITY = Choice(float("nan"), float("nan"), candidate_error_deg={})
+NO_DENSITY = Choice(float("nan"), float("nan"))
 """Of methods that go by distributions of images."""
 
 Methods = Mapping[str, Mapping[str, Any]]

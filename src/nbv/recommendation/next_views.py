@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,24 +20,12 @@ COARSE_BINS = 120
 """Of the beliefs that criteria are asked about: 27 times faster than 360, and as good."""
 
 
-@dataclass(frozen=True)
-class Progress:
-    """What is known when the next view is chosen.
+NextView = Callable[[Belief, Rotations, np.random.Generator], Rotations]
+"""A policy for any number of views: ``policy(belief, taken_deg, rng)`` is the next rotation (n,).
 
-    Attributes
-    ----------
-    belief : Belief
-        Of n poses in their first views.
-    taken_deg : ndarray (n, t) int
-        Rotations of the views so far, counted from the first, which is 0.
-    """
-
-    belief: Belief
-    taken_deg: Rotations
-
-
-NextView = Callable[[Progress, np.random.Generator], Rotations]
-"""A policy for any number of views: the next rotation (n,), counted from the first view."""
+`belief` is of n poses in their first views; `taken_deg` (n, t) are the rotations of the views so
+far. All rotations count from the first view, whose own is 0.
+"""
 
 
 def recommended_next(criterion: str, coarse: Evidence, min_separation_deg: float) -> NextView:
@@ -55,34 +42,34 @@ def recommended_next(criterion: str, coarse: Evidence, min_separation_deg: float
         criterion that takes views as independent can know.
     """
 
-    def next_view(progress: Progress, rng: np.random.Generator) -> Rotations:
-        cost = CRITERIA[criterion](coarser(progress.belief, coarse), coarse, "posterior")
+    def next_view(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
+        cost = CRITERIA[criterion](coarser(belief, coarse), coarse, "posterior")
         rotations = np.arange(coarse.n_bins) * (360.0 / coarse.n_bins)
-        apart = circular_distance_deg(progress.taken_deg[:, :, None], rotations).min(axis=1)
+        apart = circular_distance_deg(taken_deg[:, :, None], rotations).min(axis=1)
         return least_cost_delta(np.where(apart < min_separation_deg, np.inf, cost))
 
     return next_view
 
 
-def random_next(progress: Progress, rng: np.random.Generator) -> Rotations:
+def random_next(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
     """Return a whole degree from which no view was taken, all equally likely."""
-    free = np.ones((len(progress.taken_deg), 360), dtype=bool)
-    np.put_along_axis(free, progress.taken_deg, values=False, axis=1)
+    free = np.ones((len(taken_deg), 360), dtype=bool)
+    np.put_along_axis(free, taken_deg, values=False, axis=1)
     drawn = np.where(free, rng.random(free.shape), -1.0)
     return np.asarray(drawn.argmax(axis=1), dtype=np.int64)
 
 
-def bisecting_next(progress: Progress, rng: np.random.Generator) -> Rotations:
+def bisecting_next(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
     """Return the opposite view, then the quarters, then the eighths."""
-    n, taken = progress.taken_deg.shape
+    n, taken = taken_deg.shape
     return np.full(n, BISECTING_DEG[taken - 1], dtype=np.int64)
 
 
 def evenly_spaced_next(n_views: int) -> NextView:
     """Return the policy that takes the next of `n_views` views spaced evenly."""
 
-    def next_view(progress: Progress, rng: np.random.Generator) -> Rotations:
-        n, taken = progress.taken_deg.shape
+    def next_view(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
+        n, taken = taken_deg.shape
         return np.full(n, round(taken * 360 / n_views), dtype=np.int64)
 
     return next_view

@@ -156,7 +156,6 @@ def two_views(policy: str, fusion: str, turns: Turns) -> TwoViews:
     fusion : str
         A name in `nbv.recommendation.fusion.FUSIONS`.
     turns : Turns
-        Of the objects; evidence is of others.
 
     Raises
     ------

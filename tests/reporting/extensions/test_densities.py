@@ -10,7 +10,7 @@ import pytest
 
 import synthetic
 from conftest import N_FOLDS
-from nbv.calibration.posteriors import on_degrees, write_posteriors
+from nbv.calibration.posteriors import on_degrees, posteriors_of, write_posteriors
 from nbv.errors import UserError
 from nbv.reporting.extensions.densities import DensityRun, density_comparison
 from nbv.reporting.settings import ReportSettings
@@ -43,7 +43,7 @@ def made(tree, evaluations, tmp_path_factory):
             }
         ).to_csv(estimates[place], index=False)
         logits = np.random.default_rng(fold).normal(size=(len(ids), 360, 24))
-        write_posteriors(posteriors[place], ids, logits, 1.0 + fold)
+        write_posteriors(posteriors[place], posteriors_of(ids, logits, 1.0 + fold))
     lookups = synthetic.lookup_files(tree, [UNIT], N_FOLDS)
     runs = {
         "first": DensityRun({UNIT: first}, estimates, lookups),

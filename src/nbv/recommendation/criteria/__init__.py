@@ -62,17 +62,12 @@ FOR_TWO_ESTIMATORS = ("pose_ambiguity", *FOR_MORE_VIEWS)
 def cost_unit(criterion: str, settings: Mapping[str, Any]) -> str:
     """Return the unit of a criterion's cost: ``nats``, ``degrees`` or ``1``.
 
-    Parameters
-    ----------
-    criterion : str
-        A name in `CRITERIA`.
-    settings : mapping
-        The configuration's ``density``: its ``spread`` decides on the pose ambiguity's unit.
+    The pose ambiguity's depends on the ``spread`` in the configuration's ``density``.
     """
     if criterion in OF_ERRORS:
         return "degrees"
-    in_nats = {"information_gain": True, "pose_ambiguity": settings["spread"] == "entropy"}
-    return "nats" if in_nats.get(criterion, False) else "1"
+    of_entropy = criterion == "pose_ambiguity" and settings["spread"] == "entropy"
+    return "nats" if of_entropy or criterion == "information_gain" else "1"
 
 
 def tabulate(criterion: str, evidence: Evidence, fusion: str) -> Table:

@@ -19,14 +19,12 @@ def expected_dispersion(belief: Belief, evidence: Evidence, fusion: str) -> Tabl
     Parameters as in `nbv.recommendation.criteria`; `fusion` is not used. A is in [0, 1].
     """
     rows = belief.probabilities
-    cached = evidence.moments if belief.is_tabulated and belief.evidence is evidence else None
     risk = np.empty(rows.shape, dtype=np.float32)
     for deltas in rotation_groups(evidence.n_bins, 2 * rows.size):
-        moments = (
-            evidence.first_moments(rows, deltas)
-            if cached is None
-            else cached[deltas.start : deltas.stop]
-        )
+        if rows is evidence.viewpoint:
+            moments = evidence.moments[deltas.start : deltas.stop]
+        else:
+            moments = evidence.first_moments(rows, deltas)
         length = np.sqrt(moments[:, 0] ** 2 + moments[:, 1] ** 2).sum(axis=-1)
         risk[:, deltas.start : deltas.stop] = (1.0 - length).T
     return risk

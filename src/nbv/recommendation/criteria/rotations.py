@@ -11,14 +11,8 @@ _CHUNK = 2**18
 def rotation_groups(n_bins: int, numbers_each: int) -> Iterator[range]:
     """Yield all rotations 0 to n_bins - 1, as many at once as a criterion has cache for.
 
-    Few beliefs take many rotations at once and many beliefs few: no call of numpy is small.
-
-    Parameters
-    ----------
-    n_bins : int
-        B.
-    numbers_each : int
-        Numbers in the array that one rotation needs.
+    One rotation needs an array of `numbers_each` numbers. Few beliefs take many rotations at once
+    and many beliefs few: no call of numpy is small.
     """
     at_once = max(1, _CHUNK // max(1, numbers_each))
     for start in range(0, n_bins, at_once):
