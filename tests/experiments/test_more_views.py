@@ -10,7 +10,7 @@ from nbv.recommendation.method_selection import select_methods
 
 SETTINGS = {"n_views": 4, "start_every_deg": 60, "min_separation_deg": 15}
 WITH_THE_PAPERS = EXTENSIONS | {
-    "entropy_posterior": {"policy": "pose_ambiguity", "fusion": "posterior"},
+    "ambiguity_posterior": {"policy": "pose_ambiguity", "fusion": "posterior"},
     "error_posterior": {"policy": "expected_error", "fusion": "posterior"},
 }
 

@@ -22,7 +22,7 @@ EVALUATED = ["single", "random", "opposite", "proposed"]
 SHOWN = {"table": 7, "figure": 10, "claims": 1, "runtime": 1, "report": 1}
 
 
-def test_every_file_of_the_design_is_there_with_its_columns(finished):
+def test_every_file_is_there_with_its_columns(finished):
     results = finished.results
     for category in ("mug", "chair"):
         splits = pd.read_csv(results / "splits" / f"{category}.csv")

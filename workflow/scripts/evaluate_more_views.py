@@ -17,6 +17,7 @@ with job(snakemake):
     assert_role(splits, int(wildcards.fold), "test", test.object_ids)
     choices = read_csv(snakemake.input.choices)
     evidences = stored_evidence(calibration, choices, params.density)
+    # The label decides the draws of random views: it stays as it was.
     rng = rng_for(params.seed, "sequence", *wildcards)
     rows = more_views_rows(test, evidences, params.more_views, rng)
     write_csv(snakemake.output[0], rows)

@@ -118,7 +118,7 @@ class Density(Section):
 
 
 class Recommendation(Section):
-    """What travel costs; see `nbv.recommendation.lookup.least_ambiguous_delta`."""
+    """What travel costs; see `nbv.recommendation.lookup.least_cost_delta`."""
 
     travel_cost: Annotated[NotNegative, "in the criterion's unit per degree"]
     max_travel_deg: Annotated[Number, Field(ge=0, le=180)]
@@ -155,7 +155,7 @@ class Condition(Section):
 
 
 class Transfer(Section):
-    """Conditions to train under and to test under; see `nbv.experiments.transfer`."""
+    """Conditions to train under and to test under; see `nbv.reporting.extensions.transfer`."""
 
     category: str | None
     elevation_deg: Elevation

@@ -1,1 +1,1 @@
-"""Tables, figures and the report: they show, and compute nothing."""
+"""Tables, figures and the report: they show what others computed, with intervals."""

@@ -6,7 +6,7 @@ TRAVEL_CURVES = [
     *(
         name
         for name in (
-            "entropy_posterior",
+            "ambiguity_posterior",
             "gain_posterior",
             "error_average",
             "error_posterior",
