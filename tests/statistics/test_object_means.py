@@ -9,8 +9,7 @@ from nbv.files import write_csv
 from nbv.statistics.object_means import (
     OBJECT_COLUMNS,
     indistinct_from_best,
-    load_choices,
-    load_object_means,
+    load_folds,
     mae_difference,
     mae_interval,
     object_means,
@@ -59,16 +58,15 @@ def test_places_are_told_and_not_read_from_paths(frames, tmp_path):
     write_csv(tmp_path / "a.csv", means, 12)
     write_csv(tmp_path / "b.csv", means.iloc[::-1], 12)
     files = {("mug", 0, 1): tmp_path / "a.csv", ("car", 15, 4): tmp_path / "b.csv"}
-    for load in (load_object_means, load_choices):
-        found = load(files)
-        assert list(found.columns) == ["category", "elevation_deg", "fold", *OBJECT_COLUMNS]
-        places = found[["category", "elevation_deg", "fold"]].drop_duplicates()
-        assert [tuple(row) for row in places.to_numpy().tolist()] == list(files)
-        pd.testing.assert_frame_equal(
-            found.loc[: len(means) - 1, list(OBJECT_COLUMNS)], means, check_dtype=False
-        )
+    found = load_folds(files)
+    assert list(found.columns) == ["category", "elevation_deg", "fold", *OBJECT_COLUMNS]
+    places = found[["category", "elevation_deg", "fold"]].drop_duplicates()
+    assert [tuple(row) for row in places.to_numpy().tolist()] == list(files)
+    pd.testing.assert_frame_equal(
+        found.loc[: len(means) - 1, list(OBJECT_COLUMNS)], means, check_dtype=False
+    )
     with pytest.raises(UserError, match=r"c\.csv does not exist"):
-        load_object_means({("mug", 0, 2): tmp_path / "c.csv"})
+        load_folds({("mug", 0, 2): tmp_path / "c.csv"})
 
 
 def test_differences_are_paired_by_object(sample):

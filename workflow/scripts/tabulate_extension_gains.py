@@ -9,14 +9,14 @@ with job(snakemake):
     from nbv.reporting.extensions.blocks import blocks_of
     from nbv.reporting.extensions.gains import extension_gains_table
     from nbv.reporting.table import write_table
-    from nbv.statistics.object_means import load_choices, load_object_means
+    from nbv.statistics.object_means import load_folds
     from nbv.statistics.paired import Resampler
 
     given, params = snakemake.input, snakemake.params
     objects = files_by_run(params.folds, given.objects)
     choices = files_by_run(params.folds, given.choices)
-    blocks = blocks_of({run: load_object_means(found) for run, found in objects.items()})
-    choices = {run: load_choices(found) for run, found in choices.items()}
+    blocks = blocks_of({run: load_folds(found) for run, found in objects.items()})
+    choices = {run: load_folds(found) for run, found in choices.items()}
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
     table = extension_gains_table(blocks, choices, params.methods, resampler)
     write_table(table, dict(snakemake.output.items()))

@@ -9,12 +9,12 @@ with job(snakemake):
     from nbv.reporting.extensions.blocks import blocks_of
     from nbv.reporting.extensions.leaderboard import leaderboard_table
     from nbv.reporting.table import write_table
-    from nbv.statistics.object_means import load_object_means
+    from nbv.statistics.object_means import load_folds
     from nbv.statistics.paired import Resampler
 
     params = snakemake.params
     files = files_by_run(params.folds, snakemake.input.objects)
-    blocks = blocks_of({run: load_object_means(found) for run, found in files.items()})
+    blocks = blocks_of({run: load_folds(found) for run, found in files.items()})
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
     table = leaderboard_table(blocks, params.methods, resampler)
     write_table(table, dict(snakemake.output.items()))

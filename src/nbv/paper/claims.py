@@ -7,6 +7,7 @@ gives no margin, ours is 1 degree of MAE or median, and 1 percentage point of pA
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from nbv.experiments.results import Unit
 from nbv.labels import category_label
@@ -33,12 +34,12 @@ _ALL_CATEGORIES: tuple[Unit, ...] = tuple((category, 0) for category in CATEGORI
 
 def best(statistic: str, term: Term, label: str = "") -> AtLeast:
     """Return the statement that the term's method is better than each of the other methods."""
-    return all_of([Better(statistic, term, _with(term, m)) for m in _others(term.method)], label)
+    return all_of([Better(statistic, term, other) for other in _others(term)], label)
 
 
 def ranked(statistic: str, term: Term, rank: int) -> AtLeast:
     """Return the statement that exactly ``rank - 1`` of the other methods are better."""
-    others = [_with(term, method) for method in _others(term.method)]
+    others = _others(term)
     behind = AtLeast(len(others) - rank + 1, tuple(Better(statistic, term, o) for o in others))
     ahead = AtLeast(rank - 1, tuple(Better(statistic, o, term) for o in others))
     return all_of([behind, ahead])
@@ -46,17 +47,13 @@ def ranked(statistic: str, term: Term, rank: int) -> AtLeast:
 
 def _not_best_but_comparable(statistic: str, term: Term) -> AtLeast:
     """Return the statement that some method is better, and Opposite by less than the margin."""
-    others = [_with(term, method) for method in _others(term.method)]
-    close = Comparable(statistic, term, _with(term, OPPOSITE), MARGIN)
-    return all_of([close, AtLeast(1, tuple(Better(statistic, o, term) for o in others))])
+    close = Comparable(statistic, term, replace(term, method=OPPOSITE), MARGIN)
+    return all_of([close, AtLeast(1, tuple(Better(statistic, o, term) for o in _others(term)))])
 
 
-def _others(method: str) -> list[str]:
-    return [other for other in METHODS if other != method]
-
-
-def _with(term: Term, method: str) -> Term:
-    return Term(method, term.units, term.group, term.fold, term.initial_deg)
+def _others(term: Term) -> list[Term]:
+    """Return the term with each of the other methods."""
+    return [replace(term, method=method) for method in METHODS if method != term.method]
 
 
 def _at(elevation_deg: int, method: str = PROPOSED) -> Term:
@@ -79,7 +76,7 @@ def _two_views_parts() -> tuple[Statement, ...]:
     terms = [(_of(name, SINGLE), category_label(name)) for name in CATEGORIES if name != "mug"]
     terms += [(_at(e, SINGLE), f"Mug {e}°") for e in ELEVATIONS_DEG]
     return tuple(
-        all_of([Better("mae", _with(term, m), term) for m in _others(SINGLE)], label)
+        all_of([Better("mae", other, term) for other in _others(term)], label)
         for term, label in terms
     )
 

@@ -5,9 +5,9 @@ MAE in degrees, pAUC in percent. Columns are single, random, opposite, proposed 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 METHODS = ("single", "random", "opposite", "proposed")
 """The paper's methods, in the order of its columns."""
@@ -26,14 +26,8 @@ Row = tuple[float, ...]
 class Note:
     """A remark, and the published figures that it explains: it is out of place without them.
 
-    Attributes
-    ----------
-    text : str
-        The remark.
-    metric, rows, method : str, tuple of str, str
-        Which figures; empty for any.
-    ours : bool
-        Whether it explains our figures as well, so that it is shown where none is published too.
+    Empty fields stand for any figure. With `ours` it explains our figures as well, so that it is
+    shown where none is published too.
     """
 
     text: str
@@ -45,17 +39,7 @@ class Note:
 
 @dataclass(frozen=True)
 class PublishedTable:
-    """One table of the paper.
-
-    Attributes
-    ----------
-    title : str
-        What it shows.
-    values : mapping of str to mapping of str to tuple of float
-        ``values[metric][row]``, one figure per method in the order of `METHODS`.
-    notes : tuple of Note
-        Known slips and differences of definition.
-    """
+    """One table: its title, ``values[metric][row]`` in the order of `METHODS`, and known slips."""
 
     title: str
     values: Mapping[str, Mapping[str, Row]]
@@ -78,7 +62,7 @@ def _mug_note(table: str, values: str) -> Note:
     )
 
 
-_TABLES: dict[str, PublishedTable] = {
+PUBLISHED: Mapping[str, PublishedTable] = {
     "table1": PublishedTable(
         "MAE by category at elevation 0°",
         {
@@ -232,13 +216,11 @@ _TABLES: dict[str, PublishedTable] = {
         ),
     ),
 }
-
-PUBLISHED: Mapping[str, PublishedTable] = MappingProxyType(_TABLES)
 """The paper's tables by name, ``table1`` to ``table7``."""
 
 
-def published_value(table: str, metric: str, row: str, method: str) -> float | None:
-    """Return one published figure as printed, or None where the paper prints none.
+def published_value(table: str, metric: str, row: str, method: str) -> float:
+    """Return one published figure as printed, or NaN where the paper prints none.
 
     Parameters
     ----------
@@ -249,9 +231,8 @@ def published_value(table: str, metric: str, row: str, method: str) -> float | N
     row : str
         A category, elevation, group, initial azimuth or fold, or `AVERAGE_ROW`, `SIGMA_ROW`.
     method : str
-        A method's name; those that the paper does not have give None.
     """
     row_values = PUBLISHED[table].values.get(metric, {}).get(row)
     if row_values is None or method not in METHODS:
-        return None
+        return math.nan
     return row_values[METHODS.index(method)]

@@ -24,7 +24,7 @@ Intervals are not corrected for the number of comparisons.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from nbv.experiments.results import Unit
@@ -95,30 +95,14 @@ Statement = Comparison | AtLeast
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper and what it says about the results.
-
-    Attributes
-    ----------
-    id : str
-        Short name, unique.
-    section : str
-        Where the paper says it.
-    sentence : str
-        The sentence, quoted or shortened.
-    compared : str
-        What is compared and by which rule, in words.
-    statement : Statement
-        The same, to be evaluated.
-    note : str
-        What to bear in mind.
-    """
+    """A sentence of the paper, what it compares in words, and the same to be evaluated."""
 
     id: str
     section: str
     sentence: str
     compared: str
     statement: Statement
-    note: str = field(default="")
+    note: str = ""
 
 
 def all_of(parts: Sequence[Statement], label: str = "") -> AtLeast:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -136,22 +137,16 @@ class _Evaluator:
         if a is None or b is None:
             return row
         found = a.minus(b)
-        if isinstance(part, Comparable):
-            verdict = statements.comparable_verdict(found.low, found.high, part.margin)
-        else:
-            verdict = statements.better_verdict(part.statistic, found.low, found.high)
-        fewest = min(
-            paired.fewest_resampled(part.statistic, self._sample(term)) for term in (part.a, part.b)
-        )
-        return (
-            row
-            | {"value": a.value, "versus_value": b.value}
-            | found.columns("difference", "ci")
-            | {
-                "part_verdict": statements.if_enough(verdict, fewest),
-                "n_objects": self._sample(part.a).n_objects,
-            }
-        )
+        samples = self._sample(part.a), self._sample(part.b)
+        fewest = min(paired.fewest_resampled(part.statistic, sample) for sample in samples)
+        verdict = _interval_verdict(part, found.low, found.high)
+        return row | {
+            "value": a.value,
+            "versus_value": b.value,
+            **found.columns("difference", "ci"),
+            "part_verdict": statements.if_enough(verdict, fewest),
+            "n_objects": samples[0].n_objects,
+        }
 
     def _measure_outliers(self, part: FreeOfOutliers) -> dict[str, Any]:
         row: dict[str, Any] = {
@@ -167,7 +162,7 @@ class _Evaluator:
         lower, upper = np.quantile(errors, [0.25, 0.75])
         fence = float(upper + statements.TUKEY_FACTOR * (upper - lower))
         percent = 100.0 * float(np.mean(errors > fence))
-        verdict = _outlier_verdict(percent)
+        verdict = statements.FAILS if percent > 0 else statements.HOLDS
         fewest = paired.fewest_resampled("outliers_percent", sample)
         return row | {
             "value": percent,
@@ -179,12 +174,12 @@ class _Evaluator:
     def _estimate(self, statistic: str, term: Term) -> Estimate | None:
         key = (statistic, term)
         if key not in self._estimates:
-            found = None
-            if self._present(term):
-                sample = self._sample(term)
-                if sample.n_images:
-                    found = paired.estimate(statistic, sample, term.method, self._resampler)
-            self._estimates[key] = found
+            sample = self._sample(term) if self._present(term) else None
+            self._estimates[key] = (
+                paired.estimate(statistic, sample, term.method, self._resampler)
+                if sample and sample.n_images
+                else None
+            )
         return self._estimates[key]
 
     def _present(self, term: Term) -> bool:
@@ -210,26 +205,23 @@ class _Evaluator:
         return sample
 
 
-def _published(statistic: str, term: Term) -> float | None:
+def _published(statistic: str, term: Term) -> float:
     """Return what the paper prints for a term: pooled categories as the mean of their rows."""
-    figures = [_published_unit(statistic, term, unit) for unit in term.units]
-    known = [figure for figure in figures if figure is not None]
-    return float(np.mean(known)) if len(known) == len(figures) else None
+    return float(np.mean([_published_unit(statistic, term, unit) for unit in term.units]))
 
 
-def _published_unit(statistic: str, term: Term, unit: Unit) -> float | None:
+def _published_unit(statistic: str, term: Term, unit: Unit) -> float:
     category, elevation = unit
     metric = statistic.removesuffix("_sigma")
-    focus = category == published.FOCUS_CATEGORY
     if term.initial_deg or metric not in ("mae", "pauc"):
-        return None
+        return math.nan
     if term.group is not None:
         table, row = "table5", str(term.group)
     elif term.fold is not None:
         table, row = "table7", str(term.fold)
     elif statistic.endswith("_sigma"):
         table, row = "table7", published.SIGMA_ROW
-    elif focus:
+    elif category == published.FOCUS_CATEGORY:
         # Tables 1 and 3 print fold 2 for the mug; these are the averages over folds.
         table, row = ("table2" if metric == "mae" else "table4"), str(elevation)
     else:
@@ -241,24 +233,18 @@ def _published_verdict(part: Comparison) -> Verdict:
     if isinstance(part, FreeOfOutliers):
         return statements.NOT_RUN
     a, b = _published(part.statistic, part.a), _published(part.statistic, part.b)
-    return statements.NOT_RUN if a is None or b is None else _as_it_stands(part, a - b)
+    return _interval_verdict(part, a - b, a - b)
 
 
 def _point_verdict(part: Comparison, row: Mapping[str, Any]) -> Verdict:
-    verdict: Verdict = row["part_verdict"]
-    if verdict == statements.NOT_RUN:
-        return verdict
+    if row["part_verdict"] == statements.NOT_RUN:
+        return statements.NOT_RUN
     if isinstance(part, FreeOfOutliers):
-        return _outlier_verdict(row["value"])
-    return _as_it_stands(part, row["difference"])
+        return statements.FAILS if row["value"] > 0 else statements.HOLDS
+    return _interval_verdict(part, row["difference"], row["difference"])
 
 
-def _outlier_verdict(percent: float) -> Verdict:
-    return statements.FAILS if percent > 0 else statements.HOLDS
-
-
-def _as_it_stands(part: Better | Comparable, difference: float) -> Verdict:
-    """Judge a difference without regard to its uncertainty."""
+def _interval_verdict(part: Better | Comparable, low: float, high: float) -> Verdict:
     if isinstance(part, Comparable):
-        return statements.comparable_verdict(difference, difference, part.margin)
-    return statements.better_verdict(part.statistic, difference, difference)
+        return statements.comparable_verdict(low, high, part.margin)
+    return statements.better_verdict(part.statistic, low, high)

@@ -112,17 +112,10 @@ class Comparison:
 
     def lines(self) -> list[str]:
         """Return everything as text: settings, problems, remarks, counts and the verdict."""
-        judgement = (
-            f"{self.run} {'agrees' if self.agrees else 'does not agree'} with {self.reference}"
-        )
-        found = [
-            self.settings_line(),
-            *self.problems,
-            *self.remarks,
-            self.summary_line(),
-            judgement,
-        ]
-        return [line for line in found if line]
+        verb = "agrees" if self.agrees else "does not agree"
+        settings = [self.settings_line()] if self.settings else []
+        judgement = f"{self.run} {verb} with {self.reference}"
+        return [*settings, *self.problems, *self.remarks, self.summary_line(), judgement]
 
 
 def compare_runs(reference: Path, run: Path) -> Comparison:
@@ -219,17 +212,8 @@ def _differing_counts(pairs: Iterable[tuple[Cell, Cell]]) -> list[str]:
 def judge_cell(theirs: Cell, mine: Cell, factor: float) -> list[Cell]:
     """Judge the figures that a cell has: its value, its paired difference, its σ.
 
-    Parameters
-    ----------
-    theirs, mine : mapping
-        The reference's cell and the run's: `nbv.reporting.cells.CELL_COLUMNS`.
-    factor : float
-        From `sigma_ratio`.
-
-    Returns
-    -------
-    list of mapping
-        `JUDGED_COLUMNS`, one for each figure that either of them has.
+    ``theirs`` is the reference's, ``factor`` the `sigma_ratio`. Returns `JUDGED_COLUMNS`, one row
+    for each figure that either cell has.
     """
     rows = []
     is_sigma = theirs["row"] == SIGMA_ROW

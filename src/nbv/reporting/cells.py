@@ -61,17 +61,7 @@ def method_cells(
 ) -> list[dict[str, Any]]:
     """Return one row's cells: a statistic of each of the settings' methods on the same images.
 
-    Parameters
-    ----------
-    table, row, row_label : str
-        Where the cells are.
-    metric : str
-        A statistic of `nbv.statistics.paired.estimate`.
-    sample : PairedErrors
-        The images; methods that it lacks are left out.
-    resampler : Resampler
-    settings : ReportSettings
-        ``methods``, and the ``reference`` of the differences.
+    Methods that the sample lacks are left out; differences are to the settings' ``reference``.
     """
     estimates = {
         method: paired.estimate(metric, sample, method, resampler)
@@ -79,17 +69,11 @@ def method_cells(
         if method in sample.errors_deg
     }
     reference = estimates.get(settings.reference)
+    shared = {"metric": metric, "n_objects": sample.n_objects, "n_images": sample.n_images}
     cells = []
     for method, found in estimates.items():
-        made = cell(
-            table,
-            row,
-            row_label,
-            method=method,
-            metric=metric,
-            n_objects=sample.n_objects,
-            n_images=sample.n_images,
-        ) | found.interval().columns("value", "ci")
+        made = cell(table, row, row_label, method=method, **shared)
+        made |= found.interval().columns("value", "ci")
         if not metric.endswith("_sigma"):
             made["sigma"] = paired.fold_sigma(metric, sample, method)
         if reference and method != settings.reference:

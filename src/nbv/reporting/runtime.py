@@ -81,12 +81,7 @@ def load_jobs(files: Iterable[tuple[str, Path, Path]]) -> pd.DataFrame:
 
 
 def summarise_jobs(jobs: pd.DataFrame) -> pd.DataFrame:
-    """Sum up jobs by rule.
-
-    Parameters
-    ----------
-    jobs : pandas.DataFrame
-        From `load_jobs`.
+    """Sum up the jobs of `load_jobs` by rule.
 
     Returns
     -------
@@ -109,13 +104,7 @@ def summarise_jobs(jobs: pd.DataFrame) -> pd.DataFrame:
 
 
 def runtime_table(jobs: pd.DataFrame) -> Table:
-    """Return the table of what a run cost, rule by rule.
-
-    Parameters
-    ----------
-    jobs : pandas.DataFrame
-        From `load_jobs`.
-    """
+    """Return the table of what the jobs of `load_jobs` cost, rule by rule."""
     runtime = summarise_jobs(jobs)
     rows = tuple(_row(row) for row in runtime.to_dict("records"))
     notes = ("No job was timed in this run.",) if runtime.empty else tuple(_notes(runtime))

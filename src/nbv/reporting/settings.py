@@ -77,15 +77,14 @@ def reference_units(units: Iterable[Unit], settings: ReportSettings) -> list[Uni
 
     Each category at the reference elevation, or where it was not run, at its lowest one.
     """
-    present = list(units)
-    return [
-        (category, _reference_elevation_deg(present, category, settings))
-        for category in dict.fromkeys(category for category, _ in present)
-    ]
+    by_category: dict[str, list[Unit]] = {}
+    for unit in units:
+        by_category.setdefault(unit[0], []).append(unit)
+    return [(name, common_elevation_deg(own, settings)) for name, own in by_category.items()]
 
 
 def common_elevation_deg(units: Iterable[Unit], settings: ReportSettings) -> int:
-    """Return the elevation that a heading over `reference_units` names; see `unit_label`."""
+    """Return the reference elevation, or where none of the units has it, their lowest one."""
     elevations = {elevation for _, elevation in units}
     wanted = settings.reference_elevation_deg
     return wanted if wanted in elevations else min(elevations)
@@ -102,10 +101,5 @@ def focus_unit(units: Iterable[Unit], settings: ReportSettings) -> Unit:
     """Return the focus category at the reference elevation, or at its lowest one."""
     present = list(units)
     category = focus_category(present, settings)
-    return category, _reference_elevation_deg(present, category, settings)
-
-
-def _reference_elevation_deg(units: list[Unit], category: str, settings: ReportSettings) -> int:
-    elevations = [elevation for name, elevation in units if name == category]
-    wanted = settings.reference_elevation_deg
-    return wanted if wanted in elevations else min(elevations)
+    own = [unit for unit in present if unit[0] == category]
+    return category, common_elevation_deg(own, settings)

@@ -54,6 +54,11 @@ class MethodStyle:
     hatch: str
     width: float = 1.5
 
+    @property
+    def curve(self) -> dict[str, Any]:
+        """How the method's curves are drawn, without markers."""
+        return {"color": self.color, "linestyle": self.line, "linewidth": self.width}
+
 
 _STYLES: Mapping[str, MethodStyle] = {
     "single": MethodStyle("#000000", (0, (1.0, 1.2)), "o", ""),
@@ -88,29 +93,13 @@ def azimuth_axis(axes: Axes, label: str, vertical: bool = False) -> None:
     """Mark a circle of degrees every 90."""
     ticks = [0, 90, 180, 270, 360]
     if vertical:
-        axes.set_ylim(0, 360)
-        axes.set_yticks(ticks)
-        axes.set_ylabel(label)
+        axes.set(ylim=(0, 360), yticks=ticks, ylabel=label)
     else:
-        axes.set_xlim(0, 360)
-        axes.set_xticks(ticks)
-        axes.set_xlabel(label)
+        axes.set(xlim=(0, 360), xticks=ticks, xlabel=label)
 
 
 def save_figure(figure: Figure, paths: Mapping[str, Path]) -> None:
-    """Write a figure as ``png`` (150 dpi) and ``pdf``; the same figure gives the same bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-    paths : mapping of str to Path
-        By format.
-
-    Raises
-    ------
-    KeyError
-        If a format is neither.
-    """
+    """Write a figure as ``png`` (150 dpi) and ``pdf``; the same figure gives the same bytes."""
     with mpl.rc_context(RC):
         for kind, path in paths.items():
             with replacing(path) as temporary:

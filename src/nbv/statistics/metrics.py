@@ -59,18 +59,7 @@ def mae_deg(errors_deg: ArrayLike) -> float:
 
 
 def median_deg(errors_deg: ArrayLike) -> float:
-    """Return the median error over images, in degrees (Fig. 9). Lower is better.
-
-    Parameters
-    ----------
-    errors_deg : (n_images,) float
-        Circular distances in [0, 180].
-
-    Raises
-    ------
-    ValueError
-        If there is no error at all.
-    """
+    """Return the median error over images, in degrees (Fig. 9); otherwise as `mae_deg`."""
     return float(np.median(_non_empty(errors_deg)))
 
 
@@ -86,12 +75,7 @@ def pea(errors_deg: ArrayLike, thresholds_deg: ArrayLike) -> Floats:
     errors_deg : (n_images,) float
         Circular distances in [0, 180].
     thresholds_deg : (...) float
-        Thresholds in degrees.
-
-    Returns
-    -------
-    (...) float
-        One fraction for each threshold.
+        The result has the same shape.
     """
     ordered = np.sort(_non_empty(errors_deg))
     below = np.searchsorted(ordered, np.asarray(thresholds_deg, dtype=np.float64), side="left")
@@ -104,17 +88,8 @@ def pauc(errors_deg: ArrayLike) -> float:
     Exactly ``100 - mean(min(error, 100))``: integrating the step of one image from 0 to 100
     leaves the part of the range above its error. It is thus an MAE that counts no error above
     100 degrees, and says little that the MAE does not unless half-turns are common. Higher is
-    better. Many published values are lower than this can be (`nbv.paper.published`).
-
-    Parameters
-    ----------
-    errors_deg : (n_images,) float
-        Circular distances in [0, 180].
-
-    Raises
-    ------
-    ValueError
-        If there is no error at all.
+    better. Many published values are lower than this can be (`nbv.paper.published`). Takes and
+    raises what `mae_deg` does.
     """
     return float(np.mean(accuracy_area(_non_empty(errors_deg))))
 
@@ -140,16 +115,9 @@ def fold_std(values: ArrayLike) -> float:
 
 
 def resample_objects(n_objects: int, rng: np.random.Generator, n_resamples: int) -> Ints:
-    """Draw objects with replacement and return how often each was drawn.
+    """Draw as many objects as there are, with replacement, and return how often each was drawn.
 
-    Parameters
-    ----------
-    n_objects : int
-        Number of objects, and of draws in each resample.
-    rng : numpy.random.Generator
-        Draws ``rng.integers(n_objects, size=(n_resamples, n_objects))`` and nothing else.
-    n_resamples : int
-        Number of resamples.
+    Takes ``rng.integers(n_objects, size=(n_resamples, n_objects))`` and nothing else.
 
     Returns
     -------
@@ -186,9 +154,8 @@ def resampled_means(values: ArrayLike, objects: Ints, multiplicities: Ints) -> F
     counts = np.bincount(objects, minlength=n_objects).astype(np.float64)
     weights = multiplicities.astype(np.float64)
     drawn = weights @ counts
-    totals = weights @ sums
-    means = np.full(totals.shape, np.nan)
-    np.divide(totals, drawn, out=means, where=drawn > 0)
+    means = np.full(drawn.shape, np.nan)
+    np.divide(weights @ sums, drawn, out=means, where=drawn > 0)
     return means
 
 
@@ -203,9 +170,8 @@ def resampled_medians(values: ArrayLike, objects: Ints, multiplicities: Ints) ->
     flat = np.asarray(values, dtype=np.float64)
     grid = np.quantile(flat, np.linspace(0.0, 1.0, _MEDIAN_GRID), method="inverted_cdf")
     n_objects = multiplicities.shape[1]
-    cell = np.searchsorted(grid, flat, side="left")
-    flat_cell = objects * _MEDIAN_GRID + cell
-    histogram = np.bincount(flat_cell, minlength=n_objects * _MEDIAN_GRID)
+    cell = objects * _MEDIAN_GRID + np.searchsorted(grid, flat, side="left")
+    histogram = np.bincount(cell, minlength=n_objects * _MEDIAN_GRID)
     up_to = np.cumsum(histogram.reshape(n_objects, _MEDIAN_GRID), axis=1).astype(np.float64)
     reached = multiplicities.astype(np.float64) @ up_to
     total = reached[:, -1:]

@@ -42,30 +42,14 @@ def object_means(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)[list(OBJECT_COLUMNS)]
 
 
-def load_object_means(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
-    """Read what `object_means` gave for each unit and fold into one frame.
+def load_folds(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
+    """Read one CSV file for each unit and fold into one frame, such as `object_means` of each.
 
     Returns
     -------
     DataFrame
-        ``category, elevation_deg, fold`` and `OBJECT_COLUMNS`.
+        ``category, elevation_deg, fold`` and the columns of the files.
     """
-    return _load_folds(files)
-
-
-def load_choices(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
-    """Read which policy and fusion each method has in each unit and fold into one frame.
-
-    Returns
-    -------
-    DataFrame
-        ``category, elevation_deg, fold`` and the columns of
-        `nbv.experiments.extensions.choices_frame`.
-    """
-    return _load_folds(files)
-
-
-def _load_folds(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
     parts = []
     for place, path in files.items():
         rows = read_csv(existing(path))

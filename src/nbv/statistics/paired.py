@@ -6,6 +6,7 @@ Tables and claims take their figures from here, so both state the same value and
 from __future__ import annotations
 
 import zlib
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -153,10 +154,8 @@ class Resampler:
 
     def multiplicities(self, sample: PairedErrors) -> Ints:
         """Return (n_resamples, n_objects) draws, resampling within each category."""
-        blocks = []
-        for category in dict.fromkeys(sample.category_of):
-            blocks.append(self._draw(category, sample.category_of.count(category), 0))
-        return np.concatenate(blocks, axis=1)
+        sizes = Counter(sample.category_of)
+        return np.concatenate([self._draw(name, size, 0) for name, size in sizes.items()], axis=1)
 
     def multiplicities_by_fold(self, sample: PairedErrors) -> Ints:
         """Return (n_resamples, n_objects) draws, resampling within each fold's test objects.
@@ -178,22 +177,11 @@ class Resampler:
         return self._drawn[key]
 
 
-LOWER_IS_BETTER: Mapping[str, bool] = {
-    "mae": True,
-    "pauc": False,
-    "median": True,
-    "mae_sigma": True,
-    "pauc_sigma": True,
-}
+STATISTICS = ("mae", "pauc", "median", "mae_sigma", "pauc_sigma")
 """The statistics that `estimate` knows."""
 
-UNIT_OF: Mapping[str, str] = {
-    "mae": "°",
-    "pauc": "\u00a0%",
-    "median": "°",
-    "mae_sigma": "°",
-    "pauc_sigma": "\u00a0%",
-}
+LOWER_IS_BETTER: Mapping[str, bool] = {name: name != "pauc" for name in STATISTICS}
+UNIT_OF: Mapping[str, str] = {name: "\u00a0%" if "pauc" in name else "°" for name in STATISTICS}
 
 
 @dataclass(frozen=True)
@@ -221,12 +209,6 @@ def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resam
     statistic : str
         ``mae`` or ``median`` (degrees), ``pauc`` (percent), or ``mae_sigma`` and ``pauc_sigma``:
         the standard deviation over folds of the figure per fold.
-    sample : PairedErrors
-        The images.
-    method : str
-        Whose errors.
-    resampler : Resampler
-        Source of the shared resamples.
 
     Raises
     ------
@@ -237,11 +219,8 @@ def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resam
     if pooled != statistic:
         return _estimate_sigma(pooled, sample, method, resampler)
     value, drawn = _METRICS[statistic](errors), resampler.multiplicities(sample)
-    if statistic == "median":
-        samples = metrics.resampled_medians(errors, sample.objects, drawn)
-    else:
-        samples = metrics.resampled_means(_per_image(statistic, errors), sample.objects, drawn)
-    return Estimate(value, samples)
+    resampled = metrics.resampled_medians if statistic == "median" else metrics.resampled_means
+    return Estimate(value, resampled(_per_image(statistic, errors), sample.objects, drawn))
 
 
 def fold_sigma(statistic: str, sample: PairedErrors, method: str) -> float:

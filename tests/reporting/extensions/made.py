@@ -50,7 +50,7 @@ def blocks(shifts=SHIFTS, **rest):
 
 
 def choices(errors, categories=CATEGORIES):
-    """What `load_choices` reads, with these cross-validated errors in every fold."""
+    """What `load_folds` reads of choices, with these cross-validated errors in every fold."""
     rows = [
         (category, 0, fold, method, error)
         for category in categories

@@ -19,14 +19,8 @@ def ablation_table(
 ) -> Table:
     """Return the table of all rows of the space, each compared with the first.
 
-    Parameters
-    ----------
-    space : DataFrame
-        From `nbv.experiments.ablation.ablation_space`.
-    found : mapping of int to DataFrame
-        By row: ``fold, object_id, error_deg`` of all folds.
-    category : str
-    resampler : Resampler
+    ``space`` is of `nbv.experiments.ablation.ablation_space`; ``found`` has by its rows the
+    ``fold, object_id, error_deg`` of all folds.
     """
     named = [frame.assign(method=str(row)) for row, frame in found.items()]
     sample = paired_objects(pd.concat(named), category)

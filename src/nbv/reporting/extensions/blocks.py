@@ -51,12 +51,8 @@ def blocks_of(
 ) -> dict[Block, PairedErrors]:
     """Return the objects' errors of each run and category at its reference elevation.
 
-    Parameters
-    ----------
-    runs : mapping of str to DataFrame
-        From `nbv.statistics.object_means.load_object_means`, by the run's name.
-    elevation_deg : int
-        Where a category was not run at it, the category's lowest elevation is taken.
+    Where a category was not run at it, its lowest one is taken. ``runs`` has by a run's name what
+    `nbv.statistics.object_means.load_folds` read of ``objects.csv``.
     """
     blocks = {}
     for run, means in runs.items():

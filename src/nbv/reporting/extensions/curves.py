@@ -30,16 +30,7 @@ def _draw(axes: Axes, x: pd.Series, y: pd.Series, method: str, methods: tuple[st
     """Draw one curve: baselines in the paper's styles, criteria in the further ones in turn."""
     others = tuple(name for name in methods if name not in _BASELINES)
     style = method_style(_BASELINES.get(method, method), others)
-    axes.plot(
-        x,
-        y,
-        label=method_label(method),
-        color=style.color,
-        linestyle=style.line,
-        marker=style.marker,
-        markersize=4,
-        linewidth=style.width,
-    )
+    axes.plot(x, y, label=method_label(method), marker=style.marker, markersize=4, **style.curve)
 
 
 def _grid(n_panels: int, height_in: float = 2.9) -> tuple[Figure, list[Axes]]:
@@ -62,13 +53,7 @@ def _legend(figure: Figure, panels: list[Axes]) -> None:
 
 @mpl.rc_context(RC)
 def more_views_figure(cells: pd.DataFrame) -> Figure:
-    """Draw the error against the number of views, a panel for each category.
-
-    Parameters
-    ----------
-    cells : DataFrame
-        Of `nbv.reporting.extensions.more_views.more_views_table`.
-    """
+    """Draw the cells of `more_views.more_views_table`, a panel for each category."""
     categories = list(dict.fromkeys(cells["category"]))
     methods = tuple(dict.fromkeys(cells["method"]))
     figure, panels = _grid(len(categories))
@@ -87,12 +72,9 @@ def more_views_figure(cells: pd.DataFrame) -> Figure:
 
 
 def travel_curves(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFrame]:
-    """Return error against travel of each category, all folds pooled.
+    """Return error against travel by category, all folds pooled.
 
-    Parameters
-    ----------
-    files : mapping of (category, fold) to Path
-        Rows of `nbv.experiments.travel.travel_rows`.
+    The files, by category and fold, hold rows of `nbv.experiments.travel.travel_rows`.
     """
     return {
         category: pooled_travel({int(str(fold)): part for fold, part in rows.groupby("fold")})
@@ -102,15 +84,7 @@ def travel_curves(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFra
 
 @mpl.rc_context(RC)
 def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
-    """Draw the error against the mean travel as its price rises, a panel for each category.
-
-    Parameters
-    ----------
-    curves : mapping of str to DataFrame
-        By category, of `travel_curves`.
-    methods : tuple of str
-        The methods to draw.
-    """
+    """Draw error against mean travel as its price rises, a panel for each of `travel_curves`."""
     figure, panels = _grid(len(curves))
     for axes, (category, rows) in zip(panels, curves.items(), strict=True):
         for method in methods:
@@ -129,13 +103,7 @@ def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) 
 
 
 def travel_table(curves: Mapping[str, pd.DataFrame]) -> Table:
-    """Return the curves as a table that has a CSV file only.
-
-    Parameters
-    ----------
-    curves : mapping of str to DataFrame
-        By category, of `travel_curves`.
-    """
+    """Return `travel_curves` as a table that has a CSV file only."""
     cells = pd.concat([curve.assign(category=category) for category, curve in curves.items()])
     title = "Error against travel"
     return Table("travel", title, title, cells, header=(), rows=(), decimals=6)

@@ -35,21 +35,12 @@ DENSITIES: Mapping[str, str] = {
     "as_trained": "p(φ given I), as trained",
     "posterior": "p(φ given I), at its temperature",
 }
-METRICS = (
-    "log_likelihood",
-    "entropy",
-    "circular_variance",
-    "single",
-    "opposite",
-    "recommended",
-)
+_OF_DENSITIES = ("log_likelihood", "entropy", "circular_variance")
+_OF_ERRORS = ("single", "opposite", "recommended")
+METRICS = (*_OF_DENSITIES, *_OF_ERRORS)
 METHODS: Mapping[str, Mapping[str, str]] = {
-    "estimate": {"single": "single", "opposite": "opposite", "recommended": "proposed"},
-    "posterior": {
-        "single": "single",
-        "opposite": "opposite_product",
-        "recommended": "gain_product",
-    },
+    "estimate": dict(zip(_OF_ERRORS, ("single", "opposite", "proposed"), strict=True)),
+    "posterior": dict(zip(_OF_ERRORS, ("single", "opposite_product", "gain_product"), strict=True)),
 }
 """Whose errors a density's are, by the metric."""
 
@@ -81,13 +72,7 @@ class DensityRun:
 def density_comparison(runs: Mapping[str, DensityRun], settings: ReportSettings) -> Table:
     """Return the mean of every metric for every density of every run, with its uncertainty.
 
-    Parameters
-    ----------
-    runs : mapping of str to DensityRun
-        The first is what the others are compared with, on its units. All were tested on the same
-        images.
-    settings : ReportSettings
-        ``n_resamples`` and ``seed``.
+    The first run is what the others are compared with, on its units.
 
     Returns
     -------
@@ -150,7 +135,7 @@ def _metrics(run: DensityRun, unit: Unit) -> Iterator[tuple[str, str, pd.DataFra
     """Yield (density, metric, frame): ``fold, object_id, initial_deg, error_deg`` = the metric."""
     for fold, path in _of_unit(run.estimates, unit):
         for density, found in _of_images(run, (*unit, fold), read_estimates(path)):
-            for metric in METRICS[:3]:
+            for metric in _OF_DENSITIES:
                 yield density, metric, found[_KEY].assign(error_deg=found[metric])
     errors = run.evaluations[unit]
     for density in METHODS if run.posteriors else ["estimate"]:

@@ -41,19 +41,9 @@ _COLUMNS = (
 def favoured(choices: Mapping[str, pd.DataFrame], methods: Methods) -> dict[str, str]:
     """Return for each run the extension that its calibration objects favour as a whole.
 
-    Parameters
-    ----------
-    choices : mapping of str to DataFrame
-        By run, from `nbv.statistics.object_means.load_choices`.
-    methods : mapping of str to mapping
-        ``policy`` and ``fusion`` of the configuration's extensions.
-
-    Returns
-    -------
-    dict of str to str
-        The extension of least cross-validated error, averaged over folds and then over
-        categories, without random views, oracles and those that take what is selected. A run
-        whose errors were not cross-validated has none.
+    That is the one of least cross-validated error, averaged over folds and then over categories,
+    without random views, oracles and those that take what is selected. A run whose errors were
+    not cross-validated has none. ``choices`` has by run the folds' ``choices.csv``.
     """
     candidates = [
         name
@@ -78,17 +68,7 @@ def extension_gains_table(
 ) -> Table:
     """Return what extensions gain, block by block.
 
-    Columns of methods that the configuration lacks are left out.
-
-    Parameters
-    ----------
-    blocks : mapping of (run, category) to PairedErrors
-        From `blocks_of`.
-    choices : mapping of str to DataFrame
-        By run, from `nbv.statistics.object_means.load_choices`.
-    methods : mapping of str to mapping
-        ``policy`` and ``fusion`` of the configuration's methods and extensions.
-    resampler : Resampler
+    Columns of methods that the configuration lacks are left out; `favoured` explains ``choices``.
     """
     present = shared_methods(blocks, methods)
     known = {name: method for name, method in methods.items() if name in present}
@@ -102,9 +82,9 @@ def extension_gains_table(
     cells, rows = [], []
     for block, sample in blocks.items():
         run, category = block
-        row = [Cell(f"{category_label(category)} ({run})")]
+        row, named = [Cell(f"{category_label(category)} ({run})")], by_run[run]
         for _, mine, other in shown:
-            method, versus = by_run[run].get(mine), by_run[run].get(other)
+            method, versus = named.get(mine), named.get(other)
             if method is None or (other and versus is None):
                 row.append(Cell("–"))
                 continue

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy import stats
 
 from nbv.labels import category_label, number
@@ -22,6 +21,7 @@ from nbv.reporting.extensions.blocks import (
     shared_methods,
 )
 from nbv.reporting.table import Cell, Table
+from nbv.statistics.metrics import Floats
 from nbv.statistics.object_means import indistinct_from_best, mae_difference
 from nbv.statistics.paired import Resampler
 
@@ -32,14 +32,6 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
     Bold is the best of a column where the interval of its difference to every other method
     excludes 0; otherwise all that cannot be told from the best are marked with an asterisk.
     Oracles are bounds and are not ranked.
-
-    Parameters
-    ----------
-    blocks : mapping of (run, category) to PairedErrors
-        From `blocks_of`.
-    methods : mapping of str to mapping
-        ``policy`` and ``fusion`` of the configuration's methods and extensions.
-    resampler : Resampler
     """
     shown = shared_methods(blocks, methods)
     ranked = [method for method in shown if methods[method]["policy"] != ORACLE]
@@ -57,7 +49,8 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
             alone = best == [method]
             mark = "*" if method in best and not alone else ""
             texts[method].append(Cell(f"{number(made['value'])}{mark}", alone))
-    ranks = _ranks(blocks, ranked)
+    errors = np.array([[s.errors_deg[m].mean() for m in ranked] for s in blocks.values()])
+    ranks = stats.rankdata(np.round(errors, 6), axis=1)  # 1: the lowest MAE of a block
     mean_rank = dict(zip(ranked, ranks.mean(axis=0), strict=True))
     order = sorted(shown, key=lambda method: mean_rank.get(method, np.inf))
     header = ("Method", *(f"{category_label(c)} ({r})" for r, c in blocks), "Mean rank")
@@ -66,39 +59,28 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
         "MAE in degrees over test images of all folds, at the reference elevation.",
         "Bold: below every other method, the 95 % interval over objects excluding 0. "
         "*: cannot be told from the lowest of its column. Oracles know the truth: a bound.",
-        *_rank_notes(blocks, methods, ranked, ranks),
+        *_rank_notes(methods, dict(zip(ranked, errors.T, strict=True)), ranks),
     )
     frame = pd.DataFrame(cells, columns=list(CELL_COLUMNS))
     return Table("leaderboard", "Leaderboard", "Leaderboard", frame, header, tuple(rows), notes)
 
 
-def _ranks(blocks: Blocks, methods: Sequence[str]) -> NDArray[np.float64]:
-    """Return each method's rank in each block, (n_blocks, n_methods), 1 the lowest MAE."""
-    table = [[sample.errors_deg[m].mean() for m in methods] for sample in blocks.values()]
-    return np.asarray(stats.rankdata(np.round(table, 6), axis=1))
-
-
-def _rank_notes(
-    blocks: Blocks, methods: Methods, ranked: Sequence[str], ranks: NDArray[np.float64]
-) -> list[str]:
-    if len(blocks) < 3 or len(ranked) < 3:
-        return []
+def _rank_notes(methods: Methods, mae: Mapping[str, Floats], ranks: Floats) -> Iterator[str]:
+    n_blocks = len(ranks)
+    if n_blocks < 3 or len(mae) < 3:
+        return
     friedman = stats.friedmanchisquare(*ranks.T)
-    notes = [
-        f"Friedman test over {len(blocks)} columns that all methods rank alike: "
+    yield (
+        f"Friedman test over {n_blocks} columns that all methods rank alike: "
         f"p = {friedman.pvalue:.2g}."
-    ]
+    )
     selected = method_with(methods, SELECTED, SELECTED)
     for versus in (method_with(methods, "opposite", SELECTED), SUBJECT):
-        if selected and versus and {selected, versus}.issubset(ranked):
-            gaps = [
-                s.errors_deg[selected].mean() - s.errors_deg[versus].mean() for s in blocks.values()
-            ]
-            if np.any(gaps):
-                test = stats.wilcoxon(gaps)
-                notes.append(
+        if selected and versus and {selected, versus} <= mae.keys():
+            gaps = mae[selected] - mae[versus]
+            if gaps.any():
+                yield (
                     f"Wilcoxon signed-rank test over columns, {selected.replace('_', ' ')} against "
-                    f"{versus.replace('_', ' ')}: p = {test.pvalue:.2g} (with {len(gaps)} columns "
-                    f"no less than {2 ** (1 - len(gaps)):.2g} is possible)."
+                    f"{versus.replace('_', ' ')}: p = {stats.wilcoxon(gaps).pvalue:.2g} (with "
+                    f"{n_blocks} columns no less than {2 ** (1 - n_blocks):.2g} is possible)."
                 )
-    return notes

@@ -14,19 +14,10 @@ from nbv.statistics.paired import Resampler
 
 
 def more_views_table(rows_by_category: Mapping[str, pd.DataFrame], resampler: Resampler) -> Table:
-    """Return error and travel against the number of views.
+    """Return error and travel against the number of views, by category and policy.
 
-    Parameters
-    ----------
-    rows_by_category : mapping of str to DataFrame
-        Columns `nbv.experiments.more_views.COLUMNS` and ``fold``.
-    resampler : Resampler
-
-    Returns
-    -------
-    Table
-        A row for each category and policy, and a last column that compares its three views with
-        four at random.
+    The rows have `nbv.experiments.more_views.COLUMNS` and ``fold``. The last column compares a
+    policy's three views with four at random.
     """
     cells, printed = [], []
     views = sorted({n for rows in rows_by_category.values() for n in rows["n_views"]})

@@ -27,13 +27,8 @@ def run_comparison(
 ) -> Table:
     """Return the MAE of every method in every run, with paired differences to the first run.
 
-    Parameters
-    ----------
-    runs : mapping of str to mapping
-        By run, frames of `nbv.experiments.results.load_evaluations` for the same units. All were
-        tested on the same images. A method needs to be in one of them alone.
-    settings : ReportSettings
-        ``n_resamples`` and ``seed``.
+    ``runs`` has by run the frames of `nbv.experiments.results.load_evaluations` for the same units
+    and test images. A method needs to be in one of them alone.
 
     Raises
     ------
@@ -55,27 +50,25 @@ def run_comparison(
             sample = pair_methods(by_run, unit[0])
             cells += method_cells(_NAME, row, label, "mae", sample, resampler, shown)
     frame = pd.DataFrame(cells, columns=list(CELL_COLUMNS))
-    rows = [
-        _row(str(label), part, list(runs)) for label, part in frame.groupby("row_label", sort=False)
-    ]
-    header = ("MAE", *runs, *(f"{run} {MINUS} {first}" for run in list(runs)[1:]))
+    names = list(runs)
+    by_label = frame.groupby("row_label", sort=False)
+    rows = tuple(_row(str(label), part, names) for label, part in by_label)
+    header = ("MAE", *names, *(f"{name} {MINUS} {first}" for name in names[1:]))
     note = (
         "Mean absolute errors over test images. Differences are paired image by image, with 95 % "
         "intervals over objects; those do not contain the chance of training."
     )
     title = "The same methods in several runs"
-    return Table(_NAME, title, title, frame, header, tuple(rows), (note,))
+    return Table(_NAME, title, title, frame, header, rows, (note,))
 
 
 def _row(label: str, part: pd.DataFrame, runs: list[str]) -> Row:
     """Return a method's errors run by run, then the differences; a dash where there is none."""
     found = {cell["method"]: cell for cell in part.to_dict("records")}
     values = [f"{number(found[run]['value'])}°" if run in found else "–" for run in runs]
-    differences = []
-    for run in runs[1:]:
-        value, low, high = (
-            found[run][name] if run in found else np.nan
-            for name in ("difference", "difference_low", "difference_high")
-        )
-        differences.append(interval_text(value, low, high) if np.isfinite(value) else "–")
+    differences = ["–"] * (len(runs) - 1)
+    for index, run in enumerate(runs[1:]):
+        if run in found and np.isfinite(found[run]["difference"]):
+            ends = found[run]["difference_low"], found[run]["difference_high"]
+            differences[index] = interval_text(found[run]["difference"], *ends)
     return tuple(map(Cell, (label, *values, *differences)))

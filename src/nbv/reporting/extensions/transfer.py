@@ -18,8 +18,8 @@ from nbv.labels import category_label, method_label, number
 from nbv.reporting.cells import cell, shared_resampler
 from nbv.reporting.settings import ReportSettings
 from nbv.reporting.table import Cell, Row, Table
-from nbv.statistics import paired
-from nbv.statistics.paired import pair_methods
+from nbv.statistics.object_means import mae_difference, mae_interval
+from nbv.statistics.paired import fold_sigma, pair_methods
 
 Pair = tuple[str, str]
 """The condition trained on and the one tested on."""
@@ -32,11 +32,6 @@ _NAME = "transfer"
 
 def load_transfer(files: Mapping[TransferFile, Path], unit: Unit) -> dict[Pair, pd.DataFrame]:
     """Read every method's errors under every pair of conditions.
-
-    Parameters
-    ----------
-    files : mapping of (trained on, tested on, fold, method) to path
-    unit : (category, elevation_deg)
 
     Raises
     ------
@@ -55,50 +50,31 @@ def transfer_table(
     unit: Unit,
     settings: ReportSettings,
 ) -> Table:
-    """Return the table of MAEs, one cell for each method and pair of conditions.
+    """Return the table of MAEs, one cell for each of the settings' methods and pair of conditions.
 
-    Parameters
-    ----------
-    evaluations : mapping
-        From `load_transfer`.
-    conditions : mapping
-        ``sensor`` and ``framing`` of each condition.
-    unit : (category, elevation_deg)
-    settings : ReportSettings
-        ``methods``, and the object bootstrap.
-
-    Returns
-    -------
-    Table
-        Its cells have `cells.CELL_COLUMNS`, ``trained_on`` and ``tested_on``; ``difference*`` is
-        the paired difference to the estimator that was trained on what is tested.
+    ``evaluations`` are of `load_transfer`; ``conditions`` have a ``sensor`` and a ``framing``. The
+    cells have `cells.CELL_COLUMNS`, ``trained_on`` and ``tested_on``; ``difference*`` is the paired
+    difference to the estimator that was trained on what is tested.
     """
     category, elevation = unit
     resampler = shared_resampler(settings)
     cells = []
     for tested in conditions:
-        frames = {trained: evaluations[trained, tested] for trained in conditions}
-        named = [
-            frame.assign(method=f"{trained}/" + frame["method"].astype(str))
-            for trained, frame in frames.items()
-        ]
+        named = []
+        for trained in conditions:
+            frame = evaluations[trained, tested]
+            named.append(frame.assign(method=f"{trained}/" + frame["method"].astype(str)))
         sample = pair_methods(pd.concat(named, ignore_index=True), category)
         for method, trained in itertools.product(settings.methods, conditions):
             name = f"{trained}/{method}"
-            found = paired.estimate("mae", sample, name, resampler)
-            made = cell(
-                _NAME,
-                f"{trained} on {tested}",
-                f"{trained} on {tested}",
-                method=method,
-                metric="mae",
-                sigma=paired.fold_sigma("mae", sample, name),
-                n_objects=sample.n_objects,
-                n_images=sample.n_images,
-            ) | found.interval().columns("value", "ci")
+            pair = f"{trained} on {tested}"
+            made = cell(_NAME, pair, pair, method=method, metric="mae")
+            made |= mae_interval(sample, name, resampler).columns("value", "ci")
+            made |= {"n_objects": sample.n_objects, "n_images": sample.n_images}
+            made |= {"sigma": fold_sigma("mae", sample, name)}
             if trained != tested:
-                matched = paired.estimate("mae", sample, f"{tested}/{method}", resampler)
-                made |= found.minus(matched).columns("difference")
+                less = mae_difference(sample, name, f"{tested}/{method}", resampler)
+                made |= less.columns("difference")
             cells.append(made | {"trained_on": trained, "tested_on": tested})
     frame = pd.DataFrame(cells)
     title = f"MAE of {category_label(category)} at elevation {elevation}°, trained on × tested on"

@@ -14,12 +14,7 @@ from nbv.statistics.paired import Resampler
 def view_sphere_table(rows: pd.DataFrame, category: str, resampler: Resampler) -> Table:
     """Return what choosing the elevation with the rotation gains, by the first elevation.
 
-    Parameters
-    ----------
-    rows : DataFrame
-        Columns `nbv.experiments.view_sphere.COLUMNS` and ``fold``.
-    category : str
-    resampler : Resampler
+    The rows have `nbv.experiments.view_sphere.COLUMNS` and ``fold``.
     """
     cells, printed = [], []
     criteria = [m.removesuffix("_sphere") for m in rows["method"].unique() if "_sphere" in m]

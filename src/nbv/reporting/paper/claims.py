@@ -14,13 +14,8 @@ from nbv.reporting.table import Cell, Part, Row, Table
 def claims_table(claims: pd.DataFrame) -> Table:
     """Return one row per claim: sentence, verdicts, our figures, and the paper's own.
 
-    Those that were not run come last, under a heading of their own. The CSV file has a row for
-    each comparison that claims are made of.
-
-    Parameters
-    ----------
-    claims : pandas.DataFrame
-        Of `nbv.paper.verdicts.evaluate_claims`.
+    Those that were not run come last, under a heading of their own. The CSV file is what
+    `nbv.paper.verdicts.evaluate_claims` returned: a row for each comparison.
     """
     header = (
         "Section",
@@ -31,18 +26,11 @@ def claims_table(claims: pd.DataFrame) -> Table:
         "Our figures",
         "The paper's own figures",
     )
-    run, not_run = (
-        tuple(_row(claim) for claim in part.to_dict("records")) for part in by_run(claims)
-    )
+    run, not_run = (tuple(map(_row, part.to_dict("records"))) for part in by_run(claims))
+    parts = (Part(run), Part(not_run, "Not run"))
+    title, n_text = "The paper's claims", len(header)
     return Table(
-        "claims",
-        "The paper's claims",
-        "The paper's claims",
-        claims,
-        header,
-        (Part(run), Part(not_run, "Not run")),
-        VERDICT_RULES,
-        n_text_columns=len(header),
+        "claims", title, title, claims, header, parts, VERDICT_RULES, n_text_columns=n_text
     )
 
 

@@ -67,7 +67,7 @@ def example_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
     return [method_label(method) for method in methods], rows
 
 
-def comparison_notes(name: str, cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
+def comparison_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
     """Say what is shown, how many objects it rests on, and what the difference is."""
     yield _legend(cells)
     objects = cells.groupby("row_label", sort=False)["n_objects"].max()
@@ -80,20 +80,18 @@ def comparison_notes(name: str, cells: pd.DataFrame, settings: ReportSettings) -
             f"{_difference_title(settings)} is the paired difference with its 95 % interval over "
             f"objects ({settings.n_resamples} resamples)."
         )
-    yield from _published_notes(name, cells)
 
 
-def fold_notes(name: str, cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
+def fold_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
     """Say what is shown, and how many objects all folds together rest on."""
     yield _legend(cells)
     yield f"{_counts(cells)}."
     yield "The average is over the pooled images of all folds."
-    yield from _published_notes(name, cells)
 
 
-def example_notes(name: str, cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
-    """Say what is to be known about the published examples."""
-    yield from _published_notes(name, cells)
+def published_notes(name: str, cells: pd.DataFrame) -> list[str]:
+    """Return what is to be known about the published figures that a table shows."""
+    return [note.text for note in PUBLISHED[name].notes if _explains(note, cells)]
 
 
 def _methods(cells: pd.DataFrame) -> list[str]:
@@ -148,12 +146,6 @@ def _legend(cells: pd.DataFrame) -> str:
 def _counts(cells: pd.DataFrame) -> str:
     objects, images = int(cells["n_objects"].max()), int(cells["n_images"].max())
     return f"{objects} test objects, {images:,} initial views"
-
-
-def _published_notes(name: str, cells: pd.DataFrame) -> Iterator[str]:
-    for note in PUBLISHED[name].notes:
-        if _explains(note, cells):
-            yield note.text
 
 
 def _explains(note: Note, cells: pd.DataFrame) -> bool:

@@ -5,7 +5,7 @@ Their CSV files are tidy, one row per cell; see `nbv.reporting.cells` for the co
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,16 +39,7 @@ Evaluations = Mapping[Unit, pd.DataFrame]
 def build_table(
     name: str, evaluations: Evaluations, settings: ReportSettings | None = None
 ) -> Table:
-    """Build one of the paper's tables from whatever of it was run.
-
-    Parameters
-    ----------
-    name : str
-        ``table1`` to ``table7``.
-    evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
-        Frames of `results.load_evaluations`. Tables have rows for what is present only.
-    settings : ReportSettings, optional
-        Defaults are the paper's.
+    """Build one of `TABLES` from whatever of it was run; the default settings are the paper's.
 
     Raises
     ------
@@ -70,7 +61,7 @@ def build_table(
         cells,
         (made.row_title, *header),
         tuple(rows),
-        (*made.notes, *kind.notes(name, cells, chosen)),
+        (*made.notes, *kind.notes(cells, chosen), *layout.published_notes(name, cells)),
     )
 
 
@@ -90,7 +81,7 @@ class _Kind:
 
     measure: Callable[[str, Evaluations, ReportSettings], _Measured]
     body: Callable[[pd.DataFrame, ReportSettings], Body] = layout.comparison_body
-    notes: Callable[[str, pd.DataFrame, ReportSettings], Iterator[str]] = layout.comparison_notes
+    notes: Callable[[pd.DataFrame, ReportSettings], Iterable[str]] = layout.comparison_notes
 
 
 def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
@@ -193,10 +184,9 @@ def _published_of_focus(unit: Unit, cells: list[dict[str, Any]]) -> list[dict[st
 def _with_published(cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return cells with what the paper prints in the same place."""
     place = ("table", "metric", "row", "method")
-    found = [published.published_value(*(one[key] for key in place)) for one in cells]
     return [
-        one | {"published": np.nan if figure is None else figure}
-        for one, figure in zip(cells, found, strict=True)
+        one | {"published": published.published_value(*(one[key] for key in place))}
+        for one in cells
     ]
 
 
@@ -206,7 +196,7 @@ _KINDS: Mapping[str, _Kind] = {
     "table3": _Kind(_by_category),
     "table4": _Kind(_by_elevation),
     "table5": _Kind(_by_group),
-    "table6": _Kind(_examples, layout.example_body, layout.example_notes),
+    "table6": _Kind(_examples, layout.example_body, lambda *_: ()),
     "table7": _Kind(_by_fold, layout.fold_body, layout.fold_notes),
 }
 

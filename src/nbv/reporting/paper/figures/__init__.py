@@ -25,73 +25,69 @@ class FigureKind:
 
     draw: Callable[[FigureInputs], Figure]
     caption: str
-    needs: frozenset[str]
-
-
-def _kind(draw: Callable[[FigureInputs], Figure], caption: str, needs: str = "") -> FigureKind:
-    return FigureKind(draw, caption, frozenset(needs.split()))
+    needs: tuple[str, ...] = ()
 
 
 FIGURES: Mapping[str, FigureKind] = {
-    "figure2": _kind(
+    "figure2": FigureKind(
         choice.selection,
         "Figure 2. The criterion (the paper's: ambiguity) selects the next viewpoint: an initial "
         "view from where the category's single-view error is largest, the recommended, the "
         "opposite and the worst next view, and the cost of each. The object has the median "
         "single-view error of its fold.",
-        "depth splits lookups",
+        ("depth", "splits", "lookups"),
     ),
-    "figure3": _kind(
+    "figure3": FigureKind(
         choice.idea,
         "Figure 3. The idea: how widely the pose is spread given one view's estimate (top), how "
         "widely the paper's Eq. 3 expects it to be spread with a second view, for the recommended "
         "and the worst rotation (middle), and what is left once the second view's estimate is in "
         "(bottom; both estimates combined by Bayes' rule).",
-        "depth splits lookups",
+        ("depth", "splits", "lookups"),
     ),
-    "figure5": _kind(
+    "figure5": FigureKind(
         views.categories,
         "Figure 5. Depth images of each category. Nearer is brighter; white is background.",
-        "depth",
+        ("depth",),
     ),
-    "figure6": _kind(
+    "figure6": FigureKind(
         views.elevations,
         "Figure 6. Depth images at different elevations. Nearer is brighter; white is background.",
-        "depth",
+        ("depth",),
     ),
-    "figure7": _kind(
+    "figure7": FigureKind(
         choice.picks,
         "Figure 7. The next view of each method for the initial image of Figure 2, and the pose "
         "estimated from both.",
-        "depth splits",
+        ("depth", "splits"),
     ),
-    "figure8": _kind(
+    "figure8": FigureKind(
         views.groups,
         "Figure 8. The four groups of initial viewpoints of Table 5.",
-        "depth",
+        ("depth",),
     ),
-    "figure9": _kind(
+    "figure9": FigureKind(
         errors.boxplots,
         "Figure 9. Pose errors by category and method. Above as in the paper (minimum, quartiles, "
         "median, maximum); below with whiskers to the 5th and 95th percentile. No point is left "
         "out as an outlier, and none is drawn singly.",
     ),
-    "pea": _kind(
+    "pea": FigureKind(
         errors.accuracy,
         "Pose estimation accuracy: the fraction of images with an error below the threshold. The "
         "pAUC is the area below a curve on a linear axis.",
     ),
-    "azimuth": _kind(
+    "azimuth": FigureKind(
         errors.by_azimuth,
         "Mean error by initial azimuth, a running mean over 15°. Dotted lines bound the viewpoint "
         "groups.",
     ),
-    "heatmaps": _kind(
+    "heatmaps": FigureKind(
         heatmaps.lookup_maps,
         "One fold's lookup table: the true viewpoint's likelihood given the estimate, and the cost "
         "of each rotation with the recommended one marked. A good estimator's likelihood lies on "
         "the dotted diagonal.",
-        "lookups",
+        ("lookups",),
     ),
 }
 """Figures by name, in the order of a report."""

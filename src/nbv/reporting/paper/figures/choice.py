@@ -17,7 +17,7 @@ from nbv.reporting.paper.figures.inputs import (
     cost_words,
     example_view,
 )
-from nbv.reporting.style import INK, MUTED, azimuth_axis, method_style, new_figure
+from nbv.reporting.style import INK, MUTED, azimuth_axis, new_figure
 
 Likelihood = NDArray[np.float32]
 
@@ -33,21 +33,12 @@ def selection(inputs: FigureInputs) -> Figure:
     best = round(int(lookup.recommended_delta_deg[first]) / step)
     worst = int(np.argmax(row))
     words = cost_words(lookup)
-    candidates = [
-        (best, "recommended"),
-        (round(180 / step), "opposite"),
-        (worst, "worst"),
-    ]
+    candidates = [(best, "recommended"), (round(180 / step), "opposite"), (worst, "worst")]
     figure = new_figure(8.0, 4.2)
     grid = figure.add_gridspec(2, 4, width_ratios=(1.15, 1, 1, 1), height_ratios=(1.0, 0.95))
     limits = depth_limits(shown.views)
-    initial = figure.add_subplot(grid[0, 0])
-    draw_depth(
-        initial,
-        shown.view(shown.azimuth_deg),
-        limits,
-        f"Initial view, φ = {shown.azimuth_deg}°\nestimate {round(shown.estimate_deg) % 360}°",
-    )
+    title = f"Initial view, φ = {shown.azimuth_deg}°\nestimate {round(shown.estimate_deg) % 360}°"
+    draw_depth(figure.add_subplot(grid[0, 0]), shown.view(shown.azimuth_deg), limits, title)
     for column, (delta_bin, name) in enumerate(candidates, 1):
         azimuth = float(wrap_deg(shown.azimuth_deg + delta_bin * step))
         axes = figure.add_subplot(grid[0, column])
@@ -167,15 +158,14 @@ def picks(inputs: FigureInputs) -> Figure:
         draw_depth(panel, shown.view(azimuth), limits, method_label(method))
         panel.set_xlabel(f"δ = {delta:.0f}°, view at {azimuth:.0f}°\n{_result(shown, method)}")
         for spine in panel.spines.values():
-            spine.set_color(method_style(method, inputs.settings.methods).color)
+            spine.set_color(inputs.style(method).color)
             spine.set_linewidth(2.0)
     figure.suptitle(f"Next views for one image: {shown.title}", fontsize=10)
     return figure
 
 
 def _delta(shown: ExampleView, method: str) -> float:
-    value = shown.outcomes[method]["delta_deg"]
-    return float(value) if value == value else float("nan")
+    return float(shown.outcomes[method]["delta_deg"])
 
 
 def _result(shown: ExampleView, method: str) -> str:

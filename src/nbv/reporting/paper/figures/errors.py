@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +16,7 @@ from nbv.experiments.results import Unit
 from nbv.labels import method_label
 from nbv.reporting.paper.figures.inputs import FigureInputs
 from nbv.reporting.settings import common_elevation_deg, reference_units, unit_label
-from nbv.reporting.style import INK, MUTED, azimuth_axis, method_style, new_figure
+from nbv.reporting.style import INK, MUTED, azimuth_axis, new_figure
 from nbv.statistics import metrics
 from nbv.statistics.paired import PairedErrors, pair_methods
 
@@ -33,7 +34,7 @@ def boxplots(inputs: FigureInputs) -> Figure:
     errors = {unit: _paired(inputs, unit).errors_deg for unit in units}
     for axes, whiskers in ((whole, (0, 100)), (close, (5, 95))):
         for index, method in enumerate(methods):
-            style = method_style(method, inputs.settings.methods)
+            style = inputs.style(method)
             offset = (index - (len(methods) - 1) / 2) * 0.8 / len(methods)
             boxes = axes.boxplot(
                 [errors[unit][method] for unit in units],
@@ -67,8 +68,8 @@ def boxplots(inputs: FigureInputs) -> Figure:
     close.set_ylim(0, max(_close_limit_deg(e) for unit in units for e in errors[unit].values()))
     handles: list[Patch | Line2D] = [
         Patch(
-            facecolor=method_style(m, inputs.settings.methods).color,
-            hatch=method_style(m, inputs.settings.methods).hatch,
+            facecolor=inputs.style(m).color,
+            hatch=inputs.style(m).hatch,
             edgecolor=INK,
             label=method_label(m),
         )
@@ -97,14 +98,8 @@ def accuracy(inputs: FigureInputs) -> Figure:
     for axes, unit in zip(panels, units, strict=True):
         sample = _paired(inputs, unit)
         for method in inputs.methods(unit):
-            style = method_style(method, inputs.settings.methods)
-            axes.plot(
-                thresholds,
-                metrics.pea(sample.errors_deg[method], thresholds),
-                color=style.color,
-                linestyle=style.line,
-                linewidth=style.width,
-            )
+            accuracies = metrics.pea(sample.errors_deg[method], thresholds)
+            axes.plot(thresholds, accuracies, **inputs.style(method).curve)
         # Equal steps of the square root spread out the small thresholds, where methods differ.
         axes.set_xscale("function", functions=(np.sqrt, np.square))
         axes.set_xlim(0, metrics.PAUC_LIMIT_DEG)
@@ -126,15 +121,10 @@ def by_azimuth(inputs: FigureInputs) -> Figure:
     for axes, unit in zip(panels, units, strict=True):
         sample = _paired(inputs, unit)
         for position, method in enumerate(inputs.methods(unit)):
-            azimuths, means = _mean_by_azimuth(sample, method)
-            style = method_style(method, inputs.settings.methods)
             axes.plot(
-                azimuths,
-                means,
-                color=style.color,
-                linestyle=style.line,
-                linewidth=style.width,
-                marker=style.marker,
+                *_mean_by_azimuth(sample, method),
+                **inputs.style(method).curve,
+                marker=inputs.style(method).marker,
                 markersize=4,
                 markevery=(position * 11, 45),
             )
@@ -142,16 +132,8 @@ def by_azimuth(inputs: FigureInputs) -> Figure:
             axes.axvline(boundary, color=MUTED, linewidth=0.7, linestyle=":")
         axes.set_ylim(0, 1.1 * axes.get_ylim()[1])
         for group, centre in ((1, 22), (2, 90), (3, 180), (4, 270), (1, 338)):
-            axes.text(
-                centre,
-                0.99,
-                str(group),
-                ha="center",
-                va="top",
-                fontsize=8,
-                color=MUTED,
-                transform=axes.get_xaxis_transform(),
-            )
+            place: Any = {"ha": "center", "va": "top", "transform": axes.get_xaxis_transform()}
+            axes.text(centre, 0.99, str(group), fontsize=8, color=MUTED, **place)
         axes.grid(visible=False, axis="x")
         axes.set_title(unit_label(unit, common))
         axes.set_ylabel("Mean error (degrees)")
@@ -168,12 +150,9 @@ def _mean_by_azimuth(
     sample: PairedErrors, method: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     azimuths, index = np.unique(sample.initial_deg, return_inverse=True)
-    sums = np.bincount(index, weights=sample.errors_deg[method])
-    means = sums / np.bincount(index)
-    width = max(round(_WINDOW_DEG * azimuths.size / 360), 1)
-    half = width // 2
-    smooth = np.mean([np.roll(means, shift) for shift in range(-half, half + 1)], axis=0)
-    return azimuths, smooth
+    means = np.bincount(index, weights=sample.errors_deg[method]) / np.bincount(index)
+    half = round(_WINDOW_DEG * azimuths.size / 360) // 2
+    return azimuths, np.mean([np.roll(means, shift) for shift in range(-half, half + 1)], axis=0)
 
 
 def _paired(inputs: FigureInputs, unit: Unit) -> PairedErrors:
@@ -194,19 +173,15 @@ def _panels(units: Sequence[Unit], height_in: float) -> tuple[Figure, list[Axes]
 def _line_legend(
     figure: Figure, inputs: FigureInputs, units: Sequence[Unit], markers: bool = False
 ) -> None:
-    handles = []
-    for method in inputs.methods(units[0]):
-        style = method_style(method, inputs.settings.methods)
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=style.color,
-                linestyle=style.line,
-                linewidth=style.width,
-                marker=style.marker if markers else "",
-                markersize=4,
-                label=method_label(method),
-            )
+    handles = [
+        Line2D(
+            [],
+            [],
+            **inputs.style(method).curve,
+            marker=inputs.style(method).marker if markers else "",
+            markersize=4,
+            label=method_label(method),
         )
+        for method in inputs.methods(units[0])
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), handlelength=3.2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
@@ -27,27 +29,14 @@ def lookup_maps(inputs: FigureInputs) -> Figure:
     half = 180 / likelihood.shape[0]
     extent = (-half, 360 - half, -half, 360 - half)
     top = likelihood.max()
-    shown = left.imshow(
-        likelihood.T,
-        origin="lower",
-        extent=extent,
-        cmap="cividis",
-        norm=LogNorm(top / 10**_DECADES, top),
-        interpolation="nearest",
-        aspect="auto",
-    )
+    image: Any = {"origin": "lower", "extent": extent, "cmap": "cividis"}
+    image |= {"interpolation": "nearest", "aspect": "auto"}
+    shown = left.imshow(likelihood.T, norm=LogNorm(top / 10**_DECADES, top), **image)
     left.plot([0, 360], [0, 360], color="black", linewidth=1.0, linestyle=":")
     left.set_title("Viewpoint likelihood V[e, φ]")
     azimuth_axis(left, "True viewpoint φ (degrees)", vertical=True)
     figure.colorbar(shown, ax=left, label="Probability per bin (log scale)", extend="min")
-    shown = right.imshow(
-        cost.T,
-        origin="lower",
-        extent=extent,
-        cmap="cividis",
-        interpolation="nearest",
-        aspect="auto",
-    )
+    shown = right.imshow(cost.T, **image)
     n_bins = cost.shape[0]
     right.plot(
         np.arange(n_bins) * 360 / n_bins,

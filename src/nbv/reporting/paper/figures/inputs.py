@@ -19,6 +19,7 @@ from nbv.recommendation.criteria import cost_unit
 from nbv.recommendation.lookup import LookupTable, load_lookup
 from nbv.reporting.paper.examples import Example, choose_example, example_row, hardest_azimuth_deg
 from nbv.reporting.settings import ReportSettings, focus_unit
+from nbv.reporting.style import MethodStyle, method_style
 
 Codes = NDArray[np.uint8]
 Key = TypeVar("Key")
@@ -88,6 +89,10 @@ class FigureInputs:
         present = set(self.evaluations[unit]["method"].astype(str))
         return tuple(method for method in self.settings.methods if method in present)
 
+    def style(self, method: str) -> MethodStyle:
+        """Return how a method of the settings is drawn."""
+        return method_style(method, self.settings.methods)
+
 
 @dataclass(frozen=True)
 class ExampleView:
@@ -150,16 +155,9 @@ def example_view(inputs: FigureInputs) -> ExampleView:
 
 @dataclass(frozen=True)
 class CostWords:
-    """How figures name what a criterion gives.
+    """How figures name what selects the next view, what a lookup table holds, and the table.
 
-    Attributes
-    ----------
-    selects : str
-        What selects the next view: the paper's ambiguity, or another criterion.
-    cost, unit : str
-        What a cell of the lookup table holds.
-    table : str
-        The lookup table: the paper's goes by the spread that its ambiguity is.
+    The paper's table goes by the spread that its ambiguity is.
     """
 
     selects: str
@@ -180,13 +178,7 @@ def cost_words(lookup: LookupTable) -> CostWords:
 
 
 def _given(files: Mapping[Key, Path], key: Key, kind: str) -> Path:
-    """Return the file of a key.
-
-    Raises
-    ------
-    UserError
-        If there is none.
-    """
+    """Return the file of a key, or raise a UserError."""
     if key not in files:
         place = " ".join(map(str, key)) if isinstance(key, tuple) else key
         raise UserError(f"no {kind} for {place}; run that stage first")
