@@ -1,5 +1,6 @@
 """Documents: their links, the files they name, the glossary, and words that have a better one."""
 
+import pkgutil
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -127,3 +128,17 @@ def test_no_banned_word_is_left() -> None:
                 line = text.count("\n", 0, match.start())
                 found.append(f"{name}:{line}: {match[0]!r}; say {better}")
     assert not found, "\n".join(["", *found])
+
+
+def test_every_name_of_the_package_that_a_text_gives_exists() -> None:
+    """`nbv.module.name` in docstrings, comments and documents leads somewhere."""
+    missing = []
+    for path in scanned():
+        if path.suffix not in {".py", ".smk", ".md", ".yaml"} or "tests" in path.parts:
+            continue
+        for name in set(re.findall(r"`(nbv(?:\.\w+)+)`", path.read_text("utf-8"))):
+            try:
+                pkgutil.resolve_name(name)
+            except (ImportError, AttributeError):
+                missing.append(f"{path.relative_to(ROOT)}: {name}")
+    assert not missing, missing

@@ -6,7 +6,7 @@ import re
 from itertools import product
 from pathlib import Path
 
-from nbv.layout import Layout, fold_folder, unit_folder
+from nbv.layout import Layout, files_by_run, fold_folder, unit_folder
 
 ROOT = Path(__file__).parents[1]
 LAYOUT = Layout("results/paper")
@@ -67,3 +67,11 @@ def test_rules_and_scripts_spell_no_path():
     for path in [*ROOT.glob("workflow/rules/**/*.smk"), *ROOT.glob("workflow/scripts/*.py")]:
         code = re.sub(r"\.(?:log|benchmark)\(\s*f?\".*?\"\s*\)", "", path.read_text(), flags=re.S)
         assert not spelt.search(code), path
+
+
+def test_files_are_told_apart_by_run():
+    keys = [("one", "mug", 1), ("two", "mug", 1), ("one", "mug", 2)]
+    assert files_by_run(keys, ["a", "b", "c"]) == {
+        "one": {("mug", 1): "a", ("mug", 2): "c"},
+        "two": {("mug", 1): "b"},
+    }

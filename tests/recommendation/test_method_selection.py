@@ -77,7 +77,6 @@ def test_where_no_method_is_surely_better_the_papers_opposite_is_taken():
         ("x", "none", "posterior", "takes no second view"),
         ("x", "selected", "selected", "none to be selected"),
         ("x", "oracle", "posterior", "no other extension fuses by posterior"),
-        ("opposite_average", "opposite", "average", r"repeats methods\.opposite; remove it"),
         ("x", "opposite", "product", "choose estimator=classifier"),
     ],
 )

@@ -46,6 +46,18 @@ def test_a_wrong_setting(fresh, override, message):
     assert not fresh.results.exists()
 
 
+def test_another_criterion_for_proposed_is_a_run_like_any_other(fresh):
+    """Its lookup table has another name and unit; the figures that show it are still planned."""
+    jobs = fresh.would_run("methods.proposed.policy=expected_error")
+    assert (jobs["lookup"], jobs["figure"]) == (4, 10)
+
+
+def test_proposed_without_a_lookup_table_plans_no_figure_of_one(fresh):
+    jobs = fresh.would_run("methods={proposed: {policy: opposite}}")
+    assert "lookup" not in jobs
+    assert jobs["figure"] == 7
+
+
 def test_a_root_that_does_not_exist(fresh):
     settings = (*TINY, FOLDER, "dataset.root=nowhere")
     done = fresh.run("--cores", "1", overrides=settings, fails=True)

@@ -68,8 +68,8 @@ def check_methods(methods: Methods, extensions: Methods, gives_distributions: bo
     Raises
     ------
     UserError
-        Where a policy or a fusion is unknown or cannot be had, where an extension's name stands
-        for something else already, or where an extension repeats a method of the paper.
+        Where a policy or a fusion is unknown or cannot be had, or where an extension's name stands
+        for something else already.
     """
     for name, method in methods.items():
         key = f"methods.{name}"
@@ -77,13 +77,10 @@ def check_methods(methods: Methods, extensions: Methods, gives_distributions: bo
         if method["policy"] == ORACLE or method["fusion"] != "average":
             raise UserError(f"{key}: oracles and fusion other than average belong under extensions")
     taken = {*methods, *(method["policy"] for method in methods.values())}
-    paper = {(method["policy"], method["fusion"]): name for name, method in methods.items()}
     for name, method in extensions.items():
         key, policy, fusion = f"extensions.{name}", method["policy"], method["fusion"]
         if name in taken:
             raise UserError(f"{key}: the name is taken by a method; choose another")
-        if (policy, fusion) in paper:
-            raise UserError(f"{key}: it repeats methods.{paper[policy, fusion]}; remove it")
         _check_names(key, {k: v for k, v in method.items() if v != SELECTED})
         if policy == SINGLE:
             raise UserError(f"{key}.policy={SINGLE}: it takes no second view")

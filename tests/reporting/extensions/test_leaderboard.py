@@ -26,6 +26,16 @@ def test_methods_come_by_mean_rank_and_bounds_last():
     assert ranks == [f"{rank:.2f}" for rank in range(1, 9)] + ["–"]
 
 
+def test_a_method_of_two_names_is_ranked_once():
+    twin = METHODS | {"opposite_average": {"policy": "opposite", "fusion": "average"}}
+    shifts = SHIFTS | {"opposite_average": SHIFTS["opposite"]}
+    both, once = board(shifts, twin), board()
+    assert texts(both).keys() == texts(once).keys()
+    assert {name: row[-1] for name, row in texts(both).items()} == {
+        name: row[-1] for name, row in texts(once).items()
+    }
+
+
 def test_cells_are_maes_and_paired_differences_to_the_opposite_view():
     rows = object_rows()
     table = board()
@@ -70,7 +80,7 @@ def test_friedmans_test_ranks_each_method_once():
 
 def test_a_fair_method_may_have_any_name():
     name = "oracle_like_chosen_selected"
-    table = board(SHIFTS | {name: 1.5}, METHODS | {name: METHODS["fixed_average"]})
+    table = board(SHIFTS | {name: 1.5}, METHODS | {name: {"policy": "expected_error"}})
     assert texts(table)[name.replace("_", " ")][-1] == "3.00"
 
 

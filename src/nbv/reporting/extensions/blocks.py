@@ -73,10 +73,16 @@ def rows_by_category(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.Data
 
 
 def shared_methods(blocks: Blocks, methods: Methods) -> list[str]:
-    """Return the methods of the configuration that every block has."""
+    """Return the methods of the configuration that every block has.
+
+    Of several with the same policy and fusion, only the first is ranked: they are one method.
+    """
     first = next(iter(blocks.values()))
     everywhere = [m for m in first.errors_deg if all(m in s.errors_deg for s in blocks.values())]
-    return [method for method in everywhere if method in methods]
+    named = {
+        method_with(methods, m["policy"], m.get("fusion", "average")) for m in methods.values()
+    }
+    return [method for method in everywhere if method in named]
 
 
 def method_with(methods: Methods, policy: str, fusion: str) -> str | None:
