@@ -82,7 +82,7 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
         return {name: stored[name] for name in stored.files}
 
 
-def existing(path: Path) -> Path:
+def existing(path: str | Path) -> Path:
     """Return `path`.
 
     Raises
@@ -90,6 +90,6 @@ def existing(path: Path) -> Path:
     UserError
         If no file is there.
     """
-    if not path.is_file():
+    if not Path(path).is_file():
         raise UserError(f"{path} does not exist; finish the run first, or is it another folder?")
-    return path
+    return Path(path)

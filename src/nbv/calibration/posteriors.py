@@ -13,8 +13,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize_scalar
-from scipy.special import log_softmax
 
 from nbv.angles import nearest_bin
 from nbv.errors import UserError
@@ -24,6 +22,13 @@ Floats = NDArray[np.float64]
 
 TEMPERATURES = (0.05, 20.0)
 """The least and the largest temperature that `fit_temperature` finds."""
+
+
+def _log_softmax(logits: NDArray[np.floating]) -> Floats:
+    # Half a second of imports, which only the jobs of a classifier need.
+    from scipy.special import log_softmax
+
+    return np.asarray(log_softmax(logits, axis=-1))
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,7 @@ class Posteriors:
     def as_trained(self) -> Floats:
         """The log of the distributions at a temperature of 1, (n, n_views, k)."""
         logits = self.log_posterior.astype(np.float64) * self.temperature
-        return np.asarray(log_softmax(logits, axis=-1))
+        return _log_softmax(logits)
 
 
 def on_degrees(posterior: Floats, n_bins: int = 360) -> Floats:
@@ -122,9 +127,10 @@ def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:
     azimuth_deg : array-like, broadcasting to (...)
         The truth.
     """
+    from scipy.optimize import minimize_scalar
 
     def loss(log_temperature: float) -> float:
-        tempered = log_softmax(logits / np.exp(log_temperature), axis=-1)
+        tempered = _log_softmax(logits / np.exp(log_temperature))
         return -float(log_likelihood(tempered, azimuth_deg).mean())
 
     bounds = tuple(np.log(TEMPERATURES))
@@ -133,7 +139,7 @@ def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:
 
 def posteriors_of(object_ids: Sequence[str], logits: Floats, temperature: float) -> Posteriors:
     """Return the distributions softmax(logits / temperature) of full turns (n, n_views, k)."""
-    return Posteriors(tuple(object_ids), log_softmax(logits / temperature, axis=-1), temperature)
+    return Posteriors(tuple(object_ids), _log_softmax(logits / temperature), temperature)
 
 
 def write_posteriors(path: str | Path, posteriors: Posteriors) -> None:
