@@ -7,11 +7,16 @@ import os
 # As in the workflow's jobs: products of small matrices on several threads wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import hypothesis
 import numpy as np
 import pytest
 
 import synthetic
 from nbv.experiments.results import load_evaluations
+
+# Machines are noisy, and a first example may import a library: no test is timed.
+hypothesis.settings.register_profile("untimed", deadline=None)
+hypothesis.settings.load_profile("untimed")
 
 UNITS = (("mug", 0), ("mug", 30), ("chair", 0))
 N_FOLDS = 3
