@@ -100,8 +100,8 @@ def _neighbours(azimuth_deg: ArrayLike, n_classes: int) -> tuple[NDArray[np.intp
     return below.astype(np.intp) % n_classes, place - below
 
 
-def answer_likelihood(posteriors: Posteriors) -> Floats:
-    """Return L[viewpoint, answer] (k, k) of answers that are drawn from images' distributions.
+def estimate_likelihood(posteriors: Posteriors) -> Floats:
+    """Return L[viewpoint, estimate] (k, k) of estimates that are drawn from images' distributions.
 
     The mean of p(class | image) over all images of a viewpoint, which is as smooth as the
     distributions and has no setting. The posteriors are of objects that the network was not trained

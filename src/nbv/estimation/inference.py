@@ -1,4 +1,4 @@
-"""What a trained network answers for images."""
+"""The outputs of a trained network for images, and the azimuth that they give."""
 
 from __future__ import annotations
 

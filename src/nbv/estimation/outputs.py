@@ -53,7 +53,7 @@ def decode_directions(outputs: Outputs) -> Outputs:
 def decode_classes(outputs: Outputs) -> Outputs:
     """Return the mean direction of the softmax of logits (..., k), degrees in [0, 360).
 
-    It is the direction of the mean of exp(i theta): the answer of least expected 1 - cos(error).
+    It is the direction of the mean of exp(i theta): the estimate of least expected 1 - cos(error).
     """
     n_classes = outputs.shape[-1]
     angles = 2 * np.pi * np.arange(n_classes) / n_classes

@@ -1,4 +1,4 @@
-"""What less travel costs in error: each table with a price on degrees, or with a limit."""
+"""Error against travel: each lookup table with a travel cost, or with a limit on travel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nbv.recommendation.lookup import least_cost_delta
 from nbv.recommendation.method_selection import SelectedMethod
 from nbv.recommendation.policies import Turns, take_second_views
 
-# Multiples of the price at which the camera would, for the average estimate, rather stay.
+# Multiples of the travel cost at which, for the average estimate, staying costs as little as going.
 RELATIVE_COSTS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0)
 LIMITS_DEG = (15, 30, 45, 60, 90, 120, 150, 180)
 ANY_DIRECTION = "either_way"
@@ -26,7 +26,7 @@ COLUMNS = ("method", "rule", "setting", "travel_deg", "error_deg", "n_images")
 def travel_rows(selected: Mapping[str, SelectedMethod], test: Estimates) -> pd.DataFrame:
     """Return error against travel for every extension of a fold that follows a table.
 
-    Columns are `COLUMNS`, means over test images. Rule ``cost``: `setting` is the price in the
+    Columns are `COLUMNS`, means over test images. Rule ``cost``: `setting` is the cost in the
     criterion's unit per degree, at each of `RELATIVE_COSTS` times the table's mean range over 180
     degrees. Rule ``limit``: `setting` is the longest travel allowed, degrees. Under the name
     `ANY_DIRECTION` with its fusion, rule ``fixed``: travel by `setting` degrees one way or the
@@ -58,8 +58,8 @@ def _restricted(cost: NDArray[np.float32]) -> Iterator[tuple[str, float, Rotatio
     """Yield a rule, its setting and the rotation for each estimate under it."""
     per_degree = float(np.ptp(cost, axis=1).mean()) / 180.0
     for relative in RELATIVE_COSTS:
-        price = relative * per_degree
-        yield "cost", price, least_cost_delta(cost, travel_cost=price)
+        travel_cost = relative * per_degree
+        yield "cost", travel_cost, least_cost_delta(cost, travel_cost=travel_cost)
     for limit in LIMITS_DEG:
         yield "limit", limit, least_cost_delta(cost, max_travel_deg=limit)
 
@@ -67,7 +67,7 @@ def _restricted(cost: NDArray[np.float32]) -> Iterator[tuple[str, float, Rotatio
 def pooled_travel(frames: Mapping[int, pd.DataFrame]) -> pd.DataFrame:
     """Return the curves of several folds as one, weighted by their images.
 
-    The k-th price of one fold is averaged with the k-th of the others: prices are relative to
+    The k-th cost of one fold is averaged with the k-th of the others: costs are relative to
     each fold's own table.
     """
     parts = []

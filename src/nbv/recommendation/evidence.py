@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.calibration.density import Conditionals, conditionals
-from nbv.calibration.posteriors import Posteriors, answer_likelihood
+from nbv.calibration.posteriors import Posteriors, estimate_likelihood
 
 Table = NDArray[np.float32]
 
@@ -129,6 +129,6 @@ def posterior_evidence(calibration: Posteriors, settings: Mapping[str, Any]) -> 
     Bins are the classes. Nothing is smoothed, for the distributions are smooth already; without
     calibration estimates no criterion in `nbv.recommendation.criteria.OF_ERRORS` is defined.
     """
-    answers = answer_likelihood(calibration)
-    pair = Conditionals(answers.T / answers.sum(axis=0)[:, None], answers)
-    return Evidence(np.empty((0, len(answers))), pair, np.nan, np.nan, settings)
+    estimates = estimate_likelihood(calibration)
+    pair = Conditionals(estimates.T / estimates.sum(axis=0)[:, None], estimates)
+    return Evidence(np.empty((0, len(estimates))), pair, np.nan, np.nan, settings)

@@ -71,7 +71,7 @@ def posterior(
 ) -> Angles:
     """Return the mean direction of the pose given both estimates (docs/method.md).
 
-    The direction of sum_theta V[e1, theta] L[theta + delta, e2] exp(i theta): of all answers the
+    The direction of sum_theta V[e1, theta] L[theta + delta, e2] exp(i theta): of all poses the
     one of least expected 1 - cos(error), where the errors of two views are independent.
 
     Parameters

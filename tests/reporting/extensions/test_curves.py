@@ -21,7 +21,7 @@ def cells_of(methods):
 
 
 def travelled():
-    """Fixed travel for the baseline; prices and limits for the criterion."""
+    """Fixed travel for the baseline; travel costs and limits for the criterion."""
     rows = [("either_way_average", "fixed", t, t, 9 - t / 30) for t in (0, 90, 180)]
     rows += [("gain_posterior", "cost", p, 170 - 50 * p, 3 + p) for p in (0, 1, 2)]
     rows += [("gain_posterior", "limit", 90, 60, 50.0)]
@@ -41,13 +41,13 @@ def test_a_curve_for_each_policy_by_number_of_views():
         assert list(line.get_ydata()) == [9.0, 4.5, 3.0]
 
 
-def test_a_curve_for_each_price_and_none_for_limits():
+def test_a_curve_for_each_travel_cost_and_none_for_limits():
     figure = travel_figure({"mug": travelled(), "car": travelled()}, METHODS)
     assert [axes.get_title() for axes in figure.axes if axes.get_visible()] == ["Mug", "Car"]
-    fixed, priced = figure.axes[0].lines
+    fixed, costed = figure.axes[0].lines
     assert list(fixed.get_ydata()) == [9, 6, 3]
-    assert list(priced.get_xdata()) == [70, 120, 170]
-    assert list(priced.get_ydata()) == [5, 4, 3]
+    assert list(costed.get_xdata()) == [70, 120, 170]
+    assert list(costed.get_ydata()) == [5, 4, 3]
     assert figure.axes[0].get_xlabel() == "Mean travel (°)"
 
 

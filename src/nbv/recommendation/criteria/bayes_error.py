@@ -38,12 +38,12 @@ def bayes_error(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     expected = np.empty(rows.shape, dtype=np.float32)
     for deltas in rotation_groups(n_bins, len(rows) * n_objects * len(pose)):
         moments = evidence.first_moments(rows, deltas)
-        answer = direction_deg(moments[:, 0], moments[:, 1]).astype(np.float32)
+        fused = direction_deg(moments[:, 0], moments[:, 1]).astype(np.float32)
         # By rotation, estimate and belief: what is gathered below lies together.
-        answer = np.ascontiguousarray(answer.transpose(0, 2, 1))
+        fused = np.ascontiguousarray(fused.transpose(0, 2, 1))
         place = np.arange(len(deltas))[:, None]
         seen = given[:, (pose + deltas.start + place) % n_bins]
-        apart = np.abs(answer[place, seen] - pose_deg[:, None])
+        apart = np.abs(fused[place, seen] - pose_deg[:, None])
         # Both lie in [0, 360), where this is the circular distance.
         error = np.minimum(apart, 360.0 - apart).sum(axis=0)
         expected[:, deltas.start : deltas.stop] = (error * weights.T).sum(axis=1).T

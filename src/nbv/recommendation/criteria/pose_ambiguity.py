@@ -17,8 +17,8 @@ POSE_LIKELIHOODS = ("given_estimate", "given_truth")
 def pose_likelihood(conditionals: Conditionals, name: str) -> Table:
     """Return T[viewpoint, pose] = p(pose | viewpoint) under one of its two interpretations.
 
-    ``given_estimate``: how spread the truth is when the estimator answers the viewpoint (T = V).
-    ``given_truth``: how spread the answers are when the viewpoint is the truth (T = L).
+    ``given_estimate``: how spread the truth is when the viewpoint is the estimate (T = V).
+    ``given_truth``: how spread the estimates are when the viewpoint is the truth (T = L).
     """
     if name not in POSE_LIKELIHOODS:
         raise UserError(f"density.pose_likelihood={name}: {nearest(name, POSE_LIKELIHOODS)}")
@@ -41,7 +41,7 @@ def two_view_poses(viewpoint: Table, pose: Table, delta_bins: int) -> Table:
     Returns
     -------
     ndarray (n, B) float32
-        Rows are distributions. Two answers that exclude each other say nothing about the pose.
+        Rows are distributions. Two estimates that exclude each other say nothing about the pose.
     """
     return _mixed(viewpoint, pose, np.roll(pose, (-delta_bins, -delta_bins), axis=(0, 1)))
 

@@ -84,7 +84,7 @@ def travel_curves(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFra
 
 @mpl.rc_context(RC)
 def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
-    """Draw error against mean travel as its price rises, a panel for each of `travel_curves`."""
+    """Draw error against mean travel as its cost rises, a panel for each of `travel_curves`."""
     figure, panels = _grid(len(curves))
     for axes, (category, rows) in zip(panels, curves.items(), strict=True):
         for method in methods:

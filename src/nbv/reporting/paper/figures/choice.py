@@ -84,14 +84,14 @@ def idea(inputs: FigureInputs) -> Figure:
     """Fig. 3: the spread of the pose after one view, before a second view, and after it."""
     shown = example_view(inputs)
     lookup = inputs.lookup(shown.example.fold)
-    viewpoint, answers = lookup.viewpoint_likelihood, lookup.estimate_likelihood
+    viewpoint, estimates = lookup.viewpoint_likelihood, lookup.estimate_likelihood
     n_bins = len(viewpoint)
     step = 360 / n_bins
     first = int(nearest_bin(shown.estimate_deg, n_bins))
     one = viewpoint[first]
     best = round(int(lookup.recommended_delta_deg[first]) / step)
     worst = int(np.argmax(lookup.cost[first]))
-    given = viewpoint if lookup.pose_likelihood == "given_estimate" else answers
+    given = viewpoint if lookup.pose_likelihood == "given_estimate" else estimates
     curves: list[list[tuple[Likelihood, str, str, str]]] = [
         [(one, "p(φ | e)", "#E69F00", "solid")],
         [
@@ -106,8 +106,8 @@ def idea(inputs: FigureInputs) -> Figure:
     if seen is not None and np.isfinite(_delta(shown, inputs.settings.subject)):
         delta = round(float(seen["delta_deg"]) / step)
         second = int(nearest_bin(float(seen["next_estimate_deg"]), n_bins))
-        belief = one * np.roll(answers[:, second], -delta)
-        # As before the second view: two answers that exclude each other say nothing.
+        belief = one * np.roll(estimates[:, second], -delta)
+        # As before the second view: two estimates that exclude each other say nothing.
         belief = belief if belief.any() else np.ones_like(one)
         curves.append([(belief / belief.sum(), "p(θ | e₁, e₂, δ)", "#D55E00", "solid")])
         titles.append(f"After the second view at δ = {delta * step:.0f}°")

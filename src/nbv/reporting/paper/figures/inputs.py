@@ -105,7 +105,7 @@ class ExampleView:
     azimuth_deg : int
         Its initial viewpoint: where the category's single-view error is largest.
     estimate_deg : float
-        What the estimator answered there.
+        Its estimate there.
     views : (n_viewpoints, side, side) uint8
         Depth codes of every viewpoint of the object.
     outcomes : mapping of str to pandas.Series
