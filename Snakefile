@@ -54,6 +54,7 @@ include: "workflow/rules/extensions/comparisons.smk"
 rule extensions:
     input:
         rules.leaderboard.output,
+        rules.extension_gains.output,
         rules.more_views.output,
         rules.travel.output,
         rules.view_sphere.output if SPHERE_CATEGORIES else [],

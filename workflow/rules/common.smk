@@ -91,6 +91,8 @@ UNIT = ("{category}", "{elevation}")
 FOLD = (*UNIT, "{fold}")
 # Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
 ENVIRONMENT = str(BASE / "workflow/environment.yaml")
+# A whole path, because rules in two folders use the same scripts.
+SCRIPTS = BASE / "workflow/scripts"
 
 
 wildcard_constraints:
@@ -112,7 +114,7 @@ def sources(script, settings=CONFIG):
             *([SENSORS[sensor]] if sensor in SENSORS else []),
         ],
     }
-    path = BASE / "workflow/scripts" / f"{script}.py"
+    path = SCRIPTS / f"{script}.py"
     files = provenance.source_files(path, chosen.get(script, []))
     here = Path.cwd()
     return [
@@ -123,7 +125,7 @@ def sources(script, settings=CONFIG):
 
 def all_sources():
     """The modules that the results as a whole depend on."""
-    scripts = (BASE / "workflow/scripts").glob("*.py")
+    scripts = SCRIPTS.glob("*.py")
     return sorted({file for script in scripts for file in sources(script.stem)})
 
 

@@ -20,7 +20,7 @@ rule settings:
     params:
         configuration=CONFIG,
     script:
-        "../scripts/record_settings.py"
+        f"{SCRIPTS}/record_settings.py"
 
 
 rule meshes:
@@ -44,7 +44,7 @@ rule meshes:
         objects=lambda wildcards: OBJECTS[wildcards.category],
         seed=CONFIG["seed"],
     script:
-        "../scripts/prepare_meshes.py"
+        f"{SCRIPTS}/prepare_meshes.py"
 
 
 rule splits:
@@ -69,7 +69,7 @@ rule splits:
         calibration_fraction=CONFIG["calibration_fraction"],
         seed=CONFIG["seed"],
     script:
-        "../scripts/split_objects.py"
+        f"{SCRIPTS}/split_objects.py"
 
 
 rule render:
@@ -95,7 +95,7 @@ rule render:
             CONFIG["sensor"], wildcards.category, CONFIG["seed"]
         ),
     script:
-        "../scripts/render_depth.py"
+        f"{SCRIPTS}/render_depth.py"
 
 
 rule renders:

@@ -24,7 +24,7 @@ rule train:
         | ({"epochs": CONFIG["crossfit_epochs"]} if CROSSFIT else {}),
         seed=CONFIG["seed"],
     script:
-        "../scripts/train_estimator.py"
+        f"{SCRIPTS}/train_estimator.py"
 
 
 # One estimator for each part: it trains on all other parts, and its part calibrates it.
@@ -65,7 +65,7 @@ rule estimate:
         device=CONFIG["estimator"]["device"],
         precision=CONFIG["estimator"]["precision"],
     script:
-        "../scripts/estimate_views.py"
+        f"{SCRIPTS}/estimate_views.py"
 
 
 rule estimators:

@@ -20,7 +20,7 @@ rule lookup:
     params:
         density=DECISION,
     script:
-        "../scripts/build_lookup.py"
+        f"{SCRIPTS}/build_lookup.py"
 
 
 rule evaluate_baselines:
@@ -43,7 +43,7 @@ rule evaluate_baselines:
         methods={name: METHODS[name] for name in BASELINE_METHODS},
         seed=CONFIG["seed"],
     script:
-        "../scripts/evaluate_baselines.py"
+        f"{SCRIPTS}/evaluate_baselines.py"
 
 
 rule evaluate_recommended:
@@ -71,7 +71,7 @@ rule evaluate_recommended:
     params:
         method=lambda wildcards: METHODS[wildcards.method],
     script:
-        "../scripts/evaluate_recommended.py"
+        f"{SCRIPTS}/evaluate_recommended.py"
 
 
 rule lookups:

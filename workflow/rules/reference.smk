@@ -23,7 +23,7 @@ rule compare:
     params:
         run=lambda wildcards, input: str(Path(input.report).parent),
     script:
-        "../scripts/compare_with_reference.py"
+        f"{SCRIPTS}/compare_with_reference.py"
 
 
 rule reference:
@@ -41,4 +41,4 @@ rule reference:
         run=lambda wildcards, input: str(Path(input.report).parent),
         reference=str(REFERENCES / CONFIG["name"]),
     script:
-        "../scripts/keep_reference.py"
+        f"{SCRIPTS}/keep_reference.py"

@@ -61,7 +61,7 @@ rule table:
         settings=lambda wildcards: settings_of(RESAMPLED, wildcards.table),
         evaluations=lambda wildcards: evaluations_of(units_of(wildcards.table)),
     script:
-        "../scripts/tabulate_paper.py"
+        f"{SCRIPTS}/tabulate_paper.py"
 
 
 rule figure:
@@ -88,7 +88,7 @@ rule figure:
         units=lambda wildcards: units_of(wildcards.figure),
         folds=lambda wildcards: folds_of(units_of(wildcards.figure)),
     script:
-        "../scripts/plot_paper.py"
+        f"{SCRIPTS}/plot_paper.py"
 
 
 rule claims:
@@ -112,7 +112,7 @@ rule claims:
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
     script:
-        "../scripts/judge_claims.py"
+        f"{SCRIPTS}/judge_claims.py"
 
 
 rule runtime:
@@ -136,7 +136,7 @@ rule runtime:
     params:
         rules=[rule for rule, _ in JOBS],
     script:
-        "../scripts/tabulate_runtime.py"
+        f"{SCRIPTS}/tabulate_runtime.py"
 
 
 rule report:
@@ -165,7 +165,7 @@ rule report:
         tables=list(TABLES),
         figures=SHOWN_FIGURES,
     script:
-        "../scripts/build_report.py"
+        f"{SCRIPTS}/build_report.py"
 
 
 rule tables:

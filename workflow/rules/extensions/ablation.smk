@@ -34,7 +34,7 @@ rule evaluate_ablation:
         density=DECISION,
         folds=list(FOLDS),
     script:
-        "../../scripts/evaluate_ablation.py"
+        f"{SCRIPTS}/evaluate_ablation.py"
 
 
 rule ablation:
@@ -59,4 +59,4 @@ rule ablation:
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
     script:
-        "../../scripts/tabulate_ablation.py"
+        f"{SCRIPTS}/tabulate_ablation.py"

@@ -28,7 +28,7 @@ rule density_comparison:
         posteriors=lambda wildcards: compared_keys(test_posteriors),
         settings=RESAMPLED,
     script:
-        "../../scripts/tabulate_density_comparison.py"
+        f"{SCRIPTS}/tabulate_density_comparison.py"
 
 
 rule run_comparison:
@@ -50,4 +50,4 @@ rule run_comparison:
         evaluations=lambda wildcards: compared_keys(methods_in),
         settings=RESAMPLED,
     script:
-        "../../scripts/tabulate_run_comparison.py"
+        f"{SCRIPTS}/tabulate_run_comparison.py"

@@ -24,7 +24,7 @@ rule leaderboard:
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
     script:
-        "../../scripts/tabulate_leaderboard.py"
+        f"{SCRIPTS}/tabulate_leaderboard.py"
 
 
 rule extension_gains:
@@ -51,4 +51,4 @@ rule extension_gains:
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
     script:
-        "../../scripts/tabulate_extension_gains.py"
+        f"{SCRIPTS}/tabulate_extension_gains.py"

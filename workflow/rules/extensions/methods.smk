@@ -41,7 +41,7 @@ rule evaluate_extensions:
         density=DECISION,
         seed=CONFIG["seed"],
     script:
-        "../../scripts/evaluate_extensions.py"
+        f"{SCRIPTS}/evaluate_extensions.py"
 
 
 rule extension_evaluations:

@@ -24,7 +24,7 @@ rule evaluate_more_views:
         more_views=CONFIG["more_views"],
         seed=CONFIG["seed"],
     script:
-        "../../scripts/evaluate_more_views.py"
+        f"{SCRIPTS}/evaluate_more_views.py"
 
 
 rule more_views:
@@ -53,4 +53,4 @@ rule more_views:
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
     script:
-        "../../scripts/tabulate_more_views.py"
+        f"{SCRIPTS}/tabulate_more_views.py"

@@ -165,7 +165,7 @@ rule transfer_table:
         unit=TRANSFER_UNIT,
         evaluations=TRANSFER_KEYS,
     script:
-        "../../scripts/tabulate_transfer.py"
+        f"{SCRIPTS}/tabulate_transfer.py"
 
 
 rule transfer:

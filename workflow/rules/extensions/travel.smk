@@ -37,4 +37,4 @@ rule travel:
         folds=[(category, fold) for category, _, fold in folds_of(REFERENCE_UNITS)],
         methods=TRAVEL_CURVES,
     script:
-        "../../scripts/tabulate_travel.py"
+        f"{SCRIPTS}/tabulate_travel.py"

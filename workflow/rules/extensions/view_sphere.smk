@@ -33,7 +33,7 @@ rule evaluate_view_sphere:
         more_views=CONFIG["more_views"],
         elevations=lambda wildcards: CONFIG["elevations_deg"][wildcards.category],
     script:
-        "../../scripts/evaluate_view_sphere.py"
+        f"{SCRIPTS}/evaluate_view_sphere.py"
 
 
 rule view_sphere:
@@ -63,4 +63,4 @@ rule view_sphere:
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
     script:
-        "../../scripts/tabulate_view_sphere.py"
+        f"{SCRIPTS}/tabulate_view_sphere.py"
