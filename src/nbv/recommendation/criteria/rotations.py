@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 # Numbers in the largest array that a criterion makes of a group of rotations.
-_CHUNK = 2**18
+_CHUNK = 2**16
 
 
 def rotation_groups(n_bins: int, numbers_each: int) -> Iterator[range]:
