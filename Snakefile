@@ -5,6 +5,7 @@
 #   snakemake --cores 2 tables                                           one stage
 #   snakemake --cores 2 extensions                                       the extensions
 #   snakemake --cores 2 transfer                                         trained on × tested on
+#   snakemake --cores 2 verify                                           is any file damaged?
 #   snakemake --cores 2 results/paper/evaluation/mug/el00/fold3/proposed.csv   one file
 
 from snakemake.utils import min_version
@@ -39,6 +40,7 @@ include: "workflow/rules/data.smk"
 include: "workflow/rules/estimation.smk"
 include: "workflow/rules/recommendation.smk"
 include: "workflow/rules/reporting.smk"
+include: "workflow/rules/verification.smk"
 include: "workflow/rules/reference.smk"
 # The paper ends here. What follows is beyond it, and nothing above depends on it.
 include: "workflow/rules/extensions/methods.smk"
@@ -62,7 +64,7 @@ rule extensions:
 
 onstart:
     lift_rate_limit()
-    Path(LAYOUT.last_error).unlink(missing_ok=True)
+    forget_last_error()
     banner(
         f"nbv: experiment {CONFIG['experiment']}, data set {CONFIG['dataset']['source']}, "
         f"{len(UNITS)} units of {CONFIG['n_folds']} folds",
@@ -80,7 +82,7 @@ onsuccess:
 onerror:
     banner(
         "nbv: stopped",
-        *last_error(),
+        *reasons(),
         "what was finished is kept; the same command goes on from there",
         f"logs: {LAYOUT.logs}/",
     )

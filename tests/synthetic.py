@@ -44,6 +44,7 @@ def build_tree(
             directory.mkdir(parents=True, exist_ok=True)
             images = np.stack([_render(cloud, elevation, side) for cloud in clouds])
             np.save(directory / f"el{elevation:02d}.npy", images)
+            (directory / f"el{elevation:02d}_objects.json").write_text(json.dumps(ids))
             estimates = _estimates(category, elevation, n_objects, rng)
             _write_folds(root, category, elevation, ids, estimates, n_folds, rng, delta_step)
     _write_surroundings(root, units, n_folds)
@@ -74,6 +75,11 @@ def lookup_files(root, units, n_folds, criterion="pose_ambiguity"):
 def depth_files(root, units):
     """The depth images by category and elevation."""
     return {unit: root / f"depth/{unit[0]}/el{unit[1]:02d}.npy" for unit in units}
+
+
+def object_files(root, units):
+    """The objects of the depth images by category and elevation."""
+    return {unit: root / f"depth/{unit[0]}/el{unit[1]:02d}_objects.json" for unit in units}
 
 
 def split_files(root, units):

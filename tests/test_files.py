@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from nbv import files
+from nbv.errors import UserError
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path):
@@ -36,3 +37,44 @@ def test_csv_rounds_floats_and_leaves_absent_values_empty(tmp_path):
     frame = pd.DataFrame({"x": [1.23456, np.nan], "n": [1, 2]})
     files.write_csv(tmp_path / "t.csv", frame)
     assert (tmp_path / "t.csv").read_bytes() == b"x,n\n1.2346,1\n,2\n"
+
+
+def test_whoever_writes_the_same_file_later_is_the_one_who_does(tmp_path):
+    """A job whose run was killed loses its temporary file to the job of the next run."""
+    target = tmp_path / "a[1].csv"
+
+    def orphan():
+        with files.replacing(target) as temporary:
+            temporary.write_text("orphan")
+            files.write_text(target, "new")
+
+    with pytest.raises(FileNotFoundError):
+        orphan()
+    assert target.read_text() == "new"
+    assert [path.name for path in tmp_path.iterdir()] == [target.name]
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"\xff\xfe\x00", b"a,b\n1,2,3\n"])
+@pytest.mark.parametrize("read", [files.read_arrays, files.open_array, files.read_json])
+def test_a_damaged_file_is_one_line_that_names_it(tmp_path, content, read):
+    path = tmp_path / "file"
+    path.write_bytes(content)
+    with pytest.raises(UserError, match="file: cannot be read .* run the same command again") as e:
+        read(path)
+    assert len(str(e.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"a,b\n1,2\n1,2,3\n"])
+def test_a_damaged_table_is_one_line_that_names_it(tmp_path, content):
+    path = tmp_path / "t.csv"
+    path.write_bytes(content)
+    with pytest.raises(UserError, match=r"t\.csv: cannot be read"):
+        files.read_csv(path)
+
+
+def test_a_missing_array_is_named(tmp_path):
+    files.write_arrays(tmp_path / "a.npz", {"x": np.arange(3)})
+    with pytest.raises(UserError, match=r"a\.npz: holds no array 'y'"):
+        files.read_arrays(tmp_path / "a.npz", ("x", "y"))
+    with pytest.raises(UserError, match=r"b\.npz does not exist"):
+        files.read_arrays(tmp_path / "b.npz")

@@ -2,18 +2,25 @@ from __future__ import annotations
 
 import errno
 import logging
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from nbv.checksums import write_checksum
 from nbv.errors import UserError
-from nbv.jobs import job
+from nbv.jobs import job, killed_jobs
 
 
 @pytest.fixture
 def snakemake(tmp_path):
     yield SimpleNamespace(
+        input=[],
         output=["out.csv"],
         log=[str(tmp_path / "logs" / "train" / "mug.log")],
         rule="train",
@@ -38,6 +45,21 @@ def snakemake(tmp_path):
             OSError(errno.ENOSPC, "No space left on device", "a.npy"),
             "error: a.npy: no space left on the disk; free some and run the same command again",
         ),
+        (
+            OSError(errno.EROFS, "Read-only file system", "a.npy"),
+            "error: a.npy: cannot be written, the file system is read-only",
+        ),
+        (
+            MemoryError("Unable to allocate 7 TiB"),
+            "error: memory ran out (Unable to allocate 7 TiB): use fewer --cores, or smaller "
+            "settings",
+        ),
+        (
+            RuntimeError("[enforce fail] DefaultCPUAllocator: can't allocate memory: 9 bytes"),
+            "error: memory ran out ([enforce fail] DefaultCPUAllocator: can't allocate memory: 9 "
+            "bytes): use fewer --cores, or smaller settings",
+        ),
+        (UserError("two\nlines"), "error: two lines"),
     ],
 )
 def test_a_mistake_is_one_line_everywhere(snakemake, tmp_path, capsys, error, line):
@@ -62,3 +84,84 @@ def test_progress_goes_to_the_terminal_and_to_the_log(snakemake, capsys):
         logging.getLogger("nbv.estimation").info("epoch 1")
     assert "train mug/00] epoch 1" in capsys.readouterr().err
     assert "epoch 1" in Path(snakemake.log[0]).read_text()
+
+
+def test_inputs_are_held_to_their_checksums_and_outputs_get_theirs(snakemake, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    snakemake.input, snakemake.output = ["results/a/in.csv"], ["results/a/out.csv"]
+    Path("results/a").mkdir(parents=True)
+    Path("results/a/in.csv").write_text("whole")
+    write_checksum("results/a/in.csv")
+    with job(snakemake):
+        Path("results/a/out.csv").write_text("made")
+    assert Path("results/a/checksums/out.csv.sha256").is_file()
+    Path("results/a/in.csv").write_text("wholf")
+    with pytest.raises(SystemExit), job(snakemake):
+        raise AssertionError("a damaged input was read")
+    assert "results/a/in.csv changed" in Path("logs/last_error.txt").read_text()
+
+
+def test_a_log_that_cannot_be_written_is_named(snakemake, tmp_path, capsys):
+    (tmp_path / "logs").write_text("a file where the folder should be")
+    with pytest.raises(SystemExit), job(snakemake):
+        pass
+    assert "mug.log: cannot be written" in capsys.readouterr().err
+
+
+def test_jobs_that_end_without_a_word_were_killed(snakemake, tmp_path):
+    logs, since = tmp_path / "logs", time.time() - 5
+
+    def ended(name, error=None):
+        snakemake.log[0] = str(logs / f"{name}.log")
+        try:
+            with job(snakemake):
+                if error is not None:
+                    raise error
+        except (SystemExit, KeyboardInterrupt):
+            pass
+
+    ended("whole")
+    ended("failed", UserError("x"))
+    ended("crashed", ZeroDivisionError())
+    ended("interrupted", KeyboardInterrupt())
+    assert killed_jobs(logs, since) == []
+    (logs / "train").mkdir()
+    (logs / "train/mug.log").write_text("[10:00:00 train mug] epoch 3\n")
+    (logs / "train/old.log").write_text("[10:00:00 train old] epoch 3\n")
+    os.utime(logs / "train/old.log", (since - 100, since - 100))
+    assert killed_jobs(logs, since) == ["train/mug"]
+
+
+# A process called snakemake starts a shell, which starts a job that says how long it lives.
+STARTER = """
+import subprocess, sys
+subprocess.run(["bash", "-c", f"{sys.executable} {sys.argv[1]}; true"])
+"""
+JOB = """
+import time
+from pathlib import Path
+from nbv.processes import end_with_snakemake
+end_with_snakemake()
+for beat in range(600):
+    Path("beat.txt").write_text(str(beat))
+    time.sleep(0.1)
+"""
+
+
+def test_a_job_ends_soon_after_its_snakemake_was_killed(tmp_path):
+    (tmp_path / "snakemake").write_text(STARTER)
+    (tmp_path / "job.py").write_text(JOB)
+    starter = subprocess.Popen([sys.executable, "snakemake", "job.py"], cwd=tmp_path)
+    beat = tmp_path / "beat.txt"
+    for _ in range(200):
+        if beat.exists():
+            break
+        time.sleep(0.1)
+    starter.send_signal(signal.SIGKILL)
+    starter.wait()
+    deadline = time.monotonic() + 30
+    last = None
+    while beat.read_text() != last and time.monotonic() < deadline:
+        last = beat.read_text()
+        time.sleep(2)
+    assert 0 < int(last) < 400

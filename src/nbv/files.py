@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+import secrets
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,11 +24,14 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path in the folder of `path`; it replaces `path` when the block succeeds.
 
     The temporary path keeps the suffix, for writers that choose a format by it. An error removes
-    the temporary file and leaves `path` as it was.
+    the temporary file and leaves `path` as it was. A name is used once: whoever still writes the
+    same file, such as a job whose run was killed, loses its temporary file here and fails.
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = target.with_name(f".{target.stem}.partial{target.suffix}")
+    for left_over in target.parent.glob(f".{escape(target.stem)}.*.partial{escape(target.suffix)}"):
+        left_over.unlink(missing_ok=True)
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.partial{target.suffix}")
     try:
         yield temporary
         temporary.replace(target)
@@ -51,17 +56,49 @@ def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
         frame.round(decimals).to_csv(temporary, index=False, lineterminator="\n")
 
 
+@contextmanager
+def reading(path: str | Path) -> Iterator[None]:
+    """Turn whatever a reader raises on a damaged file into one line that names the file.
+
+    Raises
+    ------
+    UserError
+        Where the file is missing, or what the block reads of it cannot be read.
+    """
+    try:
+        yield
+    except UserError:
+        raise
+    except FileNotFoundError as error:
+        raise UserError(f"{path} does not exist; finish the run first") from error
+    # No list of what a reader may raise on arbitrary bytes is complete.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise damaged(path, f"cannot be read ({reason})") from error
+
+
+def damaged(path: str | Path, what: str) -> UserError:
+    """Return the error of a file that holds what none of the project's writers writes."""
+    return UserError(f"{path}: {what}; delete the file and run the same command again")
+
+
 def read_csv(path: str | Path) -> pd.DataFrame:
     """Read what `write_csv` wrote.
 
     Object ids stay text as written (``007``, ``NA``, ``null``). In other columns an empty cell,
     and nothing else, is an absent value.
+
+    Raises
+    ------
+    UserError
+        As of `reading`.
     """
     import pandas as pd  # here, so that loading a lookup table costs no import of pandas
 
-    columns = pd.read_csv(path, nrows=0).columns
-    empty = {name: [""] for name in columns if name != "object_id"}
-    return pd.read_csv(path, dtype={"object_id": str}, keep_default_na=False, na_values=empty)
+    with reading(path):
+        columns = pd.read_csv(path, nrows=0).columns
+        empty = {name: [""] for name in columns if name != "object_id"}
+        return pd.read_csv(path, dtype={"object_id": str}, keep_default_na=False, na_values=empty)
 
 
 def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -71,15 +108,53 @@ def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 
 
 def open_array(path: str | Path) -> NDArray[Any]:
-    """Map an array stored as `.npy` into memory, read-only."""
-    stored: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
-    return stored
+    """Map an array stored as `.npy` into memory, read-only; errors as of `reading`."""
+    with reading(path):
+        stored: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+        return stored
 
 
-def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
-    """Read a whole `.npz` written by `write_arrays`."""
-    with np.load(path, allow_pickle=False) as stored:
-        return {name: stored[name] for name in stored.files}
+def read_arrays(path: str | Path, names: Iterable[str] = ()) -> dict[str, NDArray[Any]]:
+    """Read a whole `.npz` written by `write_arrays`.
+
+    Parameters
+    ----------
+    path : path
+    names : iterable of str
+        Arrays that have to be there.
+
+    Raises
+    ------
+    UserError
+        Where one of `names` is missing, and as of `reading`.
+    """
+    with reading(path), np.load(path, allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    for name in names:
+        if name not in arrays:
+            raise damaged(path, f"holds no array {name!r}")
+    return arrays
+
+
+def need_distributions(
+    path: str | Path, densities: NDArray[np.floating[Any]], shape: tuple[int, ...]
+) -> None:
+    """Raise UserError where the rows of an array of that shape are no distributions.
+
+    They may miss a sum of 1 by what single precision rounds.
+    """
+    if densities.shape != shape:
+        raise damaged(path, f"an array has the shape {densities.shape} in place of {shape}")
+    sums = densities.sum(axis=-1, dtype=np.float64)
+    # Written so that NaN is refused as well.
+    if not ((densities >= 0).all() and (np.abs(sums - 1.0) < 1e-3).all()):
+        raise damaged(path, "a row is no distribution: it is negative or does not sum to 1")
+
+
+def read_json(path: str | Path) -> Any:
+    """Read what `write_json` wrote; errors as of `reading`."""
+    with reading(path):
+        return json.loads(Path(path).read_text(encoding="utf-8"))
 
 
 def existing(path: str | Path) -> Path:

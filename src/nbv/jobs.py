@@ -1,4 +1,7 @@
-"""Every job of the workflow logs its progress, and an error ends it with one clear line."""
+"""Every job of the workflow logs its progress, and an error ends it with one clear line.
+
+A job reads nothing that changed after it was written, and does not outlive its workflow.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +15,28 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from nbv import checksums
 from nbv.errors import UserError
+from nbv.processes import end_with_snakemake
 
 log = logging.getLogger(__name__)
+
+_FINISHED, _FAILED, _STOPPED = "processor time", "error: ", "stopped"
+_FOR_THE_USER: dict[int | None, str] = {
+    errno.ENOSPC: "no space left on the disk; free some and run the same command again",
+    errno.EDQUOT: "the disk quota is used up; free some and run the same command again",
+    errno.EROFS: "cannot be written, the file system is read-only",
+    errno.EACCES: "permission denied",
+    errno.ENAMETOOLONG: "the name is too long for this file system",
+}
 
 
 @contextmanager
 def job(snakemake: Any) -> Iterator[None]:
     """Log a job's progress to the terminal and to its log file; end it with one line on an error.
+
+    The inputs are held to their checksums before, and the outputs get theirs after. A job whose
+    Snakemake was killed ends as well.
 
     Parameters
     ----------
@@ -34,43 +51,93 @@ def job(snakemake: Any) -> Iterator[None]:
         With status 1, after it has reported an error.
     """
     path = Path(snakemake.log[0])
-    label = " ".join([snakemake.rule, "/".join(snakemake.wildcards)]).strip()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    to_file = logging.FileHandler(path, mode="w", encoding="utf-8")
+    _log_to(path, " ".join([snakemake.rule, "/".join(snakemake.wildcards)]).strip())
+    end_with_snakemake()
+    try:
+        for file in snakemake.input:
+            checksums.check(file)
+        yield
+        for file in snakemake.output:
+            checksums.write_checksum(file)
+    except UserError as error:
+        _fail(f"{error}", path)
+    except OSError as error:
+        if error.errno not in _FOR_THE_USER:
+            _fail_unexpectedly(error, path)
+        # An error from an open file names no file; only the job's own outputs are open.
+        where = error.filename or next(iter(snakemake.output), path)
+        _fail(f"{where}: {_FOR_THE_USER[error.errno]}", path)
+    except Exception as error:
+        if not _is_lack_of_memory(error):
+            _fail_unexpectedly(error, path)
+        reason = " ".join(str(error).split())
+        _fail(f"memory ran out ({reason}): use fewer --cores, or smaller settings", path)
+    except BaseException:
+        log.info(_STOPPED, extra={"log_only": True})
+        raise
+    else:
+        # Snakemake's benchmark only samples it; `nbv.reporting.runtime` reads this line.
+        log.info(f"{_FINISHED} %.2f s", sum(os.times()[:4]), extra={"log_only": True})
+
+
+def killed_jobs(logs: str | Path, since: float) -> list[str]:
+    """Return the jobs whose logs end in the middle: they were killed without a word.
+
+    Parameters
+    ----------
+    logs : path
+        The folder of a run's logs.
+    since : float
+        Seconds since 1970: older logs are of earlier runs.
+    """
+    return [
+        path.relative_to(logs).with_suffix("").as_posix()
+        for path in sorted(Path(logs).rglob("*.log"))
+        if path.stat().st_mtime >= since and not _has_end(path)
+    ]
+
+
+def _has_end(path: Path) -> bool:
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    ends = (f"] {end}" for end in (_FINISHED, _FAILED, _STOPPED))
+    return any(end in line for end in ends for line in lines[-1:])
+
+
+def _log_to(path: Path, label: str) -> None:
     to_terminal = logging.StreamHandler(sys.stderr)
     to_terminal.addFilter(lambda record: not getattr(record, "log_only", False))
-    root = logging.getLogger()
-    for handler in (to_file, to_terminal):
-        handler.setFormatter(logging.Formatter(f"[%(asctime)s {label}] %(message)s", "%H:%M:%S"))
-        root.addHandler(handler)
-    root.setLevel(logging.INFO)
+    _add_handler(to_terminal, label)
     # A full disk makes every write to the log fail; logging would print a traceback for each.
     logging.raiseExceptions = False
     for noisy in ("matplotlib", "fontTools", "trimesh", "OpenGL"):
         logging.getLogger(noisy).setLevel(logging.ERROR)
     try:
-        yield
-    except UserError as error:
-        _fail(f"{error}", path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _add_handler(logging.FileHandler(path, mode="w", encoding="utf-8"), label)
     except OSError as error:
-        if error.errno != errno.ENOSPC:
-            _fail_unexpectedly(error, path)
-        # An error from an open file names no file; only the job's own outputs are open.
-        where = error.filename or snakemake.output[0]
-        _fail(f"{where}: no space left on the disk; free some and run the same command again", path)
-    except Exception as error:
-        _fail_unexpectedly(error, path)
-    else:
-        # Snakemake's benchmark only samples it; `nbv.reporting.runtime` reads this line.
-        log.info("processor time %.2f s", sum(os.times()[:4]), extra={"log_only": True})
+        _fail(f"{path}: cannot be written ({error.strerror})", path)
+
+
+def _add_handler(handler: logging.Handler, label: str) -> None:
+    handler.setFormatter(logging.Formatter(f"[%(asctime)s {label}] %(message)s", "%H:%M:%S"))
+    logging.getLogger().addHandler(handler)
+    logging.getLogger().setLevel(logging.INFO)
+
+
+def _is_lack_of_memory(error: Exception) -> bool:
+    # Torch, which is not imported here, raises a RuntimeError of its own.
+    return isinstance(error, MemoryError) or any(
+        words in str(error) for words in ("can't allocate memory", "out of memory")
+    )
 
 
 def _fail(message: str, log_file: Path) -> None:
-    log.error("error: %s", message)
+    message = " ".join(message.splitlines())
+    log.error("%s%s", _FAILED, message)
     logs = next((folder for folder in log_file.parents if folder.name == "logs"), log_file.parent)
     # A full disk may not even take this line; the terminal has it already.
     with contextlib.suppress(OSError):
-        (logs / "last_error.txt").write_text(f"error: {message}\n", encoding="utf-8")
+        (logs / "last_error.txt").write_text(f"{_FAILED}{message}\n", encoding="utf-8")
     raise SystemExit(1)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import Any
 
 
@@ -32,6 +33,10 @@ class Layout:
     def depth(self, category: str, elevation: int | str) -> str:
         """Return the depth images of a unit."""
         return f"{self.root}/depth/{unit_folder(category, elevation)}.npy"
+
+    def depth_objects(self, category: str, elevation: int | str) -> str:
+        """Return the ids of the objects in a unit's depth images, in their order."""
+        return f"{self.root}/depth/{unit_folder(category, elevation)}_objects.json"
 
     def estimator(self, category: str, elevation: int | str, fold: int | str) -> str:
         """Return the estimator that a fold tests."""
@@ -94,6 +99,11 @@ class Layout:
         return f"{self.root}/benchmarks/{job}.tsv"
 
     @property
+    def checksums(self) -> str:
+        """The folder of `checksum_of` every file."""
+        return f"{self.root}/checksums"
+
+    @property
     def logs(self) -> str:
         """The folder of all logs."""
         return f"{self.root}/logs"
@@ -122,6 +132,15 @@ class Layout:
         self, stage: str, category: str, elevation: int | str, fold: int | str, name: str
     ) -> str:
         return f"{self.root}/{stage}/{fold_folder(category, elevation, fold)}/{name}"
+
+
+def checksum_of(path: str) -> str | None:
+    """Return where the checksum of a run's file lies; None for a file that is of no run."""
+    results, *inside = PurePath(path).parts
+    if results != "results" or len(inside) < 2:
+        return None
+    run, *rest = inside
+    return f"{Layout(f'results/{run}').checksums}/{'/'.join(rest)}.sha256"
 
 
 def unit_folder(category: str, elevation: int | str) -> str:

@@ -24,7 +24,7 @@ def test_every_object_is_tested_once_and_has_one_role_in_each_fold(n, n_folds, s
     assert not frame.duplicated(["object_id", "fold"]).any()
     for fold in range(1, n_folds + 1):
         for role in folds.ROLES:
-            assert folds.objects_with_role(frame, fold, role).ids
+            assert folds.objects_with_role(frame, fold, role)
 
 
 @settings(max_examples=40, deadline=None)
@@ -35,15 +35,15 @@ def test_cross_fitting_calibrates_everyone_by_an_estimator_of_the_others(n, n_fo
     roles = folds.calibration_roles(frame)
     assert roles == tuple(f"part{part}" for part in range(1, parts + 1))
     for fold in range(1, n_folds + 1):
-        test = folds.objects_with_role(frame, fold, "test").ids
-        assert test == folds.objects_with_role(held_out, fold, "test").ids
-        everyone = folds.objects_with_role(frame, fold, *folds.training_roles(frame)).ids
+        test = folds.objects_with_role(frame, fold, "test")
+        assert test == folds.objects_with_role(held_out, fold, "test")
+        everyone = folds.objects_with_role(frame, fold, *folds.training_roles(frame))
         assert not set(test) & set(everyone)
         calibrated = []
         sizes = set()
         for part in range(1, parts + 1):
-            own = set(folds.objects_with_role(frame, fold, roles[part - 1]).ids)
-            others = folds.objects_with_role(frame, fold, *folds.training_roles(frame, part)).ids
+            own = set(folds.objects_with_role(frame, fold, roles[part - 1]))
+            others = folds.objects_with_role(frame, fold, *folds.training_roles(frame, part))
             assert own.isdisjoint(others)
             assert own | set(others) == set(everyone)
             calibrated += own
@@ -61,10 +61,10 @@ def test_held_out_calibration_trains_one_estimator_on_the_rest():
 
 def test_every_part_is_a_calibration_object():
     frame = split(12, 3, parts=2)
-    everyone = folds.objects_with_role(frame, 1, "part1", "part2").ids
-    folds.assert_role(frame, 1, "calibration", everyone)
+    everyone = folds.objects_with_role(frame, 1, "part1", "part2")
+    folds.need_role(frame, 1, "calibration", everyone)
     with pytest.raises(UserError, match="no test object of fold 1"):
-        folds.assert_role(frame, 1, "test", everyone)
+        folds.need_role(frame, 1, "test", everyone)
 
 
 def test_more_parts_than_objects():
@@ -80,11 +80,64 @@ def test_the_papers_numbers():
     assert (counts["train"] == 80).all()
 
 
-def test_rows_point_into_the_order_of_all_objects(tmp_path):
-    write_csv(tmp_path / "s.csv", split(12, 3))
-    frame = folds.read_splits(tmp_path / "s.csv")
-    chosen = folds.objects_with_role(frame, 2, "calibration")
-    assert chosen.ids == [f"{row:03d}" for row in chosen.rows]
+@pytest.mark.parametrize("parts", [None, 3])
+def test_splits_come_back_and_the_order_of_their_rows_means_nothing(tmp_path, parts):
+    whole = split(12, 3, parts=parts)
+    shuffled = whole.sample(frac=1.0, random_state=1)
+    write_csv(tmp_path / "s.csv", shuffled)
+    read = folds.read_splits(tmp_path / "s.csv")
+    for fold in (1, 2, 3):
+        for role in {*whole["role"]}:
+            found = folds.objects_with_role(read, fold, role)
+            assert sorted(found) == folds.objects_with_role(whole, fold, role)
+
+
+def without_a_row(frame):
+    return frame.drop(index=4)
+
+
+def without_an_objects_test(frame):
+    frame.loc[frame["role"].eq("test").idxmax(), "role"] = "train"
+    return frame
+
+
+def with_a_second_test(frame):
+    tested = frame.loc[frame["fold"].eq(1) & frame["role"].eq("test"), "object_id"].iloc[0]
+    frame.loc[frame["fold"].eq(2) & frame["object_id"].eq(tested), "role"] = "test"
+    return frame
+
+
+def with_a_row_twice(frame):
+    return frame.sort_index(key=lambda rows: rows % 35).iloc[[*range(len(frame)), 0]]
+
+
+def without_a_fold(frame):
+    return frame[frame["fold"] != 2]
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (without_a_row, "missing from a fold"),
+        (without_an_objects_test, "tested in exactly one fold"),
+        (with_a_second_test, "tested in exactly one fold"),
+        (with_a_row_twice, "more than one role in a fold"),
+        (without_a_fold, "folds must be 1, 2"),
+    ],
+)
+def test_splits_that_are_not_whole_are_refused(tmp_path, damage, message):
+    write_csv(tmp_path / "s.csv", damage(split(12, 3)))
+    with pytest.raises(UserError, match=message):
+        folds.read_splits(tmp_path / "s.csv")
+
+
+def test_images_of_other_objects_than_the_splits_are_refused():
+    frame = split(10)
+    names = sorted(set(frame["object_id"]))
+    folds.need_objects(frame, names[::-1])
+    for others in (names[1:], [*names, "stranger"]):
+        with pytest.raises(UserError, match="'(000|stranger)' is not both in"):
+            folds.need_objects(frame, others)
 
 
 def test_an_object_with_two_roles_is_refused():
@@ -96,9 +149,12 @@ def test_an_object_with_two_roles_is_refused():
 
 def test_reading_objects_of_another_role_is_refused():
     frame = split(10)
-    train = folds.objects_with_role(frame, 1, "train").ids
+    train = folds.objects_with_role(frame, 1, "train")
+    test = folds.objects_with_role(frame, 1, "test")
     with pytest.raises(UserError, match=f"{train[0]!r} is no test object of fold 1"):
-        folds.assert_role(frame, 1, "test", train[:1])
+        folds.need_role(frame, 1, "test", [*test, train[0]])
+    with pytest.raises(UserError, match=f"{test[0]!r} is missing, a test object of fold 1"):
+        folds.need_role(frame, 1, "test", test[1:])
 
 
 def test_too_few_objects():

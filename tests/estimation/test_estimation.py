@@ -20,6 +20,7 @@ from nbv.estimation.networks import build_network
 from nbv.estimation.outputs import class_targets, decode_classes, direction_targets
 from nbv.estimation.training import train_estimator, train_network
 from nbv.estimation.weights import Estimator, load_estimator, save_estimator
+from nbv.rendering.store import DepthImages
 
 SETTINGS = {
     "kind": "regressor",
@@ -57,6 +58,13 @@ def clock_faces(n_objects: int, n_views: int = 72, side: int = 16, seed: int = 0
     return codes
 
 
+NAMES = list("abcdefghijkl")
+
+
+def named(faces):
+    return DepthImages(tuple(NAMES[: len(faces)]), faces)
+
+
 def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():
     faces = clock_faces(12)
     first, again, other = (
@@ -73,7 +81,7 @@ def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():
 def test_a_classifier_learns_to_read_a_clock():
     faces = clock_faces(12)
     settings = CLASSES | {"epochs": 12}
-    trained = train_estimator(faces, np.arange(10), ["x"] * 10, settings, CPU, 1)
+    trained = train_estimator(named(faces), NAMES[:10], settings, CPU, 1)
     estimate = estimate_azimuth(trained, faces[10:], CPU)
     assert circular_distance_deg(estimate, np.arange(72) * 5.0).mean() < 6
 
@@ -107,8 +115,7 @@ def test_a_temperature_moves_a_classifiers_mean_and_leaves_a_regressors_angle():
 
 def test_an_estimator_comes_back_from_its_file_with_its_history(tmp_path):
     faces = clock_faces(3, 24)
-    rows = np.array([0, 2])
-    trained = train_estimator(faces, rows, ["a", "c"], SETTINGS | {"epochs": 1}, CPU, 0)
+    trained = train_estimator(named(faces), ["a", "c"], SETTINGS | {"epochs": 1}, CPU, 0)
     save_estimator(tmp_path / "estimator.safetensors", trained, CPU)
     read = load_estimator(tmp_path / "estimator.safetensors", CPU)
     assert list(read.trained_on) == ["a", "c"]
@@ -120,8 +127,8 @@ def test_each_part_is_asked_of_its_own_estimator():
     torch.manual_seed(0)
     faces = clock_faces(3, 8)
     estimators = [untrained(seen=("b",)), untrained(seen=("a", "c"))]
-    parts = [(["c", "a"], np.array([2, 0])), (["b"], np.array([1]))]
-    names, outputs = outputs_of_parts(estimators, faces, parts, CPU)
+    parts = [["c", "a"], ["b"]]
+    names, outputs = outputs_of_parts(estimators, named(faces), parts, CPU)
     assert names == ["c", "a", "b"]
     for name, found in zip(names, outputs, strict=True):
         asked = estimators[1] if name == "b" else estimators[0]
@@ -130,9 +137,39 @@ def test_each_part_is_asked_of_its_own_estimator():
 
 def test_objects_that_were_trained_on_are_refused():
     estimators = [untrained(seen=("a", "b")), untrained(seen=("c",))]
-    parts = [(["c"], np.array([0])), (["b", "c"], np.array([1, 0]))]
     with pytest.raises(UserError, match="'c' was trained on"):
-        outputs_of_parts(estimators, clock_faces(2, 8), parts, CPU)
+        outputs_of_parts(estimators, named(clock_faces(3, 8)), [["c"], ["b", "c"]], CPU)
+
+
+def test_an_object_without_images_is_named():
+    with pytest.raises(UserError, match="'d' has no depth images"):
+        outputs_of_parts([untrained()], named(clock_faces(3, 8)), [["a", "d"]], CPU)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"learning_rate": 1e30}, {"weight_decay": 1e38}, {"learning_rate": float("inf")}]
+)
+def test_a_training_that_diverges_stops_and_names_the_setting(wrong):
+    key = next(iter(wrong))
+    with pytest.raises(UserError, match=rf"not finite in epoch 1: lower .*{key}="):
+        train_network(clock_faces(3), SETTINGS | {"epochs": 2} | wrong, CPU, 0)
+
+
+def test_outputs_that_are_not_finite_are_refused():
+    estimator = untrained()
+    torch.nn.init.constant_(next(iter(estimator.network.parameters())), float("nan"))
+    with pytest.raises(UserError, match="outputs are not finite"):
+        network_outputs(estimator, clock_faces(1, 8), CPU)
+
+
+def test_a_damaged_estimator_is_named(tmp_path):
+    path = tmp_path / "estimator.safetensors"
+    save_estimator(path, untrained(), CPU)
+    whole = path.read_bytes()
+    for content in (b"", whole[:100], whole[:-1], b"\xff" * 64, whole.replace(b"nbv", b"xyz")):
+        path.write_bytes(content)
+        with pytest.raises(UserError, match=r"estimator\.safetensors: .*run the same command again"):
+            load_estimator(path, CPU)
 
 
 def test_images_of_another_size_are_refused():
@@ -181,7 +218,7 @@ def test_any_image_side_fits_the_network(side):
 
 def test_bfloat16_and_float32_answer_alike():
     faces = clock_faces(8)
-    trained = train_estimator(faces, np.arange(7), ["x"] * 7, SETTINGS, CPU, 0)
+    trained = train_estimator(named(faces), NAMES[:7], SETTINGS, CPU, 0)
     full = estimate_azimuth(trained, faces[7:], CPU)
     half = estimate_azimuth(trained, faces[7:], hw.Hardware(torch.device("cpu"), torch.bfloat16))
     assert np.median(circular_distance_deg(full, half)) < 1.0

@@ -1,10 +1,6 @@
-"""Many objects into one file."""
+"""Many objects."""
 
 from __future__ import annotations
-
-import itertools
-import logging
-import time
 
 import numpy as np
 import pytest
@@ -12,11 +8,10 @@ import trimesh
 from rendering_shapes import procedural, shape_of
 
 from nbv.errors import UserError
-from nbv.files import open_array
 from nbv.rendering import open_renderer
 from nbv.rendering.camera import Camera
-from nbv.rendering.depth_codes import decode_depth, encode_depth
-from nbv.rendering.render import render_objects, write_depth
+from nbv.rendering.depth_codes import decode_depth
+from nbv.rendering.render import render_objects
 
 CAMERA = Camera(image_side=16)
 
@@ -29,27 +24,6 @@ def embree():
 @pytest.fixture(scope="module")
 def meshes():
     return {"box": shape_of(trimesh.creation.box((1, 2, 3))), "mug": procedural("mug")}
-
-
-def test_the_file_holds_each_object_from_each_azimuth(tmp_path, embree, meshes):
-    path = tmp_path / "depth" / "el15.npy"
-    write_depth(path, meshes, 15.0, CAMERA, embree)
-    stored = open_array(path)
-    assert isinstance(stored, np.memmap)
-    assert stored.shape == (2, 360, 16, 16)
-    assert stored.dtype == np.uint8
-    assert not stored.flags.writeable
-    for images, mesh in zip(stored, meshes.values(), strict=True):
-        for azimuth in (0, 37, 359):
-            alone = embree.render(*mesh, 15.0, [azimuth], CAMERA)
-            assert np.array_equal(images[azimuth], encode_depth(alone, CAMERA)[0])
-    assert [p.name for p in path.parent.iterdir()] == ["el15.npy"]
-
-
-def test_the_same_meshes_make_the_same_bytes(tmp_path, embree, meshes):
-    for name in ("a.npy", "b.npy"):
-        write_depth(tmp_path / name, meshes, 0.0, CAMERA, embree, n_azimuths=12)
-    assert (tmp_path / "a.npy").read_bytes() == (tmp_path / "b.npy").read_bytes()
 
 
 def test_fewer_azimuths_are_every_so_many_of_all(embree, meshes):
@@ -72,25 +46,8 @@ def test_a_sensor_measures_before_depth_is_encoded(embree, meshes):
     assert np.allclose(gain, 0.1, atol=0.0051)
 
 
-def test_an_object_that_does_not_fit_is_named_and_nothing_is_left(tmp_path, embree, meshes):
-    path = tmp_path / "el00.npy"
-    path.write_bytes(b"what was there before")
+def test_an_object_that_does_not_fit_is_named(embree, meshes):
     large = dict(meshes, huge=type(meshes["box"])(meshes["box"].vertices * 3, meshes["box"].faces))
     with pytest.raises(UserError, match=r"^huge: the object .*(leaves|behind)") as caught:
-        write_depth(path, large, 0.0, CAMERA, embree, n_azimuths=4)
+        list(render_objects(large, 0.0, CAMERA, embree, n_azimuths=4))
     assert "\n" not in str(caught.value)
-    assert path.read_bytes() == b"what was there before"
-    assert [p.name for p in tmp_path.iterdir()] == ["el00.npy"]
-
-
-def test_progress_is_logged_with_rate_and_time_left(tmp_path, embree, meshes, caplog, monkeypatch):
-    monkeypatch.setattr(time, "monotonic", itertools.count(step=10.0).__next__)
-    many = {f"{name}{i}": mesh for i in range(10) for name, mesh in meshes.items()}
-    with caplog.at_level(logging.INFO, logger="nbv"):
-        write_depth(tmp_path / "el00.npy", many, 0.0, CAMERA, embree, n_azimuths=2)
-    lines = [record.message for record in caplog.records]
-    assert len(lines) == 10
-    assert "object 2 of 20" in lines[0]
-    assert "images/s" in lines[0]
-    assert "s left" in lines[0]
-    assert "20 objects, 40 images" in lines[-1]

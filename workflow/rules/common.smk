@@ -3,6 +3,7 @@
 import functools
 import re
 import sys
+import time
 from pathlib import Path
 
 try:
@@ -20,9 +21,11 @@ from nbv.config import (
     snakemake_overrides,
 )
 from nbv.errors import UserError
+from nbv.jobs import killed_jobs
 from nbv.layout import Layout, fold_folder, unit_folder
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
+from nbv.processes import hold_lock
 from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.method_selection import check_methods
 from nbv.recommendation.policies import needs_lookup
@@ -30,6 +33,15 @@ from nbv.rendering import RENDERERS
 from nbv.rendering.noise import SENSORS, check_sensor, sensor_settings
 
 BASE = Path(workflow.basedir)
+STARTED = time.time()
+# Held until this process ends.
+RUN_LOCK, LOCKS_REMOVED = hold_lock(Path(".snakemake"))
+if LOCKS_REMOVED:
+    print(
+        "nbv: the run before was killed; its lock is removed",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def stop(message):
@@ -183,8 +195,8 @@ def figure_inputs(wildcards):
     found = {"evaluations": paths(LAYOUT.evaluation, evaluations_of(units))}
     if "depth" in needs:
         found["depth"] = paths(LAYOUT.depth, units)
-    if "splits" in needs:
-        found["splits"] = [LAYOUT.splits(category) for category, _ in units]
+    if "objects" in needs:
+        found["objects"] = paths(LAYOUT.depth_objects, units)
     if "lookups" in needs:
         found["lookups"] = [
             LAYOUT.lookup(*fold, PROPOSED_LOOKUP) for fold in folds_of(units)
@@ -375,6 +387,24 @@ def lift_rate_limit():
         workflow.scheduler.job_rate_limiter = None
 
 
-def last_error():
+def forget_last_error():
+    """Begin with no error; the first thing that a run writes."""
+    try:
+        Path(LAYOUT.logs).mkdir(parents=True, exist_ok=True)
+        Path(LAYOUT.last_error).unlink(missing_ok=True)
+    except OSError as error:
+        stop(f"{LAYOUT.root} cannot be written: {error.strerror}")
+
+
+def reasons():
+    """What the run stopped for."""
     path = Path(LAYOUT.last_error)
-    return path.read_text().splitlines() if path.exists() else []
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    killed = killed_jobs(LAYOUT.logs, STARTED)
+    if not killed:
+        return lines
+    return [
+        *lines,
+        f"error: killed from outside: {', '.join(killed)}",
+        "most often memory ran out: use fewer --cores, or smaller settings",
+    ]

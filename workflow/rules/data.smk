@@ -77,7 +77,8 @@ rule render:
         sources("render_depth"),
         meshes=rules.meshes.output[0],
     output:
-        LAYOUT.depth(*UNIT),
+        depth=LAYOUT.depth(*UNIT),
+        objects=LAYOUT.depth_objects(*UNIT),
     log:
         LAYOUT.log("render/{category}/el{elevation}"),
     benchmark:

@@ -5,7 +5,8 @@ rule train:
     input:
         sources("train_estimator"),
         splits=rules.splits.output[0],
-        depth=rules.render.output[0],
+        depth=rules.render.output.depth,
+        objects=rules.render.output.objects,
     output:
         LAYOUT.estimator(*FOLD),
     log:
@@ -41,7 +42,8 @@ rule estimate:
     input:
         sources("estimate_views"),
         splits=rules.splits.output[0],
-        depth=rules.render.output[0],
+        depth=rules.render.output.depth,
+        objects=rules.render.output.objects,
         estimator=rules.train.output[0],
         of_parts=expand(rules.train_part.output[0], part=PARTS, allow_missing=True),
     output:

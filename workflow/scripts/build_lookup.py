@@ -4,13 +4,13 @@ from nbv.jobs import job
 
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.calibration.splits import need_role, read_splits
     from nbv.recommendation.density_selection import chosen_lookup
     from nbv.recommendation.lookup import save_lookup
 
     calibration = read_estimates(snakemake.input.calibration)
     splits = read_splits(snakemake.input.splits)
-    assert_role(splits, int(snakemake.wildcards.fold), "calibration", calibration.object_ids)
+    need_role(splits, int(snakemake.wildcards.fold), "calibration", calibration.object_ids)
     table = chosen_lookup(
         calibration.estimate_deg, snakemake.wildcards.criterion, snakemake.params.density
     )

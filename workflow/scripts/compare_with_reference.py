@@ -6,10 +6,12 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
+    from nbv.checksums import need_intact
     from nbv.errors import UserError
     from nbv.reference.compare import compare_runs
 
     reference, run = Path(snakemake.input.reference).parent, Path(snakemake.params.run)
+    need_intact(snakemake.params.run)
     comparison = compare_runs(reference, run)
     for line in comparison.lines():
         logging.getLogger(__name__).info("%s", line)

@@ -9,13 +9,13 @@ with job(snakemake):
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.weights import load_estimator
     from nbv.experiments.held_out import estimate_fold
-    from nbv.files import open_array
+    from nbv.rendering.store import open_depth
 
     params, given, output = snakemake.params, snakemake.input, snakemake.output
     use_one_thread()
     hardware = choose_hardware(params.device, params.precision)
     found = estimate_fold(
-        open_array(given.depth),
+        open_depth(given.depth, given.objects),
         read_splits(given.splits),
         int(snakemake.wildcards.fold),
         load_estimator(given.estimator, hardware),

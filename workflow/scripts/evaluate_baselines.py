@@ -4,7 +4,7 @@ from nbv.jobs import job
 
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.calibration.splits import need_role, read_splits
     from nbv.experiments.two_views import evaluate_method
     from nbv.files import write_csv
     from nbv.seeds import rng_for
@@ -12,7 +12,7 @@ with job(snakemake):
     params, wildcards = snakemake.params, snakemake.wildcards
     test = read_estimates(snakemake.input.test)
     splits = read_splits(snakemake.input.splits)
-    assert_role(splits, int(wildcards.fold), "test", test.object_ids)
+    need_role(splits, int(wildcards.fold), "test", test.object_ids)
     for (name, method), path in zip(params.methods.items(), snakemake.output, strict=True):
         rng = rng_for(params.seed, name, *wildcards)
         write_csv(path, evaluate_method(method, test, rng))

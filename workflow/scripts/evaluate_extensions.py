@@ -5,7 +5,7 @@ from nbv.jobs import job
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
     from nbv.calibration.posteriors import read_posteriors
-    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.calibration.splits import need_role, read_splits
     from nbv.experiments.extensions import evaluate_extensions
     from nbv.files import read_csv, write_csv
     from nbv.recommendation.lookup import save_lookup
@@ -17,7 +17,7 @@ with job(snakemake):
     splits, posteriors = read_splits(given.splits), {}
     estimates = {role: read_estimates(given[role]) for role in ("calibration", "test")}
     for role, found in estimates.items():
-        assert_role(splits, int(wildcards.fold), role, found.object_ids)
+        need_role(splits, int(wildcards.fold), role, found.object_ids)
         if path := given.get(f"{role}_posteriors"):
             posteriors[f"{role}_posteriors"] = read_posteriors(path, found.object_ids)
     made = evaluate_extensions(

@@ -4,13 +4,13 @@ from nbv.jobs import job
 
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.calibration.splits import need_role, read_splits
     from nbv.experiments.two_views import evaluate_method
     from nbv.files import write_csv
     from nbv.recommendation.lookup import load_lookup
 
     test = read_estimates(snakemake.input.test)
     splits = read_splits(snakemake.input.splits)
-    assert_role(splits, int(snakemake.wildcards.fold), "test", test.object_ids)
+    need_role(splits, int(snakemake.wildcards.fold), "test", test.object_ids)
     lookup = load_lookup(snakemake.input.lookup)
     write_csv(snakemake.output[0], evaluate_method(snakemake.params.method, test, lookup=lookup))

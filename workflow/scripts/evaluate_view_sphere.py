@@ -4,7 +4,7 @@ from nbv.jobs import job
 
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.splits import assert_role, read_splits
+    from nbv.calibration.splits import need_role, read_splits
     from nbv.experiments.extensions import stored_evidence
     from nbv.experiments.view_sphere import view_sphere_rows
     from nbv.files import read_csv, write_csv
@@ -15,8 +15,8 @@ with job(snakemake):
     for position, elevation in enumerate(params.elevations):
         calibration = read_estimates(snakemake.input.calibration[position])
         tests[elevation] = read_estimates(snakemake.input.test[position])
-        assert_role(splits, fold, "calibration", calibration.object_ids)
-        assert_role(splits, fold, "test", tests[elevation].object_ids)
+        need_role(splits, fold, "calibration", calibration.object_ids)
+        need_role(splits, fold, "test", tests[elevation].object_ids)
         choices = read_csv(snakemake.input.choices[position])
         evidences[elevation] = stored_evidence(calibration, choices, params.density)
     write_csv(snakemake.output[0], view_sphere_rows(tests, evidences, params.more_views))

@@ -5,6 +5,8 @@ from pathlib import Path
 from nbv.jobs import job
 
 with job(snakemake):
+    from nbv.checksums import need_intact
     from nbv.reference.store import collect_reference
 
+    need_intact(snakemake.params.run)
     collect_reference(Path(snakemake.params.run), Path(snakemake.params.reference))

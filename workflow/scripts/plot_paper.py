@@ -15,7 +15,7 @@ with job(snakemake):
     keys = {
         "evaluations": params.evaluations,
         "depth": params.units,
-        "splits": [category for category, _ in params.units],
+        "objects": params.units,
         "lookups": params.folds,
     }
     # A figure's rule declares what the figure needs, and nothing else.

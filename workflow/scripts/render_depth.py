@@ -7,15 +7,18 @@ with job(snakemake):
     from nbv.rendering import open_renderer
     from nbv.rendering.camera import Camera
     from nbv.rendering.noise import open_sensor
-    from nbv.rendering.render import write_depth
+    from nbv.rendering.render import N_AZIMUTHS, render_objects
+    from nbv.rendering.store import write_depth
 
-    params, wildcards = snakemake.params, snakemake.wildcards
+    params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
     camera = Camera(**params.camera)
-    write_depth(
-        snakemake.output[0],
-        load_meshes(snakemake.input.meshes),
+    meshes = load_meshes(snakemake.input.meshes)
+    images = render_objects(
+        meshes,
         float(wildcards.elevation),
         camera,
         open_renderer(params.renderer["name"]),
         open_sensor(params.sensor, camera, wildcards.category, int(wildcards.elevation)),
     )
+    shape = N_AZIMUTHS, camera.image_side, camera.image_side
+    write_depth(output.depth, output.objects, meshes, images, shape)

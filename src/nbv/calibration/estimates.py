@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,8 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.errors import UserError
-from nbv.files import read_csv, write_csv
+from nbv.files import damaged, read_csv, reading, write_csv
 
 COLUMNS = ("object_id", "azimuth_deg", "estimate_deg")
 
@@ -55,16 +55,55 @@ def read_estimates(path: str | Path) -> Estimates:
     Raises
     ------
     UserError
-        Where columns or views are missing.
+        Where columns or views are missing, or an estimate is not in [0, 360).
     """
     frame = read_csv(path)
-    missing = set(COLUMNS) - set(frame.columns)
-    if missing:
-        raise UserError(f"{path}: column {sorted(missing)[0]!r} is missing")
-    object_ids = tuple(frame["object_id"].drop_duplicates())
-    n_views, odd = divmod(len(frame), max(len(object_ids), 1))
-    azimuth = np.tile(np.arange(n_views) * (360.0 / max(n_views, 1)), len(object_ids))
-    if odd or not np.array_equal(frame["azimuth_deg"].to_numpy(), azimuth):
-        raise UserError(f"{path}: not a full turn of equally spaced views of each object")
+    need_columns(path, frame, COLUMNS)
+    object_ids = objects_of_full_turns(path, frame, "azimuth_deg")
+    need_azimuths(path, frame, ("estimate_deg",))
     estimate_deg = frame["estimate_deg"].to_numpy(dtype=np.float64)
-    return Estimates(object_ids, estimate_deg.reshape(len(object_ids), n_views))
+    return Estimates(object_ids, estimate_deg.reshape(len(object_ids), -1))
+
+
+def need_columns(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
+    """Raise UserError where a column is missing, or there is no row."""
+    for name in columns:
+        if name not in frame.columns:
+            raise damaged(path, f"no column {name!r}")
+    if frame.empty:
+        raise damaged(path, "holds no rows")
+
+
+def objects_of_full_turns(
+    path: str | Path, frame: pd.DataFrame, azimuth_column: str
+) -> tuple[str, ...]:
+    """Return the objects of a table that has a row for each view of a full turn of each object.
+
+    Raises
+    ------
+    UserError
+        Where the rows are not one object after the other, or the azimuths of an object are not
+        0, 360 / n_views, ….
+    """
+    object_ids = tuple(frame["object_id"].drop_duplicates())
+    n_views, odd = divmod(len(frame), len(object_ids))
+    azimuth_deg = np.tile(np.arange(n_views) * (360.0 / n_views), len(object_ids))
+    if (
+        odd
+        or not np.array_equal(frame[azimuth_column].to_numpy(), azimuth_deg)
+        or not np.array_equal(frame["object_id"], np.repeat(object_ids, n_views))
+    ):
+        raise damaged(path, "not a full turn of equally spaced views of each object")
+    return object_ids
+
+
+def need_azimuths(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
+    """Raise UserError where a column holds anything but numbers in [0, 360)."""
+    for name in columns:
+        with reading(path):
+            values = frame[name].to_numpy(dtype=np.float64)
+        # Written so that NaN is refused as well.
+        wrong = ~((values >= 0.0) & (values < 360.0))
+        if wrong.any():
+            row = int(np.flatnonzero(wrong)[0])
+            raise damaged(path, f"{name}={values[row]} in row {row + 1} is not in [0, 360)")

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import nearest_bin
 from nbv.errors import UserError
-from nbv.files import read_arrays, write_arrays
+from nbv.files import damaged, need_distributions, read_arrays, reading, write_arrays
 
 Floats = NDArray[np.float64]
 
@@ -160,10 +160,16 @@ def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
     Raises
     ------
     UserError
-        Where it is about other objects than those given, or in another order.
+        Where it is about other objects than those given, or in another order, or is damaged.
     """
-    stored = read_arrays(path)
+    stored = read_arrays(path, ("object_ids", "log_posterior", "temperature"))
     names = tuple(str(name) for name in stored["object_ids"])
     if names != tuple(object_ids):
         raise UserError(f"{path}: not of the objects that the estimates are of; make both again")
-    return Posteriors(names, stored["log_posterior"], float(stored["temperature"]))
+    with reading(path):
+        posteriors = Posteriors(names, stored["log_posterior"], float(stored["temperature"]))
+        _, n_views, n_classes = posteriors.log_posterior.shape
+        need_distributions(path, posteriors.distributions, (len(names), n_views, n_classes))
+        if not 0.0 < posteriors.temperature < np.inf:
+            raise damaged(path, f"the temperature {posteriors.temperature} is not above 0")
+    return posteriors

@@ -9,14 +9,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.files import read_csv
+from nbv.files import damaged, read_csv
 from nbv.fold_sizes import enough_objects
 
 ROLES = ("train", "calibration", "test")
@@ -82,27 +80,31 @@ def make_splits(
     return pd.concat(rows, ignore_index=True)
 
 
-class Chosen(NamedTuple):
-    """Objects of one role in one fold, and where they stand among all objects."""
-
-    ids: list[str]
-    rows: NDArray[np.intp]
-
-
 def read_splits(path: str | Path) -> pd.DataFrame:
     """Read `splits/<category>.csv`.
 
     Raises
     ------
     UserError
-        Where columns are missing or a role is unknown.
+        Where the file cannot be read, or is not one of `make_splits`: folds from 1, each with
+        every object once and in a known role, and each object tested in one fold.
     """
     splits = read_csv(path)
     if list(splits.columns) != ["object_id", "fold", "role"]:
         raise UserError(f"{path}: the columns must be object_id, fold, role")
-    others = set(splits["role"]) - set(ROLES)
-    if unknown := sorted(role for role in others if not _PART.fullmatch(str(role))):
+    others = {str(role) for role in splits["role"]} - set(ROLES)
+    if unknown := sorted(role for role in others if not _PART.fullmatch(role)):
         raise UserError(f"{path}: role {unknown[0]!r} is none of {', '.join(ROLES)}, part1, …")
+    folds = set(splits["fold"])
+    if not folds or folds != set(range(1, len(folds) + 1)):
+        raise damaged(path, "the folds must be 1, 2, …")
+    if splits.duplicated(["object_id", "fold"]).any():
+        raise damaged(path, "an object has more than one role in a fold")
+    if len(splits) != len(folds) * splits["object_id"].nunique():
+        raise damaged(path, "an object is missing from a fold")
+    tested = splits.loc[splits["role"] == "test", "object_id"]
+    if tested.duplicated().any() or len(tested) != splits["object_id"].nunique():
+        raise damaged(path, "an object is not tested in exactly one fold")
     return splits
 
 
@@ -126,8 +128,8 @@ def training_roles(splits: pd.DataFrame, without: int | None = None) -> tuple[st
     return tuple(role for role in roles if role != f"part{without}")
 
 
-def objects_with_role(splits: pd.DataFrame, fold: int, *roles: str) -> Chosen:
-    """Return the objects of some roles in one fold, after asserting that none has two roles.
+def objects_with_role(splits: pd.DataFrame, fold: int, *roles: str) -> list[str]:
+    """Return the ids of the objects of some roles in one fold, in the order of the splits.
 
     Raises
     ------
@@ -140,20 +142,30 @@ def objects_with_role(splits: pd.DataFrame, fold: int, *roles: str) -> Chosen:
     repeated = of_fold.loc[of_fold["object_id"].duplicated(), "object_id"]
     if len(repeated):
         raise UserError(f"fold {fold} gives object {repeated.iloc[0]!r} more than one role")
-    rows = np.flatnonzero(of_fold["role"].isin(roles).to_numpy())
-    return Chosen([str(name) for name in of_fold["object_id"].iloc[rows]], rows)
+    return [str(name) for name in of_fold.loc[of_fold["role"].isin(roles), "object_id"]]
 
 
-def assert_role(splits: pd.DataFrame, fold: int, role: str, object_ids: Iterable[str]) -> None:
-    """Raise UserError where an object that was read has another role in this fold, naming it.
+def need_objects(splits: pd.DataFrame, object_ids: Iterable[str]) -> None:
+    """Raise UserError where objects with images are others than those in the splits, naming one."""
+    if different := sorted(set(object_ids) ^ set(splits["object_id"])):
+        raise UserError(
+            f"object {different[0]!r} is not both in the splits and among the depth images: they "
+            "are of different runs; make both again"
+        )
+
+
+def need_role(splits: pd.DataFrame, fold: int, role: str, object_ids: Iterable[str]) -> None:
+    """Raise UserError where objects that were read are not those with a role in a fold.
 
     This holds what is read to the splits: no object may be trained on and calibrated or tested
-    with, wherever its file came from. ``calibration`` stands for all `calibration_roles`.
+    with, and none may be missing, wherever the file came from. ``calibration`` stands for all
+    `calibration_roles`.
     """
     roles = calibration_roles(splits) if role == "calibration" else (role,)
-    strangers = sorted(set(object_ids) - set(objects_with_role(splits, fold, *roles).ids))
-    if strangers:
+    read, planned = set(object_ids), set(objects_with_role(splits, fold, *roles))
+    if different := sorted(read - planned) or sorted(planned - read):
+        what = "is no" if different[0] in read else "is missing, a"
         raise UserError(
-            f"object {strangers[0]!r} is no {role} object of fold {fold}: estimates and splits are "
-            "of different runs; make the estimates again"
+            f"object {different[0]!r} {what} {role} object of fold {fold}: estimates and splits "
+            "are of different runs; make the estimates again"
         )

@@ -14,24 +14,25 @@ from nbv.estimation.images import to_input
 from nbv.estimation.networks import kind_of
 from nbv.estimation.outputs import Outputs
 from nbv.estimation.weights import Estimator
+from nbv.rendering.store import DepthImages
 
 
 def outputs_of_parts(
     estimators: Sequence[Estimator],
-    depth: NDArray[np.uint8],
-    parts: Sequence[tuple[Sequence[str], NDArray[np.intp]]],
+    images: DepthImages,
+    parts: Sequence[Sequence[str]],
     hardware: Hardware,
 ) -> tuple[list[str], Outputs]:
-    """Return the outputs for some objects of a depth file, divided among estimators.
+    """Return the outputs for some objects, divided among estimators.
 
     Parameters
     ----------
     estimators : sequence of Estimator
         One for each part: the whole is one part, or each is asked about what it has not seen.
-    depth : ndarray (n_objects, n_views, side, side) uint8
+    images : DepthImages
         All objects of a category.
-    parts : sequence of (names, rows)
-        The objects of each part, and where they stand among all.
+    parts : sequence of sequence of str
+        The objects of each part.
     hardware : Hardware
 
     Returns
@@ -43,17 +44,18 @@ def outputs_of_parts(
     Raises
     ------
     UserError
-        Where an estimator has seen one of its objects, or images of another size.
+        Where an estimator has seen one of its objects, or images of another size, or its outputs
+        are not finite.
     """
     names: list[str] = []
     outputs = []
-    for estimator, (object_ids, rows) in zip(estimators, parts, strict=True):
+    for estimator, object_ids in zip(estimators, parts, strict=True):
         if seen := sorted(set(object_ids) & set(estimator.trained_on)):
             raise UserError(
                 f"object {seen[0]!r} was trained on: its estimates say nothing; train again"
             )
         names += object_ids
-        outputs.append(network_outputs(estimator, depth[rows], hardware))
+        outputs.append(network_outputs(estimator, images.of(object_ids), hardware))
     return names, np.concatenate(outputs)
 
 
@@ -80,7 +82,7 @@ def network_outputs(
     Raises
     ------
     UserError
-        Where the estimator was trained on images of another size.
+        Where the estimator was trained on images of another size, or its outputs are not finite.
     """
     side = codes.shape[-1]
     if side != estimator.image_side:
@@ -94,7 +96,10 @@ def network_outputs(
         for start in range(0, len(flat), batch_size):
             output = estimator.network(to_input(flat[start : start + batch_size], hardware))
             outputs.append(output.float().cpu().numpy().astype(np.float64))
-    return np.concatenate(outputs).reshape(*codes.shape[:-2], -1)
+    found = np.concatenate(outputs).reshape(*codes.shape[:-2], -1)
+    if not np.isfinite(found).all():
+        raise UserError("the estimator's outputs are not finite; train it again")
+    return found
 
 
 def decode(estimator: Estimator, outputs: Outputs, temperature: float = 1.0) -> NDArray[np.float64]:

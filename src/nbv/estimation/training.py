@@ -13,10 +13,12 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from nbv.errors import UserError
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.images import to_input
 from nbv.estimation.networks import build_network, kind_of
 from nbv.estimation.weights import Estimator
+from nbv.rendering.store import DepthImages
 
 log = logging.getLogger(__name__)
 
@@ -49,19 +51,18 @@ class Progress:
 
 
 def train_estimator(
-    depth: NDArray[np.uint8],
-    rows: NDArray[np.intp],
+    images: DepthImages,
     object_ids: Sequence[str],
     settings: Mapping[str, Any],
     hardware: Hardware,
     seed: int,
 ) -> Estimator:
-    """Train an estimator on the objects `rows` of a depth file.
+    """Train an estimator on some objects, whose ids are kept with the weights.
 
-    Parameters as of `train_network`; `object_ids` name those objects, kept with the weights.
+    Parameters and errors as of `train_network` and of `nbv.rendering.store.DepthImages.of`.
     """
-    network = train_network(depth[rows], settings, hardware, seed)
-    return Estimator(network, settings, depth.shape[-1], object_ids)
+    network = train_network(images.of(object_ids), settings, hardware, seed)
+    return Estimator(network, settings, images.codes.shape[-1], object_ids)
 
 
 def train_network(
@@ -88,6 +89,11 @@ def train_network(
     -------
     torch.nn.Module
         In evaluation mode, on the hardware's device.
+
+    Raises
+    ------
+    UserError
+        Where the loss or a weight is no finite number any more.
     """
     n_objects, n_views, side, _ = codes.shape
     kind = kind_of(settings)
@@ -127,9 +133,23 @@ def train_network(
             running += loss.detach()
             now = time.perf_counter()
             if now - reported > PROGRESS_SECONDS:
+                _need_finite(network, running, epoch, settings)
                 progress.report(
                     epoch, len(chosen) + batch * batch_size, float(running) / (batch + 1)
                 )
                 reported = now
+        _need_finite(network, running, epoch, settings)
         progress.report(epoch, n_images, float(running) / batches)
     return network.eval()
+
+
+def _need_finite(
+    network: nn.Module, loss: torch.Tensor, epoch: int, settings: Mapping[str, Any]
+) -> None:
+    if all(bool(torch.isfinite(values).all()) for values in (loss, *network.parameters())):
+        return
+    raise UserError(
+        f"training: the loss or a weight is not finite in epoch {epoch + 1}: lower "
+        f"estimator.learning_rate={settings['learning_rate']:g} or "
+        f"estimator.weight_decay={settings['weight_decay']:g}"
+    )

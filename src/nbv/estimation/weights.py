@@ -12,10 +12,9 @@ import safetensors
 import safetensors.torch
 from torch import nn
 
-from nbv.errors import UserError
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.networks import build_network
-from nbv.files import replacing
+from nbv.files import damaged, reading, replacing
 
 
 @dataclass(frozen=True)
@@ -66,17 +65,18 @@ def load_estimator(path: str | Path, hardware: Hardware) -> Estimator:
     UserError
         Where the file is no estimator of this project.
     """
-    try:
+    with reading(path):
         with safetensors.safe_open(path, framework="pt") as stored:
-            history = json.loads((stored.metadata() or {})["nbv"])
-        tensors = safetensors.torch.load_file(path)
-    except (safetensors.SafetensorError, KeyError) as error:
-        raise UserError(f"{path}: not an estimator of nbv; train it again ({error})") from error
-    network = build_network(history["settings"], history["image_side"])
-    network.load_state_dict(tensors)
-    return Estimator(
-        network.to(hardware.device).eval(),
-        history["settings"],
-        history["image_side"],
-        history["trained_on"],
-    )
+            metadata = stored.metadata() or {}
+        if "nbv" not in metadata:
+            raise damaged(path, "not an estimator of nbv")
+        history = json.loads(metadata["nbv"])
+        network = build_network(history["settings"], history["image_side"])
+        network.load_state_dict(safetensors.torch.load_file(path))
+        estimator = Estimator(
+            network.eval(), history["settings"], history["image_side"], history["trained_on"]
+        )
+        if not all(bool(values.isfinite().all()) for values in network.state_dict().values()):
+            raise damaged(path, "a weight is not finite")
+    estimator.network.to(hardware.device)
+    return estimator

@@ -6,18 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors, fit_temperature, posteriors_of
-from nbv.calibration.splits import calibration_roles, objects_with_role
+from nbv.calibration.splits import calibration_roles, need_objects, objects_with_role
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.inference import decode, outputs_of_parts
 from nbv.estimation.weights import Estimator
+from nbv.rendering.store import DepthImages
 
 
 def estimate_fold(
-    depth: NDArray[np.uint8],
+    images: DepthImages,
     splits: pd.DataFrame,
     fold: int,
     tested: Estimator,
@@ -30,8 +30,8 @@ def estimate_fold(
 
     Parameters
     ----------
-    depth : ndarray (n_objects, n_views, side, side) uint8
-        All objects of a category, in the order of the splits.
+    images : DepthImages
+        All objects of a category.
     splits : DataFrame
         From `nbv.calibration.splits.read_splits`.
     fold : int
@@ -52,17 +52,19 @@ def estimate_fold(
     Raises
     ------
     UserError
-        As of `nbv.estimation.inference.outputs_of_parts`.
+        As of `nbv.calibration.splits.need_objects` and
+        `nbv.estimation.inference.outputs_of_parts`.
     """
+    need_objects(splits, images.object_ids)
     parts = [objects_with_role(splits, fold, role) for role in calibration_roles(splits)]
     test = [objects_with_role(splits, fold, "test")]
     outputs = {
-        "calibration": outputs_of_parts(of_parts or [tested], depth, parts, hardware),
-        "test": outputs_of_parts([tested], depth, test, hardware),
+        "calibration": outputs_of_parts(of_parts or [tested], images, parts, hardware),
+        "test": outputs_of_parts([tested], images, test, hardware),
     }
     temperature, posteriors = 1.0, None
     if distributions:
-        azimuth_deg = np.linspace(0, 360, depth.shape[1], endpoint=False)
+        azimuth_deg = np.linspace(0, 360, images.codes.shape[1], endpoint=False)
         temperature = fit_temperature(outputs["calibration"][1], azimuth_deg)
     found = {}
     for role, (object_ids, output) in outputs.items():

@@ -1,4 +1,4 @@
-"""Reading what a run wrote, file by file: errors, objects and depth images.
+"""Reading what a run wrote, file by file: errors and objects.
 
 A *unit* is one category at one elevation: what a row of Tables 1 to 4 is made of.
 """
@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from nbv.calibration.estimates import need_azimuths, need_columns, objects_of_full_turns
 from nbv.calibration.splits import read_splits
 from nbv.errors import UserError
 from nbv.experiments.two_views import COLUMNS
-from nbv.files import existing, open_array, read_csv
+from nbv.files import damaged, existing, read_csv, reading
 
 Unit = tuple[str, int]
 """A category and an elevation in degrees."""
@@ -42,45 +42,57 @@ def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.Data
     Raises
     ------
     UserError
-        If a file is missing, empty, or lacks a column.
+        Where a file is missing or damaged, where the methods of a fold are not about the same
+        objects, or where two folds test the same one.
     """
     parts: dict[Unit, dict[str, list[pd.DataFrame]]] = {}
     for (category, elevation_deg, fold, method), path in files.items():
         frame = read_evaluation(path).assign(method=method, fold=fold)
         parts.setdefault((category, elevation_deg), {}).setdefault(method, []).append(frame)
-    return {unit: _join(by_method) for unit, by_method in parts.items()}
+    return {unit: _join(unit, by_method) for unit, by_method in parts.items()}
 
 
-def _join(by_method: Mapping[str, list[pd.DataFrame]]) -> pd.DataFrame:
+def _join(name: Unit, by_method: Mapping[str, list[pd.DataFrame]]) -> pd.DataFrame:
     frames = [frame for of_method in by_method.values() for frame in of_method]
     unit = pd.concat(frames, ignore_index=True)
+    tested = unit[["method", "fold", "object_id"]].drop_duplicates()
+    n_methods = tested.groupby(["fold", "object_id"])["method"].nunique()
+    of_objects = tested.groupby("object_id")["fold"].nunique()
+    where = f"{name[0]} at {name[1]}°"
+    if (n_methods != len(by_method)).any():
+        fold, object_id = n_methods.index[n_methods != len(by_method)][0]
+        raise UserError(
+            f"evaluation of {where}, fold {fold}: object {object_id!r} is not evaluated by every "
+            "method; delete the fold's files and run the same command again"
+        )
+    if (of_objects > 1).any():
+        raise UserError(
+            f"evaluation of {where}: object {of_objects.index[of_objects > 1][0]!r} is tested in "
+            "more than one fold; delete the evaluations and run the same command again"
+        )
     unit["method"] = pd.Categorical(unit["method"], categories=list(by_method), ordered=True)
     return unit[["method", "fold", *COLUMNS]]
 
 
 def load_object_ids(splits: Path) -> tuple[str, ...]:
-    """Return a category's objects in the order of the depth images, from its splits."""
+    """Return a category's objects, from its splits."""
     read = read_splits(existing(splits))
     return tuple(read.loc[read["fold"] == read["fold"].min(), "object_id"])
 
 
-def load_depth(path: Path) -> NDArray[np.uint8]:
-    """Map a unit's depth codes into memory: (n_objects, n_viewpoints, side, side) uint8.
-
-    0 is background; nearer is a larger code. The file is read as far as it is indexed.
-    """
-    return open_array(existing(path))
-
-
 def read_evaluation(path: Path) -> pd.DataFrame:
     """Read one method's errors of one fold; errors as of `load_evaluations`."""
-    try:
-        frame = read_csv(existing(path))
-    except pd.errors.EmptyDataError:
-        frame = pd.DataFrame()
-    absent = [name for name in COLUMNS if name not in frame.columns]
-    if absent:
-        raise UserError(f"{path}: no column {absent[0]!r}; delete the file and run the stage again")
-    if frame.empty:
-        raise UserError(f"{path}: holds no rows; delete the file and run the stage again")
+    frame = read_csv(path)
+    need_columns(path, frame, COLUMNS)
+    objects_of_full_turns(path, frame, "initial_deg")
+    need_azimuths(path, frame, ("initial_estimate_deg", "pose_estimate_deg"))
+    followed = frame.dropna(subset="delta_deg")
+    if len(followed) not in (0, len(frame)):
+        raise damaged(path, "delta_deg is missing in some rows")
+    need_azimuths(path, followed, ("delta_deg", "next_estimate_deg"))
+    with reading(path):
+        error_deg = frame["error_deg"].to_numpy(dtype=np.float64)
+    # Written so that NaN is refused as well.
+    if not ((error_deg >= 0.0) & (error_deg <= 180.0)).all():
+        raise damaged(path, "an error_deg is not in [0, 180]")
     return frame

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.files import read_arrays, write_arrays
+from nbv.files import damaged, read_arrays, reading, write_arrays
 
 
 class Surface(Protocol):
@@ -67,17 +68,50 @@ def save_meshes(path: str | Path, meshes: Mapping[str, Surface]) -> None:
 
 
 def stored_ids(path: str | Path) -> list[str]:
-    """Return the ids in a file of `save_meshes`, in its order, without loading the meshes."""
-    with np.load(path, allow_pickle=False) as stored:
+    """Return the ids in a file of `save_meshes`, in its order, without loading the meshes.
+
+    Raises
+    ------
+    UserError
+        As of `nbv.files.reading`.
+    """
+    with reading(path), np.load(path, allow_pickle=False) as stored:
         return [str(object_id) for object_id in stored["ids"]]
 
 
 def load_meshes(path: str | Path) -> dict[str, Mesh]:
-    """Return the meshes in a file of `save_meshes`, in its order."""
-    arrays = read_arrays(path)
-    vertex_at, face_at = arrays["vertex_offsets"], arrays["face_offsets"]
+    """Return the meshes in a file of `save_meshes`, in its order.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read, or a mesh in it is no mesh.
+    """
+    arrays = read_arrays(path, ("ids", "vertices", "faces", "vertex_offsets", "face_offsets"))
     meshes: dict[str, Mesh] = {}
-    for i, object_id in enumerate(arrays["ids"]):
-        vertices = arrays["vertices"][vertex_at[i] : vertex_at[i + 1]]
-        meshes[str(object_id)] = Mesh(vertices, arrays["faces"][face_at[i] : face_at[i + 1]])
+    with reading(path):
+        ids = [str(object_id) for object_id in arrays["ids"]]
+        parts = {
+            name: [*pairwise(map(int, arrays[f"{name}_offsets"]))] for name in ("vertex", "face")
+        }
+        for object_id, of_vertices, of_faces in zip(
+            ids, parts["vertex"], parts["face"], strict=True
+        ):
+            mesh = Mesh(arrays["vertices"][slice(*of_vertices)], arrays["faces"][slice(*of_faces)])
+            if not _is_sound(mesh):
+                raise damaged(path, f"the mesh of object {object_id!r} is not sound")
+            meshes[object_id] = mesh
+        if len(meshes) != len(ids):
+            raise damaged(path, "two objects have the same id")
     return meshes
+
+
+def _is_sound(mesh: Mesh) -> bool:
+    vertices, faces = mesh
+    return bool(
+        vertices.shape[1:] == faces.shape[1:] == (3,)
+        and len(faces)
+        and np.isfinite(vertices).all()
+        and faces.min() >= 0
+        and faces.max() < len(vertices)
+    )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import nearest_bin, travel_deg
-from nbv.files import read_arrays, write_arrays
+from nbv.files import damaged, need_distributions, read_arrays, reading, write_arrays
 from nbv.recommendation.criteria import tabulate
 from nbv.recommendation.evidence import Evidence
 
@@ -118,10 +118,30 @@ def save_lookup(path: str | Path, table: LookupTable) -> None:
 
 
 def load_lookup(path: str | Path) -> LookupTable:
-    """Read what `save_lookup` wrote."""
-    stored = read_arrays(path)
-    # An array without axes holds a number or a text.
-    values: dict[str, Any] = {
-        name: array if array.ndim else array.item() for name, array in stored.items()
-    }
-    return LookupTable(**{item.name: values[item.name] for item in fields(LookupTable)})
+    """Read what `save_lookup` wrote.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read, V or L is no conditional density, a cost is not finite, or a
+        recommended rotation is no whole number of degrees in [0, 360).
+    """
+    names = [item.name for item in fields(LookupTable)]
+    stored = read_arrays(path, names)
+    with reading(path):
+        # An array without axes holds a number or a text.
+        values: dict[str, Any] = {
+            name: stored[name] if stored[name].ndim else stored[name].item() for name in names
+        }
+        table = LookupTable(**values)
+        n_bins = len(table.cost)
+        for density in (table.viewpoint_likelihood, table.estimate_likelihood):
+            need_distributions(path, density, (n_bins, n_bins))
+        if table.cost.shape != (n_bins, n_bins) or not np.isfinite(table.cost).all():
+            raise damaged(path, "a cost is not finite")
+        delta_deg = table.recommended_delta_deg
+        if delta_deg.shape != (n_bins,) or not np.issubdtype(delta_deg.dtype, np.integer):
+            raise damaged(path, "the recommended rotations are no whole degrees")
+        if ((delta_deg < 0) | (delta_deg >= 360)).any():
+            raise damaged(path, "a recommended rotation is not in [0, 360)")
+    return table

@@ -1,16 +1,12 @@
-"""Depth images of many objects, written directly to one array on disk."""
+"""Depth images of many objects."""
 
 from __future__ import annotations
 
-import logging
-import time
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 import numpy as np
 
 from nbv.errors import UserError
-from nbv.files import replacing
 from nbv.meshes.store import Surface
 from nbv.rendering import Renderer
 from nbv.rendering.camera import Camera
@@ -18,10 +14,8 @@ from nbv.rendering.crop import crop_measured, sensor_camera
 from nbv.rendering.depth_codes import Codes, encode_depth
 from nbv.rendering.noise import Measure
 
-logger = logging.getLogger(__name__)
-
-# Progress is logged at each tenth of the work, but not more often than this.
-_SECONDS_BETWEEN_LINES = 5.0
+N_AZIMUTHS = 360
+"""Views of a full turn."""
 
 
 def render_objects(
@@ -30,7 +24,7 @@ def render_objects(
     camera: Camera,
     renderer: Renderer,
     measure: Measure | None = None,
-    n_azimuths: int = 360,
+    n_azimuths: int = N_AZIMUTHS,
 ) -> Iterator[Codes]:
     """Yield the encoded depth images of each object.
 
@@ -68,60 +62,3 @@ def render_objects(
         if measure is not None:
             depth = crop_measured(measure(depth, object_id), camera)
         yield encode_depth(depth, camera)
-
-
-def write_depth(
-    path: str | Path,
-    meshes: Mapping[str, Surface],
-    elevation_deg: float,
-    camera: Camera,
-    renderer: Renderer,
-    measure: Measure | None = None,
-    n_azimuths: int = 360,
-) -> None:
-    """Render all objects into one `.npy` file, (n_objects, n_azimuths, side, side) uint8.
-
-    The images go to disk as they are made; memory holds those of one object. The file appears
-    under its name only when it is complete. Parameters and errors as in `render_objects`.
-    """
-    side = camera.image_side
-    header = {
-        "descr": np.lib.format.dtype_to_descr(np.dtype(np.uint8)),
-        "fortran_order": False,
-        "shape": (len(meshes), n_azimuths, side, side),
-    }
-    images = render_objects(meshes, elevation_deg, camera, renderer, measure, n_azimuths)
-    progress = _Progress(str(path), len(meshes), n_azimuths)
-    # Written, not mapped: a full disk then raises an error instead of a fatal signal.
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        np.lib.format.write_array_header_1_0(file, header)
-        for index, codes in enumerate(images):
-            file.write(codes.tobytes())
-            progress.advance(index + 1)
-
-
-class _Progress:
-    def __init__(self, name: str, n_objects: int, images_each: int) -> None:
-        self._name, self._n_objects, self._images_each = name, n_objects, images_each
-        self._start = self._last = time.monotonic()
-        self._tenth = 0
-
-    def advance(self, done: int) -> None:
-        now = time.monotonic()
-        elapsed = max(now - self._start, 1e-9)
-        rate = done * self._images_each / elapsed
-        if done == self._n_objects:
-            images = done * self._images_each
-            logger.info(
-                "%s: %d objects, %d images in %.1f s (%.0f images/s)",
-                *(self._name, done, images, elapsed, rate),
-            )
-            return
-        tenth = 10 * done // self._n_objects
-        if tenth > self._tenth and now - self._last >= _SECONDS_BETWEEN_LINES:
-            self._tenth, self._last = tenth, now
-            left = elapsed / done * (self._n_objects - done)
-            logger.info(
-                "%s: object %d of %d, %.0f images/s, %.0f s left",
-                *(self._name, done, self._n_objects, rate, left),
-            )

@@ -30,7 +30,7 @@ def inputs(tree, evaluations):
     return FigureInputs(
         evaluations,
         depth=synthetic.depth_files(tree, UNITS),
-        splits=synthetic.split_files(tree, UNITS),
+        objects=synthetic.object_files(tree, UNITS),
         lookups=synthetic.lookup_files(tree, UNITS, N_FOLDS),
     )
 
@@ -339,6 +339,6 @@ def test_mistakes_are_named(inputs, tmp_path, evaluations):
         build_figure("figure5", FigureInputs(evaluations))
     absent = dict.fromkeys(evaluations, tmp_path / "absent.npy")
     with pytest.raises(UserError, match=r"absent\.npy does not exist"):
-        build_figure("figure5", FigureInputs(evaluations, depth=absent))
+        build_figure("figure5", FigureInputs(evaluations, depth=absent, objects=absent))
     with pytest.raises(UserError, match="no lookup table of proposed for mug 0 2"):
         build_figure("heatmaps", replace(inputs, lookups={}))

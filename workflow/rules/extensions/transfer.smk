@@ -31,7 +31,8 @@ use rule render as transfer_render with:
         ),
         meshes=rules.meshes.output[0],
     output:
-        OF_CONDITION.depth(*UNIT),
+        depth=OF_CONDITION.depth(*UNIT),
+        objects=OF_CONDITION.depth_objects(*UNIT),
     log:
         LAYOUT.log(f"transfer/render/{{condition}}/{unit_folder(*UNIT)}"),
     benchmark:
@@ -51,6 +52,7 @@ use rule train as transfer_train with:
         sources("train_estimator"),
         splits=rules.splits.output[0],
         depth=lambda wildcards: layout_of(wildcards.trained).depth(*UNIT),
+        objects=lambda wildcards: layout_of(wildcards.trained).depth_objects(*UNIT),
     output:
         OF_TRAINED.estimator(*FOLD),
     log:
@@ -64,6 +66,7 @@ use rule estimate as transfer_estimate with:
         sources("estimate_views"),
         splits=rules.splits.output[0],
         depth=lambda wildcards: layout_of(wildcards.tested).depth(*UNIT),
+        objects=lambda wildcards: layout_of(wildcards.tested).depth_objects(*UNIT),
         estimator=lambda wildcards: layout_of(wildcards.trained).estimator(*FOLD),
         of_parts=lambda wildcards: (
             stop(

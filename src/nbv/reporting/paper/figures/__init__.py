@@ -20,7 +20,7 @@ __all__ = ["FIGURES", "FigureInputs", "FigureKind", "build_figure"]
 class FigureKind:
     """One figure: how to draw it, what to print under it, and which of `FigureInputs` it needs.
 
-    ``needs`` is of ``depth``, ``splits`` and ``lookups``; every figure reads the evaluations.
+    ``needs`` is of ``depth``, ``objects`` and ``lookups``; every figure reads the evaluations.
     """
 
     draw: Callable[[FigureInputs], Figure]
@@ -35,7 +35,7 @@ FIGURES: Mapping[str, FigureKind] = {
         "view from where the category's single-view error is largest, the recommended, the "
         "opposite and the worst next view, and the cost of each. The object has the median "
         "single-view error of its fold.",
-        ("depth", "splits", "lookups"),
+        ("depth", "objects", "lookups"),
     ),
     "figure3": FigureKind(
         choice.idea,
@@ -43,28 +43,28 @@ FIGURES: Mapping[str, FigureKind] = {
         "widely the paper's Eq. 3 expects it to be spread with a second view, for the recommended "
         "and the worst rotation (middle), and what is left once the second view's estimate is in "
         "(bottom; both estimates combined by Bayes' rule).",
-        ("depth", "splits", "lookups"),
+        ("depth", "objects", "lookups"),
     ),
     "figure5": FigureKind(
         views.categories,
         "Figure 5. Depth images of each category. Nearer is brighter; white is background.",
-        ("depth",),
+        ("depth", "objects"),
     ),
     "figure6": FigureKind(
         views.elevations,
         "Figure 6. Depth images at different elevations. Nearer is brighter; white is background.",
-        ("depth",),
+        ("depth", "objects"),
     ),
     "figure7": FigureKind(
         choice.picks,
         "Figure 7. The next view of each method for the initial image of Figure 2, and the pose "
         "estimated from both.",
-        ("depth", "splits"),
+        ("depth", "objects"),
     ),
     "figure8": FigureKind(
         views.groups,
         "Figure 8. The four groups of initial viewpoints of Table 5.",
-        ("depth",),
+        ("depth", "objects"),
     ),
     "figure9": FigureKind(
         errors.boxplots,

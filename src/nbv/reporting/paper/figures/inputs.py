@@ -12,11 +12,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.experiments import results
 from nbv.experiments.results import Unit
 from nbv.files import existing
 from nbv.recommendation.criteria import cost_unit
 from nbv.recommendation.lookup import LookupTable, load_lookup
+from nbv.rendering.store import open_depth
 from nbv.reporting.paper.examples import Example, choose_example, example_row, hardest_azimuth_deg
 from nbv.reporting.settings import ReportSettings, focus_unit
 from nbv.reporting.style import MethodStyle, method_style
@@ -37,10 +37,8 @@ class FigureInputs:
         Frames of `results.load_evaluations`.
     settings : ReportSettings
         What to show.
-    depth : mapping of (category, elevation_deg) to Path
-        Depth images.
-    splits : mapping of str to Path
-        By category; they name the objects of the depth images.
+    depth, objects : mapping of (category, elevation_deg) to Path
+        Depth images, and the ids of their objects.
     lookups : mapping of (category, elevation_deg, fold) to Path
         Lookup tables that the method ``settings.subject`` follows.
     """
@@ -48,7 +46,7 @@ class FigureInputs:
     evaluations: Mapping[Unit, pd.DataFrame]
     settings: ReportSettings = field(default_factory=ReportSettings)
     depth: Mapping[Unit, Path] = field(default_factory=dict)
-    splits: Mapping[str, Path] = field(default_factory=dict)
+    objects: Mapping[Unit, Path] = field(default_factory=dict)
     lookups: Mapping[tuple[str, int, int], Path] = field(default_factory=dict)
 
     @property
@@ -64,14 +62,13 @@ class FigureInputs:
         UserError
             If a file is missing or the unit has no such object.
         """
-        images = results.load_depth(_given(self.depth, unit, "depth images"))
+        path = _given(self.depth, unit, "depth images")
+        images = open_depth(path, _given(self.objects, unit, "objects of depth images"))
         if object_id is None:
-            return np.asarray(images[0])
-        path = _given(self.splits, unit[0], "splits")
-        ids = results.load_object_ids(path)
-        if object_id not in ids:
+            return np.asarray(images.codes[0])
+        if object_id not in images.object_ids:
             raise UserError(f"{path}: no object {object_id!r}; evaluate the category again")
-        return np.asarray(images[ids.index(object_id)])
+        return np.asarray(images.codes[images.object_ids.index(object_id)])
 
     def lookup(self, fold: int) -> LookupTable:
         """Return the lookup table of the focus unit in one fold.

@@ -1,0 +1,21 @@
+"""Hold every file of a run to the checksum that it had when it was written."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    import logging
+    import shlex
+
+    from nbv.checksums import states_of_files
+    from nbv.errors import UserError
+
+    params = snakemake.params
+    states = states_of_files(params.run)
+    damaged = [path for path, state in states.items() if state == "damaged"]
+    for path in damaged:
+        logging.error("%s is not what was written", path)
+    if damaged:
+        command = shlex.join(["snakemake", *damaged, "--force", *params.options])
+        raise UserError(f"{len(damaged)} of {len(states)} files are damaged; {command}")
+    missing = sum(state == "missing" for state in states.values())
+    logging.info("%d files are as written, %d are missing", len(states) - missing, missing)
