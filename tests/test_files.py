@@ -59,7 +59,7 @@ def test_whoever_writes_the_same_file_later_is_the_one_who_does(tmp_path):
 def test_a_damaged_file_is_one_line_that_names_it(tmp_path, content, read):
     path = tmp_path / "file"
     path.write_bytes(content)
-    with pytest.raises(UserError, match="file: cannot be read .* run the same command again") as e:
+    with pytest.raises(UserError, match=r"file: cannot be read .* run the same command again") as e:
         read(path)
     assert len(str(e.value).splitlines()) == 1
 

@@ -86,7 +86,9 @@ def test_progress_goes_to_the_terminal_and_to_the_log(snakemake, capsys):
     assert "epoch 1" in Path(snakemake.log[0]).read_text()
 
 
-def test_inputs_are_held_to_their_checksums_and_outputs_get_theirs(snakemake, tmp_path, monkeypatch):
+def test_inputs_are_held_to_their_checksums_and_outputs_get_theirs(
+    snakemake, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     snakemake.input, snakemake.output = ["results/a/in.csv"], ["results/a/out.csv"]
     Path("results/a").mkdir(parents=True)

@@ -136,7 +136,7 @@ def test_images_of_other_objects_than_the_splits_are_refused():
     names = sorted(set(frame["object_id"]))
     folds.need_objects(frame, names[::-1])
     for others in (names[1:], [*names, "stranger"]):
-        with pytest.raises(UserError, match="'(000|stranger)' is not both in"):
+        with pytest.raises(UserError, match=r"'(000|stranger)' is not both in"):
             folds.need_objects(frame, others)
 
 

@@ -60,7 +60,7 @@ def test_an_error_while_rendering_leaves_what_was_there(tmp_path):
         yield IMAGES[0]
         raise UserError("huge: the object leaves the image")
 
-    with pytest.raises(UserError, match="^huge"):
+    with pytest.raises(UserError, match=r"^huge"):
         write_depth(*paths, NAMES, broken(), IMAGES.shape[1:])
     assert [path.read_bytes() for path in paths] == before
 
@@ -70,8 +70,8 @@ def test_an_error_while_rendering_leaves_what_was_there(tmp_path):
     [
         (["b", "a"], "2 different objects, .* has images of 3"),
         (["b", "a", "a"], "2 different objects"),
-        (["b", "a", 7], "no list of objects"),
-        ({"b": 1}, "no list of objects"),
+        (["b", "a", 7], "holds no list of objects"),
+        ({"b": 1}, "holds no list of objects"),
     ],
 )
 def test_ids_that_do_not_fit_the_images_are_refused(tmp_path, names, message):
