@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+from pathlib import Path
 
 # As in the workflow's jobs: products of small matrices on several threads wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -13,6 +15,7 @@ import pytest
 
 import synthetic
 from nbv.experiments.results import load_evaluations
+from projects import Project, copy_of_project
 
 # Machines are noisy, and a first example may import a library: no test is timed.
 hypothesis.settings.register_profile("untimed", deadline=None)
@@ -35,3 +38,25 @@ def evaluations(tree):
 @pytest.fixture
 def rng():
     return np.random.default_rng(0)
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    """A project after a whole tiny run on two cores. Not to be changed: see `scratch`."""
+    project = copy_of_project(tmp_path_factory.mktemp("finished"))
+    project.run("--cores", "2")
+    return project
+
+
+@pytest.fixture
+def scratch(finished: Project, tmp_path: Path) -> Project:
+    """A copy of the finished project, with what Snakemake remembers of it."""
+    shutil.copytree(finished.folder, tmp_path / "project", symlinks=True)
+    return Project(tmp_path / "project")
+
+
+@pytest.fixture
+def fresh(tmp_path: Path) -> Project:
+    """A project in which nothing has been run."""
+    (tmp_path / "project").mkdir()
+    return copy_of_project(tmp_path / "project")

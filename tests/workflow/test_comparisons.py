@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 import safetensors
 
-from .conftest import TINY, Project
+from projects import TINY, Project
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ import sys
 import pytest
 import trimesh
 
-from .conftest import ROOT, TINY
+from projects import ROOT, TINY
 
 FOLDER = "dataset=folder"
 

@@ -13,8 +13,7 @@ import pytest
 from snakemake.utils import Paramspace
 
 from nbv.experiments.ablation import ablation_space
-
-from .conftest import TINY
+from projects import TINY
 
 pytestmark = pytest.mark.slow
 

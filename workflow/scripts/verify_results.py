@@ -16,6 +16,8 @@ with job(snakemake):
         logging.error("%s is not what was written", path)
     if damaged:
         command = shlex.join(["snakemake", *damaged, "--force", *params.options])
-        raise UserError(f"{len(damaged)} of {len(states)} files are damaged; {command}")
+        raise UserError(
+            f"{len(damaged)} of {len(states)} files are damaged; make them again: {command}"
+        )
     missing = sum(state == "missing" for state in states.values())
     logging.info("%d files are as written, %d are missing", len(states) - missing, missing)

@@ -10,9 +10,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import pytest
-
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 PARTS = ("Snakefile", "config", "workflow", "profiles", "src")
 TINY = (
     "categories=[mug,chair]",
@@ -95,25 +93,3 @@ def copy_of_project(folder: Path) -> Project:
         else:
             shutil.copy2(source, folder / part)
     return Project(folder)
-
-
-@pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Project:
-    """A project after a whole tiny run on two cores. Not to be changed: see `scratch`."""
-    project = copy_of_project(tmp_path_factory.mktemp("finished"))
-    project.run("--cores", "2")
-    return project
-
-
-@pytest.fixture
-def scratch(finished: Project, tmp_path: Path) -> Project:
-    """A copy of the finished project, with what Snakemake remembers of it."""
-    shutil.copytree(finished.folder, tmp_path / "project", symlinks=True)
-    return Project(tmp_path / "project")
-
-
-@pytest.fixture
-def fresh(tmp_path: Path) -> Project:
-    """A project in which nothing has been run."""
-    (tmp_path / "project").mkdir()
-    return copy_of_project(tmp_path / "project")

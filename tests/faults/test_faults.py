@@ -1,0 +1,175 @@
+"""After kills, a full disk or lack of memory the same command goes on, to the same bytes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import time
+
+import psutil
+import pytest
+
+from projects import TINY
+
+KILLS = 25
+COMMAND = ("--cores", "2")
+
+
+def start(project, **options) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        project.command(*COMMAND),
+        cwd=project.folder,
+        env=project.environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        **options,
+    )
+
+
+def kill_snakemake(running, rng) -> bool:
+    running.kill()
+    return True
+
+
+def kill_group(running, rng) -> bool:
+    os.killpg(running.pid, signal.SIGKILL)
+    return True
+
+
+def kill_job(running, rng) -> bool:
+    """Kill one job, as the kernel does where memory runs out; whether there was one."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        below = psutil.Process(running.pid).children(recursive=True)
+        jobs = [each for each in below if any(".snakemake/scripts" in a for a in each.cmdline())]
+        python = [each for each in jobs if each.name().startswith("python")]
+        if python:
+            rng.choice(python).kill()
+            return True
+    return False
+
+
+@pytest.mark.slow
+def test_kills_at_any_moment_change_no_byte(finished, fresh):
+    """No lock has to be removed by hand, and no orphan spoils what the next run writes."""
+    expected, rng = finished.outcome(), random.Random(10)
+    kinds = [kill_snakemake, kill_group, kill_job]
+    killed: list[str] = []
+    completed = 0
+    while len(killed) < KILLS:
+        running = start(fresh)
+        try:
+            _, printed = running.communicate(timeout=rng.uniform(1.0, 14.0))
+        except subprocess.TimeoutExpired:
+            kill = kinds[len(killed) % len(kinds)]
+            if kill(running, rng):
+                killed.append(kill.__name__)
+            _, printed = running.communicate()
+            if kill is kill_job and running.returncode != 0:
+                assert "killed from outside: " in printed
+        assert "--unlock" not in printed
+        assert "Traceback" not in printed
+        if running.returncode == 0:
+            completed += 1
+            assert fresh.outcome() == expected
+            shutil.rmtree(fresh.results)
+    fresh.run(*COMMAND)
+    assert fresh.outcome() == expected
+    assert not list(fresh.results.rglob("*.partial*"))
+    fresh.run("verify", "--cores", "1")
+
+
+@pytest.fixture
+def small_disk(fresh):
+    """A function that gives the results a disk of some size, or another size to the same disk."""
+    folder = fresh.folder / "results"
+    folder.mkdir()
+    mounted = False
+
+    def resize(size: int) -> None:
+        nonlocal mounted
+        options = f"size={size}" + (",remount" if mounted else "")
+        command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            pytest.skip(f"cannot mount a disk here: {done.stderr.strip()}")
+        mounted = True
+
+    yield resize
+    if mounted:
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+@pytest.mark.slow
+def test_a_disk_that_fills_in_every_stage(finished, fresh, small_disk):
+    pages = sum(
+        -(-path.stat().st_size // 4096) for path in finished.results.rglob("*") if path.is_file()
+    )
+    stages = set()
+    for percent in (2, 20, 50, 80, 90, 95):
+        small_disk(pages * 4096 * percent // 100)
+        printed = fresh.run(*COMMAND, fails=True).stderr
+        assert "no space left on the disk; free some and run the same command again" in printed
+        assert "Traceback" not in printed
+        stages |= set(re.findall(r"\d (\w+)[^\]]*\] error: \S+ no space", printed))
+    assert len(stages) >= 3, stages
+    small_disk(10 * pages * 4096)
+    fresh.run(*COMMAND)
+    assert fresh.outcome() == finished.outcome()
+
+
+@pytest.mark.slow
+def test_memory_that_runs_out_in_training(finished, scratch):
+    wide = "estimator.hidden=2000000"
+    limited = subprocess.run(
+        scratch.command(*COMMAND, overrides=(*TINY, wide)),
+        cwd=scratch.folder,
+        env=scratch.environment,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30)),
+    )
+    assert limited.returncode != 0
+    assert re.search(r"error: memory ran out \(.*\): use fewer --cores", limited.stderr)
+    assert "Traceback" not in limited.stderr
+    scratch.run(*COMMAND)
+    assert scratch.outcome() == finished.outcome()
+
+
+@pytest.mark.slow
+def test_two_runs_at_once(finished, fresh):
+    first = start(fresh)
+    # Snakemake's own lock is what tells the second one; it must be there, and stay.
+    deadline = time.monotonic() + 120
+    while not list(fresh.folder.glob(".snakemake/locks/*.lock")):
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    second = fresh.run(*COMMAND, fails=True)
+    assert "another" in second.stderr.lower()
+    assert first.poll() is None
+    first.communicate(timeout=600)
+    assert first.returncode == 0
+    assert fresh.outcome() == finished.outcome()
+
+
+@pytest.mark.slow
+def test_results_that_cannot_be_written(fresh):
+    folder = fresh.folder / "results"
+    folder.mkdir()
+    bind = ["mount", "-t", "tmpfs", "-o", "ro", "tmpfs", str(folder)]
+    if subprocess.run(bind, capture_output=True).returncode:
+        pytest.skip("cannot mount a disk here")
+    try:
+        printed = fresh.run(*COMMAND, fails=True).stderr
+    finally:
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+    assert "nbv: error: results/tiny cannot be written: Read-only file system" in printed
+    assert "last_error" not in printed
