@@ -4,6 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nbv.errors import UserError
+from nbv.files import write_csv
 from nbv.paper.claims import CATEGORIES, CLAIMS, best, ranked
 from nbv.paper.statements import (
     FAILS,
@@ -16,7 +18,7 @@ from nbv.paper.statements import (
     FreeOfOutliers,
     Term,
 )
-from nbv.paper.verdicts import evaluate_claims
+from nbv.paper.verdicts import evaluate_claims, read_claims
 from nbv.reporting.paper.tables import build_table
 from nbv.reporting.settings import ReportSettings
 from paper.claim_frames import MUG, term, unit, verdict_of
@@ -164,3 +166,17 @@ def test_the_table_of_claims_is_tidy_and_repeatable(evaluations):
     pd.testing.assert_frame_equal(once, again)
     assert not once.duplicated(["id", "part"]).any()
     assert len(once.drop_duplicates(["id", "verdict"])) == len(CLAIMS)
+
+
+def test_claims_come_back_and_half_a_file_is_refused(evaluations, rng, tmp_path):
+    path = tmp_path / "claims.csv"
+    write_csv(path, evaluate_claims(evaluations, rng, 100))
+    assert list(read_claims(path)["id"].drop_duplicates()) == [claim.id for claim in CLAIMS]
+    lines = path.read_text().splitlines(keepends=True)
+    for kept in (lines[: len(lines) // 2], lines[:-1], lines[:1]):
+        path.write_text("".join(kept))
+        with pytest.raises(UserError, match=r"claims\.csv: .*; delete the file"):
+            read_claims(path)
+    path.write_text("".join(lines).replace(UNDECIDED, "perhaps"))
+    with pytest.raises(UserError, match="'perhaps' is no verdict"):
+        read_claims(path)

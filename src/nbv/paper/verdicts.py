@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from nbv.calibration.estimates import need_columns
 from nbv.experiments.results import Unit
+from nbv.files import damaged, read_csv
 from nbv.paper import published, statements
 from nbv.paper.claim_text import summarise, term_text
 from nbv.paper.claims import CLAIMS
 from nbv.paper.statements import (
+    VERDICTS,
     Better,
     Claim,
     Comparable,
@@ -110,6 +114,29 @@ def evaluate_claims(
         }
         rows += [shared | {"part": index} | measured[part] for index, part in enumerate(parts, 1)]
     return pd.DataFrame(rows, columns=[*CLAIM_COLUMNS, *PART_COLUMNS])
+
+
+def read_claims(path: str | Path) -> pd.DataFrame:
+    """Read `evaluate_claims` of the paper's claims from a CSV file.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read, or lacks a column, a claim or one of its comparisons.
+    """
+    frame = read_csv(path)
+    need_columns(path, frame, (*CLAIM_COLUMNS, *PART_COLUMNS))
+    read = set(zip(frame["id"], frame["part"], strict=True))
+    planned = {
+        (claim.id, part + 1)
+        for claim in CLAIMS
+        for part in range(len(statements.leaves(claim.statement)))
+    }
+    if absent := sorted(planned - read):
+        raise damaged(path, f"comparison {absent[0][1]} of claim {absent[0][0]!r} is missing")
+    if unknown := sorted({*frame["verdict"], *frame["point_verdict"]} - set(VERDICTS), key=str):
+        raise damaged(path, f"{unknown[0]!r} is no verdict")
+    return frame
 
 
 class _Evaluator:

@@ -6,7 +6,6 @@ It needs nothing but itself: no scripts, no links outward, figures written into 
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Hashable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,10 +16,11 @@ from markupsafe import Markup
 
 from nbv.config import read_configuration
 from nbv.experiments.results import load_object_ids
-from nbv.files import existing, read_csv
+from nbv.files import existing, read_json, reading
 from nbv.labels import category_label, interval_text, number
 from nbv.paper.claim_text import VERDICT_RULES, by_run
 from nbv.paper.statements import FAILS, HOLDS, NOT_RUN, UNDECIDED, VERDICTS
+from nbv.paper.verdicts import read_claims
 from nbv.reporting.paper.figures import FIGURES
 from nbv.reporting.paper.tables import TABLES
 from nbv.reporting.templating import HTML
@@ -76,11 +76,11 @@ def build_report(
     UserError
         If a file is missing.
     """
-    judged = read_csv(existing(claims)).fillna({"note": "", "summary": "", "versus": ""})
+    judged = read_claims(claims).fillna({"note": "", "summary": "", "versus": ""})
     each = judged.drop_duplicates("id")
     run, not_run = by_run(judged)
     settings = read_configuration(existing(configuration).parent)
-    made_with = json.loads(existing(provenance).read_text(encoding="utf-8"))
+    made_with = read_json(provenance)
     return HTML.get_template("report.html.j2").render(
         title=f"Best next viewpoint: experiment {settings['name']}",
         sections=_SECTIONS,
@@ -131,7 +131,8 @@ def _tally(verdicts: pd.Series) -> str:
 
 def _fragment(path: Path) -> Markup:
     """Return HTML that `write_table` has escaped already."""
-    return Markup(existing(path).read_text(encoding="utf-8"))
+    with reading(path):
+        return Markup(path.read_text(encoding="utf-8"))
 
 
 def _figure(name: str, path: Path) -> dict[str, str]:
