@@ -80,7 +80,9 @@ class Project:
         kinds += ("lookup/**/*.npz", "depth/**/*.npy", "estimators/**/*.safetensors")
         kinds += ("claims.*", "figures/*", "meshes/*.npz")
         found = (path for kind in kinds for path in self.results.glob(kind))
-        paths = sorted(path for path in found if path.stem != "runtime" and path.suffix != ".damaged")
+        paths = sorted(
+            path for path in found if path.stem != "runtime" and path.suffix != ".damaged"
+        )
         return {str(path.relative_to(self.results)): path.read_bytes() for path in paths}
 
 

@@ -35,8 +35,8 @@ def test_what_was_written_is_read_again(written):
 
 @pytest.mark.skipif(shutil.which("sha256sum") is None, reason="no sha256sum here")
 def test_another_program_verifies_the_same_files(written, tmp_path):
-    beside = tmp_path / "results/tiny/checksums/estimates/mug/el00/fold1/test.csv.sha256"
-    subprocess.run(["sha256sum", "--check", "--strict", beside], check=True, cwd=tmp_path)
+    record = tmp_path / "results/tiny/checksums/estimates/mug/el00/fold1/test.csv.sha256"
+    subprocess.run(["sha256sum", "--check", "--strict", record], check=True, cwd=tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -22,19 +22,19 @@ def write_checksum(path: str) -> None:
     path : str
         Relative to the project's folder: ``results/<name>/…``. Other files have no checksum.
     """
-    beside = checksum_of(path)
-    if beside is not None:
-        write_text(beside, f"{_sha256(path)}  {path}\n")
+    record = checksum_of(path)
+    if record is not None:
+        write_text(record, f"{_sha256(path)}  {path}\n")
 
 
 def state_of(path: str) -> State:
     """Return whether a file is what it was when its checksum was written."""
-    beside = checksum_of(path)
+    record = checksum_of(path)
     if not Path(path).is_file():
         return "missing"
-    if beside is None or not Path(beside).is_file():
+    if record is None or not Path(record).is_file():
         return "without checksum"
-    return "intact" if _sha256(path) == _written(beside) else "damaged"
+    return "intact" if _sha256(path) == _written(record) else "damaged"
 
 
 def check(path: str) -> None:
@@ -65,8 +65,8 @@ def states_of_files(root: str) -> dict[str, State]:
         ``results/<name>``.
     """
     folder = Path(Layout(root).checksums)
-    beside = (path.relative_to(folder).with_suffix("") for path in folder.rglob("*.sha256"))
-    return {path: state_of(path) for path in sorted(f"{root}/{each.as_posix()}" for each in beside)}
+    record = (path.relative_to(folder).with_suffix("") for path in folder.rglob("*.sha256"))
+    return {path: state_of(path) for path in sorted(f"{root}/{each.as_posix()}" for each in record)}
 
 
 def need_intact(root: str) -> None:
@@ -84,5 +84,5 @@ def _sha256(path: str) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _written(beside: str) -> str:
-    return Path(beside).read_text(encoding="ascii", errors="replace").partition(" ")[0]
+def _written(record: str) -> str:
+    return Path(record).read_text(encoding="ascii", errors="replace").partition(" ")[0]

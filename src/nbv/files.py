@@ -101,6 +101,15 @@ def read_csv(path: str | Path) -> pd.DataFrame:
         return pd.read_csv(path, dtype={"object_id": str}, keep_default_na=False, na_values=empty)
 
 
+def need_columns(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
+    """Raise UserError where a column is missing, or there is no row."""
+    for name in columns:
+        if name not in frame.columns:
+            raise damaged(path, f"no column {name!r}")
+    if frame.empty:
+        raise damaged(path, "holds no rows")
+
+
 def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write named arrays as a compressed `.npz` (same bytes: numpy dates its members 1980)."""
     with replacing(path) as temporary:

@@ -15,7 +15,7 @@ from typing import IO
 
 import psutil
 
-# An orphan works on for no longer than this beside a job of the next run.
+# An orphan works on for no longer than this while the next run works.
 _SECONDS_BETWEEN_LOOKS = 0.5
 
 

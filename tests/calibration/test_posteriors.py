@@ -8,6 +8,7 @@ from scipy.special import log_softmax
 
 from nbv.calibration import posteriors
 from nbv.errors import UserError
+from nbv.files import read_arrays, write_arrays
 
 
 def random_logits(seed: int, shape=(6, 24)) -> np.ndarray:
@@ -83,3 +84,23 @@ def test_posteriors_come_back_with_their_temperature(tmp_path):
     np.testing.assert_allclose(read.as_trained, log_softmax(logits, axis=-1), atol=1e-4)
     with pytest.raises(UserError, match=r"p\.npz: not of the objects"):
         posteriors.read_posteriors(tmp_path / "p.npz", ["NA", "007"])
+
+
+@pytest.mark.parametrize("name", ["log_posterior", "temperature", "object_ids"])
+def test_damaged_posteriors_are_refused(tmp_path, name):
+    path = tmp_path / "p.npz"
+    made = posteriors.posteriors_of(["a", "b"], random_logits(3, (2, 5, 24)), 1.7)
+    posteriors.write_posteriors(path, made)
+    whole = read_arrays(path)
+    wrong = {
+        "log_posterior": [whole["log_posterior"] + 0.1, whole["log_posterior"] * np.nan],
+        "temperature": [np.array(0.0), np.array(np.nan), np.array([1.0, 2.0])],
+        "object_ids": [whole["object_ids"][:1]],
+    }
+    for array in wrong[name]:
+        write_arrays(path, whole | {name: array})
+        with pytest.raises(UserError, match=r"p\.npz: "):
+            posteriors.read_posteriors(path, ["a", "b"])
+    write_arrays(path, {key: array for key, array in whole.items() if key != name})
+    with pytest.raises(UserError, match=rf"p\.npz: holds no array '{name}'"):
+        posteriors.read_posteriors(path, ["a", "b"])

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from nbv.errors import UserError
+from nbv.files import read_arrays, write_arrays
 from nbv.meshes.store import Mesh, load_meshes, save_meshes
 
 
@@ -43,3 +45,25 @@ def test_nothing_is_pickled(tmp_path, meshes):
     save_meshes(tmp_path / "a.npz", meshes)
     with np.load(tmp_path / "a.npz", allow_pickle=False) as stored:
         assert all(stored[name].dtype != object for name in stored.files)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("faces", lambda faces: faces + 1000),
+        ("faces", lambda faces: -faces - 1),
+        ("vertices", lambda vertices: vertices * np.nan),
+        ("vertices", lambda vertices: vertices[:, :2]),
+        ("ids", lambda ids: ids[:-1]),
+        ("ids", lambda ids: np.array(["0", "0", "0"])),
+        ("face_offsets", lambda offsets: offsets[::-1]),
+        ("vertex_offsets", lambda offsets: offsets * 0),
+    ],
+)
+def test_meshes_that_cannot_be_are_refused(tmp_path, meshes, name, change):
+    path = tmp_path / "mug.npz"
+    save_meshes(path, meshes)
+    whole = read_arrays(path)
+    write_arrays(path, whole | {name: change(whole[name])})
+    with pytest.raises(UserError, match=r"mug\.npz: .*; delete the file and run"):
+        load_meshes(path)

@@ -5,6 +5,7 @@ import pytest
 from tests.recommendation.made import evidence_of, hidden_range_estimates
 
 from nbv.errors import UserError
+from nbv.files import read_arrays, write_arrays
 from nbv.recommendation import lookup
 
 
@@ -55,3 +56,54 @@ def test_travel_that_costs_is_avoided_and_limits_are_kept():
     within = np.where(travel <= 60, table, np.inf)
     np.testing.assert_array_equal(table[np.arange(50), near], within.min(axis=1))
     assert (lookup.least_cost_delta(table, max_travel_deg=0) == 0).all()
+
+
+def without_a_density(arrays):
+    arrays["viewpoint_likelihood"] *= 1.1
+
+
+def with_a_negative_density(arrays):
+    arrays["estimate_likelihood"][3] = [-1.0, *np.full(35, 2 / 35)]
+
+
+def with_a_cost_that_is_no_number(arrays):
+    arrays["cost"][1, 2] = np.nan
+
+
+def with_a_rotation_out_of_range(arrays):
+    arrays["recommended_delta_deg"][0] = 360
+
+
+def with_rotations_that_are_no_whole_degrees(arrays):
+    arrays["recommended_delta_deg"] = arrays["recommended_delta_deg"] + 0.5
+
+
+def with_another_number_of_bins(arrays):
+    arrays["cost"] = arrays["cost"][:-1]
+
+
+def without_an_array(arrays):
+    del arrays["cost"]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        without_a_density,
+        with_a_negative_density,
+        with_a_cost_that_is_no_number,
+        with_a_rotation_out_of_range,
+        with_rotations_that_are_no_whole_degrees,
+        with_another_number_of_bins,
+        without_an_array,
+    ],
+)
+def test_a_table_that_cannot_be_is_refused(tmp_path, damage):
+    path = tmp_path / "pose_ambiguity.npz"
+    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    lookup.save_lookup(path, table)
+    arrays = read_arrays(path)
+    damage(arrays)
+    write_arrays(path, arrays)
+    with pytest.raises(UserError, match=r"pose_ambiguity\.npz: .*; delete the file and run"):
+        lookup.load_lookup(path)

@@ -1,4 +1,4 @@
-"""The depth images of many objects in one file, with their ids beside it."""
+"""The depth images of many objects in one file, and their ids."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.files import damaged, read_csv, reading, write_csv
+from nbv.files import damaged, need_columns, read_csv, reading, write_csv
 
 COLUMNS = ("object_id", "azimuth_deg", "estimate_deg")
 
@@ -63,15 +63,6 @@ def read_estimates(path: str | Path) -> Estimates:
     need_azimuths(path, frame, ("estimate_deg",))
     estimate_deg = frame["estimate_deg"].to_numpy(dtype=np.float64)
     return Estimates(object_ids, estimate_deg.reshape(len(object_ids), -1))
-
-
-def need_columns(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
-    """Raise UserError where a column is missing, or there is no row."""
-    for name in columns:
-        if name not in frame.columns:
-            raise damaged(path, f"no column {name!r}")
-    if frame.empty:
-        raise damaged(path, "holds no rows")
 
 
 def objects_of_full_turns(

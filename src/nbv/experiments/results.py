@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from nbv.calibration.estimates import need_azimuths, need_columns, objects_of_full_turns
+from nbv.calibration.estimates import need_azimuths, objects_of_full_turns
 from nbv.calibration.splits import read_splits
 from nbv.errors import UserError
 from nbv.experiments.two_views import COLUMNS
-from nbv.files import damaged, existing, read_csv, reading
+from nbv.files import damaged, existing, need_columns, read_csv, reading
 
 Unit = tuple[str, int]
 """A category and an elevation in degrees."""

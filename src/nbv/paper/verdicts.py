@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.calibration.estimates import need_columns
 from nbv.experiments.results import Unit
-from nbv.files import damaged, read_csv
+from nbv.files import damaged, need_columns, read_csv
 from nbv.paper import published, statements
 from nbv.paper.claim_text import summarise, term_text
 from nbv.paper.claims import CLAIMS

@@ -1,4 +1,4 @@
-"""The depth images of a unit on disk: one array, and the ids of its objects beside it."""
+"""The depth images of a unit on disk: one array, and the ids of its objects."""
 
 from __future__ import annotations
 
