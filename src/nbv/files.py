@@ -57,7 +57,7 @@ def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
 
 
 @contextmanager
-def reading(path: str | Path) -> Iterator[None]:
+def readable(path: str | Path) -> Iterator[None]:
     """Turn whatever a reader raises on a damaged file into one line that names the file.
 
     Raises
@@ -91,11 +91,11 @@ def read_csv(path: str | Path) -> pd.DataFrame:
     Raises
     ------
     UserError
-        As of `reading`.
+        As of `readable`.
     """
     import pandas as pd  # here, so that loading a lookup table costs no import of pandas
 
-    with reading(path):
+    with readable(path):
         columns = pd.read_csv(path, nrows=0).columns
         empty = {name: [""] for name in columns if name != "object_id"}
         return pd.read_csv(path, dtype={"object_id": str}, keep_default_na=False, na_values=empty)
@@ -117,8 +117,8 @@ def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 
 
 def open_array(path: str | Path) -> NDArray[Any]:
-    """Map an array stored as `.npy` into memory, read-only; errors as of `reading`."""
-    with reading(path):
+    """Map an array stored as `.npy` into memory, read-only; errors as of `readable`."""
+    with readable(path):
         stored: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
         return stored
 
@@ -135,9 +135,9 @@ def read_arrays(path: str | Path, names: Iterable[str] = ()) -> dict[str, NDArra
     Raises
     ------
     UserError
-        Where one of `names` is missing, and as of `reading`.
+        Where one of `names` is missing, and as of `readable`.
     """
-    with reading(path), np.load(path, allow_pickle=False) as stored:
+    with readable(path), np.load(path, allow_pickle=False) as stored:
         arrays = {name: stored[name] for name in stored.files}
     for name in names:
         if name not in arrays:
@@ -161,8 +161,8 @@ def need_distributions(
 
 
 def read_json(path: str | Path) -> Any:
-    """Read what `write_json` wrote; errors as of `reading`."""
-    with reading(path):
+    """Read what `write_json` wrote; errors as of `readable`."""
+    with readable(path):
         return json.loads(Path(path).read_text(encoding="utf-8"))
 
 

@@ -16,7 +16,7 @@ from typing import IO
 import psutil
 
 # An orphan works on for no longer than this while the next run works.
-_SECONDS_BETWEEN_LOOKS = 0.5
+_SECONDS_BETWEEN_CHECKS = 0.5
 
 
 def end_with_snakemake() -> None:
@@ -44,7 +44,7 @@ def _runs_snakemake(arguments: Iterable[str]) -> bool:
 
 def _watch(starter: psutil.Process, parent: int) -> None:
     while os.getppid() == parent and _is_alive(starter):
-        time.sleep(_SECONDS_BETWEEN_LOOKS)
+        time.sleep(_SECONDS_BETWEEN_CHECKS)
     # Nobody waits for this job any more, and the next run starts another one.
     os._exit(1)
 

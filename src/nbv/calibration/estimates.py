@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.files import damaged, need_columns, read_csv, reading, write_csv
+from nbv.files import damaged, need_columns, read_csv, readable, write_csv
 
 COLUMNS = ("object_id", "azimuth_deg", "estimate_deg")
 
@@ -91,7 +91,7 @@ def objects_of_full_turns(
 def need_azimuths(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
     """Raise UserError where a column holds anything but numbers in [0, 360)."""
     for name in columns:
-        with reading(path):
+        with readable(path):
             values = frame[name].to_numpy(dtype=np.float64)
         # Written so that NaN is refused as well.
         wrong = ~((values >= 0.0) & (values < 360.0))

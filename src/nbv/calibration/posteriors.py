@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import nearest_bin
 from nbv.errors import UserError
-from nbv.files import damaged, need_distributions, read_arrays, reading, write_arrays
+from nbv.files import damaged, need_distributions, read_arrays, readable, write_arrays
 
 Floats = NDArray[np.float64]
 
@@ -166,7 +166,7 @@ def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
     names = tuple(str(name) for name in stored["object_ids"])
     if names != tuple(object_ids):
         raise UserError(f"{path}: not of the objects that the estimates are of; make both again")
-    with reading(path):
+    with readable(path):
         posteriors = Posteriors(names, stored["log_posterior"], float(stored["temperature"]))
         _, n_views, n_classes = posteriors.log_posterior.shape
         need_distributions(path, posteriors.distributions, (len(names), n_views, n_classes))

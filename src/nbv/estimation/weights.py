@@ -14,7 +14,7 @@ from torch import nn
 
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.networks import build_network
-from nbv.files import damaged, reading, replacing
+from nbv.files import damaged, readable, replacing
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def load_estimator(path: str | Path, hardware: Hardware) -> Estimator:
     UserError
         Where the file is no estimator of this project.
     """
-    with reading(path):
+    with readable(path):
         with safetensors.safe_open(path, framework="pt") as stored:
             metadata = stored.metadata() or {}
         if "nbv" not in metadata:

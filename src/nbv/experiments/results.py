@@ -15,7 +15,7 @@ from nbv.calibration.estimates import need_azimuths, objects_of_full_turns
 from nbv.calibration.splits import read_splits
 from nbv.errors import UserError
 from nbv.experiments.two_views import COLUMNS
-from nbv.files import damaged, existing, need_columns, read_csv, reading
+from nbv.files import damaged, existing, need_columns, read_csv, readable
 
 Unit = tuple[str, int]
 """A category and an elevation in degrees."""
@@ -90,7 +90,7 @@ def read_evaluation(path: Path) -> pd.DataFrame:
     if len(followed) not in (0, len(frame)):
         raise damaged(path, "delta_deg is missing in some rows")
     need_azimuths(path, followed, ("delta_deg", "next_estimate_deg"))
-    with reading(path):
+    with readable(path):
         error_deg = frame["error_deg"].to_numpy(dtype=np.float64)
     # Written so that NaN is refused as well.
     if not ((error_deg >= 0.0) & (error_deg <= 180.0)).all():

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.files import damaged, read_arrays, reading, write_arrays
+from nbv.files import damaged, read_arrays, readable, write_arrays
 
 
 class Surface(Protocol):
@@ -73,9 +73,9 @@ def stored_ids(path: str | Path) -> list[str]:
     Raises
     ------
     UserError
-        As of `nbv.files.reading`.
+        As of `nbv.files.readable`.
     """
-    with reading(path), np.load(path, allow_pickle=False) as stored:
+    with readable(path), np.load(path, allow_pickle=False) as stored:
         return [str(object_id) for object_id in stored["ids"]]
 
 
@@ -89,7 +89,7 @@ def load_meshes(path: str | Path) -> dict[str, Mesh]:
     """
     arrays = read_arrays(path, ("ids", "vertices", "faces", "vertex_offsets", "face_offsets"))
     meshes: dict[str, Mesh] = {}
-    with reading(path):
+    with readable(path):
         ids = [str(object_id) for object_id in arrays["ids"]]
         parts = {
             name: [*pairwise(map(int, arrays[f"{name}_offsets"]))] for name in ("vertex", "face")

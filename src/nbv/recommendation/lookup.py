@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import nearest_bin, travel_deg
-from nbv.files import damaged, need_distributions, read_arrays, reading, write_arrays
+from nbv.files import damaged, need_distributions, read_arrays, readable, write_arrays
 from nbv.recommendation.criteria import tabulate
 from nbv.recommendation.evidence import Evidence
 
@@ -128,7 +128,7 @@ def load_lookup(path: str | Path) -> LookupTable:
     """
     names = [item.name for item in fields(LookupTable)]
     stored = read_arrays(path, names)
-    with reading(path):
+    with readable(path):
         # An array without axes holds a number or a text.
         values: dict[str, Any] = {
             name: stored[name] if stored[name].ndim else stored[name].item() for name in names

@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from nbv.config import read_configuration
 from nbv.experiments.results import load_object_ids
-from nbv.files import existing, read_json, reading
+from nbv.files import existing, read_json, readable
 from nbv.labels import category_label, interval_text, number
 from nbv.paper.claim_text import VERDICT_RULES, by_run
 from nbv.paper.statements import FAILS, HOLDS, NOT_RUN, UNDECIDED, VERDICTS
@@ -131,7 +131,7 @@ def _tally(verdicts: pd.Series) -> str:
 
 def _fragment(path: Path) -> Markup:
     """Return HTML that `write_table` has escaped already."""
-    with reading(path):
+    with readable(path):
         return Markup(path.read_text(encoding="utf-8"))
 
 

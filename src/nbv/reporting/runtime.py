@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.files import reading
+from nbv.files import readable
 from nbv.labels import number
 from nbv.reporting.table import Cell, Row, Table
 
@@ -73,7 +73,7 @@ def load_jobs(files: Iterable[tuple[str, Path, Path]]) -> pd.DataFrame:
         if not benchmark.is_file():
             continue
         told = _told_cpu_s(log)
-        with reading(benchmark):
+        with readable(benchmark):
             table = pd.read_csv(benchmark, sep="\t", na_values=["-"])
         for row in table.reindex(columns=["s", "cpu_time", "max_rss"]).to_dict("records"):
             cpu_s = max(told or 0.0, float(np.nan_to_num(row["cpu_time"])))
