@@ -59,7 +59,7 @@ def snakemake(tmp_path):
             "error: memory ran out ([enforce fail] DefaultCPUAllocator: can't allocate memory: 9 "
             "bytes): use fewer --cores, or smaller settings",
         ),
-        (UserError("two\nlines"), "error: two lines"),
+        (UserError("two\nlines"), "error: two\\nlines"),
     ],
 )
 def test_a_mistake_is_one_line_everywhere(snakemake, tmp_path, capsys, error, line):

@@ -7,7 +7,14 @@ from collections.abc import Iterable
 
 
 class UserError(Exception):
-    """A mistake in the input: one line that names the file, key or value, and what to do."""
+    """A mistake in the input: one line that names the file, key or value, and what to do.
+
+    What cannot be printed, such as the line break in a file's name, is shown by its escape.
+    """
+
+    def __init__(self, message: str) -> None:
+        shown = (c if c.isprintable() else ascii(c)[1:-1] for c in message)
+        super().__init__("".join(shown))
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:

@@ -20,6 +20,7 @@ from nbv.config import (
     read_configuration,
     snakemake_overrides,
 )
+from nbv.config.memory import available_bytes, check_memory
 from nbv.errors import UserError
 from nbv.jobs import killed_jobs
 from nbv.layout import Layout, fold_folder, unit_folder
@@ -79,9 +80,17 @@ try:
     METHODS, EXTENSIONS = CONFIG["methods"], CONFIG["extensions"]
     check_methods(METHODS, EXTENSIONS, CONFIG["gives_distributions"])
     check_sensor(CONFIG["sensor"], CATEGORIES)
+    # Jobs run here unless a number of jobs elsewhere was given, or this is such a job.
+    MEMORY = available_bytes(
+        is_local=workflow.is_main_process and workflow.resource_settings.nodes is None
+    )
+    check_memory(CONFIG, CONFIG["n_objects"] or 0, MEMORY)
     OBJECTS = {category: selected_objects(category) for category in CATEGORIES}
+    check_memory(CONFIG, max(map(len, OBJECTS.values())), MEMORY)
 except UserError as error:
     stop(error)
+except OSError as error:
+    stop(f"dataset.root: {error.filename} cannot be read: {error.strerror}")
 
 # What decides on a rotation: the conditionals, and the cost of travel.
 DECISION = CONFIG["density"] | CONFIG["recommendation"]
@@ -146,7 +155,10 @@ def run_settings(run):
     if run == CONFIG["name"]:
         return CONFIG
     try:
-        return read_configuration(Path("results") / run)
+        return read_configuration(
+            Path("results") / run,
+            ("categories", "elevations_deg", "methods", "extensions"),
+        )
     except UserError as error:
         stop(error)
 
@@ -322,7 +334,7 @@ def compared_runs():
 def methods_in(run):
     """The paper's methods, and those that multiply an estimator's distributions."""
     extensions = run_settings(run)["extensions"].items()
-    own = [name for name, method in extensions if method["fusion"] == "product"]
+    own = [name for name, method in extensions if method.get("fusion") == "product"]
     return [*run_settings(run)["methods"], *own]
 
 
@@ -358,7 +370,10 @@ def compared(path, names_of):
 
 
 def proposed_lookup(run):
-    return [run_settings(run)["methods"][SETTINGS.subject]["policy"]]
+    methods, name = run_settings(run)["methods"], SETTINGS.subject
+    if name not in methods or not needs_lookup(methods[name]["policy"]):
+        stop(f"the run {run} has no lookup table of a method {name}")
+    return [methods[name]["policy"]]
 
 
 def test_estimates(run):

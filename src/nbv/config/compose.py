@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from nbv.config.keys import one_line, type_of, with_new_names
+from nbv.config.keys import one_line, shortened, type_of, with_new_names
 from nbv.config.schema import Config
 from nbv.errors import UserError, nearest
 from nbv.files import existing
@@ -45,7 +45,7 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
     try:
         settings = Config.model_validate(composed).model_dump()
     except ValidationError as error:
-        raise UserError(one_line(error)) from error
+        raise UserError(one_line(error.errors())) from error
     # So that a key of one kind of estimator is no setting of another.
     estimator = {key: value for key, value in settings["estimator"].items() if value is not None}
     settings["estimator"] = estimator
@@ -70,14 +70,18 @@ def _checked(directory: Path, override: str) -> str:
     key, separator, value = override.partition("=")
     bare = key.lstrip("+~")
     if not separator and not key.startswith("~"):
-        raise UserError(f"override {override!r} is not of the form key=value")
+        raise UserError(f"override {shortened(override)!r} is not of the form key=value")
     if bare in GROUPS:
         _check_choice(directory, bare, value, bare)
         return override
     kind, _ = type_of(bare.split("."))
+    if value.replace(" ", "") == "{}":
+        # Hydra merges mappings.
+        raise UserError(f"{key}={{}} changes nothing; ~{bare}.<key> leaves a key out")
     if kind is str and value not in ("null", "") and value[0] not in "'\"":
-        # Quoted, for Hydra's grammar has no place for ~, = or brackets in plain text.
-        escaped = value.replace("'", "\\'")
+        # Quoted, for Hydra's grammar has no place for ~, = or brackets in plain text. There a
+        # backslash stands for itself, except before a quote.
+        escaped = re.sub(r"(\\*)('|$)", lambda m: 2 * m[1] + m[2].replace("'", r"\'"), value)
         override = f"{key}='{escaped}'"
     # What may be there is for the schema to say, not for the files that are composed.
     return f"++{override}" if key == bare else override
@@ -86,21 +90,74 @@ def _checked(directory: Path, override: str) -> str:
 def _check_choice(directory: Path, group: str, choice: str, key: str) -> None:
     choices = [path.stem for path in (directory / group).glob("*.yaml")]
     if choice not in choices:
-        raise UserError(f"{key}={choice} is unknown: {nearest(choice, choices)}")
+        raise UserError(f"{key}={shortened(choice)} is unknown: {nearest(choice, choices)}")
 
 
 def _composed(folder: Path, overrides: list[str]) -> Any:
     from hydra import compose, initialize_config_dir
-    from hydra.errors import HydraException
     from omegaconf import OmegaConf
-    from omegaconf.errors import OmegaConfBaseException
 
     try:
         with initialize_config_dir(str(folder), version_base="1.3"):
             composed = compose("config", overrides=overrides)
         return OmegaConf.to_container(composed, resolve=True, throw_on_missing=True)
-    except (HydraException, OmegaConfBaseException) as error:
-        raise UserError(f"configuration: {str(error).strip().splitlines()[0]}") from error
+    # No list of what a parser may raise on arbitrary text is complete.
+    except Exception as error:
+        raise UserError(_why_not_composed(folder, overrides, error)) from error
+
+
+def _why_not_composed(folder: Path, overrides: Sequence[str], error: Exception) -> str:
+    """Return what could not be composed: an override, a file or a key."""
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+
+    parser = OverridesParser.create()
+    for override in overrides:
+        written = f"override {shortened(override.removeprefix('++'))!r}"
+        try:
+            several = parser.parse_override(override).is_sweep_override()
+        except Exception as fault:
+            return f"{written} cannot be read: {_first_line(fault)}; quote what is text"
+        if several:
+            return f"{written} holds several values; write a list as [1,2]"
+    for path in sorted(folder.rglob("*.yaml")):
+        read_mapping(path)
+    key = getattr(error, "full_key", None)
+    return f"configuration{f' key {key!r}' if key else ''}: {_first_line(error)}"
+
+
+def _first_line(error: Exception) -> str:
+    lines = str(error).strip().splitlines()
+    return shortened(lines[0]) if lines else type(error).__name__
+
+
+def read_mapping(path: Path) -> dict[str, Any]:
+    """Read a YAML file that holds a mapping, as plain values; interpolations stay as written.
+
+    Raises
+    ------
+    UserError
+        With the path and the reason, where it cannot be read.
+    """
+    import yaml
+    from omegaconf import OmegaConf
+
+    try:
+        text = path.read_text(encoding="utf-8")
+        # A few aliases of aliases fill any memory; the program writes none.
+        if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, yaml.SafeLoader)):
+            raise ValueError("aliases are not allowed")
+        content = OmegaConf.to_container(OmegaConf.create(text), resolve=False)
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path} cannot be read: it is not UTF-8 text") from error
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}") from error
+    # No list of what a parser may raise on arbitrary text is complete.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{path} cannot be read as YAML: {shortened(reason)}") from error
+    if not isinstance(content, dict):
+        raise UserError(f"{path} holds no settings")
+    return {str(key): value for key, value in content.items()}
 
 
 def _name(settings: Mapping[str, Any]) -> str:
@@ -163,9 +220,15 @@ def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
         if key == "overrides":
             continue
         if not isinstance(value, str | int | float) and value is not None:
-            raise UserError(f'--config {key}: write it as overrides="[{key}=...]"')
+            raise UserError(f'--config {shortened(key)}: write it as overrides="[{key}=...]"')
         overrides.append(f"{key}={'null' if value is None else value}")
-    extra = given.get("overrides") or []
+    extra = given.get("overrides")
+    if extra is None:
+        return overrides
+    if not isinstance(extra, str | list):
+        raise UserError(
+            f'--config overrides={shortened(extra)}: write it as overrides="[key=value,…]"'
+        )
     return overrides + _items(extra if isinstance(extra, str) else ",".join(map(str, extra)))
 
 
@@ -191,21 +254,45 @@ def _items(text: str) -> list[str]:
     return [item.strip() for item in items if item.strip()]
 
 
-def read_configuration(root: Path) -> dict[str, Any]:
+def read_configuration(root: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
     """Read ``configuration.yaml`` of a run or reference as plain values, under today's names.
+
+    What it says is checked as of `load_config`. It may lack keys, which are younger than it, and
+    may have others.
+
+    Parameters
+    ----------
+    root : pathlib.Path
+        The folder of the run or reference.
+    needed : sequence of str
+        Keys that have to be there, as ``n_folds`` always has.
 
     Raises
     ------
     UserError
-        If it is missing, not a mapping, or does not say how many folds there are.
+        One line that names the file and what is wrong with it.
     """
-    from omegaconf import OmegaConf
-
     path = existing(root / "configuration.yaml")
-    configuration = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
-    if not isinstance(configuration, dict):
-        raise UserError(f"{path}: holds no settings; make it again")
-    if not isinstance(configuration.get("n_folds"), int) or configuration["n_folds"] < 2:
-        raise UserError(f"{path}: n_folds has to be 2 or more")
-    settings = with_new_names({str(key): value for key, value in configuration.items()})
+    settings = with_new_names(read_mapping(path))
+    try:
+        for key in ("n_folds", *needed):
+            if key not in settings:
+                raise UserError(f"{key} is missing")
+        _check_kept(settings)
+    except UserError as error:
+        raise UserError(f"{path}: {error}; the file is damaged: make it again") from error
     return settings | {"gives_distributions": "n_classes" in settings.get("estimator", {})}
+
+
+def _check_kept(settings: Mapping[str, Any]) -> None:
+    try:
+        Config.model_validate(settings)
+    except ValidationError as error:
+        of_other_times = ("missing", "extra_forbidden")
+        mistakes = [each for each in error.errors() if each["type"] not in of_other_times]
+        if mistakes:
+            raise UserError(one_line(mistakes)) from error
+    # The model compares keys with each other only where none is missing.
+    for category in settings.get("categories", []):
+        if category not in settings.get("elevations_deg", {}):
+            raise UserError(f"elevations_deg.{category} is missing")

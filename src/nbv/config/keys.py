@@ -6,20 +6,23 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
 
-from nbv.config.schema import RENAMED_KEYS, RENAMED_VALUES, Config
+from nbv.config.schema import NAME_RULE, RENAMED_KEYS, RENAMED_VALUES, Config
 from nbv.errors import UserError, nearest
 
-_BOUNDS = ("ge", "gt", "le", "lt", "min_length")
+_BOUNDS = ("ge", "gt", "le", "lt", "min_length", "max_length")
 _RANGES = {
-    ("ge",): "{ge} or more",
-    ("gt",): "above {gt}",
     ("ge", "le"): "{ge} to {le}",
+    ("gt", "le"): "above {gt}, {le} at most",
     ("gt", "lt"): "between {gt} and {lt}",
     ("min_length",): "one or more",
+    ("min_length", "max_length"): "one or more, {max_length} at most",
 }
+_LONGEST = 80
+"""Characters of a value that a message repeats."""
 _TYPES = {int: "a whole number", float: "a number", str: "text", list: "a list"}
 
 
@@ -99,11 +102,22 @@ def _unknown_key(parts: Sequence[str | int], fields: Mapping[str, FieldInfo]) ->
     if new in fields:
         return f"configuration key {written!r} is now {_dotted([*above, new])!r}"
     meant = nearest(written, [_dotted([*above, known]) for known in fields])
-    return f"configuration key {written!r} is unknown: {meant if fields else 'a value has no keys'}"
+    hint = meant if fields else "a value has no keys"
+    return f"configuration key {shortened(written)!r} is unknown: {hint}"
 
 
-def one_line(error: ValidationError) -> str:
-    """Return a refusal's first mistake as one line: key, value, and what the key takes.
+def shortened(value: Any) -> str:
+    """Return a value as text for a message, its middle left out where it is long."""
+    try:
+        text = str(value)
+    except ValueError:  # Python writes no integer of more than 4,300 digits.
+        return "a number of thousands of digits"
+    half = _LONGEST // 2
+    return text if len(text) <= _LONGEST else f"{text[:half]} … {text[-half:]}"
+
+
+def one_line(mistakes: Sequence[ErrorDetails]) -> str:
+    """Return the first of pydantic's mistakes as one line: key, value, and what the key takes.
 
     Raises
     ------
@@ -111,29 +125,37 @@ def one_line(error: ValidationError) -> str:
         As of `type_of`, where the mistake is an unknown key.
     """
     # An unknown key first: the key that it was meant for is missing then, too.
-    mistake = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
-    place = [part for part in mistake["loc"] if part != "[key]"]
+    mistake = min(mistakes, key=lambda each: each["type"] != "extra_forbidden")
+    place = list(mistake["loc"])
+    if place[-1:] == ["[key]"]:
+        return f"{shortened(_dotted(place[:-1]))}: {NAME_RULE}"
     kind, marks = type_of(place)
-    key, context, value = _dotted(place), mistake.get("ctx", {}), mistake["input"]
+    key, context = shortened(_dotted(place)), mistake.get("ctx", {})
+    given = f"{key}={shortened(mistake['input'])}"
     match mistake["type"]:
         case "missing":
             return f"{key} is missing"
         case "value_error":
             return f"{key}: {context['error']}"
         case "string_pattern_mismatch":
-            return f"{key}={value}: use letters, digits, '.', '_' and '-'"
+            return f"{given}: {_notes(marks)}"
         case "literal_error":
-            return f"{key}={value} is unknown: {nearest(str(value), get_args(kind))}"
+            return f"{given} is unknown: {nearest(str(mistake['input']), get_args(kind))}"
         case "finite_number":
-            return f"{key}={value} is out of range: a finite number"
+            return f"{given} is out of range: a finite number"
     if any(bound in context for bound in _BOUNDS):
-        return f"{key}={value} is out of range: {_range_text(marks)}"
-    return f"{key}={value} is not {_TYPES.get(get_origin(kind) or kind, 'a mapping')}"
+        return f"{given} is out of range: {_range_text(marks)}"
+    return f"{given} is not {_TYPES.get(get_origin(kind) or kind, 'a mapping')}"
 
 
 def _range_text(marks: Sequence[Any]) -> str:
     bounds = {
         name: getattr(mark, name) for name in _BOUNDS for mark in marks if hasattr(mark, name)
     }
-    notes = [mark for mark in marks if isinstance(mark, str)]
-    return ", ".join([_RANGES[tuple(bounds)].format(**bounds), *notes])
+    return ", ".join(
+        text for text in (_RANGES[tuple(bounds)].format(**bounds), _notes(marks)) if text
+    )
+
+
+def _notes(marks: Sequence[Any]) -> str:
+    return ", ".join(mark for mark in marks if isinstance(mark, str))

@@ -2,21 +2,73 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+import math
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from nbv.errors import UserError, nearest
 from nbv.fold_sizes import enough_objects
 
+T = TypeVar("T")
+
+NAME_RULE = "use letters, digits, '.', '_' and '-', a letter or digit first, 100 at most"
+"""What a name has to be that becomes a part of a path or a wildcard of Snakemake."""
+
+
+def _distinct(values: list[T]) -> list[T]:
+    for index, value in enumerate(values):
+        if value in values[:index]:
+            raise ValueError(f"{value} is there twice")
+    return values
+
+
+def _below_root(folder: str) -> str:
+    path = PurePosixPath(folder)
+    if path.is_absolute() or ".." in path.parts:
+        raise ValueError(f"{folder!r} is not below dataset.root")
+    return folder
+
+
+def _with_known_home(path: str) -> str:
+    try:
+        Path(path).expanduser()
+    except RuntimeError:
+        raise ValueError(f"{path!r}: there is no such user") from None
+    return path
+
+
 Whole = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(strict=True)]
-Count = Annotated[Whole, Field(ge=1)]
-Positive = Annotated[Number, Field(gt=0)]
-NotNegative = Annotated[Number, Field(ge=0)]
+# Far above any use, and small enough for arithmetic; `nbv.config.memory` refuses what is too much.
+Count = Annotated[Whole, Field(ge=1, le=10**12)]
+Angle = Annotated[Number, Field(ge=-360, le=360)]
+Bandwidth = Annotated[Number, Field(ge=0, le=180)]
+PseudoObservations = Annotated[Number, Field(ge=0, le=10**9)]
 Elevation = Annotated[Whole, Field(ge=0, le=89)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$")]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"), NAME_RULE]
+Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{1,4096}$"), "one line of text"]
+DataPath = Annotated[Text, AfterValidator(_with_known_home)]
+Axis = Annotated[
+    str,
+    Field(pattern=r"^(auto|[+-]?[xyzXYZ]|[^,\s]+(,[^,\s]+){2})$"),
+    "an axis such as +y, a vector such as 0,0,1, or auto",
+]
+Distinct = AfterValidator(_distinct)
+AtLeastOne = Field(min_length=1, max_length=100)
 Framing = Literal["silhouette", "axis"]
+
+FEWEST_PIXELS = 4
+"""Of an object's diagonal in an image: fewer show nothing of where it is seen from."""
 
 RENAMED_KEYS = {
     "contenders": "extensions",
@@ -45,15 +97,15 @@ class Dataset(Section):
     """Where meshes come from; see `nbv.meshes.sources`."""
 
     source: str
-    root: str | None = None
-    layout: str = "auto"
-    categories: dict[str, str] = {}
-    up: str = "+z"
-    front: str = "+x"
-    turn_deg: dict[str, Number] = {}
+    root: DataPath | None = None
+    layout: Literal["auto", "v1", "v2", "sem"] = "auto"
+    categories: dict[Name, Annotated[Text, AfterValidator(_below_root)]] = {}
+    up: Axis = "+z"
+    front: Axis = "+x"
+    turn_deg: dict[Name, Angle] = {}
     centre: Literal["box", "origin"] = "box"
-    exclude: list[str] = []
-    exclude_file: str | None = None
+    exclude: list[Text] = []
+    exclude_file: DataPath | None = None
 
 
 class Renderer(Section):
@@ -65,34 +117,46 @@ class Renderer(Section):
 class Camera(Section):
     """The depth camera; see `nbv.rendering.camera`."""
 
-    distance: Annotated[Number, Field(gt=1), "in object diagonals"]
-    fov_deg: Annotated[Number, Field(gt=0, lt=180)]
-    image_side: Annotated[Whole, Field(ge=8)]
+    distance: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"]
+    fov_deg: Annotated[Number, Field(ge=0.05, le=160)]
+    image_side: Annotated[Whole, Field(ge=8, le=10**6)]
     framing: Framing
+
+    @model_validator(mode="after")
+    def _check_object_is_seen(self) -> Self:
+        width = 2 * self.distance * math.tan(math.radians(self.fov_deg) / 2)
+        if self.image_side / width < FEWEST_PIXELS:
+            raise UserError(
+                f"camera.distance={self.distance:g} with camera.fov_deg={self.fov_deg:g} and "
+                f"camera.image_side={self.image_side} shows an object {self.image_side / width:.2g}"
+                f" pixels wide, and it needs {FEWEST_PIXELS}: bring the camera nearer, narrow its "
+                "view or take more pixels"
+            )
+        return self
 
 
 class Sensor(Section):
     """How the depth camera measures; see `nbv.rendering.noise`."""
 
     name: str
-    parameters: dict[str, Number] = {}
-    diagonal_m: dict[str, Positive] = {}
+    parameters: dict[Name, Annotated[Number, Field(gt=0, le=10**6)]] = {}
+    diagonal_m: dict[Name, Annotated[Number, Field(gt=0, le=1000)]] = {}
 
 
 class Estimator(Section):
     """The single-view estimator; see `nbv.estimation`. A kind omits what it does not have."""
 
     kind: str
-    channels: Annotated[list[Count], Field(min_length=1)]
+    channels: Annotated[list[Count], AtLeastOne]
     hidden: Count
-    epochs: Count
-    batch_size: Annotated[Whole, Field(ge=2)]
-    learning_rate: Positive
-    weight_decay: NotNegative
+    epochs: Annotated[Whole, Field(ge=1, le=10**6)]
+    batch_size: Annotated[Whole, Field(ge=2, le=10**12)]
+    learning_rate: Annotated[Number, Field(gt=0, le=10)]
+    weight_decay: Annotated[Number, Field(ge=0, le=10)]
     device: Literal["auto", "cpu", "cuda", "mps"]
     precision: Literal["auto", "bfloat16", "float32"]
-    n_classes: Annotated[Whole, Field(ge=8), "a divisor of 360"] | None = None
-    target_bandwidth_deg: Positive | None = None
+    n_classes: Annotated[Whole, Field(ge=8, le=360), "a divisor of 360"] | None = None
+    target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
 
     @model_validator(mode="after")
     def _check_classes(self) -> Self:
@@ -112,15 +176,15 @@ class Density(Section):
 
     pose_likelihood: Literal["given_estimate", "given_truth"]
     spread: Literal["entropy", "circular_variance"]
-    bandwidths_deg: Annotated[list[NotNegative], Field(min_length=1)]
-    pseudo_observations: Annotated[list[NotNegative], Field(min_length=1)]
-    n_parts: Annotated[Whole, Field(ge=2)]
+    bandwidths_deg: Annotated[list[Bandwidth], AtLeastOne, Distinct]
+    pseudo_observations: Annotated[list[PseudoObservations], AtLeastOne, Distinct]
+    n_parts: Annotated[Whole, Field(ge=2, le=1000)]
 
 
 class Recommendation(Section):
     """What travel costs; see `nbv.recommendation.lookup.least_cost_delta`."""
 
-    travel_cost: Annotated[NotNegative, "in the criterion's unit per degree"]
+    travel_cost: Annotated[Number, Field(ge=0, le=10**6), "in the criterion's unit per degree"]
     max_travel_deg: Annotated[Number, Field(ge=0, le=180)]
 
 
@@ -157,10 +221,10 @@ class Condition(Section):
 class Transfer(Section):
     """Conditions to train under and to test under; see `nbv.reporting.extensions.transfer`."""
 
-    category: str | None
+    category: Name | None
     elevation_deg: Elevation
-    folds: Annotated[list[Whole], Field(min_length=1)] | None
-    conditions: Annotated[dict[Name, Condition], Field(min_length=1)]
+    folds: Annotated[list[Whole], Field(min_length=1), Distinct] | None
+    conditions: Annotated[dict[Name, Condition], AtLeastOne]
 
 
 class Config(Section):
@@ -168,21 +232,21 @@ class Config(Section):
 
     experiment: Name
     name: Name | None
-    seed: Annotated[Whole, Field(ge=0)]
-    categories: Annotated[list[str], Field(min_length=1)]
-    focus_category: str | None
-    elevations_deg: dict[str, Annotated[list[Elevation], Field(min_length=1)]]
-    n_objects: Whole | None
-    n_folds: Annotated[Whole, Field(ge=2)]
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)]
+    categories: Annotated[list[Name], Field(min_length=1), Distinct]
+    focus_category: Name | None
+    elevations_deg: dict[Name, Annotated[list[Elevation], Field(min_length=1), Distinct]]
+    n_objects: Annotated[Whole, Field(ge=3, le=10**12)] | None
+    n_folds: Annotated[Whole, Field(ge=2, le=1000)]
     calibration: Literal["holdout", "crossfit"] = "holdout"
     calibration_fraction: Annotated[Number, Field(gt=0, lt=1)]
-    crossfit_parts: Annotated[Whole, Field(ge=2)] = 2
-    crossfit_epochs: Count | None = None
-    methods: dict[Name, Method]
+    crossfit_parts: Annotated[Whole, Field(ge=2, le=100)] = 2
+    crossfit_epochs: Annotated[Whole, Field(ge=1, le=10**6)] | None = None
+    methods: Annotated[dict[Name, Method], AtLeastOne]
     extensions: dict[Name, Method]
-    compared_runs: list[str] = []
-    leaderboard_runs: list[str]
-    n_resamples: Annotated[Whole, Field(ge=100)]
+    compared_runs: list[Name] = []
+    leaderboard_runs: Annotated[list[Name], Distinct]
+    n_resamples: Annotated[Whole, Field(ge=100, le=10**12)]
     dataset: Dataset
     renderer: Renderer
     camera: Camera
@@ -206,11 +270,15 @@ class Config(Section):
         for key, named in focus.items():
             if named is not None and named not in ours:
                 raise UserError(f"{key}={named} is no category of this run: {nearest(named, ours)}")
-        for turned in self.dataset.turn_deg:
-            if turned not in known:
-                raise UserError(
-                    f"dataset.turn_deg.{turned}: no such category; {nearest(turned, known)}"
-                )
+        of_categories = {
+            "dataset.turn_deg": self.dataset.turn_deg,
+            "dataset.categories": self.dataset.categories,
+            "sensor.diagonal_m": self.sensor.diagonal_m,
+        }
+        for key, values in of_categories.items():
+            for named in values:
+                if named not in known:
+                    raise UserError(f"{key}.{named}: no such category; {nearest(named, known)}")
         return self
 
     @model_validator(mode="after")

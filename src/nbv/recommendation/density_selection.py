@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.angles import nearest_bin
+from nbv.errors import UserError
 from nbv.recommendation.evidence import Evidence, gather_evidence
 from nbv.recommendation.lookup import LookupTable, build_lookup
 from nbv.recommendation.policies import Turns, two_views
@@ -109,6 +110,11 @@ def choose_densities(
     dict of str to Choice
         For each method the candidate of least mean error; of equals, the largest bandwidth and
         then the most pseudo-observations.
+
+    Raises
+    ------
+    UserError
+        Where an error is not finite: NaN would be chosen, as nothing is less.
     """
     errors: dict[str, dict[Candidate, NDArray[np.float64]]] = {name: {} for name in methods}
     for candidate, part, held_out, evidence in _trials(estimate_deg, settings, n_bins):
@@ -124,6 +130,7 @@ def choose_densities(
 
 def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
     mean = {candidate: float(of_objects.mean()) for candidate, of_objects in errors.items()}
+    _check_finite(mean, f"{name}: the two-view error")
     best = min(mean, key=mean.__getitem__)
     log.info(
         "%s: bandwidth %g deg, %g pseudo-observations (two-view error %.2f deg; worst %.2f)",
@@ -133,6 +140,16 @@ def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
         max(mean.values()),
     )
     return Choice(*best, candidate_error_deg=mean, object_error_deg=tuple(errors[best].tolist()))
+
+
+def _check_finite(values: Mapping[Candidate, float], what: str) -> None:
+    """Raise UserError for a value that no other can be compared with."""
+    for (bandwidth_deg, pseudo_observations), value in values.items():
+        if not np.isfinite(value):
+            raise UserError(
+                f"{what} of bandwidth {bandwidth_deg:g} deg and {pseudo_observations:g} "
+                f"pseudo-observations is {value}: the estimates are damaged; make them again"
+            )
 
 
 def most_likely_density(
@@ -150,6 +167,7 @@ def most_likely_density(
         rows = nearest_bin(estimate_deg[held_out], n_bins)
         chance = evidence.conditionals.viewpoint[rows, azimuth]
         found[candidate] += np.log(np.maximum(chance, np.finfo(float).tiny)).sum()
+    _check_finite(found, "the log-likelihood")
     return Choice(*max(found, key=found.__getitem__))
 
 

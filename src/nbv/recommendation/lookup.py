@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import nearest_bin, travel_deg
+from nbv.errors import UserError
 from nbv.files import damaged, need_distributions, read_arrays, readable, write_arrays
 from nbv.recommendation.criteria import tabulate
 from nbv.recommendation.evidence import Evidence
@@ -74,6 +75,11 @@ def least_cost_delta(
     -------
     ndarray (n,) int64
         In [0, 360). Of equal minima the one of smallest travel is taken, then the smaller delta.
+
+    Raises
+    ------
+    UserError
+        Where a cost is NaN, which argmin would take for the least.
     """
     n_bins = cost.shape[1]
     deltas = np.arange(n_bins) * (360.0 / n_bins)
@@ -83,6 +89,8 @@ def least_cost_delta(
     candidates = cost[:, order]
     if travel_cost:
         candidates = candidates + travel_cost * travel[order]
+    if np.isnan(candidates).any():
+        raise UserError("a rotation's cost is NaN: the estimates are damaged; make them again")
     best = order[np.argmin(candidates, axis=1)]
     recommended: NDArray[np.int64] = np.rint(deltas[best]).astype(np.int64)
     return recommended

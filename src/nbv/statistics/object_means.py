@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from nbv.angles import travel_deg
+from nbv.errors import UserError
 from nbv.files import existing, read_csv
 from nbv.statistics.metrics import Interval
 from nbv.statistics.paired import PairedErrors, Resampler, estimate
@@ -94,6 +96,9 @@ def indistinct_from_best(
 ) -> list[str]:
     """Return the method of least MAE, and those whose difference to it may be 0 (95 %)."""
     found = {method: estimate("mae", sample, method, resampler) for method in methods}
+    for method, mae in found.items():
+        if not math.isfinite(mae.value):
+            raise UserError(f"{method}: the MAE is {mae.value}: its errors are damaged")
     best = min(methods, key=lambda method: found[method].value)
     return [best] + [
         method

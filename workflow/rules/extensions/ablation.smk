@@ -23,7 +23,7 @@ rule evaluate_ablation:
     benchmark:
         LAYOUT.benchmark(f"evaluate_ablation/{ABLATIONS.wildcard_pattern}")
     wildcard_constraints:
-        setting="[^/]+",
+        setting="|".join(map(re.escape, ABLATIONS.instance_patterns)),
     conda:
         ENVIRONMENT
     resources:

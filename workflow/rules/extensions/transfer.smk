@@ -19,9 +19,9 @@ TRANSFER_KEYS = [
 
 
 wildcard_constraints:
-    condition="|".join(CONDITIONS),
-    trained="|".join(CONDITIONS),
-    tested="|".join(CONDITIONS),
+    condition="|".join(map(re.escape, CONDITIONS)),
+    trained="|".join(map(re.escape, CONDITIONS)),
+    tested="|".join(map(re.escape, CONDITIONS)),
 
 
 use rule render as transfer_render with:

@@ -129,6 +129,9 @@ def exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
     if settings["exclude_file"]:
         path = Path(settings["exclude_file"]).expanduser()
         try:
+            # A device or a pipe may have no end.
+            if path.exists() and not path.is_file():
+                raise UserError(f"dataset.exclude_file={path} is not a file")
             lines = path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
