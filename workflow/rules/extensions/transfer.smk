@@ -157,8 +157,8 @@ rule transfer_table:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt(10),
     params:
         settings=RESAMPLED,
         conditions=TRANSFER["conditions"],
