@@ -175,7 +175,7 @@ class OneNode:
             daemon.wait()
 
 
-def until(is_so: Callable[[], bool], what: str, timeout_s: float = 300) -> None:
+def until(is_so: Callable[[], bool], what: str, timeout_s: float = 1200) -> None:
     """Wait until something is so."""
     deadline = time.monotonic() + timeout_s
     while not is_so():
@@ -214,7 +214,7 @@ def one_node(folder: Path) -> Iterator[OneNode]:
         cluster.start_munged()
         cluster.start("slurmctld", "-D", "-i")
         cluster.start_slurmd()
-        until(cluster.is_up, f"the node is up (logs: {folder})", timeout_s=60)
+        until(cluster.is_up, f"the node is up (logs: {folder})", timeout_s=120)
         yield cluster
     finally:
         cluster.kill_jobs()
