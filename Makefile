@@ -1,6 +1,7 @@
 # make reproduce   the paper, end to end        make quick   the same graph, small
 # make test        the test suite               make check   lint, types, imports, workflow lint
 # make bench       the speed benchmarks         make compare a finished run with docs/reference
+# make test-slurm  the workflow on a real SLURM of one node, where root may install it
 
 PYTHON ?= python3
 CORES ?= 2
@@ -8,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: reproduce quick compare reference bench test test-quick check clean
+.PHONY: reproduce quick compare reference bench test test-quick test-slurm check clean
 
 reproduce: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -30,6 +31,11 @@ test: $(READY)
 
 test-quick: $(READY)
 	$(BIN)/pytest -m "not slow"
+
+# Not where it can be neither found nor installed: one line then says why.
+test-slurm: $(READY)
+	tests/workflow/slurm/install.sh $(BIN)/python
+	$(BIN)/pytest -rs --log-cli-level=INFO --log-cli-format="%(asctime)s %(message)s" tests/workflow/slurm
 
 check: $(READY)
 	$(BIN)/ruff check .

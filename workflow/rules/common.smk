@@ -384,6 +384,11 @@ def test_posteriors(run):
     return ["test"] if run_settings(run)["gives_distributions"] else []
 
 
+def per_attempt(amount):
+    """A resource that grows with each attempt: its lack may be what ended the last one."""
+    return lambda wildcards, attempt: amount * attempt
+
+
 def banner(*lines):
     line = "-" * 72
     print("\n".join(["", line, *lines, line]), file=sys.stderr, flush=True)

@@ -15,8 +15,8 @@ rule settings:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=5,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(5),
     params:
         configuration=CONFIG,
     script:
@@ -37,8 +37,8 @@ rule meshes:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=30,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(30),
     params:
         dataset=lambda wildcards: dataset_of(wildcards.category),
         objects=lambda wildcards: OBJECTS[wildcards.category],
@@ -61,8 +61,8 @@ rule splits:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=5,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(5),
     params:
         **({"crossfit_parts": len(PARTS)} if CROSSFIT else {}),
         n_folds=CONFIG["n_folds"],
@@ -87,8 +87,8 @@ rule render:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=60,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(30),
     params:
         renderer=CONFIG["renderer"],
         camera=CONFIG["camera"],

@@ -18,8 +18,8 @@ rule train:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
-        runtime=60,
+        mem_mb=per_attempt(2500),
+        runtime=per_attempt(30),
     params:
         estimator=CONFIG["estimator"]
         | ({"epochs": CONFIG["crossfit_epochs"]} if CROSSFIT else {}),
@@ -61,8 +61,8 @@ rule estimate:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1500,
-        runtime=10,
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt(10),
     params:
         device=CONFIG["estimator"]["device"],
         precision=CONFIG["estimator"]["precision"],

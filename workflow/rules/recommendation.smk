@@ -15,8 +15,8 @@ rule lookup:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         density=DECISION,
     script:
@@ -37,8 +37,8 @@ rule evaluate_baselines:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         methods={name: METHODS[name] for name in BASELINE_METHODS},
         seed=CONFIG["seed"],
@@ -66,8 +66,8 @@ rule evaluate_recommended:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         method=lambda wildcards: METHODS[wildcards.method],
     script:

@@ -18,8 +18,8 @@ rule compare:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=5,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(5),
     params:
         run=lambda wildcards, input: str(Path(input.report).parent),
     script:
@@ -35,8 +35,8 @@ rule reference:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=5,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(5),
     params:
         run=lambda wildcards, input: str(Path(input.report).parent),
         reference=str(REFERENCES / CONFIG["name"]),

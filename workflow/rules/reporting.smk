@@ -55,8 +55,8 @@ rule table:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(5),
     params:
         settings=lambda wildcards: settings_of(RESAMPLED, wildcards.table),
         evaluations=lambda wildcards: evaluations_of(units_of(wildcards.table)),
@@ -80,8 +80,8 @@ rule figure:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1500,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(5),
     params:
         settings=lambda wildcards: settings_of(SHOWN, wildcards.figure),
         evaluations=lambda wildcards: evaluations_of(units_of(wildcards.figure)),
@@ -105,8 +105,8 @@ rule claims:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt(10),
     params:
         evaluations=evaluations_of(UNITS),
         n_resamples=CONFIG["n_resamples"],
@@ -131,8 +131,8 @@ rule runtime:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=5,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(5),
     params:
         rules=[rule for rule, _ in JOBS],
     script:
@@ -158,8 +158,8 @@ rule report:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         categories=CATEGORIES,
         tables=list(TABLES),

@@ -27,8 +27,8 @@ rule evaluate_ablation:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1500,
-        runtime=10,
+        mem_mb=per_attempt(1500),
+        runtime=per_attempt(10),
     params:
         instance=ABLATIONS.instance,
         density=DECISION,
@@ -52,8 +52,8 @@ rule ablation:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         category=FOCUS,
         n_resamples=CONFIG["n_resamples"],

@@ -19,8 +19,8 @@ rule density_comparison:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt(10),
     params:
         evaluations=lambda wildcards: compared_keys(density_methods),
         estimates=lambda wildcards: compared_keys(test_estimates),
@@ -44,8 +44,8 @@ rule run_comparison:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         evaluations=lambda wildcards: compared_keys(methods_in),
         settings=RESAMPLED,

@@ -16,8 +16,8 @@ rule leaderboard:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         folds=leaderboard_folds,
         methods=METHODS | EXTENSIONS,
@@ -43,8 +43,8 @@ rule extension_gains:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         folds=leaderboard_folds,
         methods=METHODS | EXTENSIONS,

@@ -32,8 +32,8 @@ rule evaluate_extensions:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt(10),
     params:
         methods=list(METHODS),
         extensions=EXTENSIONS,

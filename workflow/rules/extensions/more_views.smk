@@ -17,8 +17,8 @@ rule evaluate_more_views:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt(10),
     params:
         density=DECISION,
         more_views=CONFIG["more_views"],
@@ -46,8 +46,8 @@ rule more_views:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         folds=[(category, fold) for category, _, fold in folds_of(REFERENCE_UNITS)],
         n_resamples=CONFIG["n_resamples"],

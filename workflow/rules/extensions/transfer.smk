@@ -160,8 +160,8 @@ rule transfer_table:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt(10),
     params:
         settings=RESAMPLED,
         conditions=TRANSFER["conditions"],

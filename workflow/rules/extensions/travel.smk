@@ -31,8 +31,8 @@ rule travel:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         folds=[(category, fold) for category, _, fold in folds_of(REFERENCE_UNITS)],
         methods=TRAVEL_CURVES,

@@ -26,8 +26,8 @@ rule evaluate_view_sphere:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
-        runtime=20,
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt(20),
     params:
         density=DECISION,
         more_views=CONFIG["more_views"],
@@ -55,8 +55,8 @@ rule view_sphere:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=per_attempt(1000),
+        runtime=per_attempt(10),
     params:
         folds=list(FOLDS),
         category=SPHERE_CATEGORIES[0] if SPHERE_CATEGORIES else "",
