@@ -7,8 +7,8 @@ rule verify:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=30,
+        mem_mb=per_attempt(500),
+        runtime=per_attempt(30),
     params:
         run=LAYOUT.root,
         options=[word for word in sys.argv[1:] if word != "verify"],

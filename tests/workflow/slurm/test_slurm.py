@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from ..conftest import TINY, copy_of_project
+from projects import TINY, copy_of_project
+
 from .one_node import OneNode, missing, one_node, until
 
 pytestmark = pytest.mark.skipif(missing() is not None, reason=str(missing()))
