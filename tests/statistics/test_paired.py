@@ -171,6 +171,22 @@ def test_sigma_is_over_fold_means(evaluations):
     assert paired.fold_sigma("mae", sample, "proposed") == pytest.approx(means.std())
 
 
+@pytest.mark.parametrize("n_folds", [2, 3])
+@pytest.mark.parametrize("statistic", ["mae", "pauc"])
+def test_sigma_is_resampled_within_each_fold(n_folds, statistic):
+    """Each resample's images put together one object at a time."""
+    sample = paired.pair_methods(evaluated(4, n_folds=n_folds), "mug")
+    found = paired.estimate(f"{statistic}_sigma", sample, "single", paired.Resampler(3, 20))
+    drawn = paired.Resampler(3, 20).multiplicities_by_fold(sample)
+    errors = sample.errors_deg["single"]
+    metric = {"mae": metrics.mae_deg, "pauc": metrics.pauc}[statistic]
+    in_fold = [sample.folds == fold for fold in range(1, n_folds + 1)]
+    assert found.value == pytest.approx(np.std([metric(errors[one]) for one in in_fold], ddof=1))
+    for counts, sigma in zip(drawn, found.samples, strict=True):
+        repeated = [np.repeat(errors[one], counts[sample.objects[one]]) for one in in_fold]
+        assert sigma == pytest.approx(np.std([metric(each) for each in repeated], ddof=1))
+
+
 def test_one_fold_has_no_sigma(evaluations):
     sample = paired.pair_methods(evaluations["mug", 0], "mug")
     found = paired.estimate(
