@@ -2,14 +2,21 @@
 # make test        the test suite               make check   lint, types, imports, workflow lint
 # make bench       the speed benchmarks         make compare a finished run with docs/reference
 # make test-slurm  the workflow on a real SLURM of one node, where root may install it
+# make coverage    branches that tests reach    make mutation whether tests notice changed code
+# make audit       known vulnerabilities        make licences the licences of what is locked
+# make lock        the locks again              UPGRADE=--upgrade takes the newest versions
 
 PYTHON ?= python3
 CORES ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+AUDIT := $(VENV)/.audit-ready
+LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+	--no-annotate --custom-compile-command "make lock"
 
-.PHONY: reproduce quick compare reference bench test test-quick test-slurm check clean
+.PHONY: reproduce quick compare reference bench test test-quick test-slurm coverage mutation check lock audit \
+	licences clean
 
 reproduce: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -37,6 +44,24 @@ test-slurm: $(READY)
 	tests/workflow/slurm/install.sh $(BIN)/python
 	$(BIN)/pytest -rs --log-cli-level=INFO --log-cli-format="%(asctime)s %(message)s" tests/workflow/slurm
 
+coverage: $(READY)
+	$(BIN)/pytest -m "not slow" --cov --cov-report=term
+
+mutation: $(AUDIT)
+	$(BIN)/mutmut run --max-children $(CORES)
+	$(BIN)/mutmut results
+
+lock: $(AUDIT)
+	$(LOCK) $(UPGRADE) pyproject.toml --group dev --no-emit-package torch --output-file requirements.lock
+	$(LOCK) $(UPGRADE) --group audit --constraints requirements.lock --output-file requirements-audit.lock
+
+audit: $(AUDIT)
+	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements.lock
+	$(BIN)/pip-audit --strict --disable-pip --no-deps --requirement requirements-torch.lock
+
+licences: $(AUDIT)
+	$(BIN)/python tools/licences.py > docs/licences.md
+
 check: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -45,12 +70,15 @@ check: $(READY)
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint
 
-$(READY): requirements.lock pyproject.toml
+$(READY): requirements.lock requirements-torch.lock workflow/environment.post-deploy.sh pyproject.toml
 	$(PYTHON) -c 'import sys; (3, 11) <= sys.version_info[:2] <= (3, 13) or sys.exit("nbv needs Python 3.11 to 3.13, this is " + sys.version.split()[0] + ": make PYTHON=python3.12 ...")'
 	$(PYTHON) -m venv --clear $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	PATH="$(CURDIR)/$(BIN):$$PATH" bash workflow/environment.post-deploy.sh
+	touch $@
+
+$(AUDIT): $(READY) requirements-audit.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-audit.lock
 	touch $@
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) mutants .coverage* .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

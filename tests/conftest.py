@@ -19,6 +19,14 @@ from projects import Project, copy_of_project
 
 # Machines are noisy, and a first example may import a library: no test is timed.
 hypothesis.settings.register_profile("untimed", deadline=None)
+# A mutant is caught by any failing example: the smallest one is not looked for.
+hypothesis.settings.register_profile(
+    "mutation",
+    deadline=None,
+    derandomize=True,
+    database=None,
+    phases=(hypothesis.Phase.explicit, hypothesis.Phase.generate),
+)
 hypothesis.settings.load_profile("untimed")
 
 UNITS = (("mug", 0), ("mug", 30), ("chair", 0))

@@ -28,9 +28,10 @@ def brute_force_smooth(counts, kernel):
     return out
 
 
-def test_smoothing_is_the_double_sum_over_the_torus():
-    counts = density.pair_counts(*random_pairs(0, 40), 12)
-    expected = brute_force_smooth(counts, density.von_mises_kernel(12, 25.0))
+@pytest.mark.parametrize("n_bins", [9, 12])
+def test_smoothing_is_the_double_sum_over_the_torus(n_bins):
+    counts = density.pair_counts(*random_pairs(0, 40), n_bins)
+    expected = brute_force_smooth(counts, density.von_mises_kernel(n_bins, 25.0))
     np.testing.assert_allclose(density.smooth(counts, 25.0), expected, atol=1e-12)
 
 
@@ -108,3 +109,20 @@ def test_negative_settings_are_refused(kwargs):
     full = {"bandwidth_deg": 5.0, "pseudo_observations": 1.0} | kwargs
     with pytest.raises(ValueError, match="0 or more"):
         density.conditionals([1.0], [2.0], **full)
+
+
+def test_a_row_of_little_mass_keeps_its_shape():
+    joint = np.array([[0.1, 0.3], [0.0, 0.0]])
+    np.testing.assert_allclose(density.conditional(joint, 0.0), [[0.25, 0.75], [0.5, 0.5]])
+
+
+def test_pseudo_observations_are_counted_in_rows_of_360_bins():
+    """One pair, not smoothed: ten observations of 360 rows are a hundred of 36."""
+    pair = density.conditionals([10.0], [20.0], bandwidth_deg=0, pseudo_observations=10, n_bins=36)
+    assert pair.viewpoint[1, 2] == pytest.approx((1 + 100 / 36) / 101, rel=1e-12)
+    assert pair.viewpoint[1, 3] == pytest.approx(100 / 36 / 101, rel=1e-12)
+
+
+def test_bins_are_of_one_degree_unless_said_otherwise():
+    pair = density.conditionals([1.0], [2.0], bandwidth_deg=5, pseudo_observations=1)
+    assert pair.n_bins == 360

@@ -20,7 +20,9 @@ from nbv.recommendation.criteria import (
     cost_unit,
     tabulate,
 )
-from nbv.recommendation.criteria.pose_ambiguity import POSE_LIKELIHOODS
+from nbv.recommendation.criteria.pose_ambiguity import POSE_LIKELIHOODS, two_view_poses
+from nbv.recommendation.criteria.rotations import rotation_groups
+from nbv.recommendation.criteria.spreads import SPREADS
 from nbv.recommendation.evidence import Evidence, gather_evidence
 from nbv.recommendation.fusion import ESTIMATE_FUSIONS, FUSIONS
 
@@ -104,6 +106,39 @@ def test_the_pose_ambiguity_is_the_triple_loop(interpretation, spread, plain):
     table = ambiguity_table(pair, {"pose_likelihood": interpretation, "spread": spread})
     expected = plain_loops(pair.viewpoint.tolist(), T, T, plain)
     np.testing.assert_allclose(table, expected, atol=2e-5)
+
+
+@pytest.mark.parametrize("delta", [0, 1, 5, 11])
+def test_the_poses_after_one_rotation_are_the_mixture_of_products(delta):
+    pair = random_conditionals(12)
+    V, T = pair.viewpoint.astype(np.float32), pair.estimate.astype(np.float32)
+    expected = np.zeros((12, 12))
+    for row in range(12):
+        for phi in range(12):
+            terms = [T[phi, t] * T[(phi + delta) % 12, (t + delta) % 12] for t in range(12)]
+            expected[row] += V[row, phi] * np.array(terms) / sum(terms)
+    found = two_view_poses(V, T, delta)
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("spread", SPREADS)
+def test_spreads_and_tables_are_in_single_precision(spread):
+    rows = random_conditionals(12).viewpoint.astype(np.float32)
+    assert SPREADS[spread](rows).dtype == np.float32
+    evidence = evidence_of()
+    for criterion in CRITERIA:
+        assert tabulate(criterion, evidence, "average").dtype == np.float32
+
+
+@pytest.mark.parametrize("numbers_each", [0, 1, 1000, 2**15, 2**16, 2**17])
+def test_groups_of_rotations_are_all_of_them_in_order_and_fit_the_cache(numbers_each):
+    groups = list(rotation_groups(360, numbers_each))
+    assert [delta for group in groups for delta in group] == list(range(360))
+    # The largest array has 2^16 numbers, or those of one rotation.
+    most = max(1, 2**16 // max(1, numbers_each))
+    assert len(groups[0]) == min(360, most)
+    assert max(len(group) for group in groups) == len(groups[0])
 
 
 def test_each_factor_of_the_pose_ambiguity_belongs_to_the_estimator_of_its_view():
@@ -345,3 +380,24 @@ def test_coarse_beliefs_are_asked_in_coarse_bins():
         fast = CRITERIA[criterion](coarser(belief, coarse), coarse, "posterior")
         for one in range(2):
             assert np.corrcoef(slow[one], fast[one])[0, 1] > 0.9
+
+
+def test_the_error_of_a_belief_needs_calibration_estimates():
+    uniform = np.full((8, 8), 1 / 8)
+    evidence = Evidence(np.empty((0, 8)), Conditionals(uniform, uniform), 10, 2, SETTINGS)
+    with pytest.raises(ValueError, match="bayes_error needs calibration estimates"):
+        CRITERIA["bayes_error"](every_belief(evidence), evidence, "posterior")
+
+
+def test_a_table_is_made_once_and_for_each_fusion_where_that_matters():
+    evidence = evidence_of()
+    made = {
+        (criterion, rule): tabulate(criterion, evidence, rule)
+        for criterion in ("information_gain", "expected_error")
+        for rule in ESTIMATE_FUSIONS
+    }
+    first, second = ESTIMATE_FUSIONS
+    assert made["information_gain", first] is made["information_gain", second]
+    assert made["expected_error", first] is not made["expected_error", second]
+    for (criterion, rule), table in made.items():
+        assert tabulate(criterion, evidence, rule) is table

@@ -49,6 +49,11 @@ def test_second_views_wrap_round():
     np.testing.assert_array_equal(seen[1], np.roll(estimate[1], -2))
 
 
+def test_every_whole_degree_leads_to_its_own_view():
+    seen = fusion.at_second_view(np.arange(360.0)[None], np.arange(360)[None])
+    np.testing.assert_array_equal(seen[0], 2 * np.arange(360) % 360)
+
+
 def test_posterior_fusion_is_the_direction_of_the_sum():
     evidence = evidence_of()
     rng = np.random.default_rng(3)
@@ -125,3 +130,38 @@ def test_the_product_multiplies_in_the_frame_of_the_first_view(seed, delta, k):
 def test_images_that_exclude_each_other_fall_back_on_the_first():
     first, second = np.eye(12)[[3]], np.eye(12)[[8]]
     assert product(first, second, np.array([60]))[0] == pytest.approx(90)
+
+
+def test_distributions_of_several_objects_are_fused_each_by_its_own_rotation():
+    """As policies call it: objects by views, and a rotation for each."""
+    first, second = random_rows(0, 6).reshape(2, 3, 12), random_rows(1, 6).reshape(2, 3, 12)
+    delta = np.array([[0, 30, 60], [330, 180, 90]])
+    found = product(first, second, delta)
+    assert found.shape == (2, 3)
+    for one in np.ndindex(2, 3):
+        alone = product(first[one][None], second[one][None], delta[one][None])
+        assert found[one] == pytest.approx(alone[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ESTIMATE_FUSIONS)
+def test_errors_after_every_rotation_are_those_of_fusing_each_pair(name):
+    """With more views than bins: l[delta, object, view], one pair of views at a time."""
+    evidence, estimate = evidence_of(), estimates(2, 2 * N_BINS, seed=5)
+    errors = fusion.rotation_errors_deg(estimate, evidence, name)
+    assert errors.shape == (N_BINS, 2, 2 * N_BINS)
+    assert errors.dtype == np.float32
+    for delta, one, view in [(0, 0, 0), (5, 1, 47), (23, 0, 30), (12, 1, 12)]:
+        second = estimate[one, (view + 2 * delta) % (2 * N_BINS)]
+        fused = fusion.FUSIONS[name](estimate[one, view], second, delta * 15.0, evidence)
+        expected = circular_distance_deg(fused, view * 7.5)
+        assert errors[delta, one, view] == pytest.approx(float(expected), abs=0.02)
+
+
+def test_errors_of_calibration_views_take_one_view_for_each_bin_and_are_made_once():
+    evidence = evidence_of()
+    found = fusion.calibration_errors_deg(evidence, "average")
+    views = evidence.estimate_deg[:, ::2]
+    expected = fusion.rotation_errors_deg(views, evidence, "average")
+    np.testing.assert_array_equal(found, expected)
+    assert fusion.calibration_errors_deg(evidence, "average") is found
+    assert not np.array_equal(fusion.calibration_errors_deg(evidence, "posterior"), found)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -48,7 +50,44 @@ def test_fold_std_is_the_sample_one():
     assert metrics.fold_std(values) == pytest.approx(
         (sum((v - mean) ** 2 for v in values) / 2) ** 0.5
     )
-    assert np.isnan(metrics.fold_std([3.0]))
+    assert metrics.fold_std([1.0, 3.0]) == pytest.approx(2**0.5)
+
+
+@pytest.mark.parametrize("values", [[], [3.0]])
+def test_fewer_than_two_folds_have_no_deviation_and_give_no_warning(values):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isnan(metrics.fold_std(values))
+
+
+def test_an_image_adds_what_its_error_leaves_of_100_degrees():
+    found = metrics.accuracy_area([0.0, 30.0, 100.0, 170.0])
+    np.testing.assert_array_equal(found, [100.0, 70.0, 0.0, 0.0])
+
+
+def test_the_resamples_of_figures_without_an_image_are_no_numbers():
+    values, objects = [2.0, 4.0], np.array([0, 0])
+    drawn = np.array([[1, 0], [0, 1], [2, 0]])  # the second object has no image
+    for resampled in (metrics.resampled_means, metrics.resampled_medians):
+        found = resampled(values, objects, drawn)
+        assert np.isnan(found).tolist() == [False, True, False]
+
+
+def test_the_interval_leaves_out_samples_that_are_no_numbers():
+    samples = [np.nan, *np.arange(101.0), np.inf]
+    assert metrics.percentile_interval(samples) == pytest.approx((2.5, 97.5))
+    assert metrics.percentile_interval(samples, 0.5) == pytest.approx((25.0, 75.0))
+    assert np.isnan(metrics.percentile_interval([np.nan])).all()
+
+
+def test_a_resample_draws_as_many_objects_as_there_are():
+    drawn = metrics.resample_objects(4, np.random.default_rng(2), 6)
+    again = np.random.default_rng(2).integers(4, size=(6, 4))
+    expected = [[int((row == one).sum()) for one in range(4)] for row in again]
+    assert drawn.tolist() == expected
+    assert drawn.dtype == np.int64
+    # An object that is never drawn last still has its column.
+    assert metrics.resample_objects(50, np.random.default_rng(2), 1).shape == (1, 50)
 
 
 @pytest.mark.parametrize("function", [metrics.mae_deg, metrics.median_deg, metrics.pauc])

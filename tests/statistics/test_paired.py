@@ -1,10 +1,34 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from nbv.errors import UserError
 from nbv.statistics import metrics, paired
+
+METHODS = ("single", "random", "opposite", "proposed")
+
+
+def evaluated(seed: int, n_objects: int = 9, n_folds: int = 3) -> pd.DataFrame:
+    """Errors of one unit, as `load_evaluations` gives them: each object is tested in one fold."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for method in METHODS:
+        errors = rng.gamma(2.0, 8.0, (n_objects, 360))
+        if method == "opposite":
+            errors[:, 180:] = errors[:, :180]
+        for fold in range(1, n_folds + 1):
+            for one in range(fold - 1, n_objects, n_folds):
+                columns = {"method": method, "fold": fold, "object_id": f"{one:04d}"}
+                views = {"initial_deg": np.arange(360.0), "error_deg": errors[one]}
+                parts.append(pd.DataFrame(columns | views))
+    return pd.concat(parts, ignore_index=True)
+
+
+@pytest.fixture(scope="module")
+def evaluations() -> dict[tuple[str, int], pd.DataFrame]:
+    return {("mug", 0): evaluated(0), ("chair", 0): evaluated(1)}
 
 
 def test_groups_are_the_papers_quarters():
@@ -42,6 +66,56 @@ def test_pooled_images_keep_their_objects_apart(evaluations):
     joined = np.concatenate([part.errors_deg["single"] for part in parts])
     found = paired.estimate("mae", both, "single", paired.Resampler(0, 50))
     assert found.value == pytest.approx(joined.mean())
+    for name in ("folds", "initial_deg"):
+        expected = np.concatenate([getattr(part, name) for part in parts])
+        np.testing.assert_array_equal(getattr(both, name), expected)
+    np.testing.assert_array_equal(both.objects[: parts[0].n_images], parts[0].objects)
+    np.testing.assert_array_equal(both.objects[parts[0].n_images :], parts[1].objects + 9)
+    assert both.category_of == ("mug",) * 9 + ("chair",) * 9
+
+
+def test_pooled_methods_are_those_that_all_categories_have(evaluations):
+    first = paired.pair_methods(evaluations["mug", 0], "mug")
+    rest = evaluations["chair", 0]
+    second = paired.pair_methods(rest[rest["method"] != "random"], "chair")
+    for parts in ([first, second], [second, first]):
+        assert list(paired.pool(parts).errors_deg) == ["single", "opposite", "proposed"]
+    assert list(paired.pool([first]).errors_deg) == list(METHODS)
+
+
+def test_no_method_at_all_is_refused(evaluations):
+    frame = evaluations["mug", 0]
+    with pytest.raises(UserError, match="mug: no evaluated method; evaluate one first"):
+        paired.pair_methods(frame[:0], "mug")
+
+
+def test_selected_images_keep_everything_that_belongs_to_them(evaluations):
+    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+    mask = sample.initial_deg < 90
+    kept = sample.select(mask)
+    assert (kept.n_images, kept.n_objects) == (9 * 90, 9)
+    assert (kept.initial_deg < 90).all()
+    np.testing.assert_array_equal(kept.folds, sample.folds[mask])
+    np.testing.assert_array_equal(kept.objects, sample.objects[mask])
+    assert kept.category_of == sample.category_of
+    for method in METHODS:
+        np.testing.assert_array_equal(kept.errors_deg[method], sample.errors_deg[method][mask])
+
+
+def test_images_are_ordered_by_fold_object_and_azimuth(evaluations):
+    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+    np.testing.assert_array_equal(sample.folds, np.repeat([1, 2, 3], 3 * 360))
+    np.testing.assert_array_equal(sample.objects[::360], [0, 3, 6, 1, 4, 7, 2, 5, 8])
+    np.testing.assert_array_equal(sample.initial_deg, np.tile(np.arange(360.0), 9))
+    assert sample.category_of == ("mug",) * 9
+    assert sample.objects.dtype == sample.folds.dtype == np.int64
+
+
+def test_a_resampler_takes_one_seed_from_the_generator_and_two_thousand_resamples():
+    one, other = (paired.Resampler.seeded(np.random.default_rng(s), 7) for s in (1, 2))
+    assert one.seed == int(np.random.default_rng(1).integers(2**31)) != other.seed
+    assert one.n_resamples == 7
+    assert paired.Resampler(0).n_resamples == 2000
 
 
 def test_draws_do_not_depend_on_what_was_asked_before(evaluations):
@@ -95,6 +169,22 @@ def test_sigma_is_over_fold_means(evaluations):
     found = paired.estimate("mae_sigma", sample, "proposed", paired.Resampler(0, 200))
     assert found.value == pytest.approx(metrics.fold_std(means))
     assert paired.fold_sigma("mae", sample, "proposed") == pytest.approx(means.std())
+
+
+@pytest.mark.parametrize("n_folds", [2, 3])
+@pytest.mark.parametrize("statistic", ["mae", "pauc"])
+def test_sigma_is_resampled_within_each_fold(n_folds, statistic):
+    """Each resample's images put together one object at a time."""
+    sample = paired.pair_methods(evaluated(4, n_folds=n_folds), "mug")
+    found = paired.estimate(f"{statistic}_sigma", sample, "single", paired.Resampler(3, 20))
+    drawn = paired.Resampler(3, 20).multiplicities_by_fold(sample)
+    errors = sample.errors_deg["single"]
+    metric = {"mae": metrics.mae_deg, "pauc": metrics.pauc}[statistic]
+    in_fold = [sample.folds == fold for fold in range(1, n_folds + 1)]
+    assert found.value == pytest.approx(np.std([metric(errors[one]) for one in in_fold], ddof=1))
+    for counts, sigma in zip(drawn, found.samples, strict=True):
+        repeated = [np.repeat(errors[one], counts[sample.objects[one]]) for one in in_fold]
+        assert sigma == pytest.approx(np.std([metric(each) for each in repeated], ddof=1))
 
 
 def test_one_fold_has_no_sigma(evaluations):

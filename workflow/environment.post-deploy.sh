@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# Installs what is locked, and nbv, into the Python first in PATH; run from the project's folder.
+# `make` runs it in .venv, and Snakemake in the environment that it made of environment.yaml.
+set -euo pipefail
+
+install() { python -m pip install --quiet --disable-pip-version-check "$@"; }
+
+# A few packages are built from source. pip would take their build tool without checking its hash,
+# so it comes first.
+setuptools=$(mktemp)
+trap 'rm -f "$setuptools"' EXIT
+sed -n '/^setuptools==/,/[^\\]$/p' requirements.lock > "$setuptools"
+install --require-hashes --requirement "$setuptools"
+
+install --require-hashes --no-build-isolation --requirement requirements.lock
+install --requirement requirements-torch.lock
+install --no-deps --no-build-isolation --editable .
