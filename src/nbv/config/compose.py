@@ -45,6 +45,8 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
     try:
         settings = Config.model_validate(composed).model_dump()
     except ValidationError as error:
+        if any(mistake["type"] == "missing" for mistake in error.errors()):
+            _check_files(folder)
         raise UserError(one_line(error.errors())) from error
     # So that a key of one kind of estimator is no setting of another.
     estimator = {key: value for key, value in settings["estimator"].items() if value is not None}
@@ -119,10 +121,15 @@ def _why_not_composed(folder: Path, overrides: Sequence[str], error: Exception) 
             return f"{written} cannot be read: {_first_line(fault)}; quote what is text"
         if several:
             return f"{written} holds several values; write a list as [1,2]"
-    for path in sorted(folder.rglob("*.yaml")):
-        read_mapping(path)
+    _check_files(folder)
     key = getattr(error, "full_key", None)
     return f"configuration{f' key {key!r}' if key else ''}: {_first_line(error)}"
+
+
+def _check_files(folder: Path) -> None:
+    """Raise UserError for a file of the configuration that is damaged."""
+    for path in sorted(folder.rglob("*.yaml")):
+        read_mapping(path)
 
 
 def _first_line(error: Exception) -> str:
@@ -143,19 +150,26 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
     try:
         text = path.read_text(encoding="utf-8")
+        events = list(yaml.parse(text, yaml.SafeLoader))
         # A few aliases of aliases fill any memory; the program writes none.
-        if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, yaml.SafeLoader)):
-            raise ValueError("aliases are not allowed")
-        content = OmegaConf.to_container(OmegaConf.create(text), resolve=False)
+        if any(isinstance(event, yaml.AliasEvent) for event in events):
+            raise UserError(f"{path}: aliases (*name) are not allowed; write the value again")
+        # After the beginnings of the stream and of its document.
+        holds_keys = any(isinstance(event, yaml.MappingStartEvent) for event in events[2:3])
+        content = OmegaConf.to_container(OmegaConf.create(text if holds_keys else "{}"))
+    except UserError:
+        raise
     except UnicodeDecodeError as error:
         raise UserError(f"{path} cannot be read: it is not UTF-8 text") from error
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}") from error
     # No list of what a parser may raise on arbitrary text is complete.
     except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise UserError(f"{path} cannot be read as YAML: {shortened(reason)}") from error
-    if not isinstance(content, dict):
+        mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
+        where = f" in line {mark.line + 1}" if mark else ""
+        reason = " ".join(str(problem or error).split()) or type(error).__name__
+        raise UserError(f"{path} cannot be read as YAML{where}: {shortened(reason)}") from error
+    if not isinstance(content, dict) or not content:
         raise UserError(f"{path} holds no settings")
     return {str(key): value for key, value in content.items()}
 

@@ -124,7 +124,8 @@ def training_objects(settings: Mapping[str, Any], n_objects: int) -> int:
     rest: int = n_objects - n_objects // settings["n_folds"]
     if settings["calibration"] == "crossfit" or rest < 2:
         return rest
-    return rest - min(max(round(settings["calibration_fraction"] * rest), 1), rest - 1)
+    fraction: float = settings["calibration_fraction"]
+    return rest - min(max(round(fraction * rest), 1), rest - 1)
 
 
 def n_parameters(estimator: Mapping[str, Any], image_side: int) -> int:

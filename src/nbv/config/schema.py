@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, Self, TypeVar
 
@@ -270,7 +271,7 @@ class Config(Section):
         for key, named in focus.items():
             if named is not None and named not in ours:
                 raise UserError(f"{key}={named} is no category of this run: {nearest(named, ours)}")
-        of_categories = {
+        of_categories: dict[str, Collection[str]] = {
             "dataset.turn_deg": self.dataset.turn_deg,
             "dataset.categories": self.dataset.categories,
             "sensor.diagonal_m": self.sensor.diagonal_m,
