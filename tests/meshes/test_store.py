@@ -6,16 +6,20 @@ import numpy as np
 import pytest
 import trimesh
 
-from nbv.meshes.store import Mesh, load_meshes, save_meshes
+from nbv.errors import UserError
+from nbv.files import read_arrays, write_arrays
+from nbv.meshes.normalisation import normalise
+from nbv.meshes.store import Mesh, load_meshes, save_meshes, stored_ids
 
 
 @pytest.fixture
 def meshes():
-    return {
+    made = {
         "ball": trimesh.creation.icosphere(subdivisions=2),
         "a box, named at length": trimesh.creation.box(),
         "0": trimesh.creation.annulus(0.5, 1.0, 2.0),
     }
+    return {name: normalise(mesh, "+z", "+x", 0.0, "box") for name, mesh in made.items()}
 
 
 def test_what_is_saved_is_loaded_in_its_order(tmp_path, meshes):
@@ -43,3 +47,49 @@ def test_nothing_is_pickled(tmp_path, meshes):
     save_meshes(tmp_path / "a.npz", meshes)
     with np.load(tmp_path / "a.npz", allow_pickle=False) as stored:
         assert all(stored[name].dtype != object for name in stored.files)
+
+
+def changed(name, change):
+    def damage(arrays):
+        arrays[name] = change(arrays[name].copy())
+
+    return damage
+
+
+def at(place, value):
+    def change(array):
+        array[place] = value
+        return array
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("damage", "named"),
+    [
+        (lambda arrays: arrays.pop("faces"), "holds no array 'faces'"),
+        (changed("vertices", lambda array: array[:, :2]), "'vertices' has another form"),
+        (changed("faces", lambda array: array.astype(float)), "'faces' has another form"),
+        (changed("ids", at(1, "ball")), "an id is there twice"),
+        (changed("vertices", lambda array: array[:-1]), "'vertex_offsets' does not fit"),
+        (changed("face_offsets", at(1, 0)), "'face_offsets' does not fit"),
+        (changed("face_offsets", lambda array: array[:-1]), "'face_offsets' does not fit"),
+        (changed("vertices", at((0, 0), np.nan)), "the mesh of 'ball' is damaged"),
+        (changed("vertices", at((0, 0), 1e30)), "the mesh of 'ball' is damaged"),
+        (changed("faces", at((0, 0), 10_000)), "the mesh of 'ball' is damaged"),
+        (changed("faces", at((0, 0), -1)), "the mesh of 'ball' is damaged"),
+    ],
+)
+@pytest.mark.parametrize("read", [load_meshes, stored_ids])
+def test_damage_is_named_with_the_file(tmp_path, meshes, damage, named, read):
+    path = tmp_path / "mug.npz"
+    save_meshes(path, meshes)
+    arrays = read_arrays(path)
+    damage(arrays)
+    write_arrays(path, arrays)
+    with pytest.raises(UserError) as caught:
+        read(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert named in message
+    assert "\n" not in message

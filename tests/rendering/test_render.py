@@ -119,7 +119,7 @@ def test_an_object_too_small_to_be_seen_stops_with_its_name(embree, meshes, came
 def test_a_surface_too_thin_to_be_seen_stops_with_its_name(embree, meshes):
     flat = meshes | {"thin": type(meshes["box"])(*sliver())}
     images = render_objects(flat, 0.0, CAMERA, embree, n_azimuths=8)
-    with pytest.raises(UserError, match="^thin: the object covers no pixel in"):
+    with pytest.raises(UserError, match=r"^thin: the object covers no pixel in"):
         list(images)
 
 
@@ -127,7 +127,7 @@ def test_a_sensor_that_measures_nothing_stops_and_a_gap_is_logged(embree, meshes
     def blind(depth, object_id):
         return np.zeros_like(depth)
 
-    with pytest.raises(UserError, match="^box: the sensor measures nothing .* in any view"):
+    with pytest.raises(UserError, match=r"^box: the sensor measures nothing .* in any view"):
         list(render_objects(meshes, 0.0, CAMERA, embree, blind, n_azimuths=4))
 
     def misses_two(depth, object_id):
@@ -142,5 +142,5 @@ def test_a_renderer_s_own_error_names_the_object(meshes):
         def render(self, *given):
             raise ValueError("no context")
 
-    with pytest.raises(RuntimeError, match="^box: ValueError: no context"):
+    with pytest.raises(RuntimeError, match=r"^box: ValueError: no context"):
         list(render_objects(meshes, 0.0, CAMERA, Broken(), n_azimuths=4))

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,7 @@ def _need_visible(
     depth: Depths,
     object_id: str,
     elevation_deg: float,
-    azimuths_deg: NDArray[np.float64],
+    azimuths_deg: NDArray[np.floating[Any]],
     camera: Camera,
 ) -> None:
     if n_blank := _n_blank(depth):
