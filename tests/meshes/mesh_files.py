@@ -10,11 +10,15 @@ import trimesh
 import yaml
 
 from nbv.errors import UserError
+from nbv.meshes.reader import MeshReader
 from nbv.meshes.sources import open_source
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 CONFIG = REPOSITORY / "config" / "dataset"
 REAL = REPOSITORY.parent / "shared" / "data"
+
+# Its process starts once, for all tests.
+READER = MeshReader()
 
 needs_real = pytest.mark.skipif(
     not REAL.is_dir(), reason=f"the real meshes are not there: {REAL} is no folder"

@@ -8,16 +8,18 @@ import trimesh
 
 from nbv.errors import UserError
 from nbv.files import read_arrays, write_arrays
-from nbv.meshes.store import Mesh, load_meshes, save_meshes
+from nbv.meshes.normalisation import normalise
+from nbv.meshes.store import Mesh, load_meshes, save_meshes, stored_ids
 
 
 @pytest.fixture
 def meshes():
-    return {
+    made = {
         "ball": trimesh.creation.icosphere(subdivisions=2),
         "a box, named at length": trimesh.creation.box(),
         "0": trimesh.creation.annulus(0.5, 1.0, 2.0),
     }
+    return {name: normalise(mesh, "+z", "+x", 0.0, "box") for name, mesh in made.items()}
 
 
 def test_what_is_saved_is_loaded_in_its_order(tmp_path, meshes):
@@ -47,23 +49,47 @@ def test_nothing_is_pickled(tmp_path, meshes):
         assert all(stored[name].dtype != object for name in stored.files)
 
 
+def changed(name, change):
+    def damage(arrays):
+        arrays[name] = change(arrays[name].copy())
+
+    return damage
+
+
+def at(place, value):
+    def change(array):
+        array[place] = value
+        return array
+
+    return change
+
+
 @pytest.mark.parametrize(
-    ("name", "change"),
+    ("damage", "named"),
     [
-        ("faces", lambda faces: faces + 1000),
-        ("faces", lambda faces: -faces - 1),
-        ("vertices", lambda vertices: vertices * np.nan),
-        ("vertices", lambda vertices: vertices[:, :2]),
-        ("ids", lambda ids: ids[:-1]),
-        ("ids", lambda ids: np.array(["0", "0", "0"])),
-        ("face_offsets", lambda offsets: offsets[::-1]),
-        ("vertex_offsets", lambda offsets: offsets * 0),
+        (lambda arrays: arrays.pop("faces"), "holds no array 'faces'"),
+        (changed("vertices", lambda array: array[:, :2]), "'vertices' has another form"),
+        (changed("faces", lambda array: array.astype(float)), "'faces' has another form"),
+        (changed("ids", at(1, "ball")), "an id is there twice"),
+        (changed("vertices", lambda array: array[:-1]), "'vertex_offsets' does not fit"),
+        (changed("face_offsets", at(1, 0)), "'face_offsets' does not fit"),
+        (changed("face_offsets", lambda array: array[:-1]), "'face_offsets' does not fit"),
+        (changed("vertices", at((0, 0), np.nan)), "the mesh of 'ball' is damaged"),
+        (changed("vertices", at((0, 0), 1e30)), "the mesh of 'ball' is damaged"),
+        (changed("faces", at((0, 0), 10_000)), "the mesh of 'ball' is damaged"),
+        (changed("faces", at((0, 0), -1)), "the mesh of 'ball' is damaged"),
     ],
 )
-def test_meshes_that_cannot_be_are_refused(tmp_path, meshes, name, change):
+@pytest.mark.parametrize("read", [load_meshes, stored_ids])
+def test_damage_is_named_with_the_file(tmp_path, meshes, damage, named, read):
     path = tmp_path / "mug.npz"
     save_meshes(path, meshes)
-    whole = read_arrays(path)
-    write_arrays(path, whole | {name: change(whole[name])})
-    with pytest.raises(UserError, match=r"mug\.npz: .*; delete the file and run"):
-        load_meshes(path)
+    arrays = read_arrays(path)
+    damage(arrays)
+    write_arrays(path, arrays)
+    with pytest.raises(UserError) as caught:
+        read(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert named in message
+    assert "\n" not in message

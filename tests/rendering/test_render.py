@@ -51,3 +51,53 @@ def test_an_object_that_does_not_fit_is_named(embree, meshes):
     with pytest.raises(UserError, match=r"^huge: the object .*(leaves|behind)") as caught:
         list(render_objects(large, 0.0, CAMERA, embree, n_azimuths=4))
     assert "\n" not in str(caught.value)
+
+
+def sliver():
+    """A triangle that is 1e-6 wide: it has an area, and lies between the centres of pixels."""
+    vertices = np.array([[-0.5, 0.0, 0.001], [0.5, 0.0, 0.001], [0.0, 0.0, 0.001001]], np.float32)
+    return vertices, np.array([[0, 1, 2]], np.int32)
+
+
+@pytest.mark.parametrize(
+    ("camera", "elevation_deg"),
+    [
+        (Camera(image_side=16, distance=1e6), 0.0),
+        (Camera(image_side=16, fov_deg=179.9), 15.0),
+    ],
+)
+def test_an_object_too_small_to_be_seen_stops_with_its_name(embree, meshes, camera, elevation_deg):
+    message = r"^box: the object covers no pixel in [1-8] of 8 views, first at azimuth .*camera\."
+    with pytest.raises(UserError, match=message) as caught:
+        list(render_objects(meshes, elevation_deg, camera, embree, n_azimuths=8))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_surface_too_thin_to_be_seen_stops_with_its_name(embree, meshes):
+    flat = meshes | {"thin": type(meshes["box"])(*sliver())}
+    images = render_objects(flat, 0.0, CAMERA, embree, n_azimuths=8)
+    with pytest.raises(UserError, match=r"^thin: the object covers no pixel in"):
+        list(images)
+
+
+def test_a_sensor_that_measures_nothing_stops_and_a_gap_is_logged(embree, meshes, caplog):
+    def blind(depth, object_id):
+        return np.zeros_like(depth)
+
+    with pytest.raises(UserError, match=r"^box: the sensor measures nothing .* in any view"):
+        list(render_objects(meshes, 0.0, CAMERA, embree, blind, n_azimuths=4))
+
+    def misses_two(depth, object_id):
+        return np.concatenate([np.zeros_like(depth[:2]), depth[2:]])
+
+    assert len(list(render_objects(meshes, 0.0, CAMERA, embree, misses_two, n_azimuths=4))) == 2
+    assert "box: the sensor measures nothing in 2 of 4 views" in caplog.text
+
+
+def test_a_renderer_s_own_error_names_the_object(meshes):
+    class Broken:
+        def render(self, *given):
+            raise ValueError("no context")
+
+    with pytest.raises(RuntimeError, match=r"^box: ValueError: no context"):
+        list(render_objects(meshes, 0.0, CAMERA, Broken(), n_azimuths=4))

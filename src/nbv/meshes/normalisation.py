@@ -25,6 +25,12 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 # Vectors may be rounded numbers; 0.02 is about one degree.
 _PERPENDICULAR_WITHIN = 0.02
 
+# In units of the file. Beyond them squares of lengths overflow or vanish in single precision, in
+# which most formats keep their numbers: such a length is damage, not a size.
+_EXTENTS = (1e-18, 1e18)
+# In squares of the object's diagonal: below it an area is rounding.
+_LEAST_AREA = 1e-12
+
 
 def direction(axis: str, key: str) -> NDArray[np.float64]:
     """Return the unit vector of an axis of the file.
@@ -103,8 +109,8 @@ def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
     Raises
     ------
     UserError
-        If it has no face, a face index out of range, a used vertex that is not finite, or no
-        extent.
+        If it has no face, a face index out of range, a used vertex that is not finite, no extent
+        or an absurd one, or no area.
     """
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     if len(faces) == 0:
@@ -120,8 +126,21 @@ def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
             f"{origin}: vertex {broken[0]} is not finite, {len(broken)} of {len(used)} in all; "
             "numbers expected"
         )
-    if float(np.linalg.norm(np.ptp(vertices[used], axis=0))) == 0.0:
+    low, high = vertices[used].min(axis=0), vertices[used].max(axis=0)
+    # Halved, for the difference of two finite numbers may not be finite.
+    extent = 2.0 * math.hypot(*(high / 2.0 - low / 2.0))
+    if extent == 0.0:
         raise UserError(f"{origin}: all faces lie in one point; a non-zero extent expected")
+    if not _EXTENTS[0] <= extent <= _EXTENTS[1]:
+        farthest = used[np.abs(vertices[used]).max(axis=1).argmax()]
+        raise UserError(
+            f"{origin}: the mesh extends over {extent:.3g}, vertex {farthest} is the farthest; "
+            f"{_EXTENTS[0]:g} to {_EXTENTS[1]:g} expected"
+        )
+    corners = (vertices[faces] - low) / extent
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    if float(np.linalg.norm(normals, axis=1).sum()) / 2.0 < _LEAST_AREA:
+        raise UserError(f"{origin}: the faces have no area; a surface expected")
 
 
 def normalise(

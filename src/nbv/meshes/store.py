@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.files import damaged, read_arrays, readable, write_arrays
+from nbv.files import damaged, read_arrays, write_arrays
+
+# Of each array in a file: the kind of its numbers, and its shape, None for any length.
+_FORMS: Mapping[str, tuple[str, tuple[int | None, ...]]] = {
+    "ids": ("U", (None,)),
+    "vertices": ("f", (None, 3)),
+    "faces": ("i", (None, 3)),
+    "vertex_offsets": ("i", (None,)),
+    "face_offsets": ("i", (None,)),
+}
+_ROWS = {"vertex": "vertices", "face": "faces"}
+# Single precision keeps a diagonal of 1 to far less.
+_EXTENT_TOLERANCE = 1e-4
 
 
 class Surface(Protocol):
@@ -68,15 +79,8 @@ def save_meshes(path: str | Path, meshes: Mapping[str, Surface]) -> None:
 
 
 def stored_ids(path: str | Path) -> list[str]:
-    """Return the ids in a file of `save_meshes`, in its order, without loading the meshes.
-
-    Raises
-    ------
-    UserError
-        As of `nbv.files.readable`.
-    """
-    with readable(path), np.load(path, allow_pickle=False) as stored:
-        return [str(object_id) for object_id in stored["ids"]]
+    """Return the ids in a file of `save_meshes`, in its order; errors as of `load_meshes`."""
+    return list(load_meshes(path))
 
 
 def load_meshes(path: str | Path) -> dict[str, Mesh]:
@@ -85,33 +89,45 @@ def load_meshes(path: str | Path) -> dict[str, Mesh]:
     Raises
     ------
     UserError
-        Where the file cannot be read, or a mesh in it is no mesh.
+        Where the file is damaged: an array is missing or of another form, an id is there twice, or
+        a mesh has no faces, a face beyond its vertices or another size than one diagonal.
     """
-    arrays = read_arrays(path, ("ids", "vertices", "faces", "vertex_offsets", "face_offsets"))
+    arrays = read_arrays(path)
+    if wrong := _wrong(arrays):
+        raise damaged(path, wrong)
+    vertex_at, face_at = arrays["vertex_offsets"], arrays["face_offsets"]
     meshes: dict[str, Mesh] = {}
-    with readable(path):
-        ids = [str(object_id) for object_id in arrays["ids"]]
-        parts = {
-            name: [*pairwise(map(int, arrays[f"{name}_offsets"]))] for name in ("vertex", "face")
-        }
-        for object_id, of_vertices, of_faces in zip(
-            ids, parts["vertex"], parts["face"], strict=True
-        ):
-            mesh = Mesh(arrays["vertices"][slice(*of_vertices)], arrays["faces"][slice(*of_faces)])
-            if not _is_sound(mesh):
-                raise damaged(path, f"the mesh of object {object_id!r} is not sound")
-            meshes[object_id] = mesh
-        if len(meshes) != len(ids):
-            raise damaged(path, "two objects have the same id")
+    for i, object_id in enumerate(arrays["ids"]):
+        vertices = arrays["vertices"][vertex_at[i] : vertex_at[i + 1]]
+        meshes[str(object_id)] = Mesh(vertices, arrays["faces"][face_at[i] : face_at[i + 1]])
+        if not _is_sound(meshes[str(object_id)]):
+            raise damaged(path, f"the mesh of {str(object_id)!a} is not sound")
     return meshes
+
+
+def _wrong(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return what is wrong with the arrays of a file as a whole, or nothing."""
+    for name, (kind, shape) in _FORMS.items():
+        array = arrays.get(name)
+        if array is None:
+            return f"holds no array {name!r}"
+        if array.dtype.kind != kind or array.ndim != len(shape) or array.shape[1:] != shape[1:]:
+            return f"array {name!r} has another form"
+    ids = arrays["ids"]
+    if len(np.unique(ids)) != len(ids):
+        return "an id is there twice"
+    for name in ("vertex", "face"):
+        offsets, rows = arrays[f"{name}_offsets"], len(arrays[_ROWS[name]])
+        ends = (offsets[0], offsets[-1]) if len(offsets) == len(ids) + 1 else None
+        if ends != (0, rows) or (np.diff(offsets) < 1).any():
+            return f"array '{name}_offsets' does not fit the others"
+    return ""
 
 
 def _is_sound(mesh: Mesh) -> bool:
     vertices, faces = mesh
-    return bool(
-        vertices.shape[1:] == faces.shape[1:] == (3,)
-        and len(faces)
-        and np.isfinite(vertices).all()
-        and faces.min() >= 0
-        and faces.max() < len(vertices)
-    )
+    if not np.isfinite(vertices).all() or faces.min() < 0 or faces.max() >= len(vertices):
+        return False
+    # In double precision, for damage may have made a number whose square overflows.
+    extent = np.ptp(vertices.astype(np.float64), axis=0)
+    return abs(float(np.linalg.norm(extent)) - 1.0) < _EXTENT_TOLERANCE

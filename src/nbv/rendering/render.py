@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nbv.errors import UserError
 from nbv.meshes.store import Surface
 from nbv.rendering import Renderer
 from nbv.rendering.camera import Camera
 from nbv.rendering.crop import crop_measured, sensor_camera
-from nbv.rendering.depth_codes import Codes, encode_depth
+from nbv.rendering.depth_codes import Codes, Depths, encode_depth
 from nbv.rendering.noise import Measure
+
+logger = logging.getLogger(__name__)
 
 N_AZIMUTHS = 360
 """Views of a full turn."""
@@ -50,7 +55,9 @@ def render_objects(
     Raises
     ------
     UserError
-        Naming the object that does not fit the image.
+        Naming the object that does not fit the image, that covers no pixel of a view, or of which
+        the sensor measures nothing in any view. Views in which it measures nothing are logged
+        otherwise.
     """
     drawn = camera if measure is None else sensor_camera(camera)
     azimuths_deg = np.arange(n_azimuths) * (360.0 / n_azimuths)
@@ -59,6 +66,45 @@ def render_objects(
             depth = renderer.render(mesh.vertices, mesh.faces, elevation_deg, azimuths_deg, drawn)
         except UserError as error:
             raise UserError(f"{object_id}: {error}") from error
+        except Exception as error:
+            raise RuntimeError(f"{object_id}: {type(error).__name__}: {error}") from error
+        _need_visible(depth, object_id, elevation_deg, azimuths_deg, camera)
         if measure is not None:
             depth = crop_measured(measure(depth, object_id), camera)
+            _need_measured(depth, object_id, elevation_deg)
         yield encode_depth(depth, camera)
+
+
+def _n_blank(depth: Depths) -> int:
+    return int(np.count_nonzero(~depth.any(axis=(1, 2))))
+
+
+def _need_visible(
+    depth: Depths,
+    object_id: str,
+    elevation_deg: float,
+    azimuths_deg: NDArray[np.floating[Any]],
+    camera: Camera,
+) -> None:
+    if n_blank := _n_blank(depth):
+        first = azimuths_deg[int((~depth.any(axis=(1, 2))).argmax())]
+        raise UserError(
+            f"{object_id}: the object covers no pixel in {n_blank} of {len(depth)} views, first at "
+            f"azimuth {first:g}, elevation {elevation_deg:g}: lower camera.distance="
+            f"{camera.distance:g} or camera.fov_deg={camera.fov_deg:g}, raise camera.image_side="
+            f"{camera.image_side}, or list the id in dataset.exclude if its mesh is too thin"
+        )
+
+
+def _need_measured(depth: Depths, object_id: str, elevation_deg: float) -> None:
+    n_blank = _n_blank(depth)
+    if n_blank == len(depth):
+        raise UserError(
+            f"{object_id}: the sensor measures nothing of the object in any view at elevation "
+            f"{elevation_deg:g}: change sensor.parameters, sensor.diagonal_m or camera.distance"
+        )
+    if n_blank:
+        logger.warning(
+            "%s: the sensor measures nothing in %d of %d views at elevation %g",
+            *(object_id, n_blank, len(depth), elevation_deg),
+        )

@@ -109,12 +109,17 @@ def select_objects(source: MeshSource, category: str, n_objects: int | None) -> 
     Raises
     ------
     UserError
-        If there are fewer than `n_objects`.
+        If there are fewer than `n_objects`, or none.
     """
     available = source.object_ids(category)
     if n_objects is None:
         if source.endless:
             raise UserError(f"dataset={source.name} makes any number of objects: set n_objects")
+        if not available:
+            raise UserError(
+                f"dataset={source.name}: {source.whereabouts(category)} holds no usable meshes: "
+                "add some, or correct dataset.root, dataset.categories or dataset.exclude"
+            )
         return available
     if len(available) < n_objects:
         raise UserError(

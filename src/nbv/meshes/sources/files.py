@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
+import errno
+import functools
 import logging
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nbv.errors import UserError
 from nbv.meshes.normalisation import check_mesh, normalise
+from nbv.meshes.reader import MeshReader
 
 if TYPE_CHECKING:
     import trimesh
@@ -18,6 +22,11 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 EXTENSIONS = (".obj", ".ply", ".off", ".stl", ".glb")
+
+# Ids become cells of tables, lines of logs and parts of messages: no control character, no other
+# end of a line, no byte that is not UTF-8 (a surrogate in Python's text). An id with a slash, from
+# a list of ids, would lead to another folder.
+_NOT_IN_IDS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff/]")
 
 
 class FileSource(ABC):
@@ -36,7 +45,7 @@ class FileSource(ABC):
         self.settings = settings
         if not settings["root"]:
             raise UserError(f"dataset={self.name}: dataset.root is not set; give the data's folder")
-        self.root = Path(settings["root"]).expanduser()
+        self.root = expanded(settings["root"], "dataset.root")
         self._excluded = exclusions(settings)
         self._found: dict[str, dict[str, Path]] = {}
 
@@ -62,12 +71,15 @@ class FileSource(ABC):
                 *(self.name, len(unknown), category, unknown[0]),
             )
         chosen = sorted(found.keys() - self._excluded)
-        absent = [object_id for object_id in chosen if not found[object_id].is_file()]
+        with readable_places(self.name):
+            absent = [object_id for object_id in chosen if not found[object_id].is_file()]
         if absent:
-            more = f", nor do {len(absent) - 1} more" if len(absent) > 1 else ""
+            first = found[absent[0]]
+            what = "is no regular file" if first.exists() else "does not exist"
+            more = f" ({len(absent) - 1} more like it)" if len(absent) > 1 else ""
             raise UserError(
-                f"dataset={self.name}: {found[absent[0]]} does not exist{more}: put it there or "
-                "list its id in dataset.exclude"
+                f"dataset={self.name}: {first} {what}{more}: put it there or list its id in "
+                "dataset.exclude"
             )
         return chosen
 
@@ -76,7 +88,7 @@ class FileSource(ABC):
         files = self.files(category)
         if object_id not in files:
             raise UserError(f"dataset={self.name}: {self.whereabouts(category)}: no {object_id}")
-        mesh = read_mesh(files[object_id])
+        mesh = _reader().read(files[object_id])
         check_mesh(mesh, str(files[object_id]))
         up, front = self.orientation(category, object_id)
         turn_deg = self.settings["turn_deg"].get(category, 0.0)
@@ -88,8 +100,17 @@ class FileSource(ABC):
     def files(self, category: str) -> dict[str, Path]:
         """Return what `find` returns; search only once."""
         if category not in self._found:
-            self.need_folder(self.root, "the data set (dataset.root)")
-            self._found[category] = self.find(category)
+            with readable_places(self.name):
+                self.need_folder(self.root, "the data set (dataset.root)")
+                found = self.find(category)
+            for object_id, path in found.items():
+                if unsafe := _NOT_IN_IDS.search(object_id):
+                    raise UserError(
+                        f"dataset={self.name}: the id {object_id!a} has {unsafe[0]!a} "
+                        f"in it ({str(path.parent)!a}): rename it; text without control "
+                        "characters, in UTF-8, expected"
+                    )
+            self._found[category] = found
         return self._found[category]
 
     def label(self, category: str) -> str:
@@ -117,6 +138,12 @@ class FileSource(ABC):
         return files
 
 
+@functools.cache
+def _reader() -> MeshReader:
+    """Return the one reader of this process: to start it takes as long as to read many files."""
+    return MeshReader()
+
+
 def exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
     """Return the ids in `exclude` and `exclude_file`.
 
@@ -127,11 +154,10 @@ def exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
     """
     listed = list(settings["exclude"])
     if settings["exclude_file"]:
-        path = Path(settings["exclude_file"]).expanduser()
+        path = expanded(settings["exclude_file"], "dataset.exclude_file")
         try:
-            # A device or a pipe may have no end.
             if path.exists() and not path.is_file():
-                raise UserError(f"dataset.exclude_file={path} is not a file")
+                raise OSError(errno.EINVAL, "it is no regular file")
             lines = path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
@@ -140,67 +166,19 @@ def exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
     return frozenset(object_id for object_id in listed if object_id)
 
 
-def read_mesh(path: Path) -> trimesh.Trimesh:
-    """Load a mesh file unchanged: vertices are not merged or reordered, materials are left out.
-
-    The parts of a scene are joined; each is placed by its transform.
-
-    Raises
-    ------
-    UserError
-        With the path and the reason.
-    """
-    import trimesh
-
-    if path.is_file() and path.stat().st_size == 0:
-        raise UserError(f"{path}: the file is empty; at least 1 triangle expected")
-    options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
-    try:
-        with _only_errors(trimesh.util.log):
-            mesh = trimesh.load_mesh(path, process=False, **options)
-        _need_whole_text(path)
-    # No list of what a loader may raise on arbitrary bytes is complete.
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise UserError(f"{path}: cannot be read as a mesh ({reason})") from error
-    if not isinstance(mesh, trimesh.Trimesh):
-        raise UserError(f"{path}: holds no mesh; at least 1 triangle expected")
-    return mesh
-
-
-def _need_whole_text(path: Path) -> None:
-    """Raise ValueError for a text file cut short: trimesh accepts what is left of its faces.
-
-    Trimesh refuses a binary file cut short. An OBJ file does not say how much it holds.
-    """
-    extension = path.suffix.lower()
-    if extension == ".off":
-        text = path.read_text(encoding="utf-8", errors="replace").partition("OFF")[2]
-        (n_vertices, n_faces, *_), *body = _tokens(text)
-        expected, faces_last = int(n_vertices) + int(n_faces), True
-    elif extension == ".ply" and b"format ascii" in path.open("rb").read(100):
-        header, _, text = path.read_text(encoding="utf-8", errors="replace").partition("end_header")
-        elements = [line for line in _tokens(header) if line[0] == "element"]
-        body = _tokens(text)
-        expected, faces_last = sum(int(line[2]) for line in elements), elements[-1][1] == "face"
-    else:
-        return
-    if faces_last and 0 < len(body) == expected and len(body[-1]) <= int(body[-1][0]):
-        del body[-1]
-    if len(body) < expected:
-        raise ValueError(f"{len(body)} of {expected} lines are there: the file was cut short")
-
-
-def _tokens(text: str) -> list[list[str]]:
-    lines = (line.partition("#")[0].split() for line in text.splitlines())
-    return [line for line in lines if line]
-
-
-@contextlib.contextmanager
-def _only_errors(log: logging.Logger) -> Iterator[None]:
-    level = log.level
-    log.setLevel(logging.ERROR)
+@contextmanager
+def readable_places(source: str) -> Iterator[None]:
+    """Turn the system's refusal of a path, such as one too long, into a UserError."""
     try:
         yield
-    finally:
-        log.setLevel(level)
+    except OSError as error:
+        place = ascii(str(error.filename))[1:-1]
+        raise UserError(f"dataset={source}: {place} cannot be read: {error.strerror}") from error
+
+
+def expanded(path: str, key: str) -> Path:
+    """Return a path with its ``~`` replaced; raise UserError where that is nobody's home."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError as error:
+        raise UserError(f"{key}={path}: there is no such home folder") from error

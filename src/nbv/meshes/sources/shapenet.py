@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from nbv.errors import UserError, nearest
-from nbv.meshes.sources.files import FileSource
+from nbv.meshes.sources.files import FileSource, expanded, readable_places
 
 _MODEL = {"v2": Path("models", "model_normalized.obj"), "v1": Path("model.obj")}
 _AXES = {"v2": ("+y", "-z"), "v1": ("+y", "+x"), "sem": ("+z", "-y")}
@@ -37,7 +37,8 @@ def open_shapenet(settings: Mapping[str, Any], seed: int) -> FileSource:
     if layout not in layouts:
         raise UserError(f"dataset.layout={layout}: no such layout; {nearest(layout, layouts)}")
     root = settings["root"]
-    has_metadata = bool(root) and (Path(root).expanduser() / _METADATA).is_file()
+    with readable_places("shapenet"):
+        has_metadata = bool(root) and (expanded(root, "dataset.root") / _METADATA).is_file()
     if layout == "sem" or (layout == "auto" and has_metadata):
         return ShapeNetSemSource(settings, seed)
     return ShapeNetCoreSource(settings, seed)
@@ -127,12 +128,18 @@ class ShapeNetSemSource(_ShapeNetSource):
             path = self.root / _METADATA
             if not path.is_file():
                 raise UserError(f"dataset=shapenet: {path} does not exist; layout=sem needs it")
-            with path.open(encoding="utf-8", newline="") as file:
-                reader = csv.DictReader(file)
-                absent = {"fullId", "category"} - set(reader.fieldnames or ())
-                if absent:
-                    raise UserError(f"dataset=shapenet: {path} has no column {min(absent)}")
-                self._rows = {row["fullId"].rpartition(".")[2]: row for row in reader}
+            try:
+                with path.open(encoding="utf-8", newline="") as file:
+                    reader = csv.DictReader(file)
+                    columns, rows = set(reader.fieldnames or ()), list(reader)
+            except (csv.Error, UnicodeDecodeError) as error:
+                raise UserError(f"dataset=shapenet: {path} cannot be read: {error}") from error
+            if absent := {"fullId", "category"} - columns:
+                raise UserError(f"dataset=shapenet: {path} has no column {min(absent)}")
+            for number, row in enumerate(rows, 1):
+                if not row["fullId"]:
+                    raise UserError(f"dataset=shapenet: {path}: row {number} has no fullId")
+            self._rows = {row["fullId"].rpartition(".")[2]: row for row in rows}
         return self._rows
 
 
