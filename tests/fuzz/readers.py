@@ -282,19 +282,24 @@ def posteriors_problem(posteriors: Any) -> str:
 
 
 def make_depth(path: Path) -> None:
+    from nbv.rendering.store import write_depth
+
     codes = np.random.default_rng(0).integers(0, 256, (len(IDS), 8, 6, 6), dtype=np.uint8)
-    np.save(path, codes)
+    write_depth(path.with_suffix(".npy"), path.with_suffix(".json"), IDS, codes, codes.shape[1:])
 
 
 def read_depth(path: Path) -> Any:
-    from nbv.experiments.results import load_depth
+    from nbv.rendering.store import open_depth
 
-    return np.asarray(load_depth(path))
+    images = open_depth(path.with_suffix(".npy"), path.with_suffix(".json"))
+    return images._replace(codes=np.asarray(images.codes))
 
 
-def depth_problem(codes: np.ndarray) -> str:
+def depth_problem(images: Any) -> str:
+    codes, ids = images.codes, images.object_ids
     is_images = codes.ndim == 4 and codes.dtype == np.uint8 and codes.shape[2] == codes.shape[3]
-    return "" if is_images else f"{codes.dtype} {codes.shape}"
+    is_whole = is_images and len(set(ids)) == len(codes) and all(isinstance(i, str) for i in ids)
+    return "" if is_whole else f"{codes.dtype} {codes.shape} of {ids}"
 
 
 def make_estimator(path: Path) -> None:
@@ -380,6 +385,7 @@ READERS: Mapping[str, Reader] = {
     "lookup": Reader("mug.npz", make_lookup, read_lookup, lookup_problem),
     "posteriors": Reader("mug.npz", make_posteriors, read_posteriors, posteriors_problem),
     "depth": Reader("mug.npy", make_depth, read_depth, depth_problem),
+    "depth objects": Reader("mug.json", make_depth, read_depth, depth_problem),
     "estimator": Reader("e.safetensors", make_estimator, read_estimator, estimator_problem),
     "configuration": Reader(
         "configuration.yaml", make_configuration, read_run_configuration, configuration_problem

@@ -46,7 +46,9 @@ def test_a_seed_damages_a_file_in_the_same_way(campaign, tmp_path):
 
 
 def refuses_in_two_lines(path):
-    raise UserError("one\ntwo")
+    error = UserError("")
+    error.args = ("one\ntwo",)
+    raise error
 
 
 def breaks(path):

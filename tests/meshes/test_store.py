@@ -74,10 +74,10 @@ def at(place, value):
         (changed("vertices", lambda array: array[:-1]), "'vertex_offsets' does not fit"),
         (changed("face_offsets", at(1, 0)), "'face_offsets' does not fit"),
         (changed("face_offsets", lambda array: array[:-1]), "'face_offsets' does not fit"),
-        (changed("vertices", at((0, 0), np.nan)), "the mesh of 'ball' is damaged"),
-        (changed("vertices", at((0, 0), 1e30)), "the mesh of 'ball' is damaged"),
-        (changed("faces", at((0, 0), 10_000)), "the mesh of 'ball' is damaged"),
-        (changed("faces", at((0, 0), -1)), "the mesh of 'ball' is damaged"),
+        (changed("vertices", at((0, 0), np.nan)), "the mesh of 'ball' is not sound"),
+        (changed("vertices", at((0, 0), 1e30)), "the mesh of 'ball' is not sound"),
+        (changed("faces", at((0, 0), 10_000)), "the mesh of 'ball' is not sound"),
+        (changed("faces", at((0, 0), -1)), "the mesh of 'ball' is not sound"),
     ],
 )
 @pytest.mark.parametrize("read", [load_meshes, stored_ids])

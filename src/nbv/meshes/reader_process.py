@@ -51,7 +51,7 @@ def _answer(path: Path, max_bytes: int) -> tuple[dict[str, Any], list[Any]]:
         mesh = parse_mesh(path)
         arrays = [np.asarray(mesh.vertices, "<f8"), np.asarray(mesh.faces, "<i8")]
     except MemoryError:
-        return {"refused": f"reading it needs more than {max_bytes / 2**30:g} GiB of memory"}, []
+        return {"refused": f"it needs more than {max_bytes / 2**30:g} GiB of memory to read"}, []
     # No list of what a loader may raise on arbitrary bytes is complete.
     except Exception as error:
         reason = " ".join(str(error).split())[:300] or type(error).__name__
