@@ -130,9 +130,17 @@ def test_draws_do_not_depend_on_what_was_asked_before(evaluations):
 def test_draws_by_fold_keep_each_folds_size(evaluations):
     mug = paired.pair_methods(evaluations["mug", 0], "mug")
     drawn = paired.Resampler(3, 20).multiplicities_by_fold(mug)
+    assert drawn.dtype == np.int64
     for fold in (1, 2, 3):
         members = np.unique(mug.objects[mug.folds == fold])
         assert (drawn[:, members].sum(axis=1) == members.size).all()
+
+
+def test_a_fold_of_one_object_always_draws_it():
+    sample = paired.pair_methods(evaluated(2, n_objects=4), "mug")  # in folds of 2, 1 and 1
+    drawn = paired.Resampler(3, 20).multiplicities_by_fold(sample)
+    assert (drawn[:, [1, 2]] == 1).all()
+    assert set(np.unique(drawn[:, 0])) == {0, 1, 2}
 
 
 @pytest.mark.parametrize(
@@ -194,6 +202,9 @@ def test_one_fold_has_no_sigma(evaluations):
     )
     assert np.isnan(found.value)
     assert np.isnan(found.interval().low)
+    assert found.samples.shape == (10,)
+    assert found.samples.dtype == np.float64
+    assert np.isnan(found.samples).all()
 
 
 def sample_of(a, b, objects, categories=("mug",)):
