@@ -130,6 +130,9 @@ def test_the_product_multiplies_in_the_frame_of_the_first_view(seed, delta, k):
 def test_images_that_exclude_each_other_fall_back_on_the_first():
     first, second = np.eye(12)[[3]], np.eye(12)[[8]]
     assert product(first, second, np.array([60]))[0] == pytest.approx(90)
+    # Each pair for itself: the other pair here agrees.
+    found = product(np.eye(12)[[3, 4]], np.eye(12)[[8, 6]], np.array([60, 60]))
+    assert found == pytest.approx([90, 120])
 
 
 def test_distributions_of_several_objects_are_fused_each_by_its_own_rotation():

@@ -73,6 +73,19 @@ def test_the_resamples_of_figures_without_an_image_are_no_numbers():
         assert np.isnan(found).tolist() == [False, True, False]
 
 
+def test_resampled_medians_of_few_images_are_the_lower_medians(rng):
+    """Up to a thousand images the grid holds each value."""
+    objects, values, _ = _uneven_objects(rng)
+    multiplicities = metrics.resample_objects(7, np.random.default_rng(5), 50)
+    found = metrics.resampled_medians(values, objects, multiplicities)
+    repeated = (np.repeat(values, counts[objects]) for counts in multiplicities)
+    expected = [np.quantile(each, 0.5, method="inverted_cdf") for each in repeated]
+    assert found.dtype == np.float64
+    np.testing.assert_array_equal(found, expected)
+    alone = metrics.resampled_medians([2.0, 7.0], np.array([0, 1]), np.eye(2, dtype=np.int64))
+    np.testing.assert_array_equal(alone, [2.0, 7.0])
+
+
 def test_the_interval_leaves_out_samples_that_are_no_numbers():
     samples = [np.nan, *np.arange(101.0), np.inf]
     assert metrics.percentile_interval(samples) == pytest.approx((2.5, 97.5))

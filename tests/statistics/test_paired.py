@@ -54,7 +54,8 @@ def test_methods_are_lined_up_image_by_image(evaluations, rng):
 def test_methods_on_different_images_are_refused(evaluations):
     frame = evaluations["mug", 0]
     fewer = frame.drop(frame.index[(frame["method"] == "random")][:1])
-    with pytest.raises(UserError, match="random was evaluated on other images than single"):
+    message = "^mug: random was evaluated on other images than single; evaluate both again$"
+    with pytest.raises(UserError, match=message):
         paired.pair_methods(fewer, "mug")
 
 
@@ -81,6 +82,22 @@ def test_pooled_methods_are_those_that_all_categories_have(evaluations):
     for parts in ([first, second], [second, first]):
         assert list(paired.pool(parts).errors_deg) == ["single", "opposite", "proposed"]
     assert list(paired.pool([first]).errors_deg) == list(METHODS)
+
+
+def test_methods_keep_the_order_in_which_they_appear(evaluations):
+    """Also as categories, of which some are not used."""
+    frame = evaluations["mug", 0]
+    some = frame[frame["method"] != "opposite"]
+    names = pd.CategoricalDtype(sorted(METHODS))
+    found = paired.pair_methods(some.assign(method=some["method"].astype(names)), "mug")
+    assert list(found.errors_deg) == ["single", "random", "proposed"]
+
+
+def test_objects_are_numbered_by_their_names(evaluations):
+    frame = evaluations["mug", 0]
+    found = paired.pair_methods(frame.assign(object_id=frame["object_id"].astype(int) + 5), "mug")
+    # 5 to 13 in the order of text: 10, 11, 12, 13, 5, ... In fold 1 are 5, 8 and 11.
+    assert found.objects[: 3 * 360 : 360].tolist() == [4, 7, 1]
 
 
 def test_no_method_at_all_is_refused(evaluations):
@@ -130,9 +147,17 @@ def test_draws_do_not_depend_on_what_was_asked_before(evaluations):
 def test_draws_by_fold_keep_each_folds_size(evaluations):
     mug = paired.pair_methods(evaluations["mug", 0], "mug")
     drawn = paired.Resampler(3, 20).multiplicities_by_fold(mug)
+    assert drawn.dtype == np.int64
     for fold in (1, 2, 3):
         members = np.unique(mug.objects[mug.folds == fold])
         assert (drawn[:, members].sum(axis=1) == members.size).all()
+
+
+def test_a_fold_of_one_object_always_draws_it():
+    sample = paired.pair_methods(evaluated(2, n_objects=4), "mug")  # in folds of 2, 1 and 1
+    drawn = paired.Resampler(3, 20).multiplicities_by_fold(sample)
+    assert (drawn[:, [1, 2]] == 1).all()
+    assert set(np.unique(drawn[:, 0])) == {0, 1, 2}
 
 
 @pytest.mark.parametrize(
@@ -194,6 +219,9 @@ def test_one_fold_has_no_sigma(evaluations):
     )
     assert np.isnan(found.value)
     assert np.isnan(found.interval().low)
+    assert found.samples.shape == (10,)
+    assert found.samples.dtype == np.float64
+    assert np.isnan(found.samples).all()
 
 
 def sample_of(a, b, objects, categories=("mug",)):
