@@ -43,7 +43,7 @@ rule estimate:
         splits=rules.splits.output[0],
         depth=rules.render.output[0],
         estimator=rules.train.output[0],
-        of_parts=expand(rules.train_part.output[0], part=PARTS, allow_missing=True),
+        of_parts=[LAYOUT.part_estimator(*FOLD, part) for part in PARTS],
     output:
         **{
             f"{role}_posteriors": LAYOUT.posteriors(*FOLD, role)

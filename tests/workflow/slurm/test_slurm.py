@@ -33,12 +33,12 @@ def cluster(tmp_path: Path) -> Iterator[OneNode]:
         yield started
 
 
-def in_training(cluster: OneNode, besides: set[int]) -> int:
+def in_training(cluster: OneNode, known: set[int]) -> int:
     """Wait for a further job that has come to its training, and return its number."""
     found: set[int] = set()
 
     def is_there() -> bool:
-        found.update(set(cluster.in_script("train_estimator")) - besides)
+        found.update(set(cluster.in_script("train_estimator")) - known)
         return bool(found)
 
     until(is_there, "a job is in training")
