@@ -45,7 +45,7 @@ rule estimate:
         depth=rules.render.output.depth,
         objects=rules.render.output.objects,
         estimator=rules.train.output[0],
-        of_parts=expand(rules.train_part.output[0], part=PARTS, allow_missing=True),
+        of_parts=[LAYOUT.part_estimator(*FOLD, part) for part in PARTS],
     output:
         **{
             f"{role}_posteriors": LAYOUT.posteriors(*FOLD, role)

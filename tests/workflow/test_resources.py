@@ -1,0 +1,39 @@
+"""What a cluster is asked for: memory and time of each job, and which jobs go together."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+import yaml
+
+from .conftest import ROOT
+
+pytestmark = pytest.mark.slow
+
+
+def asked(project, attempt: int) -> dict[str, tuple[int, int]]:
+    """Return the memory in MB and the minutes that each rule asks for at that attempt."""
+    dry = ("--cores", "2", "--dry-run", "--workflow-profile", "none", "--attempt", str(attempt))
+    targets = ("report", "leaderboard", "more_views", "travel", "ablation")
+    printed = project.run(*dry, *targets).stdout
+    found = {}
+    for rule, job in re.findall(r"^rule (\w+):\n(.*?)\n\n", printed, re.M | re.S):
+        resources = dict(re.findall(r"(mem_mb|runtime)=(\d+)", job))
+        found[rule] = (int(resources["mem_mb"]), int(resources["runtime"]))
+    return found
+
+
+def test_every_rule_asks_for_memory_and_time_and_for_more_when_it_is_tried_again(fresh):
+    first, third = asked(fresh, 1), asked(fresh, 3)
+    assert {"settings", "meshes", "render", "train", "lookup", "report", "ablation"} <= set(first)
+    assert first == {rule: (mb // 3, minutes // 3) for rule, (mb, minutes) in third.items()}
+    assert min(mb for mb, _ in first.values()) >= 1000
+
+
+def test_the_slurm_profile_groups_every_rule_of_the_paper_and_no_other_name(fresh):
+    profile = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text("utf-8"))
+    rules = set(fresh.run("--list-rules").stdout.split())
+    grouped = set(profile["groups"])
+    assert grouped <= rules
+    assert set(fresh.would_run()) <= grouped
