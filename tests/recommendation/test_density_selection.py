@@ -12,6 +12,7 @@ from tests.recommendation.made import (
     objects,
 )
 
+from nbv.errors import UserError
 from nbv.recommendation.density_selection import (
     choose_densities,
     chosen_lookup,
@@ -111,3 +112,20 @@ def test_the_most_likely_density_is_found_by_trying_all():
             totals[bandwidth, alpha] = total
     best = max(totals, key=totals.__getitem__)
     assert (choice.bandwidth_deg, choice.pseudo_observations) == best
+
+
+def test_an_error_that_is_not_a_number_is_never_the_least():
+    estimate = hidden_range_estimates(6)
+    estimate[2, 5] = np.nan
+    grid = {"bandwidths_deg": [8.0, 16.0], "pseudo_observations": [10.0]}
+    with np.errstate(invalid="ignore"), pytest.raises(UserError, match="is nan: the estimates"):
+        choose_density(estimate, **grid)
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), -1.0])
+@pytest.mark.parametrize("key", ["bandwidths_deg", "pseudo_observations"])
+def test_a_candidate_that_is_not_finite_makes_no_density(key, wrong):
+    """It made uniform rows without a word, and they could win."""
+    grid = {"bandwidths_deg": [8.0], "pseudo_observations": [10.0]} | {key: [8.0, wrong]}
+    with pytest.raises(ValueError, match="must be 0 or more and finite"):
+        choose_density(hidden_range_estimates(6), **grid)

@@ -18,6 +18,14 @@ def test_ties_go_to_the_smallest_travel_and_then_to_the_smaller_delta():
     assert lookup.least_cost_delta(flat).tolist() == [315, 45]
 
 
+@pytest.mark.parametrize("travel_cost", [0.0, 1.0])
+def test_a_cost_that_is_not_a_number_is_never_the_least(travel_cost):
+    cost = np.ones((2, 8))
+    cost[1, 3] = np.nan
+    with pytest.raises(UserError, match="cost is NaN"):
+        lookup.least_cost_delta(cost, travel_cost=travel_cost)
+
+
 def test_a_stored_table_comes_back_whole(tmp_path):
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     lookup.save_lookup(tmp_path / "pose_ambiguity.npz", table)

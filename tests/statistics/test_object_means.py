@@ -15,7 +15,7 @@ from nbv.statistics.object_means import (
     object_means,
     paired_objects,
 )
-from nbv.statistics.paired import Resampler
+from nbv.statistics.paired import PairedErrors, Resampler
 
 
 @pytest.fixture(scope="module")
@@ -98,3 +98,11 @@ def test_methods_that_an_object_lacks_are_left_out():
     sample = paired_objects(means, "mug")
     assert list(sample.errors_deg) == ["all"]
     assert sample.n_objects == 2
+
+
+def test_an_error_that_is_not_a_number_is_never_the_best():
+    rng = np.random.default_rng(0)
+    errors = {"good": rng.random(8), "damaged": np.full(8, np.nan)}
+    sample = PairedErrors(errors, np.arange(8), np.ones(8, int), np.zeros(8), ("mug",) * 8)
+    with pytest.raises(UserError, match="damaged: the MAE is nan"):
+        indistinct_from_best(sample, list(errors), Resampler(0, 100))

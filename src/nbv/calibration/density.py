@@ -51,8 +51,8 @@ def von_mises_kernel(n_bins: int, bandwidth_deg: float) -> NDArray[np.float64]:
     deviation `bandwidth_deg`. It is evaluated on the grid, never as a library's density with a
     location, so that it wraps by construction. A bandwidth of 0 is no smoothing.
     """
-    if bandwidth_deg < 0:
-        raise ValueError(f"bandwidth_deg must be 0 or more, not {bandwidth_deg}")
+    if not 0 <= bandwidth_deg < np.inf:
+        raise ValueError(f"bandwidth_deg must be 0 or more and finite, not {bandwidth_deg}")
     if bandwidth_deg == 0:
         return np.asarray(np.eye(1, n_bins)[0])
     concentration = 1.0 / np.radians(bandwidth_deg) ** 2
@@ -82,8 +82,10 @@ def conditional(joint: Matrix, pseudo_observations: float) -> Matrix:
     `pseudo_observations` (0 or more) uniform observations are added to every row, so that a row
     that was hardly ever seen is wide and not sharp. A row without any observation is uniform.
     """
-    if pseudo_observations < 0:
-        raise ValueError(f"pseudo_observations must be 0 or more, not {pseudo_observations}")
+    if not 0 <= pseudo_observations < np.inf:
+        raise ValueError(
+            f"pseudo_observations must be 0 or more and finite, not {pseudo_observations}"
+        )
     n_bins = joint.shape[1]
     mass = joint.sum(axis=1, keepdims=True) + pseudo_observations
     filled = joint + pseudo_observations / n_bins

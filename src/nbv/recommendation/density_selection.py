@@ -130,7 +130,13 @@ def choose_densities(
 
 def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
     mean = {candidate: float(of_objects.mean()) for candidate, of_objects in errors.items()}
-    _check_finite(mean, f"{name}: the two-view error")
+    for (bandwidth_deg, pseudo_observations), error_deg in mean.items():
+        if not np.isfinite(error_deg):
+            raise UserError(
+                f"{name}: the two-view error with a bandwidth of {bandwidth_deg:g} deg and "
+                f"{pseudo_observations:g} pseudo-observations is {error_deg}: the estimates are "
+                "damaged; make them again"
+            )
     best = min(mean, key=mean.__getitem__)
     log.info(
         "%s: bandwidth %g deg, %g pseudo-observations (two-view error %.2f deg; worst %.2f)",
@@ -140,16 +146,6 @@ def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
         max(mean.values()),
     )
     return Choice(*best, candidate_error_deg=mean, object_error_deg=tuple(errors[best].tolist()))
-
-
-def _check_finite(values: Mapping[Candidate, float], what: str) -> None:
-    """Raise UserError for a value that no other can be compared with."""
-    for (bandwidth_deg, pseudo_observations), value in values.items():
-        if not np.isfinite(value):
-            raise UserError(
-                f"{what} of bandwidth {bandwidth_deg:g} deg and {pseudo_observations:g} "
-                f"pseudo-observations is {value}: the estimates are damaged; make them again"
-            )
 
 
 def most_likely_density(
@@ -167,7 +163,6 @@ def most_likely_density(
         rows = nearest_bin(estimate_deg[held_out], n_bins)
         chance = evidence.conditionals.viewpoint[rows, azimuth]
         found[candidate] += np.log(np.maximum(chance, np.finfo(float).tiny)).sum()
-    _check_finite(found, "the log-likelihood")
     return Choice(*max(found, key=found.__getitem__))
 
 
