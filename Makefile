@@ -1,6 +1,7 @@
 # make reproduce   the paper, end to end        make quick   the same graph, small
 # make test        the test suite               make check   lint, types, imports, workflow lint
 # make bench       the speed benchmarks         make compare a finished run with docs/reference
+# make soak        2,000 damaged files, for half an hour at most
 
 PYTHON ?= python3
 CORES ?= 2
@@ -8,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: reproduce quick compare reference bench test test-quick check clean
+.PHONY: reproduce quick compare reference bench test test-quick soak check clean
 
 reproduce: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -30,6 +31,9 @@ test: $(READY)
 
 test-quick: $(READY)
 	$(BIN)/pytest -m "not slow"
+
+soak: $(READY)
+	$(BIN)/python -m tests.fuzz
 
 check: $(READY)
 	$(BIN)/ruff check .
