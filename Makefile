@@ -5,6 +5,7 @@
 # make coverage    branches that tests reach    make mutation whether tests notice changed code
 # make audit       known vulnerabilities        make licences the licences of what is locked
 # make lock        the locks again              UPGRADE=--upgrade takes the newest versions
+# make soak        2,000 damaged files, for half an hour at most
 
 PYTHON ?= python3
 CORES ?= 2
@@ -15,7 +16,7 @@ AUDIT := $(VENV)/.audit-ready
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
 
-.PHONY: reproduce quick compare reference bench test test-quick test-slurm coverage mutation check lock audit \
+.PHONY: reproduce quick compare reference bench test test-quick test-slurm soak coverage mutation check lock audit \
 	licences clean
 
 reproduce: $(READY)
@@ -61,6 +62,9 @@ audit: $(AUDIT)
 
 licences: $(AUDIT)
 	$(BIN)/python tools/licences.py > docs/licences.md
+
+soak: $(READY)
+	$(BIN)/python -m tests.fuzz
 
 check: $(READY)
 	$(BIN)/ruff check .

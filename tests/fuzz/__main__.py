@@ -32,14 +32,13 @@ def main() -> int:
         say(*done[0])
         return int(done[0].outcome == "failed")
     start, done = time.monotonic(), list(campaign.check_valid())
-    batch = 50 * given.workers
-    for first in range(0, given.cases, batch):
-        done += campaign.run(cases(given.cases)[first : first + batch])
-        minutes = (time.monotonic() - start) / 60
-        failures = [outcome for outcome in done if outcome.outcome == "failed"]
-        say(f"{len(done)} cases, {len(failures)} failures, {minutes:.1f} minutes")
-        if minutes > given.minutes:
-            break
+    failures = [outcome for outcome in done if outcome.outcome == "failed"]
+    for outcome in campaign.run(cases(given.cases), start + 60 * given.minutes):
+        done.append(outcome)
+        failures += [outcome] if outcome.outcome == "failed" else []
+        if len(done) % 100 == 0:
+            minutes = (time.monotonic() - start) / 60
+            say(f"{len(done)} cases, {len(failures)} failures, {minutes:.1f} minutes")
     for outcome in failures:
         say(f"{outcome.case.reader}:{outcome.case.number} {outcome.detail[:200]!a}")
     say(table(done), f"seed {given.seed}; the files of failures: {folder / 'failed'}")

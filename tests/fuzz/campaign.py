@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import queue
 import shutil
 import subprocess
 import sys
+import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -64,12 +67,25 @@ class Campaign:
             reader.make(path)
             self._valid[name] = path.read_bytes()
 
-    def run(self, wanted: Sequence[Case]) -> Iterator[Outcome]:
-        """Yield the outcome of each case, one worker's after the other's."""
-        shares = [wanted[i :: self._n_workers] for i in range(self._n_workers)]
+    def run(self, wanted: Sequence[Case], deadline: float = math.inf) -> Iterator[Outcome]:
+        """Yield the outcome of each case as it comes; none is begun after `time.monotonic`."""
+        outcomes: queue.SimpleQueue[Outcome | None] = queue.SimpleQueue()
+
+        def work(number: int) -> None:
+            try:
+                with Worker(self._folder / f"worker{number}") as worker:
+                    for case in wanted[number :: self._n_workers]:
+                        if time.monotonic() < deadline:
+                            outcomes.put(self._outcome(worker, case))
+            finally:
+                outcomes.put(None)
+
         with ThreadPoolExecutor(self._n_workers) as pool:
-            for outcomes in pool.map(self._run_share, range(self._n_workers), shares):
-                yield from outcomes
+            ended = [pool.submit(work, number) for number in range(self._n_workers)]
+            for _ in ended:
+                yield from iter(outcomes.get, None)
+            for future in ended:
+                future.result()
 
     def write_case(self, case: Case, folder: Path) -> Path:
         """Write a case's damaged file, and what reading it needs, below a folder."""
@@ -88,27 +104,23 @@ class Campaign:
                 path = self._folder / "valid" / name / reader.file
                 yield Outcome(Case(name, -1), *worker.ask(name, path))
 
-    def _run_share(self, number: int, share: Sequence[Case]) -> list[Outcome]:
-        outcomes = []
-        with Worker(self._folder / f"worker{number}") as worker:
-            for case in share:
-                folder = worker.folder / "case"
-                path = self.write_case(case, folder)
-                outcome = Outcome(case, *worker.ask(case.reader, path))
-                if outcome.outcome == "failed":
-                    kept = f"seed{self._seed}-{case.reader}-{case.number}".replace(" ", "-")
-                    (self._folder / "failed").mkdir(exist_ok=True)
-                    shutil.copy(path, self._folder / "failed" / f"{kept}{path.suffix}")
-                shutil.rmtree(folder)
-                outcomes.append(outcome)
-        return outcomes
+    def _outcome(self, worker: Worker, case: Case) -> Outcome:
+        folder = worker.folder / "case"
+        path = self.write_case(case, folder)
+        outcome = Outcome(case, *worker.ask(case.reader, path))
+        if outcome.outcome == "failed":
+            kept = f"seed{self._seed}-{case.reader}-{case.number}".replace(" ", "-")
+            (self._folder / "failed").mkdir(exist_ok=True)
+            shutil.copy(path, self._folder / "failed" / f"{kept}{path.suffix}")
+        shutil.rmtree(folder)
+        return outcome
 
 
 class Worker:
     """A process of `tests.fuzz.worker`, started again where a file ended it."""
 
     def __init__(self, folder: Path) -> None:
-        folder.mkdir()
+        folder.mkdir(exist_ok=True)
         self.folder, self._process = folder, None
         self._notes = folder / "notes.txt"
 

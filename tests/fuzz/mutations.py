@@ -34,7 +34,7 @@ def mutate(data: bytes, others: list[bytes], rng: Generator) -> bytes:
         kinds += TEXT * 2
     if rng.random() < 0.05:
         return others[rng.integers(len(others))]
-    for _ in range(rng.integers(1, 4)):
+    for _ in range(rng.choice([1, 1, 1, 2, 4])):
         if data:
             data = kinds[rng.integers(len(kinds))](data, rng)
     return data

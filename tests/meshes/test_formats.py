@@ -81,11 +81,13 @@ def test_an_obj_that_trimesh_would_misread_is_refused(tmp_path, content, named):
         (OFF.replace("3 0 1 2", "2 0 1 2"), "not a face of 3"),
         (OFF.replace("OFF", "4OFF"), "4OFF is not a kind"),
         (OFF.replace("4 2 0", "-1 2 0"), "announces -1"),
+        ("bell \x07 \x9f" + OFF, "bell ? ?OFF is not a kind"),
     ],
 )
 def test_an_off_that_trimesh_would_misread_is_refused(tmp_path, content, named):
     assert len(read(tmp_path / "good.off", OFF).faces) == 2
-    refused(lambda: read(tmp_path / "bad.off", content), tmp_path / "bad.off", named)
+    bad = tmp_path / "bad.off"
+    assert refused(lambda: read(bad, content), bad, named).isprintable()
 
 
 @pytest.mark.parametrize(

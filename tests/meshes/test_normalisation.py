@@ -124,6 +124,11 @@ def test_an_unknown_centre_is_refused():
         ([[0, 0, 0], [1, np.nan, 0], [0, 1, 0]], [[0, 1, 2]], "vertex 1 is not finite, 1 of 3"),
         ([[0, 0, 0], [1, 0, 0], [0, np.inf, 0]], [[0, 1, 2]], "vertex 2 is not finite"),
         (np.ones((3, 3)), [[0, 1, 2]], "in one point"),
+        ([[0, 0, 0], [1e38, 0, 0], [0, 1, 0]], [[0, 1, 2]], "extends over 1e.38, vertex 1"),
+        ([[0, 0, 0], [1.7e308, 0, 0], [-1.7e308, 1, 0]], [[0, 1, 2]], "extends over inf"),
+        (np.eye(3) * 1e-30, [[0, 1, 2]], "extends over"),
+        (np.ones((3, 3)) * [[0], [1], [3]], [[0, 1, 2]], "no area"),
+        (np.eye(4, 3), [[0, 1, 1], [2, 2, 3]], "no area"),
     ],
 )
 def test_a_mesh_that_cannot_be_drawn_is_refused_by_name(vertices, faces, named):

@@ -94,6 +94,21 @@ class TestShapeNetSem:
         source = source_of("shapenet", root=str(root), layout="sem")
         refused(lambda: source.object_ids("mug"), root / "metadata.csv", "does not exist")
 
+    @pytest.mark.parametrize(
+        ("content", "named"),
+        [
+            (b"fullId,category\n,mug\n", "row 1 has no fullId"),
+            (b"fullId,category\nwss.aa,mug\xe9\n", "cannot be read"),
+            (b'fullId,category\nwss.aa,"mug' + b"x" * 200_000, "cannot be read"),
+            (b"fullId,category\nwss./etc/passwd,mug\n", "'/etc/passwd' has '/' in it"),
+            (b"fullId,category\nwss." + b"x" * 300 + b",mug\n", "too long"),
+        ],
+    )
+    def test_a_damaged_or_hostile_table_is_named(self, root, content, named):
+        (root / "metadata.csv").write_bytes(content)
+        source = source_of("shapenet", root=str(root))
+        refused(lambda: source.object_ids("mug"), named)
+
 
 @needs_real
 def test_real_mugs_have_their_handles_at_270_degrees():

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import logging
+import os
 
 import numpy as np
+import pandas as pd
 import pytest
 import trimesh
 from mesh_files import READER, pointer, put, refused, source_of
 
+from nbv.files import read_csv, write_csv
+from nbv.meshes.preparation import prepare_meshes
 from nbv.meshes.sources import select_objects
 
 
@@ -148,3 +152,52 @@ def test_a_list_for_other_categories_is_none_of_this_one_s_business(root, caplog
 def test_a_missing_list_is_named(root):
     path = root / "no.txt"
     refused(lambda: source_of("folder", root=str(root), exclude_file=str(path)), path)
+
+
+@pytest.mark.parametrize("name", [b"two\nlines", b"return\r", b"tab\t", b"latin \xe9", b"bell\x07"])
+def test_names_that_would_break_a_table_or_a_line_are_refused(tmp_path, name):
+    put(tmp_path / "mug" / "one.ply")
+    (tmp_path / "mug" / os.fsdecode(name + b".ply")).write_bytes(b"")
+    message = refused(lambda: source_of("folder", root=str(tmp_path)).object_ids("mug"), "rename")
+    assert message.isascii()
+    assert message.isprintable()
+
+
+def test_names_with_spaces_commas_and_quotes_work(tmp_path):
+    names = ["a, b", "c 'd' \"e\"", "{f} %g $h", "Täße", "#i;j", "k" * 200]
+    for name in names:
+        put(tmp_path / "mug" / f"{name}.ply")
+    source = source_of("folder", root=str(tmp_path))
+    assert source.object_ids("mug") == sorted(names)
+    assert list(prepare_meshes(source, "mug", names)) == names
+
+
+def test_names_with_spaces_commas_and_quotes_survive_a_table(tmp_path):
+    names = ["a, b", "c 'd' \"e\"", "{f} %g $h", "Täße", " #i;j ", "NA", "007"]
+    write_csv(tmp_path / "t.csv", pd.DataFrame({"object_id": names, "fold": 1}))
+    assert list(read_csv(tmp_path / "t.csv")["object_id"]) == names
+
+
+def test_a_pipe_among_the_meshes_is_named_and_not_opened(tmp_path):
+    put(tmp_path / "mug" / "one.ply")
+    os.mkfifo(tmp_path / "mug" / "pipe.ply")
+    source = source_of("folder", root=str(tmp_path))
+    refused(lambda: source.object_ids("mug"), tmp_path / "mug" / "pipe.ply", "no regular file")
+    listed = tmp_path / "list"
+    os.mkfifo(listed)
+    refused(lambda: source_of("folder", root=str(tmp_path), exclude_file=str(listed)), listed)
+
+
+def test_a_category_without_meshes_is_named(tmp_path):
+    (tmp_path / "mug").mkdir()
+    source = source_of("folder", root=str(tmp_path))
+    refused(lambda: select_objects(source, "mug", None), tmp_path / "mug", "no usable meshes")
+
+
+@pytest.mark.parametrize("name", ["folder", "shapenet", "modelnet"])
+def test_paths_that_the_system_refuses_are_named(tmp_path, name):
+    long = str(tmp_path / ("x" * 300))
+    refused(lambda: source_of(name, root=long).object_ids("mug"), "xxx", "too long")
+    refused(lambda: source_of(name, root="~nobody-of-that-name"), "no such home folder")
+    labelled = source_of(name, root=str(tmp_path), categories={"mug": "y" * 300})
+    refused(lambda: labelled.object_ids("mug"), "yyy", "too long")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zipfile
+
 import numpy as np
 import pytest
 import trimesh
@@ -93,3 +95,15 @@ def test_damage_is_named_with_the_file(tmp_path, meshes, damage, named, read):
     assert message.startswith(f"{path}: ")
     assert named in message
     assert "\n" not in message
+
+
+def test_an_array_whose_first_bytes_are_damaged_is_named(tmp_path, meshes):
+    path = tmp_path / "mug.npz"
+    save_meshes(path, meshes)
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content.replace(b"\x93NUMPY", b"\x93NUMPX"))
+    with pytest.raises(UserError, match="array 'ids' is damaged"):
+        load_meshes(path)

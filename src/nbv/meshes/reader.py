@@ -99,9 +99,9 @@ class MeshReader:
 
     def _reason(self, status: int) -> str:
         if status == -signal.SIGPROF:
-            return f"it takes more than {self._limits[0]} s of processor time to read"
+            return f"it took more than {self._limits[0]} s of processor time"
         if status == -signal.SIGALRM:
-            return f"it takes more than {self._limits[1]} s to read"
+            return f"it took more than {self._limits[1]} s"
         with contextlib.suppress(ValueError):
             return f"the reader was ended by {signal.Signals(-status).name}; is memory short?"
         return f"the reader ended with status {status}"

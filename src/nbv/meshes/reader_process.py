@@ -51,10 +51,12 @@ def _answer(path: Path, max_bytes: int) -> tuple[dict[str, Any], list[Any]]:
         mesh = parse_mesh(path)
         arrays = [np.asarray(mesh.vertices, "<f8"), np.asarray(mesh.faces, "<i8")]
     except MemoryError:
-        return {"refused": f"it needs more than {max_bytes / 2**30:g} GiB of memory to read"}, []
+        return {"refused": f"needs more than {max_bytes / 2**30:g} GiB of memory"}, []
     # No list of what a loader may raise on arbitrary bytes is complete.
     except Exception as error:
-        reason = " ".join(str(error).split())[:300] or type(error).__name__
+        # A reason may quote the file, which may hold anything.
+        quoted = "".join(c if c.isprintable() else "?" for c in " ".join(str(error).split()))
+        reason = quoted[:300] or type(error).__name__
         return {"refused": f"cannot be read as a mesh ({reason})"}, []
     return {"vertices": len(arrays[0]), "faces": len(arrays[1])}, arrays
 

@@ -105,12 +105,15 @@ def load_meshes(path: str | Path) -> dict[str, Mesh]:
     return meshes
 
 
-def _wrong(arrays: Mapping[str, NDArray[Any]]) -> str:
+def _wrong(arrays: Mapping[str, Any]) -> str:
     """Return what is wrong with the arrays of a file as a whole, or nothing."""
     for name, (kind, shape) in _FORMS.items():
         array = arrays.get(name)
         if array is None:
             return f"holds no array {name!r}"
+        # A member whose first bytes are damaged comes as bytes.
+        if not isinstance(array, np.ndarray):
+            return f"array {name!r} is damaged"
         if array.dtype.kind != kind or array.ndim != len(shape) or array.shape[1:] != shape[1:]:
             return f"array {name!r} has another form"
     ids = arrays["ids"]
