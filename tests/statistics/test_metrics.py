@@ -111,8 +111,18 @@ def test_a_resample_draws_as_many_objects_as_there_are():
 
 @pytest.mark.parametrize("function", [metrics.mae_deg, metrics.median_deg, metrics.pauc])
 def test_no_errors_is_an_error(function):
-    with pytest.raises(ValueError, match="no errors"):
+    with pytest.raises(ValueError, match="^no errors to summarise$"):
         function([])
+
+
+def test_errors_in_single_precision_are_summed_in_double(rng):
+    narrow = rng.gamma(2.0, 8.0, 999).astype(np.float32)
+    errors = narrow.astype(np.float64)
+    assert metrics.mae_deg(narrow) == metrics.mae_deg(errors) == errors.mean()
+    assert metrics.pauc(narrow) == metrics.pauc(errors)
+    assert metrics.fold_std(narrow) == metrics.fold_std(errors)
+    assert metrics.percentile_interval(narrow) == metrics.percentile_interval(errors)
+    assert metrics.pea(narrow, [3]).dtype == np.float64
 
 
 def test_an_interval_gives_its_columns():
