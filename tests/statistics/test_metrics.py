@@ -111,7 +111,7 @@ def test_a_resample_draws_as_many_objects_as_there_are():
 
 @pytest.mark.parametrize("function", [metrics.mae_deg, metrics.median_deg, metrics.pauc])
 def test_no_errors_is_an_error(function):
-    with pytest.raises(ValueError, match="^no errors to summarise$"):
+    with pytest.raises(ValueError, match=r"^no errors to summarise$"):
         function([])
 
 
