@@ -30,6 +30,12 @@ def test_wrapping_never_gives_360(angle):
     assert angles.wrap_deg(angle) == 0.0
 
 
+def test_angles_in_single_precision_are_computed_in_double():
+    narrow = np.float32([0.1, 359.9, 725.3])
+    np.testing.assert_array_equal(angles.wrap_deg(narrow), np.mod(narrow.astype(np.float64), 360))
+    assert angles.wrap_deg(narrow).dtype == np.float64
+
+
 @given(degrees, degrees)
 def test_signed_difference_turns_b_into_a_the_shorter_way(a, b):
     turn = float(angles.signed_difference_deg(a, b))

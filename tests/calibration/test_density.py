@@ -80,6 +80,9 @@ def test_kernel_is_continuous_across_zero_and_even():
     kernel = density.von_mises_kernel(360, 6.0)
     np.testing.assert_allclose(kernel[1:], kernel[1:][::-1])
     assert kernel[0] > kernel[1] > kernel[2]
+    # One degree of a bandwidth of one degree: exp(-1/2), as of a Gaussian.
+    narrow = density.von_mises_kernel(360, 1.0)
+    assert narrow[1] / narrow[0] == pytest.approx(np.exp(-0.5), rel=1e-3)
 
 
 def test_no_smoothing_and_no_pseudo_observations_are_the_plain_frequencies():
@@ -126,3 +129,7 @@ def test_pseudo_observations_are_counted_in_rows_of_360_bins():
 def test_bins_are_of_one_degree_unless_said_otherwise():
     pair = density.conditionals([1.0], [2.0], bandwidth_deg=5, pseudo_observations=1)
     assert pair.n_bins == 360
+
+
+def test_a_bandwidth_of_0_leaves_everything_in_its_bin():
+    np.testing.assert_array_equal(density.von_mises_kernel(5, 0.0), [1, 0, 0, 0, 0])

@@ -385,7 +385,7 @@ def test_coarse_beliefs_are_asked_in_coarse_bins():
 def test_the_error_of_a_belief_needs_calibration_estimates():
     uniform = np.full((8, 8), 1 / 8)
     evidence = Evidence(np.empty((0, 8)), Conditionals(uniform, uniform), 10, 2, SETTINGS)
-    with pytest.raises(ValueError, match="bayes_error needs calibration estimates"):
+    with pytest.raises(ValueError, match=r"^bayes_error needs calibration estimates$"):
         CRITERIA["bayes_error"](every_belief(evidence), evidence, "posterior")
 
 

@@ -100,7 +100,7 @@ def test_posterior_fusion_trusts_the_view_that_can_be_trusted():
 
 
 def test_posterior_fusion_needs_evidence():
-    with pytest.raises(ValueError, match="needs evidence"):
+    with pytest.raises(ValueError, match=r"^posterior fusion needs evidence$"):
         posterior(0.0, 0.0, 0.0)
 
 

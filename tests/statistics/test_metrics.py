@@ -69,8 +69,16 @@ def test_the_resamples_of_figures_without_an_image_are_no_numbers():
     values, objects = [2.0, 4.0], np.array([0, 0])
     drawn = np.array([[1, 0], [0, 1], [2, 0]])  # the second object has no image
     for resampled in (metrics.resampled_means, metrics.resampled_medians):
-        found = resampled(values, objects, drawn)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            found = resampled(values, objects, drawn)
         assert np.isnan(found).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("resampled", [metrics.resampled_means, metrics.resampled_medians])
+def test_a_resample_of_one_image_has_its_figure(resampled):
+    found = resampled([2.0, 7.0], np.array([0, 1]), np.eye(2, dtype=np.int64))
+    np.testing.assert_array_equal(found, [2.0, 7.0])
 
 
 def test_resampled_medians_of_few_images_are_the_lower_medians(rng):
@@ -82,8 +90,6 @@ def test_resampled_medians_of_few_images_are_the_lower_medians(rng):
     expected = [np.quantile(each, 0.5, method="inverted_cdf") for each in repeated]
     assert found.dtype == np.float64
     np.testing.assert_array_equal(found, expected)
-    alone = metrics.resampled_medians([2.0, 7.0], np.array([0, 1]), np.eye(2, dtype=np.int64))
-    np.testing.assert_array_equal(alone, [2.0, 7.0])
 
 
 def test_the_interval_leaves_out_samples_that_are_no_numbers():
@@ -105,8 +111,18 @@ def test_a_resample_draws_as_many_objects_as_there_are():
 
 @pytest.mark.parametrize("function", [metrics.mae_deg, metrics.median_deg, metrics.pauc])
 def test_no_errors_is_an_error(function):
-    with pytest.raises(ValueError, match="no errors"):
+    with pytest.raises(ValueError, match=r"^no errors to summarise$"):
         function([])
+
+
+def test_errors_in_single_precision_are_summed_in_double(rng):
+    narrow = rng.gamma(2.0, 8.0, 999).astype(np.float32)
+    errors = narrow.astype(np.float64)
+    assert metrics.mae_deg(narrow) == metrics.mae_deg(errors) == errors.mean()
+    assert metrics.pauc(narrow) == metrics.pauc(errors)
+    assert metrics.fold_std(narrow) == metrics.fold_std(errors)
+    assert metrics.percentile_interval(narrow) == metrics.percentile_interval(errors)
+    assert metrics.pea(narrow, [3]).dtype == np.float64
 
 
 def test_an_interval_gives_its_columns():

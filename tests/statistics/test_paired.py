@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import zlib
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -142,6 +144,27 @@ def test_draws_do_not_depend_on_what_was_asked_before(evaluations):
     one.multiplicities(chair)
     np.testing.assert_array_equal(one.multiplicities(mug), other.multiplicities(mug))
     assert (one.multiplicities(mug) != one.multiplicities(chair)).any()
+
+
+def test_draws_are_those_of_the_seed_the_category_and_the_fold(evaluations):
+    """Published intervals depend on it: 0 stands for all folds."""
+    mug = paired.pair_methods(evaluations["mug", 0], "mug")
+    seeds = ([3, zlib.crc32(b"mug"), fold] for fold in range(4))
+    together, *by_fold = (np.random.default_rng(seed) for seed in seeds)
+    found = paired.Resampler(3, 20)
+    expected = metrics.resample_objects(9, together, 20)
+    np.testing.assert_array_equal(found.multiplicities(mug), expected)
+    drawn = found.multiplicities_by_fold(mug)
+    for rng, first in zip(by_fold, range(3), strict=True):
+        np.testing.assert_array_equal(drawn[:, first::3], metrics.resample_objects(3, rng, 20))
+
+
+def test_columns_of_other_widths_are_paired_alike(evaluations):
+    frame = evaluations["mug", 0]
+    narrow = frame.astype({"fold": np.int8, "initial_deg": np.int16, "error_deg": np.float32})
+    sample = paired.pair_methods(narrow, "mug")
+    assert sample.folds.dtype == np.int64
+    assert sample.initial_deg.dtype == sample.errors_deg["single"].dtype == np.float64
 
 
 def test_draws_by_fold_keep_each_folds_size(evaluations):
