@@ -204,7 +204,7 @@ def one_node(folder: Path) -> Iterator[OneNode]:
             node_port=_free_port(),
         )
     )
-    # The plugin starts srun without SLURM_CONF, because a cluster's is where srun looks for it.
+    # The plugin starts srun without SLURM_CONF, because srun finds that of a cluster by itself.
     srun = folder / "bin/srun"
     command = f'SLURM_CONF={folder / "slurm.conf"} exec {shutil.which("srun")} "$@"'
     srun.write_text(f"#!/bin/sh\n{command}\n")
