@@ -149,3 +149,8 @@ def test_a_list_for_other_categories_is_none_of_this_one_s_business(root, caplog
 def test_a_missing_list_is_named(root):
     path = root / "no.txt"
     refused(lambda: source_of("folder", root=str(root), exclude_file=str(path)), path)
+
+
+def test_a_list_of_exclusions_without_an_end_is_not_read(root):
+    """A device or a pipe; the empty device stands for those that would fill the memory."""
+    refused(lambda: source_of("folder", root=str(root), exclude_file="/dev/null"), "not a file")
