@@ -33,7 +33,7 @@ def write_meshes(folder, n: int) -> None:
         ("estimator.epocs=3", "did you mean 'estimator.epochs'?"),
         ("renderer=foo", "renderer=foo is unknown: choose from: embree, pyrender"),
         ("categories=[mgu]", "did you mean 'mug'?"),
-        ("methods.proposed.policy=pose_ambigity", "did you mean 'pose_ambiguity'?"),
+        ("methods.proposed.policy=pose_ambigity", "methods.proposed: policy 'pose_ambigity' is"),
         ("methods.proposed.rotation=opposite", "methods.proposed.policy"),
         ("contenders={}", "extensions"),
         ("estimator.epochs=three", "estimator.epochs=three is not a whole number"),

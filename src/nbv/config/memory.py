@@ -16,7 +16,7 @@ import psutil
 from nbv.errors import UserError
 
 LARGEST_NODE_BYTES = 4 * 2**40
-"""More than a node of any cluster has; jobs that run elsewhere are held against it."""
+"""More than a node of any cluster has; jobs that run elsewhere are compared with it."""
 
 _VIEWS = 360
 _INFERENCE_BATCH = 1024
