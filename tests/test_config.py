@@ -573,7 +573,7 @@ OVERRIDES = st.one_of(
     TEXTS, st.builds("{}={}".format, st.sampled_from(KEYS), st.one_of(NUMBERS, TEXTS, LISTS))
 )
 # One composition takes a twentieth of a second and more; how long says nothing here.
-FUZZED = settings(max_examples=40, deadline=None)
+FUZZED = settings(max_examples=30, deadline=None)
 
 
 def result_or_one_line(function, *arguments):

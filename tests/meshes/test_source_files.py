@@ -201,3 +201,10 @@ def test_paths_that_the_system_refuses_are_named(tmp_path, name):
     refused(lambda: source_of(name, root="~nobody-of-that-name"), "no such home folder")
     labelled = source_of(name, root=str(tmp_path), categories={"mug": "y" * 300})
     refused(lambda: labelled.object_ids("mug"), "yyy", "too long")
+
+
+def test_a_list_of_exclusions_without_an_end_is_not_read(root):
+    """A device or a pipe; the empty device stands for those that would fill the memory."""
+    refused(
+        lambda: source_of("folder", root=str(root), exclude_file="/dev/null"), "no regular file"
+    )

@@ -33,10 +33,13 @@ def write_meshes(folder, n: int) -> None:
         ("estimator.epocs=3", "did you mean 'estimator.epochs'?"),
         ("renderer=foo", "renderer=foo is unknown: choose from: embree, pyrender"),
         ("categories=[mgu]", "did you mean 'mug'?"),
-        ("methods.proposed.policy=pose_ambigity", "did you mean 'pose_ambiguity'?"),
+        ("methods.proposed.policy=pose_ambigity", "methods.proposed: policy 'pose_ambigity' is"),
         ("methods.proposed.rotation=opposite", "methods.proposed.policy"),
         ("contenders={}", "extensions"),
         ("estimator.epochs=three", "estimator.epochs=three is not a whole number"),
+        ("density.bandwidths_deg=[8,nan]", "density.bandwidths_deg[1]=nan is out of range"),
+        ("categories=[mug/../../../../x]", "categories[0]=mug/../../../../x: use letters"),
+        ("camera.image_side=100000", "camera.image_side=100000: rendering needs at least 16.4 TiB"),
     ],
 )
 def test_a_wrong_setting(fresh, override, message):
@@ -44,6 +47,44 @@ def test_a_wrong_setting(fresh, override, message):
     assert message in done.stderr
     assert complaints(done.stderr) == 1
     assert not fresh.results.exists()
+
+
+@pytest.mark.parametrize("name", ["..", "n" * 300])
+def test_a_name_that_leads_elsewhere_writes_nothing(fresh, name):
+    before = sorted(fresh.folder.rglob("*"))
+    done = fresh.run("--cores", "1", overrides=(*TINY, f"name={name}"), fails=True)
+    assert "nbv: error: name=" in done.stderr
+    assert complaints(done.stderr) == 1
+    written = set(fresh.folder.rglob("*")) - set(before)
+    assert {path.relative_to(fresh.folder).parts[0] for path in written} <= {".snakemake", "src"}
+
+
+def test_overrides_that_are_no_list(fresh):
+    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--config", "overrides=5"]
+    done = subprocess.run(
+        command, cwd=fresh.folder, env=fresh.environment, capture_output=True, text=True
+    )
+    assert done.returncode != 0
+    assert "nbv: error: --config overrides=5: write it as overrides=" in done.stderr
+    assert complaints(done.stderr) == 1
+
+
+@pytest.mark.parametrize(
+    ("target", "key", "content", "message"),
+    [
+        ("run_comparison", "compared_runs", b"\x89PNG\r\n\x1a\n", "it is not UTF-8 text"),
+        ("leaderboard", "leaderboard_runs", b"n_folds: 5\n", "categories is missing"),
+    ],
+)
+def test_a_damaged_configuration_of_another_run(fresh, target, key, content, message):
+    path = fresh.results.with_name("other") / "configuration.yaml"
+    path.parent.mkdir(parents=True)
+    path.write_bytes(content)
+    settings = (*TINY, f"{key}=[other]")
+    done = fresh.run("--cores", "1", target, overrides=settings, fails=True)
+    assert "nbv: error: results/other/configuration.yaml" in done.stderr
+    assert message in done.stderr
+    assert complaints(done.stderr) == 1
 
 
 def test_another_criterion_for_proposed_is_a_run_like_any_other(fresh):

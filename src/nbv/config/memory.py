@@ -16,7 +16,7 @@ import psutil
 from nbv.errors import UserError
 
 LARGEST_NODE_BYTES = 4 * 2**40
-"""More than a node of any cluster has; the limit of jobs that run elsewhere."""
+"""More than a node of any cluster has; jobs that run elsewhere are compared with it."""
 
 _VIEWS = 360
 _INFERENCE_BATCH = 1024
@@ -32,7 +32,7 @@ class Need:
     job : str
         What the job does.
     keys : tuple of str
-        The settings that decide, the first one above all.
+        The settings that decide.
     n_bytes : int
         At the least.
     """
@@ -75,9 +75,10 @@ def check_memory(settings: Mapping[str, Any], n_objects: int, limit_bytes: int) 
         if total > limit:
             largest = max(parts, key=lambda need: need.n_bytes)
             given = ", ".join(f"{key}={_value(settings, key)}" for key in largest.keys)
+            advice = "lower it" if len(largest.keys) == 1 else "lower one of them"
             raise UserError(
                 f"{given}: {job} needs at least {_amount(total)} of memory, and there are "
-                f"{_amount(limit)}; lower {largest.keys[0]}"
+                f"{_amount(limit)}; {advice}"
             )
 
 

@@ -96,7 +96,10 @@ def check_methods(methods: Methods, extensions: Methods, gives_distributions: bo
 
 def _check_names(key: str, method: Mapping[str, Any]) -> None:
     if "policy" in method:
-        needs_lookup(method["policy"])
+        try:
+            needs_lookup(method["policy"])
+        except UserError as error:
+            raise UserError(f"{key}: {error}") from error
     if method.get("fusion", "average") not in FUSIONS:
         given = f"{key}.fusion={method['fusion']}"
         raise UserError(f"{given} is unknown: {nearest(method['fusion'], FUSIONS)}")

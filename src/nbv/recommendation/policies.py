@@ -142,7 +142,7 @@ def needs_lookup(policy: str) -> bool:
     """
     if policy != SINGLE and policy not in POLICIES:
         known = [SINGLE, *POLICIES]
-        raise UserError(f"methods: policy {policy!r} is unknown: {nearest(policy, known)}")
+        raise UserError(f"policy {policy!r} is unknown: {nearest(policy, known)}")
     return policy in CRITERIA
 
 
