@@ -161,9 +161,7 @@ def test_training_objects_are_those_of_the_splits(n_objects, n_folds, fraction, 
     ids = [str(index) for index in range(n_objects)]
     splits = make_splits(ids, n_folds, fraction, np.random.default_rng(0), parts)
     roles = ("train",) if parts is None else ("part1", "part2")
-    largest = max(
-        len(objects_with_role(splits, fold, *roles).ids) for fold in range(1, n_folds + 1)
-    )
+    largest = max(len(objects_with_role(splits, fold, *roles)) for fold in range(1, n_folds + 1))
     settings = {"n_folds": n_folds, "calibration_fraction": fraction}
     settings["calibration"] = "holdout" if parts is None else "crossfit"
     assert training_objects(settings, n_objects) == largest
