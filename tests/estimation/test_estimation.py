@@ -239,6 +239,31 @@ def test_a_device_that_is_not_there_is_refused():
         hw.choose_hardware("cuda")
 
 
+@pytest.mark.parametrize(
+    ("cuda", "mps", "device"),
+    [(True, True, "cuda"), (False, True, "mps"), (False, False, "cpu")],
+)
+def test_auto_takes_the_first_device_that_is_there(monkeypatch, cuda, mps, device):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: cuda)
+    monkeypatch.setattr(torch.backends.mps, "is_available", lambda: mps)
+    assert str(hw.choose_hardware("auto", "float32")) == f"{device}, float32"
+
+
+@pytest.mark.parametrize("native", [True, False])
+def test_bfloat16_is_taken_where_the_device_has_it(monkeypatch, native):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "is_bf16_supported", lambda **_: native)
+    taken = "bfloat16" if native else "float32"
+    assert str(hw.choose_hardware("cuda")) == f"cuda, {taken}"
+    assert hw.choose_hardware("cuda", "bfloat16").dtype == torch.bfloat16
+
+
+def test_the_processors_own_precision_is_one_of_two_and_mps_computes_in_float32(monkeypatch):
+    assert hw.choose_hardware("cpu").dtype in (torch.bfloat16, torch.float32)
+    monkeypatch.setattr(torch.backends.mps, "is_available", lambda: True)
+    assert hw.choose_hardware("mps").dtype == torch.float32
+
+
 def test_an_unknown_network():
     with pytest.raises(UserError, match=r"estimator\.kind=regresor: did you mean 'regressor'"):
         build_network(SETTINGS | {"kind": "regresor"}, 16)

@@ -120,6 +120,8 @@ def test_errors_in_single_precision_are_summed_in_double(rng):
     errors = narrow.astype(np.float64)
     assert metrics.mae_deg(narrow) == metrics.mae_deg(errors) == errors.mean()
     assert metrics.pauc(narrow) == metrics.pauc(errors)
+    left = metrics.accuracy_area(narrow)
+    np.testing.assert_array_equal(left, 100.0 - errors.clip(max=100.0))
     assert metrics.fold_std(narrow) == metrics.fold_std(errors)
     assert metrics.percentile_interval(narrow) == metrics.percentile_interval(errors)
     assert metrics.pea(narrow, [3]).dtype == np.float64

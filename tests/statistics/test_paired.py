@@ -17,7 +17,9 @@ def evaluated(seed: int, n_objects: int = 9, n_folds: int = 3) -> pd.DataFrame:
     rng = np.random.default_rng(seed)
     parts = []
     for method in METHODS:
-        errors = rng.gamma(2.0, 8.0, (n_objects, 360))
+        errors = rng.gamma(2.0, 8.0, (n_objects, 360)) % 90
+        # Now and then the front is taken for the back.
+        errors = np.where(rng.random(errors.shape) < 0.1, 180 - errors, errors)
         if method == "opposite":
             errors[:, 180:] = errors[:, :180]
         for fold in range(1, n_folds + 1):
