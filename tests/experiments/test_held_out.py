@@ -14,6 +14,7 @@ from nbv.estimation.inference import decode, estimate_azimuth, network_outputs
 from nbv.estimation.networks import build_network
 from nbv.estimation.weights import Estimator
 from nbv.experiments.held_out import estimate_fold
+from nbv.rendering.store import DepthImages
 
 CPU = Hardware(torch.device("cpu"), torch.float32)
 NETWORK = {"kind": "regressor", "channels": [4, 8], "hidden": 8}
@@ -31,50 +32,55 @@ def estimator(seen: tuple[str, ...], settings=NETWORK, seed: int = 0) -> Estimat
 
 
 @pytest.fixture
-def depth(rng) -> np.ndarray:
-    return rng.integers(0, 256, (len(NAMES), 24, 16, 16)).astype(np.uint8)
+def images(rng) -> DepthImages:
+    codes = rng.integers(0, 256, (len(NAMES), 24, 16, 16)).astype(np.uint8)
+    return DepthImages(NAMES, codes)
 
 
-def test_objects_are_calibrated_and_tested_by_the_estimator_that_saw_neither(depth):
+def test_objects_are_calibrated_and_tested_by_the_estimator_that_saw_neither(images):
     tested = estimator(("b", "d"))
     roles = splits("test", "train", "calibration", "train", "calibration")
-    found = estimate_fold(depth, roles, 1, tested, [], CPU, distributions=False)
+    found = estimate_fold(images, roles, 1, tested, [], CPU, distributions=False)
     for role, names in {"calibration": ("c", "e"), "test": ("a",)}.items():
         estimates, posteriors = found[role]
         assert estimates.object_ids == names
         assert posteriors is None
-        rows = [NAMES.index(name) for name in names]
-        expected = estimate_azimuth(tested, depth[rows], CPU)
+        expected = estimate_azimuth(tested, images.of(names), CPU)
         np.testing.assert_allclose(estimates.estimate_deg, expected, atol=1e-3)
 
 
-def test_each_part_is_calibrated_by_the_estimator_of_the_others(depth):
+def test_each_part_is_calibrated_by_the_estimator_of_the_others(images):
     tested, first, second = (
         estimator(seen, seed=seed) for seed, seen in enumerate(("bcde", "de", "bc"))
     )
     roles = splits("test", "part1", "part1", "part2", "part2")
-    found = estimate_fold(depth, roles, 1, tested, [first, second], CPU, distributions=False)
+    found = estimate_fold(images, roles, 1, tested, [first, second], CPU, distributions=False)
     calibration, _ = found["calibration"]
     assert calibration.object_ids == ("b", "c", "d", "e")
-    by_part = [estimate_azimuth(first, depth[1:3], CPU), estimate_azimuth(second, depth[3:], CPU)]
+    by_part = [
+        estimate_azimuth(first, images.of("bc"), CPU),
+        estimate_azimuth(second, images.of("de"), CPU),
+    ]
     np.testing.assert_allclose(calibration.estimate_deg, np.concatenate(by_part), atol=1e-3)
 
 
-def test_calibration_objects_alone_choose_the_temperature_of_all(depth):
+def test_calibration_objects_alone_choose_the_temperature_of_all(images):
     tested = estimator(("b", "d"), CLASSES)
     roles = splits("test", "train", "calibration", "train", "calibration")
-    found = estimate_fold(depth, roles, 1, tested, [], CPU, distributions=True)
-    temperature = fit_temperature(network_outputs(tested, depth[[2, 4]], CPU), np.arange(24) * 15.0)
-    for role, rows in {"calibration": [2, 4], "test": [0]}.items():
+    found = estimate_fold(images, roles, 1, tested, [], CPU, distributions=True)
+    temperature = fit_temperature(
+        network_outputs(tested, images.of("ce"), CPU), np.arange(24) * 15.0
+    )
+    for role, names in {"calibration": "ce", "test": "a"}.items():
         estimates, posteriors = found[role]
         assert posteriors is not None
         assert posteriors.temperature == pytest.approx(temperature, rel=1e-3)
         np.testing.assert_allclose(posteriors.distributions.sum(axis=-1), 1.0, atol=1e-6)
-        expected = decode(tested, network_outputs(tested, depth[rows], CPU), temperature)
+        expected = decode(tested, network_outputs(tested, images.of(names), CPU), temperature)
         np.testing.assert_allclose(estimates.estimate_deg, expected, atol=0.05)
 
 
-def test_an_estimator_that_has_seen_a_test_object_is_refused(depth):
+def test_an_estimator_that_has_seen_a_test_object_is_refused(images):
     roles = splits("test", "train", "calibration", "train", "calibration")
     with pytest.raises(UserError, match="'a' was trained on"):
-        estimate_fold(depth, roles, 1, estimator(("a",)), [], CPU, distributions=False)
+        estimate_fold(images, roles, 1, estimator(("a",)), [], CPU, distributions=False)
