@@ -18,8 +18,8 @@ def asked(project, attempt: int) -> dict[str, tuple[int, int]]:
     targets = ("report", "leaderboard", "more_views", "travel", "ablation")
     printed = project.run(*dry, *targets).stdout
     found = {}
-    for rule, job in re.findall(r"^rule (\w+):\n(.*?)\n\n", printed, re.M | re.S):
-        resources = dict(re.findall(r"(mem_mb|runtime)=(\d+)", job))
+    for rule, line in re.findall(r"^rule (\w+):\n(?: .*\n)*? +resources: (.*)$", printed, re.M):
+        resources = dict(re.findall(r"(mem_mb|runtime)=(\d+)", line))
         found[rule] = (int(resources["mem_mb"]), int(resources["runtime"]))
     return found
 

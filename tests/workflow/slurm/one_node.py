@@ -175,7 +175,7 @@ class OneNode:
             daemon.wait()
 
 
-def until(is_so: Callable[[], bool], what: str, timeout_s: float = 1200) -> None:
+def until(is_so: Callable[[], bool], what: str, timeout_s: float = 600) -> None:
     """Wait until something is so."""
     deadline = time.monotonic() + timeout_s
     while not is_so():

@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 # Ask sooner and more often than on a cluster that others use as well.
 COMMAND = ("--workflow-profile", "profiles/slurm", "--slurm-init-seconds-before-status-checks", "3")
 # Enough for a machine that has much else to do: a quiet one takes a tenth.
-RUN_S = 3600
+RUN_S = 1800
 # Two folds are enough: one is cancelled, the node is lost below one, slurmd restarts below one.
 # They train for some seconds, so that all this meets them there.
 CHANGED = {"categories": "[mug]", "estimator.epochs": "150"}
