@@ -20,7 +20,11 @@ from nbv.recommendation.criteria import (
     cost_unit,
     tabulate,
 )
-from nbv.recommendation.criteria.pose_ambiguity import POSE_LIKELIHOODS, two_view_poses
+from nbv.recommendation.criteria.pose_ambiguity import (
+    POSE_LIKELIHOODS,
+    pose_likelihood,
+    two_view_poses,
+)
 from nbv.recommendation.criteria.rotations import rotation_groups
 from nbv.recommendation.criteria.spreads import SPREADS
 from nbv.recommendation.evidence import Evidence, gather_evidence
@@ -124,7 +128,10 @@ def test_the_poses_after_one_rotation_are_the_mixture_of_products(delta):
 
 @pytest.mark.parametrize("spread", SPREADS)
 def test_spreads_and_tables_are_in_single_precision(spread):
-    rows = random_conditionals(12).viewpoint.astype(np.float32)
+    pair = random_conditionals(12)
+    for name in POSE_LIKELIHOODS:
+        assert pose_likelihood(pair, name).dtype == np.float32
+    rows = pair.viewpoint.astype(np.float32)
     assert SPREADS[spread](rows).dtype == np.float32
     evidence = evidence_of()
     for criterion in CRITERIA:
@@ -268,7 +275,9 @@ def test_errors_of_two_views_are_known_for_one_first_estimate_by_the_same_estima
         (replace(belief, first_bin=None), evidence),
         (belief, evidence_of()),
     ):
-        with pytest.raises(ValueError, match="one first estimate by the same estimator"):
+        with pytest.raises(
+            ValueError, match=r"^errors of two views need one first estimate by the same estimator$"
+        ):
             CRITERIA[criterion](unknown, other, "average")
 
 
