@@ -7,7 +7,7 @@ import re
 import pytest
 import yaml
 
-from .conftest import ROOT
+from projects import ROOT
 
 pytestmark = pytest.mark.slow
 
