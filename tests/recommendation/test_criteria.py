@@ -332,8 +332,8 @@ def test_a_perfect_estimator_leaves_no_ambiguity():
 
 
 def test_answers_that_exclude_each_other_say_nothing():
-    T = np.roll(np.eye(4), 1, axis=1)
-    T[1] = [1, 0, 0, 0]  # disagrees with the view from bin 0, turned by 1
+    T = np.roll(np.eye(5), 1, axis=1)
+    T[1] = [1, 0, 0, 0, 0]  # disagrees with the view from bin 0, turned by 1
     table = ambiguity_table(Conditionals(T, T), SETTINGS)
     expected = plain_loops(T.tolist(), T.tolist(), T.tolist(), plain_entropy)
     np.testing.assert_allclose(table, expected, atol=1e-6)
