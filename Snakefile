@@ -82,7 +82,7 @@ onsuccess:
 onerror:
     banner(
         "nbv: stopped",
-        *reasons(),
+        *reasons(log),
         "what was finished is kept; the same command goes on from there",
         f"logs: {LAYOUT.logs}/",
     )

@@ -416,11 +416,14 @@ def forget_last_error():
         stop(f"{LAYOUT.root} cannot be written: {error.strerror}")
 
 
-def reasons():
-    """What the run stopped for."""
+def reasons(logs):
+    """What the run stopped for, with the help of Snakemake's own logs."""
     path = Path(LAYOUT.last_error)
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    killed = killed_jobs(LAYOUT.logs, STARTED)
+    # A job that had no time to begin its log is known to Snakemake alone.
+    told = "".join(Path(log).read_text(encoding="utf-8") for log in logs)
+    unknown = re.findall(r"(\w+)\.py' died with <Signals.SIGKILL", told)
+    killed = killed_jobs(LAYOUT.logs, STARTED) or unknown
     if not killed:
         return lines
     return [
