@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -133,9 +133,14 @@ def read_claims(path: str | Path) -> pd.DataFrame:
     }
     if absent := sorted(planned - read):
         raise damaged(path, f"comparison {absent[0][1]} of claim {absent[0][0]!r} is missing")
-    if unknown := sorted({*frame["verdict"], *frame["point_verdict"]} - set(VERDICTS), key=str):
-        raise damaged(path, f"{unknown[0]!r} is no verdict")
+    need_verdicts(path, [*frame["verdict"], *frame["point_verdict"]])
     return frame
+
+
+def need_verdicts(path: str | Path, values: Iterable[str]) -> None:
+    """Raise UserError where a value is none of the verdicts."""
+    if unknown := sorted(set(values) - set(VERDICTS), key=str):
+        raise damaged(path, f"{str(unknown[0])[:40]!r} is no verdict")
 
 
 class _Evaluator:

@@ -10,7 +10,8 @@ from typing import Any
 
 from nbv.config import default_of, read_configuration
 from nbv.errors import UserError
-from nbv.files import existing, read_csv, replacing
+from nbv.files import existing, need_columns, read_csv, replacing
+from nbv.paper.verdicts import need_verdicts
 from nbv.provenance import read_provenance
 from nbv.rendering.noise import IDEAL
 from nbv.reporting.cells import CELL_COLUMNS
@@ -176,7 +177,11 @@ def read_cells(path: Path) -> dict[tuple[str, ...], Cell]:
 
 def read_verdicts(root: Path) -> dict[str, str]:
     """Read the verdict of each claim of a run or reference."""
-    claims = read_csv(existing(root / "claims.csv")).drop_duplicates("id")
+    path = root / "claims.csv"
+    claims = read_csv(path)
+    need_columns(path, claims, ("id", "verdict"))
+    need_verdicts(path, claims["verdict"])
+    claims = claims.drop_duplicates("id")
     return dict(zip(claims["id"], claims["verdict"], strict=True))
 
 
