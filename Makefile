@@ -55,10 +55,12 @@ mutation: $(AUDIT)
 lock: $(AUDIT)
 	$(LOCK) $(UPGRADE) pyproject.toml --group dev --no-emit-package torch --output-file requirements.lock
 	$(LOCK) $(UPGRADE) --group audit --constraints requirements.lock --output-file requirements-audit.lock
+	$(BIN)/python tools/extra.py slurm | $(LOCK) --no-deps --output-file requirements-slurm.lock -
 
 audit: $(AUDIT)
 	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements.lock
 	$(BIN)/pip-audit --strict --disable-pip --no-deps --requirement requirements-torch.lock
+	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements-slurm.lock
 
 licences: $(AUDIT)
 	$(BIN)/python tools/licences.py > docs/licences.md
@@ -80,8 +82,9 @@ $(READY): requirements.lock requirements-torch.lock workflow/environment.post-de
 	PATH="$(CURDIR)/$(BIN):$$PATH" bash workflow/environment.post-deploy.sh
 	touch $@
 
-$(AUDIT): $(READY) requirements-audit.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-audit.lock
+$(AUDIT): $(READY) requirements-audit.lock requirements-slurm.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes \
+		--requirement requirements-audit.lock --requirement requirements-slurm.lock
 	touch $@
 
 clean:

@@ -119,7 +119,9 @@ def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 def open_array(path: str | Path) -> NDArray[Any]:
     """Map an array stored as `.npy` into memory, read-only; errors as of `readable`."""
     with readable(path):
-        stored: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+        stored = np.load(path, mmap_mode="r", allow_pickle=False)
+        if not isinstance(stored, np.ndarray):
+            raise ValueError("not one array")
         return stored
 
 
