@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.angles import circular_distance_deg
+from nbv.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.estimation import hardware as hw
 from nbv.estimation.images import to_input
@@ -20,7 +21,6 @@ from nbv.estimation.networks import build_network
 from nbv.estimation.outputs import class_targets, decode_classes, direction_targets
 from nbv.estimation.training import train_estimator, train_network
 from nbv.estimation.weights import Estimator, load_estimator, save_estimator
-from nbv.rendering.store import DepthImages
 
 SETTINGS = {
     "kind": "regressor",

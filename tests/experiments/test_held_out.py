@@ -8,13 +8,13 @@ import pytest
 import torch
 
 from nbv.calibration.posteriors import fit_temperature
+from nbv.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.inference import decode, estimate_azimuth, network_outputs
 from nbv.estimation.networks import build_network
 from nbv.estimation.weights import Estimator
 from nbv.experiments.held_out import estimate_fold
-from nbv.rendering.store import DepthImages
 
 CPU = Hardware(torch.device("cpu"), torch.float32)
 NETWORK = {"kind": "regressor", "channels": [4, 8], "hidden": 8}

@@ -282,14 +282,14 @@ def posteriors_problem(posteriors: Any) -> str:
 
 
 def make_depth(path: Path) -> None:
-    from nbv.rendering.store import write_depth
+    from nbv.depth_images import write_depth
 
     codes = np.random.default_rng(0).integers(0, 256, (len(IDS), 8, 6, 6), dtype=np.uint8)
     write_depth(path.with_suffix(".npy"), path.with_suffix(".json"), IDS, codes, codes.shape[1:])
 
 
 def read_depth(path: Path) -> Any:
-    from nbv.rendering.store import open_depth
+    from nbv.depth_images import open_depth
 
     images = open_depth(path.with_suffix(".npy"), path.with_suffix(".json"))
     return images._replace(codes=np.asarray(images.codes))

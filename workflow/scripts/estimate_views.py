@@ -6,10 +6,10 @@ with job(snakemake):
     from nbv.calibration.estimates import write_estimates
     from nbv.calibration.posteriors import write_posteriors
     from nbv.calibration.splits import read_splits
+    from nbv.depth_images import open_depth
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.weights import load_estimator
     from nbv.experiments.held_out import estimate_fold
-    from nbv.rendering.store import open_depth
 
     params, given, output = snakemake.params, snakemake.input, snakemake.output
     use_one_thread()

@@ -3,12 +3,12 @@
 from nbv.jobs import job
 
 with job(snakemake):
+    from nbv.depth_images import write_depth
     from nbv.meshes.store import load_meshes
     from nbv.rendering import open_renderer
     from nbv.rendering.camera import Camera
     from nbv.rendering.noise import open_sensor
     from nbv.rendering.render import N_AZIMUTHS, render_objects
-    from nbv.rendering.store import write_depth
 
     params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
     camera = Camera(**params.camera)

@@ -4,10 +4,10 @@ from nbv.jobs import job
 
 with job(snakemake):
     from nbv.calibration.splits import need_objects, objects_with_role, read_splits, training_roles
+    from nbv.depth_images import open_depth
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.training import train_estimator
     from nbv.estimation.weights import save_estimator
-    from nbv.rendering.store import open_depth
     from nbv.seeds import seed_for
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input

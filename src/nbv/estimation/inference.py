@@ -8,13 +8,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from nbv.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.images import to_input
 from nbv.estimation.networks import kind_of
 from nbv.estimation.outputs import Outputs
 from nbv.estimation.weights import Estimator
-from nbv.rendering.store import DepthImages
 
 
 def outputs_of_parts(

@@ -13,12 +13,12 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from nbv.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.images import to_input
 from nbv.estimation.networks import build_network, kind_of
 from nbv.estimation.weights import Estimator
-from nbv.rendering.store import DepthImages
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +59,7 @@ def train_estimator(
 ) -> Estimator:
     """Train an estimator on some objects, whose ids are kept with the weights.
 
-    Parameters and errors as of `train_network` and of `nbv.rendering.store.DepthImages.of`.
+    Parameters and errors as of `train_network` and of `nbv.depth_images.DepthImages.of`.
     """
     network = train_network(images.of(object_ids), settings, hardware, seed)
     return Estimator(network, settings, images.codes.shape[-1], object_ids)

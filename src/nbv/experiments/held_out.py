@@ -10,10 +10,10 @@ import pandas as pd
 from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors, fit_temperature, posteriors_of
 from nbv.calibration.splits import calibration_roles, need_objects, objects_with_role
+from nbv.depth_images import DepthImages
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.inference import decode, outputs_of_parts
 from nbv.estimation.weights import Estimator
-from nbv.rendering.store import DepthImages
 
 
 def estimate_fold(

@@ -11,12 +11,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nbv.depth_images import open_depth
 from nbv.errors import UserError
 from nbv.experiments.results import Unit
 from nbv.files import existing
 from nbv.recommendation.criteria import cost_unit
 from nbv.recommendation.lookup import LookupTable, load_lookup
-from nbv.rendering.store import open_depth
 from nbv.reporting.paper.examples import Example, choose_example, example_row, hardest_azimuth_deg
 from nbv.reporting.settings import ReportSettings, focus_unit
 from nbv.reporting.style import MethodStyle, method_style

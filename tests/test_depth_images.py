@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nbv.depth_images import DepthImages, open_depth, write_depth
 from nbv.errors import UserError
 from nbv.files import write_json
-from nbv.rendering.store import DepthImages, open_depth, write_depth
 
 NAMES = ["b", "a", "007"]
 IMAGES = np.random.default_rng(0).integers(0, 256, (3, 12, 8, 8), dtype=np.uint8)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from nbv.errors import UserError
 from nbv.files import damaged, open_array, read_json, replacing, write_json
-from nbv.rendering.depth_codes import Codes
+
+Codes = NDArray[np.uint8]
 
 logger = logging.getLogger(__name__)
 
@@ -98,7 +99,7 @@ def open_depth(path: str | Path, objects_path: str | Path) -> DepthImages:
     UserError
         Where a file cannot be read or the two are not about the same number of objects.
     """
-    codes: NDArray[np.uint8] = open_array(path)
+    codes: Codes = open_array(path)
     if codes.ndim != 4 or codes.dtype != np.uint8 or codes.shape[2] != codes.shape[3]:
         raise damaged(path, "holds no depth images of objects")
     names = read_json(objects_path)
