@@ -9,7 +9,7 @@ HOLDER = """
 import sys
 from pathlib import Path
 from nbv.processes import hold_lock
-held, removed = hold_lock(Path(sys.argv[1]))
+held, removed, others = hold_lock(Path(sys.argv[1]))
 print(removed, flush=True)
 sys.stdin.read()
 """
@@ -32,14 +32,14 @@ def test_locks_are_removed_only_when_no_run_is_alive(tmp_path):
     lock = tmp_path / "locks" / "0.input.lock"
     lock.write_text("results/tiny/report.html\n")
 
-    held, removed = hold_lock(tmp_path)
-    assert (held is not None, removed, lock.exists()) == (True, False, True)
+    held, removed, others = hold_lock(tmp_path)
+    assert (held is not None, removed, others, lock.exists()) == (True, False, True, True)
     held.close()
 
     process.kill()
     process.communicate()
-    held, removed = hold_lock(tmp_path)
-    assert (removed, lock.exists()) == (True, False)
+    held, removed, others = hold_lock(tmp_path)
+    assert (removed, others, lock.exists()) == (True, False, False)
     second, removed = holder(tmp_path)
     assert removed == "False"
     second.communicate("")
@@ -48,4 +48,4 @@ def test_locks_are_removed_only_when_no_run_is_alive(tmp_path):
 
 def test_a_folder_that_cannot_be_written_has_no_lock(tmp_path):
     (tmp_path / "file").write_text("")
-    assert hold_lock(tmp_path / "file" / ".snakemake") == (None, False)
+    assert hold_lock(tmp_path / "file" / ".snakemake") == (None, False, False)

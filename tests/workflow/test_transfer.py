@@ -23,7 +23,9 @@ PLACE = "mug/el00/fold2"
 def test_trained_on_and_tested_on(scratch):
     scratch.run("--cores", "2", "transfer", overrides=(*TINY, *MORE))
     results = scratch.results
-    made = sorted(str(path.relative_to(results)) for path in results.glob("transfer/*/depth/*/*"))
+    made = sorted(
+        str(path.relative_to(results)) for path in results.glob("transfer/*/depth/*/*.npy")
+    )
     assert made == ["transfer/kinect/depth/mug/el00.npy"]  # ideal is the run's own condition
     clean, noisy = (
         np.load(results / name, mmap_mode="r") for name in ("depth/mug/el00.npy", made[0])

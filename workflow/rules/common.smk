@@ -36,18 +36,26 @@ from nbv.rendering.noise import SENSORS, check_sensor, sensor_settings
 BASE = Path(workflow.basedir)
 STARTED = time.time()
 # Held until this process ends.
-RUN_LOCK, LOCKS_REMOVED = hold_lock(Path(".snakemake"))
-if LOCKS_REMOVED:
-    print(
-        "nbv: the run before was killed; its lock is removed",
-        file=sys.stderr,
-        flush=True,
-    )
+RUN_LOCK = hold_lock(Path(".snakemake"))
 
 
 def stop(message):
     """End with one line: nothing has been started yet."""
     sys.exit(f"nbv: error: {message}")
+
+
+def tell(message):
+    """Print a line, but not once more in each job that parses the workflow again."""
+    if workflow.is_main_process:
+        print(f"nbv: {message}", file=sys.stderr, flush=True)
+
+
+if RUN_LOCK.removed:
+    tell("the run before was killed; its lock is removed")
+if RUN_LOCK.others:
+    tell(
+        "another run is working in this folder; one cannot make the files of the other"
+    )
 
 
 def selected_objects(category):
