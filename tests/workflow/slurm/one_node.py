@@ -112,6 +112,8 @@ class OneNode:
         for process in (*keepers, *jobs):
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
+        # A process may be seen for a while after its kill: no one may take it for a live job.
+        psutil.wait_procs([*keepers, *jobs], timeout=60)
 
     def processes(self) -> list[psutil.Process]:
         """Return the processes of all jobs that run."""
