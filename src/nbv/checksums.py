@@ -65,8 +65,8 @@ def states_of_files(root: str) -> dict[str, State]:
         ``results/<name>``.
     """
     folder = Path(Layout(root).checksums)
-    record = (path.relative_to(folder).with_suffix("") for path in folder.rglob("*.sha256"))
-    return {path: state_of(path) for path in sorted(f"{root}/{each.as_posix()}" for each in record)}
+    inside = (path.relative_to(folder).with_suffix("") for path in folder.rglob("*.sha256"))
+    return {path: state_of(path) for path in sorted(f"{root}/{each.as_posix()}" for each in inside)}
 
 
 def need_intact(root: str) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.depth_images import Codes
 from nbv.rendering.camera import Camera
 
 Depths = NDArray[np.float32]
-Codes = NDArray[np.uint8]
 
 STEP = 0.005
 """Depth per code, in object diagonals."""

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.depth_images import Codes
 from nbv.errors import UserError
 from nbv.meshes.store import Surface
 from nbv.rendering import Renderer
 from nbv.rendering.camera import Camera
 from nbv.rendering.crop import crop_measured, sensor_camera
-from nbv.rendering.depth_codes import Codes, Depths, encode_depth
+from nbv.rendering.depth_codes import Depths, encode_depth
 from nbv.rendering.noise import Measure
 
 logger = logging.getLogger(__name__)

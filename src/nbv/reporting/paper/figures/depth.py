@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from nbv.reporting.paper.figures.inputs import Codes
+from nbv.depth_images import Codes
 from nbv.reporting.style import MUTED
 
 _FAR_GREY, _NEAR_GREY = 0.12, 0.86

@@ -9,9 +9,8 @@ from typing import TypeVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from nbv.depth_images import open_depth
+from nbv.depth_images import Codes, open_depth
 from nbv.errors import UserError
 from nbv.experiments.results import Unit
 from nbv.files import existing
@@ -21,7 +20,6 @@ from nbv.reporting.paper.examples import Example, choose_example, example_row, h
 from nbv.reporting.settings import ReportSettings, focus_unit
 from nbv.reporting.style import MethodStyle, method_style
 
-Codes = NDArray[np.uint8]
 Key = TypeVar("Key")
 
 _LONGEST_NAME = 16
