@@ -13,6 +13,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 AUDIT := $(VENV)/.audit-ready
+PYTEST := $(BIN)/pytest --numprocesses $(CORES) --dist worksteal
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
 
@@ -35,10 +36,10 @@ bench: $(READY)
 	$(BIN)/python -m performance
 
 test: $(READY)
-	$(BIN)/pytest
+	$(PYTEST)
 
 test-quick: $(READY)
-	$(BIN)/pytest -m "not slow"
+	$(PYTEST) -m "not slow"
 
 # Not where it can be neither found nor installed: one line then says why.
 test-slurm: $(READY)
@@ -46,7 +47,7 @@ test-slurm: $(READY)
 	$(BIN)/pytest -rs --log-cli-level=INFO --log-cli-format="%(asctime)s %(message)s" tests/workflow/slurm
 
 coverage: $(READY)
-	$(BIN)/pytest -m "not slow" --cov --cov-report=term
+	$(PYTEST) -m "not slow" --cov --cov-report=term
 
 mutation: $(AUDIT)
 	$(BIN)/mutmut run --max-children $(CORES)

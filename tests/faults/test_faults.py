@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import random
 import re
@@ -19,13 +20,17 @@ from projects import TINY
 
 KILLS = 25
 COMMAND = ("--cores", "2")
-# One category, because a run is made many times.
+# A job of every kind in one category, because a run is made many times.
+TARGETS = (
+    "evaluation",
+    *(f"results/tiny/{name}" for name in ("claims.md", "tables/table1.md", "figures/figure2.png")),
+)
 SMALL = tuple("categories=[mug]" if "categories=" in one else one for one in TINY)
 
 
-def start(project, overrides=TINY) -> subprocess.Popen[str]:
+def start(project, *targets, overrides=TINY) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        project.command(*COMMAND, overrides=overrides),
+        project.command(*COMMAND, *targets, overrides=overrides),
         cwd=project.folder,
         env=project.environment,
         stdout=subprocess.DEVNULL,
@@ -35,45 +40,45 @@ def start(project, overrides=TINY) -> subprocess.Popen[str]:
     )
 
 
-def kill_snakemake(running, rng) -> bool:
+def kill_snakemake(running, rng) -> None:
     running.kill()
-    return True
 
 
-def kill_group(running, rng) -> bool:
+def kill_group(running, rng) -> None:
     os.killpg(running.pid, signal.SIGKILL)
-    return True
 
 
-def kill_job(running, rng) -> bool:
-    """Kill one job, as the kernel does where memory runs out; whether there was one."""
-    with contextlib.suppress(psutil.NoSuchProcess):
-        below = psutil.Process(running.pid).children(recursive=True)
-        jobs = [each for each in below if any(".snakemake/scripts" in a for a in each.cmdline())]
-        python = [each for each in jobs if each.name().startswith("python")]
-        if python:
-            rng.choice(python).kill()
-            return True
-    return False
+def kill_job(running, rng) -> None:
+    """Kill one job, as the kernel does where memory runs out; wait for one, or for the end."""
+    while running.poll() is None:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            below = psutil.Process(running.pid).children(recursive=True)
+            jobs = [one for one in below if any(".snakemake/scripts" in a for a in one.cmdline())]
+            if python := [one for one in jobs if one.name().startswith("python")]:
+                rng.choice(python).kill()
+                return
+        time.sleep(0.02)
 
 
 @pytest.mark.slow
 def test_kills_at_any_moment_change_no_byte(fresh):
     """No lock has to be removed by hand, and no orphan spoils what the next run writes."""
-    fresh.run(*COMMAND, overrides=SMALL)
+    started = time.monotonic()
+    fresh.run(*COMMAND, *TARGETS, overrides=SMALL)
+    whole_s = time.monotonic() - started
     expected, rng = fresh.outcome(), random.Random(10)
     shutil.rmtree(fresh.results)
-    kinds = [kill_snakemake, kill_group, kill_job]
-    killed: list[str] = []
-    while len(killed) < KILLS:
-        running = start(fresh, SMALL)
+    kinds = itertools.cycle([kill_snakemake, kill_group, kill_job])
+    n_killed = 0
+    while n_killed < KILLS:
+        running = start(fresh, *TARGETS, overrides=SMALL)
         try:
-            _, printed = running.communicate(timeout=rng.uniform(1.0, 14.0))
+            _, printed = running.communicate(timeout=rng.uniform(0.1, 0.6) * whole_s)
         except subprocess.TimeoutExpired:
-            kill = kinds[len(killed) % len(kinds)]
-            if kill(running, rng):
-                killed.append(kill.__name__)
+            kill = next(kinds)
+            kill(running, rng)
             _, printed = running.communicate()
+            n_killed += running.returncode != 0
             if kill is kill_job and running.returncode != 0:
                 assert "killed from outside: " in printed
         assert "--unlock" not in printed
@@ -81,7 +86,7 @@ def test_kills_at_any_moment_change_no_byte(fresh):
         if running.returncode == 0:
             assert fresh.outcome() == expected
             shutil.rmtree(fresh.results)
-    fresh.run(*COMMAND, overrides=SMALL)
+    fresh.run(*COMMAND, *TARGETS, overrides=SMALL)
     assert fresh.outcome() == expected
     assert not list(fresh.results.rglob("*.partial*"))
     fresh.run("verify", "--cores", "1", overrides=SMALL)
