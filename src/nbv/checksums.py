@@ -24,7 +24,7 @@ def write_checksum(path: str) -> None:
     """
     record = checksum_of(path)
     if record is not None:
-        write_text(record, f"{_sha256(path)}  {path}\n")
+        write_text(record, f"{sha256_of(path)}  {path}\n")
 
 
 def state_of(path: str) -> State:
@@ -34,7 +34,7 @@ def state_of(path: str) -> State:
         return "missing"
     if record is None or not Path(record).is_file():
         return "without checksum"
-    return "intact" if _sha256(path) == _written(record) else "damaged"
+    return "intact" if sha256_of(path) == _written(record) else "damaged"
 
 
 def check(path: str) -> None:
@@ -79,7 +79,8 @@ def need_intact(root: str) -> None:
         )
 
 
-def _sha256(path: str) -> str:
+def sha256_of(path: str) -> str:
+    """Return the SHA-256 of a file, in hexadecimal."""
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -42,6 +42,11 @@ class Layout:
         """Return the estimator that a fold tests."""
         return self._of_fold("estimators", category, elevation, fold, "estimator.safetensors")
 
+    def pretrained(self, fold: int | str, part: int | str | None = None) -> str:
+        """Return the network of all categories that a fold's estimators can start from."""
+        name = "estimator" if part is None else f"without_part{part}"
+        return f"{self.root}/estimators/pretrained/fold{fold}/{name}.safetensors"
+
     def part_estimator(
         self, category: str, elevation: int | str, fold: int | str, part: int | str
     ) -> str:

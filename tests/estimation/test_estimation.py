@@ -6,8 +6,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from clock_faces import CLASSES, CPU, NAMES, SETTINGS, clock_faces, named, untrained
 from nbv.angles import circular_distance_deg
-from nbv.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.estimation import hardware as hw
 from nbv.estimation.images import to_input
@@ -22,47 +22,10 @@ from nbv.estimation.outputs import class_targets, decode_classes, direction_targ
 from nbv.estimation.training import train_estimator, train_network
 from nbv.estimation.weights import Estimator, load_estimator, save_estimator
 
-SETTINGS = {
-    "kind": "regressor",
-    "channels": [8, 16],
-    "hidden": 32,
-    "epochs": 6,
-    "batch_size": 32,
-    "learning_rate": 3e-3,
-    "weight_decay": 1e-2,
-}
-CLASSES = SETTINGS | {"kind": "classifier", "n_classes": 24, "target_bandwidth_deg": 10}
-CPU = hw.Hardware(torch.device("cpu"), torch.float32)
-
-
-def untrained(settings=SETTINGS, side: int = 16, seen: tuple[str, ...] = ()) -> Estimator:
-    return Estimator(build_network(settings, side).eval(), settings, side, seen)
-
 
 @pytest.fixture(autouse=True)
 def one_thread():
     hw.use_one_thread()
-
-
-def clock_faces(n_objects: int, n_views: int = 72, side: int = 16, seed: int = 0) -> np.ndarray:
-    """Images of a hand that points to the azimuth: (n_objects, n_views, side, side) codes."""
-    rng = np.random.default_rng(seed)
-    angles = 2 * np.pi * np.arange(n_views) / n_views
-    rows, columns = np.mgrid[:side, :side] - (side - 1) / 2
-    codes = np.zeros((n_objects, n_views, side, side), np.uint8)
-    for one in range(n_objects):
-        length, width = rng.uniform(5, 7), rng.uniform(1.0, 2.0)
-        along = columns * np.cos(angles)[:, None, None] - rows * np.sin(angles)[:, None, None]
-        across = columns * np.sin(angles)[:, None, None] + rows * np.cos(angles)[:, None, None]
-        codes[one][(along > 0) & (along < length) & (abs(across) < width)] = 128
-    return codes
-
-
-NAMES = list("abcdefghijkl")
-
-
-def named(faces):
-    return DepthImages(tuple(NAMES[: len(faces)]), faces)
 
 
 def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():

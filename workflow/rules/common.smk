@@ -22,6 +22,7 @@ from nbv.config import (
 )
 from nbv.config.memory import available_bytes, check_memory
 from nbv.errors import UserError
+from nbv.estimation.warm_start import PRETRAINED, STAGES, stage_settings, start_of
 from nbv.jobs import killed_jobs
 from nbv.layout import Layout, fold_folder, unit_folder
 from nbv.meshes.sources import SOURCES, open_source, select_objects
@@ -109,11 +110,22 @@ FOLDS = range(1, CONFIG["n_folds"] + 1)
 # Parts of a fold's training objects, where calibration is cross-fitted.
 CROSSFIT = CONFIG["calibration"] == "crossfit"
 PARTS = range(1, CONFIG["crossfit_parts"] + 1) if CROSSFIT else []
+# Cross-fitting trains each of its estimators in fewer epochs.
+STAGE_SETTINGS = {
+    stage: stage_settings(
+        CONFIG["estimator"], stage, CONFIG["crossfit_epochs"] if CROSSFIT else None
+    )
+    for stage in STAGES
+}
 # A unit is a category at an elevation. Each fold of a unit has an estimator of its own.
 UNITS = [
     (category, elevation)
     for category in CATEGORIES
     for elevation in CONFIG["elevations_deg"][category]
+]
+PRETRAINS = CONFIG["estimator"]["warm_start"] in ("categories", "both")
+LOWEST_UNITS = [
+    (category, min(CONFIG["elevations_deg"][category])) for category in CATEGORIES
 ]
 # The wildcards of a unit and of a fold, as the paths of `nbv.layout` take them.
 UNIT = ("{category}", "{elevation}")
@@ -195,6 +207,34 @@ def paths(path, keys):
     return [path(*key) for key in keys]
 
 
+# What a training starts from.
+
+
+def start_of_unit(category, elevation):
+    elevations = CONFIG["elevations_deg"][category]
+    return start_of(CONFIG["estimator"]["warm_start"], elevations, elevation)
+
+
+def training_start(wildcards):
+    """The estimators that a training starts from: one, or none where the weights are random."""
+    start = start_of_unit(wildcards.category, int(wildcards.elevation))
+    fold, part = wildcards.fold, wildcards.get("part")
+    if start is None:
+        return []
+    if start == PRETRAINED:
+        return [LAYOUT.pretrained(fold, part)]
+    place = (wildcards.category, start, fold)
+    if part is None:
+        return [LAYOUT.estimator(*place)]
+    return [LAYOUT.part_estimator(*place, part)]
+
+
+def stage_of(wildcards):
+    """The settings of a training."""
+    stage = "fine_tuning" if training_start(wildcards) else "training"
+    return STAGE_SETTINGS[stage]
+
+
 # What tables and figures are about, and the files that they need.
 
 
@@ -230,6 +270,10 @@ def counted_jobs():
         "meshes": CATEGORIES,
         "splits": CATEGORIES,
         "render": [unit_folder(*unit) for unit in UNITS],
+        "pretrain": [f"fold{fold}" for fold in FOLDS] if PRETRAINS else [],
+        "pretrain_part": [
+            f"fold{fold}/{part}" for fold in FOLDS for part in PARTS if PRETRAINS
+        ],
         "train": [fold_folder(*fold) for fold in folds_of(UNITS)],
         "train_part": [
             f"{fold_folder(*fold)}/{part}" for fold in folds_of(UNITS) for part in PARTS
@@ -329,6 +373,12 @@ def layout_of(name):
         settings[key] == CONFIG[key] for key in ("camera", "sensor")
     )
     return LAYOUT if is_run else LAYOUT.below("transfer", name)
+
+
+def trained_under(name):
+    """The run's own estimators only where they too were trained from random weights."""
+    start = start_of_unit(*TRANSFER_UNIT)
+    return layout_of(name) if start is None else LAYOUT.below("transfer", name)
 
 
 # The runs that this one is compared with.

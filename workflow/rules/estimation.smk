@@ -1,12 +1,50 @@
 # One estimator for each fold of a unit, and its estimates for objects that it never saw.
 
 
+# The network of all categories that a fold's estimators can start from, at lowest elevations.
+rule pretrain:
+    input:
+        sources("pretrain_network"),
+        splits=paths(LAYOUT.splits, [(category,) for category in CATEGORIES]),
+        depth=paths(LAYOUT.depth, LOWEST_UNITS),
+        objects=paths(LAYOUT.depth_objects, LOWEST_UNITS),
+    output:
+        LAYOUT.pretrained("{fold}"),
+    log:
+        LAYOUT.log("pretrain/fold{fold}"),
+    benchmark:
+        LAYOUT.benchmark("pretrain/fold{fold}")
+    # Everything else waits for it.
+    priority: 60
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=per_attempt(2500 + 500 * len(CATEGORIES)),
+        runtime=per_attempt(30),
+    params:
+        categories=CATEGORIES,
+        estimator=STAGE_SETTINGS["pretraining"],
+        seed=CONFIG["seed"],
+    script:
+        f"{SCRIPTS}/pretrain_network.py"
+
+
+use rule pretrain as pretrain_part with:
+    output:
+        LAYOUT.pretrained("{fold}", "{part}"),
+    log:
+        LAYOUT.log("pretrain_part/fold{fold}/{part}"),
+    benchmark:
+        LAYOUT.benchmark("pretrain_part/fold{fold}/{part}")
+
+
 rule train:
     input:
         sources("train_estimator"),
         splits=rules.splits.output[0],
         depth=rules.render.output.depth,
         objects=rules.render.output.objects,
+        start=training_start,
     output:
         LAYOUT.estimator(*FOLD),
     log:
@@ -21,8 +59,7 @@ rule train:
         mem_mb=per_attempt(2500),
         runtime=per_attempt(30),
     params:
-        estimator=CONFIG["estimator"]
-        | ({"epochs": CONFIG["crossfit_epochs"]} if CROSSFIT else {}),
+        estimator=stage_of,
         seed=CONFIG["seed"],
     script:
         f"{SCRIPTS}/train_estimator.py"

@@ -7,7 +7,7 @@ with job(snakemake):
     from nbv.depth_images import open_depth
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.training import train_estimator
-    from nbv.estimation.weights import save_estimator
+    from nbv.estimation.weights import read_start, save_estimator
     from nbv.seeds import seed_for
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
@@ -17,11 +17,17 @@ with job(snakemake):
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
     part = wildcards.get("part")
     roles = training_roles(splits, without=None if part is None else int(part))
+    object_ids = objects_with_role(splits, int(wildcards.fold), *roles)
+    output = snakemake.output[0]
+    starts = [
+        read_start(path, wildcards.category, object_ids, output, hardware) for path in given.start
+    ]
     estimator = train_estimator(
         images,
-        objects_with_role(splits, int(wildcards.fold), *roles),
+        object_ids,
         params.estimator,
         hardware,
         seed_for(params.seed, "train", *wildcards),
+        start=starts[0] if starts else None,
     )
-    save_estimator(snakemake.output[0], estimator, hardware)
+    save_estimator(output, estimator, hardware)

@@ -52,6 +52,8 @@ Whole = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(strict=True)]
 # Far above any use, and small enough for arithmetic; `nbv.config.memory` refuses what is too much.
 Count = Annotated[Whole, Field(ge=1, le=10**12)]
+Epochs = Annotated[Whole, Field(ge=1, le=10**6)]
+LearningRate = Annotated[Number, Field(gt=0, le=10)]
 Angle = Annotated[Number, Field(ge=-360, le=360)]
 Bandwidth = Annotated[Number, Field(ge=0, le=180)]
 PseudoObservations = Annotated[Number, Field(ge=0, le=10**9)]
@@ -144,18 +146,28 @@ class Sensor(Section):
     diagonal_m: dict[Name, Annotated[Number, Field(gt=0, le=1000)]] = {}
 
 
+class Stage(Section):
+    """What a stage of training has of its own; see `nbv.estimation.warm_start`."""
+
+    epochs: Epochs
+    learning_rate: LearningRate
+
+
 class Estimator(Section):
     """The single-view estimator; see `nbv.estimation`. A kind omits what it does not have."""
 
     kind: str
     channels: Annotated[list[Count], AtLeastOne]
     hidden: Count
-    epochs: Annotated[Whole, Field(ge=1, le=10**6)]
+    epochs: Epochs
     batch_size: Annotated[Whole, Field(ge=2, le=10**12)]
-    learning_rate: Annotated[Number, Field(gt=0, le=10)]
+    learning_rate: LearningRate
     weight_decay: Annotated[Number, Field(ge=0, le=10)]
     device: Literal["auto", "cpu", "cuda", "mps"]
     precision: Literal["auto", "bfloat16", "float32"]
+    warm_start: Literal["none", "elevations", "categories", "both"] = "none"
+    pretraining: Stage = Stage(epochs=2, learning_rate=9e-3)
+    fine_tuning: Stage = Stage(epochs=4, learning_rate=4e-3)
     n_classes: Annotated[Whole, Field(ge=8, le=360), "a divisor of 360"] | None = None
     target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
 
@@ -242,7 +254,7 @@ class Config(Section):
     calibration: Literal["holdout", "crossfit"] = "holdout"
     calibration_fraction: Annotated[Number, Field(gt=0, lt=1)]
     crossfit_parts: Annotated[Whole, Field(ge=2, le=100)] = 2
-    crossfit_epochs: Annotated[Whole, Field(ge=1, le=10**6)] | None = None
+    crossfit_epochs: Epochs | None = None
     methods: Annotated[dict[Name, Method], AtLeastOne]
     extensions: dict[Name, Method]
     compared_runs: list[Name] = []

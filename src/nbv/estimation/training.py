@@ -18,7 +18,7 @@ from nbv.errors import UserError
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.images import to_input
 from nbv.estimation.networks import build_network, kind_of
-from nbv.estimation.weights import Estimator
+from nbv.estimation.weights import Estimator, Start
 
 log = logging.getLogger(__name__)
 
@@ -56,13 +56,15 @@ def train_estimator(
     settings: Mapping[str, Any],
     hardware: Hardware,
     seed: int,
+    start: Start | None = None,
 ) -> Estimator:
     """Train an estimator on some objects, whose ids are kept with the weights.
 
     Parameters and errors as of `train_network` and of `nbv.depth_images.DepthImages.of`.
     """
-    network = train_network(images.of(object_ids), settings, hardware, seed)
-    return Estimator(network, settings, images.codes.shape[-1], object_ids)
+    weights, origin = (start.network, start.origin) if start else (None, None)
+    network = train_network(images.of(object_ids), settings, hardware, seed, weights)
+    return Estimator(network, settings, images.codes.shape[-1], object_ids, origin)
 
 
 def train_network(
@@ -70,6 +72,7 @@ def train_network(
     settings: Mapping[str, Any],
     hardware: Hardware,
     seed: int,
+    start: nn.Module | None = None,
 ) -> nn.Module:
     """Train a network on its kind's targets and loss, with AdamW and a one-cycle schedule.
 
@@ -84,6 +87,9 @@ def train_network(
     seed : int
         Of the weights and of the order of the images: the same seed on the same machine gives the
         same bits.
+    start : torch.nn.Module, optional
+        A network of the same kind and size. Its weights are those to start from, and it stays as
+        it is; random weights without it.
 
     Returns
     -------
@@ -93,12 +99,14 @@ def train_network(
     Raises
     ------
     UserError
-        Where the loss or a weight is no finite number any more.
+        Where the loss or a weight is no finite number any more, or the start is of another size.
     """
     n_objects, n_views, side, _ = codes.shape
     kind = kind_of(settings)
     torch.manual_seed(seed)
     network = build_network(settings, side).to(hardware.device)
+    if start is not None:
+        _set_weights(network, start)
     images = to_input(codes, hardware)
     of_one = kind.targets(settings, n_views)
     targets = torch.from_numpy(np.tile(of_one, (n_objects, 1))).to(hardware.device)
@@ -141,6 +149,16 @@ def train_network(
         _need_finite(network, running, epoch, settings)
         progress.report(epoch, n_images, float(running) / batches)
     return network.eval()
+
+
+def _set_weights(network: nn.Module, start: nn.Module) -> None:
+    try:
+        network.load_state_dict(start.state_dict())
+    except RuntimeError as error:
+        raise UserError(
+            "training: it starts from a network of another size: train that one again with the "
+            "same estimator.kind, channels, hidden, n_classes and camera.image_side"
+        ) from error
 
 
 def _need_finite(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +13,10 @@ import safetensors
 import safetensors.torch
 from torch import nn
 
+from nbv.checksums import sha256_of
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.networks import build_network
+from nbv.estimation.warm_start import with_category
 from nbv.files import damaged, readable, replacing
 
 
@@ -30,13 +33,32 @@ class Estimator:
     image_side : int
         Pixels.
     trained_on : sequence of str
-        The objects it has seen.
+        The objects it has seen; ``<category>/<object>`` where objects of all categories meet.
+    started_from : mapping, optional
+        ``path`` (from the estimator's own folder) and ``sha256`` of the estimator whose weights it
+        started from.
     """
 
     network: nn.Module
     settings: Mapping[str, Any]
     image_side: int
     trained_on: Sequence[str]
+    started_from: Mapping[str, str] | None = None
+
+
+@dataclass(frozen=True)
+class Start:
+    """Weights to start a training from.
+
+    Attributes
+    ----------
+    network : torch.nn.Module
+    origin : mapping
+        See `Estimator.started_from`.
+    """
+
+    network: nn.Module
+    origin: Mapping[str, str]
 
 
 def save_estimator(path: str | Path, estimator: Estimator, hardware: Hardware) -> None:
@@ -47,6 +69,8 @@ def save_estimator(path: str | Path, estimator: Estimator, hardware: Hardware) -
         "trained_on": list(estimator.trained_on),
         "hardware": str(hardware),
     }
+    if estimator.started_from is not None:
+        history["started_from"] = dict(estimator.started_from)
     tensors = {
         name: tensor.detach().cpu().contiguous()
         for name, tensor in estimator.network.state_dict().items()
@@ -74,9 +98,44 @@ def load_estimator(path: str | Path, hardware: Hardware) -> Estimator:
         network = build_network(history["settings"], history["image_side"])
         network.load_state_dict(safetensors.torch.load_file(path))
         estimator = Estimator(
-            network.eval(), history["settings"], history["image_side"], history["trained_on"]
+            network.eval(),
+            history["settings"],
+            history["image_side"],
+            history["trained_on"],
+            history.get("started_from"),
         )
         if not all(bool(values.isfinite().all()) for values in network.state_dict().values()):
             raise damaged(path, "a weight is not finite")
     estimator.network.to(hardware.device)
     return estimator
+
+
+def read_start(
+    path: str, category: str, object_ids: Sequence[str], output: str, hardware: Hardware
+) -> Start:
+    """Read what a training is to start from.
+
+    Parameters
+    ----------
+    path : str
+        An estimator of the same category, or a network that all categories were pretrained with.
+    category : str
+    object_ids : sequence of str
+        The objects to train on.
+    output : str
+        Where the new estimator is to lie.
+    hardware : Hardware
+
+    Raises
+    ------
+    UserError
+        Where it has seen other objects of the category: one of them may be there to calibrate or
+        to test with. Also as of `load_estimator`.
+    """
+    stored = load_estimator(path, hardware)
+    seen, own = set(stored.trained_on), set(object_ids)
+    qualified = set(with_category(category, object_ids))
+    if seen != own and {name for name in seen if name.startswith(f"{category}/")} != qualified:
+        raise damaged(path, f"it has seen other objects of {category} than what starts from it")
+    relative = os.path.relpath(path, Path(output).parent)
+    return Start(stored.network, {"path": relative, "sha256": sha256_of(path)})

@@ -53,12 +53,17 @@ use rule train as transfer_train with:
         splits=rules.splits.output[0],
         depth=lambda wildcards: layout_of(wildcards.trained).depth(*UNIT),
         objects=lambda wildcards: layout_of(wildcards.trained).depth_objects(*UNIT),
+        # Another estimator has seen the run's own condition.
+        start=[],
     output:
         OF_TRAINED.estimator(*FOLD),
     log:
         LAYOUT.log(f"transfer/train/{{trained}}/{fold_folder(*FOLD)}"),
     benchmark:
         LAYOUT.benchmark(f"transfer/train/{{trained}}/{fold_folder(*FOLD)}")
+    params:
+        estimator=STAGE_SETTINGS["training"],
+        seed=CONFIG["seed"],
 
 
 use rule estimate as transfer_estimate with:
@@ -67,7 +72,7 @@ use rule estimate as transfer_estimate with:
         splits=rules.splits.output[0],
         depth=lambda wildcards: layout_of(wildcards.tested).depth(*UNIT),
         objects=lambda wildcards: layout_of(wildcards.tested).depth_objects(*UNIT),
-        estimator=lambda wildcards: layout_of(wildcards.trained).estimator(*FOLD),
+        estimator=lambda wildcards: trained_under(wildcards.trained).estimator(*FOLD),
         of_parts=lambda wildcards: (
             stop(
                 "transfer calibrates with objects held out: needs calibration=holdout"

@@ -1,0 +1,71 @@
+"""What a training starts from: random weights, or those of a network trained before.
+
+A category's elevation can start from the estimator one elevation lower, and its lowest elevation
+from a network that was pretrained with all categories of the fold. A fine-tuning that starts so
+takes fewer epochs. No calibration or test object of the fold is seen on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, Final, Literal
+
+PRETRAINED: Final = "pretrained"
+Stage = Literal["training", "pretraining", "fine_tuning"]
+STAGES: tuple[Stage, ...] = ("training", "pretraining", "fine_tuning")
+
+
+def start_of(
+    warm_start: str, elevations_deg: Collection[int], elevation: int
+) -> int | Literal["pretrained"] | None:
+    """Return what the estimator of one elevation starts from.
+
+    Parameters
+    ----------
+    warm_start : str
+        ``estimator.warm_start``: none, elevations, categories or both.
+    elevations_deg : collection of int
+        All elevations of the category, degrees.
+    elevation : int
+        One of them.
+
+    Returns
+    -------
+    int, "pretrained" or None
+        The elevation whose estimator it starts from (the nearest lower one, degrees), the network
+        of all categories, or random weights.
+    """
+    lower = [other for other in elevations_deg if other < elevation]
+    if lower and warm_start in ("elevations", "both"):
+        return max(lower)
+    return PRETRAINED if warm_start in ("categories", "both") else None
+
+
+def stage_settings(
+    estimator: Mapping[str, Any], stage: Stage, epochs: int | None = None
+) -> dict[str, Any]:
+    """Return the settings of one stage of training, without those of the other stages.
+
+    Parameters
+    ----------
+    estimator : mapping
+        The section ``estimator`` of a configuration.
+    stage : str
+        ``training`` from random weights, ``pretraining`` of all categories together, or
+        ``fine_tuning`` of what was trained before.
+    epochs : int, optional
+        Those of a training from random weights, where they are not ``estimator.epochs``. Each
+        other stage takes its own in the same proportion, and one at the least.
+    """
+    own: Mapping[str, Any] = estimator if stage == "training" else estimator[stage]
+    share = 1.0 if epochs is None else epochs / estimator["epochs"]
+    others = ("warm_start", *STAGES)
+    return {key: value for key, value in estimator.items() if key not in others} | {
+        "epochs": max(round(own["epochs"] * share), 1),
+        "learning_rate": own["learning_rate"],
+    }
+
+
+def with_category(category: str, object_ids: Sequence[str]) -> list[str]:
+    """Return ``<category>/<object>``: an id of its own where objects of all categories meet."""
+    return [f"{category}/{object_id}" for object_id in object_ids]

@@ -1,0 +1,39 @@
+"""Train one network on the training objects that all categories have in a fold."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    import numpy as np
+
+    from nbv.calibration.splits import need_objects, objects_with_role, read_splits, training_roles
+    from nbv.depth_images import DepthImages, open_depth
+    from nbv.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.estimation.training import train_estimator
+    from nbv.estimation.warm_start import with_category
+    from nbv.estimation.weights import save_estimator
+    from nbv.seeds import seed_for
+
+    params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
+    use_one_thread()
+    part = wildcards.get("part")
+    names: list[str] = []
+    codes = []
+    for category, splits_path, *depth_paths in zip(
+        params.categories, given.splits, given.depth, given.objects, strict=True
+    ):
+        splits, images = read_splits(splits_path), open_depth(*depth_paths)
+        need_objects(splits, images.object_ids)
+        roles = training_roles(splits, without=None if part is None else int(part))
+        object_ids = objects_with_role(splits, int(wildcards.fold), *roles)
+        names += with_category(category, object_ids)
+        codes.append(images.of(object_ids))
+    images = DepthImages(tuple(names), np.concatenate(codes))
+    hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
+    estimator = train_estimator(
+        images,
+        names,
+        params.estimator,
+        hardware,
+        seed_for(params.seed, "pretrain", *wildcards),
+    )
+    save_estimator(snakemake.output[0], estimator, hardware)
