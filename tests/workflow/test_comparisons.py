@@ -93,6 +93,22 @@ def trained_on(path):
         return set(json.loads(stored.metadata()["nbv"])["trained_on"])
 
 
+def test_estimators_of_two_runs_are_compared_on_the_objects_that_they_have_not_seen(scratch):
+    overrides = (*TINY, "name=longer", "estimator.epochs=2", "compared_runs=[tiny]")
+    scratch.run("--cores", "2", "estimator_comparison", overrides=overrides)
+    longer = scratch.folder / "results/longer"
+    cells = pd.read_csv(longer / "tables/estimator_comparison.csv").set_index(["row", "method"])
+    for category in ("mug", "chair"):
+        for role in ("calibration", "test"):
+            for run in ("longer", "tiny"):
+                files = (longer.parent / run / "estimates" / category).rglob(f"{role}.csv")
+                rows = pd.concat([pd.read_csv(path) for path in files])
+                apart = abs(rows["estimate_deg"] - rows["azimuth_deg"])
+                found = cells.loc[(f"{category}/el00 {role}", run), "value"]
+                assert found == pytest.approx(np.minimum(apart, 360 - apart).mean(), abs=1e-3)
+    assert not (longer / "evaluation").exists()
+
+
 def test_a_compared_run_that_is_not_there_is_named(finished):
     settings = (*OTHER, "compared_runs=[nowhere]")
     done = finished.run("--cores", "1", "run_comparison", overrides=settings, fails=True)

@@ -23,6 +23,7 @@ from nbv.config import (
 from nbv.config.memory import available_bytes, check_memory
 from nbv.errors import UserError
 from nbv.estimation.warm_start import PRETRAINED, STAGES, stage_settings, start_of
+from nbv.experiments.results import ESTIMATED_ROLES
 from nbv.jobs import killed_jobs
 from nbv.layout import Layout, fold_folder, unit_folder
 from nbv.meshes.sources import SOURCES, open_source, select_objects
@@ -405,23 +406,23 @@ def density_methods(run):
     return sorted({name for kind in kinds for name in DENSITY_METHODS[kind].values()})
 
 
-def compared_keys(names_of):
+def compared_keys(names_of, units=None):
     """Run, category, elevation, fold, and one of the names that a run has, of every file."""
     return [
         (run, *fold, name)
         for run in compared_runs()
-        for fold in folds_of(REFERENCE_UNITS)
+        for fold in folds_of(REFERENCE_UNITS if units is None else units)
         for name in names_of(run)
     ]
 
 
-def compared(path, names_of):
+def compared(path, names_of, units=None):
     """The files of all runs. Those of other runs are not made here; they have to be there."""
 
     def files(wildcards):
         return [
             run_file(run, path(Layout(f"results/{run}"), *place), "compared_runs")
-            for run, *place in compared_keys(names_of)
+            for run, *place in compared_keys(names_of, units)
         ]
 
     return files
@@ -432,6 +433,10 @@ def proposed_lookup(run):
     if name not in methods or not needs_lookup(methods[name]["policy"]):
         stop(f"the run {run} has no lookup table of a method {name}")
     return [methods[name]["policy"]]
+
+
+def estimated_roles(run):
+    return ESTIMATED_ROLES
 
 
 def test_estimates(run):

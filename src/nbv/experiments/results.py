@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from nbv.calibration.estimates import need_azimuths, objects_of_full_turns
+from nbv.angles import circular_distance_deg
+from nbv.calibration.estimates import need_azimuths, objects_of_full_turns, read_estimates
 from nbv.calibration.splits import read_splits
 from nbv.errors import UserError
 from nbv.experiments.two_views import COLUMNS
@@ -22,6 +23,13 @@ Unit = tuple[str, int]
 
 EvaluationFile = tuple[str, int, int, str]
 """What a file of errors is about: category, elevation in degrees, fold (from 1) and method."""
+
+
+EstimatesFile = tuple[str, int, int, str]
+"""What a file of estimates is about: category, elevation in degrees, fold (from 1) and role."""
+
+ESTIMATED_ROLES = ("calibration", "test")
+"""The roles of objects that have estimates."""
 
 
 def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.DataFrame]:
@@ -72,6 +80,43 @@ def _join(name: Unit, by_method: Mapping[str, list[pd.DataFrame]]) -> pd.DataFra
         )
     unit["method"] = pd.Categorical(unit["method"], categories=list(by_method), ordered=True)
     return unit[["method", "fold", *COLUMNS]]
+
+
+def load_estimate_errors(files: Mapping[EstimatesFile, Path]) -> dict[Unit, pd.DataFrame]:
+    """Read the errors of estimates from one view.
+
+    Parameters
+    ----------
+    files : mapping of (category, elevation_deg, fold, role) to path
+        Of `nbv.calibration.estimates.write_estimates`; a role of `ESTIMATED_ROLES`.
+
+    Returns
+    -------
+    dict of (category, elevation_deg) to pandas.DataFrame
+        As of `load_evaluations`, with the role as ``method`` and the columns ``method, fold,
+        object_id, initial_deg, error_deg``. An object calibrates in several folds.
+
+    Raises
+    ------
+    UserError
+        Where a file is missing or damaged.
+    """
+    parts: dict[Unit, list[pd.DataFrame]] = {}
+    for (category, elevation_deg, fold, role), path in files.items():
+        estimates = read_estimates(existing(path))
+        errors = circular_distance_deg(estimates.estimate_deg, estimates.azimuth_deg)
+        n_objects, n_views = errors.shape
+        frame = pd.DataFrame(
+            {
+                "method": role,
+                "fold": fold,
+                "object_id": np.repeat(np.asarray(estimates.object_ids, dtype=object), n_views),
+                "initial_deg": np.tile(estimates.azimuth_deg, n_objects),
+                "error_deg": errors.ravel(),
+            }
+        )
+        parts.setdefault((category, elevation_deg), []).append(frame)
+    return {unit: pd.concat(frames, ignore_index=True) for unit, frames in parts.items()}
 
 
 def load_object_ids(splits: Path) -> tuple[str, ...]:

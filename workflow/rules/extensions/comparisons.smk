@@ -51,3 +51,25 @@ rule run_comparison:
         settings=RESAMPLED,
     script:
         f"{SCRIPTS}/tabulate_run_comparison.py"
+
+
+rule estimator_comparison:
+    input:
+        sources("tabulate_estimator_comparison"),
+        estimates=compared(Layout.estimates, estimated_roles, UNITS),
+    output:
+        csv=LAYOUT.table("estimator_comparison", "csv"),
+        md=LAYOUT.table("estimator_comparison", "md"),
+        tex=LAYOUT.table("estimator_comparison", "tex"),
+    log:
+        LAYOUT.log("estimator_comparison"),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=per_attempt(2000),
+        runtime=per_attempt(10),
+    params:
+        estimates=lambda wildcards: compared_keys(estimated_roles, UNITS),
+        settings=RESAMPLED,
+    script:
+        f"{SCRIPTS}/tabulate_estimator_comparison.py"
