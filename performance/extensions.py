@@ -1,4 +1,4 @@
-"""Extensions: all tables of one unit, and one more view, with bounds in time."""
+"""Extensions: all tables of one unit against the paper's, and one more view, bounded in time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from performance.lookup import calibration_estimates
 from performance.settings import configuration
 from performance.timing import on_one_core, take_turns
 
-TABLES_SECONDS = Target(3.0, at_most=True)
+TABLES = Target(15.0, at_most=True)
 STEP_MILLISECONDS = Target(20.0, at_most=True)
 
 
@@ -52,9 +52,9 @@ def _tables(quick: bool) -> Figure:
     turns = take_turns([every_table, papers_table], rounds)
     detail = (
         f"{len(criteria)} criteria with {len(ESTIMATE_FUSIONS)} fusion rules, {n_bins} bins, one "
-        f"core; {turns.ratio(0, 1):.1f} times the paper's table alone ({turns.typical(1):.2f} s)"
+        f"core: {turns.typical(0):.2f} s against {turns.typical(1):.2f} s"
     )
-    return Figure("all tables of one unit, seconds", turns.typical(0), TABLES_SECONDS, detail)
+    return Figure("all tables of one unit / the paper's table", turns.ratio(0, 1), TABLES, detail)
 
 
 def _steps(quick: bool) -> list[Figure]:
