@@ -15,6 +15,7 @@ DOCUMENTS = [
 PAGES = [path for path in DOCUMENTS if path.name == "README.md" or "reference" not in path.parts]
 
 TERMS = (
+    "warm start",
     *("viewpoint", "pose", "view", "estimate", "rotation δ", "calibration pair", "conditional"),
     *("evidence", "belief", "criterion", "cost", "policy", "fusion", "method", "extension", "unit"),
 )
