@@ -77,7 +77,9 @@ def default_of(key: str, otherwise: Any) -> Any:
     *above, last = key.split(".")
     with contextlib.suppress(UserError, KeyError):
         field = fields_of(type_of(above)[0])[last]
-        return otherwise if field.is_required() else field.get_default(call_default_factory=True)
+        if not field.is_required():
+            default = field.get_default(call_default_factory=True)
+            return default.model_dump() if isinstance(default, BaseModel) else default
     return otherwise
 
 
