@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import torch
@@ -26,6 +29,17 @@ from nbv.estimation.weights import Estimator, load_estimator, save_estimator
 @pytest.fixture(autouse=True)
 def one_thread():
     hw.use_one_thread()
+
+
+def test_one_thread_and_determinism_do_not_load_torchs_compiler():
+    """It takes two seconds of every job."""
+    code = (
+        "import sys, torch; from nbv.estimation.hardware import use_one_thread; use_one_thread(); "
+        "print(torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), "
+        "torch.is_deterministic_algorithms_warn_only_enabled(), 'torch._inductor' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1", "True", "True", "False"]
 
 
 def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():

@@ -101,7 +101,9 @@ def use_one_thread() -> None:
     if torch.get_num_threads() != 1:
         raise RuntimeError(f"torch runs {torch.get_num_threads()} threads, not 1")
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
-    torch.use_deterministic_algorithms(True, warn_only=True)
+    # The same switch as use_deterministic_algorithms(True, warn_only=True), which also imports
+    # torch's compiler: two seconds a job.
+    torch.set_deterministic_debug_mode("warn")
     # Filling memory that is about to be written finds faults; results are the same without.
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
     _keep_freed_memory()
