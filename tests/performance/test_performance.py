@@ -1,17 +1,22 @@
 import json
 import os
+import re
 import time
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+import yaml
 from performance.__main__ import BENCHMARKS, main
 from performance.figures import Figure, Target, summary_line, table_line
 from performance.growth import in_words
+from performance.settings import configuration
 from performance.solids import object_with_faces
 from performance.timing import Turns, growth_exponent, median_ratio, take_turns
-from performance.workflow import utilisation
+from performance.workflow import cost, steps_from_random_weights, utilisation
 
-from nbv.files import write_csv
+from nbv.files import write_csv, write_text
 from nbv.reporting.runtime import load_jobs, summarise_jobs
 
 
@@ -151,3 +156,21 @@ def test_incomplete_processor_times_are_no_verdict_unless_they_suffice(tmp_path)
 
 def test_a_run_that_never_was_has_no_figure(tmp_path):
     assert utilisation(tmp_path / "paper").detail.startswith("not run")
+
+
+def test_the_steps_of_a_run_are_those_of_every_estimator():
+    """Five folds of ten units, 80 of 125 objects each, seen 360 times in eleven epochs."""
+    settings = configuration()
+    assert steps_from_random_weights(settings) == 5 * 10 * 11 * (80 * 360 // 64)
+    assert cost(Path("nowhere"), 1).detail.startswith("not run")
+
+
+def test_the_cost_of_a_run_is_its_processor_time_in_bare_steps(tmp_path):
+    settings = configuration()
+    write_text(tmp_path / "configuration.yaml", yaml.safe_dump(settings))
+    row = {"rule": "all", "cpu_s": 1000.0}
+    write_csv(tmp_path / "tables/runtime.csv", pd.DataFrame([row]))
+    figure = cost(tmp_path, 2)
+    found = re.fullmatch(r"1,000 s against .* steps of (\d+\.\d) ms, one thread", figure.detail)
+    expected = 1000.0 / (steps_from_random_weights(settings) * float(found[1]) / 1e3)
+    assert figure.ratio == pytest.approx(expected, rel=0.05)
