@@ -10,12 +10,24 @@ import pandas as pd
 import pytest
 from safetensors import safe_open
 
-from projects import TINY
+from projects import TINY, Project, copy_of_project
 
 pytestmark = pytest.mark.slow
 
-ELEVATIONS = (0, 15, 60)
-MORE = ("estimator.warm_start=both", f"elevations_deg.mug={list(ELEVATIONS)}".replace(" ", ""))
+
+def overrides(*elevations: int) -> tuple[str, ...]:
+    return ("estimator.warm_start=both", f"elevations_deg.mug=[{','.join(map(str, elevations))}]")
+
+
+MORE = overrides(0, 15, 60)
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory) -> Project:
+    """The estimators of two categories; mugs are seen from three elevations."""
+    project = copy_of_project(tmp_path_factory.mktemp("warm"))
+    project.run("--cores", "2", "estimators", overrides=(*TINY, *MORE))
+    return project
 
 
 def history(path: Path) -> dict:
@@ -40,32 +52,38 @@ def ancestors(path: Path) -> list[Path]:
     return found
 
 
-@pytest.mark.parametrize("calibration", ["holdout", "crossfit"])
-def test_ancestors_have_seen_the_training_objects_and_no_others(fresh, calibration):
-    crossfit = ("calibration=crossfit", "crossfit_epochs=1") if calibration == "crossfit" else ()
-    fresh.run("--cores", "2", "estimates", overrides=(*TINY, *MORE, *crossfit))
-    estimators = fresh.results / "estimators"
-    names = ["estimator"] + (["without_part1", "without_part2"] if crossfit else [])
-    for fold in (1, 2):
-        for name in names:
-            part = name.removeprefix("without_") if name != "estimator" else None
-            own = {
-                category: training_objects(fresh.results, category, fold, part)
-                for category in ("mug", "chair")
-            }
-            pretrained = estimators / f"pretrained/fold{fold}/{name}.safetensors"
-            assert set(history(pretrained)["trained_on"]) == {
-                f"{category}/{each}" for category, ids in own.items() for each in ids
-            }
-            for category, elevations in (("mug", ELEVATIONS), ("chair", (0,))):
-                chain = [
-                    estimators / f"{category}/el{elevation:02d}/fold{fold}/{name}.safetensors"
-                    for elevation in elevations
-                ]
-                for place, path in enumerate(chain):
-                    assert ancestors(path) == [*reversed(chain[:place]), pretrained]
-                    assert set(history(path)["trained_on"]) == own[category]
-    assert not list(estimators.rglob("fold3"))
+def check_fold(results: Path, fold: int, elevations: tuple[int, ...], part: str | None) -> None:
+    """Check what each estimator of a fold, or of all parts but one, has seen and started from."""
+    name = "estimator" if part is None else f"without_{part}"
+    estimators, units = results / "estimators", {"mug": elevations, "chair": (0,)}
+    own = {category: training_objects(results, category, fold, part) for category in units}
+    pretrained = estimators / f"pretrained/fold{fold}/{name}.safetensors"
+    assert ancestors(pretrained) == []
+    assert set(history(pretrained)["trained_on"]) == {
+        f"{category}/{each}" for category, ids in own.items() for each in ids
+    }
+    for category, of_category in units.items():
+        chain = [
+            estimators / f"{category}/el{elevation:02d}/fold{fold}/{name}.safetensors"
+            for elevation in of_category
+        ]
+        for place, path in enumerate(chain):
+            assert ancestors(path) == [*reversed(chain[:place]), pretrained]
+            assert set(history(path)["trained_on"]) == own[category]
+
+
+@pytest.mark.parametrize("fold", [1, 2])
+def test_ancestors_have_seen_the_training_objects_and_no_others(warm, fold):
+    check_fold(warm.results, fold, (0, 15, 60), None)
+
+
+def test_ancestors_of_a_part_have_not_seen_that_part(fresh):
+    files = [f"results/tiny/estimates/{unit}/fold1/test.csv" for unit in ("mug/el60", "chair/el00")]
+    crossfit = ("calibration=crossfit", "crossfit_epochs=1")
+    fresh.run("--cores", "2", *files, overrides=(*TINY, *overrides(0, 60), *crossfit))
+    # A lower elevation's parts are made for what starts from them.
+    for part in (None, "part1", "part2"):
+        check_fold(fresh.results, 1, (0, 60), part)
 
 
 def test_one_estimator_can_be_asked_for_by_name_and_brings_what_it_starts_from(fresh):
@@ -84,12 +102,11 @@ def test_one_estimator_can_be_asked_for_by_name_and_brings_what_it_starts_from(f
     assert epochs == [1, 4]
 
 
-def test_a_changed_start_trains_what_follows_again(fresh):
-    """Neither fine-tuning's settings nor another category's objects can go unnoticed."""
-    fresh.run("--cores", "2", "estimators", overrides=(*TINY, *MORE))
+def test_a_changed_start_trains_what_follows_again(warm):
+    """Neither fine-tuning's settings nor pretraining's can go unnoticed."""
 
     def planned(*more: str) -> dict[str, int]:
-        return fresh.would_run(*more, targets=("estimators",))
+        return warm.would_run(*more, targets=("estimators",))
 
     made_again = {"train": 8, "estimators": 1}
     assert planned(*MORE) == {}
