@@ -77,10 +77,11 @@ def test_ancestors_have_seen_the_training_objects_and_no_others(warm, fold):
     check_fold(warm.results, fold, (0, 15, 60), None)
 
 
-def test_ancestors_of_a_part_have_not_seen_that_part(fresh):
+def test_ancestors_of_a_classifier_of_some_parts_have_not_seen_the_others(fresh):
     files = [f"results/tiny/estimates/{unit}/fold1/test.csv" for unit in ("mug/el60", "chair/el00")]
     crossfit = ("calibration=crossfit", "crossfit_epochs=1")
-    fresh.run("--cores", "2", *files, overrides=(*TINY, *overrides(0, 60), *crossfit))
+    classifier = ("estimator=classifier", "estimator.n_classes=24")
+    fresh.run("--cores", "2", *files, overrides=(*TINY, *overrides(0, 60), *crossfit, *classifier))
     # A lower elevation's parts are made for what starts from them.
     for part in (None, "part1", "part2"):
         check_fold(fresh.results, 1, (0, 60), part)
