@@ -11,6 +11,8 @@ import trimesh
 
 from projects import ROOT, TINY
 
+# Each starts Snakemake.
+pytestmark = pytest.mark.slow
 FOLDER = "dataset=folder"
 
 
@@ -124,7 +126,6 @@ def test_too_few_meshes_left_after_an_earlier_run(fresh):
     assert "holds 5 usable meshes, n_objects=8 asked for" in done.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
