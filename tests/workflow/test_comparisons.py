@@ -109,6 +109,13 @@ def test_estimators_of_two_runs_are_compared_on_the_objects_that_they_have_not_s
     assert not (longer / "evaluation").exists()
 
 
+def test_estimators_with_other_calibration_objects_are_not_compared(other):
+    project, settings = Project(other.parents[1]), (*OTHER, "compared_runs=[tiny]")
+    done = project.run("--cores", "1", "estimator_comparison", overrides=settings, fails=True)
+    assert "nbv: error: compared_runs: the run tiny has calibration=holdout" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_a_compared_run_that_is_not_there_is_named(finished):
     settings = (*OTHER, "compared_runs=[nowhere]")
     done = finished.run("--cores", "1", "run_comparison", overrides=settings, fails=True)

@@ -436,6 +436,12 @@ def proposed_lookup(run):
 
 
 def estimated_roles(run):
+    theirs = run_settings(run).get("calibration", "holdout")
+    if theirs != CONFIG["calibration"]:
+        stop(
+            f"compared_runs: the run {run} has calibration={theirs}, this one "
+            f"{CONFIG['calibration']}, so their calibration objects differ; leave it out"
+        )
     return ESTIMATED_ROLES
 
 

@@ -146,8 +146,8 @@ class Sensor(Section):
     diagonal_m: dict[Name, Annotated[Number, Field(gt=0, le=1000)]] = {}
 
 
-class Stage(Section):
-    """What a stage of training has of its own; see `nbv.estimation.warm_start`."""
+class Schedule(Section):
+    """How long and at which peak rate a stage trains; see `nbv.estimation.warm_start`."""
 
     epochs: Epochs
     learning_rate: LearningRate
@@ -166,8 +166,8 @@ class Estimator(Section):
     device: Literal["auto", "cpu", "cuda", "mps"]
     precision: Literal["auto", "bfloat16", "float32"]
     warm_start: Literal["none", "elevations", "categories", "both"] = "none"
-    pretraining: Stage = Stage(epochs=2, learning_rate=9e-3)
-    fine_tuning: Stage = Stage(epochs=4, learning_rate=4e-3)
+    pretraining: Schedule = Schedule(epochs=2, learning_rate=9e-3)
+    fine_tuning: Schedule = Schedule(epochs=4, learning_rate=4e-3)
     n_classes: Annotated[Whole, Field(ge=8, le=360), "a divisor of 360"] | None = None
     target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
 
