@@ -138,6 +138,7 @@ N_CLASSES = 36
 PRODUCTS = {
     "gain_product": {"policy": "information_gain", "fusion": "product"},
     "opposite_product": {"policy": "opposite", "fusion": "product"},
+    "error_product": {"policy": "expected_error", "fusion": "product"},
 }
 
 
@@ -168,7 +169,7 @@ def test_by_its_images_distributions_a_hidden_handle_is_sought_and_found():
         mean_directions(calibration),
         estimates,
         PRODUCTS,
-        FEW_DENSITIES,
+        FEW_DENSITIES | {"affinity": {"power": 16, "pseudo_observations": 90}},
         lambda name: np.random.default_rng(0),
         calibration,
         test,
@@ -182,4 +183,5 @@ def test_by_its_images_distributions_a_hidden_handle_is_sought_and_found():
         np.testing.assert_allclose(frame["next_estimate_deg"], expected[rows, views])
     assert (frames["opposite_product"]["delta_deg"] == 180).all()
     assert circular_distance_deg(estimates.estimate_deg, np.arange(360)).ravel()[hidden].mean() > 20
-    assert frames["gain_product"]["error_deg"][hidden].mean() < 5
+    for name in ("gain_product", "error_product"):
+        assert frames[name]["error_deg"][hidden].mean() < 5

@@ -265,20 +265,26 @@ def test_fixed_is_expected_error_without_any_trust_in_the_estimate(fusion):
 
 
 @pytest.mark.parametrize("criterion", ["expected_error", "fixed"])
-def test_errors_of_two_views_are_known_for_one_first_estimate_by_the_same_estimator(criterion):
+def test_errors_of_two_views_are_known_for_one_first_view_by_the_same_estimator(criterion):
     evidence = evidence_of()
     belief = first_belief(np.array([10.0]), evidence)
     cost = CRITERIA[criterion](belief, evidence, "average")
     np.testing.assert_array_equal(cost[0], tabulate(criterion, evidence, "average")[1])
     for unknown, other in (
         (replace(belief, n_views=2), evidence),
-        (replace(belief, first_bin=None), evidence),
         (belief, evidence_of()),
     ):
         with pytest.raises(
-            ValueError, match=r"^errors of two views need one first estimate by the same estimator$"
+            ValueError, match=r"^errors of two views need one first view by the same estimator$"
         ):
             CRITERIA[criterion](unknown, other, "average")
+
+
+def test_an_expected_error_of_estimates_needs_an_estimate():
+    evidence = evidence_of()
+    belief = replace(first_belief(np.array([10.0]), evidence), first_bin=None)
+    with pytest.raises(ValueError, match=r"^fusion 'average' needs a first estimate$"):
+        CRITERIA["expected_error"](belief, evidence, "average")
 
 
 @pytest.mark.parametrize("k", [1, 7, 19])

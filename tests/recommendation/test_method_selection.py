@@ -85,7 +85,7 @@ def test_an_extension_that_cannot_be(name, policy, fusion, message):
         check_methods(METHODS, {name: {"policy": policy, "fusion": fusion}}, False)
 
 
-@pytest.mark.parametrize("policy", ["expected_error", "fixed", "bayes_error", "oracle", "selected"])
+@pytest.mark.parametrize("policy", ["bayes_error", "selected"])
 def test_policies_that_need_estimates_are_refused_for_distributions(policy):
     extension = {"x": {"policy": policy, "fusion": "product"}} | EXTENSIONS
     with pytest.raises(UserError, match=r"extensions\.x\.policy=.* not defined for distributions"):

@@ -104,6 +104,7 @@ except OSError as error:
 
 # What decides on a rotation: the conditionals, and the cost of travel.
 DECISION = CONFIG["density"] | CONFIG["recommendation"]
+EXTENSION_DECISION = DECISION | {"affinity": CONFIG["affinity"]}
 LOOKUP_METHODS = [name for name in METHODS if needs_lookup(METHODS[name]["policy"])]
 BASELINE_METHODS = [name for name in METHODS if name not in LOOKUP_METHODS]
 LOOKUP_CRITERIA = sorted({METHODS[name]["policy"] for name in LOOKUP_METHODS})

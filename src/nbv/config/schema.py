@@ -194,6 +194,13 @@ class Density(Section):
     n_parts: Annotated[Whole, Field(ge=2, le=1000)]
 
 
+class Affinity(Section):
+    """How like distributions count; see `nbv.recommendation.criteria.expected_error`."""
+
+    power: Annotated[Number, Field(gt=0, le=10**4)]
+    pseudo_observations: PseudoObservations
+
+
 class Recommendation(Section):
     """What travel costs; see `nbv.recommendation.lookup.least_cost_delta`."""
 
@@ -266,6 +273,7 @@ class Config(Section):
     sensor: Sensor
     estimator: Estimator
     density: Density
+    affinity: Affinity = Affinity(power=16, pseudo_observations=90)
     recommendation: Recommendation
     more_views: MoreViews
     transfer: Transfer

@@ -30,7 +30,9 @@ class Evidence:
     bandwidth_deg, pseudo_observations : float
         The density's settings.
     settings : mapping
-        The configuration's ``density``: what a criterion may be set by.
+        The configuration's ``density`` and ``affinity``: what a criterion may be set by.
+    distributions : ndarray (n_objects, n_views, B) float32, optional
+        p(azimuth | image) of calibration images, where the conditionals are made of them.
     made : dict
         What several criteria share, so that it is computed once; see `once`.
     """
@@ -40,6 +42,7 @@ class Evidence:
     bandwidth_deg: float
     pseudo_observations: float
     settings: Mapping[str, Any]
+    distributions: NDArray[np.float32] | None = None
     made: dict[Any, Table] = field(default_factory=dict, repr=False, compare=False)
 
     def once(self, key: Any, make: Callable[[], Table]) -> Table:
@@ -126,9 +129,9 @@ def gather_evidence(
 def posterior_evidence(calibration: Posteriors, settings: Mapping[str, Any]) -> Evidence:
     """Make evidence of a classifier's distributions of calibration images.
 
-    Bins are the classes. Nothing is smoothed, for the distributions are smooth already; without
-    calibration estimates no criterion in `nbv.recommendation.criteria.OF_ERRORS` is defined.
+    Bins are the classes. Nothing is smoothed, for the distributions are smooth already.
     """
     estimates = estimate_likelihood(calibration)
     pair = Conditionals(estimates.T / estimates.sum(axis=0)[:, None], estimates)
-    return Evidence(np.empty((0, len(estimates))), pair, np.nan, np.nan, settings)
+    views = calibration.distributions.astype(np.float32)
+    return Evidence(np.empty((0, len(estimates))), pair, np.nan, np.nan, settings, views)

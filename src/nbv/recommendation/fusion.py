@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -166,36 +167,55 @@ ESTIMATE_FUSIONS = tuple(name for name in FUSIONS if name not in OF_DISTRIBUTION
 
 
 def calibration_errors_deg(evidence: Evidence, fusion: str) -> NDArray[np.float32]:
-    """Return `rotation_errors_deg` (B, n_objects, B) of calibration views, one for each bin."""
-    step = evidence.estimate_deg.shape[1] // evidence.n_bins
-    views = evidence.estimate_deg[:, ::step]
+    """Return `rotation_errors_deg` (B, n_objects, B) of calibration views, one for each bin.
+
+    Raises
+    ------
+    ValueError
+        Where the fusion is of distributions and the evidence has none.
+    """
+    of_views = evidence.distributions if fusion in OF_DISTRIBUTIONS else evidence.estimate_deg
+    if of_views is None:
+        raise ValueError(f"fusion {fusion!r} needs evidence of distributions")
+    views = of_views[:, :: of_views.shape[1] // evidence.n_bins]
     return evidence.once(("errors", fusion), lambda: rotation_errors_deg(views, evidence, fusion))
 
 
 def rotation_errors_deg(
-    estimate_deg: Angles, evidence: Evidence, fusion: str
+    of_views: NDArray[np.floating[Any]], evidence: Evidence, fusion: str
 ) -> NDArray[np.float32]:
     """Return the error after every rotation from every view.
 
     Parameters
     ----------
-    estimate_deg : ndarray (n_objects, n_views)
-        View k of n has the azimuth 360 k / n; n is a multiple of the evidence's B.
+    of_views : ndarray (n_objects, n_views) or (n_objects, n_views, B)
+        What the fusion rule fuses: an estimate in degrees of each view, or a distribution. View k
+        of n has the azimuth 360 k / n; n is a multiple of the evidence's B.
     evidence : Evidence
         For the fusion rule.
     fusion : str
-        A name in `ESTIMATE_FUSIONS`.
+        A name in `FUSIONS`.
 
     Returns
     -------
     ndarray (B, n_objects, n_views) float32
         ``l[delta, object, view] = d(fuse(e(o, phi), e(o, phi + delta), delta), phi)``, degrees.
     """
-    n_bins, n_views = evidence.n_bins, estimate_deg.shape[1]
+    n_bins, n_views = evidence.n_bins, of_views.shape[1]
     azimuth_deg = np.arange(n_views) * (360.0 / n_views)
     shifts = np.arange(n_bins) * (n_views // n_bins)
-    delta_deg = (np.arange(n_bins) * (360.0 / n_bins))[:, None, None]
-    twice = np.concatenate([estimate_deg, estimate_deg], axis=1)
-    second = np.stack([twice[:, shift : shift + n_views] for shift in shifts])
-    fused = FUSIONS[fusion](estimate_deg, second, delta_deg, evidence)
+    delta_deg = np.arange(n_bins) * (360.0 / n_bins)
+    twice = np.concatenate([of_views, of_views], axis=1)
+    if fusion in OF_DISTRIBUTIONS:
+        # One rotation at a time: together they would be B times the distributions.
+        rotations = (np.full(of_views.shape[:2], delta) for delta in delta_deg)
+        fused = np.stack(
+            [
+                FUSIONS[fusion](of_views, twice[:, shift : shift + n_views], delta, evidence)
+                for shift, delta in zip(shifts, rotations, strict=True)
+            ]
+        )
+    else:
+        second = np.stack([twice[:, shift : shift + n_views] for shift in shifts])
+        fused = FUSIONS[fusion](of_views, second, delta_deg[:, None, None], evidence)
     return circular_distance_deg(fused, azimuth_deg).astype(np.float32)

@@ -13,12 +13,12 @@ from scipy import stats
 from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors
 from nbv.errors import UserError, nearest
-from nbv.recommendation.criteria import CRITERIA, OF_ERRORS
+from nbv.recommendation.criteria import CRITERIA, FOR_ESTIMATES
 from nbv.recommendation.density_selection import Choice, choose_densities, chosen_evidence
 from nbv.recommendation.evidence import Evidence, posterior_evidence
 from nbv.recommendation.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
 from nbv.recommendation.lookup import LookupTable, build_lookup
-from nbv.recommendation.policies import ORACLE, SINGLE, needs_lookup
+from nbv.recommendation.policies import ORACLE, POLICIES, SINGLE, needs_lookup
 
 SELECTED = "selected"
 """As a policy and a fusion: those of the pair that calibration objects favour."""
@@ -112,10 +112,10 @@ def _check_distributions(key: str, method: Mapping[str, Any], gives_distribution
             f"{key}.fusion={fusion}: this estimator gives no distributions of the azimuth; "
             "choose estimator=classifier, which does"
         )
-    if policy in (ORACLE, SELECTED, *OF_ERRORS):
+    if policy in (SELECTED, *FOR_ESTIMATES):
+        known = [name for name in POLICIES if name not in FOR_ESTIMATES]
         raise UserError(
-            f"{key}.policy={policy}: it is not defined for distributions; choose random, opposite, "
-            f"{', '.join(name for name in CRITERIA if name not in OF_ERRORS)}"
+            f"{key}.policy={policy}: it is not defined for distributions; choose {', '.join(known)}"
         )
 
 

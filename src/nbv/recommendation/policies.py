@@ -104,7 +104,10 @@ def _oracle(turns: Turns, fusion: str) -> Rotations:
     """
     if turns.evidence is None:
         raise ValueError("policy 'oracle' needs evidence")
-    errors = rotation_errors_deg(turns.estimate_deg, turns.evidence, fusion)
+    of_views = turns.estimate_deg if fusion not in OF_DISTRIBUTIONS else turns.distributions
+    if of_views is None:
+        raise ValueError(f"fusion {fusion!r} needs distributions")
+    errors = rotation_errors_deg(of_views, turns.evidence, fusion)
     by_view = errors.reshape(len(errors), -1).T
     return least_cost_delta(by_view).reshape(turns.estimate_deg.shape)
 

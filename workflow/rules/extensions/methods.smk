@@ -38,7 +38,7 @@ rule evaluate_extensions:
         methods=list(METHODS),
         extensions=EXTENSIONS,
         lookups=EXTENSION_LOOKUPS,
-        density=DECISION,
+        density=EXTENSION_DECISION,
         seed=CONFIG["seed"],
     script:
         f"{SCRIPTS}/evaluate_extensions.py"

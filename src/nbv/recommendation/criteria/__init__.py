@@ -50,7 +50,10 @@ FOR_A_FUSION = frozenset({"expected_error", "fixed"})
 """Criteria that depend on the fusion rule and are of one estimator; the others serve all rules."""
 
 OF_ERRORS = frozenset({"bayes_error", *FOR_A_FUSION})
-"""Criteria in degrees: they need calibration estimates."""
+"""Criteria in degrees."""
+
+FOR_ESTIMATES = frozenset({"bayes_error"})
+"""Criteria that need calibration estimates and are not defined for distributions of images."""
 
 FOR_MORE_VIEWS = ("information_gain", "expected_dispersion", "bayes_error")
 """Criteria that are defined after any number of views."""

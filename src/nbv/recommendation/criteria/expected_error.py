@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +11,10 @@ from nbv.angles import nearest_bin
 from nbv.calibration.density import von_mises_kernel
 from nbv.recommendation.belief import Belief
 from nbv.recommendation.evidence import Evidence, Table
-from nbv.recommendation.fusion import calibration_errors_deg
+from nbv.recommendation.fusion import OF_DISTRIBUTIONS, calibration_errors_deg
+
+# Beliefs whose weights are in memory at once.
+_CHUNK = 1024
 
 
 def kernel_weights(evidence: Evidence) -> NDArray[np.float64]:
@@ -25,41 +30,81 @@ def kernel_weights(evidence: Evidence) -> NDArray[np.float64]:
     return np.asarray(kernel[(np.arange(n_bins)[:, None] - bins) % n_bins])
 
 
-def first_estimate_bins(belief: Belief, evidence: Evidence) -> NDArray[np.intp]:
-    """Return the bins of the first estimates, all that errors of two views depend on.
+def affinity(one: Table, other: Table) -> Table:
+    """Return the affinity of every pair of distributions (n, B) and (m, B), (n, m) in [0, 1].
 
-    Raises
-    ------
-    ValueError
-        After more than one view, without an estimate, or where another estimator takes the next
-        view: nothing is known of the error there.
+    ``sum_theta sqrt(b(theta) c(theta))``, the Bhattacharyya coefficient: 1 where the two are
+    equal, 0 where one excludes the other (Bhattacharyya, 1943).
     """
-    if belief.first_bin is None or belief.n_views != 1 or belief.evidence is not evidence:
-        raise ValueError("errors of two views need one first estimate by the same estimator")
-    return belief.first_bin
+    return np.asarray(np.sqrt(one) @ np.sqrt(other).T)
+
+
+def need_first_view(belief: Belief, evidence: Evidence) -> None:
+    """Raise ValueError unless the belief is of one view by the estimator of the evidence.
+
+    Of other beliefs nothing is known about the error of two views.
+    """
+    if belief.n_views != 1 or belief.evidence is not evidence:
+        raise ValueError("errors of two views need one first view by the same estimator")
 
 
 def expected_error(belief: Belief, evidence: Evidence, fusion: str) -> Table:
-    """Return a kernel regression of the error on the first estimate, for each rotation.
+    """Return a kernel regression of the error on the first view, for each rotation.
 
     For each calibration object o and view phi (one for each bin) the error of the rotation delta is
-    ``l(o, phi, delta) = d(fuse(e(o, phi), e(o, phi + delta), delta), phi)``. It does not take views
-    of one object as independent. Each row is shrunk towards the mean over all estimates by
-    pseudo-observations, so that where little is known the best fixed rotation is taken
-    (docs/method.md).
+    ``l(o, phi, delta) = d(fuse(x(o, phi), x(o, phi + delta), delta), phi)``, where x is what the
+    fusion rule fuses. Views count by their likeness with the first view: estimates by a von Mises
+    kernel of the density's bandwidth in their distance, distributions by their `affinity` to the
+    power ``affinity.power``. Pseudo-observations shrink the mean towards that over all views, so
+    that where little is known the best fixed rotation is taken. Nothing is assumed about the
+    independence of views of one object (docs/method.md).
 
-    Parameters as in `nbv.recommendation.criteria`; `belief` is of one estimate by the estimator of
+    Parameters as in `nbv.recommendation.criteria`; `belief` is of one view by the estimator of
     `evidence`, or ValueError is raised. A is in degrees.
     """
-    bins = first_estimate_bins(belief, evidence)
-    return evidence.once(("regression", fusion), lambda: _regression(evidence, fusion))[bins]
+    need_first_view(belief, evidence)
+    if fusion in OF_DISTRIBUTIONS:
+        return _regression_on_distributions(belief, evidence, fusion)
+    if belief.first_bin is None:
+        raise ValueError(f"fusion {fusion!r} needs a first estimate")
+    table = evidence.once(("regression", fusion), lambda: _regression(evidence, fusion))
+    return table[belief.first_bin]
 
 
 def _regression(evidence: Evidence, fusion: str) -> Table:
     n_bins = evidence.n_bins
     errors = calibration_errors_deg(evidence, fusion).reshape(n_bins, -1)
-    weights = kernel_weights(evidence)
     # A row of 360 is what pseudo-observations are counted in, as in the densities.
-    alpha = max(evidence.pseudo_observations * 360.0 / n_bins, np.finfo(float).tiny)
+    alpha = evidence.pseudo_observations * 360.0 / n_bins
+    return _shrunk(kernel_weights(evidence), errors, alpha)
+
+
+def _regression_on_distributions(belief: Belief, evidence: Evidence, fusion: str) -> Table:
+    n_bins = evidence.n_bins
+    errors = calibration_errors_deg(evidence, fusion).reshape(n_bins, -1)
+    views, settings = evidence.distributions, evidence.settings["affinity"]
+    if views is None:
+        raise ValueError(f"fusion {fusion!r} needs evidence of distributions")
+    step = views.shape[1] // n_bins
+    calibration = views[:, ::step].reshape(-1, n_bins)
+    rows = belief.probabilities
+    costs = [
+        _shrunk(
+            step * affinity(rows[start : start + _CHUNK], calibration) ** settings["power"],
+            errors,
+            settings["pseudo_observations"],
+        )
+        for start in range(0, len(rows), _CHUNK)
+    ]
+    return np.concatenate(costs)
+
+
+def _shrunk(weights: NDArray[np.floating[Any]], errors: Table, alpha: float) -> Table:
+    """Return the weighted mean error of each rotation (n, B), shrunk by alpha pseudo-observations.
+
+    `weights` are (n, n_views), `errors` (B, n_views).
+    """
+    alpha = max(alpha, np.finfo(float).tiny)
     total = weights.astype(np.float32) @ errors.T + np.float32(alpha) * errors.mean(axis=1)
-    return np.asarray(total / (weights.sum(axis=1) + alpha)[:, None], dtype=np.float32)
+    of_all = weights.sum(axis=1, dtype=np.float64) + alpha
+    return np.asarray(total / of_all[:, None], dtype=np.float32)

@@ -1,11 +1,11 @@
-"""One rotation for every estimate: the best on calibration objects."""
+"""One rotation for every first view: the best on calibration objects."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from nbv.recommendation.belief import Belief
-from nbv.recommendation.criteria.expected_error import first_estimate_bins
+from nbv.recommendation.criteria.expected_error import need_first_view
 from nbv.recommendation.evidence import Evidence, Table
 from nbv.recommendation.fusion import calibration_errors_deg
 
@@ -16,6 +16,7 @@ def fixed(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     What `nbv.recommendation.criteria.expected_error.expected_error` tends to with ever more
     pseudo-observations; parameters, errors and unit as there.
     """
+    need_first_view(belief, evidence)
     errors = calibration_errors_deg(evidence, fusion)
     mean = errors.reshape(evidence.n_bins, -1).mean(axis=1)
-    return np.tile(mean, (len(first_estimate_bins(belief, evidence)), 1)).astype(np.float32)
+    return np.tile(mean, (len(belief.probabilities), 1)).astype(np.float32)
