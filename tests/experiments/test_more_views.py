@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from tests.recommendation.made import EXTENSIONS, FEW_DENSITIES, objects
 
+from nbv.angles import circular_distance_deg
+from nbv.calibration.posteriors import Posteriors
 from nbv.experiments.extensions import choices_frame, stored_evidence
 from nbv.experiments.more_views import more_views_rows
+from nbv.recommendation.evidence import posterior_evidence
 from nbv.recommendation.method_selection import select_methods
 
 SETTINGS = {"n_views": 4, "start_every_deg": 60, "min_separation_deg": 15}
@@ -42,3 +45,45 @@ def test_two_errors_have_two_names_and_the_pose_ambiguity_is_of_two_views_alone(
         "information_gain",
         "bayes_error",
     }
+
+
+N_CLASSES = 36
+AFFINITY = {"affinity": {"power": 8, "pseudo_observations": 90, "caution": 2.0}}
+
+
+def half_turned(n_objects, seed):
+    """Distributions with two peaks half a turn apart, but for a quarter that knows the truth."""
+    rng = np.random.default_rng(seed)
+    truth, centres = np.arange(360.0), np.arange(N_CLASSES) * 360 / N_CLASSES
+    answer = truth + rng.normal(0, 4, (n_objects, 360))
+    peak = np.exp(20 * (np.cos(np.radians(centres - answer[..., None])) - 1))
+    other = np.roll(peak, N_CLASSES // 2, axis=-1)
+    blind = (circular_distance_deg(truth, 90) > 45)[:, None]
+    p = np.where(blind, peak + rng.uniform(0.5, 2, (n_objects, 360, 1)) * other, peak) + 1e-6
+    return Posteriors(
+        tuple(f"{seed}-{k}" for k in range(n_objects)),
+        np.log(p / p.sum(axis=-1, keepdims=True)),
+        1.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def products():
+    calibration, test = half_turned(8, 0), half_turned(4, 2)
+    choices = choices_frame(select_methods(objects(6, 0), EXTENSIONS, FEW_DENSITIES))
+    evidences = stored_evidence(objects(6, 0), choices, FEW_DENSITIES)
+    evidence = posterior_evidence(calibration, AFFINITY)
+    estimates = objects(4, 2)
+    rng = np.random.default_rng(0)
+    return more_views_rows(estimates, evidences, SETTINGS, rng, test, evidence)
+
+
+def test_with_distributions_every_number_of_views_has_a_spacing(products):
+    means = products.groupby(["method", "n_views"])[["error_deg", "travel_deg"]].mean()
+    for n_views in (2, 3, 4):
+        chosen = means.loc[("expected_error_product", n_views)]
+        even = means.loc[("evenly_spaced_product", n_views)]
+        assert chosen["travel_deg"] <= even["travel_deg"]
+        assert chosen["error_deg"] <= even["error_deg"] + 1.0
+    two = means.xs(2, level="n_views")["error_deg"]
+    assert two["expected_error_product"] < 0.5 * two["random_product"]

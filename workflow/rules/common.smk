@@ -209,6 +209,15 @@ def paths(path, keys):
     return [path(*key) for key in keys]
 
 
+def posteriors_of_fold():
+    """The files of images' distributions by name, where the estimator gives them."""
+    if not CONFIG["gives_distributions"]:
+        return {}
+    return {
+        f"{role}_posteriors": LAYOUT.posteriors(*FOLD, role) for role in ESTIMATED_ROLES
+    }
+
+
 # What a training starts from.
 
 

@@ -84,11 +84,7 @@ rule estimate:
         estimator=rules.train.output[0],
         of_parts=[LAYOUT.part_estimator(*FOLD, part) for part in PARTS],
     output:
-        **{
-            f"{role}_posteriors": LAYOUT.posteriors(*FOLD, role)
-            for role in ("calibration", "test")
-            if CONFIG["gives_distributions"]
-        },
+        **posteriors_of_fold(),
         calibration=LAYOUT.estimates(*FOLD, "calibration"),
         test=LAYOUT.estimates(*FOLD, "test"),
     log:

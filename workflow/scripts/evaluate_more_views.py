@@ -4,20 +4,26 @@ from nbv.jobs import job
 
 with job(snakemake):
     from nbv.calibration.estimates import read_estimates
+    from nbv.calibration.posteriors import read_posteriors
     from nbv.calibration.splits import need_role, read_splits
     from nbv.experiments.extensions import stored_evidence
     from nbv.experiments.more_views import more_views_rows
     from nbv.files import read_csv, write_csv
+    from nbv.recommendation.evidence import posterior_evidence
     from nbv.seeds import rng_for
 
-    params, wildcards = snakemake.params, snakemake.wildcards
-    splits = read_splits(snakemake.input.splits)
-    calibration, test = (read_estimates(snakemake.input[r]) for r in ("calibration", "test"))
+    params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
+    splits, products = read_splits(given.splits), {}
+    calibration, test = (read_estimates(given[role]) for role in ("calibration", "test"))
     need_role(splits, int(wildcards.fold), "calibration", calibration.object_ids)
     need_role(splits, int(wildcards.fold), "test", test.object_ids)
-    choices = read_csv(snakemake.input.choices)
+    choices = read_csv(given.choices)
     evidences = stored_evidence(calibration, choices, params.density)
     # The label decides the draws of random views: it stays as it was.
     rng = rng_for(params.seed, "sequence", *wildcards)
-    rows = more_views_rows(test, evidences, params.more_views, rng)
+    if path := given.get("calibration_posteriors"):
+        held_out = read_posteriors(path, calibration.object_ids)
+        products["of_distributions"] = posterior_evidence(held_out, params.density)
+        products["posteriors"] = read_posteriors(given.test_posteriors, test.object_ids)
+    rows = more_views_rows(test, evidences, params.more_views, rng, **products)
     write_csv(snakemake.output[0], rows)

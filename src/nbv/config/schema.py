@@ -199,6 +199,7 @@ class Affinity(Section):
 
     power: Annotated[Number, Field(gt=0, le=10**4)]
     pseudo_observations: PseudoObservations
+    caution: Annotated[Number, Field(ge=0, le=100), "in standard errors"] = 2.0
 
 
 class Recommendation(Section):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,14 @@ from numpy.typing import NDArray
 
 from nbv.angles import circular_distance_deg, travel_deg
 from nbv.calibration.estimates import Estimates
-from nbv.recommendation.belief import first_belief, mean_direction_deg, updated
+from nbv.calibration.posteriors import Posteriors
+from nbv.recommendation.belief import (
+    Belief,
+    first_belief,
+    mean_direction_deg,
+    multiplied,
+    updated,
+)
 from nbv.recommendation.criteria import FOR_MORE_VIEWS
 from nbv.recommendation.evidence import Evidence
 from nbv.recommendation.next_views import (
@@ -22,14 +30,78 @@ from nbv.recommendation.next_views import (
     random_next,
     recommended_next,
 )
+from nbv.recommendation.spacing import spaced_next
 
 COLUMNS = ("method", "n_views", "object_id", "error_deg", "travel_deg")
+
+Indices = NDArray[np.intp] | NDArray[np.int64]
+
+
+class Views(Protocol):
+    """What is seen of n objects from each of their azimuths, and how beliefs come of it."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of objects and of azimuths, then what else there is."""
+
+    def first(self, objects: Indices, azimuths: Indices) -> Belief:
+        """Return the beliefs after first views."""
+
+    def further(
+        self, belief: Belief, objects: Indices, azimuths: Indices, delta_deg: NDArray[np.int64]
+    ) -> Belief:
+        """Return the beliefs after one view more, `delta_deg` from the first one."""
+
+
+@dataclass(frozen=True)
+class EstimatedViews:
+    """Estimates (n_objects, n_views) in degrees, fused by posterior with the evidence."""
+
+    estimate_deg: NDArray[np.float64]
+    evidence: Evidence
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """See `Views`."""
+        return self.estimate_deg.shape
+
+    def first(self, objects: Indices, azimuths: Indices) -> Belief:
+        """Return V[e] of each first estimate."""
+        return first_belief(self.estimate_deg[objects, azimuths], self.evidence)
+
+    def further(
+        self, belief: Belief, objects: Indices, azimuths: Indices, delta_deg: NDArray[np.int64]
+    ) -> Belief:
+        """Return `nbv.recommendation.belief.updated`."""
+        return updated(belief, self.estimate_deg[objects, azimuths], delta_deg, self.evidence)
+
+
+@dataclass(frozen=True)
+class DistributionViews:
+    """Distributions (n_objects, n_views, B), fused by product; n_views is a multiple of B."""
+
+    distributions: NDArray[np.float64]
+    evidence: Evidence
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """See `Views`."""
+        return self.distributions.shape
+
+    def first(self, objects: Indices, azimuths: Indices) -> Belief:
+        """Return what the first images say."""
+        return Belief(self.distributions[objects, azimuths].astype(np.float32), self.evidence)
+
+    def further(
+        self, belief: Belief, objects: Indices, azimuths: Indices, delta_deg: NDArray[np.int64]
+    ) -> Belief:
+        """Return `nbv.recommendation.belief.multiplied`."""
+        return multiplied(belief, self.distributions[objects, azimuths], delta_deg)
 
 
 def follow(
     policy: NextView,
-    test: Estimates,
-    evidence: Evidence,
+    views: Views,
     *,
     n_views: int,
     start_every: int,
@@ -41,10 +113,8 @@ def follow(
     ----------
     policy : callable
         Chooses every next view.
-    test : Estimates
-        360 views an object.
-    evidence : Evidence
-        360 bins; for the beliefs.
+    views : Views
+        Of test objects, 360 an object.
     n_views : int
         Views in all.
     start_every : int
@@ -57,19 +127,17 @@ def follow(
     ndarray (2, n_objects, n_starts, n_views)
         Error and total travel after each view, degrees.
     """
-    estimate_deg = test.estimate_deg
-    n_objects, n_azimuths = estimate_deg.shape
+    n_objects, n_azimuths = views.shape[:2]
     starts = np.tile(np.arange(0, n_azimuths, start_every), n_objects)
     objects = np.repeat(np.arange(n_objects), len(starts) // n_objects)
-    belief = first_belief(estimate_deg[objects, starts], evidence)
+    belief = views.first(objects, starts)
     taken = np.zeros((len(objects), 1), dtype=np.int64)
     travelled = np.zeros(len(objects))
     reached = np.empty((2, len(objects), n_views))
     for view in range(n_views):
         if view:
             delta = policy(belief, taken, rng)
-            seen = estimate_deg[objects, (starts + delta) % n_azimuths]
-            belief = updated(belief, seen, delta, evidence)
+            belief = views.further(belief, objects, (starts + delta) % n_azimuths, delta)
             travelled = travelled + travel_deg(delta - taken[:, -1])
             taken = np.column_stack([taken, delta])
         pose_deg = mean_direction_deg(belief.probabilities)
@@ -83,6 +151,8 @@ def more_views_rows(
     evidences: Mapping[str, Callable[[int], Evidence]],
     settings: Mapping[str, Any],
     rng: np.random.Generator,
+    posteriors: Posteriors | None = None,
+    of_distributions: Evidence | None = None,
 ) -> pd.DataFrame:
     """Return error and travel of every policy, after each number of views, object by object.
 
@@ -96,6 +166,9 @@ def more_views_rows(
     settings : mapping
         The configuration's ``more_views``: ``n_views, start_every_deg, min_separation_deg``.
     rng : numpy.random.Generator
+    posteriors, of_distributions : optional
+        The test objects' distributions, and evidence of those of calibration objects: policies with
+        the fusion ``product`` are added.
 
     Returns
     -------
@@ -103,28 +176,39 @@ def more_views_rows(
         Columns `COLUMNS`: means over first views. Travel goes from view to view, the shorter way.
     """
     rows: list[pd.DataFrame] = []
+    every = range(1, settings["n_views"] + 1)
+    apart_deg = settings["min_separation_deg"]
 
-    def add(method: str, policy: NextView, name: str, views: Sequence[int]) -> None:
+    def add(method: str, policy: NextView, views: Views, numbers: Sequence[int]) -> None:
         reached = follow(
             policy,
-            test,
-            evidences[name](test.estimate_deg.shape[1]),
-            n_views=views[-1],
+            views,
+            n_views=numbers[-1],
             start_every=settings["start_every_deg"],
             rng=rng,
         ).mean(axis=2)
-        for n in views:
+        for n in numbers:
             values = (method, n, test.object_ids, *reached[:, :, n - 1])
             rows.append(pd.DataFrame(dict(zip(COLUMNS, values, strict=True))))
 
-    every = range(1, settings["n_views"] + 1)
-    add("random", random_next, "random", every)
-    add("bisecting", bisecting_next, "opposite", every)
+    def of(name: str) -> Views:
+        return EstimatedViews(test.estimate_deg, evidences[name](test.estimate_deg.shape[1]))
+
+    add("random", random_next, of("random"), every)
+    add("bisecting", bisecting_next, of("opposite"), every)
     for last in every:
-        add("evenly_spaced", evenly_spaced_next(last), "opposite", [last])
+        add("evenly_spaced", evenly_spaced_next(last), of("opposite"), [last])
     for criterion in FOR_MORE_VIEWS:
         if criterion in evidences:
             coarse = evidences[criterion](COARSE_BINS)
-            policy = recommended_next(criterion, coarse, settings["min_separation_deg"])
-            add(criterion, policy, criterion, every)
+            add(criterion, recommended_next(criterion, coarse, apart_deg), of(criterion), every)
+    if posteriors is not None and of_distributions is not None:
+        seen = DistributionViews(posteriors.distributions, of_distributions)
+        by_gain = recommended_next("information_gain", of_distributions, apart_deg)
+        add("random_product", random_next, seen, every)
+        add("information_gain_product", by_gain, seen, every)
+        for last in every:
+            add("evenly_spaced_product", evenly_spaced_next(last), seen, [last])
+            spaced = spaced_next(of_distributions, last, apart_deg)
+            add("expected_error_product", spaced, seen, [last])
     return pd.concat(rows, ignore_index=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import circular_distance_deg, direction_deg, midpoint_deg, nearest_bin, wrap_deg
-from nbv.recommendation.belief import mean_direction_deg
+from nbv.recommendation.belief import mean_direction_deg, product_of
 from nbv.recommendation.evidence import Evidence
 
 Angles = NDArray[np.float64]
@@ -148,13 +148,11 @@ def product(
         each other.
     """
     delta = np.asarray(delta_deg)
-    n_bins = np.shape(first)[-1]
-    seen = (np.arange(n_bins) + nearest_bin(delta, n_bins).reshape(-1, 1)) % n_bins
-    own = np.asarray(first, dtype=np.float64).reshape(-1, n_bins)
-    other = np.asarray(second, dtype=np.float64).reshape(-1, n_bins)
-    both = own * np.take_along_axis(other, seen, axis=1)
-    both = np.where(both.sum(axis=1, keepdims=True) > 0, both, own)
-    return mean_direction_deg(both).reshape(delta.shape)
+    own, other = (
+        np.asarray(rows, dtype=np.float64).reshape(-1, np.shape(rows)[-1])
+        for rows in (first, second)
+    )
+    return mean_direction_deg(product_of(own, other, delta)).reshape(delta.shape)
 
 
 Fusion = Callable[[ArrayLike, ArrayLike, ArrayLike, Evidence | None], Angles]

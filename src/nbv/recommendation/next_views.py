@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.angles import circular_distance_deg
+from nbv.angles import circular_distance_deg, nearest_bin
 from nbv.recommendation.belief import Belief, coarser
 from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.evidence import Evidence
@@ -52,11 +52,12 @@ def recommended_next(criterion: str, coarse: Evidence, min_separation_deg: float
 
 
 def random_next(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
-    """Return a whole degree from which no view was taken, all equally likely."""
-    free = np.ones((len(taken_deg), 360), dtype=bool)
-    np.put_along_axis(free, taken_deg, values=False, axis=1)
+    """Return the centre of a bin from which no view was taken, all equally likely."""
+    n_bins = belief.probabilities.shape[1]
+    free = np.ones((len(taken_deg), n_bins), dtype=bool)
+    np.put_along_axis(free, nearest_bin(taken_deg, n_bins), values=False, axis=1)
     drawn = np.where(free, rng.random(free.shape), -1.0)
-    return np.asarray(drawn.argmax(axis=1), dtype=np.int64)
+    return np.asarray(drawn.argmax(axis=1) * (360 // n_bins), dtype=np.int64)
 
 
 def bisecting_next(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
@@ -66,11 +67,12 @@ def bisecting_next(belief: Belief, taken_deg: Rotations, rng: np.random.Generato
 
 
 def evenly_spaced_next(n_views: int) -> NextView:
-    """Return the policy that takes the next of `n_views` views spaced evenly."""
+    """Return the policy that takes the next of `n_views` views spaced evenly, to the bin."""
 
     def next_view(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
         n, taken = taken_deg.shape
-        return np.full(n, round(taken * 360 / n_views), dtype=np.int64)
+        n_bins = belief.probabilities.shape[1]
+        return np.full(n, round(taken * n_bins / n_views) * (360 // n_bins), dtype=np.int64)
 
     return next_view
 

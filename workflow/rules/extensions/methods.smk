@@ -10,11 +10,7 @@ EXTENSION_LOOKUPS = [
 rule evaluate_extensions:
     input:
         sources("evaluate_extensions"),
-        **{
-            f"{role}_posteriors": rules.estimate.output[f"{role}_posteriors"]
-            for role in ("calibration", "test")
-            if CONFIG["gives_distributions"]
-        },
+        **posteriors_of_fold(),
         splits=rules.splits.output[0],
         calibration=rules.estimate.output.calibration,
         test=rules.estimate.output.test,

@@ -4,6 +4,7 @@
 rule evaluate_more_views:
     input:
         sources("evaluate_more_views"),
+        **posteriors_of_fold(),
         splits=rules.splits.output[0],
         calibration=rules.estimate.output.calibration,
         test=rules.estimate.output.test,
@@ -20,7 +21,7 @@ rule evaluate_more_views:
         mem_mb=per_attempt(2000),
         runtime=per_attempt(10),
     params:
-        density=DECISION,
+        density=EXTENSION_DECISION,
         more_views=CONFIG["more_views"],
         seed=CONFIG["seed"],
     script:

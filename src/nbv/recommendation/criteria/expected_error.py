@@ -13,8 +13,8 @@ from nbv.recommendation.belief import Belief
 from nbv.recommendation.evidence import Evidence, Table
 from nbv.recommendation.fusion import OF_DISTRIBUTIONS, calibration_errors_deg
 
-# Beliefs whose weights are in memory at once.
-_CHUNK = 1024
+BELIEFS_AT_ONCE = 1024
+"""How many beliefs are weighed at once, to bound the memory."""
 
 
 def kernel_weights(evidence: Evidence) -> NDArray[np.float64]:
@@ -90,11 +90,12 @@ def _regression_on_distributions(belief: Belief, evidence: Evidence, fusion: str
     rows = belief.probabilities
     costs = [
         _shrunk(
-            step * affinity(rows[start : start + _CHUNK], calibration) ** settings["power"],
+            step
+            * affinity(rows[start : start + BELIEFS_AT_ONCE], calibration) ** settings["power"],
             errors,
             settings["pseudo_observations"],
         )
-        for start in range(0, len(rows), _CHUNK)
+        for start in range(0, len(rows), BELIEFS_AT_ONCE)
     ]
     return np.concatenate(costs)
 

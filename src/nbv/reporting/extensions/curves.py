@@ -17,6 +17,7 @@ from nbv.reporting.style import RC, method_style, new_figure
 from nbv.reporting.table import Table
 
 _COLUMNS = 3
+_PRODUCT = "_product"
 _BASELINES: Mapping[str, str] = {
     "random": "random",
     "bisecting": "opposite",
@@ -45,7 +46,12 @@ def _grid(n_panels: int, height_in: float = 2.9) -> tuple[Figure, list[Axes]]:
 
 def _legend(figure: Figure, panels: list[Axes]) -> None:
     """Write the legend below, as wide as the panels are and as high as it has to be."""
-    handles, labels = panels[0].get_legend_handles_labels()
+    named = {
+        label: handle
+        for axes in panels
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    labels, handles = list(named), list(named.values())
     n_columns = min(len(panels), _COLUMNS) + 1
     figure.set_figheight(figure.get_figheight() + 0.2 * (-(-len(labels) // n_columns) - 2))
     figure.legend(handles, labels, loc="outside lower center", ncols=n_columns)
@@ -53,16 +59,18 @@ def _legend(figure: Figure, panels: list[Axes]) -> None:
 
 @mpl.rc_context(RC)
 def more_views_figure(cells: pd.DataFrame) -> Figure:
-    """Draw the cells of `more_views.more_views_table`, a panel for each category."""
-    categories = list(dict.fromkeys(cells["category"]))
-    methods = tuple(dict.fromkeys(cells["method"]))
-    figure, panels = _grid(len(categories))
-    for axes, category in zip(panels, categories, strict=True):
-        part = cells[cells["category"] == category]
-        for method in methods:
-            curve = part[part["method"] == method]
-            _draw(axes, curve["n_views"], curve["value"], method, methods)
-        axes.set_title(category_label(category))
+    """Draw the cells of `more_views.more_views_table`, a panel for each category and fusion."""
+    by_product = cells["method"].str.endswith(_PRODUCT)
+    drawn = cells.assign(by_product=by_product, policy=cells["method"].str.removesuffix(_PRODUCT))
+    policies = tuple(dict.fromkeys(drawn["policy"]))
+    parts = list(drawn.groupby(["by_product", "category"], sort=False))
+    figure, panels = _grid(len(parts))
+    for axes, ((product, category), part) in zip(panels, parts, strict=True):
+        for policy, curve in part.groupby("policy", sort=False):
+            _draw(axes, curve["n_views"], curve["value"], str(policy), policies)
+        fusion = "product" if product else "posterior"
+        shown = f" (fused by {fusion})" if by_product.any() else ""
+        axes.set_title(category_label(str(category)) + shown)
         axes.set_xticks(sorted(part["n_views"].unique()))
         axes.set_ylim(bottom=0)
         axes.set_xlabel("Number of views")

@@ -44,10 +44,17 @@ def more_views_table(rows_by_category: Mapping[str, pd.DataFrame], resampler: Re
             printed.append((*row, last))
     header = ("Policy", *(f"{n} view{'s' if n > 1 else ''}" for n in views), "3 views − Random's 4")
     notes = (
-        "MAE in degrees [mean travel from view to view]; all fused by posterior.",
+        f"MAE in degrees [mean travel from view to view]; {_fusions(rows_by_category)}.",
         "Last column: paired by object, 95 % interval; bold where three views of this policy are "
         "better than four at random and the interval excludes 0.",
         "Evenly spaced knows the number of views before the first view; its last one is shown.",
     )
     title = "Error and travel against the number of views"
     return Table("more_views", title, title, pd.DataFrame(cells), header, tuple(printed), notes)
+
+
+def _fusions(rows_by_category: Mapping[str, pd.DataFrame]) -> str:
+    methods = {method for rows in rows_by_category.values() for method in rows["method"]}
+    if any(method.endswith("_product") for method in methods):
+        return "fused by posterior, or by product where the policy's name says so"
+    return "all fused by posterior"
