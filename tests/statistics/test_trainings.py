@@ -1,0 +1,129 @@
+"""Intervals over objects and trainings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from nbv.statistics.trainings import Mean, crossed_mean, holm, pooled_mean
+
+
+def simulated(rng, n_trainings, n_objects, of_training=0.1, remainder=1.0):
+    """Differences of mean 0, skewed over objects as errors are, with an effect of each training."""
+
+    def skewed(shape):
+        return (rng.gamma(0.5, 1.0, shape) - 0.5) / np.sqrt(0.5)
+
+    return (
+        skewed((1, n_objects))
+        + of_training * rng.standard_normal((n_trainings, 1))
+        + remainder * skewed((n_trainings, n_objects))
+    )
+
+
+@pytest.mark.parametrize("n_objects", [15, 50, 125])
+@pytest.mark.parametrize("of_training", [0.0, 0.1, 0.3])
+def test_intervals_cover_the_truth_about_as_often_as_they_say(n_objects, of_training):
+    """95 %, on skewed errors; intervals over the objects of one training do not."""
+    rng, n = np.random.default_rng(0), 1500
+    both = alone = 0
+    for _ in range(n):
+        table = simulated(rng, 5, n_objects, of_training)
+        found = crossed_mean(table).interval()
+        both += found.low <= 0 <= found.high
+        one = crossed_mean(table[:1]).interval()
+        alone += one.low <= 0 <= one.high
+    assert 0.91 <= both / n <= 0.98
+    if of_training == 0.3:
+        assert alone / n < 0.9
+
+
+def test_the_variance_is_that_of_the_mean_over_new_objects_and_trainings():
+    """Without bias: the mean of what is estimated is the variance of the estimates."""
+    rng = np.random.default_rng(1)
+    found = [crossed_mean(simulated(rng, 4, 30, 0.3)) for _ in range(4000)]
+    variance = np.var([mean.value for mean in found])
+    assert np.mean([mean.variance for mean in found]) == pytest.approx(variance, rel=0.1)
+    assert pytest.approx(variance, rel=0.1) == 1 / 30 + 0.3**2 / 4 + 1 / 120
+
+
+@given(st.integers(2, 30), st.integers(0, 999))
+def test_one_training_gives_students_interval_over_objects(n_objects, seed):
+    values = np.random.default_rng(seed).normal(1.0, 2.0, n_objects)
+    found = crossed_mean(values[None]).interval()
+    low, high = stats.t.interval(0.95, n_objects - 1, loc=values.mean(), scale=stats.sem(values))
+    assert (found.low, found.high) == (pytest.approx(low), pytest.approx(high))
+    expected = stats.ttest_1samp(values, 0.0).pvalue
+    assert crossed_mean(values[None]).p_value == pytest.approx(expected)
+
+
+@given(st.integers(2, 6), st.integers(2, 20), st.floats(0.1, 9.0), st.integers(0, 99))
+def test_scale_order_and_sign_change_nothing_else(n_trainings, n_objects, factor, seed):
+    rng = np.random.default_rng(seed)
+    table = rng.normal(1, 1, (n_trainings, n_objects))
+    mean = crossed_mean(table)
+    shuffled = rng.permutation(rng.permutation(table, axis=0), axis=1)
+    for other, scale in ((shuffled, 1.0), (factor * table, factor), (-table, -1.0)):
+        found = crossed_mean(other)
+        assert found.value == pytest.approx(scale * mean.value)
+        assert found.variance == pytest.approx(scale**2 * mean.variance)
+        assert found.degrees_of_freedom == pytest.approx(mean.degrees_of_freedom)
+
+
+def test_the_same_errors_in_every_training_leave_the_objects_alone():
+    of_objects = np.random.default_rng(0).normal(0, 1, 20)
+    found, alone = crossed_mean(np.tile(of_objects, (5, 1))), crossed_mean(of_objects[None])
+    assert found.variance == pytest.approx(alone.variance)
+    assert found.degrees_of_freedom == pytest.approx(alone.degrees_of_freedom)
+
+
+def test_nothing_that_varies_is_sure():
+    assert crossed_mean(np.zeros((3, 4))).p_value == 1.0
+    same = crossed_mean(np.full((3, 4), 2.0))
+    assert same.p_value == 0.0
+    assert (same.interval().low, same.interval().high) == (2.0, 2.0)
+
+
+def test_one_object_says_nothing_about_others():
+    assert np.isnan(crossed_mean([[1.0], [2.0]]).variance)
+
+
+@pytest.mark.parametrize("values", [[], [1.0, 2.0], [[np.nan, 1.0]], [[]]])
+def test_what_is_no_table_of_finite_values_is_refused(values):
+    with pytest.raises(ValueError, match="needs a finite value"):
+        crossed_mean(values)
+
+
+def test_categories_are_pooled_by_their_objects():
+    rng = np.random.default_rng(0)
+    tables = [rng.normal(1, 1, (3, n)) for n in (10, 30)]
+    found = pooled_mean([crossed_mean(table) for table in tables])
+    assert found.value == pytest.approx(np.concatenate([t.mean(axis=0) for t in tables]).mean())
+    parts = [crossed_mean(table) for table in tables]
+    assert found.variance == pytest.approx(parts[0].variance / 16 + parts[1].variance * 9 / 16)
+    assert (found.n_objects, found.n_trainings) == (40, 3)
+    alone = pooled_mean(parts[:1])
+    assert alone == Mean(
+        parts[0].value,
+        pytest.approx(parts[0].variance),
+        pytest.approx(parts[0].degrees_of_freedom),
+        10,
+        3,
+    )
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
+def test_holm_rejects_what_the_step_down_rule_rejects(values):
+    p_values = {str(place): value for place, value in enumerate(values)}
+    adjusted = holm(p_values)
+    assert list(adjusted) == list(p_values)
+    for level in (0.01, 0.05, 0.5):
+        rejected, ordered = set(), sorted(p_values, key=lambda name: p_values[name])
+        for place, name in enumerate(ordered):
+            if p_values[name] * (len(ordered) - place) > level:
+                break
+            rejected.add(name)
+        assert {name for name in adjusted if adjusted[name] <= level} == rejected
