@@ -146,9 +146,9 @@ def spaced_next(evidence: Evidence, n_views: int, min_separation_deg: float) -> 
 
     def next_view(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
         if taken_deg.shape[1] > 1:
-            return (taken_deg[:, -1] + taken_deg[:, 1]) % 360
+            return np.asarray((taken_deg[:, -1] + taken_deg[:, 1]) % 360)
         excess = excess_of_spacings(belief, evidence, n_views, spacings, caution)
         chosen = spacings[excess.argmin(axis=1)] % evidence.n_bins
-        return np.rint(chosen * (360.0 / evidence.n_bins)).astype(np.int64)
+        return np.asarray(np.rint(chosen * (360.0 / evidence.n_bins)), dtype=np.int64)
 
     return next_view

@@ -1,0 +1,166 @@
+"""Held-out estimates of many trainings in one compact file, enough to redo the statistics.
+
+Estimates are kept as hundredths of a degree from the truth. Distributions are kept for every view
+that is a class apart, in the frame of the truth, as 255ths of the root of a probability. What is
+read from estimates or from such a file is the same, so both give the same tables.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.angles import signed_difference_deg
+from nbv.calibration.estimates import Estimates, read_estimates
+from nbv.calibration.posteriors import Posteriors, read_posteriors
+from nbv.files import damaged, read_arrays, readable, write_arrays
+
+FORMAT = 1
+_LEVELS = 255.0
+# Of a class whose root was rounded to 0: no image excludes a pose for good.
+_LEAST_PROBABILITY = 1e-6
+_SETTINGS = "settings"
+
+KeptKey = tuple[int, int, str, int, int, str]
+"""Shuffle, replicate, category, elevation in degrees, fold (from 1) and role."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What an estimator says of objects that it was not trained on, as precisely as it is kept.
+
+    Attributes
+    ----------
+    object_ids : tuple of str
+        n objects.
+    residual : ndarray (n, n_views) int16
+        Estimate less truth, hundredths of a degree; view k of n_views has the azimuth
+        360 k / n_views.
+    roots : ndarray (n, B, B) uint8, optional
+        255 times the root of p(azimuth | image), by view and by distance from the truth in classes.
+    """
+
+    object_ids: tuple[str, ...]
+    residual: NDArray[np.int16]
+    roots: NDArray[np.uint8] | None = None
+
+    @property
+    def estimates(self) -> Estimates:
+        """The estimates of all views, to hundredths of a degree."""
+        n_views = self.residual.shape[1]
+        truth = np.arange(n_views) * (360.0 / n_views)
+        return Estimates(self.object_ids, np.round((truth + self.residual / 100.0) % 360.0, 2))
+
+    @property
+    def posteriors(self) -> Posteriors | None:
+        """The distributions of views one class apart, or None where there are none."""
+        if self.roots is None:
+            return None
+        p = np.maximum((self.roots / _LEVELS) ** 2, _LEAST_PROBABILITY)
+        turned = _turned(p / p.sum(axis=-1, keepdims=True), 1)
+        return Posteriors(self.object_ids, np.log(turned), 1.0)
+
+    @property
+    def estimates_of_posteriors(self) -> Estimates:
+        """The estimates of the views that `posteriors` has."""
+        n_views = self.residual.shape[1]
+        step = 1 if self.roots is None else n_views // self.roots.shape[1]
+        return Estimates(self.object_ids, self.estimates.estimate_deg[:, ::step])
+
+
+def held_out(estimates: Estimates, posteriors: Posteriors | None = None) -> HeldOut:
+    """Return estimates, and the distributions of the same images, as precisely as they are kept.
+
+    The number of views has to be a multiple of the number of classes.
+    """
+    away = signed_difference_deg(estimates.estimate_deg, estimates.azimuth_deg)
+    # Half a turn is kept as -18000 whether it was reached one way or the other.
+    residual = (np.rint(away * 100.0) + 18000) % 36000 - 18000
+    roots = None
+    if posteriors is not None:
+        p = posteriors.distributions
+        p = p[:, :: p.shape[1] // p.shape[2]]
+        roots = np.rint(np.sqrt(_turned(p, -1)) * _LEVELS).astype(np.uint8)
+    return HeldOut(estimates.object_ids, residual.astype(np.int16), roots)
+
+
+def _turned(p: NDArray[np.float64], way: int) -> NDArray[np.float64]:
+    """Turn the distribution of view k by k classes, (n, B, B)."""
+    n_bins = p.shape[2]
+    classes = (np.arange(n_bins) - way * np.arange(n_bins)[:, None]) % n_bins
+    return np.asarray(np.take_along_axis(p, classes[None], axis=2))
+
+
+def read_held_out(estimates: str | Path, posteriors: str | Path | None = None) -> HeldOut:
+    """Read a fold's estimates, and its distributions where there are any.
+
+    Errors as of `nbv.calibration.estimates.read_estimates` and
+    `nbv.calibration.posteriors.read_posteriors`.
+    """
+    found = read_estimates(estimates)
+    return held_out(found, read_posteriors(posteriors, found.object_ids) if posteriors else None)
+
+
+def keep_estimates(
+    path: str | Path, held: Mapping[KeptKey, HeldOut], settings: Mapping[str, Any]
+) -> None:
+    """Write everything that the statistics need; `settings` are the run's configuration."""
+    arrays: dict[str, NDArray[Any]] = {
+        "format": np.asarray(FORMAT),
+        _SETTINGS: np.asarray(json.dumps(settings, sort_keys=True)),
+    }
+    for key, one in held.items():
+        name = _name(key)
+        arrays[f"{name}/objects"] = np.asarray(one.object_ids, dtype=np.str_)
+        arrays[f"{name}/residual"] = one.residual
+        if one.roots is not None:
+            arrays[f"{name}/roots"] = one.roots
+    write_arrays(path, arrays)
+
+
+def kept_settings(path: str | Path) -> tuple[dict[str, Any], list[KeptKey]]:
+    """Return the configuration that a file was kept with, and the keys of what it holds.
+
+    Raises
+    ------
+    UserError
+        Where it is no such file, or of another format.
+    """
+    with readable(path), np.load(path, allow_pickle=False) as stored:
+        if "format" not in stored.files or int(stored["format"]) != FORMAT:
+            raise damaged(path, f"not a file of kept estimates of format {FORMAT}")
+        settings = json.loads(str(stored[_SETTINGS]))
+        suffix = "/residual"
+        names = [name.removesuffix(suffix) for name in stored.files if name.endswith(suffix)]
+    return settings, [_key(name) for name in names]
+
+
+def read_kept(path: str | Path) -> dict[KeptKey, HeldOut]:
+    """Read what `keep_estimates` wrote; errors as of `kept_settings`."""
+    _, keys = kept_settings(path)
+    arrays = read_arrays(path)
+    found = {}
+    with readable(path):
+        for key in keys:
+            name = _name(key)
+            found[key] = HeldOut(
+                tuple(str(one) for one in arrays[f"{name}/objects"]),
+                arrays[f"{name}/residual"],
+                arrays.get(f"{name}/roots"),
+            )
+    return found
+
+
+def _name(key: KeptKey) -> str:
+    return "/".join(str(part) for part in key)
+
+
+def _key(name: str) -> KeptKey:
+    shuffle, replicate, category, elevation, fold, role = name.split("/")
+    return int(shuffle), int(replicate), category, int(elevation), int(fold), role
