@@ -67,7 +67,7 @@ def test_a_hotter_network_has_a_proportionally_higher_temperature():
 
 def test_answers_are_the_mean_distribution_of_each_viewpoint():
     logs = log_softmax(random_logits(4, (3, 48, 24)), axis=-1)
-    found = posteriors.estimate_likelihood(posteriors.Posteriors(("a", "b", "c"), logs, 1.0))
+    found = posteriors.estimate_likelihood(np.exp(logs))
     # 7.5 degrees a view and 15 a class: centred on the even views, half-way ones go upwards.
     for viewpoint in range(24):
         views = [2 * viewpoint - 1, 2 * viewpoint]

@@ -8,7 +8,7 @@ from nbv.angles import circular_distance_deg
 from nbv.calibration.posteriors import Posteriors
 from nbv.experiments.extensions import choices_frame, stored_evidence
 from nbv.experiments.more_views import more_views_rows
-from nbv.recommendation.evidence import posterior_evidence
+from nbv.recommendation.evidence import evidence_of_distributions
 from nbv.recommendation.method_selection import select_methods
 
 SETTINGS = {"n_views": 4, "start_every_deg": 60, "min_separation_deg": 15}
@@ -72,7 +72,7 @@ def products():
     calibration, test = half_turned(8, 0), half_turned(4, 2)
     choices = choices_frame(select_methods(objects(6, 0), EXTENSIONS, FEW_DENSITIES))
     evidences = stored_evidence(objects(6, 0), choices, FEW_DENSITIES)
-    evidence = posterior_evidence(calibration, AFFINITY)
+    evidence = evidence_of_distributions(calibration.distributions, AFFINITY)
     estimates = objects(4, 2)
     rng = np.random.default_rng(0)
     return more_views_rows(estimates, evidences, SETTINGS, rng, test, evidence)

@@ -10,11 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.angles import circular_distance_deg
-from nbv.calibration.posteriors import Posteriors
 from nbv.recommendation.belief import Belief
 from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.criteria.expected_error import affinity
-from nbv.recommendation.evidence import posterior_evidence
+from nbv.recommendation.evidence import evidence_of_distributions
 from nbv.recommendation.fusion import product, rotation_errors_deg
 from nbv.recommendation.policies import Turns, two_views
 
@@ -33,8 +32,7 @@ def distributions(seed, n_objects=3, n_views=N_VIEWS):
 
 
 def evidence_of(views, **settings):
-    posteriors = Posteriors(tuple("abcdefgh"[: len(views)]), np.log(views), 1.0)
-    return posterior_evidence(posteriors, {"affinity": AFFINITY | settings})
+    return evidence_of_distributions(views, {"affinity": AFFINITY | settings})
 
 
 def cost_of(criterion, rows, evidence):

@@ -9,7 +9,7 @@ with job(snakemake):
     from nbv.experiments.extensions import stored_evidence
     from nbv.experiments.more_views import more_views_rows
     from nbv.files import read_csv, write_csv
-    from nbv.recommendation.evidence import posterior_evidence
+    from nbv.recommendation.evidence import evidence_of_distributions
     from nbv.seeds import rng_for
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
@@ -23,7 +23,9 @@ with job(snakemake):
     rng = rng_for(params.seed, "sequence", *wildcards)
     if path := given.get("calibration_posteriors"):
         held_out = read_posteriors(path, calibration.object_ids)
-        products["of_distributions"] = posterior_evidence(held_out, params.density)
+        products["of_distributions"] = evidence_of_distributions(
+            held_out.distributions, params.density
+        )
         products["posteriors"] = read_posteriors(given.test_posteriors, test.object_ids)
     rows = more_views_rows(test, evidences, params.more_views, rng, **products)
     write_csv(snakemake.output[0], rows)

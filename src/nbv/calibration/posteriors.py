@@ -100,15 +100,15 @@ def _neighbours(azimuth_deg: ArrayLike, n_classes: int) -> tuple[NDArray[np.intp
     return below.astype(np.intp) % n_classes, place - below
 
 
-def estimate_likelihood(posteriors: Posteriors) -> Floats:
+def estimate_likelihood(distributions: NDArray[np.floating]) -> Floats:
     """Return L[viewpoint, estimate] (k, k) of estimates that are drawn from images' distributions.
 
     The mean of p(class | image) over all images of a viewpoint, which is as smooth as the
-    distributions and has no setting. The posteriors are of objects that the network was not trained
-    on, with at least k views each.
+    distributions (n, n_views, k) and has no setting. They are of objects that the network was not
+    trained on, with at least k views each.
     """
-    _, n_views, n_classes = posteriors.log_posterior.shape
-    of_view = posteriors.distributions.mean(axis=0)
+    _, n_views, n_classes = distributions.shape
+    of_view = distributions.mean(axis=0)
     viewpoint = nearest_bin(np.arange(n_views) * (360.0 / n_views), n_classes)
     sums = np.zeros((n_classes, n_classes))
     np.add.at(sums, viewpoint, of_view)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.calibration.density import Conditionals, conditionals
-from nbv.calibration.posteriors import Posteriors, estimate_likelihood
+from nbv.calibration.posteriors import estimate_likelihood
 
 Table = NDArray[np.float32]
 
@@ -55,6 +55,12 @@ class Evidence:
     def n_bins(self) -> int:
         """B, the number of bins round the circle."""
         return self.conditionals.n_bins
+
+    @property
+    def n_views(self) -> int:
+        """Number of views of each calibration object."""
+        views = self.estimate_deg if self.distributions is None else self.distributions
+        return int(views.shape[1])
 
     @cached_property
     def viewpoint(self) -> Table:
@@ -126,12 +132,14 @@ def gather_evidence(
     return Evidence(estimate_deg, pair, bandwidth_deg, pseudo_observations, settings)
 
 
-def posterior_evidence(calibration: Posteriors, settings: Mapping[str, Any]) -> Evidence:
-    """Make evidence of a classifier's distributions of calibration images.
+def evidence_of_distributions(
+    distributions: NDArray[np.floating[Any]], settings: Mapping[str, Any]
+) -> Evidence:
+    """Make evidence of a classifier's distributions (n_objects, n_views, B) of calibration images.
 
     Bins are the classes. Nothing is smoothed, for the distributions are smooth already.
     """
-    estimates = estimate_likelihood(calibration)
+    estimates = estimate_likelihood(distributions)
     pair = Conditionals(estimates.T / estimates.sum(axis=0)[:, None], estimates)
-    views = calibration.distributions.astype(np.float32)
+    views = distributions.astype(np.float32)
     return Evidence(np.empty((0, len(estimates))), pair, np.nan, np.nan, settings, views)

@@ -15,7 +15,7 @@ from nbv.calibration.posteriors import Posteriors
 from nbv.errors import UserError, nearest
 from nbv.recommendation.criteria import CRITERIA, FOR_ESTIMATES
 from nbv.recommendation.density_selection import Choice, choose_densities, chosen_evidence
-from nbv.recommendation.evidence import Evidence, posterior_evidence
+from nbv.recommendation.evidence import Evidence, evidence_of_distributions
 from nbv.recommendation.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
 from nbv.recommendation.lookup import LookupTable, build_lookup
 from nbv.recommendation.policies import ORACLE, POLICIES, SINGLE, needs_lookup
@@ -154,7 +154,9 @@ def select_methods(
     of_estimates = {n: m for n, m in extensions.items() if m["fusion"] not in OF_DISTRIBUTIONS}
     resolved, choices = _resolve(estimate_deg, of_estimates, settings)
     made: dict[tuple[float, float], Evidence] = {}
-    of_distributions = None if posteriors is None else posterior_evidence(posteriors, settings)
+    of_distributions = None
+    if posteriors is not None:
+        of_distributions = evidence_of_distributions(posteriors.distributions, settings)
     selected = {}
     for name, method in {**extensions, **resolved}.items():
         policy, fusion, lookup = method["policy"], method["fusion"], None

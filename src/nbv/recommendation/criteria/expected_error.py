@@ -24,7 +24,7 @@ def kernel_weights(evidence: Evidence) -> NDArray[np.float64]:
     the number of views that the one stands for.
     """
     n_bins = evidence.n_bins
-    step = evidence.estimate_deg.shape[1] // n_bins
+    step = evidence.n_views // n_bins
     kernel = step * von_mises_kernel(n_bins, evidence.bandwidth_deg)
     bins = nearest_bin(evidence.estimate_deg[:, ::step].ravel(), n_bins)
     return np.asarray(kernel[(np.arange(n_bins)[:, None] - bins) % n_bins])
@@ -85,7 +85,7 @@ def _regression_on_distributions(belief: Belief, evidence: Evidence, fusion: str
     views, settings = evidence.distributions, evidence.settings["affinity"]
     if views is None:
         raise ValueError(f"fusion {fusion!r} needs evidence of distributions")
-    step = views.shape[1] // n_bins
+    step = evidence.n_views // n_bins
     calibration = views[:, ::step].reshape(-1, n_bins)
     rows = belief.probabilities
     costs = [

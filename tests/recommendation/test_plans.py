@@ -1,4 +1,4 @@
-"""Views at equal steps, and how far apart they are best."""
+"""Plans for several views, and which one an image leads to."""
 
 from __future__ import annotations
 
@@ -19,12 +19,18 @@ from nbv.angles import circular_distance_deg
 from nbv.recommendation.belief import Belief
 from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.criteria.expected_error import affinity
+from nbv.recommendation.following import DistributionViews, follow
 from nbv.recommendation.fusion import rotation_errors_deg
-from nbv.recommendation.spacing import (
-    excess_of_spacings,
+from nbv.recommendation.next_views import recommended_next
+from nbv.recommendation.plans import (
+    Plans,
+    at_spacing,
+    choose_plan,
+    excess_of_plans,
+    plans_of,
     spaced_errors_deg,
-    spaced_next,
     spacing_bins,
+    step_by_step_errors_deg,
 )
 
 CAUTIOUS = {"caution": 2.0}
@@ -72,7 +78,9 @@ def test_without_caution_two_views_cost_what_the_expected_error_says():
     evidence = evidence_of(distributions(0), caution=0.0)
     belief, spacings = first_views(1, evidence), spacing_bins(2, N_BINS, 0.0)
     cost = CRITERIA["expected_error"](belief, evidence, "product")
-    excess = excess_of_spacings(belief, evidence, 2, spacings, 0.0)
+    plans = plans_of(evidence, 2, np.empty(0), 0.0)
+    assert plans.spacing_deg.tolist() == (spacings * 360 // N_BINS).tolist()
+    excess = excess_of_plans(belief, evidence, plans.errors_deg, plans.caution)
     expected = cost[:, spacings] - cost[:, spacings[:1]]
     np.testing.assert_allclose(excess, expected, atol=2e-3)
 
@@ -83,7 +91,7 @@ def test_caution_adds_standard_errors_over_objects():
     views = evidence.distributions[:, :: N_VIEWS // N_BINS]
     errors = spaced_errors_deg(views, 3, spacings)
     weights = 2 * affinity(belief.probabilities, views.reshape(-1, N_BINS)) ** 4
-    plain, cautious = (excess_of_spacings(belief, evidence, 3, spacings, c) for c in (0.0, 2.0))
+    plain, cautious = (excess_of_plans(belief, evidence, errors, c) for c in (0.0, 2.0))
     for row, place in np.ndindex(plain.shape):
         difference = errors[place] - errors[0]
         counts, sums = np.empty(5), np.empty(5)
@@ -100,27 +108,61 @@ def test_caution_adds_standard_errors_over_objects():
 
 def test_one_calibration_object_moves_nothing_from_even_spacing():
     evidence = evidence_of(distributions(0, n_objects=1), **CAUTIOUS)
-    belief, taken = first_views(1, evidence), np.zeros((7, 1), dtype=np.int64)
-    found = spaced_next(evidence, 3, 15.0)(belief, taken, np.random.default_rng(0))
-    assert (found == 120).all()
+    plans = plans_of(evidence, 3, step_by_step_errors_deg(evidence, 3, 15.0), 15.0)
+    assert (choose_plan(first_views(1, evidence), evidence, plans) == 0).all()
+    assert plans.spacing_deg[0] == 120
 
 
-def test_the_first_view_decides_and_the_others_follow_at_the_same_step():
+def test_step_by_step_is_a_plan_of_three_views_and_more():
     evidence = evidence_of(distributions(0, n_objects=6), **CAUTIOUS)
-    policy, rng = spaced_next(evidence, 4, 15.0), np.random.default_rng(0)
-    belief, taken = first_views(2, evidence), np.zeros((7, 1), dtype=np.int64)
+    by_gain = step_by_step_errors_deg(evidence, 4, 15.0)
+    assert by_gain.shape == (4, 6, N_BINS)
+    for n_views in (3, 4):
+        plans = plans_of(evidence, n_views, by_gain, 15.0)
+        assert len(plans.errors_deg) == len(plans.spacing_deg) + 1
+        np.testing.assert_array_equal(plans.errors_deg[-1], by_gain[n_views - 1])
+    assert len(plans_of(evidence, 2, by_gain, 15.0).errors_deg) == N_BINS
+
+
+def test_the_views_of_a_part_are_chosen_with_the_evidence_of_the_others():
+    """Two objects of five parts: each is chosen for by the other."""
+    views = distributions(5, n_objects=2)
+    found = step_by_step_errors_deg(evidence_of(views), 3, 0.0)
+    for one in (0, 1):
+        known = evidence_of(views[[1 - one]])
+        seen = DistributionViews(views[[one]], known)
+        policy, rng = recommended_next("information_gain", known, 0.0), np.random.default_rng(1)
+        reached = follow(policy, seen, n_views=3, start_every_deg=30, rng=rng)
+        np.testing.assert_allclose(found[:, one], reached[0, 0].T, atol=1e-4)
+
+
+def test_a_plan_that_is_surely_better_for_images_alike_is_taken_for_those():
+    """Even spacing errs by 10 degrees, the next plan by 1 from every second view and 20 else."""
+    views = distributions(7, n_objects=6)
+    evidence = evidence_of(views, power=200.0, pseudo_observations=1e-3, **CAUTIOUS)
+    errors = np.full((2, 6, N_BINS), 10.0, dtype=np.float32)
+    errors[1, :, ::2], errors[1, :, 1::2] = 1.0, 20.0
+    rows = views[:, ::2].reshape(-1, N_BINS).astype(np.float32)
+    plans = Plans(np.array([120]), errors, 0.0)
+    found = choose_plan(Belief(rows, evidence), evidence, plans).reshape(6, N_BINS)
+    assert (found == (np.arange(N_BINS) % 2 == 0)).mean() > 0.9
+
+
+def test_every_view_follows_at_its_step():
+    taken = np.zeros((2, 1), dtype=np.int64)
+    policy, rng = at_spacing(np.array([90, -60])), np.random.default_rng(0)
+    belief = first_views(2, evidence_of(distributions(0)))
     for _ in range(3):
         taken = np.column_stack([taken, policy(belief, taken, rng)])
-    steps = np.diff(np.column_stack([taken, taken[:, -1] + taken[:, 1]]), axis=1) % 360
-    assert (steps == steps[:, :1]).all()
-    assert circular_distance_deg(taken[:, 1], 0).max() <= 90
+    assert taken.tolist() == [[0, 90, 180, 270], [0, 300, 240, 180]]
 
 
-def test_spacings_need_distributions_and_a_first_view_of_the_same_estimator():
-    evidence, spacings = evidence_of(distributions(0)), spacing_bins(3, N_BINS, 0.0)
+def test_plans_need_distributions_and_a_first_view_of_the_same_estimator():
+    evidence = evidence_of(distributions(0))
+    errors = np.zeros((2, 3, N_BINS), dtype=np.float32)
     other = first_views(1, evidence_of(distributions(0)))
     with pytest.raises(ValueError, match="one first view by the same estimator"):
-        excess_of_spacings(other, evidence, 3, spacings, 0.0)
-    blind = replace(evidence, distributions=None)
-    with pytest.raises(ValueError, match="need evidence of distributions"):
-        excess_of_spacings(first_views(1, blind), blind, 3, spacings, 0.0)
+        excess_of_plans(other, evidence, errors, 0.0)
+    blind = replace(evidence, distributions=None, estimate_deg=np.zeros((3, N_VIEWS)))
+    with pytest.raises(ValueError, match="plans need evidence of distributions"):
+        excess_of_plans(first_views(1, blind), blind, errors, 0.0)

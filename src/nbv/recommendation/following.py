@@ -1,0 +1,140 @@
+"""Following a policy from view to view."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.angles import circular_distance_deg, nearest_bin, travel_deg
+from nbv.recommendation.belief import (
+    Belief,
+    first_belief,
+    mean_direction_deg,
+    multiplied,
+    updated,
+)
+from nbv.recommendation.evidence import Evidence
+from nbv.recommendation.next_views import NextView
+
+Floats = NDArray[np.floating]
+Indices = NDArray[np.intp]
+
+
+class Views(Protocol):
+    """What is seen of n objects from each of their views, and how beliefs come of it."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of objects and of evenly spaced views, then what else there is."""
+
+    def first(self, objects: Indices, views: Indices) -> Belief:
+        """Return the beliefs after first views."""
+
+    def further(
+        self, belief: Belief, objects: Indices, views: Indices, delta_deg: NDArray[np.int64]
+    ) -> Belief:
+        """Return the beliefs after one view more, `delta_deg` from the first one."""
+
+
+@dataclass(frozen=True)
+class EstimatedViews:
+    """Estimates (n_objects, n_views) in degrees, fused by posterior with the evidence."""
+
+    estimate_deg: NDArray[np.float64]
+    evidence: Evidence
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """See `Views`."""
+        return self.estimate_deg.shape
+
+    def first(self, objects: Indices, views: Indices) -> Belief:
+        """Return V[e] of each first estimate."""
+        return first_belief(self.estimate_deg[objects, views], self.evidence)
+
+    def further(
+        self, belief: Belief, objects: Indices, views: Indices, delta_deg: NDArray[np.int64]
+    ) -> Belief:
+        """Return `nbv.recommendation.belief.updated`."""
+        return updated(belief, self.estimate_deg[objects, views], delta_deg, self.evidence)
+
+
+@dataclass(frozen=True)
+class DistributionViews:
+    """Distributions (n_objects, n_views, B), fused by product; n_views is a multiple of B."""
+
+    distributions: Floats
+    evidence: Evidence
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """See `Views`."""
+        return self.distributions.shape
+
+    def first(self, objects: Indices, views: Indices) -> Belief:
+        """Return what the first images say."""
+        return Belief(self.distributions[objects, views].astype(np.float32), self.evidence)
+
+    def further(
+        self, belief: Belief, objects: Indices, views: Indices, delta_deg: NDArray[np.int64]
+    ) -> Belief:
+        """Return `nbv.recommendation.belief.multiplied`."""
+        return multiplied(belief, self.distributions[objects, views], delta_deg)
+
+
+def first_views(views: Views, start_every_deg: int) -> tuple[Indices, NDArray[np.int64], Belief]:
+    """Return object, azimuth in degrees and belief of every first view, object by object."""
+    n_objects, n_azimuths = views.shape[:2]
+    azimuths = np.arange(0, 360, start_every_deg)
+    objects = np.repeat(np.arange(n_objects), len(azimuths))
+    starts = np.tile(azimuths, n_objects)
+    return objects, starts, views.first(objects, nearest_bin(starts, n_azimuths))
+
+
+def follow(
+    policy: NextView,
+    views: Views,
+    *,
+    n_views: int,
+    start_every_deg: int,
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Follow a policy from several first views of each object.
+
+    Parameters
+    ----------
+    policy : callable
+        Chooses every next view.
+    views : Views
+        First views and rotations are multiples of 360 / their number.
+    n_views : int
+        Views in all.
+    start_every_deg : int
+        Between first views.
+    rng : numpy.random.Generator
+        Where a policy draws.
+
+    Returns
+    -------
+    ndarray (2, n_objects, n_starts, n_views)
+        Error and total travel after each view, degrees.
+    """
+    n_objects, n_azimuths = views.shape[:2]
+    objects, starts, belief = first_views(views, start_every_deg)
+    taken = np.zeros((len(objects), 1), dtype=np.int64)
+    travelled = np.zeros(len(objects))
+    reached = np.empty((2, len(objects), n_views))
+    for view in range(n_views):
+        if view:
+            delta = policy(belief, taken, rng)
+            seen_from = nearest_bin(starts + delta, n_azimuths)
+            belief = views.further(belief, objects, seen_from, delta)
+            travelled = travelled + travel_deg(delta - taken[:, -1])
+            taken = np.column_stack([taken, delta])
+        pose_deg = mean_direction_deg(belief.probabilities)
+        reached[0, :, view] = circular_distance_deg(pose_deg, starts)
+        reached[1, :, view] = travelled
+    return reached.reshape(2, n_objects, -1, n_views)
