@@ -1,29 +1,37 @@
 """Every choice of the next view with every fusion, on the same estimates of one fold.
 
 A choice and a fusion are told apart only where both vary: the paper's method differs from Opposite
-in the choice, and from its extensions in both.
+in the choice, and from its extensions in both. All choices with the same fusion share its density,
+so that they differ in nothing else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors
-from nbv.experiments.extensions import choices_frame, stored_evidence
 from nbv.experiments.kept_estimates import HeldOut
 from nbv.experiments.more_views import more_views_rows
 from nbv.experiments.two_views import evaluate_method
-from nbv.recommendation.density_selection import Choice, chosen_evidence, most_likely_density
-from nbv.recommendation.evidence import evidence_of_distributions
-from nbv.recommendation.fusion import ESTIMATE_FUSIONS, OF_DISTRIBUTIONS
+from nbv.recommendation.density_selection import (
+    COARSE_BINS,
+    Choice,
+    choose_densities,
+    chosen_evidence,
+    most_likely_density,
+)
+from nbv.recommendation.evidence import Evidence, evidence_of_distributions
+from nbv.recommendation.fusion import ESTIMATE_FUSIONS
 from nbv.recommendation.lookup import build_lookup
-from nbv.recommendation.method_selection import select_methods
+from nbv.recommendation.policies import needs_lookup
 
 Pair = tuple[str, str]
 """A choice of the next view and a fusion."""
@@ -44,8 +52,30 @@ POLICIES: Final[Mapping[str, str]] = {
 }
 """The policy of each choice; the pose ambiguity has two readings."""
 
+READINGS: Final[Mapping[str, tuple[str, ...]]] = {
+    "given_estimate": tuple(choice for choice in POLICIES if choice != "given_truth"),
+    "given_truth": ("given_truth",),
+}
+"""The choices under each reading of the pose likelihood; only the pose ambiguity's depend on it."""
+
 OF_IMAGES = ("random", "fixed", "opposite", "information_gain", "expected_error")
-"""Choices that are defined where images give distributions."""
+"""Choices that are defined where images give distributions, which are fused by product."""
+
+DECIDED_BY: Final[Mapping[str, str]] = {"average": "pose_ambiguity", "posterior": "random"}
+"""The policy whose errors decide on a fusion's density: the paper's, or one without a table."""
+
+MORE_VIEWS: Final[Mapping[str, Pair]] = {
+    "random": ("random", "posterior"),
+    "evenly_spaced": ("evenly_spaced", "posterior"),
+    "information_gain": ("information_gain", "posterior"),
+    "random_product": ("random", "product"),
+    "evenly_spaced_product": ("evenly_spaced", "product"),
+    "information_gain_product": ("information_gain", "product"),
+    "expected_error_product": ("expected_error", "product"),
+}
+"""Choice and fusion of the policies of `nbv.experiments.more_views` that are compared."""
+
+RngOf = Callable[[str], np.random.Generator]
 
 
 @dataclass(frozen=True)
@@ -59,7 +89,8 @@ class Factorial:
     more_views : DataFrame
         As of `nbv.experiments.more_views.more_views_rows`.
     densities : DataFrame
-        What calibration objects chose; as of `nbv.experiments.extensions.choices_frame`.
+        What calibration objects chose for each fusion and for `AS_PRINTED`: ``fusion,
+        bandwidth_deg, pseudo_observations, validated_error_deg``.
     """
 
     frames: dict[Pair, pd.DataFrame]
@@ -72,9 +103,11 @@ def evaluate_factorial(
     test: HeldOut,
     settings: Mapping[str, Any],
     more_views: Mapping[str, Any],
-    rng_of: Callable[[str], np.random.Generator],
+    rng_of: RngOf,
 ) -> Factorial:
     """Evaluate every choice with every fusion on the test objects of one fold.
+
+    Tables that choose have `COARSE_BINS` bins; estimates are fused with 360.
 
     Parameters
     ----------
@@ -88,69 +121,80 @@ def evaluate_factorial(
     rng_of : callable
         The generator of a choice, by name: random views are the same under every fusion.
     """
-    known, tested = calibration.estimates, test.estimates
-    frames = {
-        SINGLE: evaluate_method({"policy": "none", "fusion": "average"}, tested),
-        AS_PRINTED: _as_printed(known, tested, settings),
-    }
-    densities = []
-    others = [choice for choice in POLICIES if choice != "given_truth"]
-    for choices, reading in ((others, "given_estimate"), (["given_truth"], "given_truth")):
-        own = dict(settings) | {"pose_likelihood": reading}
-        made, chosen = _evaluated(_pairs(choices, ESTIMATE_FUSIONS), known, tested, own, rng_of)
-        frames |= made
-        densities.append(chosen)
-    evidences = stored_evidence(known, densities[0], settings)
-    of_images, evidence = calibration.posteriors, None
-    if of_images is not None:
-        pairs = _pairs(OF_IMAGES, sorted(OF_DISTRIBUTIONS))
-        few = calibration.estimates_of_posteriors, test.estimates_of_posteriors
-        made, chosen = _evaluated(pairs, *few, settings, rng_of, of_images, test.posteriors)
-        frames |= made
-        densities.append(chosen)
-        evidence = evidence_of_distributions(of_images.distributions, settings)
-    rng = rng_of("more_views")
-    rows = more_views_rows(tested, evidences, more_views, rng, test.posteriors, evidence)
-    return Factorial(frames, rows, pd.concat(densities, ignore_index=True))
+    known, tested = calibration.estimates.estimate_deg, test.estimates
+    densities = _densities(known, settings)
+    frames = {SINGLE: evaluate_method({"policy": "none", "fusion": "average"}, tested)}
+    for fusion in ESTIMATE_FUSIONS:
+        frames |= _estimate_frames(fusion, densities[fusion], known, tested, settings, rng_of)
+    printed = dict(settings) | {"pose_likelihood": "given_truth", "pseudo_observations": [0.0]}
+    densities["as_printed"] = most_likely_density(known, printed)
+    coarse = chosen_evidence(known, densities["as_printed"], printed, COARSE_BINS)
+    table = build_lookup(coarse, POLICIES["given_truth"])
+    method = {"policy": POLICIES["given_truth"], "fusion": "average"}
+    frames[AS_PRINTED] = evaluate_method(method, tested, lookup=table)
+    of_images = None
+    if calibration.posteriors is not None and test.posteriors is not None:
+        of_images = evidence_of_distributions(calibration.posteriors.distributions, settings)
+        frames |= _product_frames(test, test.posteriors, of_images, rng_of)
+    evidence = cache(partial(chosen_evidence, known, densities["posterior"], settings))
+    evidences: dict[str, Callable[[int], Evidence]] = dict.fromkeys(
+        ("random", "opposite", "information_gain"), lambda n_bins: evidence(n_bins=n_bins)
+    )
+    rows = more_views_rows(
+        tested, evidences, more_views, rng_of("more_views"), test.posteriors, of_images
+    )
+    return Factorial(frames, rows, _densities_frame(densities))
 
 
-def _pairs(choices: Iterable[str], fusions: Iterable[str]) -> list[Pair]:
-    return [(choice, fusion) for choice in choices for fusion in fusions]
-
-
-def _evaluated(
-    pairs: Iterable[Pair],
-    calibration: Estimates,
+def _estimate_frames(
+    fusion: str,
+    density: Choice,
+    calibration_deg: NDArray[np.float64],
     test: Estimates,
     settings: Mapping[str, Any],
-    rng_of: Callable[[str], np.random.Generator],
-    calibration_posteriors: Posteriors | None = None,
-    test_posteriors: Posteriors | None = None,
-) -> tuple[dict[Pair, pd.DataFrame], pd.DataFrame]:
-    """Return the frame of each pair, and the densities that were chosen."""
-    named = {f"{choice}_{fusion}": (choice, fusion) for choice, fusion in pairs}
-    methods = {name: {"policy": POLICIES[c], "fusion": f} for name, (c, f) in named.items()}
-    selected = select_methods(calibration, methods, settings, calibration_posteriors)
-    frames = {
-        named[name]: evaluate_method(
-            methods[name],
-            test,
-            rng_of(named[name][0]),
-            one.lookup,
-            one.evidence,
-            test_posteriors,
+    rng_of: RngOf,
+) -> dict[Pair, pd.DataFrame]:
+    """Return the frame of every choice with one fusion of estimates."""
+    frames = {}
+    for reading, choices in READINGS.items():
+        own = dict(settings) | {"pose_likelihood": reading}
+        coarse, fine = (
+            chosen_evidence(calibration_deg, density, own, n_bins) for n_bins in (COARSE_BINS, 360)
         )
-        for name, one in selected.items()
+        for choice in choices:
+            policy = POLICIES[choice]
+            lookup = build_lookup(coarse, policy, fusion) if needs_lookup(policy) else None
+            method = {"policy": policy, "fusion": fusion}
+            frames[choice, fusion] = evaluate_method(method, test, rng_of(choice), lookup, fine)
+    return frames
+
+
+def _densities(estimate_deg: NDArray[np.float64], settings: Mapping[str, Any]) -> dict[str, Choice]:
+    methods = {
+        fusion: {"policy": DECIDED_BY[fusion], "fusion": fusion} for fusion in ESTIMATE_FUSIONS
     }
-    return frames, choices_frame(selected)
+    return choose_densities(estimate_deg, methods, settings)
 
 
-def _as_printed(
-    calibration: Estimates, test: Estimates, settings: Mapping[str, Any]
-) -> pd.DataFrame:
-    reading = {"pose_likelihood": "given_truth", "pseudo_observations": [0.0]}
-    own = dict(settings) | reading
-    likeliest = most_likely_density(calibration.estimate_deg, own)
-    evidence = chosen_evidence(calibration.estimate_deg, Choice(likeliest.bandwidth_deg, 0.0), own)
-    lookup = build_lookup(evidence, "pose_ambiguity")
-    return evaluate_method({"policy": "pose_ambiguity", "fusion": "average"}, test, lookup=lookup)
+def _product_frames(
+    test: HeldOut, posteriors: Posteriors, evidence: Evidence, rng_of: RngOf
+) -> dict[Pair, pd.DataFrame]:
+    return {
+        (choice, "product"): evaluate_method(
+            {"policy": POLICIES[choice], "fusion": "product"},
+            test.estimates_of_posteriors,
+            rng_of(choice),
+            evidence=evidence,
+            posteriors=posteriors,
+        )
+        for choice in OF_IMAGES
+    }
+
+
+def _densities_frame(densities: Mapping[str, Choice]) -> pd.DataFrame:
+    rows = [
+        (name, choice.bandwidth_deg, choice.pseudo_observations, choice.error_deg)
+        for name, choice in densities.items()
+    ]
+    columns = ["fusion", "bandwidth_deg", "pseudo_observations", "validated_error_deg"]
+    return pd.DataFrame(rows, columns=columns)

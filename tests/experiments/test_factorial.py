@@ -1,0 +1,84 @@
+"""Every choice of the next view with every fusion."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from tests.experiments.test_two_views import hidden_handle, mean_directions
+from tests.recommendation.made import FEW_DENSITIES
+
+from nbv.experiments.factorial import (
+    AS_PRINTED,
+    OF_IMAGES,
+    POLICIES,
+    SINGLE,
+    evaluate_factorial,
+)
+from nbv.experiments.kept_estimates import held_out
+from nbv.recommendation.density_selection import COARSE_BINS
+from nbv.recommendation.fusion import ESTIMATE_FUSIONS
+
+SETTINGS = FEW_DENSITIES | {
+    "affinity": {"power": 16, "pseudo_observations": 90, "caution": 2.0},
+    "travel_cost": 0.0,
+    "max_travel_deg": 180.0,
+}
+MORE_VIEWS = {"n_views": 3, "start_every_deg": 60, "min_separation_deg": 15}
+
+
+def rng_of(name):
+    return np.random.default_rng(len(name))
+
+
+@pytest.fixture(scope="module")
+def made():
+    calibration, test = hidden_handle(5, 1), hidden_handle(3, 0)
+    sides = [held_out(mean_directions(one), one) for one in (calibration, test)]
+    return evaluate_factorial(*sides, SETTINGS, MORE_VIEWS, rng_of)
+
+
+def test_every_choice_meets_every_fusion(made):
+    expected = set(itertools.product(POLICIES, ESTIMATE_FUSIONS))
+    expected |= {(choice, "product") for choice in OF_IMAGES} | {SINGLE, AS_PRINTED}
+    assert set(made.frames) == expected
+    for (_, fusion), frame in made.frames.items():
+        assert len(frame) == 3 * (36 if fusion == "product" else 360)
+        assert set(frame["object_id"]) == {"0-0", "0-1", "0-2"}
+
+
+def test_a_choice_that_asks_no_table_takes_the_same_views_under_each_fusion(made):
+    for choice in ("random", "opposite"):
+        views = [made.frames[choice, fusion]["delta_deg"] for fusion in ESTIMATE_FUSIONS]
+        np.testing.assert_array_equal(*views)
+    assert (made.frames["fixed", "average"].groupby("object_id")["delta_deg"].nunique() == 1).all()
+
+
+def test_tables_have_coarse_bins_and_the_error_is_that_of_the_fused_pose(made):
+    for choice in set(POLICIES) - {"random", "opposite"}:
+        delta = made.frames[choice, "posterior"]["delta_deg"]
+        assert (delta % (360 // COARSE_BINS) == 0).all()
+
+
+def test_what_sees_the_hidden_handle_beats_a_random_view(made):
+    error = {pair: frame["error_deg"].mean() for pair, frame in made.frames.items()}
+    for fusion in ESTIMATE_FUSIONS:
+        assert error["expected_error", fusion] < error["random", fusion] < error[SINGLE]
+    assert error["information_gain", "product"] < error["random", "product"]
+    assert error["expected_error", "posterior"] <= error["fixed", "posterior"] + 0.5
+
+
+def test_the_densities_are_those_of_the_grid_and_none_is_added_to_what_is_printed(made):
+    densities = made.densities.set_index("fusion")
+    assert list(densities.index) == ["average", "posterior", "as_printed"]
+    assert set(densities["bandwidth_deg"]) <= {6, 12}
+    assert densities.loc["as_printed", "pseudo_observations"] == 0
+    assert densities.loc["average", "pseudo_observations"] == 10
+
+
+def test_without_distributions_nothing_is_multiplied():
+    sides = [held_out(mean_directions(hidden_handle(n, n))) for n in (4, 2)]
+    made = evaluate_factorial(*sides, SETTINGS, MORE_VIEWS, rng_of)
+    assert "product" not in {fusion for _, fusion in made.frames}
+    assert not made.more_views["method"].str.endswith("_product").any()
