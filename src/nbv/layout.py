@@ -22,6 +22,42 @@ class Layout:
         """Return the same paths below a subfolder, such as those of one condition of transfer."""
         return Layout("/".join((self.root, *folders)))
 
+    def shuffle(self, shuffle: int | str) -> Layout:
+        """Return where one division into folds lies; 0 is the run's own."""
+        return self if str(shuffle) == "0" else self.below("confirmation", f"shuffle{shuffle}")
+
+    def replicate(self, shuffle: int | str, replicate: int | str) -> Layout:
+        """Return where one training under a shuffle lies; 0 and 0 are the run's own."""
+        if (str(shuffle), str(replicate)) == ("0", "0"):
+            return self
+        return self.below("confirmation", f"shuffle{shuffle}", f"replicate{replicate}")
+
+    def kept_estimates(self, shuffle: int | str, replicate: int | str) -> str:
+        """Return the held-out estimates of one training of every fold, in one file."""
+        return f"{self.root}/confirmation/kept/shuffle{shuffle}_replicate{replicate}.npz"
+
+    @property
+    def all_kept_estimates(self) -> str:
+        """The held-out estimates of all trainings: what the statistics are redone from."""
+        return f"{self.root}/confirmation/estimates.npz"
+
+    def factorial(
+        self,
+        run: str,
+        shuffle: int | str,
+        replicate: int | str,
+        category: str,
+        elevation: int | str,
+    ) -> str:
+        """Return each object's errors under every choice and fusion, after one training."""
+        place = f"{run}/shuffle{shuffle}_replicate{replicate}"
+        unit = unit_folder(category, elevation)
+        return f"{self.root}/confirmation/objects/{place}/{unit}.csv"
+
+    def confirmation(self, name: str, kind: str) -> str:
+        """Return a table or figure over all trainings."""
+        return f"{self.root}/confirmation/{name}.{kind}"
+
     def meshes(self, category: str) -> str:
         """Return the prepared meshes of a category."""
         return f"{self.root}/meshes/{category}.npz"

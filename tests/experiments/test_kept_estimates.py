@@ -14,6 +14,7 @@ from nbv.calibration.posteriors import Posteriors, write_posteriors
 from nbv.errors import UserError
 from nbv.experiments.kept_estimates import (
     held_out,
+    join_kept,
     keep_estimates,
     kept_settings,
     read_held_out,
@@ -98,3 +99,21 @@ def test_another_file_is_named(tmp_path):
             read(tmp_path / "other.npz")
         with pytest.raises(UserError, match=r"none\.npz"):
             read(tmp_path / "none.npz")
+
+
+def test_files_of_the_same_settings_are_joined(tmp_path):
+    one, two = held_out(objects(2, 0)), held_out(objects(2, 1))
+    other = (0, 1, *KEY[2:])
+    keep_estimates(tmp_path / "a.npz", {KEY: one}, {"seed": 1})
+    keep_estimates(tmp_path / "b.npz", {other: two}, {"seed": 1})
+    join_kept(tmp_path / "all.npz", [tmp_path / "a.npz", tmp_path / "b.npz"])
+    settings, keys = kept_settings(tmp_path / "all.npz")
+    assert (settings, keys) == ({"seed": 1}, [KEY, other])
+    found = read_kept(tmp_path / "all.npz", [other])
+    assert list(found) == [other]
+    np.testing.assert_array_equal(found[other].residual, two.residual)
+    with pytest.raises(UserError, match=r"a\.npz: holds no estimates of 0/1/coffee_mug"):
+        read_kept(tmp_path / "a.npz", [other])
+    keep_estimates(tmp_path / "b.npz", {other: two}, {"seed": 2})
+    with pytest.raises(UserError, match=r"b\.npz: kept with other settings"):
+        join_kept(tmp_path / "all.npz", [tmp_path / "a.npz", tmp_path / "b.npz"])

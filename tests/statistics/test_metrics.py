@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from nbv.pose_errors import accuracy_area, half_turned
 from nbv.statistics import metrics
 
 errors_strategy = arrays(np.float64, st.integers(1, 40), elements=st.floats(0, 180))
@@ -61,7 +62,7 @@ def test_fewer_than_two_folds_have_no_deviation_and_give_no_warning(values):
 
 
 def test_an_image_adds_what_its_error_leaves_of_100_degrees():
-    found = metrics.accuracy_area([0.0, 30.0, 100.0, 170.0])
+    found = accuracy_area([0.0, 30.0, 100.0, 170.0])
     np.testing.assert_array_equal(found, [100.0, 70.0, 0.0, 0.0])
 
 
@@ -120,7 +121,7 @@ def test_errors_in_single_precision_are_summed_in_double(rng):
     errors = narrow.astype(np.float64)
     assert metrics.mae_deg(narrow) == metrics.mae_deg(errors) == errors.mean()
     assert metrics.pauc(narrow) == metrics.pauc(errors)
-    left = metrics.accuracy_area(narrow)
+    left = accuracy_area(narrow)
     np.testing.assert_array_equal(left, 100.0 - errors.clip(max=100.0))
     assert metrics.fold_std(narrow) == metrics.fold_std(errors)
     assert metrics.percentile_interval(narrow) == metrics.percentile_interval(errors)
@@ -170,3 +171,7 @@ def test_resampled_medians_equal_a_naive_loop_to_within_the_grid(rng):
     fast = metrics.resampled_medians(values, objects, multiplicities)
     rank = np.searchsorted(np.sort(values), fast) - np.searchsorted(np.sort(values), naive)
     assert np.abs(rank).max() <= objects.size / 1000 + 2
+
+
+def test_half_turned_images_are_those_above_90_degrees():
+    assert half_turned([0.0, 90.0, 90.1, 180.0]).tolist() == [0.0, 0.0, 100.0, 100.0]

@@ -6,6 +6,7 @@ import pytest
 
 from nbv.errors import UserError
 from nbv.files import write_csv
+from nbv.statistics import metrics
 from nbv.statistics.object_means import (
     OBJECT_COLUMNS,
     indistinct_from_best,
@@ -47,6 +48,9 @@ def test_object_means_are_plain_means(frames):
         mine = of_method[of_method["object_id"] == "0004"]
         found = indexed.loc[(method, "0004")]
         assert found["error_deg"] == pytest.approx(np.mean(mine["error_deg"]))
+        assert found["pauc_percent"] == pytest.approx(metrics.pauc(mine["error_deg"]))
+        turned = np.mean(mine["error_deg"] > 90)
+        assert found["above_90_percent"] == pytest.approx(100 * turned)
         delta = [0.0 if np.isnan(d) else float(d) for d in mine["delta_deg"]]
         shorter = [min(d % 360, -d % 360) for d in delta]
         assert found["travel_deg"] == pytest.approx(np.mean(shorter))

@@ -8,7 +8,7 @@ read from estimates or from such a file is the same, so both give the same table
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from nbv.angles import signed_difference_deg
 from nbv.calibration.estimates import Estimates, read_estimates
 from nbv.calibration.posteriors import Posteriors, read_posteriors
-from nbv.files import damaged, read_arrays, readable, write_arrays
+from nbv.errors import UserError
+from nbv.files import damaged, readable, write_arrays
 
 FORMAT = 1
 _LEVELS = 255.0
@@ -141,20 +142,50 @@ def kept_settings(path: str | Path) -> tuple[dict[str, Any], list[KeptKey]]:
     return settings, [_key(name) for name in names]
 
 
-def read_kept(path: str | Path) -> dict[KeptKey, HeldOut]:
-    """Read what `keep_estimates` wrote; errors as of `kept_settings`."""
-    _, keys = kept_settings(path)
-    arrays = read_arrays(path)
+def read_kept(path: str | Path, keys: Iterable[KeptKey] | None = None) -> dict[KeptKey, HeldOut]:
+    """Read what `keep_estimates` wrote, all of it or some keys.
+
+    Raises
+    ------
+    UserError
+        As of `kept_settings`, and where there is no such key.
+    """
+    _, held = kept_settings(path)
+    wanted = held if keys is None else list(keys)
+    for key in wanted:
+        if key not in held:
+            raise UserError(f"{path}: holds no estimates of {_name(key)}; keep them again")
     found = {}
-    with readable(path):
-        for key in keys:
+    with readable(path), np.load(path, allow_pickle=False) as stored:
+        for key in wanted:
             name = _name(key)
+            roots = f"{name}/roots"
             found[key] = HeldOut(
-                tuple(str(one) for one in arrays[f"{name}/objects"]),
-                arrays[f"{name}/residual"],
-                arrays.get(f"{name}/roots"),
+                tuple(str(one) for one in stored[f"{name}/objects"]),
+                stored[f"{name}/residual"],
+                stored[roots] if roots in stored.files else None,
             )
     return found
+
+
+def join_kept(path: str | Path, parts: Iterable[str | Path]) -> None:
+    """Write what several files of the same settings keep as one file.
+
+    Raises
+    ------
+    UserError
+        As of `kept_settings`, and where two files were kept with other settings.
+    """
+    held: dict[KeptKey, HeldOut] = {}
+    first: dict[str, Any] | None = None
+    for part in parts:
+        settings, _ = kept_settings(part)
+        first = settings if first is None else first
+        if settings != first:
+            raise UserError(f"{part}: kept with other settings than the others; keep it again")
+        held |= read_kept(part)
+    if first is not None:
+        keep_estimates(path, held, first)
 
 
 def _name(key: KeptKey) -> str:

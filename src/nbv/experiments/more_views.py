@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from nbv.calibration.estimates import Estimates
 from nbv.calibration.posteriors import Posteriors
+from nbv.pose_errors import accuracy_area, half_turned
 from nbv.recommendation.criteria import FOR_MORE_VIEWS
 from nbv.recommendation.evidence import Evidence
 from nbv.recommendation.following import (
@@ -37,7 +38,15 @@ from nbv.recommendation.plans import (
 
 Floats = NDArray[np.float64]
 
-COLUMNS = ("method", "n_views", "object_id", "error_deg", "travel_deg")
+COLUMNS = (
+    "method",
+    "n_views",
+    "object_id",
+    "error_deg",
+    "pauc_percent",
+    "above_90_percent",
+    "travel_deg",
+)
 
 
 def more_views_rows(
@@ -48,7 +57,7 @@ def more_views_rows(
     posteriors: Posteriors | None = None,
     of_distributions: Evidence | None = None,
 ) -> pd.DataFrame:
-    """Return error and travel of every policy, after each number of views, object by object.
+    """Return what every policy has reached after each number of views, object by object.
 
     Parameters
     ----------
@@ -77,9 +86,11 @@ def more_views_rows(
         return follow(policy, views, n_views=n_views, start_every_deg=start_every_deg, rng=rng)
 
     def add(method: str, of_views: Floats, numbers: Sequence[int]) -> None:
-        means = of_views.mean(axis=2)
+        errors, travel = of_views
+        figures = (errors, accuracy_area(errors), half_turned(errors), travel)
         for n in numbers:
-            values = (method, n, test.object_ids, *means[:, :, n - 1])
+            means = [figure[:, :, n - 1].mean(axis=1) for figure in figures]
+            values = (method, n, test.object_ids, *means)
             rows.append(pd.DataFrame(dict(zip(COLUMNS, values, strict=True))))
 
     def of(name: str) -> Views:

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nbv.pose_errors import accuracy_area
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-PAUC_LIMIT_DEG = 100.0
-"""Upper end of the thresholds that the pAUC integrates over (Tables 3 and 4 of the paper)."""
 
 _MEDIAN_GRID = 1001
 
@@ -92,11 +91,6 @@ def pauc(errors_deg: ArrayLike) -> float:
     raises what `mae_deg` does.
     """
     return float(np.mean(accuracy_area(_non_empty(errors_deg))))
-
-
-def accuracy_area(errors_deg: ArrayLike) -> Floats:
-    """Return what each image adds to the mean that is the pAUC, in percent, in [0, 100]."""
-    return PAUC_LIMIT_DEG - np.minimum(np.asarray(errors_deg, dtype=np.float64), PAUC_LIMIT_DEG)
 
 
 def fold_std(values: ArrayLike) -> float:

@@ -12,17 +12,19 @@ import pandas as pd
 from nbv.angles import travel_deg
 from nbv.errors import UserError
 from nbv.files import existing, read_csv
+from nbv.pose_errors import accuracy_area, half_turned
 from nbv.statistics.metrics import Interval
 from nbv.statistics.paired import PairedErrors, Resampler, estimate
 
 FoldFile = tuple[str, int, int]
 """What a file is about: category, elevation in degrees and fold (from 1)."""
 
-OBJECT_COLUMNS = ("method", "object_id", "n_images", "error_deg", "travel_deg")
+MEAN_COLUMNS = ("error_deg", "pauc_percent", "above_90_percent", "travel_deg")
+OBJECT_COLUMNS = ("method", "object_id", "n_images", *MEAN_COLUMNS)
 
 
 def object_means(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Return each object's mean error and travel under each method.
+    """Return each object's mean error, pAUC, share of errors above 90° and travel by method.
 
     Parameters
     ----------
@@ -37,8 +39,12 @@ def object_means(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     parts = []
     for method, frame in frames.items():
         travel = travel_deg(frame["delta_deg"].fillna(0).to_numpy(dtype=np.float64))
-        rows = frame.assign(travel_deg=travel).groupby("object_id", sort=True)
-        means = rows[["error_deg", "travel_deg"]].mean()
+        rows = frame.assign(
+            pauc_percent=accuracy_area(frame["error_deg"]),
+            above_90_percent=half_turned(frame["error_deg"]),
+            travel_deg=travel,
+        ).groupby("object_id", sort=True)
+        means = rows[list(MEAN_COLUMNS)].mean()
         means.insert(0, "n_images", rows.size())
         parts.append(means.reset_index().assign(method=method))
     return pd.concat(parts, ignore_index=True)[list(OBJECT_COLUMNS)]

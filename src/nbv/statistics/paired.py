@@ -15,6 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
+from nbv.pose_errors import accuracy_area
 from nbv.statistics import metrics
 from nbv.statistics.metrics import Floats, Interval, Ints
 
@@ -244,7 +245,7 @@ def _estimate_sigma(
 
 def _per_image(statistic: str, errors_deg: Floats) -> Floats:
     """Return what each image adds to a statistic that is a mean over images."""
-    return metrics.accuracy_area(errors_deg) if statistic == "pauc" else errors_deg
+    return accuracy_area(errors_deg) if statistic == "pauc" else errors_deg
 
 
 _METRICS: Mapping[str, Callable[[Floats], float]] = {

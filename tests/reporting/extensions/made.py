@@ -37,7 +37,10 @@ def object_rows(shifts=SHIFTS, categories=CATEGORIES, noise=0.1, n_objects=30):
     """Each method's errors, on average 10 degrees and its shift."""
     rng = np.random.default_rng(0)
     rows = [
-        (category, 0, 1 + k % 5, method, f"{k:02d}", 360, 10 + shift + rng.normal(0, noise), 90.0)
+        (
+            *(category, 0, 1 + k % 5, method, f"{k:02d}", 360),
+            *(10 + shift + rng.normal(0, noise), 90.0, 1.0, 90.0),
+        )
         for category in categories
         for method, shift in shifts.items()
         for k in range(n_objects)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from nbv.experiments.results import Unit
 from nbv.labels import method_label
+from nbv.pose_errors import PAUC_LIMIT_DEG
 from nbv.reporting.paper.figures.inputs import FigureInputs
 from nbv.reporting.settings import common_elevation_deg, reference_units, unit_label
 from nbv.reporting.style import INK, MUTED, azimuth_axis, new_figure
@@ -94,7 +95,7 @@ def accuracy(inputs: FigureInputs) -> Figure:
     units = reference_units(inputs.evaluations, inputs.settings)
     common = common_elevation_deg(units, inputs.settings)
     figure, panels = _panels(units, 2.5)
-    thresholds = np.linspace(0.0, np.sqrt(metrics.PAUC_LIMIT_DEG), 401) ** 2
+    thresholds = np.linspace(0.0, np.sqrt(PAUC_LIMIT_DEG), 401) ** 2
     for axes, unit in zip(panels, units, strict=True):
         sample = _paired(inputs, unit)
         for method in inputs.methods(unit):
@@ -102,7 +103,7 @@ def accuracy(inputs: FigureInputs) -> Figure:
             axes.plot(thresholds, accuracies, **inputs.style(method).curve)
         # Equal steps of the square root spread out the small thresholds, where methods differ.
         axes.set_xscale("function", functions=(np.sqrt, np.square))
-        axes.set_xlim(0, metrics.PAUC_LIMIT_DEG)
+        axes.set_xlim(0, PAUC_LIMIT_DEG)
         axes.set_xticks([0, 5, 10, 20, 40, 60, 100])
         axes.set_ylim(0, 1.01)
         axes.set_title(unit_label(unit, common))
