@@ -5,6 +5,7 @@
 #   snakemake --cores 2 tables                                           one stage
 #   snakemake --cores 2 extensions                                       the extensions
 #   snakemake --cores 2 transfer                                         trained on × tested on
+#   snakemake --cores 2 confirm                                          several trainings
 #   snakemake --cores 2 verify                                           is any file damaged?
 #   snakemake --cores 2 results/paper/evaluation/mug/el00/fold3/proposed.csv   one file
 
@@ -28,6 +29,7 @@ localrules:
     extension_evaluations,
     extensions,
     transfer,
+    confirm,
 
 
 rule all:
@@ -51,6 +53,7 @@ include: "workflow/rules/extensions/travel.smk"
 include: "workflow/rules/extensions/ablation.smk"
 include: "workflow/rules/extensions/transfer.smk"
 include: "workflow/rules/extensions/comparisons.smk"
+include: "workflow/rules/extensions/confirmation.smk"
 
 
 rule extensions:

@@ -23,6 +23,7 @@ from nbv.config import (
 from nbv.config.memory import available_bytes, check_memory
 from nbv.errors import UserError
 from nbv.estimation.warm_start import PRETRAINED, STAGES, stage_settings, start_of
+from nbv.experiments.kept_estimates import kept_settings
 from nbv.experiments.results import ESTIMATED_ROLES
 from nbv.jobs import killed_jobs
 from nbv.layout import Layout, fold_folder, unit_folder
@@ -129,6 +130,11 @@ PRETRAINS = CONFIG["estimator"]["warm_start"] in ("categories", "both")
 LOWEST_UNITS = [
     (category, min(CONFIG["elevations_deg"][category])) for category in CATEGORIES
 ]
+REPLICATES = [
+    (shuffle, replicate)
+    for shuffle, replicates in CONFIG["confirmation"]["replicates"].items()
+    for replicate in replicates
+]
 # The wildcards of a unit and of a fold, as the paths of `nbv.layout` take them.
 UNIT = ("{category}", "{elevation}")
 FOLD = (*UNIT, "{fold}")
@@ -209,12 +215,12 @@ def paths(path, keys):
     return [path(*key) for key in keys]
 
 
-def posteriors_of_fold():
+def posteriors_of_fold(layout=LAYOUT):
     """The files of images' distributions by name, where the estimator gives them."""
     if not CONFIG["gives_distributions"]:
         return {}
     return {
-        f"{role}_posteriors": LAYOUT.posteriors(*FOLD, role) for role in ESTIMATED_ROLES
+        f"{role}_posteriors": layout.posteriors(*FOLD, role) for role in ESTIMATED_ROLES
     }
 
 
@@ -226,18 +232,18 @@ def start_of_unit(category, elevation):
     return start_of(CONFIG["estimator"]["warm_start"], elevations, elevation)
 
 
-def training_start(wildcards):
+def training_start(wildcards, layout=LAYOUT):
     """The estimators that a training starts from: one, or none where the weights are random."""
     start = start_of_unit(wildcards.category, int(wildcards.elevation))
     fold, part = wildcards.fold, wildcards.get("part")
     if start is None:
         return []
     if start == PRETRAINED:
-        return [LAYOUT.pretrained(fold, part)]
+        return [layout.pretrained(fold, part)]
     place = (wildcards.category, start, fold)
     if part is None:
-        return [LAYOUT.estimator(*place)]
-    return [LAYOUT.part_estimator(*place, part)]
+        return [layout.estimator(*place)]
+    return [layout.part_estimator(*place, part)]
 
 
 def stage_of(wildcards):
@@ -461,6 +467,68 @@ def test_estimates(run):
 
 def test_posteriors(run):
     return ["test"] if run_settings(run)["gives_distributions"] else []
+
+
+# Trainings beyond the run's own.
+
+
+def replicate_layout(wildcards):
+    return LAYOUT.replicate(wildcards.shuffle, wildcards.replicate)
+
+
+def shuffled_splits(wildcards):
+    return LAYOUT.shuffle(wildcards.shuffle).splits(wildcards.category)
+
+
+def replicate_start(wildcards):
+    return training_start(wildcards, replicate_layout(wildcards))
+
+
+def held_out_keys():
+    """Category, elevation, fold and role of what is kept of a training."""
+    return [
+        (*fold, role) for fold in folds_of(LOWEST_UNITS) for role in ESTIMATED_ROLES
+    ]
+
+
+def held_out_files(path):
+    return lambda wildcards: [
+        path(replicate_layout(wildcards), *key) for key in held_out_keys()
+    ]
+
+
+@functools.cache
+def kept_runs():
+    """By run, the file that its estimates were kept in (None: this run's) and their keys."""
+    if not CONFIG["confirmation"]["kept"]:
+        keys = [
+            (shuffle, replicate, *unit)
+            for shuffle, replicate in REPLICATES
+            for unit in LOWEST_UNITS
+        ]
+        return {CONFIG["name"]: (None, keys)}
+    found = {}
+    for path in CONFIG["confirmation"]["kept"]:
+        try:
+            settings, keys = kept_settings(path)
+        except UserError as error:
+            stop(f"confirmation.kept: {error}")
+        run = settings["name"]
+        if run in found:
+            stop(
+                f"confirmation.kept: {path} is of the run {run}, as {found[run][0]} is"
+            )
+        found[run] = (path, list(dict.fromkeys(key[:4] for key in keys)))
+    return found
+
+
+def kept_file(wildcards):
+    path, _ = kept_runs()[wildcards.run]
+    return path or LAYOUT.kept_estimates(wildcards.shuffle, wildcards.replicate)
+
+
+def factorial_keys():
+    return [(run, *key) for run, (_, keys) in kept_runs().items() for key in keys]
 
 
 def per_attempt(amount):

@@ -5,13 +5,14 @@ from nbv.jobs import job
 with job(snakemake):
     from nbv.experiments.kept_estimates import keep_estimates, read_held_out
 
-    params, given = snakemake.params, snakemake.input
-    posteriors = given.get("posteriors") or [None] * len(params.keys)
+    params, given, wildcards = snakemake.params, snakemake.input, snakemake.wildcards
+    training = int(wildcards.shuffle), int(wildcards.replicate)
+    posteriors = given.get("posteriors") or [None] * len(params.held_out)
     keep_estimates(
         snakemake.output[0],
         {
-            tuple(key): read_held_out(*paths)
-            for key, *paths in zip(params.keys, given.estimates, posteriors, strict=True)
+            (*training, *key): read_held_out(*paths)
+            for key, *paths in zip(params.held_out, given.estimates, posteriors, strict=True)
         },
         params.configuration,
     )

@@ -13,7 +13,7 @@ with job(snakemake):
         stored_ids(snakemake.input.meshes),
         params.n_folds,
         params.calibration_fraction,
-        rng_for(params.seed, "splits", snakemake.wildcards.category),
+        rng_for(params.seed, "splits", *snakemake.wildcards),
         params.get("crossfit_parts"),
     )
     write_csv(snakemake.output[0], splits)

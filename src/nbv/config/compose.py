@@ -218,10 +218,15 @@ def load_condition(
     return load_config(directory, [*kept, *chosen])
 
 
+SHORT_NAMES = {"from": "confirmation.kept"}
+"""Keys of Snakemake's ``--config`` that are shorter than those of the configuration."""
+
+
 def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
     """Turn what came with Snakemake's ``--config`` into Hydra overrides.
 
-    That is ``key=value`` pairs such as ``experiment=quick``, and ``overrides``, a list (or one
+    That is ``key=value`` pairs such as ``experiment=quick`` (`SHORT_NAMES` are known), and
+    ``overrides``, a list (or one
     string) of Hydra overrides for keys that Snakemake's command line cannot spell.
 
     Raises
@@ -233,9 +238,13 @@ def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
     for key, value in given.items():
         if key == "overrides":
             continue
+        if key in SHORT_NAMES:
+            items = value if isinstance(value, list) else _items(str(value))
+            value = f"[{','.join(map(str, items))}]"
         if not isinstance(value, str | int | float) and value is not None:
             raise UserError(f'--config {shortened(key)}: write it as overrides="[{key}=...]"')
-        overrides.append(f"{key}={'null' if value is None else value}")
+        name = SHORT_NAMES.get(key, key)
+        overrides.append(f"{name}={'null' if value is None else value}")
     extra = given.get("overrides")
     if extra is None:
         return overrides

@@ -57,6 +57,7 @@ LearningRate = Annotated[Number, Field(gt=0, le=10)]
 Angle = Annotated[Number, Field(ge=-360, le=360)]
 Bandwidth = Annotated[Number, Field(ge=0, le=180)]
 PseudoObservations = Annotated[Number, Field(ge=0, le=10**9)]
+Replicate = Annotated[Whole, Field(ge=0, le=999)]
 Elevation = Annotated[Whole, Field(ge=0, le=89)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"), NAME_RULE]
 Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{1,4096}$"), "one line of text"]
@@ -232,6 +233,16 @@ class Method(Section):
         return value
 
 
+class Confirmation(Section):
+    """Trainings beyond the run's own; see `nbv.statistics.confirmation`."""
+
+    replicates: Annotated[
+        dict[Replicate, Annotated[list[Replicate], AtLeastOne, Distinct]],
+        Field(min_length=1),
+    ] = {0: [0]}
+    kept: Annotated[list[DataPath], Distinct] = []
+
+
 class Condition(Section):
     """What sees the objects, and how they are framed."""
 
@@ -278,6 +289,7 @@ class Config(Section):
     recommendation: Recommendation
     more_views: MoreViews
     transfer: Transfer
+    confirmation: Confirmation = Confirmation()
 
     @model_validator(mode="after")
     def _check_categories(self) -> Self:

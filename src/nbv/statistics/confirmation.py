@@ -1,0 +1,230 @@
+"""What all trainings together say: means of methods, and differences between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nbv.errors import UserError
+from nbv.experiments.factorial import MORE_VIEWS, SINGLE, Factorial
+from nbv.statistics.object_means import MEAN_COLUMNS, object_means
+from nbv.statistics.trainings import Mean, crossed_mean, holm, pooled_mean
+
+ALL = "all"
+"""In place of a category: the objects of all categories."""
+
+PLACE = ("dataset", "category")
+TRAINING = ("shuffle", "replicate")
+METHOD = ("choice", "fusion", "n_views")
+OBJECTS_COLUMNS = (*PLACE, *TRAINING, "fold", *METHOD, "object_id", *MEAN_COLUMNS)
+
+METHODS_COLUMNS = (
+    *PLACE,
+    *METHOD,
+    "mae_deg",
+    "low",
+    "high",
+    "pauc",
+    "above_90_percent",
+    "travel_deg",
+    "n_objects",
+    "n_trainings",
+)
+CONTRASTS_COLUMNS = (
+    *PLACE,
+    "contrast",
+    "fusion",
+    "difference_deg",
+    "low",
+    "high",
+    "p_holm",
+    "n_objects",
+    "n_trainings",
+)
+
+Method = tuple[str, str, int]
+"""A choice, a fusion and a number of views."""
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """One method less another; those of a question are adjusted together unless primary."""
+
+    method: Method
+    other: Method
+    primary: bool = False
+
+    @property
+    def name(self) -> str:
+        """Such as ``expected_error - fixed``; views and another fusion are named where they are."""
+        views = f", {self.method[2]} views" if self.method[2] != 2 else ""
+        fusion = f" ({self.other[1]})" if self.other[1] != self.method[1] else ""
+        return f"{self.method[0]} - {self.other[0]}{fusion}{views}"
+
+
+def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
+    """Return the contrasts of the protocol that some methods allow (docs/protocol.md).
+
+    Primary: the adaptive choice `expected_error` less the best fixed rotation, with the same
+    fusion. Then less Opposite and less a random view; the paper's method less Opposite, and as it
+    reads less as it works; from three views on, less evenly spaced views.
+    """
+    found = []
+    for fusion in dict.fromkeys(fusion for _, fusion, _ in methods):
+        adaptive = ("expected_error", fusion, 2)
+        found.append(Contrast(adaptive, ("fixed", fusion, 2), primary=True))
+        found += [Contrast(adaptive, (other, fusion, 2)) for other in ("opposite", "random")]
+        found += [
+            Contrast(("given_estimate", fusion, 2), (other, fusion, 2))
+            for other in ("opposite", "fixed")
+        ]
+    paper = ("given_estimate", "average", 2)
+    found += [
+        Contrast(paper, ("none", "none", 1)),
+        Contrast(("as_printed", "average", 2), paper),
+        Contrast(("expected_error", "product", 2), paper),
+    ]
+    for n_views in sorted({n for *_, n in methods if n > 2}):
+        found += [
+            Contrast((choice, fusion, n_views), ("evenly_spaced", fusion, n_views))
+            for choice in ("information_gain", "expected_error")
+            for fusion in ("posterior", "product")
+        ]
+    known = set(methods)
+    return [one for one in found if {one.method, one.other} <= known]
+
+
+def factorial_objects(made: Factorial) -> pd.DataFrame:
+    """Return the figures of every test object of one fold under every method.
+
+    Columns `METHOD`, ``object_id`` and `MEAN_COLUMNS`: means over first views.
+    """
+    names = {f"{choice}/{fusion}": (choice, fusion) for choice, fusion in made.frames}
+    means = object_means({name: made.frames[pair] for name, pair in names.items()})
+    two = means.assign(
+        choice=means["method"].map(lambda name: names[name][0]),
+        fusion=means["method"].map(lambda name: names[name][1]),
+        n_views=means["method"].map(lambda name: 1 if names[name] == SINGLE else 2),
+    )
+    rows = made.more_views[made.more_views["method"].isin(MORE_VIEWS)]
+    more = rows[rows["n_views"] > 2].assign(
+        choice=lambda frame: frame["method"].map(lambda name: MORE_VIEWS[name][0]),
+        fusion=lambda frame: frame["method"].map(lambda name: MORE_VIEWS[name][1]),
+    )
+    columns = [*METHOD, "object_id", *MEAN_COLUMNS]
+    return pd.concat([two[columns], more[columns]], ignore_index=True)
+
+
+def method_means(objects: pd.DataFrame) -> pd.DataFrame:
+    """Return the mean of every method over objects and trainings, columns `METHODS_COLUMNS`.
+
+    Parameters
+    ----------
+    objects : DataFrame
+        Columns `OBJECTS_COLUMNS`: one row for each object under each training and method.
+
+    Raises
+    ------
+    UserError
+        Where a training lacks an object or has it twice.
+    """
+    rows = []
+    for place, tables in _tables(objects):
+        for method, of_figures in tables.items():
+            figures = {name: _mean(parts) for name, parts in of_figures.items()}
+            error = figures["error_deg"]
+            interval = error.interval()
+            others = (figures[name].value for name in MEAN_COLUMNS[1:])
+            sizes = (error.n_objects, error.n_trainings)
+            rows.append(
+                (*place, *method, error.value, interval.low, interval.high, *others, *sizes)
+            )
+    return pd.DataFrame(rows, columns=list(METHODS_COLUMNS))
+
+
+def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
+    """Return differences of MAE between methods, columns `CONTRASTS_COLUMNS`.
+
+    Paired by object and training. Parameters and errors as of `method_means`. p-values of
+    secondary contrasts are adjusted by Holm's method within a data set and category.
+    """
+    rows = []
+    for place, tables in _tables(objects):
+        found: dict[Contrast, Mean] = {}
+        for contrast in contrasts_of(list(tables)):
+            mine, other = (tables[one]["error_deg"] for one in (contrast.method, contrast.other))
+            found[contrast] = _mean([a - b for a, b in zip(mine, other, strict=True)])
+        secondary = {one.name + one.method[1]: one for one in found if not one.primary}
+        adjusted = holm({name: found[one].p_value for name, one in secondary.items()})
+        for contrast, mean in found.items():
+            interval = mean.interval()
+            p_value = adjusted.get(contrast.name + contrast.method[1], mean.p_value)
+            rows.append(
+                (
+                    *place,
+                    contrast.name,
+                    contrast.method[1],
+                    *(interval.value, interval.low, interval.high, p_value),
+                    *(mean.n_objects, mean.n_trainings),
+                )
+            )
+    return pd.DataFrame(rows, columns=list(CONTRASTS_COLUMNS))
+
+
+Figures = Mapping[str, Sequence[NDArray[np.float64]]]
+"""By figure of merit, a table (n_trainings, n_objects) of each category."""
+
+
+def _tables(objects: pd.DataFrame) -> Iterator[tuple[tuple[str, str], dict[Method, Figures]]]:
+    """Yield the tables of each data set and category, then of its categories together."""
+    for dataset, rows in objects.groupby("dataset", sort=False):
+        of_categories = {
+            str(category): _of_category(part, f"{dataset}, {category}")
+            for category, part in rows.groupby("category", sort=False)
+        }
+        for category, tables in of_categories.items():
+            yield (
+                (str(dataset), category),
+                {
+                    method: {name: [table] for name, table in figures.items()}
+                    for method, figures in tables.items()
+                },
+            )
+        if len(of_categories) > 1:
+            first, *rest = of_categories.values()
+            shared = [method for method in first if all(method in other for other in rest)]
+            yield (
+                (str(dataset), ALL),
+                {
+                    method: {
+                        name: [tables[method][name] for tables in of_categories.values()]
+                        for name in MEAN_COLUMNS
+                    }
+                    for method in shared
+                },
+            )
+
+
+def _of_category(rows: pd.DataFrame, where: str) -> dict[Method, dict[str, NDArray[np.float64]]]:
+    tables: dict[Method, dict[str, NDArray[np.float64]]] = {}
+    for (choice, fusion, n_views), part in rows.groupby(list(METHOD), sort=False):
+        wide = part.set_index([*TRAINING, "object_id"])
+        if wide.index.has_duplicates:
+            raise UserError(f"{where}: an object is tested twice in a training; keep it again")
+        method = (str(choice), str(fusion), int(str(n_views)))
+        tables[method] = {}
+        for name in MEAN_COLUMNS:
+            table = wide[name].unstack("object_id")  # noqa: PD010 - nothing to aggregate
+            if table.isna().to_numpy().any():
+                raise UserError(f"{where}: a training lacks an object; finish all folds first")
+            tables[method][name] = table.to_numpy(dtype=np.float64)
+    return tables
+
+
+def _mean(tables: Sequence[NDArray[np.float64]]) -> Mean:
+    means = [crossed_mean(table) for table in tables]
+    return means[0] if len(means) == 1 else pooled_mean(means)

@@ -1,0 +1,158 @@
+"""Means and contrasts over all trainings."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nbv.errors import UserError
+from nbv.statistics.confirmation import (
+    ALL,
+    CONTRASTS_COLUMNS,
+    METHODS_COLUMNS,
+    OBJECTS_COLUMNS,
+    Contrast,
+    contrasts_of,
+    method_contrasts,
+    method_means,
+)
+from nbv.statistics.trainings import crossed_mean, holm, pooled_mean
+
+SHIFT = {
+    ("none", "none", 1): 4.0,
+    ("random", "average", 2): 3.0,
+    ("fixed", "average", 2): 2.0,
+    ("opposite", "average", 2): 2.5,
+    ("given_estimate", "average", 2): 1.5,
+    ("as_printed", "average", 2): 3.5,
+    ("expected_error", "average", 2): 1.0,
+    ("fixed", "product", 2): 0.5,
+    ("expected_error", "product", 2): 0.0,
+    ("evenly_spaced", "product", 3): -0.5,
+    ("expected_error", "product", 3): -1.0,
+}
+TRAININGS = [(0, 0), (0, 1), (1, 0)]
+SIZES = {"mug": 8, "car": 5}
+
+
+def objects_frame(noise=0.3):
+    rng = np.random.default_rng(0)
+    rows = []
+    for (category, n), training in itertools.product(SIZES.items(), TRAININGS):
+        for method, shift in SHIFT.items():
+            for k in range(n):
+                error = 10 + k + shift + rng.normal(0, noise)
+                figures = (error, 100 - error, 5.0, 90.0)
+                fold = 1 + (k + training[0]) % 2
+                rows.append(
+                    ("real", category, *training, fold, *method, f"{category}{k}", *figures)
+                )
+    return pd.DataFrame(rows, columns=list(OBJECTS_COLUMNS))
+
+
+@pytest.fixture(scope="module")
+def objects():
+    return objects_frame()
+
+
+def table_of(objects, category, method):
+    """Errors (n_trainings, n_objects), by loops."""
+    part = objects[objects["category"] == category]
+    names = sorted(set(part["object_id"]))
+    table = np.empty((len(TRAININGS), len(names)))
+    for row in part.itertuples():
+        if (row.choice, row.fusion, row.n_views) == method:
+            table[TRAININGS.index((row.shuffle, row.replicate)), names.index(row.object_id)] = (
+                row.error_deg
+            )
+    return table
+
+
+def test_means_are_over_objects_and_trainings(objects):
+    found = method_means(objects)
+    assert tuple(found.columns) == METHODS_COLUMNS
+    assert len(found) == 3 * len(SHIFT)
+    indexed = found.set_index(["category", "choice", "fusion", "n_views"])
+    for method in SHIFT:
+        parts = [crossed_mean(table_of(objects, category, method)) for category in SIZES]
+        for category, mean in zip((*SIZES, ALL), (*parts, pooled_mean(parts)), strict=True):
+            row = indexed.loc[(category, *method)]
+            ends = mean.interval()
+            assert row["mae_deg"] == pytest.approx(mean.value)
+            assert (row["low"], row["high"]) == pytest.approx((ends.low, ends.high))
+            assert row["n_objects"] == mean.n_objects
+            assert row["n_trainings"] == 3
+            assert row["pauc"] == pytest.approx(100 - mean.value)
+    assert set(found["above_90_percent"]) == {5.0}
+
+
+def test_contrasts_are_paired_by_object_and_training(objects):
+    found = method_contrasts(objects)
+    assert tuple(found.columns) == CONTRASTS_COLUMNS
+    indexed = found.set_index(["category", "contrast", "fusion"])
+    row = indexed.loc[("mug", "expected_error - fixed", "average")]
+    mine, other = (
+        table_of(objects, "mug", (choice, "average", 2)) for choice in ("expected_error", "fixed")
+    )
+    mean = crossed_mean(mine - other)
+    assert row["difference_deg"] == pytest.approx(mean.value)
+    assert row["difference_deg"] == pytest.approx(-1.0, abs=0.3)
+    # Objects differ by degrees, the difference does not: it is paired.
+    assert row["high"] - row["low"] < 1.0
+    assert row["p_holm"] == pytest.approx(mean.p_value)
+
+
+def test_secondary_contrasts_are_adjusted_together_and_primary_ones_are_not(objects):
+    found = method_contrasts(objects)
+    of_car = found[found["category"] == "car"]
+    raw = {}
+    for contrast in contrasts_of(list(SHIFT)):
+        mine, other = (table_of(objects, "car", m) for m in (contrast.method, contrast.other))
+        raw[contrast] = crossed_mean(mine - other).p_value
+    adjusted = holm({f"{c.name}|{c.method[1]}": p for c, p in raw.items() if not c.primary})
+    for contrast, plain in raw.items():
+        p_value = plain
+        row = of_car[
+            (of_car["contrast"] == contrast.name) & (of_car["fusion"] == contrast.method[1])
+        ]
+        expected = (
+            p_value if contrast.primary else adjusted[f"{contrast.name}|{contrast.method[1]}"]
+        )
+        assert row["p_holm"].item() == pytest.approx(expected)
+
+
+def test_names_say_what_differs():
+    names = {one.name for one in contrasts_of(list(SHIFT))}
+    assert names == {
+        "expected_error - fixed",
+        "expected_error - opposite",
+        "expected_error - random",
+        "given_estimate - opposite",
+        "given_estimate - fixed",
+        "given_estimate - none (none)",
+        "as_printed - given_estimate",
+        "expected_error - given_estimate (average)",
+        "expected_error - evenly_spaced, 3 views",
+    }
+    primary = [one for one in contrasts_of(list(SHIFT)) if one.primary]
+    assert {(one.name, one.method[1]) for one in primary} == {
+        ("expected_error - fixed", "average"),
+        ("expected_error - fixed", "product"),
+    }
+    assert Contrast(("a", "x", 2), ("b", "x", 2)).name == "a - b"
+
+
+def test_a_training_without_an_object_or_with_it_twice_is_named(objects):
+    with pytest.raises(UserError, match="real, mug: a training lacks an object"):
+        method_means(objects.drop(index=objects.index[0]))
+    twice = pd.concat([objects, objects.iloc[[0]]])
+    with pytest.raises(UserError, match="real, mug: an object is tested twice"):
+        method_contrasts(twice)
+
+
+def test_one_category_has_no_line_for_all(objects):
+    found = method_means(objects[objects["category"] == "mug"])
+    assert set(found["category"]) == {"mug"}

@@ -1,0 +1,34 @@
+"""Evaluate every choice with every fusion on the test objects of one unit, after one training."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    import pandas as pd
+
+    from nbv.experiments.factorial import evaluate_factorial
+    from nbv.experiments.kept_estimates import kept_settings, read_kept
+    from nbv.files import write_csv
+    from nbv.seeds import rng_for
+    from nbv.statistics.confirmation import factorial_objects
+
+    wildcards, path = snakemake.wildcards, snakemake.input.kept
+    settings, keys = kept_settings(path)
+    place = (
+        int(wildcards.shuffle),
+        int(wildcards.replicate),
+        wildcards.category,
+        int(wildcards.elevation),
+    )
+    held = read_kept(path, [key for key in keys if key[:4] == place])
+    decision = settings["density"] | settings["recommendation"]
+    parts = []
+    for fold in dict.fromkeys(key[4] for key in held):
+        made = evaluate_factorial(
+            held[*place, fold, "calibration"],
+            held[*place, fold, "test"],
+            decision | {"affinity": settings["affinity"]},
+            settings["more_views"],
+            lambda name, fold=fold: rng_for(settings["seed"], name, *place, fold),
+        )
+        parts.append(factorial_objects(made).assign(fold=fold))
+    write_csv(snakemake.output[0], pd.concat(parts, ignore_index=True))

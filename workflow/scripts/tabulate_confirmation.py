@@ -1,0 +1,26 @@
+"""Tabulate means and contrasts over all trainings."""
+
+from nbv.jobs import job
+
+with job(snakemake):
+    import pandas as pd
+
+    from nbv.files import read_csv
+    from nbv.reporting.extensions.confirmation import contrasts_table, methods_table
+    from nbv.reporting.table import write_table
+    from nbv.statistics.confirmation import method_contrasts, method_means
+
+    output = snakemake.output
+    parts = [
+        read_csv(path).assign(dataset=run, shuffle=shuffle, replicate=replicate, category=category)
+        for (run, shuffle, replicate, category, _), path in zip(
+            snakemake.params.places, snakemake.input.objects, strict=True
+        )
+    ]
+    objects = pd.concat(parts, ignore_index=True)
+    tables = {
+        "methods": methods_table(method_means(objects)),
+        "contrasts": contrasts_table(method_contrasts(objects)),
+    }
+    for name, table in tables.items():
+        write_table(table, {kind: output[f"{name}_{kind}"] for kind in ("csv", "md")})
