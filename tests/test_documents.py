@@ -15,7 +15,7 @@ DOCUMENTS = [
 PAGES = [path for path in DOCUMENTS if path.name == "README.md" or "reference" not in path.parts]
 
 TERMS = (
-    "warm start",
+    *("warm start", "affinity", "choice", "plan", "shuffle"),
     *("viewpoint", "pose", "view", "estimate", "rotation δ", "calibration pair", "conditional"),
     *("evidence", "belief", "criterion", "cost", "policy", "fusion", "method", "extension", "unit"),
 )

@@ -20,7 +20,7 @@ SMALL = (
     "estimator.warm_start=categories",
     "more_views.n_views=3",
     "more_views.start_every_deg=90",
-    "confirmation.replicates={0:[0],1:[0]}",
+    "confirmation.replicates=[[0],[0]]",
 )
 TRAININGS = {(0, 0): "", (1, 0): "confirmation/shuffle1/replicate0/"}
 
@@ -121,7 +121,7 @@ def test_one_training_of_one_fold_can_be_asked_for_by_name(fresh):
 
 
 def test_the_paper_needs_no_other_training(fresh):
-    planned = fresh.would_run("confirmation.replicates={0:[0,1,2],3:[1]}")
+    planned = fresh.would_run("confirmation.replicates=[[0,1,2],[],[1]]")
     assert not [name for name in planned if "replicate" in name or "shuffle" in name]
 
 

@@ -132,7 +132,7 @@ LOWEST_UNITS = [
 ]
 REPLICATES = [
     (shuffle, replicate)
-    for shuffle, replicates in CONFIG["confirmation"]["replicates"].items()
+    for shuffle, replicates in enumerate(CONFIG["confirmation"]["replicates"])
     for replicate in replicates
 ]
 # The wildcards of a unit and of a fold, as the paths of `nbv.layout` take them.

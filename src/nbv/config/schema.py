@@ -236,11 +236,15 @@ class Method(Section):
 class Confirmation(Section):
     """Trainings beyond the run's own; see `nbv.statistics.confirmation`."""
 
-    replicates: Annotated[
-        dict[Replicate, Annotated[list[Replicate], AtLeastOne, Distinct]],
-        Field(min_length=1),
-    ] = {0: [0]}
+    replicates: Annotated[list[Annotated[list[Replicate], Distinct]], AtLeastOne] = [[0]]
     kept: Annotated[list[DataPath], Distinct] = []
+
+    @field_validator("replicates")
+    @classmethod
+    def _check_there_is_one(cls, value: list[list[int]]) -> list[list[int]]:
+        if not any(value):
+            raise ValueError("there is no replicate under any shuffle")
+        return value
 
 
 class Condition(Section):

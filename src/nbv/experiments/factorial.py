@@ -50,13 +50,13 @@ POLICIES: Final[Mapping[str, str]] = {
     "expected_dispersion": "expected_dispersion",
     "expected_error": "expected_error",
 }
-"""The policy of each choice; the pose ambiguity has two readings."""
+"""The policy of each choice; the pose ambiguity has two interpretations."""
 
-READINGS: Final[Mapping[str, tuple[str, ...]]] = {
+BY_POSE_LIKELIHOOD: Final[Mapping[str, tuple[str, ...]]] = {
     "given_estimate": tuple(choice for choice in POLICIES if choice != "given_truth"),
     "given_truth": ("given_truth",),
 }
-"""The choices under each reading of the pose likelihood; only the pose ambiguity's depend on it."""
+"""The choices under each interpretation of the pose likelihood; it concerns the ambiguity alone."""
 
 OF_IMAGES = ("random", "fixed", "opposite", "information_gain", "expected_error")
 """Choices that are defined where images give distributions, which are fused by product."""
@@ -156,8 +156,8 @@ def _estimate_frames(
 ) -> dict[Pair, pd.DataFrame]:
     """Return the frame of every choice with one fusion of estimates."""
     frames = {}
-    for reading, choices in READINGS.items():
-        own = dict(settings) | {"pose_likelihood": reading}
+    for pose_likelihood, choices in BY_POSE_LIKELIHOOD.items():
+        own = dict(settings) | {"pose_likelihood": pose_likelihood}
         coarse, fine = (
             chosen_evidence(calibration_deg, density, own, n_bins) for n_bins in (COARSE_BINS, 360)
         )

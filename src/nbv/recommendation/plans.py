@@ -134,7 +134,7 @@ def plans_of(
     """Return the plans for n views.
 
     Two views have every rotation for a plan and no caution, as `expected_error` has: the second
-    view is worth so much that its mean error is known soon.
+    view brings so much that its mean error is known soon.
 
     Parameters
     ----------
