@@ -102,26 +102,28 @@ def test_contrasts_are_paired_by_object_and_training(objects):
     assert row["difference_deg"] == pytest.approx(-1.0, abs=0.3)
     # Objects differ by degrees, the difference does not: it is paired.
     assert row["high"] - row["low"] < 1.0
-    assert row["p_holm"] == pytest.approx(mean.p_value)
 
 
-def test_secondary_contrasts_are_adjusted_together_and_primary_ones_are_not(objects):
+def test_all_but_primary_contrasts_over_all_categories_are_adjusted_together(objects):
     found = method_contrasts(objects)
-    of_car = found[found["category"] == "car"]
-    raw = {}
-    for contrast in contrasts_of(list(SHIFT)):
-        mine, other = (table_of(objects, "car", m) for m in (contrast.method, contrast.other))
-        raw[contrast] = crossed_mean(mine - other).p_value
-    adjusted = holm({f"{c.name}|{c.method[1]}": p for c, p in raw.items() if not c.primary})
-    for contrast, plain in raw.items():
-        p_value = plain
-        row = of_car[
-            (of_car["contrast"] == contrast.name) & (of_car["fusion"] == contrast.method[1])
-        ]
-        expected = (
-            p_value if contrast.primary else adjusted[f"{contrast.name}|{contrast.method[1]}"]
-        )
-        assert row["p_holm"].item() == pytest.approx(expected)
+    for category in ("car", ALL):
+        raw, primary = {}, set()
+        for contrast in contrasts_of(list(SHIFT)):
+            means = [
+                crossed_mean(
+                    table_of(objects, one, contrast.method) - table_of(objects, one, contrast.other)
+                )
+                for one in (SIZES if category == ALL else [category])
+            ]
+            key = contrast.name, contrast.method[1]
+            raw[key] = (pooled_mean(means) if category == ALL else means[0]).p_value
+            if contrast.primary and category == ALL:
+                primary.add(key)
+        adjusted = holm({"|".join(key): p for key, p in raw.items() if key not in primary})
+        rows = found[found["category"] == category].set_index(["contrast", "fusion"])
+        for key, p_value in raw.items():
+            expected = p_value if key in primary else adjusted["|".join(key)]
+            assert rows.loc[key, "p_holm"] == pytest.approx(expected)
 
 
 def test_names_say_what_differs():
@@ -137,10 +139,14 @@ def test_names_say_what_differs():
         "expected_error - given_estimate (average)",
         "expected_error - evenly_spaced, 3 views",
     }
-    primary = [one for one in contrasts_of(list(SHIFT)) if one.primary]
-    assert {(one.name, one.method[1]) for one in primary} == {
+    primary = {(one.name, one.method[1]) for one in contrasts_of(list(SHIFT)) if one.primary}
+    assert primary == {
         ("expected_error - fixed", "average"),
         ("expected_error - fixed", "product"),
+        ("given_estimate - opposite", "average"),
+        ("as_printed - given_estimate", "average"),
+        ("expected_error - given_estimate (average)", "product"),
+        ("expected_error - evenly_spaced, 3 views", "product"),
     }
     assert Contrast(("a", "x", 2), ("b", "x", 2)).name == "a - b"
 

@@ -73,6 +73,15 @@ def test_scale_order_and_sign_change_nothing_else(n_trainings, n_objects, factor
         assert found.degrees_of_freedom == pytest.approx(mean.degrees_of_freedom)
 
 
+@given(st.integers(2, 6), st.integers(2, 8), st.integers(0, 999))
+def test_no_interval_is_wider_than_the_scarcer_factor_alone_makes_it(n_trainings, n_objects, seed):
+    found = crossed_mean(np.random.default_rng(seed).normal(0, 1, (n_trainings, n_objects)))
+    fewest = min(n_trainings, n_objects) - 1
+    assert found.degrees_of_freedom >= fewest
+    half = stats.t.ppf(0.975, fewest) * np.sqrt(found.variance)
+    assert found.interval().high - found.value <= half * (1 + 1e-9)
+
+
 def test_the_same_errors_in_every_training_leave_the_objects_alone():
     of_objects = np.random.default_rng(0).normal(0, 1, 20)
     found, alone = crossed_mean(np.tile(of_objects, (5, 1))), crossed_mean(of_objects[None])

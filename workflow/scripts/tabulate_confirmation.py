@@ -6,7 +6,12 @@ with job(snakemake):
     import pandas as pd
 
     from nbv.files import read_csv
-    from nbv.reporting.extensions.confirmation import contrasts_table, methods_table
+    from nbv.reporting.extensions.confirmation import (
+        contrasts_figure,
+        contrasts_table,
+        methods_table,
+    )
+    from nbv.reporting.style import save_figure
     from nbv.reporting.table import write_table
     from nbv.statistics.confirmation import method_contrasts, method_means
 
@@ -18,9 +23,12 @@ with job(snakemake):
         )
     ]
     objects = pd.concat(parts, ignore_index=True)
+    contrasts = method_contrasts(objects)
     tables = {
         "methods": methods_table(method_means(objects)),
-        "contrasts": contrasts_table(method_contrasts(objects)),
+        "contrasts": contrasts_table(contrasts),
     }
     for name, table in tables.items():
         write_table(table, {kind: output[f"{name}_{kind}"] for kind in ("csv", "md")})
+    paths = {kind: output[f"contrasts_{kind}"] for kind in ("png", "pdf")}
+    save_figure(contrasts_figure(contrasts), paths)

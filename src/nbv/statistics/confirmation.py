@@ -38,6 +38,7 @@ CONTRASTS_COLUMNS = (
     *PLACE,
     "contrast",
     "fusion",
+    "primary",
     "difference_deg",
     "low",
     "high",
@@ -52,7 +53,7 @@ Method = tuple[str, str, int]
 
 @dataclass(frozen=True)
 class Contrast:
-    """One method less another; those of a question are adjusted together unless primary."""
+    """One method less another; a primary one answers a question of docs/protocol.md."""
 
     method: Method
     other: Method
@@ -67,33 +68,30 @@ class Contrast:
 
 
 def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
-    """Return the contrasts of the protocol that some methods allow (docs/protocol.md).
-
-    Primary: the adaptive choice `expected_error` less the best fixed rotation, with the same
-    fusion. Then less Opposite and less a random view; the paper's method less Opposite, and as it
-    reads less as it works; from three views on, less evenly spaced views.
-    """
+    """Return the contrasts of docs/protocol.md that some methods allow."""
     found = []
     for fusion in dict.fromkeys(fusion for _, fusion, _ in methods):
-        adaptive = ("expected_error", fusion, 2)
+        adaptive, paper = (("expected_error", fusion, 2), ("given_estimate", fusion, 2))
+        opposite = ("opposite", fusion, 2)
         found.append(Contrast(adaptive, ("fixed", fusion, 2), primary=True))
         found += [Contrast(adaptive, (other, fusion, 2)) for other in ("opposite", "random")]
-        found += [
-            Contrast(("given_estimate", fusion, 2), (other, fusion, 2))
-            for other in ("opposite", "fixed")
-        ]
+        found.append(Contrast(paper, opposite, primary=fusion == "average"))
+        found.append(Contrast(paper, ("fixed", fusion, 2)))
     paper = ("given_estimate", "average", 2)
     found += [
         Contrast(paper, ("none", "none", 1)),
-        Contrast(("as_printed", "average", 2), paper),
-        Contrast(("expected_error", "product", 2), paper),
+        Contrast(("as_printed", "average", 2), paper, primary=True),
+        Contrast(("expected_error", "product", 2), paper, primary=True),
     ]
     for n_views in sorted({n for *_, n in methods if n > 2}):
-        found += [
-            Contrast((choice, fusion, n_views), ("evenly_spaced", fusion, n_views))
-            for choice in ("information_gain", "expected_error")
-            for fusion in ("posterior", "product")
-        ]
+        for choice, fusion in (
+            ("information_gain", "posterior"),
+            ("information_gain", "product"),
+            ("expected_error", "product"),
+        ):
+            even = ("evenly_spaced", fusion, n_views)
+            primary = choice == "expected_error"
+            found.append(Contrast((choice, fusion, n_views), even, primary))
     known = set(methods)
     return [one for one in found if {one.method, one.other} <= known]
 
@@ -149,8 +147,9 @@ def method_means(objects: pd.DataFrame) -> pd.DataFrame:
 def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
     """Return differences of MAE between methods, columns `CONTRASTS_COLUMNS`.
 
-    Paired by object and training. Parameters and errors as of `method_means`. p-values of
-    secondary contrasts are adjusted by Holm's method within a data set and category.
+    Paired by object and training. Parameters and errors as of `method_means`. Primary contrasts
+    over all categories keep their p-values. Those of all others are adjusted by Holm's method
+    within a data set and category.
     """
     rows = []
     for place, tables in _tables(objects):
@@ -158,7 +157,10 @@ def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
         for contrast in contrasts_of(list(tables)):
             mine, other = (tables[one]["error_deg"] for one in (contrast.method, contrast.other))
             found[contrast] = _mean([a - b for a, b in zip(mine, other, strict=True)])
-        secondary = {one.name + one.method[1]: one for one in found if not one.primary}
+        over_all = place[1] == ALL
+        secondary = {
+            one.name + one.method[1]: one for one in found if not (one.primary and over_all)
+        }
         adjusted = holm({name: found[one].p_value for name, one in secondary.items()})
         for contrast, mean in found.items():
             interval = mean.interval()
@@ -168,6 +170,7 @@ def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
                     *place,
                     contrast.name,
                     contrast.method[1],
+                    contrast.primary,
                     *(interval.value, interval.low, interval.high, p_value),
                     *(mean.n_objects, mean.n_trainings),
                 )

@@ -90,10 +90,9 @@ def crossed_mean(values: ArrayLike) -> Mean:
     if n_objects == 1:
         return Mean(float(mean), float("nan"), float("nan"), 1, n_trainings)
     variance = max(objects + trainings - remainder, objects, trainings)
-    freedom = _freedom(
-        variance,
-        [(objects, n_objects - 1), (trainings, n_trainings - 1), (remainder, cells)],
-    )
+    terms = [(objects, n_objects - 1), (trainings, n_trainings - 1), (remainder, cells)]
+    # The remainder is taken away, so the rule can fall below what the scarcer factor has alone.
+    freedom = max(_freedom(variance, terms), min(n_objects, n_trainings) - 1.0)
     return Mean(float(mean), variance, freedom, n_objects, n_trainings)
 
 

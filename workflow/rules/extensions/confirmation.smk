@@ -166,6 +166,8 @@ rule statistics:
             for name in ("methods", "contrasts")
             for kind in ("csv", "md")
         },
+        contrasts_png=LAYOUT.confirmation("contrasts", "png"),
+        contrasts_pdf=LAYOUT.confirmation("contrasts", "pdf"),
     log:
         LAYOUT.log("statistics"),
     benchmark:

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import matplotlib as mpl
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from nbv.labels import category_label, interval_text, number
+from nbv.reporting.style import INK, MUTED, RC, new_figure
 from nbv.reporting.table import Cell, Part, Table
 
 _INTERVALS = (
     "Intervals are 95 % and contain the chance of objects and of trainings (docs/method.md)."
 )
+_ROW_IN = 0.22
+_PANEL_IN = 0.75
+_BETTER, _UNDECIDED, _WORSE = "better", "undecided", "worse"
+# Colour and marker: told apart in grey and by those who see no colours.
+_VERDICTS = {_BETTER: ("#0072B2", "o"), _UNDECIDED: (MUTED, "s"), _WORSE: ("#D55E00", "^")}
 
 
 def methods_table(means: pd.DataFrame) -> Table:
@@ -60,12 +70,61 @@ def contrasts_table(contrasts: pd.DataFrame) -> Table:
         "Difference of MAE in degrees, paired by object and training; bold where the interval "
         "excludes 0.",
         _INTERVALS,
-        "p: of expected error less fixed, the primary contrast, as it is; of all others adjusted "
-        "by Holm's method within their data set and category.",
+        "p: of the primary contrasts (docs/protocol.md) over all categories as they are; of all "
+        "others adjusted by Holm's method within their data set and category.",
     )
     return Table(
         "contrasts", title, title, contrasts, header, tuple(parts), notes, n_text_columns=2
     )
+
+
+@mpl.rc_context(RC)
+def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
+    """Draw the contrasts that answer the questions of docs/protocol.md, a panel for each.
+
+    Parameters
+    ----------
+    contrasts : DataFrame
+        Of `nbv.statistics.confirmation.method_contrasts`.
+
+    Raises
+    ------
+    ValueError
+        Where none of them is there.
+    """
+    answers = contrasts[contrasts["primary"]]
+    panels = list(answers.groupby("contrast", sort=False))
+    if not panels:
+        raise ValueError("no contrast answers a question")
+    heights = [_PANEL_IN + _ROW_IN * len(part) for _, part in panels]
+    figure = new_figure(6.4, sum(heights) + 0.5)
+    drawn = figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights).ravel().tolist()
+    for axes, (name, part) in zip(drawn, panels, strict=True):
+        _forest(axes, part)
+        axes.set_title(_contrast(str(name)), loc="left")
+    drawn[-1].set_xlabel("Difference of MAE (°), below 0 is better")
+    handles = [
+        Line2D([], [], color=colour, marker=marker, linestyle="none", label=verdict)
+        for verdict, (colour, marker) in _VERDICTS.items()
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure
+
+
+def _forest(axes: Axes, contrasts: pd.DataFrame) -> None:
+    several = len(set(contrasts["fusion"])) > 1
+    labels = []
+    for place, (_, row) in enumerate(contrasts.iterrows()):
+        verdict = _WORSE if row["low"] > 0 else _BETTER if row["high"] < 0 else _UNDECIDED
+        colour, marker = _VERDICTS[verdict]
+        axes.plot([row["low"], row["high"]], [place, place], color=colour, linewidth=1.4)
+        axes.plot(row["difference_deg"], place, color=colour, marker=marker, markersize=5)
+        fusion = f", {row['fusion']}" if several else ""
+        labels.append(f"{row['dataset']}, {category_label(str(row['category']))}{fusion}")
+    axes.axvline(0.0, color=INK, linewidth=0.8)
+    axes.set_yticks(range(len(labels)), labels)
+    axes.set_ylim(len(labels) - 0.5, -0.5)
+    axes.grid(visible=False, axis="y")
 
 
 def _mean(row: pd.Series) -> str:

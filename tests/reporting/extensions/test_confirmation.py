@@ -1,0 +1,66 @@
+"""Tables and the figure over all trainings."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+from tests.statistics.test_confirmation import SHIFT, objects_frame
+
+from nbv.reporting.extensions.confirmation import (
+    contrasts_figure,
+    contrasts_table,
+    methods_table,
+)
+from nbv.reporting.table import table_markdown
+from nbv.statistics.confirmation import method_contrasts, method_means
+
+
+@pytest.fixture(scope="module")
+def contrasts():
+    return method_contrasts(objects_frame())
+
+
+def test_a_column_for_each_fusion_and_a_row_for_each_choice():
+    means = method_means(objects_frame())
+    table = methods_table(means)
+    assert table.header == ("Choice", "Average", "Product")
+    assert [part.heading for part in table.parts] == ["real, Mug", "real, Car", "real, All"]
+    of_mug = {row[0].text: [cell.text for cell in row[1:]] for row in table.parts[0].rows}
+    assert len(of_mug) == len({(choice, n) for choice, _, n in SHIFT})
+    assert of_mug["One view"][0] == of_mug["One view"][1]
+    assert of_mug["Random"][1] == "–"
+    mean = means[(means["category"] == "mug") & (means["choice"] == "random")].iloc[0]
+    low, high = f"{mean['low']:.2f}", f"{mean['high']:.2f}"
+    assert of_mug["Random"][0] == f"{mean['mae_deg']:.2f} ({low} to {high})"
+    assert "Evenly spaced, 3 views" in of_mug
+
+
+def test_a_difference_is_bold_where_its_interval_excludes_0(contrasts):
+    table = contrasts_table(contrasts)
+    assert table.parts[0].heading == "real, Mug (8 objects, 3 trainings)"
+    rows = [row for part in table.parts for row in part.rows]
+    assert len(rows) == len(contrasts)
+    for row, (_, found) in zip(rows, contrasts.iterrows(), strict=True):
+        assert row[2].bold == (found["low"] > 0 or found["high"] < 0)
+    assert "| Expected error less fixed | average |" in table_markdown(table)
+
+
+def test_the_figure_has_a_panel_for_each_question_and_a_mark_for_each_answer(contrasts):
+    figure = contrasts_figure(contrasts)
+    primary = contrasts[contrasts["primary"]]
+    assert len(figure.axes) == primary["contrast"].nunique()
+    for axes, (_, part) in zip(figure.axes, primary.groupby("contrast", sort=False), strict=True):
+        labels = [label.get_text() for label in axes.get_yticklabels()]
+        assert len(labels) == len(part)
+        marks = [line for line in axes.lines if line.get_marker() not in ("None", "")]
+        assert [mark.get_xdata()[0] for mark in marks] == part["difference_deg"].tolist()
+        for mark, (_, row) in zip(marks, part.iterrows(), strict=True):
+            expected = "^" if row["low"] > 0 else "o" if row["high"] < 0 else "s"
+            assert mark.get_marker() == expected
+    assert "Difference of MAE (°)" in figure.axes[-1].get_xlabel()
+
+
+def test_without_an_answer_there_is_no_figure(contrasts):
+    none = pd.DataFrame(columns=contrasts.columns).astype({"primary": bool})
+    with pytest.raises(ValueError, match="no contrast answers a question"):
+        contrasts_figure(none)
