@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,6 @@ from nbv.recommendation.following import (
 )
 from nbv.recommendation.next_views import (
     COARSE_BINS,
-    NextView,
     bisecting_next,
     evenly_spaced_next,
     random_next,
@@ -37,6 +37,8 @@ from nbv.recommendation.plans import (
 )
 
 Floats = NDArray[np.float64]
+Run = Callable[..., Floats]
+Reached = tuple[str, Sequence[int], Floats]
 
 COLUMNS = (
     "method",
@@ -78,50 +80,69 @@ def more_views_rows(
     DataFrame
         Columns `COLUMNS`: means over first views. Travel goes from view to view, the shorter way.
     """
-    rows: list[pd.DataFrame] = []
+    run = partial(follow, start_every_deg=settings["start_every_deg"], rng=rng)
+    reached = list(_by_posterior(test, evidences, settings, run))
+    if posteriors is not None and of_distributions is not None:
+        reached += _by_product(posteriors, of_distributions, settings, run)
+    rows = [
+        _row(test.object_ids, method, n, of_views[:, :, :, n - 1])
+        for method, numbers, of_views in reached
+        for n in numbers
+    ]
+    return pd.concat(rows, ignore_index=True)
+
+
+def _row(object_ids: tuple[str, ...], method: str, n_views: int, reached: Floats) -> pd.DataFrame:
+    """Return the rows of one policy and number of views; `reached` is of `follow`."""
+    errors, travel = reached
+    figures = (errors, accuracy_area(errors), half_turned(errors), travel)
+    means = (figure.mean(axis=1) for figure in figures)
+    values = (method, n_views, object_ids, *means)
+    return pd.DataFrame(dict(zip(COLUMNS, values, strict=True)))
+
+
+def _by_posterior(
+    test: Estimates,
+    evidences: Mapping[str, Callable[[int], Evidence]],
+    settings: Mapping[str, Any],
+    run: Run,
+) -> Iterator[Reached]:
+    """Yield policy, numbers of views and what was reached, fused by posterior."""
     every = range(1, settings["n_views"] + 1)
-    apart_deg, start_every_deg = settings["min_separation_deg"], settings["start_every_deg"]
-
-    def reached(policy: NextView, views: Views, n_views: int) -> Floats:
-        return follow(policy, views, n_views=n_views, start_every_deg=start_every_deg, rng=rng)
-
-    def add(method: str, of_views: Floats, numbers: Sequence[int]) -> None:
-        errors, travel = of_views
-        figures = (errors, accuracy_area(errors), half_turned(errors), travel)
-        for n in numbers:
-            means = [figure[:, :, n - 1].mean(axis=1) for figure in figures]
-            values = (method, n, test.object_ids, *means)
-            rows.append(pd.DataFrame(dict(zip(COLUMNS, values, strict=True))))
 
     def of(name: str) -> Views:
         return EstimatedViews(test.estimate_deg, evidences[name](test.estimate_deg.shape[1]))
 
-    add("random", reached(random_next, of("random"), every[-1]), every)
-    add("bisecting", reached(bisecting_next, of("opposite"), every[-1]), every)
+    yield "random", every, run(random_next, of("random"), n_views=every[-1])
+    yield "bisecting", every, run(bisecting_next, of("opposite"), n_views=every[-1])
     for n in every:
-        add("evenly_spaced", reached(evenly_spaced_next(n), of("opposite"), n), [n])
+        yield "evenly_spaced", [n], run(evenly_spaced_next(n), of("opposite"), n_views=n)
     for criterion in FOR_MORE_VIEWS:
         if criterion in evidences:
-            policy = recommended_next(criterion, evidences[criterion](COARSE_BINS), apart_deg)
-            add(criterion, reached(policy, of(criterion), every[-1]), every)
-    if posteriors is None or of_distributions is None:
-        return pd.concat(rows, ignore_index=True)
-    seen = DistributionViews(posteriors.distributions, of_distributions)
-    belief = first_views(seen, start_every_deg)[2]
-    add("random_product", reached(random_next, seen, every[-1]), every)
-    by_gain = recommended_next("information_gain", of_distributions, apart_deg)
-    step_by_step = reached(by_gain, seen, every[-1])
-    add("information_gain_product", step_by_step, every)
-    of_calibration = step_by_step_errors_deg(of_distributions, every[-1], apart_deg)
+            coarse = evidences[criterion](COARSE_BINS)
+            policy = recommended_next(criterion, coarse, settings["min_separation_deg"])
+            yield criterion, every, run(policy, of(criterion), n_views=every[-1])
+
+
+def _by_product(
+    posteriors: Posteriors, evidence: Evidence, settings: Mapping[str, Any], run: Run
+) -> Iterator[Reached]:
+    """Yield the same fused by product; from two views on the first one chooses a plan."""
+    every, apart_deg = range(1, settings["n_views"] + 1), settings["min_separation_deg"]
+    seen = DistributionViews(posteriors.distributions, evidence)
+    yield "random_product", every, run(random_next, seen, n_views=every[-1])
     for n in every:
-        add("evenly_spaced_product", reached(evenly_spaced_next(n), seen, n), [n])
-        if n == 1:
-            continue
-        plans = plans_of(of_distributions, n, of_calibration, apart_deg)
-        chosen = choose_plan(belief, of_distributions, plans)
+        yield "evenly_spaced_product", [n], run(evenly_spaced_next(n), seen, n_views=n)
+    by_gain = recommended_next("information_gain", evidence, apart_deg)
+    step_by_step = run(by_gain, seen, n_views=every[-1])
+    yield "information_gain_product", every, step_by_step
+    of_calibration = step_by_step_errors_deg(evidence, every[-1], apart_deg)
+    belief = first_views(seen, settings["start_every_deg"])[2]
+    for n in every[1:]:
+        plans = plans_of(evidence, n, of_calibration, apart_deg)
+        chosen = choose_plan(belief, evidence, plans)
         steps_deg = np.append(plans.spacing_deg, 0)[chosen]
-        spaced = reached(at_spacing(steps_deg), seen, n)
+        spaced = run(at_spacing(steps_deg), seen, n_views=n)
         goes_on = (chosen == len(plans.spacing_deg)).reshape(spaced.shape[1:3])
         planned = np.where(goes_on[None, :, :, None], step_by_step[..., :n], spaced)
-        add("expected_error_product", planned, [n])
-    return pd.concat(rows, ignore_index=True)
+        yield "expected_error_product", [n], planned
