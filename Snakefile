@@ -45,6 +45,7 @@ include: "workflow/rules/reporting.smk"
 include: "workflow/rules/verification.smk"
 include: "workflow/rules/reference.smk"
 # The paper ends here. What follows is beyond it, and nothing above depends on it.
+include: "workflow/rules/extensions/common.smk"
 include: "workflow/rules/extensions/methods.smk"
 include: "workflow/rules/extensions/leaderboard.smk"
 include: "workflow/rules/extensions/more_views.smk"

@@ -147,6 +147,9 @@ rule evaluate_factorial:
         LAYOUT.log(f"evaluate_factorial/{{run}}/{REPLICATE}/{unit_folder(*UNIT)}"),
     benchmark:
         LAYOUT.benchmark(f"evaluate_factorial/{{run}}/{REPLICATE}/{unit_folder(*UNIT)}")
+    # A file of kept estimates may have categories that this run has not.
+    wildcard_constraints:
+        category="[^/]+",
     conda:
         ENVIRONMENT
     resources:

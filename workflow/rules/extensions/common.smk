@@ -1,0 +1,236 @@
+# The functions of the extensions' rule files.
+
+import functools
+
+from nbv.config import load_condition, read_configuration
+from nbv.experiments.kept_estimates import kept_settings
+
+REPLICATES = [
+    (shuffle, replicate)
+    for shuffle, replicates in enumerate(CONFIG["confirmation"]["replicates"])
+    for replicate in replicates
+]
+
+
+def run_settings(run):
+    """The configuration of a finished run."""
+    if run == CONFIG["name"]:
+        return CONFIG
+    try:
+        return read_configuration(
+            Path("results") / run,
+            ("categories", "elevations_deg", "methods", "extensions"),
+        )
+    except UserError as error:
+        stop(error)
+
+
+def run_file(run, path, key):
+    """A file of a run, named at that configuration key; only this run's are made here."""
+    if run != CONFIG["name"] and not Path(path).exists():
+        stop(f"{key}: {path} does not exist; finish the run {run} first")
+    return path
+
+
+# The runs that the leaderboard ranks.
+
+
+def leaderboard_folds(wildcards):
+    """Run, category, elevation and fold of everything that the leaderboard ranks."""
+    keys = []
+    for run in CONFIG["leaderboard_runs"] or [CONFIG["name"]]:
+        settings = run_settings(run)
+        keys += [
+            (run, category, elevation, fold)
+            for category in settings["categories"]
+            for elevation in settings["elevations_deg"][category]
+            for fold in range(1, settings["n_folds"] + 1)
+        ]
+    return keys
+
+
+def leaderboard_files(name):
+    """The extension files of that name, of every run."""
+
+    def files(wildcards):
+        return [
+            run_file(
+                run, Layout(f"results/{run}").extension(*fold, name), "leaderboard_runs"
+            )
+            for run, *fold in leaderboard_folds(wildcards)
+        ]
+
+    return files
+
+
+# Files of every elevation.
+
+
+def at_every_elevation(path):
+    return lambda wildcards: [
+        path(wildcards.category, elevation, wildcards.fold)
+        for elevation in CONFIG["elevations_deg"][wildcards.category]
+    ]
+
+
+# Conditions of transfer, and the files made under them.
+
+
+@functools.cache
+def condition_settings(name):
+    try:
+        settings = load_condition(
+            BASE / "config", OVERRIDES, CONFIG, TRANSFER["conditions"][name]
+        )
+        check_sensor(settings["sensor"], [TRANSFER_UNIT[0]])
+    except UserError as error:
+        stop(error)
+    return settings
+
+
+def layout_of(name):
+    """The run's own files where it was made under that very condition."""
+    settings = condition_settings(name)
+    is_run = TRANSFER_UNIT in UNITS and all(
+        settings[key] == CONFIG[key] for key in ("camera", "sensor")
+    )
+    return LAYOUT if is_run else LAYOUT.below("transfer", name)
+
+
+def trained_under(name):
+    """The run's own estimators only where they too were trained from random weights."""
+    start = start_of_unit(*TRANSFER_UNIT)
+    return layout_of(name) if start is None else LAYOUT.below("transfer", name)
+
+
+# The runs that this one is compared with.
+
+
+def compared_runs():
+    """This run's name, then those that it is compared with."""
+    return list(dict.fromkeys([CONFIG["name"], *CONFIG["compared_runs"]]))
+
+
+def methods_in(run):
+    """The paper's methods, and those that multiply an estimator's distributions."""
+    extensions = run_settings(run)["extensions"].items()
+    own = [name for name, method in extensions if method.get("fusion") == "product"]
+    return [*run_settings(run)["methods"], *own]
+
+
+def density_methods(run):
+    """The methods whose errors tell what a density brings."""
+    kinds = [
+        "estimate",
+        *(["posterior"] if run_settings(run)["gives_distributions"] else []),
+    ]
+    return sorted({name for kind in kinds for name in DENSITY_METHODS[kind].values()})
+
+
+def compared_keys(names_of, units=None):
+    """Run, category, elevation, fold, and one of the names that a run has, of every file."""
+    return [
+        (run, *fold, name)
+        for run in compared_runs()
+        for fold in folds_of(REFERENCE_UNITS if units is None else units)
+        for name in names_of(run)
+    ]
+
+
+def compared(path, names_of, units=None):
+    """The files of all runs. Those of other runs are not made here; they have to be there."""
+
+    def files(wildcards):
+        return [
+            run_file(run, path(Layout(f"results/{run}"), *place), "compared_runs")
+            for run, *place in compared_keys(names_of, units)
+        ]
+
+    return files
+
+
+def proposed_lookup(run):
+    methods, name = run_settings(run)["methods"], SETTINGS.subject
+    if name not in methods or not needs_lookup(methods[name]["policy"]):
+        stop(f"the run {run} has no lookup table of a method {name}")
+    return [methods[name]["policy"]]
+
+
+def estimated_roles(run):
+    theirs = run_settings(run).get("calibration", "holdout")
+    if theirs != CONFIG["calibration"]:
+        stop(
+            f"compared_runs: the run {run} has calibration={theirs}, this one "
+            f"{CONFIG['calibration']}, so their calibration objects differ; leave it out"
+        )
+    return ESTIMATED_ROLES
+
+
+def test_estimates(run):
+    return ["test"]
+
+
+def test_posteriors(run):
+    return ["test"] if run_settings(run)["gives_distributions"] else []
+
+
+# Trainings beyond the run's own.
+
+
+def replicate_layout(wildcards):
+    return LAYOUT.replicate(wildcards.shuffle, wildcards.replicate)
+
+
+def shuffled_splits(wildcards):
+    return LAYOUT.shuffle(wildcards.shuffle).splits(wildcards.category)
+
+
+def replicate_start(wildcards):
+    return training_start(wildcards, replicate_layout(wildcards))
+
+
+def held_out_keys():
+    """Category, elevation, fold and role of what is kept of a training."""
+    return [
+        (*fold, role) for fold in folds_of(LOWEST_UNITS) for role in ESTIMATED_ROLES
+    ]
+
+
+def held_out_files(path):
+    return lambda wildcards: [
+        path(replicate_layout(wildcards), *key) for key in held_out_keys()
+    ]
+
+
+@functools.cache
+def kept_runs():
+    """By run, the file that its estimates were kept in (None: this run's) and their keys."""
+    if not CONFIG["confirmation"]["kept"]:
+        keys = [
+            (shuffle, replicate, *unit)
+            for shuffle, replicate in REPLICATES
+            for unit in LOWEST_UNITS
+        ]
+        return {CONFIG["name"]: (None, keys)}
+    found = {}
+    for path in CONFIG["confirmation"]["kept"]:
+        try:
+            settings, keys = kept_settings(path)
+        except UserError as error:
+            stop(f"confirmation.kept: {error}")
+        run = settings["name"]
+        if run in found:
+            stop(
+                f"confirmation.kept: {path} is of the run {run}, as {found[run][0]} is"
+            )
+        found[run] = (path, list(dict.fromkeys(key[:4] for key in keys)))
+    return found
+
+
+def kept_file(wildcards):
+    path, _ = kept_runs()[wildcards.run]
+    return path or LAYOUT.kept_estimates(wildcards.shuffle, wildcards.replicate)
+
+
+def factorial_keys():
+    return [(run, *key) for run, (_, keys) in kept_runs().items() for key in keys]
