@@ -12,7 +12,13 @@ from clock_faces import CPU, SETTINGS, clock_faces, named, untrained
 from nbv.config import load_config
 from nbv.errors import UserError
 from nbv.estimation.training import train_estimator, train_network
-from nbv.estimation.warm_start import STAGES, stage_settings, start_of, with_category
+from nbv.estimation.warm_start import (
+    STAGES,
+    stage_from,
+    stage_settings,
+    start_of,
+    with_category,
+)
 from nbv.estimation.weights import Estimator, read_start, save_estimator
 from projects import ROOT
 
@@ -44,8 +50,15 @@ def test_a_stage_has_its_own_epochs_and_rate_and_nothing_of_the_others(kind):
             own["learning_rate"],
         )
     # What a training from random weights is recorded with: the same keys as ever.
-    assert set(stages["training"]) == set(estimator) - {"warm_start", "pretraining", "fine_tuning"}
+    assert set(stages["training"]) == set(estimator) - {"warm_start", *STAGES}
     assert all(set(settings) == set(stages["training"]) for settings in stages.values())
+
+
+@pytest.mark.parametrize(
+    ("start", "stage"), [(None, "training"), ("pretrained", "fine_tuning"), (0, "next_elevation")]
+)
+def test_what_a_training_starts_from_decides_its_stage(start, stage):
+    assert stage_from(start) == stage
 
 
 @given(st.integers(1, 100), st.integers(1, 100), st.integers(1, 100))

@@ -104,7 +104,7 @@ def test_one_estimator_can_be_asked_for_by_name_and_brings_what_it_starts_from(f
 
 
 def test_a_changed_start_trains_what_follows_again(warm):
-    """Neither fine-tuning's settings nor pretraining's can go unnoticed."""
+    """The settings of no stage can change unnoticed."""
 
     def planned(*more: str) -> dict[str, int]:
         return warm.would_run(*more, targets=("estimators",))
@@ -112,6 +112,7 @@ def test_a_changed_start_trains_what_follows_again(warm):
     made_again = {"train": 8, "estimators": 1}
     assert planned(*MORE) == {}
     assert planned(*MORE, "estimator.epochs=2") == {}
+    assert planned(*MORE, "estimator.next_elevation.epochs=2") == made_again | {"train": 4}
     assert planned(*MORE, "estimator.fine_tuning.epochs=2") == made_again
     assert planned(*MORE, "estimator.pretraining.epochs=1") == made_again | {"pretrain": 2}
     # From random weights.

@@ -19,7 +19,13 @@ from nbv.config import (
 )
 from nbv.config.memory import available_bytes, check_memory
 from nbv.errors import UserError
-from nbv.estimation.warm_start import PRETRAINED, STAGES, stage_settings, start_of
+from nbv.estimation.warm_start import (
+    PRETRAINED,
+    STAGES,
+    stage_from,
+    stage_settings,
+    start_of,
+)
 from nbv.experiments.results import ESTIMATED_ROLES
 from nbv.jobs import killed_jobs
 from nbv.layout import Layout, fold_folder, unit_folder
@@ -219,8 +225,8 @@ def training_start(wildcards, layout=LAYOUT):
 
 def stage_of(wildcards):
     """The settings of a training."""
-    stage = "fine_tuning" if training_start(wildcards) else "training"
-    return STAGE_SETTINGS[stage]
+    start = start_of_unit(wildcards.category, int(wildcards.elevation))
+    return STAGE_SETTINGS[stage_from(start)]
 
 
 # What tables and figures are about, and the files that they need.

@@ -168,7 +168,8 @@ class Estimator(Section):
     precision: Literal["auto", "bfloat16", "float32"]
     warm_start: Literal["none", "elevations", "categories", "both"] = "none"
     pretraining: Schedule = Schedule(epochs=2, learning_rate=9e-3)
-    fine_tuning: Schedule = Schedule(epochs=4, learning_rate=4e-3)
+    fine_tuning: Schedule = Schedule(epochs=5, learning_rate=4e-3)
+    next_elevation: Schedule = Schedule(epochs=4, learning_rate=4e-3)
     n_classes: Annotated[Whole, Field(ge=8, le=360), "a divisor of 360"] | None = None
     target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
 

@@ -1,8 +1,8 @@
 """What a training starts from: random weights, or those of a network trained before.
 
 A category's elevation can start from the estimator one elevation lower, and its lowest elevation
-from a network that was pretrained with all categories of the fold. A fine-tuning that starts so
-takes fewer epochs. No calibration or test object of the fold is seen on the way.
+from a network that was pretrained with all categories of the fold. A training that starts so takes
+fewer epochs. No calibration or test object of the fold is seen on the way.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Final, Literal
 
 PRETRAINED: Final = "pretrained"
-Stage = Literal["training", "pretraining", "fine_tuning"]
-STAGES: tuple[Stage, ...] = ("training", "pretraining", "fine_tuning")
+Stage = Literal["training", "pretraining", "fine_tuning", "next_elevation"]
+STAGES: tuple[Stage, ...] = ("training", "pretraining", "fine_tuning", "next_elevation")
 
 
 def start_of(
@@ -41,6 +41,13 @@ def start_of(
     return PRETRAINED if warm_start in ("categories", "both") else None
 
 
+def stage_from(start: int | Literal["pretrained"] | None) -> Stage:
+    """Return the stage of a training by what it starts from; see `start_of`."""
+    if start is None:
+        return "training"
+    return "fine_tuning" if start == PRETRAINED else "next_elevation"
+
+
 def stage_settings(
     estimator: Mapping[str, Any], stage: Stage, epochs: int | None = None
 ) -> dict[str, Any]:
@@ -51,8 +58,8 @@ def stage_settings(
     estimator : mapping
         The section ``estimator`` of a configuration.
     stage : str
-        ``training`` from random weights, ``pretraining`` of all categories together, or
-        ``fine_tuning`` of what was trained before.
+        ``training`` from random weights, ``pretraining`` of all categories together,
+        ``fine_tuning`` of the pretrained network, or ``next_elevation``.
     epochs : int, optional
         Those of a training from random weights, where they are not ``estimator.epochs``. Each
         other stage takes its own in the same proportion, and one at the least.
