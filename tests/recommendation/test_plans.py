@@ -21,7 +21,7 @@ from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.criteria.expected_error import affinity
 from nbv.recommendation.following import DistributionViews, follow
 from nbv.recommendation.fusion import rotation_errors_deg
-from nbv.recommendation.next_views import recommended_next
+from nbv.recommendation.next_views import evenly_spaced_travel_deg, recommended_next
 from nbv.recommendation.plans import (
     Plans,
     at_spacing,
@@ -30,6 +30,7 @@ from nbv.recommendation.plans import (
     plans_of,
     spaced_errors_deg,
     spacing_bins,
+    step_by_step,
     step_by_step_errors_deg,
 )
 
@@ -78,7 +79,7 @@ def test_without_caution_two_views_cost_what_the_expected_error_says():
     evidence = evidence_of(distributions(0), caution=0.0)
     belief, spacings = first_views(1, evidence), spacing_bins(2, N_BINS, 0.0)
     cost = CRITERIA["expected_error"](belief, evidence, "product")
-    plans = plans_of(evidence, 2, np.empty(0), 0.0)
+    plans = plans_of(evidence, 2, 0.0)
     assert plans.spacing_deg.tolist() == (spacings * 360 // N_BINS).tolist()
     excess = excess_of_plans(belief, evidence, plans.errors_deg, plans.caution)
     expected = cost[:, spacings] - cost[:, spacings[:1]]
@@ -108,32 +109,65 @@ def test_caution_adds_standard_errors_over_objects():
 
 def test_one_calibration_object_moves_nothing_from_even_spacing():
     evidence = evidence_of(distributions(0, n_objects=1), **CAUTIOUS)
-    plans = plans_of(evidence, 3, step_by_step_errors_deg(evidence, 3, 15.0), 15.0)
+    plans = plans_of(evidence, 3, 15.0)
     assert (choose_plan(first_views(1, evidence), evidence, plans) == 0).all()
     assert plans.spacing_deg[0] == 120
 
 
 def test_step_by_step_is_a_plan_of_three_views_and_more():
     evidence = evidence_of(distributions(0, n_objects=6), **CAUTIOUS)
-    by_gain = step_by_step_errors_deg(evidence, 4, 15.0)
-    assert by_gain.shape == (4, 6, N_BINS)
     for n_views in (3, 4):
-        plans = plans_of(evidence, n_views, by_gain, 15.0)
+        by_gain = step_by_step_errors_deg(evidence, n_views, 15.0)
+        plans = plans_of(evidence, n_views, 15.0)
         assert len(plans.errors_deg) == len(plans.spacing_deg) + 1
-        np.testing.assert_array_equal(plans.errors_deg[-1], by_gain[n_views - 1])
-    assert len(plans_of(evidence, 2, by_gain, 15.0).errors_deg) == N_BINS
+        np.testing.assert_array_equal(plans.errors_deg[-1], by_gain)
+    assert len(plans_of(evidence, 2, 15.0).errors_deg) == N_BINS
+
+
+@pytest.mark.parametrize("n_views", [2, 3, 4, 5])
+def test_step_by_step_travels_no_farther_than_even_spacing_and_else_as_it_likes(n_views):
+    evidence = evidence_of(distributions(0, n_objects=6))
+    seen, rng = DistributionViews(distributions(3), evidence), np.random.default_rng(0)
+    budget_deg = evenly_spaced_travel_deg(n_views)
+    for apart_deg in (0.0, 15.0, 30.0):
+        views = {
+            limit: follow(
+                recommended_next("information_gain", evidence, apart_deg, limit),
+                seen,
+                n_views=n_views,
+                start_every_deg=15,
+                rng=rng,
+            )
+            for limit in (n_views, None)
+        }
+        assert views[n_views][1, :, :, -1].max() <= budget_deg
+        free = (views[None][1, :, :, 1:-1].max(axis=-1, initial=0) <= budget_deg - 30 * n_views) & (
+            views[None][1, :, :, -1] <= budget_deg
+        )
+        np.testing.assert_array_equal(views[n_views][:, free], views[None][:, free])
+
+
+def test_where_the_travel_left_is_too_short_the_nearest_view_follows():
+    """Views at 0, 180 and 90 degrees have travelled as far as four evenly spaced ones."""
+    evidence = evidence_of(distributions(0))
+    belief, rng = first_views(1, evidence), np.random.default_rng(0)
+    taken = np.tile([0, 180, 90], (len(belief.probabilities), 1))
+    found = recommended_next("information_gain", evidence, 45.0, 4)(belief, taken, rng)
+    assert np.abs(found - 90).max() == np.abs(found - 90).min() > 0
+    assert circular_distance_deg(found[:, None], taken).min() >= 45
 
 
 def test_the_views_of_a_part_are_chosen_with_the_evidence_of_the_others():
     """Two objects of five parts: each is chosen for by the other."""
     views = distributions(5, n_objects=2)
     found = step_by_step_errors_deg(evidence_of(views), 3, 0.0)
+    assert found.shape == (2, N_BINS)
     for one in (0, 1):
         known = evidence_of(views[[1 - one]])
         seen = DistributionViews(views[[one]], known)
-        policy, rng = recommended_next("information_gain", known, 0.0), np.random.default_rng(1)
+        policy, rng = step_by_step(known, 0.0, 3), np.random.default_rng(1)
         reached = follow(policy, seen, n_views=3, start_every_deg=30, rng=rng)
-        np.testing.assert_allclose(found[:, one], reached[0, 0].T, atol=1e-4)
+        np.testing.assert_allclose(found[one], reached[0, 0, :, -1], atol=1e-4)
 
 
 def test_a_plan_that_is_surely_better_for_images_alike_is_taken_for_those():

@@ -33,7 +33,7 @@ from nbv.recommendation.plans import (
     at_spacing,
     choose_plan,
     plans_of,
-    step_by_step_errors_deg,
+    step_by_step,
 )
 
 Floats = NDArray[np.float64]
@@ -134,15 +134,15 @@ def _by_product(
     for n in every:
         yield "evenly_spaced_product", [n], run(evenly_spaced_next(n), seen, n_views=n)
     by_gain = recommended_next("information_gain", evidence, apart_deg)
-    step_by_step = run(by_gain, seen, n_views=every[-1])
-    yield "information_gain_product", every, step_by_step
-    of_calibration = step_by_step_errors_deg(evidence, every[-1], apart_deg)
+    yield "information_gain_product", every, run(by_gain, seen, n_views=every[-1])
     belief = first_views(seen, settings["start_every_deg"])[2]
+    yield "expected_error_product", [1], run(random_next, seen, n_views=1)
     for n in every[1:]:
-        plans = plans_of(evidence, n, of_calibration, apart_deg)
+        plans = plans_of(evidence, n, apart_deg)
         chosen = choose_plan(belief, evidence, plans)
         steps_deg = np.append(plans.spacing_deg, 0)[chosen]
         spaced = run(at_spacing(steps_deg), seen, n_views=n)
+        stepped = run(step_by_step(evidence, apart_deg, n), seen, n_views=n)
         goes_on = (chosen == len(plans.spacing_deg)).reshape(spaced.shape[1:3])
-        planned = np.where(goes_on[None, :, :, None], step_by_step[..., :n], spaced)
+        planned = np.where(goes_on[None, :, :, None], stepped, spaced)
         yield "expected_error_product", [n], planned

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.angles import circular_distance_deg, nearest_bin
+from nbv.angles import circular_distance_deg, nearest_bin, travel_deg
 from nbv.recommendation.belief import Belief, coarser
 from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.evidence import Evidence
@@ -28,7 +28,9 @@ far. All rotations count from the first view, whose own is 0.
 """
 
 
-def recommended_next(criterion: str, coarse: Evidence, min_separation_deg: float) -> NextView:
+def recommended_next(
+    criterion: str, coarse: Evidence, min_separation_deg: float, n_views: int | None = None
+) -> NextView:
     """Return the policy that takes the view of least cost.
 
     Parameters
@@ -40,15 +42,35 @@ def recommended_next(criterion: str, coarse: Evidence, min_separation_deg: float
     min_separation_deg : float
         From every view so far: an estimator errs alike from nearly the same place, and no
         criterion that takes views as independent can know.
+    n_views : int, optional
+        In all. Then they travel no farther than as many evenly spaced views; where too little
+        travel is left for that, the nearest view is taken.
     """
 
     def next_view(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
         cost = CRITERIA[criterion](coarser(belief, coarse), coarse, "posterior")
-        rotations = np.arange(coarse.n_bins) * (360.0 / coarse.n_bins)
+        bin_deg = 360.0 / coarse.n_bins
+        rotations = np.arange(coarse.n_bins) * bin_deg
         apart = circular_distance_deg(taken_deg[:, :, None], rotations).min(axis=1)
-        return least_cost_delta(np.where(apart < min_separation_deg, np.inf, cost))
+        cost = np.where(apart < min_separation_deg, np.inf, cost)
+        if n_views is None:
+            return least_cost_delta(cost)
+        travel = travel_deg(rotations - taken_deg[:, -1:])
+        # Each view after the next one needs as much at the least.
+        reserve = (n_views - 1 - taken_deg.shape[1]) * np.ceil(min_separation_deg / bin_deg)
+        so_far = travel_deg(np.diff(taken_deg, axis=1)).sum(axis=1, keepdims=True)
+        left = evenly_spaced_travel_deg(n_views) - reserve * bin_deg - so_far
+        within = np.where(travel <= left, cost, np.inf)
+        nearest = np.where(np.isfinite(cost), travel, np.inf)
+        none = np.isinf(within).all(axis=1, keepdims=True)
+        return least_cost_delta(np.where(none, nearest, within))
 
     return next_view
+
+
+def evenly_spaced_travel_deg(n_views: int) -> float:
+    """Return the travel of views 360° / n apart."""
+    return (n_views - 1) * 360.0 / n_views
 
 
 def random_next(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:

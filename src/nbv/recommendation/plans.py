@@ -4,7 +4,8 @@ Evenly spaced views are 360° / n apart. Closer ones, one way round or the other
 tell more; views chosen step by step by the information gain find what is hidden. No plan is best
 for all objects: a half-turn is seen best by even spacing, a hidden handle step by step. So the
 errors that each plan really led to on calibration objects decide, for each first view by the images
-that look alike, and evenly spaced views are what other plans have to beat.
+that look alike, and evenly spaced views are what other plans have to beat. No plan travels farther
+than they do.
 """
 
 from __future__ import annotations
@@ -83,28 +84,33 @@ def at_spacing(spacing_deg: Rotations) -> NextView:
     return next_view
 
 
-def step_by_step_errors_deg(evidence: Evidence, n_views: int, min_separation_deg: float) -> Table:
-    """Return the errors (n_views, n_objects, B) that the information gain led to, in degrees.
+def step_by_step(evidence: Evidence, min_separation_deg: float, n_views: int) -> NextView:
+    """Return the policy of the information gain that travels no farther than even spacing."""
+    return recommended_next("information_gain", evidence, min_separation_deg, n_views)
 
-    From every view of calibration objects a bin apart, after each number of views. Views of one
-    part of the objects are chosen with the evidence of all others; one object alone has its own.
+
+def step_by_step_errors_deg(evidence: Evidence, n_views: int, min_separation_deg: float) -> Table:
+    """Return the errors (n_objects, B) that n views chosen by the information gain led to, degrees.
+
+    From every view of calibration objects a bin apart. Views of one part of the objects are chosen
+    with the evidence of all others; one object alone has its own.
     """
     distributions, n_bins = _distributions(evidence), evidence.n_bins
     n_objects = len(distributions)
     part_of = np.arange(n_objects) % min(_PARTS, n_objects)
-    errors = np.empty((n_views, n_objects, n_bins), dtype=np.float32)
+    errors = np.empty((n_objects, n_bins), dtype=np.float32)
     for part in range(part_of.max() + 1):
         own = part_of == part
         others = distributions[~own] if n_objects > 1 else distributions
         known = evidence_of_distributions(others, evidence.settings)
         reached = follow(
-            recommended_next("information_gain", known, min_separation_deg),
+            step_by_step(known, min_separation_deg, n_views),
             DistributionViews(distributions[own], known),
             n_views=n_views,
             start_every_deg=360 // n_bins,
             rng=np.random.default_rng(0),  # nothing is drawn
         )
-        errors[:, own] = reached[0].transpose(2, 0, 1)
+        errors[own] = reached[0, :, :, -1]
     return errors
 
 
@@ -117,8 +123,8 @@ class Plans:
     spacing_deg : ndarray (S,) int64
         Of the plans at equal steps, evenly spaced views first.
     errors_deg : ndarray (P, n_objects, B) float32
-        Of each plan from each view of calibration objects. The last of S + 1 plans goes step by
-        step.
+        Of each plan from each view of calibration objects. Plans that are not at equal steps come
+        last: of three views and more, one that goes step by step.
     caution : float
         Standard errors; see `excess_of_plans`.
     """
@@ -128,9 +134,7 @@ class Plans:
     caution: float
 
 
-def plans_of(
-    evidence: Evidence, n_views: int, step_by_step: Table, min_separation_deg: float
-) -> Plans:
+def plans_of(evidence: Evidence, n_views: int, min_separation_deg: float) -> Plans:
     """Return the plans for n views.
 
     Two views have every rotation for a plan and no caution, as `expected_error` has: the second
@@ -142,8 +146,6 @@ def plans_of(
         Of distributions.
     n_views : int
         2 or more.
-    step_by_step : ndarray (n, n_objects, B)
-        Of `step_by_step_errors_deg`.
     min_separation_deg : float
     """
     spacings = spacing_bins(n_views, evidence.n_bins, min_separation_deg)
@@ -151,7 +153,8 @@ def plans_of(
     degrees = np.rint(spacings * (360.0 / evidence.n_bins)).astype(np.int64)
     if n_views == 2:
         return Plans(degrees, errors, 0.0)
-    errors = np.concatenate([errors, step_by_step[n_views - 1 : n_views]])
+    by_gain = step_by_step_errors_deg(evidence, n_views, min_separation_deg)
+    errors = np.concatenate([errors, by_gain[None]])
     return Plans(degrees, errors, evidence.settings["affinity"]["caution"])
 
 
