@@ -104,6 +104,7 @@ def _competition(leaves: Sequence[Comparison], measured: Measured, place: bool =
 _STATISTIC_LABELS: Mapping[str, str] = {
     "mae": "MAE",
     "pauc": "pAUC",
+    "above_90_percent": "errors above 90°",
     "median": "median",
     "mae_sigma": "σ of MAE",
     "pauc_sigma": "σ of pAUC",

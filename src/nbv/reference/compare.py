@@ -53,7 +53,7 @@ IDENTICAL, WITHIN, OUTSIDE, UNJUDGED = "identical", "within", "outside", "not ju
 # Which cell (table, row, row_label, method, metric), which of its figures, and how it was judged.
 JUDGED_COLUMNS = (*CELL_COLUMNS[:5], "quantity", "reference", "low", "high", "here", "status")
 _EXAMPLE_METRICS = frozenset({"estimate", "error"})
-_METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC"}
+_METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC", "above_90_percent": "errors above 90°"}
 _COUNTS = {"n_objects": "test objects", "n_images": "initial views"}
 
 

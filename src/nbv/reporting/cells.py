@@ -1,9 +1,10 @@
 """Tidy cells: one statistic of each method on the same images, with its uncertainty.
 
-``value`` is in degrees (``mae``, ``estimate``, ``error``) or percent (``pauc``), pooled over the
-images of all folds; ``sigma`` is the sample standard deviation of the cell's figure per fold;
-``ci_*`` its 95 % interval over objects; ``difference*`` the paired difference to the reference
-method with its interval; ``published`` what the paper prints in the same place.
+``value`` is in degrees (``mae``, ``estimate``, ``error``) or percent (``pauc``,
+``above_90_percent``), pooled over the images of all folds; ``sigma`` is the sample standard
+deviation of the cell's figure per fold; ``ci_*`` its 95 % interval over objects; ``difference*``
+the paired difference to the reference method with its interval; ``published`` what the paper prints
+in the same place.
 """
 
 from __future__ import annotations

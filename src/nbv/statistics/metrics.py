@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.pose_errors import accuracy_area
+from nbv.pose_errors import accuracy_area, half_turned
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,6 +91,15 @@ def pauc(errors_deg: ArrayLike) -> float:
     raises what `mae_deg` does.
     """
     return float(np.mean(accuracy_area(_non_empty(errors_deg))))
+
+
+def above_90_percent(errors_deg: ArrayLike) -> float:
+    """Return the share of errors above 90 degrees, in percent: front and back are confused.
+
+    Lower is better. The mean of two opposite estimates is 90 degrees from both, so averaging can
+    turn one error of 180 degrees into two of 90. Takes and raises what `mae_deg` does.
+    """
+    return float(np.mean(half_turned(_non_empty(errors_deg))))
 
 
 def fold_std(values: ArrayLike) -> float:

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.pose_errors import accuracy_area
+from nbv.pose_errors import accuracy_area, half_turned
 from nbv.statistics import metrics
 from nbv.statistics.metrics import Floats, Interval, Ints
 
@@ -178,11 +178,13 @@ class Resampler:
         return self._drawn[key]
 
 
-STATISTICS = ("mae", "pauc", "median", "mae_sigma", "pauc_sigma")
+STATISTICS = ("mae", "pauc", "above_90_percent", "median", "mae_sigma", "pauc_sigma")
 """The statistics that `estimate` knows."""
 
 LOWER_IS_BETTER: Mapping[str, bool] = {name: name != "pauc" for name in STATISTICS}
-UNIT_OF: Mapping[str, str] = {name: "\u00a0%" if "pauc" in name else "°" for name in STATISTICS}
+UNIT_OF: Mapping[str, str] = {
+    name: "\u00a0%" if "pauc" in name or "percent" in name else "°" for name in STATISTICS
+}
 
 
 @dataclass(frozen=True)
@@ -208,8 +210,8 @@ def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resam
     Parameters
     ----------
     statistic : str
-        ``mae`` or ``median`` (degrees), ``pauc`` (percent), or ``mae_sigma`` and ``pauc_sigma``:
-        the standard deviation over folds of the figure per fold.
+        ``mae`` or ``median`` (degrees), ``pauc`` or ``above_90_percent`` (percent), or
+        ``mae_sigma`` and ``pauc_sigma``: the standard deviation over folds of the figure per fold.
 
     Raises
     ------
@@ -225,7 +227,7 @@ def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resam
 
 
 def fold_sigma(statistic: str, sample: PairedErrors, method: str) -> float:
-    """Return σ over folds of the statistic (``mae`` or ``pauc``) of one method."""
+    """Return σ over folds of the statistic (a mean over images) of one method."""
     errors, metric = sample.errors_deg[method], _METRICS[statistic]
     folds = np.unique(sample.folds)
     return metrics.fold_std([metric(errors[sample.folds == fold]) for fold in folds])
@@ -245,6 +247,8 @@ def _estimate_sigma(
 
 def _per_image(statistic: str, errors_deg: Floats) -> Floats:
     """Return what each image adds to a statistic that is a mean over images."""
+    if statistic == "above_90_percent":
+        return half_turned(errors_deg)
     return accuracy_area(errors_deg) if statistic == "pauc" else errors_deg
 
 
@@ -252,4 +256,5 @@ _METRICS: Mapping[str, Callable[[Floats], float]] = {
     "mae": metrics.mae_deg,
     "median": metrics.median_deg,
     "pauc": metrics.pauc,
+    "above_90_percent": metrics.above_90_percent,
 }

@@ -59,8 +59,17 @@ def cell(table, row, method, metric):
     return found.iloc[0]
 
 
+def half_turns(errors):
+    return 100 * statistics.mean(error > 90 for error in errors)
+
+
 @pytest.mark.parametrize(
-    ("name", "metric", "function"), [("table1", "mae", statistics.mean), ("table3", "pauc", pauc)]
+    ("name", "metric", "function"),
+    [
+        ("table1", "mae", statistics.mean),
+        ("table3", "pauc", pauc),
+        ("table1", "above_90_percent", half_turns),
+    ],
 )
 def test_by_category(evaluations, rows, name, metric, function):
     table = build_table(name, evaluations, QUICK)

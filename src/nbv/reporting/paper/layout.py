@@ -2,7 +2,7 @@
 
 A cell shows ``ours [published]``, the best method of a row in bold. Tables 1 to 5 close with the
 paired difference to the reference method and its interval, so that a difference can be told from
-noise without another table.
+noise without another table. Below, the same rows show the share of errors above 90°.
 """
 
 from __future__ import annotations
@@ -16,20 +16,24 @@ from nbv.labels import MINUS, interval_text, method_label, number
 from nbv.paper.published import PUBLISHED, SIGMA_ROW, Note
 from nbv.reporting.settings import ReportSettings
 from nbv.reporting.table import Cell, Row
+from nbv.statistics.paired import LOWER_IS_BETTER, UNIT_OF
 
 Body = tuple[list[str], list[Row]]
 """The titles of the columns after the first, and the rows."""
 
 METRIC_TITLES = {"mae": "MAE", "pauc": "pAUC"}
+HALF_TURNS = "above_90_percent"
 
 
 def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
     """Rows by methods, then the difference of the subject to the reference (Tables 1 to 5)."""
-    methods, unit = _methods(cells), _unit(cells)
+    methods = _methods(cells)
     differs = _shows_difference(cells, settings)
     rows = []
-    for label, part in cells.groupby("row_label", sort=False):
-        row = [Cell(str(label)), *_values(part, methods, unit)]
+    in_blocks = cells.sort_values("metric", key=lambda names: names == HALF_TURNS, kind="stable")
+    for (metric, label), part in in_blocks.groupby(["metric", "row_label"], sort=False):
+        title = f"{label}: errors above 90°" if metric == HALF_TURNS else str(label)
+        row = [Cell(title), *_values(part, methods)]
         if differs:
             subject = part[part["method"] == settings.subject].iloc[0]
             ends = subject["difference_low"], subject["difference_high"]
@@ -45,7 +49,7 @@ def fold_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
     rows = []
     for label, part in cells.groupby("row_label", sort=False):
         of_metric = [part[part["metric"] == metric] for metric in METRIC_TITLES]
-        columns = [_values(found, methods, _unit(found)) for found in of_metric]
+        columns = [_values(found, methods) for found in of_metric]
         pairs = zip(*columns, strict=True)
         rows.append((Cell(str(label)), *(cell for pair in pairs for cell in pair)))
     titles = METRIC_TITLES.values()
@@ -98,15 +102,13 @@ def _methods(cells: pd.DataFrame) -> list[str]:
     return list(dict.fromkeys(cells["method"]))
 
 
-def _unit(cells: pd.DataFrame) -> str:
-    return "°" if (cells["metric"] == "mae").all() else ""
-
-
-def _values(row: pd.DataFrame, methods: list[str], unit: str) -> list[Cell]:
+def _values(row: pd.DataFrame, methods: list[str]) -> list[Cell]:
     """Return ``ours [published]`` per method; the best of the row, as printed, is bold."""
     by_method = row.set_index("method").reindex(methods)
     values = by_method["value"].round(2)
-    lower_is_better = (row["row"] == SIGMA_ROW).all() or (row["metric"] == "mae").all()
+    (metric,) = row["metric"].unique()
+    unit = "" if metric == "pauc" else UNIT_OF[metric]
+    lower_is_better = LOWER_IS_BETTER[metric] or (row["row"] == SIGMA_ROW).all()
     best = values.min() if lower_is_better else values.max()
     cells = []
     for value, published in zip(values, by_method["published"], strict=True):
