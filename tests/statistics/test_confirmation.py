@@ -14,12 +14,14 @@ from nbv.statistics.confirmation import (
     CONTRASTS_COLUMNS,
     METHODS_COLUMNS,
     OBJECTS_COLUMNS,
+    TRAININGS_COLUMNS,
     Contrast,
     contrasts_of,
     method_contrasts,
     method_means,
+    training_contrasts,
 )
-from nbv.statistics.trainings import crossed_mean, holm, pooled_mean
+from nbv.statistics.trainings import crossed_mean, holm, pooled_mean, predicted_by_others
 
 SHIFT = {
     ("none", "none", 1): 4.0,
@@ -124,6 +126,31 @@ def test_all_but_primary_contrasts_over_all_categories_are_adjusted_together(obj
         for key, p_value in raw.items():
             expected = p_value if key in primary else adjusted["|".join(key)]
             assert rows.loc[key, "p_holm"] == pytest.approx(expected)
+
+
+def test_each_training_is_compared_with_the_others(objects):
+    found = training_contrasts(objects)
+    assert tuple(found.columns) == TRAININGS_COLUMNS
+    assert len(found) == 3 * len(contrasts_of(list(SHIFT))) * len(TRAININGS)
+    keys = ["category", "contrast", "fusion", "shuffle", "replicate"]
+    indexed = found.set_index(keys)
+    for category in (*SIZES, ALL):
+        tables = [
+            table_of(objects, one, ("expected_error", "average", 2))
+            - table_of(objects, one, ("fixed", "average", 2))
+            for one in (SIZES if category == ALL else [category])
+        ]
+        for training, expected in zip(TRAININGS, predicted_by_others(tables), strict=True):
+            row = indexed.loc[(category, "expected_error - fixed", "average", *training)]
+            shown = row["difference_deg"], row["low"], row["high"]
+            assert shown == pytest.approx((expected.value, expected.low, expected.high))
+
+
+def test_fewer_than_three_trainings_and_unlike_ones_are_not_compared(objects):
+    two = objects[objects["shuffle"] == 0]
+    assert training_contrasts(two).empty
+    some = objects[(objects["category"] == "mug") | (objects["shuffle"] == 0)]
+    assert set(training_contrasts(some)["category"]) == {"mug"}
 
 
 def test_names_say_what_differs():

@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from nbv.statistics.trainings import Mean, crossed_mean, holm, pooled_mean
+from nbv.statistics.trainings import (
+    Mean,
+    crossed_mean,
+    holm,
+    pooled_mean,
+    predicted_by_others,
+)
 
 
 def simulated(rng, n_trainings, n_objects, of_training=0.1, remainder=1.0):
@@ -104,6 +110,30 @@ def test_one_object_says_nothing_about_others():
 def test_what_is_no_table_of_finite_values_is_refused(values):
     with pytest.raises(ValueError, match="needs a finite value"):
         crossed_mean(values)
+
+
+@pytest.mark.parametrize("n_trainings", [3, 5])
+@pytest.mark.parametrize("sizes", [(8,), (6, 15)])
+def test_the_other_trainings_predict_a_training_as_often_as_they_say(n_trainings, sizes):
+    rng, inside, n = np.random.default_rng(3), 0, 3000
+    for _ in range(n):
+        objects = [rng.gamma(0.5, 1.0, size) for size in sizes]
+        tables = [each + rng.normal(0.0, 0.3, (n_trainings, each.size)) for each in objects]
+        found = predicted_by_others(tables)[0]
+        assert found.value == pytest.approx(np.concatenate(tables, axis=1)[0].mean())
+        inside += found.low <= found.value <= found.high
+    # Satterthwaite's rule makes intervals of two categories and two others a little wide.
+    assert 0.94 <= inside / n <= (0.96 if len(sizes) == 1 else 0.99)
+
+
+def test_the_prediction_is_the_classical_one_and_needs_two_others():
+    table = np.random.default_rng(1).normal(size=(4, 7))
+    means = table.mean(axis=1)
+    for own, found in enumerate(predicted_by_others([table])):
+        others = np.delete(means, own)
+        ends = stats.t(2, others.mean(), others.std(ddof=1) * np.sqrt(4 / 3)).interval(0.95)
+        assert (found.low, found.high) == pytest.approx(ends)
+    assert predicted_by_others([table[:2]]) == []
 
 
 def test_categories_are_pooled_by_their_objects():

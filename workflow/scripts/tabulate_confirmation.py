@@ -5,7 +5,7 @@ from nbv.jobs import job
 with job(snakemake):
     import pandas as pd
 
-    from nbv.files import read_csv
+    from nbv.files import read_csv, write_csv
     from nbv.reporting.extensions.confirmation import (
         contrasts_figure,
         contrasts_table,
@@ -13,7 +13,7 @@ with job(snakemake):
     )
     from nbv.reporting.style import save_figure
     from nbv.reporting.table import write_table
-    from nbv.statistics.confirmation import method_contrasts, method_means
+    from nbv.statistics.confirmation import method_contrasts, method_means, training_contrasts
 
     output = snakemake.output
     parts = [
@@ -23,11 +23,12 @@ with job(snakemake):
         )
     ]
     objects = pd.concat(parts, ignore_index=True)
-    contrasts = method_contrasts(objects)
+    contrasts, of_trainings = method_contrasts(objects), training_contrasts(objects)
     tables = {
         "methods": methods_table(method_means(objects)),
-        "contrasts": contrasts_table(contrasts),
+        "contrasts": contrasts_table(contrasts, of_trainings),
     }
+    write_csv(output.trainings_csv, of_trainings)
     for name, table in tables.items():
         write_table(table, {kind: output[f"{name}_{kind}"] for kind in ("csv", "md")})
     paths = {kind: output[f"contrasts_{kind}"] for kind in ("png", "pdf")}

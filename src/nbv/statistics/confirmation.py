@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from nbv.errors import UserError
 from nbv.experiments.factorial import MORE_VIEWS, SINGLE, Factorial
 from nbv.statistics.object_means import MEAN_COLUMNS, object_means
-from nbv.statistics.trainings import Mean, crossed_mean, holm, pooled_mean
+from nbv.statistics.trainings import (
+    Mean,
+    crossed_mean,
+    holm,
+    pooled_mean,
+    predicted_by_others,
+)
 
 ALL = "all"
 """In place of a category: the objects of all categories."""
@@ -45,6 +51,16 @@ CONTRASTS_COLUMNS = (
     "p_holm",
     "n_objects",
     "n_trainings",
+)
+
+TRAININGS_COLUMNS = (
+    *PLACE,
+    "contrast",
+    "fusion",
+    *TRAINING,
+    "difference_deg",
+    "low",
+    "high",
 )
 
 Method = tuple[str, str, int]
@@ -176,6 +192,31 @@ def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
                 )
             )
     return pd.DataFrame(rows, columns=list(CONTRASTS_COLUMNS))
+
+
+def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
+    """Return what each training alone shows, columns `TRAININGS_COLUMNS`.
+
+    ``low`` and ``high`` are what the other trainings predict for it
+    (`nbv.statistics.trainings.predicted_by_others`). Parameters and errors as of `method_means`.
+    Places without three trainings, the same of every category, have no rows.
+    """
+    rows = []
+    for (dataset, category), tables in _tables(objects):
+        own = objects[objects["dataset"] == dataset]
+        own = own if category == ALL else own[own["category"] == category]
+        trainings = [key for key, _ in own.groupby(list(TRAINING))]
+        for contrast in contrasts_of(list(tables)):
+            mine, other = (tables[one]["error_deg"] for one in (contrast.method, contrast.other))
+            if any(len(table) != len(trainings) for table in mine):
+                continue
+            shown = predicted_by_others([a - b for a, b in zip(mine, other, strict=True)])
+            names = (dataset, category, contrast.name, contrast.method[1])
+            rows += [
+                (*names, *training, one.value, one.low, one.high)
+                for training, one in zip(trainings, shown, strict=bool(shown))
+            ]
+    return pd.DataFrame(rows, columns=list(TRAININGS_COLUMNS))
 
 
 Figures = Mapping[str, Sequence[NDArray[np.float64]]]

@@ -112,6 +112,39 @@ def pooled_mean(parts: Sequence[Mean]) -> Mean:
     return Mean(value, sum(terms), freedom, int(sizes.sum()), n_trainings)
 
 
+def predicted_by_others(tables: Sequence[Floats]) -> list[Interval]:
+    """Return, for each training, its mean and the 95 % interval that the others predict for it.
+
+    The prediction interval of one more training of the same objects: the mean of the others, and
+    Student's t of their spread times sqrt(1 + 1 / their number). If trainings vary normally, 95 %
+    of all means lie inside.
+
+    Parameters
+    ----------
+    tables : sequence of ndarray (n_trainings, n_objects)
+        Of each category, with the same trainings; categories count by their objects.
+
+    Returns
+    -------
+    list of Interval
+        Empty with fewer than three trainings.
+    """
+    sizes = np.array([table.shape[1] for table in tables], dtype=np.float64)
+    weights = sizes / sizes.sum()
+    means = np.stack([table.mean(axis=1) for table in tables], axis=1)
+    n_trainings = len(means)
+    found = []
+    for own in range(n_trainings if n_trainings > 2 else 0):
+        others = np.delete(means, own, axis=0)
+        terms = weights**2 * others.var(axis=0, ddof=1)
+        freedom = _freedom(terms.sum(), [(term, n_trainings - 2.0) for term in terms])
+        half = stats.t.ppf(0.975, freedom) * np.sqrt(terms.sum() * (1 + 1 / len(others)))
+        centre = weights @ others.mean(axis=0)
+        value = float(weights @ means[own])
+        found.append(Interval(value, float(centre - half), float(centre + half)))
+    return found
+
+
 def holm(p_values: Mapping[str, float]) -> dict[str, float]:
     """Return p-values adjusted for their number (Holm, 1979): each that is below 0.05 still counts.
 

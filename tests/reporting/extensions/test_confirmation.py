@@ -12,7 +12,14 @@ from nbv.reporting.extensions.confirmation import (
     methods_table,
 )
 from nbv.reporting.table import table_markdown
-from nbv.statistics.confirmation import method_contrasts, method_means
+from nbv.statistics.confirmation import (
+    TRAININGS_COLUMNS,
+    method_contrasts,
+    method_means,
+    training_contrasts,
+)
+
+NO_TRAININGS = pd.DataFrame(columns=list(TRAININGS_COLUMNS))
 
 
 @pytest.fixture(scope="module")
@@ -36,13 +43,31 @@ def test_a_column_for_each_fusion_and_a_row_for_each_choice():
 
 
 def test_a_difference_is_bold_where_its_interval_excludes_0(contrasts):
-    table = contrasts_table(contrasts)
+    table = contrasts_table(contrasts, NO_TRAININGS)
     assert table.parts[0].heading == "real, Mug (8 objects, 3 trainings)"
     rows = [row for part in table.parts for row in part.rows]
     assert len(rows) == len(contrasts)
     for row, (_, found) in zip(rows, contrasts.iterrows(), strict=True):
         assert row[2].bold == (found["low"] > 0 or found["high"] < 0)
     assert "| Expected error less fixed | average |" in table_markdown(table)
+
+
+def test_a_note_says_how_well_single_trainings_agree(contrasts):
+    of_trainings = training_contrasts(objects_frame())
+    note = contrasts_table(contrasts, of_trainings).notes[-1]
+    predicted = overall = 0
+    for _, row in of_trainings.iterrows():
+        same = (
+            contrasts[["category", "contrast", "fusion"]]
+            == row[["category", "contrast", "fusion"]].tolist()
+        )
+        (found,) = (one for _, one in contrasts[same.all(axis=1)].iterrows())
+        predicted += row["low"] <= row["difference_deg"] <= row["high"]
+        overall += found["low"] <= row["difference_deg"] <= found["high"]
+    n = len(of_trainings)
+    assert f"of {n} differences, {100 * predicted / n:.0f} %" in note
+    assert f"and {100 * overall / n:.0f} % in the intervals above" in note
+    assert len(contrasts_table(contrasts, NO_TRAININGS).notes) == 3
 
 
 def test_the_figure_has_a_panel_for_each_question_and_a_mark_for_each_answer(contrasts):

@@ -169,6 +169,7 @@ rule statistics:
             for name in ("methods", "contrasts")
             for kind in ("csv", "md")
         },
+        trainings_csv=LAYOUT.confirmation("trainings", "csv"),
         contrasts_png=LAYOUT.confirmation("contrasts", "png"),
         contrasts_pdf=LAYOUT.confirmation("contrasts", "pdf"),
     log:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import matplotlib as mpl
 import pandas as pd
 from matplotlib.axes import Axes
@@ -44,8 +46,11 @@ def methods_table(means: pd.DataFrame) -> Table:
     return Table("methods", title, title, means, header, tuple(parts), notes)
 
 
-def contrasts_table(contrasts: pd.DataFrame) -> Table:
-    """Return the contrasts of `nbv.statistics.confirmation.method_contrasts` as a table."""
+def contrasts_table(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Table:
+    """Return the contrasts of `nbv.statistics.confirmation.method_contrasts` as a table.
+
+    A note says how well single trainings agree (`training_contrasts` of the same module).
+    """
     parts = []
     for (dataset, category), part in contrasts.groupby(["dataset", "category"], sort=False):
         rows = [
@@ -72,9 +77,25 @@ def contrasts_table(contrasts: pd.DataFrame) -> Table:
         _INTERVALS,
         "p: of the primary contrasts (docs/protocol.md) over all categories as they are; of all "
         "others adjusted by Holm's method within their data set and category.",
+        *_agreement(contrasts, of_trainings),
     )
     return Table(
         "contrasts", title, title, contrasts, header, tuple(parts), notes, n_text_columns=2
+    )
+
+
+def _agreement(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Iterator[str]:
+    if of_trainings.empty:
+        return
+    each = of_trainings["difference_deg"]
+    predicted = each.between(of_trainings["low"], of_trainings["high"])
+    place = ["dataset", "category", "contrast", "fusion"]
+    ends = of_trainings[place].merge(contrasts[[*place, "low", "high"]], on=place, how="left")
+    overall = each.between(ends["low"], ends["high"])
+    yield (
+        f"Single trainings: of {len(each)} differences, {number(100 * predicted.mean(), 0)} % lie "
+        "in the 95 % interval that the other trainings predict for one more training of the same "
+        f"objects, and {number(100 * overall.mean(), 0)} % in the intervals above."
     )
 
 
