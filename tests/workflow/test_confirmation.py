@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from safetensors import safe_open
@@ -109,9 +110,22 @@ def test_the_kept_file_alone_gives_the_same_tables(confirmed, fresh):
     fresh.run("--cores", "2", "statistics", overrides=(*TINY[:-1], *again))
     made = fresh.folder / "results/again"
     assert not (made / "estimators").exists()
-    for name in ("methods.csv", "methods.md", "contrasts.csv", "contrasts.md"):
+    for name in ("methods.csv", "methods.md", "contrasts.csv", "contrasts.md", "trainings.csv"):
         before = (confirmed.results / "confirmation" / name).read_bytes()
         assert (made / "confirmation" / name).read_bytes() == before
+
+
+def test_runs_of_one_data_set_have_other_categories(confirmed, fresh):
+    kept = confirmed.results / "confirmation/estimates.npz"
+    with np.load(kept) as stored:
+        arrays = dict(stored)
+    settings = json.loads(str(arrays["settings"]))
+    settings["confirmation"]["dataset"], settings["name"] = "tiny", "other"
+    np.savez(fresh.folder / "other.npz", **arrays | {"settings": np.array(json.dumps(settings))})
+    files = f"confirmation.kept=[{kept},other.npz]"
+    done = fresh.run("--cores", "1", "statistics", overrides=(*TINY, files), fails=True)
+    line = f"other.npz and {kept} have the same categories of the data set tiny"
+    assert line in done.stdout + done.stderr
 
 
 def test_one_training_of_one_fold_can_be_asked_for_by_name(fresh):

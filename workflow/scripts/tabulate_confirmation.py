@@ -17,8 +17,8 @@ with job(snakemake):
 
     output = snakemake.output
     parts = [
-        read_csv(path).assign(dataset=run, shuffle=shuffle, replicate=replicate, category=category)
-        for (run, shuffle, replicate, category, _), path in zip(
+        read_csv(path).assign(dataset=dataset, shuffle=shuffle, replicate=replicate, category=category)
+        for (dataset, shuffle, replicate, category), path in zip(
             snakemake.params.places, snakemake.input.objects, strict=True
         )
     ]

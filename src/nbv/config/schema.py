@@ -237,6 +237,7 @@ class Method(Section):
 class Confirmation(Section):
     """Trainings beyond the run's own; see `nbv.statistics.confirmation`."""
 
+    dataset: Name | None = None
     replicates: Annotated[list[Annotated[list[Replicate], Distinct]], AtLeastOne] = [[0]]
     kept: Annotated[list[DataPath], Distinct] = []
 

@@ -202,16 +202,20 @@ def held_out_files(path):
     ]
 
 
+def dataset_name(settings):
+    return settings["confirmation"]["dataset"] or settings["name"]
+
+
 @functools.cache
 def kept_runs():
-    """By run, the file that its estimates were kept in (None: this run's) and their keys."""
+    """By run, the file that its estimates were kept in (None: this run's), keys and data set."""
     if not CONFIG["confirmation"]["kept"]:
         keys = [
             (shuffle, replicate, *unit)
             for shuffle, replicate in REPLICATES
             for unit in LOWEST_UNITS
         ]
-        return {CONFIG["name"]: (None, keys)}
+        return {CONFIG["name"]: (None, keys, dataset_name(CONFIG))}
     found = {}
     for path in CONFIG["confirmation"]["kept"]:
         try:
@@ -223,14 +227,31 @@ def kept_runs():
             stop(
                 f"confirmation.kept: {path} is of the run {run}, as {found[run][0]} is"
             )
-        found[run] = (path, list(dict.fromkeys(key[:4] for key in keys)))
+        keys = list(dict.fromkeys(key[:4] for key in keys))
+        dataset = dataset_name(settings)
+        for other, others, name in found.values():
+            if name == dataset and {key[2] for key in keys} & {
+                key[2] for key in others
+            }:
+                stop(
+                    f"confirmation.kept: {path} and {other} have the same categories of "
+                    f"the data set {dataset}"
+                )
+        found[run] = (path, keys, dataset)
     return found
 
 
 def kept_file(wildcards):
-    path, _ = kept_runs()[wildcards.run]
+    path, *_ = kept_runs()[wildcards.run]
     return path or LAYOUT.kept_estimates(wildcards.shuffle, wildcards.replicate)
 
 
 def factorial_keys():
-    return [(run, *key) for run, (_, keys) in kept_runs().items() for key in keys]
+    return [(run, *key) for run, (_, keys, _) in kept_runs().items() for key in keys]
+
+
+def factorial_places():
+    """Data set, shuffle, replicate and category of each of them."""
+    return [
+        (dataset, *key[:3]) for _, keys, dataset in kept_runs().values() for key in keys
+    ]

@@ -182,7 +182,7 @@ rule statistics:
         mem_mb=per_attempt(2000),
         runtime=per_attempt(10),
     params:
-        places=lambda wildcards: factorial_keys(),
+        places=lambda wildcards: factorial_places(),
     script:
         f"{SCRIPTS}/tabulate_confirmation.py"
 
