@@ -286,6 +286,12 @@ def _write_surroundings(root, units, n_folds):
         "elevations_deg": {**elevations, "spoon": [0]},
         "n_folds": n_folds,
         "dataset": {"source": "procedural"},
+        "estimator": {"warm_start": "elevations"},
+        "density": {
+            "pose_likelihood": "given_estimate",
+            "bandwidths_deg": [8.0],
+            "pseudo_observations": [10.0],
+        },
     }
     # JSON is YAML.
     (root / "configuration.yaml").write_text(json.dumps(settings, indent=2) + "\n")

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import base64
+import json
 import re
+from html import unescape
 from html.parser import HTMLParser
 
 import numpy as np
@@ -132,9 +134,25 @@ def test_it_says_what_was_run(page):
         "Mug 9",
         "0123456789abcdef",
         "torch 2.13.0",
+        "starts from the one an elevation lower",
     ):
         assert words in text
     assert "nan" not in text.lower().split()
+
+
+@pytest.mark.parametrize("given", ["estimate", "truth"])
+@pytest.mark.parametrize("candidates", [1, 2])
+def test_it_says_at_first_how_proposed_was_repaired(inputs, tmp_path, given, candidates):
+    settings = json.loads(inputs["configuration"].read_text())
+    settings["density"]["pose_likelihood"] = f"given_{given}"
+    settings["density"]["bandwidths_deg"] = [8.0, 16.0][:candidates]
+    path = tmp_path / "configuration.yaml"
+    path.write_text(json.dumps(settings))
+    text = build_report(**inputs | {"configuration": path}).split("</header>")[0]
+    assert ("given the estimate and not the truth" in text) == (given == "estimate")
+    assert ("by the errors of the decisions" in text) == (candidates > 1)
+    as_printed = "Proposed is the paper's method as it is printed." in unescape(text)
+    assert as_printed == (given == "truth" and candidates == 1)
 
 
 def test_it_is_repeatable(inputs, html):
