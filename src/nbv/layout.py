@@ -50,9 +50,31 @@ class Layout:
         elevation: int | str,
     ) -> str:
         """Return each object's errors under every choice and fusion, after one training."""
+        return self._factorial("objects", run, shuffle, replicate, category, elevation)
+
+    def beliefs(
+        self,
+        run: str,
+        shuffle: int | str,
+        replicate: int | str,
+        category: str,
+        elevation: int | str,
+    ) -> str:
+        """Return how well the beliefs after several views know each object's pose, likewise."""
+        return self._factorial("beliefs", run, shuffle, replicate, category, elevation)
+
+    def _factorial(
+        self,
+        name: str,
+        run: str,
+        shuffle: int | str,
+        replicate: int | str,
+        category: str,
+        elevation: int | str,
+    ) -> str:
         place = f"{run}/shuffle{shuffle}_replicate{replicate}"
         unit = unit_folder(category, elevation)
-        return f"{self.root}/confirmation/objects/{place}/{unit}.csv"
+        return f"{self.root}/confirmation/{name}/{place}/{unit}.csv"
 
     def confirmation(self, name: str, kind: str) -> str:
         """Return a table or figure over all trainings."""

@@ -40,6 +40,24 @@ def test_a_uniform_density_has_minus_log_360_nats_per_degree(k):
     np.testing.assert_allclose(found, -np.log(360))
 
 
+PROBABILITIES = st.lists(st.integers(0, 6), min_size=1, max_size=9).filter(any)
+
+
+@given(PROBABILITIES, st.floats(0.01, 0.99))
+def test_regions_hold_just_their_share_of_truths_drawn_from_the_distribution(counts, level):
+    """An identity, ties and zeros included; and the region is the smallest that does."""
+    drawn = np.array(counts) / sum(counts)
+    bins = np.arange(len(drawn))
+    inside = posteriors.region_coverage(np.tile(drawn, (len(drawn), 1)), bins, level)
+    assert drawn @ inside == pytest.approx(level)
+    assert (inside[drawn == 0] == 0).all()
+    left, size = level, 0.0
+    for p in sorted(drawn[drawn > 0], reverse=True):
+        size += min(left / p, 1.0)
+        left = max(left - p, 0.0)
+    assert inside.sum() == pytest.approx(size)
+
+
 @given(st.integers(0, 19), st.sampled_from([0.3, 1.0, 3.0]))
 def test_the_temperature_is_the_best_of_a_grid(seed, scale):
     rng = np.random.default_rng(seed)

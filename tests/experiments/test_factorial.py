@@ -19,6 +19,7 @@ from nbv.experiments.factorial import (
 from nbv.experiments.kept_estimates import held_out
 from nbv.recommendation.density_selection import COARSE_BINS
 from nbv.recommendation.fusion import ESTIMATE_FUSIONS
+from nbv.statistics.confirmation import factorial_beliefs
 
 SETTINGS = FEW_DENSITIES | {
     "affinity": {"power": 16, "pseudo_observations": 90, "caution": 2.0},
@@ -82,3 +83,17 @@ def test_without_distributions_nothing_is_multiplied():
     made = evaluate_factorial(*sides, SETTINGS, MORE_VIEWS, rng_of)
     assert "product" not in {fusion for _, fusion in made.frames}
     assert not made.more_views["method"].str.endswith("_product").any()
+
+
+def test_beliefs_are_of_one_view_once_and_of_more_by_choice(made):
+    keys = ["choice", "fusion", "n_views", "object_id"]
+    found = factorial_beliefs(made).set_index(keys).sort_index()
+    assert found.index.is_unique
+    one_view = found.xs(1, level="n_views")
+    assert set(one_view.index.get_level_values("choice")) == {"none"}
+    assert set(one_view.index.get_level_values("fusion")) == {"posterior", "product"}
+    rows = made.more_views.set_index(["method", "n_views", "object_id"]).sort_index()
+    for n_views in (2, 3):
+        mine = found.loc[("evenly_spaced", "product", n_views)]
+        same = rows.loc[("evenly_spaced_product", n_views), mine.columns]
+        np.testing.assert_array_equal(mine, same)

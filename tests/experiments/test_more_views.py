@@ -5,7 +5,7 @@ import pytest
 from tests.recommendation.made import EXTENSIONS, FEW_DENSITIES, objects
 
 from nbv.angles import circular_distance_deg
-from nbv.calibration.posteriors import Posteriors
+from nbv.calibration.posteriors import Posteriors, log_likelihood
 from nbv.experiments.extensions import choices_frame, stored_evidence
 from nbv.experiments.more_views import more_views_rows
 from nbv.recommendation.evidence import evidence_of_distributions
@@ -76,6 +76,16 @@ def products():
     estimates = objects(4, 2)
     rng = np.random.default_rng(0)
     return more_views_rows(estimates, evidences, SETTINGS, rng, test, evidence)
+
+
+def test_one_view_knows_the_pose_as_well_as_its_distribution(products):
+    test = half_turned(4, 2)
+    starts = np.arange(0, 360, SETTINGS["start_every_deg"])
+    logs = log_likelihood(np.log(test.distributions[:, starts]), starts[None, :])
+    rows = products[(products["method"] == "random_product") & (products["n_views"] == 1)]
+    np.testing.assert_allclose(rows["log_likelihood"], logs.mean(axis=1), atol=1e-4)
+    for level in (50, 90):
+        assert rows[f"inside_{level}_percent"].between(0, 100).all()
 
 
 def test_with_distributions_every_number_of_views_has_a_spacing(products):

@@ -11,11 +11,14 @@ import pytest
 from nbv.errors import UserError
 from nbv.statistics.confirmation import (
     ALL,
+    BELIEF_COLUMNS,
+    BELIEFS_COLUMNS,
     CONTRASTS_COLUMNS,
     METHODS_COLUMNS,
     OBJECTS_COLUMNS,
     TRAININGS_COLUMNS,
     Contrast,
+    belief_means,
     contrasts_of,
     method_contrasts,
     method_means,
@@ -89,6 +92,16 @@ def test_means_are_over_objects_and_trainings(objects):
             assert row["n_trainings"] == 3
             assert row["pauc"] == pytest.approx(100 - mean.value)
     assert set(found["above_90_percent"]) == {5.0}
+
+
+def test_beliefs_have_the_same_means(objects):
+    figures = ["error_deg", "pauc_percent", "above_90_percent"]
+    renamed = objects.rename(columns=dict(zip(figures, BELIEF_COLUMNS, strict=True)))
+    found, expected = belief_means(renamed), method_means(objects)
+    assert tuple(found.columns) == BELIEFS_COLUMNS
+    ours = ["log_likelihood", "low", "high", "inside_50_percent", "inside_90_percent"]
+    theirs = ["mae_deg", "low", "high", "pauc", "above_90_percent"]
+    np.testing.assert_array_equal(found[ours], expected[theirs])
 
 
 def test_contrasts_are_paired_by_object_and_training(objects):

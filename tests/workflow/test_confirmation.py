@@ -23,6 +23,7 @@ SMALL = (
     "more_views.start_every_deg=90",
     "confirmation.replicates=[[0],[0]]",
 )
+TABLES = ("methods", "contrasts", "beliefs")
 TRAININGS = {(0, 0): "", (1, 0): "confirmation/shuffle1/replicate0/"}
 
 
@@ -100,6 +101,9 @@ def test_the_tables_are_of_every_object_in_every_training(confirmed):
             away = (rows["estimate_deg"] - rows["azimuth_deg"]).abs()
             errors.append(away.where(away <= 180, 360 - away))
     assert single["mae_deg"] == pytest.approx(pd.concat(errors).mean(), abs=0.01)
+    beliefs = pd.read_csv(folder / "beliefs.csv")
+    assert set(beliefs["n_views"]) == {1, 2, 3}
+    assert set(beliefs["fusion"]) == {"posterior", "product"}
     text = (folder / "contrasts.md").read_text(encoding="utf-8")
     assert "Expected error less fixed" in text
 
@@ -110,7 +114,8 @@ def test_the_kept_file_alone_gives_the_same_tables(confirmed, fresh):
     fresh.run("--cores", "2", "statistics", overrides=(*TINY[:-1], *again))
     made = fresh.folder / "results/again"
     assert not (made / "estimators").exists()
-    for name in ("methods.csv", "methods.md", "contrasts.csv", "contrasts.md", "trainings.csv"):
+    tables = [f"{name}.{kind}" for name in TABLES for kind in ("csv", "md")]
+    for name in (*tables, "trainings.csv"):
         before = (confirmed.results / "confirmation" / name).read_bytes()
         assert (made / "confirmation" / name).read_bytes() == before
 

@@ -9,7 +9,7 @@ with job(snakemake):
     from nbv.experiments.kept_estimates import kept_settings, read_kept
     from nbv.files import write_csv
     from nbv.seeds import rng_for
-    from nbv.statistics.confirmation import factorial_objects
+    from nbv.statistics.confirmation import factorial_beliefs, factorial_objects
 
     wildcards, path = snakemake.wildcards, snakemake.input.kept
     settings, keys = kept_settings(path)
@@ -21,7 +21,7 @@ with job(snakemake):
     )
     held = read_kept(path, [key for key in keys if key[:4] == place])
     decision = settings["density"] | settings["recommendation"]
-    parts = []
+    objects, beliefs = [], []
     for fold in dict.fromkeys(key[4] for key in held):
         made = evaluate_factorial(
             held[*place, fold, "calibration"],
@@ -30,5 +30,7 @@ with job(snakemake):
             settings["more_views"],
             lambda name, fold=fold: rng_for(settings["seed"], name, *place, fold),
         )
-        parts.append(factorial_objects(made).assign(fold=fold))
-    write_csv(snakemake.output[0], pd.concat(parts, ignore_index=True))
+        objects.append(factorial_objects(made).assign(fold=fold))
+        beliefs.append(factorial_beliefs(made).assign(fold=fold))
+    for name, parts in (("objects", objects), ("beliefs", beliefs)):
+        write_csv(snakemake.output[name], pd.concat(parts, ignore_index=True))

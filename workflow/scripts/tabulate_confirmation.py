@@ -7,26 +7,38 @@ with job(snakemake):
 
     from nbv.files import read_csv, write_csv
     from nbv.reporting.extensions.confirmation import (
+        beliefs_table,
         contrasts_figure,
         contrasts_table,
         methods_table,
     )
     from nbv.reporting.style import save_figure
     from nbv.reporting.table import write_table
-    from nbv.statistics.confirmation import method_contrasts, method_means, training_contrasts
+    from nbv.statistics.confirmation import (
+        belief_means,
+        method_contrasts,
+        method_means,
+        training_contrasts,
+    )
 
     output = snakemake.output
-    parts = [
-        read_csv(path).assign(dataset=dataset, shuffle=shuffle, replicate=replicate, category=category)
-        for (dataset, shuffle, replicate, category), path in zip(
-            snakemake.params.places, snakemake.input.objects, strict=True
+    columns = ["dataset", "shuffle", "replicate", "category"]
+    read = {
+        name: pd.concat(
+            [
+                read_csv(path).assign(**dict(zip(columns, place, strict=True)))
+                for place, path in zip(snakemake.params.places, snakemake.input[name], strict=True)
+            ],
+            ignore_index=True,
         )
-    ]
-    objects = pd.concat(parts, ignore_index=True)
+        for name in ("objects", "beliefs")
+    }
+    objects = read["objects"]
     contrasts, of_trainings = method_contrasts(objects), training_contrasts(objects)
     tables = {
         "methods": methods_table(method_means(objects)),
         "contrasts": contrasts_table(contrasts, of_trainings),
+        "beliefs": beliefs_table(belief_means(read["beliefs"])),
     }
     write_csv(output.trainings_csv, of_trainings)
     for name, table in tables.items():

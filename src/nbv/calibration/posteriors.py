@@ -93,6 +93,31 @@ def log_likelihood(log_posterior: NDArray[np.floating], azimuth_deg: ArrayLike) 
     return np.asarray(mixed + np.log(n_classes / 360.0))
 
 
+def region_coverage(
+    probabilities: NDArray[np.floating], bins: NDArray[np.integer], level: float
+) -> Floats:
+    """Return whether the densest region of a probability holds the truth, (n,) in [0, 1].
+
+    The region is the smallest set of bins with the probability `level`. It holds a part of the bins
+    that are just dense enough, so that of truths drawn from the distributions themselves exactly
+    the share `level` is inside.
+
+    Parameters
+    ----------
+    probabilities : ndarray (n, B)
+    bins : ndarray (n,) int
+        Of the truth.
+    level : float
+        In (0, 1).
+    """
+    own = np.take_along_axis(probabilities, bins[:, None], axis=1)
+    denser = np.where(probabilities > own, probabilities, 0.0).sum(axis=1, dtype=np.float64)
+    alike = np.where(probabilities == own, probabilities, 0.0).sum(axis=1, dtype=np.float64)
+    share = np.zeros(len(own))
+    np.divide(level - denser, alike, out=share, where=alike > 0)
+    return np.clip(share, 0.0, 1.0)
+
+
 def _neighbours(azimuth_deg: ArrayLike, n_classes: int) -> tuple[NDArray[np.intp], Floats]:
     """Return the class centre at or below each azimuth, and how far it lies towards the next."""
     place = np.asarray(azimuth_deg, dtype=np.float64) * (n_classes / 360.0)

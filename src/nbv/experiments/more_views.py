@@ -48,6 +48,9 @@ COLUMNS = (
     "pauc_percent",
     "above_90_percent",
     "travel_deg",
+    "log_likelihood",
+    "inside_50_percent",
+    "inside_90_percent",
 )
 
 
@@ -79,6 +82,7 @@ def more_views_rows(
     -------
     DataFrame
         Columns `COLUMNS`: means over first views. Travel goes from view to view, the shorter way.
+        The last three are of the belief after all views; see `nbv.recommendation.following.follow`.
     """
     run = partial(follow, start_every_deg=settings["start_every_deg"], rng=rng)
     reached = list(_by_posterior(test, evidences, settings, run))
@@ -94,8 +98,8 @@ def more_views_rows(
 
 def _row(object_ids: tuple[str, ...], method: str, n_views: int, reached: Floats) -> pd.DataFrame:
     """Return the rows of one policy and number of views; `reached` is of `follow`."""
-    errors, travel = reached
-    figures = (errors, accuracy_area(errors), half_turned(errors), travel)
+    errors, *others = reached
+    figures = (errors, accuracy_area(errors), half_turned(errors), *others)
     means = (figure.mean(axis=1) for figure in figures)
     values = (method, n_views, object_ids, *means)
     return pd.DataFrame(dict(zip(COLUMNS, values, strict=True)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.angles import circular_distance_deg, nearest_bin, travel_deg
+from nbv.calibration.posteriors import region_coverage
 from nbv.recommendation.belief import (
     Belief,
     first_belief,
@@ -21,6 +23,18 @@ from nbv.recommendation.next_views import NextView
 
 Floats = NDArray[np.floating]
 Indices = NDArray[np.intp]
+
+FIGURES = (
+    "error_deg",
+    "travel_deg",
+    "log_likelihood",
+    "inside_50_percent",
+    "inside_90_percent",
+)
+"""What `follow` returns of each view: among others how well the belief knows the truth."""
+
+# Of a belief in the truth; less would be lost in rounding, and one view would rule a mean.
+_LEAST_PROBABILITY = 1e-12
 
 
 class Views(Protocol):
@@ -119,14 +133,16 @@ def follow(
 
     Returns
     -------
-    ndarray (2, n_objects, n_starts, n_views)
-        Error and total travel after each view, degrees.
+    ndarray (5, n_objects, n_starts, n_views)
+        `FIGURES` after each view: error and total travel in degrees; the log of the belief in the
+        truth, nats per degree; whether the regions of 50 and 90 % hold the truth, percent
+        (`nbv.calibration.posteriors.region_coverage`).
     """
     n_objects, n_azimuths = views.shape[:2]
     objects, starts, belief = first_views(views, start_every_deg)
     taken = np.zeros((len(objects), 1), dtype=np.int64)
     travelled = np.zeros(len(objects))
-    reached = np.empty((2, len(objects), n_views))
+    reached = np.empty((len(FIGURES), len(objects), n_views))
     for view in range(n_views):
         if view:
             delta = policy(belief, taken, rng)
@@ -134,7 +150,18 @@ def follow(
             belief = views.further(belief, objects, seen_from, delta)
             travelled = travelled + travel_deg(delta - taken[:, -1])
             taken = np.column_stack([taken, delta])
-        pose_deg = mean_direction_deg(belief.probabilities)
-        reached[0, :, view] = circular_distance_deg(pose_deg, starts)
-        reached[1, :, view] = travelled
-    return reached.reshape(2, n_objects, -1, n_views)
+        reached[:, :, view] = [_error_deg(belief, starts), travelled, *_knowledge(belief, starts)]
+    return reached.reshape(len(FIGURES), n_objects, -1, n_views)
+
+
+def _error_deg(belief: Belief, truth_deg: NDArray[np.int64]) -> Floats:
+    return circular_distance_deg(mean_direction_deg(belief.probabilities), truth_deg)
+
+
+def _knowledge(belief: Belief, truth_deg: NDArray[np.int64]) -> Iterator[Floats]:
+    n_bins = belief.probabilities.shape[1]
+    bins = nearest_bin(truth_deg, n_bins)
+    of_truth = np.take_along_axis(belief.probabilities, bins[:, None], axis=1)[:, 0]
+    yield np.log(np.maximum(of_truth, _LEAST_PROBABILITY) * (n_bins / 360.0))
+    for level in (0.5, 0.9):
+        yield 100.0 * region_coverage(belief.probabilities, bins, level)

@@ -53,6 +53,19 @@ CONTRASTS_COLUMNS = (
     "n_trainings",
 )
 
+BELIEF_COLUMNS = ("log_likelihood", "inside_50_percent", "inside_90_percent")
+"""How well beliefs know the pose; see `nbv.recommendation.following.follow`."""
+
+BELIEFS_COLUMNS = (
+    *PLACE,
+    *METHOD,
+    "log_likelihood",
+    "low",
+    "high",
+    *BELIEF_COLUMNS[1:],
+    "n_objects",
+    "n_trainings",
+)
 TRAININGS_COLUMNS = (
     *PLACE,
     "contrast",
@@ -124,13 +137,39 @@ def factorial_objects(made: Factorial) -> pd.DataFrame:
         fusion=means["method"].map(lambda name: names[name][1]),
         n_views=means["method"].map(lambda name: 1 if names[name] == SINGLE else 2),
     )
-    rows = made.more_views[made.more_views["method"].isin(MORE_VIEWS)]
-    more = rows[rows["n_views"] > 2].assign(
+    more = _named(made.more_views[made.more_views["n_views"] > 2])
+    columns = [*METHOD, "object_id", *MEAN_COLUMNS]
+    return pd.concat([two[columns], more[columns]], ignore_index=True)
+
+
+def factorial_beliefs(made: Factorial) -> pd.DataFrame:
+    """Return how well the beliefs of one fold know each test object's pose, after 1 view and more.
+
+    Columns `METHOD`, ``object_id`` and `BELIEF_COLUMNS`: means over first views. After one view
+    the choice is ``none``.
+    """
+    rows = _named(made.more_views)
+    first = (rows["n_views"] == 1) & (rows["choice"] == "evenly_spaced")
+    kept = rows[first | (rows["n_views"] > 1)].copy()
+    kept.loc[kept["n_views"] == 1, "choice"] = SINGLE[0]
+    return kept[[*METHOD, "object_id", *BELIEF_COLUMNS]].reset_index(drop=True)
+
+
+def _named(more_views: pd.DataFrame) -> pd.DataFrame:
+    """Return rows of more views with their choice and fusion; those that are compared."""
+    rows = more_views[more_views["method"].isin(MORE_VIEWS)]
+    return rows.assign(
         choice=lambda frame: frame["method"].map(lambda name: MORE_VIEWS[name][0]),
         fusion=lambda frame: frame["method"].map(lambda name: MORE_VIEWS[name][1]),
     )
-    columns = [*METHOD, "object_id", *MEAN_COLUMNS]
-    return pd.concat([two[columns], more[columns]], ignore_index=True)
+
+
+def belief_means(beliefs: pd.DataFrame) -> pd.DataFrame:
+    """Return how well beliefs know the pose over objects and trainings, columns `BELIEFS_COLUMNS`.
+
+    Parameters and errors as of `method_means`, with `BELIEF_COLUMNS` in place of `MEAN_COLUMNS`.
+    """
+    return _means(beliefs, BELIEF_COLUMNS, BELIEFS_COLUMNS)
 
 
 def method_means(objects: pd.DataFrame) -> pd.DataFrame:
@@ -146,18 +185,19 @@ def method_means(objects: pd.DataFrame) -> pd.DataFrame:
     UserError
         Where a training lacks an object or has it twice.
     """
+    return _means(objects, MEAN_COLUMNS, METHODS_COLUMNS)
+
+
+def _means(objects: pd.DataFrame, names: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:
+    """Return the means of all figures named, with an interval of the first one."""
     rows = []
-    for place, tables in _tables(objects):
+    for place, tables in _tables(objects, names):
         for method, of_figures in tables.items():
-            figures = {name: _mean(parts) for name, parts in of_figures.items()}
-            error = figures["error_deg"]
-            interval = error.interval()
-            others = (figures[name].value for name in MEAN_COLUMNS[1:])
-            sizes = (error.n_objects, error.n_trainings)
-            rows.append(
-                (*place, *method, error.value, interval.low, interval.high, *others, *sizes)
-            )
-    return pd.DataFrame(rows, columns=list(METHODS_COLUMNS))
+            first, *others = (_mean(of_figures[name]) for name in names)
+            interval = first.interval()
+            means = (first.value, interval.low, interval.high, *(other.value for other in others))
+            rows.append((*place, *method, *means, first.n_objects, first.n_trainings))
+    return pd.DataFrame(rows, columns=list(columns))
 
 
 def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
@@ -223,11 +263,13 @@ Figures = Mapping[str, Sequence[NDArray[np.float64]]]
 """By figure of merit, a table (n_trainings, n_objects) of each category."""
 
 
-def _tables(objects: pd.DataFrame) -> Iterator[tuple[tuple[str, str], dict[Method, Figures]]]:
+def _tables(
+    objects: pd.DataFrame, names: Sequence[str] = ("error_deg",)
+) -> Iterator[tuple[tuple[str, str], dict[Method, Figures]]]:
     """Yield the tables of each data set and category, then of its categories together."""
     for dataset, rows in objects.groupby("dataset", sort=False):
         of_categories = {
-            str(category): _of_category(part, f"{dataset}, {category}")
+            str(category): _of_category(part, f"{dataset}, {category}", names)
             for category, part in rows.groupby("category", sort=False)
         }
         for category, tables in of_categories.items():
@@ -246,14 +288,16 @@ def _tables(objects: pd.DataFrame) -> Iterator[tuple[tuple[str, str], dict[Metho
                 {
                     method: {
                         name: [tables[method][name] for tables in of_categories.values()]
-                        for name in MEAN_COLUMNS
+                        for name in names
                     }
                     for method in shared
                 },
             )
 
 
-def _of_category(rows: pd.DataFrame, where: str) -> dict[Method, dict[str, NDArray[np.float64]]]:
+def _of_category(
+    rows: pd.DataFrame, where: str, names: Sequence[str]
+) -> dict[Method, dict[str, NDArray[np.float64]]]:
     tables: dict[Method, dict[str, NDArray[np.float64]]] = {}
     for (choice, fusion, n_views), part in rows.groupby(list(METHOD), sort=False):
         wide = part.set_index([*TRAINING, "object_id"])
@@ -261,7 +305,7 @@ def _of_category(rows: pd.DataFrame, where: str) -> dict[Method, dict[str, NDArr
             raise UserError(f"{where}: an object is tested twice in a training; keep it again")
         method = (str(choice), str(fusion), int(str(n_views)))
         tables[method] = {}
-        for name in MEAN_COLUMNS:
+        for name in names:
             table = wide[name].unstack("object_id")  # noqa: PD010 - nothing to aggregate
             if table.isna().to_numpy().any():
                 raise UserError(f"{where}: a training lacks an object; finish all folds first")

@@ -140,9 +140,8 @@ rule evaluate_factorial:
         sources("evaluate_factorial"),
         kept=kept_file,
     output:
-        LAYOUT.factorial(
-            "{run}", "{shuffle}", "{replicate}", "{category}", "{elevation}"
-        ),
+        objects=LAYOUT.factorial("{run}", "{shuffle}", "{replicate}", *UNIT),
+        beliefs=LAYOUT.beliefs("{run}", "{shuffle}", "{replicate}", *UNIT),
     log:
         LAYOUT.log(f"evaluate_factorial/{{run}}/{REPLICATE}/{unit_folder(*UNIT)}"),
     benchmark:
@@ -163,10 +162,11 @@ rule statistics:
     input:
         sources("tabulate_confirmation"),
         objects=lambda wildcards: paths(LAYOUT.factorial, factorial_keys()),
+        beliefs=lambda wildcards: paths(LAYOUT.beliefs, factorial_keys()),
     output:
         **{
             f"{name}_{kind}": LAYOUT.confirmation(name, kind)
-            for name in ("methods", "contrasts")
+            for name in ("methods", "contrasts", "beliefs")
             for kind in ("csv", "md")
         },
         trainings_csv=LAYOUT.confirmation("trainings", "csv"),

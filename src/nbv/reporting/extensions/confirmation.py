@@ -46,6 +46,32 @@ def methods_table(means: pd.DataFrame) -> Table:
     return Table("methods", title, title, means, header, tuple(parts), notes)
 
 
+def beliefs_table(means: pd.DataFrame) -> Table:
+    """Return the means of `nbv.statistics.confirmation.belief_means` as a table."""
+    parts = []
+    for (dataset, category), part in means.groupby(["dataset", "category"], sort=False):
+        rows = [
+            (
+                Cell(_choice(str(row["choice"]), int(row["n_views"]))),
+                Cell(str(row["fusion"])),
+                Cell(interval_text(row["log_likelihood"], row["low"], row["high"])),
+                *(Cell(number(row[f"inside_{level}_percent"], 1)) for level in (50, 90)),
+            )
+            for _, row in part.iterrows()
+        ]
+        parts.append(Part(tuple(rows), f"{dataset}, {category_label(str(category))}"))
+    title = "How well beliefs know the pose"
+    header = ("Choice", "Fusion", "Log-likelihood", "Inside 50 %", "Inside 90 %")
+    notes = (
+        "Log-likelihood: of the true pose under the fused distribution, in nats per degree; a "
+        "probability below 1e-12 counts as 1e-12.",
+        "Inside: how often the densest region with 50 or 90 % of the probability holds the true "
+        "pose, in percent. Below 50 or 90 the distribution is too sure.",
+        _INTERVALS,
+    )
+    return Table("beliefs", title, title, means, header, tuple(parts), notes, n_text_columns=2)
+
+
 def contrasts_table(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Table:
     """Return the contrasts of `nbv.statistics.confirmation.method_contrasts` as a table.
 
