@@ -1,6 +1,7 @@
 # make reproduce   the paper, end to end        make quick   the same graph, small
 # make test        the test suite               make check   lint, types, imports, workflow lint
 # make bench       the speed benchmarks         make compare a finished run with docs/reference
+# make confirm     several trainings of all data sets, for hours (tools/confirm.sh)
 # make test-slurm  the workflow on a real SLURM of one node, where root may install it
 # make coverage    branches that tests reach    make mutation whether tests notice changed code
 # make audit       known vulnerabilities        make licences the licences of what is locked
@@ -17,7 +18,7 @@ PYTEST := $(BIN)/pytest --numprocesses $(CORES) --dist worksteal
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
 
-.PHONY: reproduce quick compare reference bench test test-quick test-slurm soak coverage mutation check lock audit \
+.PHONY: reproduce quick confirm compare reference bench test test-quick test-slurm soak coverage mutation check lock audit \
 	licences clean
 
 reproduce: $(READY)
@@ -25,6 +26,9 @@ reproduce: $(READY)
 
 quick: $(READY)
 	$(BIN)/snakemake --cores $(CORES) --config experiment=quick
+
+confirm: $(READY)
+	PATH="$(CURDIR)/$(BIN):$$PATH" CORES=$(CORES) tools/confirm.sh
 
 compare: $(READY)
 	$(BIN)/snakemake --cores $(CORES) compare
