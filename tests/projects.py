@@ -21,6 +21,7 @@ TINY = (
     "camera.image_side=16",
     "estimator.channels=[4,8]",
     "estimator.epochs=1",
+    "estimator.warm_start=none",
     "density.bandwidths_deg=[8,20]",
     "density.pseudo_observations=[10]",
     "density.n_parts=2",

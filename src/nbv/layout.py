@@ -43,28 +43,6 @@ class Layout:
 
     def factorial(
         self,
-        run: str,
-        shuffle: int | str,
-        replicate: int | str,
-        category: str,
-        elevation: int | str,
-    ) -> str:
-        """Return each object's errors under every choice and fusion, after one training."""
-        return self._factorial("objects", run, shuffle, replicate, category, elevation)
-
-    def beliefs(
-        self,
-        run: str,
-        shuffle: int | str,
-        replicate: int | str,
-        category: str,
-        elevation: int | str,
-    ) -> str:
-        """Return how well the beliefs after several views know each object's pose, likewise."""
-        return self._factorial("beliefs", run, shuffle, replicate, category, elevation)
-
-    def _factorial(
-        self,
         name: str,
         run: str,
         shuffle: int | str,
@@ -72,6 +50,11 @@ class Layout:
         category: str,
         elevation: int | str,
     ) -> str:
+        """Return what became of every choice and fusion after one training.
+
+        `name`: ``objects`` (each object's errors), ``beliefs`` (how well the beliefs after several
+        views know each object's pose) or ``densities`` (those chosen).
+        """
         place = f"{run}/shuffle{shuffle}_replicate{replicate}"
         unit = unit_folder(category, elevation)
         return f"{self.root}/confirmation/{name}/{place}/{unit}.csv"

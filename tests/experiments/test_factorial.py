@@ -71,11 +71,14 @@ def test_what_sees_the_hidden_handle_beats_a_random_view(made):
 
 
 def test_the_densities_are_those_of_the_grid_and_none_is_added_to_what_is_printed(made):
-    densities = made.densities.set_index("fusion")
+    densities = made.densities.set_index("density")
     assert list(densities.index) == ["average", "posterior", "as_printed"]
     assert set(densities["bandwidth_deg"]) <= {6, 12}
     assert densities.loc["as_printed", "pseudo_observations"] == 0
     assert densities.loc["average", "pseudo_observations"] == 10
+    # Five objects from every degree: five pairs a row.
+    assert densities.loc["average", "pairs_percent"] == pytest.approx(100 * 5 / 15)
+    assert densities.loc["as_printed", "pairs_percent"] == 100
 
 
 def test_without_distributions_nothing_is_multiplied():

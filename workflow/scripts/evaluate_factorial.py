@@ -21,7 +21,7 @@ with job(snakemake):
     )
     held = read_kept(path, [key for key in keys if key[:4] == place])
     decision = settings["density"] | settings["recommendation"]
-    objects, beliefs = [], []
+    parts = {"objects": [], "beliefs": [], "densities": []}
     for fold in dict.fromkeys(key[4] for key in held):
         made = evaluate_factorial(
             held[*place, fold, "calibration"],
@@ -30,7 +30,8 @@ with job(snakemake):
             settings["more_views"],
             lambda name, fold=fold: rng_for(settings["seed"], name, *place, fold),
         )
-        objects.append(factorial_objects(made).assign(fold=fold))
-        beliefs.append(factorial_beliefs(made).assign(fold=fold))
-    for name, parts in (("objects", objects), ("beliefs", beliefs)):
-        write_csv(snakemake.output[name], pd.concat(parts, ignore_index=True))
+        parts["objects"].append(factorial_objects(made).assign(fold=fold))
+        parts["beliefs"].append(factorial_beliefs(made).assign(fold=fold))
+        parts["densities"].append(made.densities.assign(fold=fold))
+    for name, frames in parts.items():
+        write_csv(snakemake.output[name], pd.concat(frames, ignore_index=True))

@@ -10,6 +10,7 @@ with job(snakemake):
         beliefs_table,
         contrasts_figure,
         contrasts_table,
+        densities_table,
         methods_table,
     )
     from nbv.reporting.style import save_figure
@@ -31,7 +32,7 @@ with job(snakemake):
             ],
             ignore_index=True,
         )
-        for name in ("objects", "beliefs")
+        for name in ("objects", "beliefs", "densities")
     }
     objects = read["objects"]
     contrasts, of_trainings = method_contrasts(objects), training_contrasts(objects)
@@ -39,6 +40,7 @@ with job(snakemake):
         "methods": methods_table(method_means(objects)),
         "contrasts": contrasts_table(contrasts, of_trainings),
         "beliefs": beliefs_table(belief_means(read["beliefs"])),
+        "densities": densities_table(read["densities"]),
     }
     write_csv(output.trainings_csv, of_trainings)
     for name, table in tables.items():

@@ -75,6 +75,14 @@ MORE_VIEWS: Final[Mapping[str, Pair]] = {
 }
 """Choice and fusion of the policies of `nbv.experiments.more_views` that are compared."""
 
+DENSITY_COLUMNS = (
+    "density",
+    "bandwidth_deg",
+    "pseudo_observations",
+    "pairs_percent",
+    "validated_error_deg",
+)
+
 RngOf = Callable[[str], np.random.Generator]
 
 
@@ -89,8 +97,9 @@ class Factorial:
     more_views : DataFrame
         As of `nbv.experiments.more_views.more_views_rows`.
     densities : DataFrame
-        What calibration objects chose for each fusion and for `AS_PRINTED`: ``fusion,
-        bandwidth_deg, pseudo_observations, validated_error_deg``.
+        What calibration objects chose for each fusion and for `AS_PRINTED`; `DENSITY_COLUMNS`.
+        ``pairs_percent`` is the mean share of calibration pairs in a row of V, whose other part are
+        uniform pseudo-observations.
     """
 
     frames: dict[Pair, pd.DataFrame]
@@ -143,7 +152,7 @@ def evaluate_factorial(
     rows = more_views_rows(
         tested, evidences, more_views, rng_of("more_views"), test.posteriors, of_images
     )
-    return Factorial(frames, rows, _densities_frame(densities))
+    return Factorial(frames, rows, _densities_frame(densities, known.size / 360))
 
 
 def _estimate_frames(
@@ -191,10 +200,10 @@ def _product_frames(
     }
 
 
-def _densities_frame(densities: Mapping[str, Choice]) -> pd.DataFrame:
-    rows = [
-        (name, choice.bandwidth_deg, choice.pseudo_observations, choice.error_deg)
-        for name, choice in densities.items()
-    ]
-    columns = ["fusion", "bandwidth_deg", "pseudo_observations", "validated_error_deg"]
-    return pd.DataFrame(rows, columns=columns)
+def _densities_frame(densities: Mapping[str, Choice], pairs_of_row: float) -> pd.DataFrame:
+    rows = []
+    for name, choice in densities.items():
+        alpha = choice.pseudo_observations
+        share = 100.0 * pairs_of_row / (pairs_of_row + alpha)
+        rows.append((name, choice.bandwidth_deg, alpha, share, choice.error_deg))
+    return pd.DataFrame(rows, columns=list(DENSITY_COLUMNS))

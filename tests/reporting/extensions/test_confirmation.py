@@ -6,14 +6,19 @@ import pandas as pd
 import pytest
 from tests.statistics.test_confirmation import SHIFT, objects_frame
 
+from nbv.experiments.factorial import DENSITY_COLUMNS
 from nbv.reporting.extensions.confirmation import (
+    beliefs_table,
     contrasts_figure,
     contrasts_table,
+    densities_table,
     methods_table,
 )
 from nbv.reporting.table import table_markdown
 from nbv.statistics.confirmation import (
+    BELIEF_COLUMNS,
     TRAININGS_COLUMNS,
+    belief_means,
     method_contrasts,
     method_means,
     training_contrasts,
@@ -68,6 +73,37 @@ def test_a_note_says_how_well_single_trainings_agree(contrasts):
     assert f"of {n} differences, {100 * predicted / n:.0f} %" in note
     assert f"and {100 * overall / n:.0f} % in the intervals above" in note
     assert len(contrasts_table(contrasts, NO_TRAININGS).notes) == 3
+
+
+def test_beliefs_have_a_row_for_each_choice_fusion_and_number_of_views():
+    figures = ["error_deg", "pauc_percent", "above_90_percent"]
+    means = belief_means(
+        objects_frame().rename(columns=dict(zip(figures, BELIEF_COLUMNS, strict=True)))
+    )
+    table = beliefs_table(means)
+    assert sum(len(part.rows) for part in table.parts) == len(means)
+    first, found = table.parts[0].rows[0], means.iloc[0]
+    assert [cell.text for cell in first[:2]] == ["One view", "none"]
+    assert first[2].text.startswith(f"{found['log_likelihood']:.2f} (")
+    assert [float(cell.text) for cell in first[3:]] == pytest.approx(
+        [found["inside_50_percent"], found["inside_90_percent"]], abs=0.05
+    )
+
+
+def test_densities_are_counted_over_folds_and_trainings():
+    rows = [
+        ("real", "mug", 0, replicate, fold, name, width, alpha, 100 * 20 / (20 + alpha), 5.0)
+        for replicate in (0, 1)
+        for fold in (1, 2)
+        for name, width, alpha in (("average", 4.0 * fold, 100.0), ("as_printed", 6.0, 0.0))
+    ]
+    places = ["dataset", "category", "shuffle", "replicate", "fold"]
+    table = densities_table(pd.DataFrame(rows, columns=[*places, *DENSITY_COLUMNS]))
+    assert table.parts[0].heading == "real, Mug (4 folds)"
+    assert [[cell.text for cell in row] for row in table.parts[0].rows] == [
+        ["Average", "4° (2), 8° (2)", "100 (4)", "17"],
+        ["As printed", "6° (4)", "0 (4)", "100"],
+    ]
 
 
 def test_the_figure_has_a_panel_for_each_question_and_a_mark_for_each_answer(contrasts):

@@ -246,8 +246,12 @@ def kept_file(wildcards):
     return path or LAYOUT.kept_estimates(wildcards.shuffle, wildcards.replicate)
 
 
-def factorial_keys():
-    return [(run, *key) for run, (_, keys, _) in kept_runs().items() for key in keys]
+def factorial_files(name):
+    return lambda wildcards: [
+        LAYOUT.factorial(name, run, *key)
+        for run, (_, keys, _) in kept_runs().items()
+        for key in keys
+    ]
 
 
 def factorial_places():

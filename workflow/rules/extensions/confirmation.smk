@@ -4,6 +4,8 @@
 OF_SHUFFLE = LAYOUT.shuffle("{shuffle}")
 OF_REPLICATE = LAYOUT.replicate("{shuffle}", "{replicate}")
 REPLICATE = "shuffle{shuffle}_replicate{replicate}"
+# What became of every choice and fusion after one training.
+OF_FACTORIAL = ("objects", "beliefs", "densities")
 
 
 wildcard_constraints:
@@ -140,8 +142,10 @@ rule evaluate_factorial:
         sources("evaluate_factorial"),
         kept=kept_file,
     output:
-        objects=LAYOUT.factorial("{run}", "{shuffle}", "{replicate}", *UNIT),
-        beliefs=LAYOUT.beliefs("{run}", "{shuffle}", "{replicate}", *UNIT),
+        **{
+            name: LAYOUT.factorial(name, "{run}", "{shuffle}", "{replicate}", *UNIT)
+            for name in OF_FACTORIAL
+        },
     log:
         LAYOUT.log(f"evaluate_factorial/{{run}}/{REPLICATE}/{unit_folder(*UNIT)}"),
     benchmark:
@@ -161,12 +165,11 @@ rule evaluate_factorial:
 rule statistics:
     input:
         sources("tabulate_confirmation"),
-        objects=lambda wildcards: paths(LAYOUT.factorial, factorial_keys()),
-        beliefs=lambda wildcards: paths(LAYOUT.beliefs, factorial_keys()),
+        **{name: factorial_files(name) for name in OF_FACTORIAL},
     output:
         **{
             f"{name}_{kind}": LAYOUT.confirmation(name, kind)
-            for name in ("methods", "contrasts", "beliefs")
+            for name in ("methods", "contrasts", "beliefs", "densities")
             for kind in ("csv", "md")
         },
         trainings_csv=LAYOUT.confirmation("trainings", "csv"),

@@ -72,6 +72,45 @@ def beliefs_table(means: pd.DataFrame) -> Table:
     return Table("beliefs", title, title, means, header, tuple(parts), notes, n_text_columns=2)
 
 
+def densities_table(densities: pd.DataFrame) -> Table:
+    """Return which densities calibration objects chose, and how often, as a table.
+
+    Parameters
+    ----------
+    densities : DataFrame
+        ``dataset, category, shuffle, replicate, fold`` and
+        `nbv.experiments.factorial.DENSITY_COLUMNS`: a row for each fold of each training.
+    """
+    parts = []
+    for (dataset, category), part in densities.groupby(["dataset", "category"], sort=False):
+        rows = [
+            (
+                Cell(str(name).replace("_", " ").capitalize()),
+                Cell(_counts(chosen["bandwidth_deg"], "°")),
+                Cell(_counts(chosen["pseudo_observations"])),
+                Cell(number(chosen["pairs_percent"].mean(), 0)),
+            )
+            for name, chosen in part.groupby("density", sort=False)
+        ]
+        n_folds = len(part.drop_duplicates(["shuffle", "replicate", "fold"]))
+        heading = f"{dataset}, {category_label(str(category))} ({n_folds} folds)"
+        parts.append(Part(tuple(rows), heading))
+    title = "Densities that calibration objects chose"
+    header = ("Density", "Smoothing", "Pseudo-observations", "Pairs (%)")
+    notes = (
+        "Density: of the fusion average or posterior, and of the paper's method as printed.",
+        "Each value with the number of folds that chose it.",
+        "Pairs: the mean share of calibration pairs in a row of V; the rest are uniform "
+        "pseudo-observations.",
+    )
+    return Table("densities", title, title, densities, header, tuple(parts), notes)
+
+
+def _counts(values: pd.Series, unit: str = "") -> str:
+    counts = values.value_counts().sort_index()
+    return ", ".join(f"{value:g}{unit} ({n})" for value, n in counts.items())
+
+
 def contrasts_table(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Table:
     """Return the contrasts of `nbv.statistics.confirmation.method_contrasts` as a table.
 
