@@ -24,7 +24,7 @@ from nbv.statistics.confirmation import (
     method_means,
     training_contrasts,
 )
-from nbv.statistics.trainings import crossed_mean, holm, pooled_mean, predicted_by_others
+from nbv.statistics.trainings import crossed_mean, holm, predicted_by_others
 
 SHIFT = {
     ("none", "none", 1): 4.0,
@@ -82,8 +82,9 @@ def test_means_are_over_objects_and_trainings(objects):
     assert len(found) == 3 * len(SHIFT)
     indexed = found.set_index(["category", "choice", "fusion", "n_views"])
     for method in SHIFT:
-        parts = [crossed_mean(table_of(objects, category, method)) for category in SIZES]
-        for category, mean in zip((*SIZES, ALL), (*parts, pooled_mean(parts)), strict=True):
+        tables = [table_of(objects, category, method) for category in SIZES]
+        parts = [crossed_mean(table) for table in tables]
+        for category, mean in zip((*SIZES, ALL), (*parts, crossed_mean(*tables)), strict=True):
             row = indexed.loc[(category, *method)]
             ends = mean.interval()
             assert row["mae_deg"] == pytest.approx(mean.value)
@@ -124,14 +125,12 @@ def test_all_but_primary_contrasts_over_all_categories_are_adjusted_together(obj
     for category in ("car", ALL):
         raw, primary = {}, set()
         for contrast in contrasts_of(list(SHIFT)):
-            means = [
-                crossed_mean(
-                    table_of(objects, one, contrast.method) - table_of(objects, one, contrast.other)
-                )
+            tables = [
+                table_of(objects, one, contrast.method) - table_of(objects, one, contrast.other)
                 for one in (SIZES if category == ALL else [category])
             ]
             key = contrast.name, contrast.method[1]
-            raw[key] = (pooled_mean(means) if category == ALL else means[0]).p_value
+            raw[key] = crossed_mean(*tables).p_value
             if contrast.primary and category == ALL:
                 primary.add(key)
         adjusted = holm({"|".join(key): p for key, p in raw.items() if key not in primary})
@@ -157,6 +156,11 @@ def test_each_training_is_compared_with_the_others(objects):
             row = indexed.loc[(category, "expected_error - fixed", "average", *training)]
             shown = row["difference_deg"], row["low"], row["high"]
             assert shown == pytest.approx((expected.value, expected.low, expected.high))
+
+
+def test_categories_are_together_only_under_the_same_trainings(objects):
+    some = objects[(objects["category"] == "mug") | (objects["shuffle"] == 0)]
+    assert set(method_means(some)["category"]) == {"mug", "car"}
 
 
 def test_fewer_than_three_trainings_and_unlike_ones_are_not_compared(objects):

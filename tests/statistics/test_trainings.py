@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from nbv.statistics.trainings import (
-    Mean,
     crossed_mean,
     holm,
-    pooled_mean,
     predicted_by_others,
 )
 
@@ -122,8 +120,7 @@ def test_the_other_trainings_predict_a_training_as_often_as_they_say(n_trainings
         found = predicted_by_others(tables)[0]
         assert found.value == pytest.approx(np.concatenate(tables, axis=1)[0].mean())
         inside += found.low <= found.value <= found.high
-    # Satterthwaite's rule makes intervals of two categories and two others a little wide.
-    assert 0.94 <= inside / n <= (0.96 if len(sizes) == 1 else 0.99)
+    assert 0.94 <= inside / n <= 0.96
 
 
 def test_the_prediction_is_the_classical_one_and_needs_two_others():
@@ -139,19 +136,45 @@ def test_the_prediction_is_the_classical_one_and_needs_two_others():
 def test_categories_are_pooled_by_their_objects():
     rng = np.random.default_rng(0)
     tables = [rng.normal(1, 1, (3, n)) for n in (10, 30)]
-    found = pooled_mean([crossed_mean(table) for table in tables])
+    found = crossed_mean(*tables)
     assert found.value == pytest.approx(np.concatenate([t.mean(axis=0) for t in tables]).mean())
-    parts = [crossed_mean(table) for table in tables]
-    assert found.variance == pytest.approx(parts[0].variance / 16 + parts[1].variance * 9 / 16)
     assert (found.n_objects, found.n_trainings) == (40, 3)
-    alone = pooled_mean(parts[:1])
-    assert alone == Mean(
-        parts[0].value,
-        pytest.approx(parts[0].variance),
-        pytest.approx(parts[0].degrees_of_freedom),
-        10,
-        3,
-    )
+    # Categories are not drawn: how far they are apart is no chance.
+    apart = crossed_mean(tables[0] + 50.0, tables[1])
+    assert apart.variance == pytest.approx(found.variance)
+    assert crossed_mean(tables[0]) == crossed_mean(*tables[:1])
+    with pytest.raises(ValueError, match="same trainings"):
+        crossed_mean(tables[0], tables[1][:2])
+
+
+@pytest.mark.parametrize("shared", [0.0, 0.3])
+def test_categories_may_share_what_varies_between_trainings(shared):
+    """One pretrained network for all of them: their means vary together."""
+    rng, n, inside, values, variances = np.random.default_rng(5), 1500, 0, [], []
+    for _ in range(n):
+        of_training = shared * rng.standard_normal((5, 1))
+        tables = [simulated(rng, 5, size, 0.1) + of_training for size in (20, 40)]
+        found = crossed_mean(*tables)
+        inside += found.interval().low <= 0 <= found.interval().high
+        values.append(found.value)
+        variances.append(found.variance)
+    assert np.mean(variances) == pytest.approx(np.var(values), rel=0.15)
+    assert 0.91 <= inside / n <= 0.98
+
+
+@pytest.mark.parametrize("n_shuffles", [3, 5])
+def test_intervals_cover_where_folds_share_their_calibration_objects(n_shuffles):
+    """Each shuffle has its own folds, and each fold its own network and calibration objects."""
+    rng, n, n_objects, inside = np.random.default_rng(7), 1000, 60, 0
+    for _ in range(n):
+        objects = rng.gamma(0.5, 1.0, n_objects) - 0.5
+        table = np.empty((n_shuffles, n_objects))
+        for row in table:
+            fold = rng.permutation(n_objects) % 5
+            row[:] = objects + rng.normal(0.0, 0.5, 5)[fold] + rng.normal(0.0, 0.5, n_objects)
+        found = crossed_mean(table).interval()
+        inside += found.low <= 0 <= found.high
+    assert 0.91 <= inside / n <= 0.98
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))

@@ -23,6 +23,9 @@ Floats = NDArray[np.float64]
 TEMPERATURES = (0.05, 20.0)
 """The least and the largest temperature that `fit_temperature` finds."""
 
+LEAST_PROBABILITY = 1e-6
+"""Of a class: no image excludes a pose for good, however sure a network is."""
+
 
 def _log_softmax(logits: NDArray[np.floating]) -> Floats:
     # Half a second of imports, which only the jobs of a classifier need.
@@ -51,8 +54,9 @@ class Posteriors:
 
     @property
     def distributions(self) -> Floats:
-        """p(class | image), (n, n_views, k)."""
-        return np.asarray(np.exp(self.log_posterior.astype(np.float64)))
+        """p(class | image), (n, n_views, k): `LEAST_PROBABILITY` or more, before it sums to 1."""
+        p = np.maximum(np.exp(self.log_posterior.astype(np.float64)), LEAST_PROBABILITY)
+        return np.asarray(p / p.sum(axis=-1, keepdims=True))
 
     @property
     def as_trained(self) -> Floats:

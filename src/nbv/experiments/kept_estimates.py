@@ -22,10 +22,7 @@ from nbv.calibration.posteriors import Posteriors, read_posteriors
 from nbv.errors import UserError
 from nbv.files import damaged, readable, write_arrays
 
-FORMAT = 1
-_LEVELS = 255.0
-# Of a class whose root was rounded to 0: no image excludes a pose for good.
-_LEAST_PROBABILITY = 1e-6
+FORMAT = 2
 _SETTINGS = "settings"
 
 KeptKey = tuple[int, int, str, int, int, str]
@@ -43,13 +40,13 @@ class HeldOut:
     residual : ndarray (n, n_views) int16
         Estimate less truth, hundredths of a degree; view k of n_views has the azimuth
         360 k / n_views.
-    roots : ndarray (n, B, B) uint8, optional
-        255 times the root of p(azimuth | image), by view and by distance from the truth in classes.
+    surprisal : ndarray (n, B, B) uint8, optional
+        −10 log p(azimuth | image), by view and by distance from the truth in classes.
     """
 
     object_ids: tuple[str, ...]
     residual: NDArray[np.int16]
-    roots: NDArray[np.uint8] | None = None
+    surprisal: NDArray[np.uint8] | None = None
 
     @property
     def estimates(self) -> Estimates:
@@ -61,9 +58,9 @@ class HeldOut:
     @property
     def posteriors(self) -> Posteriors | None:
         """The distributions of views one class apart, or None where there are none."""
-        if self.roots is None:
+        if self.surprisal is None:
             return None
-        p = np.maximum((self.roots / _LEVELS) ** 2, _LEAST_PROBABILITY)
+        p = np.exp(-0.1 * self.surprisal)
         turned = _turned(p / p.sum(axis=-1, keepdims=True), 1)
         return Posteriors(self.object_ids, np.log(turned), 1.0)
 
@@ -71,7 +68,7 @@ class HeldOut:
     def estimates_of_posteriors(self) -> Estimates:
         """The estimates of the views that `posteriors` has."""
         n_views = self.residual.shape[1]
-        step = 1 if self.roots is None else n_views // self.roots.shape[1]
+        step = 1 if self.surprisal is None else n_views // self.surprisal.shape[1]
         return Estimates(self.object_ids, self.estimates.estimate_deg[:, ::step])
 
 
@@ -83,12 +80,13 @@ def held_out(estimates: Estimates, posteriors: Posteriors | None = None) -> Held
     away = signed_difference_deg(estimates.estimate_deg, estimates.azimuth_deg)
     # Half a turn is kept as -18000 whether it was reached one way or the other.
     residual = (np.rint(away * 100.0) + 18000) % 36000 - 18000
-    roots = None
+    surprisal = None
     if posteriors is not None:
         p = posteriors.distributions
         p = p[:, :: p.shape[1] // p.shape[2]]
-        roots = np.rint(np.sqrt(_turned(p, -1)) * _LEVELS).astype(np.uint8)
-    return HeldOut(estimates.object_ids, residual.astype(np.int16), roots)
+        # At most −10 log of the least probability, 138.
+        surprisal = np.rint(-10.0 * np.log(_turned(p, -1))).astype(np.uint8)
+    return HeldOut(estimates.object_ids, residual.astype(np.int16), surprisal)
 
 
 def _turned(p: NDArray[np.float64], way: int) -> NDArray[np.float64]:
@@ -120,8 +118,8 @@ def keep_estimates(
         name = _name(key)
         arrays[f"{name}/objects"] = np.asarray(one.object_ids, dtype=np.str_)
         arrays[f"{name}/residual"] = one.residual
-        if one.roots is not None:
-            arrays[f"{name}/roots"] = one.roots
+        if one.surprisal is not None:
+            arrays[f"{name}/surprisal"] = one.surprisal
     write_arrays(path, arrays)
 
 
@@ -159,11 +157,11 @@ def read_kept(path: str | Path, keys: Iterable[KeptKey] | None = None) -> dict[K
     with readable(path), np.load(path, allow_pickle=False) as stored:
         for key in wanted:
             name = _name(key)
-            roots = f"{name}/roots"
+            surprisal = f"{name}/surprisal"
             found[key] = HeldOut(
                 tuple(str(one) for one in stored[f"{name}/objects"]),
                 stored[f"{name}/residual"],
-                stored[roots] if roots in stored.files else None,
+                stored[surprisal] if surprisal in stored.files else None,
             )
     return found
 

@@ -16,7 +16,6 @@ from nbv.statistics.trainings import (
     Mean,
     crossed_mean,
     holm,
-    pooled_mean,
     predicted_by_others,
 )
 
@@ -193,7 +192,7 @@ def _means(objects: pd.DataFrame, names: Sequence[str], columns: Sequence[str]) 
     rows = []
     for place, tables in _tables(objects, names):
         for method, of_figures in tables.items():
-            first, *others = (_mean(of_figures[name]) for name in names)
+            first, *others = (crossed_mean(*of_figures[name]) for name in names)
             interval = first.interval()
             means = (first.value, interval.low, interval.high, *(other.value for other in others))
             rows.append((*place, *method, *means, first.n_objects, first.n_trainings))
@@ -212,7 +211,7 @@ def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
         found: dict[Contrast, Mean] = {}
         for contrast in contrasts_of(list(tables)):
             mine, other = (tables[one]["error_deg"] for one in (contrast.method, contrast.other))
-            found[contrast] = _mean([a - b for a, b in zip(mine, other, strict=True)])
+            found[contrast] = crossed_mean(*(a - b for a, b in zip(mine, other, strict=True)))
         over_all = place[1] == ALL
         secondary = {
             one.name + one.method[1]: one for one in found if not (one.primary and over_all)
@@ -239,7 +238,7 @@ def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
 
     ``low`` and ``high`` are what the other trainings predict for it
     (`nbv.statistics.trainings.predicted_by_others`). Parameters and errors as of `method_means`.
-    Places without three trainings, the same of every category, have no rows.
+    Places without three trainings have no rows.
     """
     rows = []
     for (dataset, category), tables in _tables(objects):
@@ -248,8 +247,6 @@ def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
         trainings = [key for key, _ in own.groupby(list(TRAINING))]
         for contrast in contrasts_of(list(tables)):
             mine, other = (tables[one]["error_deg"] for one in (contrast.method, contrast.other))
-            if any(len(table) != len(trainings) for table in mine):
-                continue
             shown = predicted_by_others([a - b for a, b in zip(mine, other, strict=True)])
             names = (dataset, category, contrast.name, contrast.method[1])
             rows += [
@@ -266,7 +263,10 @@ Figures = Mapping[str, Sequence[NDArray[np.float64]]]
 def _tables(
     objects: pd.DataFrame, names: Sequence[str] = ("error_deg",)
 ) -> Iterator[tuple[tuple[str, str], dict[Method, Figures]]]:
-    """Yield the tables of each data set and category, then of its categories together."""
+    """Yield the tables of each data set and category, then of its categories together.
+
+    Categories are together only where all have the same trainings.
+    """
     for dataset, rows in objects.groupby("dataset", sort=False):
         of_categories = {
             str(category): _of_category(part, f"{dataset}, {category}", names)
@@ -280,7 +280,11 @@ def _tables(
                     for method, figures in tables.items()
                 },
             )
-        if len(of_categories) > 1:
+        trainings = {
+            frozenset(zip(*(part[name] for name in TRAINING), strict=True))
+            for _, part in rows.groupby("category")
+        }
+        if len(of_categories) > 1 and len(trainings) == 1:
             first, *rest = of_categories.values()
             shared = [method for method in first if all(method in other for other in rest)]
             yield (
@@ -311,8 +315,3 @@ def _of_category(
                 raise UserError(f"{where}: a training lacks an object; finish all folds first")
             tables[method][name] = table.to_numpy(dtype=np.float64)
     return tables
-
-
-def _mean(tables: Sequence[NDArray[np.float64]]) -> Mean:
-    means = [crossed_mean(table) for table in tables]
-    return means[0] if len(means) == 1 else pooled_mean(means)

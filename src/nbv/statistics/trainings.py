@@ -56,60 +56,65 @@ class Mean:
         return float(2.0 * stats.t.sf(t, self.degrees_of_freedom))
 
 
-def crossed_mean(values: ArrayLike) -> Mean:
+def crossed_mean(*tables: ArrayLike) -> Mean:
     """Return the mean of one figure of each object under each training.
 
     Parameters
     ----------
-    values : array-like (n_trainings, n_objects)
-        An object's mean error under a training, or the difference between two methods' errors.
+    *tables : array-like (n_trainings, n_objects)
+        An object's mean error under a training, or the difference between two methods' errors. Of
+        several categories under the same trainings, a table of each: objects vary within their
+        category, and categories may share what varies between trainings.
 
     Returns
     -------
     Mean
-        With one training, its variance is over objects alone.
+        Over all objects alike. With one training, its variance is over objects alone.
 
     Raises
     ------
     ValueError
-        Where the values are no finite matrix of one row and one column at least.
+        Where a table is no finite matrix of one row and one column at least, or tables have other
+        numbers of trainings.
     """
-    table = np.asarray(values, dtype=np.float64)
-    if table.ndim != 2 or not table.size or not np.isfinite(table).all():
-        raise ValueError("crossed_mean needs a finite value for each training and object")
-    n_trainings, n_objects = table.shape
-    mean, of_objects, of_trainings = table.mean(), table.mean(axis=0), table.mean(axis=1)
-    left = table - of_objects - of_trainings[:, None] + mean
-    # Mean squares over the number of values: what each adds to the variance of the mean.
-    objects = _spread(of_objects) / n_objects
-    trainings = _spread(of_trainings) / n_trainings
-    cells = (n_trainings - 1) * (n_objects - 1)
-    remainder = float((left**2).sum() / cells / table.size) if cells else 0.0
+    found = [np.asarray(table, dtype=np.float64) for table in tables]
+    for table in found:
+        if table.ndim != 2 or not table.size or not np.isfinite(table).all():
+            raise ValueError("crossed_mean needs a finite value for each training and object")
+    of_training = training_means(found)
+    n_trainings, n_objects = len(of_training), sum(table.shape[1] for table in found)
+    mean = float(of_training.mean())
+    if min(table.shape[1] for table in found) == 1:
+        nan = float("nan")
+        return Mean(mean, nan, nan, n_objects, n_trainings)
+    trainings = _spread(of_training) / n_trainings
+    # Of each category: what a mean square adds to the variance of the mean, and its freedom.
+    objects, remainders = [], []
+    for table in found:
+        n = table.shape[1]
+        share = (n / n_objects) ** 2
+        of_objects = table.mean(axis=0)
+        objects.append((share * _spread(of_objects) / n, n - 1))
+        left = table - of_objects - table.mean(axis=1, keepdims=True) + table.mean()
+        cells = (n_trainings - 1) * (n - 1)
+        square = float((left**2).sum() / cells) if cells else 0.0
+        remainders.append((share * square / table.size, cells))
+    of_objects_all, of_rest = (sum(term for term, _ in terms) for terms in (objects, remainders))
     if n_trainings == 1:
-        return Mean(float(mean), objects, n_objects - 1.0, n_objects, 1)
-    if n_objects == 1:
-        return Mean(float(mean), float("nan"), float("nan"), 1, n_trainings)
-    variance = max(objects + trainings - remainder, objects, trainings)
-    terms = [(objects, n_objects - 1), (trainings, n_trainings - 1), (remainder, cells)]
+        freedom = _freedom(of_objects_all, objects)
+        return Mean(mean, of_objects_all, freedom, n_objects, 1)
+    variance = max(of_objects_all + trainings - of_rest, of_objects_all, trainings)
+    freedom = _freedom(variance, [*objects, (trainings, n_trainings - 1), *remainders])
     # The remainder is taken away, so the rule can fall below what the scarcer factor has alone.
-    freedom = max(_freedom(variance, terms), min(n_objects, n_trainings) - 1.0)
-    return Mean(float(mean), variance, freedom, n_objects, n_trainings)
+    least = min(n_trainings, *(table.shape[1] for table in found)) - 1.0
+    return Mean(mean, variance, max(freedom, least), n_objects, n_trainings)
 
 
-def pooled_mean(parts: Sequence[Mean]) -> Mean:
-    """Return the mean over the objects of several categories, trained and tested apart.
-
-    Categories count by their objects. Their variances add up, for no training is shared.
-    """
-    sizes = np.array([part.n_objects for part in parts], dtype=np.float64)
-    weights = sizes / sizes.sum()
-    value = float(weights @ [part.value for part in parts])
-    terms = [float(w**2 * part.variance) for w, part in zip(weights, parts, strict=True)]
-    freedom = _freedom(
-        sum(terms), [(t, part.degrees_of_freedom) for t, part in zip(terms, parts, strict=True)]
-    )
-    n_trainings = min(part.n_trainings for part in parts)
-    return Mean(value, sum(terms), freedom, int(sizes.sum()), n_trainings)
+def training_means(tables: Sequence[Floats]) -> Floats:
+    """Return each training's mean over the objects of all tables, as of `crossed_mean`, (n,)."""
+    if len({len(table) for table in tables}) > 1:
+        raise ValueError("all categories need the same trainings")
+    return np.asarray(np.concatenate(tables, axis=1).mean(axis=1))
 
 
 def predicted_by_others(tables: Sequence[Floats]) -> list[Interval]:
@@ -122,26 +127,21 @@ def predicted_by_others(tables: Sequence[Floats]) -> list[Interval]:
     Parameters
     ----------
     tables : sequence of ndarray (n_trainings, n_objects)
-        Of each category, with the same trainings; categories count by their objects.
+        As of `crossed_mean`.
 
     Returns
     -------
     list of Interval
         Empty with fewer than three trainings.
     """
-    sizes = np.array([table.shape[1] for table in tables], dtype=np.float64)
-    weights = sizes / sizes.sum()
-    means = np.stack([table.mean(axis=1) for table in tables], axis=1)
-    n_trainings = len(means)
+    means = training_means(tables)
     found = []
-    for own in range(n_trainings if n_trainings > 2 else 0):
-        others = np.delete(means, own, axis=0)
-        terms = weights**2 * others.var(axis=0, ddof=1)
-        freedom = _freedom(terms.sum(), [(term, n_trainings - 2.0) for term in terms])
-        half = stats.t.ppf(0.975, freedom) * np.sqrt(terms.sum() * (1 + 1 / len(others)))
-        centre = weights @ others.mean(axis=0)
-        value = float(weights @ means[own])
-        found.append(Interval(value, float(centre - half), float(centre + half)))
+    for own in range(len(means) if len(means) > 2 else 0):
+        others = np.delete(means, own)
+        half = stats.t.ppf(0.975, len(others) - 1) * others.std(ddof=1)
+        half *= np.sqrt(1 + 1 / len(others))
+        centre = others.mean()
+        found.append(Interval(float(means[own]), float(centre - half), float(centre + half)))
     return found
 
 
