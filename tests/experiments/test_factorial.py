@@ -6,9 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
-from tests.experiments.test_two_views import hidden_handle, mean_directions
+from tests.experiments.test_two_views import N_CLASSES, hidden_handle, mean_directions
 from tests.recommendation.made import FEW_DENSITIES
 
+from nbv.angles import circular_distance_deg
 from nbv.experiments.factorial import (
     AS_PRINTED,
     OF_IMAGES,
@@ -19,6 +20,7 @@ from nbv.experiments.factorial import (
 from nbv.experiments.kept_estimates import held_out
 from nbv.recommendation.density_selection import COARSE_BINS
 from nbv.recommendation.fusion import ESTIMATE_FUSIONS
+from nbv.recommendation.policies import needs_lookup
 from nbv.statistics.confirmation import factorial_beliefs
 
 SETTINGS = FEW_DENSITIES | {
@@ -44,8 +46,8 @@ def test_every_choice_meets_every_fusion(made):
     expected = set(itertools.product(POLICIES, ESTIMATE_FUSIONS))
     expected |= {(choice, "product") for choice in OF_IMAGES} | {SINGLE, AS_PRINTED}
     assert set(made.frames) == expected
-    for (_, fusion), frame in made.frames.items():
-        assert len(frame) == 3 * (36 if fusion == "product" else 360)
+    assert {len(frame) for frame in made.frames.values()} == {3 * N_CLASSES}
+    for frame in made.frames.values():
         assert set(frame["object_id"]) == {"0-0", "0-1", "0-2"}
 
 
@@ -60,6 +62,9 @@ def test_tables_have_coarse_bins_and_the_error_is_that_of_the_fused_pose(made):
     for choice in set(POLICIES) - {"random", "opposite"}:
         delta = made.frames[choice, "posterior"]["delta_deg"]
         assert (delta % (360 // COARSE_BINS) == 0).all()
+    for frame in made.frames.values():
+        away = circular_distance_deg(frame["pose_estimate_deg"], frame["initial_deg"])
+        np.testing.assert_allclose(frame["error_deg"], away)
 
 
 def test_what_sees_the_hidden_handle_beats_a_random_view(made):
@@ -70,15 +75,24 @@ def test_what_sees_the_hidden_handle_beats_a_random_view(made):
     assert error["expected_error", "posterior"] <= error["fixed", "posterior"] + 0.5
 
 
-def test_the_densities_are_those_of_the_grid_and_none_is_added_to_what_is_printed(made):
-    densities = made.densities.set_index("density")
-    assert list(densities.index) == ["average", "posterior", "as_printed"]
+def test_each_choice_has_a_density_of_its_own_where_the_fusion_has_none(made):
+    densities = made.densities.set_index(["choice", "fusion"])
+    tables = {choice for choice, policy in POLICIES.items() if needs_lookup(policy)}
+    expected = {(choice, "average") for choice in tables} | {AS_PRINTED}
+    expected |= {("random", "posterior"), ("expected_error", "posterior")}
+    assert set(densities.index) == expected
     assert set(densities["bandwidth_deg"]) <= {6, 12}
-    assert densities.loc["as_printed", "pseudo_observations"] == 0
-    assert densities.loc["average", "pseudo_observations"] == 10
+    assert densities.loc[AS_PRINTED, "pseudo_observations"] == 0
+    assert densities.loc[("random", "posterior"), "pseudo_observations"] == 10
     # Five objects from every degree: five pairs a row.
-    assert densities.loc["average", "pairs_percent"] == pytest.approx(100 * 5 / 15)
-    assert densities.loc["as_printed", "pairs_percent"] == 100
+    assert densities.loc[("random", "posterior"), "pairs_percent"] == pytest.approx(100 * 5 / 15)
+    assert densities.loc[AS_PRINTED, "pairs_percent"] == 100
+
+
+def test_all_methods_start_from_the_same_views(made):
+    starts = {pair: tuple(frame["initial_deg"]) for pair, frame in made.frames.items()}
+    assert len(set(starts.values())) == 1
+    assert len(set(starts[SINGLE])) == N_CLASSES
 
 
 def test_without_distributions_nothing_is_multiplied():

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.recommendation.made import evidence_of, objects
 
-from nbv.angles import circular_distance_deg
+from nbv.angles import circular_distance_deg, travel_deg
 from nbv.recommendation.belief import Belief
-from nbv.recommendation.next_views import best_view, random_next, recommended_next
+from nbv.recommendation.criteria import CRITERIA
+from nbv.recommendation.next_views import (
+    best_view,
+    evenly_spaced_travel_deg,
+    random_next,
+    recommended_next,
+    shortest_walk_deg,
+)
 
 
 def test_recommended_views_keep_their_distance():
@@ -20,6 +32,42 @@ def test_recommended_views_keep_their_distance():
         delta = next_view(belief, taken, rng)
         assert circular_distance_deg(taken, delta[:, None]).min() >= 15
         taken = np.column_stack([taken, delta])
+
+
+@pytest.mark.parametrize("n_views", [2, 3, 4, 5, 8])
+@pytest.mark.parametrize("apart_deg", [0.0, 15.0, 45.0])
+def test_no_costs_lead_farther_than_even_spacing(monkeypatch, n_views, apart_deg):
+    rng, coarse = np.random.default_rng(0), evidence_of(objects(2, 0).estimate_deg, n_bins=120)
+    monkeypatch.setitem(CRITERIA, "any", lambda belief, *_: rng.random(belief.probabilities.shape))
+    next_view = recommended_next("any", coarse, apart_deg, n_views)
+    belief = Belief(np.tile(coarse.viewpoint, (9, 1)), coarse)
+    taken = np.zeros((len(belief.probabilities), 1), dtype=np.int64)
+    for _ in range(n_views - 1):
+        taken = np.column_stack([taken, next_view(belief, taken, rng)])
+    travel = travel_deg(np.diff(taken, axis=1)).sum(axis=1)
+    assert travel.max() <= evenly_spaced_travel_deg(n_views) + 1e-6
+    for one, other in itertools.combinations(taken.T, 2):
+        assert circular_distance_deg(one, other).min() >= apart_deg
+
+
+@given(
+    st.lists(st.integers(0, 23), min_size=1, max_size=4),
+    st.integers(0, 3),
+    st.sampled_from([0.0, 15.0, 40.0]),
+)
+def test_walks_are_as_short_as_views_one_way_round_can_be(taken, n_more, apart_deg):
+    n_bins, bin_deg = 24, 15.0
+    found = shortest_walk_deg(np.array([taken]) * 15, n_bins, n_more, apart_deg)[0]
+    for start in range(n_bins):
+        best = np.inf
+        for way, steps in itertools.product(
+            (1, -1), itertools.combinations(range(1, n_bins), n_more)
+        ):
+            new = [(start + way * step) % n_bins for step in steps]
+            pairs = [*itertools.product(new, taken), *itertools.combinations([start, *new], 2)]
+            if all(circular_distance_deg(a * 15, b * 15) >= apart_deg for a, b in pairs):
+                best = min(best, max(steps, default=0) * bin_deg)
+        assert found[start] == best
 
 
 def test_random_views_never_repeat():

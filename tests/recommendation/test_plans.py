@@ -147,16 +147,6 @@ def test_step_by_step_travels_no_farther_than_even_spacing_and_else_as_it_likes(
         np.testing.assert_array_equal(views[n_views][:, free], views[None][:, free])
 
 
-def test_where_the_travel_left_is_too_short_the_nearest_view_follows():
-    """Views at 0, 180 and 90 degrees have travelled as far as four evenly spaced ones."""
-    evidence = evidence_of(distributions(0))
-    belief, rng = first_views(1, evidence), np.random.default_rng(0)
-    taken = np.tile([0, 180, 90], (len(belief.probabilities), 1))
-    found = recommended_next("information_gain", evidence, 45.0, 4)(belief, taken, rng)
-    assert np.abs(found - 90).max() == np.abs(found - 90).min() > 0
-    assert circular_distance_deg(found[:, None], taken).min() >= 45
-
-
 def test_the_views_of_a_part_are_chosen_with_the_evidence_of_the_others():
     """Two objects of five parts: each is chosen for by the other."""
     views = distributions(5, n_objects=2)

@@ -142,17 +142,20 @@ def test_it_says_what_was_run(page):
 
 @pytest.mark.parametrize("given", ["estimate", "truth"])
 @pytest.mark.parametrize("candidates", [1, 2])
-def test_it_says_at_first_how_proposed_was_repaired(inputs, tmp_path, given, candidates):
+@pytest.mark.parametrize("alpha", [0.0, 3.0])
+def test_it_says_at_first_how_proposed_was_repaired(inputs, tmp_path, given, candidates, alpha):
     settings = json.loads(inputs["configuration"].read_text())
     settings["density"]["pose_likelihood"] = f"given_{given}"
     settings["density"]["bandwidths_deg"] = [8.0, 16.0][:candidates]
+    settings["density"]["pseudo_observations"] = [alpha]
     path = tmp_path / "configuration.yaml"
     path.write_text(json.dumps(settings))
     text = build_report(**inputs | {"configuration": path}).split("</header>")[0]
     assert ("given the estimate and not the truth" in text) == (given == "estimate")
     assert ("by the errors of the decisions" in text) == (candidates > 1)
     as_printed = "Proposed is the paper's method as it is printed." in unescape(text)
-    assert as_printed == (given == "truth" and candidates == 1)
+    assert ("uniform pseudo-observations" in text) == (alpha > 0)
+    assert as_printed == (given == "truth" and candidates == 1 and alpha == 0)
 
 
 def test_it_is_repeatable(inputs, html):

@@ -1,13 +1,14 @@
 """Every choice of the next view with every fusion, on the same estimates of one fold.
 
 A choice and a fusion are told apart only where both vary: the paper's method differs from Opposite
-in the choice, and from its extensions in both. All choices with the same fusion share its density,
-so that they differ in nothing else.
+in the choice, and from its extensions in both. All choices with one fusion fuse alike. An average
+has no density, so each choice has the one that is best for it. A posterior has, and all choices
+share it; the regression of ``expected_error`` has a kernel of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, Final
@@ -27,6 +28,7 @@ from nbv.recommendation.density_selection import (
     choose_densities,
     chosen_evidence,
     most_likely_density,
+    with_kernel,
 )
 from nbv.recommendation.evidence import Evidence, evidence_of_distributions
 from nbv.recommendation.fusion import ESTIMATE_FUSIONS
@@ -52,17 +54,11 @@ POLICIES: Final[Mapping[str, str]] = {
 }
 """The policy of each choice; the pose ambiguity has two interpretations."""
 
-BY_POSE_LIKELIHOOD: Final[Mapping[str, tuple[str, ...]]] = {
-    "given_estimate": tuple(choice for choice in POLICIES if choice != "given_truth"),
-    "given_truth": ("given_truth",),
-}
-"""The choices under each interpretation of the pose likelihood; it concerns the ambiguity alone."""
+CHOICES_WITH_TABLES = tuple(choice for choice, policy in POLICIES.items() if needs_lookup(policy))
+REGRESSION = "expected_error"
 
 OF_IMAGES = ("random", "fixed", "opposite", "information_gain", "expected_error")
 """Choices that are defined where images give distributions, which are fused by product."""
-
-DECIDED_BY: Final[Mapping[str, str]] = {"average": "pose_ambiguity", "posterior": "random"}
-"""The policy whose errors decide on a fusion's density: the paper's, or one without a table."""
 
 MORE_VIEWS: Final[Mapping[str, Pair]] = {
     "random": ("random", "posterior"),
@@ -76,7 +72,8 @@ MORE_VIEWS: Final[Mapping[str, Pair]] = {
 """Choice and fusion of the policies of `nbv.experiments.more_views` that are compared."""
 
 DENSITY_COLUMNS = (
-    "density",
+    "choice",
+    "fusion",
     "bandwidth_deg",
     "pseudo_observations",
     "pairs_percent",
@@ -97,7 +94,7 @@ class Factorial:
     more_views : DataFrame
         As of `nbv.experiments.more_views.more_views_rows`.
     densities : DataFrame
-        What calibration objects chose for each fusion and for `AS_PRINTED`; `DENSITY_COLUMNS`.
+        What calibration objects chose for each choice and fusion; `DENSITY_COLUMNS`.
         ``pairs_percent`` is the mean share of calibration pairs in a row of V, whose other part are
         uniform pseudo-observations.
     """
@@ -131,13 +128,15 @@ def evaluate_factorial(
         The generator of a choice, by name: random views are the same under every fusion.
     """
     known, tested = calibration.estimates.estimate_deg, test.estimates
-    densities = _densities(known, settings)
+    densities: dict[Pair, Choice] = {}
     frames = {SINGLE: evaluate_method({"policy": "none", "fusion": "average"}, tested)}
     for fusion in ESTIMATE_FUSIONS:
-        frames |= _estimate_frames(fusion, densities[fusion], known, tested, settings, rng_of)
-    printed = dict(settings) | {"pose_likelihood": "given_truth", "pseudo_observations": [0.0]}
-    densities["as_printed"] = most_likely_density(known, printed)
-    coarse = chosen_evidence(known, densities["as_printed"], printed, COARSE_BINS)
+        chosen = _densities(fusion, known, settings)
+        densities |= {(choice, fusion): density for choice, density in chosen.items()}
+        frames |= _estimate_frames(fusion, chosen, known, tested, settings, rng_of)
+    printed = _of_choice("given_truth", settings) | {"pseudo_observations": [0.0]}
+    densities[AS_PRINTED] = most_likely_density(known, printed)
+    coarse = chosen_evidence(known, densities[AS_PRINTED], printed, COARSE_BINS)
     table = build_lookup(coarse, POLICIES["given_truth"])
     method = {"policy": POLICIES["given_truth"], "fusion": "average"}
     frames[AS_PRINTED] = evaluate_method(method, tested, lookup=table)
@@ -145,7 +144,13 @@ def evaluate_factorial(
     if calibration.posteriors is not None and test.posteriors is not None:
         of_images = evidence_of_distributions(calibration.posteriors.distributions, settings)
         frames |= _product_frames(test, test.posteriors, of_images, rng_of)
-    evidence = cache(partial(chosen_evidence, known, densities["posterior"], settings))
+        step = 360 // test.posteriors.distributions.shape[1]
+        frames = {
+            pair: frame[frame["initial_deg"] % step == 0].reset_index(drop=True)
+            for pair, frame in frames.items()
+        }
+    shared = densities["random", "posterior"]
+    evidence = cache(partial(chosen_evidence, known, shared, settings))
     evidences: dict[str, Callable[[int], Evidence]] = dict.fromkeys(
         ("random", "opposite", "information_gain"), lambda n_bins: evidence(n_bins=n_bins)
     )
@@ -155,34 +160,52 @@ def evaluate_factorial(
     return Factorial(frames, rows, _densities_frame(densities, known.size / 360))
 
 
+def _of_choice(choice: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of a choice: the pose likelihood has two interpretations."""
+    given = "given_truth" if choice == "given_truth" else "given_estimate"
+    return dict(settings) | {"pose_likelihood": given}
+
+
+def _densities(
+    fusion: str, estimate_deg: NDArray[np.float64], settings: Mapping[str, Any]
+) -> dict[str, Choice]:
+    """Return the density of each choice that has one of its own, and a fusion's own as random's."""
+
+    def best(choices: Sequence[str], shared: Choice | None = None) -> dict[str, Choice]:
+        methods = {one: {"policy": POLICIES[one], "fusion": fusion} for one in choices}
+        own = _of_choice(choices[0], settings)
+        return choose_densities(estimate_deg, methods, own, shared=shared)
+
+    if fusion == "average":
+        others = [choice for choice in CHOICES_WITH_TABLES if choice != "given_truth"]
+        return best(others) | best(["given_truth"])
+    of_fusion = best(["random"])
+    return of_fusion | best([REGRESSION], shared=of_fusion["random"])
+
+
 def _estimate_frames(
     fusion: str,
-    density: Choice,
+    densities: Mapping[str, Choice],
     calibration_deg: NDArray[np.float64],
     test: Estimates,
     settings: Mapping[str, Any],
     rng_of: RngOf,
 ) -> dict[Pair, pd.DataFrame]:
     """Return the frame of every choice with one fusion of estimates."""
+    shared = densities.get("random")
+    fine = None if shared is None else chosen_evidence(calibration_deg, shared, settings)
     frames = {}
-    for pose_likelihood, choices in BY_POSE_LIKELIHOOD.items():
-        own = dict(settings) | {"pose_likelihood": pose_likelihood}
-        coarse, fine = (
-            chosen_evidence(calibration_deg, density, own, n_bins) for n_bins in (COARSE_BINS, 360)
-        )
-        for choice in choices:
-            policy = POLICIES[choice]
-            lookup = build_lookup(coarse, policy, fusion) if needs_lookup(policy) else None
-            method = {"policy": policy, "fusion": fusion}
-            frames[choice, fusion] = evaluate_method(method, test, rng_of(choice), lookup, fine)
+    for choice, policy in POLICIES.items():
+        lookup = None
+        if choice in CHOICES_WITH_TABLES:
+            own = _of_choice(choice, settings)
+            of_table = shared or densities[choice]
+            coarse = chosen_evidence(calibration_deg, of_table, own, COARSE_BINS)
+            kernel = densities.get(choice, of_table)
+            lookup = build_lookup(with_kernel(coarse, kernel), policy, fusion)
+        method = {"policy": policy, "fusion": fusion}
+        frames[choice, fusion] = evaluate_method(method, test, rng_of(choice), lookup, fine)
     return frames
-
-
-def _densities(estimate_deg: NDArray[np.float64], settings: Mapping[str, Any]) -> dict[str, Choice]:
-    methods = {
-        fusion: {"policy": DECIDED_BY[fusion], "fusion": fusion} for fusion in ESTIMATE_FUSIONS
-    }
-    return choose_densities(estimate_deg, methods, settings)
 
 
 def _product_frames(
@@ -200,10 +223,10 @@ def _product_frames(
     }
 
 
-def _densities_frame(densities: Mapping[str, Choice], pairs_of_row: float) -> pd.DataFrame:
+def _densities_frame(densities: Mapping[Pair, Choice], pairs_of_row: float) -> pd.DataFrame:
     rows = []
-    for name, choice in densities.items():
-        alpha = choice.pseudo_observations
+    for pair, chosen in densities.items():
+        alpha = chosen.pseudo_observations
         share = 100.0 * pairs_of_row / (pairs_of_row + alpha)
-        rows.append((name, choice.bandwidth_deg, alpha, share, choice.error_deg))
+        rows.append((*pair, chosen.bandwidth_deg, alpha, share, chosen.error_deg))
     return pd.DataFrame(rows, columns=list(DENSITY_COLUMNS))

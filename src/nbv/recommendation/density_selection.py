@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import logging
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -65,7 +65,10 @@ def _candidates(settings: Mapping[str, Any]) -> list[Candidate]:
 
 
 def _trials(
-    estimate_deg: NDArray[np.float64], settings: Mapping[str, Any], n_bins: int
+    estimate_deg: NDArray[np.float64],
+    settings: Mapping[str, Any],
+    n_bins: int,
+    shared: Choice | None = None,
 ) -> Iterator[tuple[Candidate, int, NDArray[np.bool_], Evidence]]:
     """Yield candidate, part, which objects are of that part, and the evidence of all others.
 
@@ -79,7 +82,10 @@ def _trials(
     part_of = np.arange(n_objects) % parts
     for candidate, part in itertools.product(candidates, range(parts)):
         others, choice = estimate_deg[part_of != part], Choice(*candidate)
-        yield candidate, part, part_of == part, chosen_evidence(others, choice, settings, n_bins)
+        evidence = chosen_evidence(others, shared or choice, settings, n_bins)
+        if shared is not None:
+            evidence = with_kernel(evidence, choice)
+        yield candidate, part, part_of == part, evidence
 
 
 def choose_densities(
@@ -88,6 +94,7 @@ def choose_densities(
     settings: Mapping[str, Any],
     *,
     n_bins: int = COARSE_BINS,
+    shared: Choice | None = None,
 ) -> dict[str, Choice]:
     """Cross-validate the decisions of several methods over calibration objects.
 
@@ -104,6 +111,8 @@ def choose_densities(
         object alone cannot be cross-validated, and the widest candidate is taken.
     n_bins : int
         Of the tables compared.
+    shared : Choice, optional
+        Of V and L; then candidates differ in the kernel of ``expected_error`` alone.
 
     Returns
     -------
@@ -117,7 +126,7 @@ def choose_densities(
         Where an error is not finite: NaN would be chosen, as nothing is less.
     """
     errors: dict[str, dict[Candidate, NDArray[np.float64]]] = {name: {} for name in methods}
-    for candidate, part, held_out, evidence in _trials(estimate_deg, settings, n_bins):
+    for candidate, part, held_out, evidence in _trials(estimate_deg, settings, n_bins, shared):
         for name, method in methods.items():
             # The same draws for every candidate.
             turns = Turns(estimate_deg[held_out], evidence, np.random.default_rng(part))
@@ -179,6 +188,16 @@ def chosen_evidence(
         bandwidth_deg=choice.bandwidth_deg,
         pseudo_observations=choice.pseudo_observations,
         n_bins=n_bins,
+    )
+
+
+def with_kernel(evidence: Evidence, choice: Choice) -> Evidence:
+    """Return the same V and L with another kernel and shrinkage for ``expected_error``."""
+    return replace(
+        evidence,
+        bandwidth_deg=choice.bandwidth_deg,
+        pseudo_observations=choice.pseudo_observations,
+        made={},
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -14,6 +15,9 @@ from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.evidence import Evidence
 from nbv.recommendation.fusion import Rotations
 from nbv.recommendation.lookup import least_cost_delta
+
+# Of sums of angles.
+_ROUNDING_DEG = 1e-6
 
 BISECTING_DEG = (180, 90, 270, 45, 225, 135, 315)
 COARSE_BINS = 120
@@ -43,8 +47,7 @@ def recommended_next(
         From every view so far: an estimator errs alike from nearly the same place, and no
         criterion that takes views as independent can know.
     n_views : int, optional
-        In all. Then they travel no farther than as many evenly spaced views; where too little
-        travel is left for that, the nearest view is taken.
+        In all. Then they travel no farther than as many evenly spaced views.
     """
 
     def next_view(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
@@ -56,16 +59,47 @@ def recommended_next(
         if n_views is None:
             return least_cost_delta(cost)
         travel = travel_deg(rotations - taken_deg[:, -1:])
-        # Each view after the next one needs as much at the least.
-        reserve = (n_views - 1 - taken_deg.shape[1]) * np.ceil(min_separation_deg / bin_deg)
-        so_far = travel_deg(np.diff(taken_deg, axis=1)).sum(axis=1, keepdims=True)
-        left = evenly_spaced_travel_deg(n_views) - reserve * bin_deg - so_far
-        within = np.where(travel <= left, cost, np.inf)
-        nearest = np.where(np.isfinite(cost), travel, np.inf)
-        none = np.isinf(within).all(axis=1, keepdims=True)
-        return least_cost_delta(np.where(none, nearest, within))
+        travel += travel_deg(np.diff(taken_deg, axis=1)).sum(axis=1, keepdims=True)
+        n_more = n_views - 1 - taken_deg.shape[1]
+        travel += shortest_walk_deg(taken_deg, coarse.n_bins, n_more, min_separation_deg)
+        return least_cost_delta(
+            np.where(travel <= evenly_spaced_travel_deg(n_views) + _ROUNDING_DEG, cost, np.inf)
+        )
 
     return next_view
+
+
+def shortest_walk_deg(
+    taken_deg: Rotations, n_bins: int, n_more: int, min_separation_deg: float
+) -> NDArray[np.float64]:
+    """Return the travel that more views need at the most, from each next rotation, (n, B) degrees.
+
+    They are taken on the way round from there, one way or the other, each as soon as it is far
+    enough from all others. inf where there is no room for them.
+
+    Parameters
+    ----------
+    taken_deg : ndarray (n, t)
+        Rotations of the views so far.
+    n_bins : int
+        B; rotations are multiples of 360 / B.
+    n_more : int
+        Views after the next one.
+    min_separation_deg : float
+    """
+    different, row_of = np.unique(taken_deg, axis=0, return_inverse=True)
+    rotations = np.arange(n_bins) * (360.0 / n_bins)
+    apart = circular_distance_deg(different[:, :, None], rotations).min(axis=1)
+    free, step = apart >= min_separation_deg, math.ceil(min_separation_deg * n_bins / 360.0)
+    walks = []
+    for way in (1, -1):
+        found, last = np.zeros(free.shape, dtype=int), np.zeros(free.shape, dtype=int)
+        for walked in range(1, n_bins + 1 - step):
+            ahead = np.roll(free, -way * walked, axis=1)
+            here = ahead & (walked - last >= step) & (found < n_more)
+            found, last = found + here, np.where(here, walked, last)
+        walks.append(np.where(found == n_more, last * (360.0 / n_bins), np.inf))
+    return np.asarray(np.minimum(*walks)[row_of.ravel()])
 
 
 def evenly_spaced_travel_deg(n_views: int) -> float:

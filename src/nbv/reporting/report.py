@@ -135,6 +135,8 @@ def _repairs(density: Mapping[str, Any]) -> str:
         repairs.append(
             "the smoothing is chosen by the errors of the decisions and not by the likelihood"
         )
+    if min(density["pseudo_observations"]) > 0:
+        repairs.append("each row of the density has uniform pseudo-observations")
     if not repairs:
         return "Proposed is the paper's method as it is printed."
     return (

@@ -98,17 +98,20 @@ class Contrast:
 def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
     """Return the contrasts of docs/protocol.md that some methods allow."""
     found = []
+    # A classifier's own question is the product; the paper's method is that of a regressor.
+    has_product = any(fusion == "product" for _, fusion, _ in methods)
     for fusion in dict.fromkeys(fusion for _, fusion, _ in methods):
         adaptive, paper = (("expected_error", fusion, 2), ("given_estimate", fusion, 2))
         opposite = ("opposite", fusion, 2)
-        found.append(Contrast(adaptive, ("fixed", fusion, 2), primary=True))
+        best_fixed = ("fixed", fusion, 2)
+        found.append(Contrast(adaptive, best_fixed, primary=has_product == (fusion == "product")))
         found += [Contrast(adaptive, (other, fusion, 2)) for other in ("opposite", "random")]
-        found.append(Contrast(paper, opposite, primary=fusion == "average"))
+        found.append(Contrast(paper, opposite, fusion == "average" and not has_product))
         found.append(Contrast(paper, ("fixed", fusion, 2)))
     paper = ("given_estimate", "average", 2)
     found += [
         Contrast(paper, ("none", "none", 1)),
-        Contrast(("as_printed", "average", 2), paper, primary=True),
+        Contrast(("as_printed", "average", 2), paper, primary=not has_product),
         Contrast(("expected_error", "product", 2), paper, primary=True),
     ]
     for n_views in sorted({n for *_, n in methods if n > 2}):

@@ -92,17 +92,20 @@ def test_beliefs_have_a_row_for_each_choice_fusion_and_number_of_views():
 
 def test_densities_are_counted_over_folds_and_trainings():
     rows = [
-        ("real", "mug", 0, replicate, fold, name, width, alpha, 100 * 20 / (20 + alpha), 5.0)
+        ("real", "mug", 0, replicate, fold, *pair, width, alpha, 100 * 20 / (20 + alpha), 5.0)
         for replicate in (0, 1)
         for fold in (1, 2)
-        for name, width, alpha in (("average", 4.0 * fold, 100.0), ("as_printed", 6.0, 0.0))
+        for pair, width, alpha in (
+            (("random", "posterior"), 4.0 * fold, 100.0),
+            (("as_printed", "average"), 6.0, 0.0),
+        )
     ]
     places = ["dataset", "category", "shuffle", "replicate", "fold"]
     table = densities_table(pd.DataFrame(rows, columns=[*places, *DENSITY_COLUMNS]))
     assert table.parts[0].heading == "real, Mug (4 folds)"
     assert [[cell.text for cell in row] for row in table.parts[0].rows] == [
-        ["Average", "4° (2), 8° (2)", "100 (4)", "17"],
-        ["As printed", "6° (4)", "0 (4)", "100"],
+        ["Random", "posterior", "4° (2), 8° (2)", "100 (4)", "17"],
+        ["As printed", "average", "6° (4)", "0 (4)", "100"],
     ]
 
 

@@ -85,25 +85,29 @@ def densities_table(densities: pd.DataFrame) -> Table:
     for (dataset, category), part in densities.groupby(["dataset", "category"], sort=False):
         rows = [
             (
-                Cell(str(name).replace("_", " ").capitalize()),
+                Cell(_choice(str(choice), 2)),
+                Cell(str(fusion)),
                 Cell(_counts(chosen["bandwidth_deg"], "°")),
                 Cell(_counts(chosen["pseudo_observations"])),
                 Cell(number(chosen["pairs_percent"].mean(), 0)),
             )
-            for name, chosen in part.groupby("density", sort=False)
+            for (choice, fusion), chosen in part.groupby(["choice", "fusion"], sort=False)
         ]
         n_folds = len(part.drop_duplicates(["shuffle", "replicate", "fold"]))
         heading = f"{dataset}, {category_label(str(category))} ({n_folds} folds)"
         parts.append(Part(tuple(rows), heading))
     title = "Densities that calibration objects chose"
-    header = ("Density", "Smoothing", "Pseudo-observations", "Pairs (%)")
+    header = ("Choice", "Fusion", "Smoothing", "Pseudo-observations", "Pairs (%)")
     notes = (
-        "Density: of the fusion average or posterior, and of the paper's method as printed.",
+        "Random, posterior: V and L of the fusion posterior, which all choices share; of Expected "
+        "error, posterior it is the kernel of the regression.",
         "Each value with the number of folds that chose it.",
         "Pairs: the mean share of calibration pairs in a row of V; the rest are uniform "
         "pseudo-observations.",
     )
-    return Table("densities", title, title, densities, header, tuple(parts), notes)
+    return Table(
+        "densities", title, title, densities, header, tuple(parts), notes, n_text_columns=2
+    )
 
 
 def _counts(values: pd.Series, unit: str = "") -> str:
