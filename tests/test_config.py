@@ -284,7 +284,8 @@ def test_a_kept_reference_has_the_settings_of_today():
     kept, ours = read_configuration(ROOT / "docs/reference/paper"), load_config(CONFIG)
     same = ("methods", "density", "more_views", "gives_distributions")
     assert {key: kept[key] for key in same} == {key: ours[key] for key in same}
-    for key, value in ours["estimator"].items():
+    # The default has changed since (docs/method.md).
+    for key, value in (ours["estimator"] | {"warm_start": "none"}).items():
         # A key that is younger than the reference had its default there.
         assert kept["estimator"].get(key, default_of(f"estimator.{key}", None)) == value
 

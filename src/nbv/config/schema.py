@@ -166,7 +166,7 @@ class Estimator(Section):
     weight_decay: Annotated[Number, Field(ge=0, le=10)]
     device: Literal["auto", "cpu", "cuda", "mps"]
     precision: Literal["auto", "bfloat16", "float32"]
-    warm_start: Literal["none", "elevations", "categories", "both"] = "both"
+    warm_start: Literal["none", "elevations", "categories", "both"] = "none"
     pretraining: Schedule = Schedule(epochs=2, learning_rate=9e-3)
     fine_tuning: Schedule = Schedule(epochs=5, learning_rate=4e-3)
     next_elevation: Schedule = Schedule(epochs=4, learning_rate=4e-3)
