@@ -198,7 +198,8 @@ def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
     with readable(path):
         posteriors = Posteriors(names, stored["log_posterior"], float(stored["temperature"]))
         _, n_views, n_classes = posteriors.log_posterior.shape
-        need_distributions(path, posteriors.distributions, (len(names), n_views, n_classes))
+        as_kept = np.exp(posteriors.log_posterior.astype(np.float64))
+        need_distributions(path, as_kept, (len(names), n_views, n_classes))
         if not 0.0 < posteriors.temperature < np.inf:
             raise damaged(path, f"the temperature {posteriors.temperature} is not above 0")
     return posteriors
