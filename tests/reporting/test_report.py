@@ -134,7 +134,7 @@ def test_it_says_what_was_run(page):
         "Mug 9",
         "0123456789abcdef",
         "torch 2.13.0",
-        "starts from the one an elevation lower",
+        "each other one from the elevation below",
     ):
         assert words in text
     assert "nan" not in text.lower().split()

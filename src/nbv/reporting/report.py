@@ -43,7 +43,8 @@ _BADGES = {
 _UNKNOWN = "not recorded"
 _STARTS = {
     "none": "each estimator starts from random weights",
-    "elevations": "an estimator starts from the one an elevation lower",
+    "elevations": "the lowest elevation starts from random weights, each other one from the "
+    "elevation below",
     "categories": "each estimator starts from a network of all categories; the paper trains each "
     "category alone",
     "both": "the lowest elevation starts from a network of all categories, each other one from the "

@@ -106,7 +106,7 @@ def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
         best_fixed = ("fixed", fusion, 2)
         found.append(Contrast(adaptive, best_fixed, primary=has_product == (fusion == "product")))
         found += [Contrast(adaptive, (other, fusion, 2)) for other in ("opposite", "random")]
-        found.append(Contrast(paper, opposite, fusion == "average" and not has_product))
+        found.append(Contrast(paper, opposite, primary=fusion == "average" and not has_product))
         found.append(Contrast(paper, ("fixed", fusion, 2)))
     paper = ("given_estimate", "average", 2)
     found += [

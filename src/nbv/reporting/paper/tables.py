@@ -30,7 +30,7 @@ from nbv.reporting.settings import (
 )
 from nbv.reporting.table import Table
 from nbv.statistics import paired
-from nbv.statistics.paired import PairedErrors, Resampler, pair_methods
+from nbv.statistics.paired import PairedErrors, pair_methods
 
 Evaluations = Mapping[Unit, pd.DataFrame]
 """Frames of `results.load_evaluations` by category and elevation."""
@@ -93,8 +93,9 @@ def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) 
     for unit in units:
         sample = pair_methods(evaluations[unit], unit[0])
         label = unit_label(unit, elevation)
-        made = _comparison(name, unit[0], label, metric, sample, resampler, settings)
-        cells += _with_published(made) if unit[1] == 0 else made
+        for shown in (metric, layout.HALF_TURNS):
+            made = method_cells(name, unit[0], label, shown, sample, resampler, settings)
+            cells += _with_published(made) if unit[1] == 0 else made
     title = f"{METRIC_TITLES[metric]} by category at elevation {elevation}°"
     return _Measured(title, "Category", cells)
 
@@ -107,7 +108,8 @@ def _by_elevation(name: str, evaluations: Evaluations, settings: ReportSettings)
     for elevation in sorted(degrees for one, degrees in evaluations if one == category):
         sample = pair_methods(evaluations[category, elevation], category)
         row = str(elevation), f"{elevation}°"
-        cells += _comparison(name, *row, metric, sample, resampler, settings)
+        for shown in (metric, layout.HALF_TURNS):
+            cells += method_cells(name, *row, shown, sample, resampler, settings)
     if category == published.FOCUS_CATEGORY:
         cells = _with_published(cells)
     title = f"{METRIC_TITLES[metric]} of {category_label(category)} by elevation"
@@ -124,26 +126,10 @@ def _by_group(name: str, evaluations: Evaluations, settings: ReportSettings) -> 
             span = f"{start}–359°, 0–{stop - 1}°" if start > stop else f"{start}–{stop - 1}°"
             sample = everything.select(groups == group)
             row = str(group), f"{group} ({span})"
-            cells += _comparison(name, *row, "mae", sample, resampler, settings)
+            for shown in ("mae", layout.HALF_TURNS):
+                cells += method_cells(name, *row, shown, sample, resampler, settings)
     title = f"MAE of {_of_focus(unit, 'by viewpoint group')}"
     return _Measured(title, "Viewpoint group", _published_of_focus(unit, cells))
-
-
-def _comparison(
-    table: str,
-    row: str,
-    row_label: str,
-    metric: str,
-    sample: PairedErrors,
-    resampler: Resampler,
-    settings: ReportSettings,
-) -> list[dict[str, Any]]:
-    """Return one row's cells, and those of the share of errors above 90°."""
-    return [
-        made
-        for shown in (metric, layout.HALF_TURNS)
-        for made in method_cells(table, row, row_label, shown, sample, resampler, settings)
-    ]
 
 
 def _by_fold(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
