@@ -22,7 +22,6 @@ TINY = (
     "estimator.channels=[4,8]",
     "estimator.epochs=1",
     "estimator.warm_start=none",
-    "estimator.warm_start=none",
     "density.bandwidths_deg=[8,20]",
     "density.pseudo_observations=[10]",
     "density.n_parts=2",
