@@ -61,6 +61,21 @@ def test_it_is_the_mean_error_weighted_by_affinity_and_shrunk():
     np.testing.assert_allclose(found, expected, rtol=1e-4)
 
 
+@pytest.mark.parametrize("n_views", [N_BINS, 3 * N_BINS])
+def test_errors_of_products_are_those_of_fusing_each_pair(n_views):
+    """Also where views lie between bins, and where two images exclude each other."""
+    views = distributions(2, n_objects=2, n_views=n_views)
+    views[0, 3], views[0, 5 * n_views // N_BINS + 3] = np.eye(N_BINS)[[0, 3]]
+    found = rotation_errors_deg(views, evidence_of(views), "product")
+    assert found.shape == (N_BINS, 2, n_views)
+    for delta in range(N_BINS):
+        second = np.roll(views, -delta * (n_views // N_BINS), axis=1)
+        turn_deg = np.full((2, n_views), delta * 360.0 / N_BINS)
+        pose = product(views, second, turn_deg)
+        expected = circular_distance_deg(pose, np.arange(n_views) * (360.0 / n_views))
+        np.testing.assert_allclose(found[delta], expected, atol=1e-3)
+
+
 def test_without_trust_in_likeness_it_is_the_best_fixed_rotation():
     views, rows = distributions(0), distributions(1)[0]
     fixed = cost_of("fixed", rows, evidence_of(views))

@@ -199,21 +199,45 @@ def rotation_errors_deg(
     ndarray (B, n_objects, n_views) float32
         ``l[delta, object, view] = d(fuse(e(o, phi), e(o, phi + delta), delta), phi)``, degrees.
     """
+    if fusion == "product":
+        return _product_errors_deg(of_views)
     n_bins, n_views = evidence.n_bins, of_views.shape[1]
     azimuth_deg = np.arange(n_views) * (360.0 / n_views)
     shifts = np.arange(n_bins) * (n_views // n_bins)
     delta_deg = np.arange(n_bins) * (360.0 / n_bins)
     twice = np.concatenate([of_views, of_views], axis=1)
-    if fusion in OF_DISTRIBUTIONS:
-        # One rotation at a time: together they would be B times the distributions.
-        rotations = (np.full(of_views.shape[:2], delta) for delta in delta_deg)
-        fused = np.stack(
-            [
-                FUSIONS[fusion](of_views, twice[:, shift : shift + n_views], delta, evidence)
-                for shift, delta in zip(shifts, rotations, strict=True)
-            ]
-        )
-    else:
-        second = np.stack([twice[:, shift : shift + n_views] for shift in shifts])
-        fused = FUSIONS[fusion](of_views, second, delta_deg[:, None, None], evidence)
+    second = np.stack([twice[:, shift : shift + n_views] for shift in shifts])
+    fused = FUSIONS[fusion](of_views, second, delta_deg[:, None, None], evidence)
     return circular_distance_deg(fused, azimuth_deg).astype(np.float32)
+
+
+def _product_errors_deg(distributions: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+    """Return `rotation_errors_deg` of `product`, of distributions (n_objects, n_views, B).
+
+    Let c be the distribution of a view and c' that of another one, both turned so that the true
+    pose comes first. Their product has the mean direction of ``sum_u c(u) c'(u) exp(i u)`` from
+    there. So one product of matrices serves all pairs of an object's views.
+    """
+    n_objects, n_views, n_bins = distributions.shape
+    of_bin = n_views // n_bins
+    # Views that are whole bins apart, one such set after the other.
+    sets = distributions.reshape(n_objects, n_bins, of_bin, n_bins).swapaxes(1, 2)
+    ahead = (np.arange(n_bins)[:, None] + np.arange(n_bins)) % n_bins
+    angles = 2 * np.pi * np.arange(n_bins) / n_bins
+    width_deg = 360.0 / n_bins
+    errors = np.empty((n_bins, n_objects, n_bins, of_bin), dtype=np.float32)
+    for (place, first), views in zip(
+        np.ndindex(sets.shape[:2]), sets.reshape(-1, n_bins, n_bins), strict=True
+    ):
+        turned = np.take_along_axis(np.asarray(views, dtype=np.float64), ahead, axis=1)
+        cosine, sine = (turned * part @ turned.T for part in (np.cos(angles), np.sin(angles)))
+        excluded = turned @ turned.T <= 0
+        if excluded.any():
+            own = turned @ np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            cosine, sine = (
+                np.where(excluded, own[:, [axis]], both) for axis, both in enumerate((cosine, sine))
+            )
+        pose_deg = np.take_along_axis(direction_deg(cosine, sine), ahead, axis=1)
+        apart = circular_distance_deg(pose_deg, first * width_deg / of_bin)
+        errors[:, place, :, first] = apart.T
+    return errors.reshape(n_bins, n_objects, n_views)
