@@ -11,42 +11,82 @@ import heapq
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
-REFERENCE = Path(__file__).parents[1] / "docs/reference/paper/runtime.csv"
-# The run that `REFERENCE` measured.
-REFERENCE_CATEGORIES, REFERENCE_UNITS = 5, 10
-OF_FOLD = ("train", "estimate", "lookup", "evaluate_baselines", "evaluate_recommended")
+from nbv.config import read_configuration
+
+REFERENCE = Path(__file__).parents[1] / "docs/reference/paper"
+OF_UNIT = ("estimate", "lookup", "evaluate_baselines", "evaluate_recommended")
 OF_CATEGORIES = ("table", "figure")
 
 
 @dataclass(frozen=True)
 class Size:
-    """What a run is made of; every category has the same elevations."""
+    """What a run is made of.
 
-    categories: int
-    elevations: int
+    Attributes
+    ----------
+    elevations : tuple of int
+        Of each category.
+    folds : int
+    """
+
+    elevations: tuple[int, ...]
     folds: int
 
     @property
     def units(self) -> int:
         """Return how many categories at an elevation there are."""
-        return self.categories * self.elevations
+        return sum(self.elevations)
+
+    @property
+    def jobs(self) -> int:
+        """Return how many jobs are sent: data and folds of each category, and the report."""
+        return len(self.elevations) * (1 + self.folds) + 1
 
 
 @dataclass(frozen=True)
 class Costs:
-    """Seconds of one job as it is sent to the cluster, and between two that follow each other."""
+    """Seconds of the parts of jobs, and between two jobs that follow each other.
 
-    data_s: float
-    fold_s: float
+    Attributes
+    ----------
+    start_s : float
+        Of Snakemake in each job of the cluster.
+    category_s, elevation_s : float
+        Data of a category, and of each of its elevations.
+    lowest_s, next_s : float
+        Of a fold, from its training to its errors: the lowest elevation, and each further one.
+    report_s : float
+    notice_s : float
+        Until Snakemake sees that a job has ended.
+    """
+
+    start_s: float
+    category_s: float
+    elevation_s: float
+    lowest_s: float
+    next_s: float
     report_s: float
     notice_s: float
 
+    def data_s(self, elevations: int) -> float:
+        """Return the seconds of the job that makes the data of a category."""
+        return self.start_s + self.category_s + elevations * self.elevation_s
+
+    def fold_s(self, elevations: int) -> float:
+        """Return the seconds of the job of a fold, whose elevations start from one another."""
+        return self.start_s + self.lowest_s + (elevations - 1) * self.next_s
+
 
 def costs(
-    size: Size, measured: Mapping[str, tuple[int, float]], start_s: float, notice_s: float
+    size: Size,
+    measured: Mapping[str, tuple[int, float]],
+    reference: Mapping[str, Any],
+    start_s: float,
+    notice_s: float,
 ) -> Costs:
     """Add up the rules of each group of ``profiles/slurm``.
 
@@ -55,10 +95,10 @@ def costs(
     size : Size
     measured : mapping of str to (int, float)
         Jobs and their wall-clock seconds in all, by rule, of the reference run.
-    start_s : float
-        Seconds that Snakemake needs to start in a job of the cluster.
-    notice_s : float
-        Seconds until Snakemake sees that a job has ended.
+    reference : mapping
+        Its configuration. Trainings take time in proportion to their epochs.
+    start_s, notice_s : float
+        See `Costs`.
 
     Returns
     -------
@@ -68,33 +108,47 @@ def costs(
     """
     one = {rule: wall_s / jobs for rule, (jobs, wall_s) in measured.items()}
     whole = {rule: wall_s for rule, (_, wall_s) in measured.items()}
-    growth = size.categories / REFERENCE_CATEGORIES
+    known = reference_size(reference)
+    estimator = reference["estimator"]
+    first, then = estimator["epochs"], estimator["next_elevation"]["epochs"]
+    n_lowest = len(known.elevations)
+    epoch_s = one["train"] * known.units / (n_lowest * first + (known.units - n_lowest) * then)
+    others_s = sum(one[rule] for rule in OF_UNIT)
     return Costs(
-        data_s=start_s + one["meshes"] + one["splits"] + size.elevations * one["render"],
-        fold_s=start_s + sum(one[rule] for rule in OF_FOLD),
+        start_s=start_s,
+        category_s=one["meshes"] + one["splits"],
+        elevation_s=one["render"],
+        lowest_s=first * epoch_s + others_s,
+        next_s=then * epoch_s + others_s,
         report_s=start_s
         + whole["settings"]
-        + growth * sum(whole[rule] for rule in OF_CATEGORIES)
-        + whole["claims"] * size.units / REFERENCE_UNITS,
+        + len(size.elevations) / n_lowest * sum(whole[rule] for rule in OF_CATEGORIES)
+        + whole["claims"] * size.units / known.units,
         notice_s=notice_s,
     )
+
+
+def reference_size(reference: Mapping[str, Any]) -> Size:
+    """Return the size of the reference run, from its configuration."""
+    elevations = (len(reference["elevations_deg"][name]) for name in reference["categories"])
+    return Size(tuple(elevations), reference["n_folds"])
 
 
 def makespan_s(size: Size, cost: Costs, cores: int) -> float:
     """Return the seconds from the first job's start to the last one's end.
 
-    Each core takes the next job in the queue: first the data of every category, then each fold as
-    soon as the data of its category are there, then the report.
+    Each core takes the next job in the queue: first the data of every category, then its folds as
+    soon as its data are there, the longest first, then the report.
     """
     free_at_s = [0.0] * cores
-    ready_at_s = []
-    for _ in range(size.categories):
-        ended_s = heapq.heappop(free_at_s) + cost.data_s
+    ready = []
+    for elevations in size.elevations:
+        ended_s = heapq.heappop(free_at_s) + cost.data_s(elevations)
         heapq.heappush(free_at_s, ended_s)
-        ready_at_s += [ended_s + cost.notice_s] * (size.elevations * size.folds)
+        ready += [(-elevations, ended_s + cost.notice_s)] * size.folds
     last_s = 0.0
-    for ready_s in ready_at_s:
-        ended_s = max(heapq.heappop(free_at_s), ready_s) + cost.fold_s
+    for elevations, ready_s in sorted(ready):
+        ended_s = max(heapq.heappop(free_at_s), ready_s) + cost.fold_s(-elevations)
         heapq.heappush(free_at_s, ended_s)
         last_s = max(last_s, ended_s)
     return last_s + cost.notice_s + cost.report_s
@@ -102,13 +156,14 @@ def makespan_s(size: Size, cost: Costs, cores: int) -> float:
 
 def work_s(size: Size, cost: Costs) -> float:
     """Return the seconds of all cores together."""
-    folds = size.units * size.folds
-    return size.categories * cost.data_s + folds * cost.fold_s + cost.report_s
+    of_categories = (cost.data_s(n) + size.folds * cost.fold_s(n) for n in size.elevations)
+    return sum(of_categories) + cost.report_s
 
 
-def critical_path_s(cost: Costs) -> float:
+def critical_path_s(size: Size, cost: Costs) -> float:
     """Return the seconds that no number of cores goes below."""
-    return cost.data_s + cost.fold_s + cost.report_s + 2 * cost.notice_s
+    longest = max(cost.data_s(n) + cost.fold_s(n) for n in size.elevations)
+    return longest + cost.report_s + 2 * cost.notice_s
 
 
 def load_measured(path: Path) -> dict[str, tuple[int, float]]:
@@ -129,14 +184,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--notice-s", type=float, default=30.0, help="until Snakemake sees that a job has ended"
     )
-    parser.add_argument("--runtime", type=Path, default=REFERENCE, help="of the paper's run")
+    parser.add_argument("--reference", type=Path, default=REFERENCE, help="a finished run's folder")
     options = parser.parse_args(arguments)
-    size = Size(options.categories, options.elevations, options.folds)
-    cost = costs(size, load_measured(options.runtime), options.start_s, options.notice_s)
-    jobs = size.categories + size.units * size.folds + 1
+    size = Size((options.elevations,) * options.categories, options.folds)
+    cost = costs(
+        size,
+        load_measured(options.reference / "runtime.csv"),
+        read_configuration(options.reference),
+        options.start_s,
+        options.notice_s,
+    )
     print(
-        f"{size.units} units, {jobs} jobs, {work_s(size, cost) / 3600:.1f} core-hours; "
-        f"critical path {critical_path_s(cost) / 60:.1f} min"
+        f"{size.units} units, {size.jobs} jobs, {work_s(size, cost) / 3600:.1f} core-hours; "
+        f"critical path {critical_path_s(size, cost) / 60:.1f} min"
     )
     for nodes in options.nodes:
         minutes = makespan_s(size, cost, nodes * options.cores) / 60

@@ -15,44 +15,55 @@ from performance.cluster import (
     load_measured,
     main,
     makespan_s,
+    reference_size,
     work_s,
 )
 
+from nbv.config import read_configuration
+
 SECONDS = st.floats(0.1, 500)
-SIZES = st.builds(Size, st.integers(1, 8), st.integers(1, 6), st.integers(1, 5))
-COSTS = st.builds(Costs, data_s=SECONDS, fold_s=SECONDS, report_s=SECONDS, notice_s=SECONDS)
+SIZES = st.builds(
+    Size,
+    st.lists(st.integers(1, 6), min_size=1, max_size=8).map(tuple),
+    st.integers(1, 5),
+)
+COSTS = st.builds(Costs, *[SECONDS] * 7)
 
 
 def test_the_papers_own_run_comes_out_as_measured():
-    """Ten units on two cores: five mugs' elevations more than one of each, so two a category."""
-    measured_s = pd.read_csv(REFERENCE).set_index("rule").loc["all", "elapsed_s"]
-    size = Size(categories=5, elevations=2, folds=5)
-    cost = costs(size, load_measured(REFERENCE), start_s=0, notice_s=0)
-    assert makespan_s(size, cost, cores=2) == pytest.approx(measured_s, rel=0.05)
+    measured, configuration = (
+        load_measured(REFERENCE / "runtime.csv"),
+        read_configuration(REFERENCE),
+    )
+    table = pd.read_csv(REFERENCE / "runtime.csv").set_index("rule")
+    size = reference_size(configuration)
+    cost = costs(size, measured, configuration, start_s=0, notice_s=0)
+    assert makespan_s(size, cost, cores=2) == pytest.approx(table.loc["all", "elapsed_s"], rel=0.05)
+    assert work_s(size, cost) == pytest.approx(measured["all"][1], rel=0.001)
 
 
 @given(SIZES, COSTS, st.integers(1, 200))
 def test_no_number_of_cores_beats_the_critical_path_or_the_work(size, cost, cores):
     found_s = makespan_s(size, cost, cores)
-    assert found_s >= critical_path_s(cost) * (1 - 1e-9)
+    assert found_s >= critical_path_s(size, cost) * (1 - 1e-9)
     assert found_s >= work_s(size, cost) / cores * (1 - 1e-9)
 
 
 @given(SIZES, COSTS)
 def test_with_a_core_for_every_job_the_critical_path_is_all(size, cost):
-    cores = size.units * size.folds
-    assert makespan_s(size, cost, cores) == pytest.approx(critical_path_s(cost))
+    assert makespan_s(size, cost, size.jobs) == pytest.approx(critical_path_s(size, cost))
 
 
 def test_one_core_does_all_the_work_one_after_the_other():
-    size = Size(categories=3, elevations=2, folds=5)
-    cost = Costs(data_s=10, fold_s=60, report_s=20, notice_s=0)
-    assert makespan_s(size, cost, cores=1) == pytest.approx(3 * 10 + 30 * 60 + 20)
+    size = Size(elevations=(2, 2, 1), folds=5)
+    cost = Costs(0, category_s=4, elevation_s=3, lowest_s=60, next_s=20, report_s=20, notice_s=0)
+    work = 3 * 4 + 5 * 3 + 15 * 60 + 10 * 20 + 20
+    assert makespan_s(size, cost, cores=1) == pytest.approx(work)
 
 
 def test_the_command_prints_a_line_for_each_number_of_nodes(capsys):
     main(["--nodes", "1", "7", "--cores", "4"])
     printed = capsys.readouterr().out
-    assert "330 units" in printed
+    assert "330 units, 331 jobs" in printed
     assert "1 nodes of 4 cores" in printed
     assert "7 nodes of 4 cores" in printed
