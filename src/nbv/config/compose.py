@@ -14,7 +14,7 @@ from nbv.config.schema import Config
 from nbv.errors import UserError, nearest
 from nbv.files import existing
 
-GROUPS = ("experiment", "dataset", "renderer", "sensor", "estimator", "density")
+GROUPS = ("experiment", "dataset", "renderer", "sensor", "randomisation", "estimator", "density")
 # The key of a group that names one of its files.
 _FILE_NAMES = {"dataset": "source", "renderer": "name", "sensor": "name", "estimator": "kind"}
 

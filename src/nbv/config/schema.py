@@ -57,6 +57,7 @@ LearningRate = Annotated[Number, Field(gt=0, le=10)]
 Angle = Annotated[Number, Field(ge=-360, le=360)]
 Bandwidth = Annotated[Number, Field(ge=0, le=180)]
 PseudoObservations = Annotated[Number, Field(ge=0, le=10**9)]
+Share = Annotated[Number, Field(ge=0, le=1)]
 Replicate = Annotated[Whole, Field(ge=0, le=999)]
 Elevation = Annotated[Whole, Field(ge=0, le=89)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"), NAME_RULE]
@@ -172,6 +173,17 @@ class Estimator(Section):
     next_elevation: Schedule = Schedule(epochs=4, learning_rate=4e-3)
     n_classes: Annotated[Whole, Field(ge=8, le=360), "a divisor of 360"] | None = None
     target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
+    pairs: str | None = None
+
+    @model_validator(mode="after")
+    def _check_pairs(self) -> Self:
+        if (self.kind == "external") != (self.pairs is not None):
+            raise UserError(
+                f"estimator.kind={self.kind} and estimator.pairs={self.pairs}: an external "
+                "estimator needs a file of calibration pairs, and no other has one; choose "
+                "estimator=external with estimator.pairs=<file>"
+            )
+        return self
 
     @model_validator(mode="after")
     def _check_classes(self) -> Self:
@@ -256,6 +268,51 @@ class Condition(Section):
     framing: Framing
 
 
+class Randomisation(Section):
+    """What a camera does that is not known; see `nbv.rendering.randomisation`."""
+
+    elevation_deg: Annotated[Number, Field(ge=0, le=85)] = 0.0
+    roll_deg: Annotated[Number, Field(ge=0, le=180)] = 0.0
+    size: Annotated[Number, Field(ge=0, le=0.9)] = 0.0
+    nearest: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"] | None = None
+    farthest: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"] | None = None
+    measured: Share = 1.0
+    table: Share = 0.0
+    thin: Share = 0.0
+    inside: Share = 0.0
+    occluded: Share = 0.0
+    patches: Annotated[Number, Field(ge=0, le=100)] = 0.0
+    shift_px: Annotated[Number, Field(ge=0, le=100)] = 0.0
+
+    @model_validator(mode="after")
+    def _check_distances(self) -> Self:
+        if (self.nearest is None) != (self.farthest is None):
+            raise UserError("randomisation.nearest and randomisation.farthest belong together")
+        if self.nearest is not None and self.farthest is not None and self.farthest < self.nearest:
+            raise UserError(
+                f"randomisation.farthest={self.farthest:g} is less than nearest={self.nearest:g}"
+            )
+        return self
+
+
+class Bundles(Section):
+    """What bundles are compared without, and on which frames; see workflow/rules/bundles.smk."""
+
+    ingredients: dict[Name, dict[Name, Number | None]] = {}
+    frames: str | None = None
+
+    @model_validator(mode="after")
+    def _check_ingredients(self) -> Self:
+        for name, left_out in self.ingredients.items():
+            for key in left_out:
+                if key not in Randomisation.model_fields:
+                    raise UserError(
+                        f"bundles.ingredients.{name}.{key} is unknown: "
+                        f"{nearest(key, Randomisation.model_fields)}"
+                    )
+        return self
+
+
 class Transfer(Section):
     """Conditions to train under and to test under; see `nbv.reporting.extensions.transfer`."""
 
@@ -296,6 +353,8 @@ class Config(Section):
     more_views: MoreViews
     transfer: Transfer
     confirmation: Confirmation = Confirmation()
+    randomisation: Randomisation = Randomisation()
+    bundles: Bundles = Bundles()
 
     @model_validator(mode="after")
     def _check_categories(self) -> Self:

@@ -47,6 +47,8 @@ class Camera:
     whole_pixels : bool
         Framing shifts by whole pixels only. The pixels then lie where they lie without framing,
         as those of a sensor do, which no crop moves.
+    roll_deg : float
+        How far the camera is turned about its optical axis, clockwise seen from behind it.
     """
 
     distance: float = 2.5
@@ -54,6 +56,7 @@ class Camera:
     image_side: int = 64
     framing: str = "silhouette"
     whole_pixels: bool = False
+    roll_deg: float = 0.0
 
     def __post_init__(self) -> None:
         if self.framing not in FRAMINGS:
@@ -190,6 +193,9 @@ def object_views(
     """
     azimuths = np.atleast_1d(np.asarray(azimuths_deg, dtype=np.float64))
     right, up, forward = viewpoint_frames(elevation_deg, azimuths)
+    if camera.roll_deg:
+        cos, sin = np.cos(np.radians(camera.roll_deg)), np.sin(np.radians(camera.roll_deg))
+        right, up = cos * right - sin * up, cos * up + sin * right
     hull = hull_vertices(vertices, faces)
     depth = camera.distance + forward @ hull.T
     if (depth <= 0).any():

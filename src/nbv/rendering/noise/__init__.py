@@ -109,7 +109,7 @@ def check_sensor(sensor: Mapping[str, Any], categories: Iterable[str]) -> None:
     for category in categories:
         settings = sensor_settings(sensor, category, 0)
         if settings["name"] != IDEAL:
-            _build(settings["name"], settings["parameters"])
+            build_sensor(settings["name"], settings["parameters"])
 
 
 def open_sensor(settings: Mapping[str, Any], camera: Camera, *place: str | int) -> Measure | None:
@@ -132,7 +132,7 @@ def open_sensor(settings: Mapping[str, Any], camera: Camera, *place: str | int) 
     name = settings["name"]
     if name == IDEAL:
         return None
-    sensor, diagonal_m = _build(name, settings["parameters"]), settings["diagonal_m"]
+    sensor, diagonal_m = build_sensor(name, settings["parameters"]), settings["diagonal_m"]
     distance_m = camera.distance * diagonal_m
     if distance_m < sensor.nearest_m:
         raise UserError(
@@ -148,7 +148,14 @@ def open_sensor(settings: Mapping[str, Any], camera: Camera, *place: str | int) 
     return measure
 
 
-def _build(name: str, parameters: Mapping[str, float]) -> Sensor:
+def build_sensor(name: str, parameters: Mapping[str, float]) -> Sensor:
+    """Return the sensor of a name.
+
+    Raises
+    ------
+    UserError
+        For an unknown sensor or parameter, or a parameter that is missing or not above 0.
+    """
     if name not in SENSORS:
         raise UserError(f"sensor={name} is unknown: {nearest(name, [IDEAL, *SENSORS])}")
     module, _, attribute = SENSORS[name].partition(":")

@@ -1,0 +1,1 @@
+"""Real depth frames: from a file in any usual form to the crop that a network sees."""

@@ -1,0 +1,220 @@
+"""From a depth frame to the crop that a network was trained on.
+
+The network saw the object from ``camera.distance`` diagonals with ``camera.focal_px``. A frame is
+taken from any distance, with any focal length, by a camera that is not directed at the object. What
+stays the same is the size of a pixel on the object, ``camera.distance / camera.focal_px``
+diagonals. So the frame is sampled at this step, by a camera in the same place that is directed at
+the object.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.frames.depth_files import DepthImage
+from nbv.frames.errors import FrameError
+from nbv.frames.intrinsics import Intrinsics
+from nbv.frames.masks import NEAREST_SHARE, Mask
+from nbv.rendering.camera import Camera
+from nbv.rendering.depth_codes import encode_depth
+
+BEHIND_SURFACE = 0.15
+"""How far an object's origin lies behind the median of what is visible of it, in diagonals."""
+
+CROPPED_DEG = 25.0
+"""A frame with less field of view was cropped about its object, which may touch the border."""
+
+NEAREST, FARTHEST = 1.5, 20.0
+"""Distances that are plausible, in diagonals."""
+
+# What mends a wrong unit, the likeliest first: millimetres, tenths and quarters of them,
+# centimetres, and back.
+_UNITS = (0.001, 1000.0, 0.1, 0.0001, 0.25, 0.01, 10.0, 100.0, 0.00025, 4000.0, 10000.0)
+
+
+@dataclass(frozen=True)
+class Crop:
+    """What a network sees of a frame.
+
+    Attributes
+    ----------
+    codes : (side, side) uint8
+        See `nbv.rendering.depth_codes.encode_depth`.
+    distance_m : float
+        The median depth of the object, metres.
+    extent_m : float
+        The diagonal of the object's bounding box in the image, metres.
+    """
+
+    codes: NDArray[np.uint8]
+    distance_m: float
+    extent_m: float
+
+
+def pixel_step(camera: Camera) -> float:
+    """Return the size of a crop's pixel on the object, in diagonals."""
+    return camera.distance / camera.focal_px
+
+
+def crop_frame(
+    depth_m: DepthImage,
+    mask: Mask,
+    intrinsics: Intrinsics,
+    camera: Camera,
+    diagonal_m: float,
+    extent_m: tuple[float, float] = (0.0, math.inf),
+) -> Crop:
+    """Return the crop of one object.
+
+    Parameters
+    ----------
+    depth_m : (rows, columns) float32
+        Metres.
+    mask : (rows, columns) bool
+        See `nbv.frames.masks.object_mask`.
+    intrinsics : Intrinsics
+    camera : Camera
+        That of the training.
+    diagonal_m : float
+        Of the object's bounding box, metres; that of a usual object of the category.
+    extent_m : (float, float)
+        Between which the object's extent in the image is plausible, metres.
+
+    Raises
+    ------
+    FrameError
+        ``mask-at-border``, ``other-resolution``, ``implausible-distance`` or ``implausible-size``.
+    """
+    rows, columns = depth_m.shape
+    intrinsics.need_resolution(rows, columns)
+    where_row, where_column = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    top, bottom, left, right = where_row[0], where_row[-1], where_column[0], where_column[-1]
+    _need_inside(top, bottom, left, right, depth_m.shape, intrinsics)
+    middle = (left + right + 1) / 2, (top + bottom + 1) / 2
+    turn, principal = _facing(intrinsics, *middle)
+    distance_m = float(np.median(depth_m[mask])) / turn[2, 2]
+    width_m = (right - left + 1) * distance_m / intrinsics.fx
+    height_m = (bottom - top + 1) * distance_m / intrinsics.fy
+    extent = math.hypot(width_m, height_m)
+    _need_plausible(distance_m, extent, diagonal_m, extent_m)
+    # A pixel covers the same length on the object's middle as in training.
+    away_m = distance_m + BEHIND_SURFACE * diagonal_m
+    grid = np.arange(camera.image_side) + 0.5 - camera.image_side / 2
+    grid *= pixel_step(camera) * diagonal_m / away_m
+    # Rays of a camera that is directed at the object, in the frame of the one that is not.
+    across, down, ahead = np.moveaxis(
+        grid[None, :, None] * turn[0] + grid[:, None, None] * turn[1] + turn[2], 2, 0
+    )
+    column = np.floor(principal[0] + intrinsics.fx * across / ahead).astype(int)
+    row = np.floor(principal[1] + intrinsics.fy * down / ahead).astype(int)
+    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns) & (ahead > 0)
+    at = row.clip(0, rows - 1), column.clip(0, columns - 1)
+    depth = np.where(inside & mask[at], depth_m[at] / (diagonal_m * ahead), 0.0)
+    return Crop(encode_depth(depth[None].astype(np.float32), camera)[0], distance_m, extent)
+
+
+def _facing(
+    intrinsics: Intrinsics, column: float, row: float
+) -> tuple[NDArray[np.float64], tuple[float, float]]:
+    """Return the axes (3, 3) of a camera directed at a place of the image, and the principal point.
+
+    The axes are rows, in the camera's own frame. It is turned by the shortest rotation. Where the
+    principal point is not known, the camera is taken to be directed there.
+    """
+    if intrinsics.cx is None or intrinsics.cy is None:
+        return np.eye(3), (column, row)
+    # In files, whole numbers are the middles of pixels.
+    principal = intrinsics.cx + 0.5, intrinsics.cy + 0.5
+    x, y = (column - principal[0]) / intrinsics.fx, (row - principal[1]) / intrinsics.fy
+    ray = np.array([x, y, 1.0]) / math.sqrt(x**2 + y**2 + 1.0)
+    across = np.array([[0.0, 0.0, ray[0]], [0.0, 0.0, ray[1]], [-ray[0], -ray[1], 0.0]])
+    turn = np.eye(3) + across + across @ across / (1.0 + ray[2])
+    return turn.T, principal
+
+
+def need_plausible_nearest(
+    depth_m: DepthImage, reach_m: float, diagonal_m: float, near_m: float | None = None
+) -> None:
+    """Refuse a frame in which the object cannot be what lies nearest, for its distance.
+
+    In another unit `reach_m` would cut the object to pieces, or take in all that is behind it, and
+    what is wrong could not be told from the mask.
+
+    Parameters
+    ----------
+    depth_m : (rows, columns) float32
+        Metres; 0 where nothing was measured.
+    reach_m, near_m : float
+        See `nbv.frames.masks.object_mask`.
+    diagonal_m : float
+        Of the object's bounding box, metres.
+
+    Raises
+    ------
+    FrameError
+        ``implausible-distance``.
+    """
+    seen = depth_m[depth_m > (near_m or 0.0)]
+    if not seen.size:
+        return
+    nearest_m = float(np.quantile(seen, NEAREST_SHARE))
+    is_too_near = nearest_m + reach_m < NEAREST * diagonal_m
+    if is_too_near or nearest_m > FARTHEST * diagonal_m:
+        unit = next((unit for unit in _UNITS if _is_near(unit * nearest_m, diagonal_m)), None)
+        raise _implausible_distance(nearest_m, diagonal_m, unit)
+
+
+def _is_near(distance_m: float, diagonal_m: float) -> bool:
+    return NEAREST * diagonal_m <= distance_m <= FARTHEST * diagonal_m
+
+
+def _implausible_distance(distance_m: float, diagonal_m: float, unit: float | None) -> FrameError:
+    return FrameError(
+        "implausible-distance",
+        f"the object is {distance_m:.3g} m away; {NEAREST * diagonal_m:.2g} to "
+        f"{FARTHEST * diagonal_m:.2g} m are plausible; {_help(unit)}",
+    )
+
+
+def _help(unit: float | None) -> str:
+    if unit is None:
+        return "mask the object alone, or is it of another category or size?"
+    return f"depths {unit:g} times as large would fit: check --depth-scale"
+
+
+def _need_inside(
+    top: int, bottom: int, left: int, right: int, shape: tuple[int, ...], intrinsics: Intrinsics
+) -> None:
+    rows, columns = shape
+    view = math.degrees(2 * math.atan(max(columns / intrinsics.fx, rows / intrinsics.fy) / 2))
+    sides = {"top": top == 0, "bottom": bottom == rows - 1}
+    sides |= {"left": left == 0, "right": right == columns - 1}
+    if view >= CROPPED_DEG and (cut := [name for name, is_cut in sides.items() if is_cut]):
+        raise FrameError(
+            "mask-at-border",
+            f"the object touches the {' and '.join(cut)} border of the frame: part of it is cut "
+            "off; move the camera, or mask the object alone",
+        )
+
+
+def _need_plausible(
+    distance_m: float, extent: float, diagonal_m: float, extent_m: tuple[float, float]
+) -> None:
+    def is_plausible(unit: float) -> bool:
+        is_sized = extent_m[0] <= unit * extent <= extent_m[1]
+        return is_sized and _is_near(unit * distance_m, diagonal_m)
+
+    if is_plausible(1.0):
+        return
+    unit = next((unit for unit in _UNITS if is_plausible(unit)), None)
+    if not _is_near(distance_m, diagonal_m):
+        raise _implausible_distance(distance_m, diagonal_m, unit)
+    raise FrameError(
+        "implausible-size",
+        f"the object would be {extent:.3g} m across in the image; {extent_m[0]:.2g} to "
+        f"{extent_m[1]:.2g} m are plausible; {_help(unit)}",
+    )

@@ -1,0 +1,160 @@
+"""Depth images from files, in metres.
+
+Numbers with a decimal point are metres, NaN or 0 where nothing was measured; whole numbers are
+multiples of a scale, 0 where nothing was measured (ROS REP 118: 32FC1 and 16UC1).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.errors import UserError
+from nbv.frames.errors import FrameError
+
+DepthImage = NDArray[np.float32]
+
+MILLIMETRE = 0.001
+ARRAYS, IMAGES = (".npy", ".npz"), (".png", ".tif", ".tiff", ".pgm")
+
+_MOST_PIXELS = 10**8
+_NUMBERS = "biuf"
+# Kind, columns, rows and the largest value that may occur; comments may stand between them.
+_PGM_HEADER = re.compile(rb"P[25]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)")
+
+
+def read_depth(path: str | Path, depth_scale: float | None = None) -> DepthImage:
+    """Read one depth image.
+
+    Parameters
+    ----------
+    path : path
+        ``.npy``, ``.npz`` (one array, or one that is called ``depth``), or a 16-bit image:
+        ``.png``, ``.tif``, ``.pgm``.
+    depth_scale : float, optional
+        Metres per unit of whole numbers; a millimetre without it. (BOP's ``depth_scale`` counts
+        millimetres: divide it by 1000.)
+
+    Returns
+    -------
+    (rows, columns) float32
+        Metres; 0 where nothing was measured.
+
+    Raises
+    ------
+    FrameError
+        ``colour-image`` or ``few-levels`` where the file is no depth image.
+    UserError
+        Where the file cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, nbv
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.save(f"{folder}/depth.npy", np.array([[730, 0]], dtype=np.uint16))
+    ...     nbv.read_depth(f"{folder}/depth.npy").round(3).tolist()
+    [[0.7300000190734863, 0.0]]
+    """
+    return to_metres(_read_array(Path(path)), depth_scale, str(path))
+
+
+def read_mask(path: str | Path) -> NDArray[np.bool_]:
+    """Read a mask (rows, columns): true where the file is not 0; errors as of `read_depth`.
+
+    Of an image with a channel for opacity, pixels that are transparent are false as well.
+    """
+    values = _read_array(Path(path))
+    if values.dtype.kind not in _NUMBERS:
+        raise UserError(f"{path} holds {values.dtype}, no numbers")
+    mask = np.asarray(np.nan_to_num(values) != 0)
+    if mask.ndim == 3:
+        has_opacity = mask.shape[2] in (2, 4)
+        colours = mask[:, :, :-1] if has_opacity else mask
+        mask = np.asarray(colours.any(axis=2) & (mask[:, :, -1] if has_opacity else True))
+    if mask.ndim != 2:
+        raise UserError(f"{path}: a mask has rows and columns, this has {mask.ndim} axes")
+    return mask
+
+
+def to_metres(
+    values: NDArray[Any], depth_scale: float | None = None, name: str = "depth"
+) -> DepthImage:
+    """Return a depth image in metres, 0 where nothing was measured; see `read_depth`."""
+    values = np.asarray(values)
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[:, :, 0]
+    if values.ndim != 2:
+        what = "a colour image" if values.ndim == 3 else f"an array of {values.ndim} axes"
+        raise FrameError("colour-image", f"{name} is {what}; give the depth image")
+    if depth_scale is not None and not 0 < depth_scale < math.inf:
+        raise UserError(f"--depth-scale={depth_scale:g}: must be above 0 (metres per unit)")
+    if np.issubdtype(values.dtype, np.floating):
+        scale = 1.0 if depth_scale is None else depth_scale
+    elif np.issubdtype(values.dtype, np.integer):
+        if values.dtype.itemsize == 1:
+            raise FrameError("few-levels", f"{name} has 8 bits a pixel, and depth needs 16")
+        scale = MILLIMETRE if depth_scale is None else depth_scale
+    else:
+        raise UserError(f"{name} holds {values.dtype}, no numbers")
+    # What overflows is as far away as what is infinite: nothing was measured.
+    with np.errstate(invalid="ignore", over="ignore"):
+        metres = values.astype(np.float32) * np.float32(scale)
+        return np.where(np.isfinite(metres) & (metres > 0), metres, np.float32(0))
+
+
+def _read_array(path: Path) -> NDArray[Any]:
+    suffix = path.suffix.lower()
+    if suffix not in ARRAYS + IMAGES:
+        raise UserError(f"{path}: no known kind of file; give {', '.join(ARRAYS + IMAGES)}")
+    try:
+        if not path.is_file():
+            raise UserError(f"{path} does not exist")
+        values = _read_image(path) if suffix in IMAGES else _read_numpy(path)
+    except UserError:
+        raise
+    # No list of what a reader may raise on arbitrary bytes is complete.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{path} cannot be read ({reason})") from error
+    if not values.size:
+        raise UserError(f"{path} holds no pixel")
+    return values
+
+
+def _read_numpy(path: Path) -> NDArray[Any]:
+    stored = np.load(path, mmap_mode="r", allow_pickle=False)
+    if isinstance(stored, np.ndarray):
+        return np.asarray(stored)
+    with stored:
+        if not stored.files:
+            raise UserError(f"{path} holds no array")
+        name = "depth" if "depth" in stored.files else stored.files[0]
+        if name != "depth" and len(stored.files) > 1:
+            raise UserError(f"{path} holds {', '.join(stored.files)}: call the depth image 'depth'")
+        return np.asarray(stored[name])
+
+
+def _read_image(path: Path) -> NDArray[Any]:
+    from PIL import Image  # here, so that arrays cost no import of it
+
+    with Image.open(path) as image:
+        if image.width * image.height > _MOST_PIXELS:
+            raise UserError(f"{path}: {image.width} × {image.height} pixels are too many")
+        # The numbers of a palette image name colours.
+        values = np.asarray(image.convert("RGB") if image.mode == "P" else image)
+        if image.format == "PPM" and image.mode == "I":
+            return _as_stored(values, path)
+        return values
+
+
+def _as_stored(values: NDArray[Any], path: Path) -> NDArray[Any]:
+    """Return a 16-bit PGM's own numbers: Pillow stretches them to 65535."""
+    header = _PGM_HEADER.match(path.read_bytes())
+    if header is None:
+        raise ValueError("its header has no largest value")
+    return np.rint(values * (int(header[3]) / 65535)).astype(np.int32)

@@ -1,0 +1,128 @@
+"""Depth frames that a sensor would take of a mesh: to try things without a camera."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.errors import UserError
+from nbv.frames.depth_files import DepthImage
+from nbv.frames.intrinsics import Intrinsics
+from nbv.meshes.normalisation import check_mesh, normalise
+from nbv.meshes.reader import MeshReader
+from nbv.meshes.store import Mesh, as_mesh
+from nbv.rendering import open_renderer
+from nbv.rendering.camera import Camera
+from nbv.rendering.noise.kinect import Kinect
+
+WIDTH, HEIGHT = 640, 480
+
+# Of the depth camera that is drawn: the first Kinect (Nguyen et al. 2012; Konolige and Mihelich).
+_KINECT = Kinect(focal_px=585.0, baseline_m=0.075, window_px=9.0)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A depth frame, and what is known of it.
+
+    Attributes
+    ----------
+    depth_m : (480, 640) float32
+        Metres; 0 where nothing was measured.
+    mask : (480, 640) bool
+        The pixels of the object where depth was measured.
+    intrinsics : Intrinsics
+    azimuth_deg, elevation_deg : float
+        Of the camera.
+    """
+
+    depth_m: DepthImage
+    mask: NDArray[np.bool_]
+    intrinsics: Intrinsics
+    azimuth_deg: float
+    elevation_deg: float
+
+
+def draw_frame(
+    mesh: Mesh,
+    azimuth_deg: float,
+    elevation_deg: float,
+    distance_m: float,
+    diagonal_m: float,
+    seed: int = 0,
+    *,
+    noise: bool = True,
+) -> Frame:
+    """Return what a first-generation Kinect measures of an object in front of it.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of unit diagonal.
+    azimuth_deg, elevation_deg : float
+        Of the camera about the object, which it is directed at.
+    distance_m : float
+    diagonal_m : float
+        Of the object's bounding box.
+    seed : int
+        Of the noise.
+    noise : bool
+        False keeps the true depth.
+
+    Raises
+    ------
+    UserError
+        Where the object does not fit the frame.
+    """
+    if not (math.isfinite(diagonal_m) and diagonal_m > 0):
+        raise UserError(f"a diagonal of {diagonal_m:g} m: it must be above 0")
+    focal_px = _KINECT.focal_px
+    fov_deg = math.degrees(2 * math.atan(WIDTH / 2 / focal_px))
+    camera = Camera(distance_m / diagonal_m, fov_deg, WIDTH, framing="axis")
+    depth = open_renderer("embree").render(
+        mesh.vertices, mesh.faces, elevation_deg, [azimuth_deg], camera
+    )
+    if noise:
+        depth = _KINECT(depth, camera, diagonal_m, np.random.default_rng(seed))
+    above = (WIDTH - HEIGHT) // 2
+    depth_m = (depth[0, above : above + HEIGHT] * np.float32(diagonal_m)).astype(np.float32)
+    intrinsics = Intrinsics(
+        focal_px, focal_px, WIDTH / 2 - 0.5, HEIGHT / 2 - 0.5, width=WIDTH, height=HEIGHT
+    )
+    return Frame(depth_m, depth_m > 0, intrinsics, azimuth_deg, elevation_deg)
+
+
+def example_frame(azimuth_deg: float = 75.0, elevation_deg: float = 15.0) -> Frame:
+    """Return a frame of a generated mug, 0.8 m away. From 75° its handle is hidden.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> nbv.example_frame().depth_m.shape
+    (480, 640)
+    """
+    return draw_frame(example_mesh(), azimuth_deg, elevation_deg, 0.8, 0.17)
+
+
+def example_mesh() -> Mesh:
+    """Return a generated mug of unit diagonal."""
+    from nbv.meshes.procedural import generate
+
+    return as_mesh(normalise(generate("mug", seed=0, index=0), "+z", "+x", 0.0, "origin"))
+
+
+def read_mesh(path: str | Path, up: str = "+z", front: str = "+x") -> Mesh:
+    """Read a mesh file and bring it to unit diagonal, its axes as of `dataset.up` and `front`.
+
+    Raises
+    ------
+    UserError
+        Where it cannot be read, or has no surface.
+    """
+    mesh = MeshReader().read(Path(path))
+    check_mesh(mesh, str(path))
+    return as_mesh(normalise(mesh, up, front, 0.0, "box"))

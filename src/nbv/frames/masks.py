@@ -1,0 +1,111 @@
+"""Which pixels of a depth image show the object."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
+
+from nbv.errors import UserError
+from nbv.frames.depth_files import DepthImage
+from nbv.frames.errors import FrameError
+
+Mask = NDArray[np.bool_]
+
+LEAST_MEASURED = 0.3
+"""Of a mask's pixels: with less depth than that nothing is known of the object."""
+
+ISLAND = 0.02
+"""A part of a mask that is smaller than this share of the largest part is dropped as noise."""
+
+SECOND_OBJECT = 0.5
+"""A part of a mask that is at least this share of the largest part is another object."""
+
+NEAREST_SHARE = 0.02
+"""Of all depths: what is nearer than this share of them is noise before the object."""
+
+_LEAST_PIXELS = 30
+_EIGHT = np.ones((3, 3), dtype=bool)
+
+
+def object_mask(
+    depth_m: DepthImage,
+    reach_m: float,
+    mask: ArrayLike | None = None,
+    near_m: float | None = None,
+    far_m: float | None = None,
+) -> Mask:
+    """Return the pixels of the object where depth was measured.
+
+    Parameters
+    ----------
+    depth_m : (rows, columns) float32
+        Metres; 0 where nothing was measured.
+    reach_m : float
+        How far the object reaches behind its nearest point, metres. Used without mask and `far_m`:
+        the object is then what lies nearest to the camera.
+    mask : (rows, columns), optional
+        Not 0 where the object is.
+    near_m, far_m : float, optional
+        The object lies between them, metres.
+
+    Returns
+    -------
+    (rows, columns) bool
+        Without `ISLAND` parts.
+
+    Raises
+    ------
+    FrameError
+        ``empty-mask``, ``little-depth`` or ``two-objects``.
+    UserError
+        Where mask and frame have different sizes, or the limits are no range.
+    """
+    inside = depth_m > 0
+    if mask is not None:
+        given = np.asarray(mask) != 0
+        if given.shape != depth_m.shape:
+            raise UserError(
+                f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}"
+            )
+        if not given.any():
+            raise FrameError("empty-mask", "the mask has no pixel")
+        if (share := float(inside[given].mean())) < LEAST_MEASURED:
+            raise FrameError(
+                "little-depth", f"only {share:.0%} of the mask's pixels have a depth; need 30 %"
+            )
+        inside &= given
+    near = 0.0 if near_m is None else near_m
+    far = np.inf if far_m is None else far_m
+    if not 0 <= near < far:
+        raise UserError(f"--near={near:g} and --far={far:g}: 0 ≤ near < far (metres)")
+    inside &= (depth_m >= near) & (depth_m <= far)
+    if mask is None and far_m is None and inside.any():
+        inside &= depth_m < np.quantile(depth_m[inside], NEAREST_SHARE) + reach_m
+    if np.count_nonzero(inside) < _LEAST_PIXELS:
+        raise FrameError(
+            "empty-mask", f"{np.count_nonzero(inside)} pixels of the object have a depth; need 30"
+        )
+    return _without_islands(inside)
+
+
+def _without_islands(inside: Mask) -> Mask:
+    # Parts are looked for where there are any: most of a frame is not the object.
+    place = ndimage.find_objects(inside.view(np.uint8))[0]
+    parts, _ = ndimage.label(inside[place], _EIGHT)
+    sizes = np.bincount(parts.ravel())
+    sizes[0] = 0
+    largest = sizes.max()
+    if np.count_nonzero(sizes >= SECOND_OBJECT * largest) > 1:
+        first, second = np.sort(sizes)[:-3:-1]
+        raise FrameError(
+            "two-objects",
+            f"two separate parts of {first} and {second} pixels: mask one of them",
+        )
+    kept = np.zeros_like(inside)
+    kept[place] = (sizes >= max(ISLAND * largest, 1))[parts]
+    return kept
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return " × ".join(map(str, reversed(shape)))

@@ -1,0 +1,88 @@
+"""Frames drawn of a mesh: what a camera in that place would see."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from frame_images import shape
+
+from nbv.errors import UserError
+from nbv.frames.crop import crop_frame
+from nbv.frames.drawn import HEIGHT, WIDTH, draw_frame, example_frame, read_mesh
+from nbv.meshes.store import Mesh
+from nbv.rendering.camera import Camera
+
+DIAGONAL_M = 0.2
+
+
+def drawn(azimuth=30.0, distance=0.9, **more):
+    vertices, faces = shape()
+    mesh = Mesh(vertices.astype(np.float32), faces.astype(np.int32))
+    return draw_frame(mesh, azimuth, 10.0, distance, DIAGONAL_M, **more)
+
+
+def test_without_noise_the_points_lie_on_the_object():
+    """In the object's frame all lie within its sphere, and some near its surface's extremes."""
+    frame = drawn(noise=False)
+    rows, columns = np.nonzero(frame.mask)
+    z = frame.depth_m[rows, columns]
+    camera = frame.intrinsics
+    x, y = (columns - camera.cx) * z / camera.fx, (rows - camera.cy) * z / camera.fy
+    apart = np.sqrt(x**2 + y**2 + (z - 0.9) ** 2)
+    assert apart.max() < 0.5 * DIAGONAL_M * 1.01
+    assert np.ptp(x) > 0.4 * DIAGONAL_M
+    assert np.ptp(y) > 0.4 * DIAGONAL_M
+
+
+def test_noise_moves_depths_by_millimetres_and_depends_on_the_seed():
+    true, one, again, other = (
+        drawn(noise=False),
+        drawn(seed=1),
+        drawn(seed=1),
+        drawn(seed=2),
+    )
+    assert np.array_equal(one.depth_m, again.depth_m)
+    assert not np.array_equal(one.depth_m, other.depth_m)
+    both = true.mask & one.mask
+    assert 0.0005 < np.abs(one.depth_m - true.depth_m)[both].mean() < 0.006
+
+
+def test_size_and_distance_in_proportion_give_the_same_crop():
+    """The noise would tell them apart."""
+    vertices, faces = shape()
+    mesh = Mesh(vertices.astype(np.float32), faces.astype(np.int32))
+    crops = []
+    for factor in (1.0, 2.0):
+        size = factor * DIAGONAL_M
+        frame = draw_frame(mesh, 70.0, 5.0, factor * 0.9, size, noise=False)
+        crop = crop_frame(frame.depth_m, frame.mask, frame.intrinsics, Camera(), size)
+        crops.append(crop.codes)
+    assert np.array_equal(*crops)
+
+
+def test_the_example_is_a_mug_with_its_handle_in_sight():
+    """At azimuth 270 the handle is before the cup; at 90 behind it, and the mug seems narrower."""
+    before, behind, aside = (example_frame(azimuth, 0.0) for azimuth in (270.0, 90.0, 0.0))
+    assert before.depth_m.shape == (HEIGHT, WIDTH)
+    nearest = [np.quantile(f.depth_m[f.mask], 0.02) for f in (before, behind)]
+    assert nearest[0] < nearest[1] - 0.01
+    widths = [np.ptp(np.nonzero(f.mask.any(axis=0))) for f in (behind, aside)]
+    assert widths[1] > 1.2 * widths[0]
+
+
+def test_a_mesh_file_is_read_with_its_axes(tmp_path):
+    (tmp_path / "wedge.obj").write_text(
+        "v 0 0 0\nv 4 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
+    )
+    mesh = read_mesh(tmp_path / "wedge.obj", up="+x", front="+y")
+    size = np.ptp(mesh.vertices, axis=0)
+    assert size.argmax() == 2
+    assert np.linalg.norm(size) == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("diagonal", [0.0, -1.0, float("nan"), float("inf")])
+def test_an_impossible_size_is_refused(diagonal):
+    vertices, faces = shape()
+    mesh = Mesh(vertices.astype(np.float32), faces.astype(np.int32))
+    with pytest.raises(UserError, match="diagonal"):
+        draw_frame(mesh, 0.0, 0.0, 0.8, diagonal)

@@ -1,0 +1,192 @@
+"""Intrinsics from numbers and from the camera files that are in use."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nbv.errors import UserError
+from nbv.frames.errors import FrameError
+from nbv.frames.intrinsics import Intrinsics, as_intrinsics, parse_intrinsics
+
+FX, FY, CX, CY = 572.41, 573.57, 325.26, 242.05
+K = [FX, 0.0, CX, 0.0, FY, CY, 0.0, 0.0, 1.0]
+WANTED = Intrinsics(FX, FY, CX, CY)
+SIZED = Intrinsics(FX, FY, CX, CY, 640, 480)
+
+pixels = st.floats(0.1, 1e5)
+
+
+def as_json(value):
+    return json.dumps(value)
+
+
+ROS_INFO = f"""\
+header:
+  stamp: {{sec: 1, nanosec: 0}}
+  frame_id: camera_depth_optical_frame
+height: 480
+width: 640
+distortion_model: plumb_bob
+d: [0.0, 0.0, 0.0, 0.0, 0.0]
+k: {K}
+r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+p: [1.0, 0.0, 2.0, 0.0, 0.0, 3.0, 4.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+"""
+CALIBRATION = {
+    "image_width": 640,
+    "image_height": 480,
+    "camera_name": "head",
+    "camera_matrix": {"rows": 3, "cols": 3, "data": K},
+    "distortion_coefficients": {"rows": 1, "cols": 5, "data": [0.0] * 5},
+}
+FILES = {
+    # BOP: one camera for all images, and one of scene_camera.json.
+    "camera.json": (
+        as_json({"cx": CX, "cy": CY, "depth_scale": 0.1, "fx": FX, "fy": FY}).replace(
+            "}", ', "height": 480, "width": 640}'
+        ),
+        SIZED,
+    ),
+    "bop.json": (as_json({"cam_K": K, "depth_scale": 1.0}), WANTED),
+    "info.yaml": (ROS_INFO, SIZED),
+    # As `ros2 topic echo --once` prints it.
+    "echo.yaml": (ROS_INFO + "---\n", SIZED),
+    "ros1.yml": (ROS_INFO.replace("\nk:", "\nK:").replace("\nd:", "\nD:"), SIZED),
+    "calibration.yaml": (yaml.safe_dump(CALIBRATION), SIZED),
+    "nested.json": (as_json({"K": np.reshape(K, (3, 3)).tolist()}), WANTED),
+    "numbers.txt": (f"fx: {FX}\nfy: {FY}\ncx: {CX}\ncy: {CY}\n", WANTED),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_camera_file_gives_the_same_camera(tmp_path, name):
+    text, wanted = FILES[name]
+    (tmp_path / name).write_text(text)
+    assert parse_intrinsics(str(tmp_path / name)) == wanted
+
+
+@given(f=pixels)
+def test_one_number_is_both_focal_lengths(f):
+    assert as_intrinsics(f) == as_intrinsics([f]) == Intrinsics(f, f)
+    assert parse_intrinsics(repr(f)) == Intrinsics(f, f)
+
+
+@given(fx=pixels, fy=pixels, cx=pixels, cy=pixels)
+def test_numbers_a_matrix_and_a_text_say_the_same(fx, fy, cx, cy):
+    wanted = Intrinsics(fx, fy, cx, cy)
+    matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    assert as_intrinsics((fx, fy, cx, cy)) == wanted
+    assert as_intrinsics(matrix) == as_intrinsics(matrix.ravel().tolist()) == wanted
+    assert parse_intrinsics(f"{fx!r}, {fy!r},{cx!r} ,{cy!r}") == wanted
+    assert parse_intrinsics(",".join(map(repr, matrix.ravel().tolist()))) == wanted
+    assert as_intrinsics(wanted) is wanted
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [np.reshape(K, (3, 3)).T, np.reshape(K, (3, 3)) / 2, np.arange(1.0, 10.0), np.ones((3, 3))],
+    ids=["transposed", "scaled", "counted", "ones"],
+)
+def test_what_is_no_camera_matrix_is_refused(matrix):
+    with pytest.raises(UserError, match="0 0 1"):
+        as_intrinsics(matrix)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [[], [1, 2], [1, 2, 3], [1] * 5, np.eye(4), "abc", ["a"] * 4, None, {"fx": 1}, [[1], [2, 3]]],
+    ids=repr,
+)
+def test_rubbish_is_one_line(value):
+    with pytest.raises(UserError, match="intrinsics") as error:
+        as_intrinsics(value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("bad", [0.0, -575.0, float("nan"), float("inf")])
+def test_focal_lengths_are_above_0(bad):
+    for numbers in ([bad], [bad, FY, CX, CY], [FX, bad, CX, CY]):
+        with pytest.raises(UserError, match="must be above 0"):
+            as_intrinsics(numbers)
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
+def test_the_principal_point_is_finite(bad):
+    with pytest.raises(UserError, match="cx="):
+        as_intrinsics([FX, FY, bad, CY])
+    with pytest.raises(UserError, match="cy="):
+        as_intrinsics([FX, FY, CX, bad])
+
+
+BAD_FILES = {
+    "empty.json": "",
+    "empty.yaml": "",
+    "list.json": "[1, 2, 3, 4]",
+    "number.yaml": "575",
+    "cut.json": '{"cam_K": [1, 0,',
+    "tabs.yaml": "k:\n\t- 1\n",
+    "other.json": '{"camera": "head"}',
+    "half.json": '{"fx": 1, "fy": 1, "cx": 1}',
+    "short.json": '{"cam_K": [1, 2, 3]}',
+    "text.json": '{"cam_K": "wide"}',
+    "null.json": '{"fx": null, "fy": 1, "cx": 1, "cy": 1}',
+    "names.json": '{"cam_K": {"fx": 1}}',
+    "zero.yaml": f"k: {[0.0] * 9}",
+    "infinite.json": as_json({"cam_K": K}).replace("}", ', "width": Infinity, "height": 480}'),
+    "nan.yaml": f"k: {K}\nwidth: .nan\nheight: 480\n",
+    "transposed.json": as_json({"cam_K": np.reshape(K, (3, 3)).T.tolist()}),
+    "nodata.yaml": "camera_matrix: {rows: 3}",
+    "deep.json": "[" * 100_000,
+    "code.yaml": "!!python/object/apply:os.getcwd []",
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_a_file_without_a_camera_is_one_line(tmp_path, name):
+    (tmp_path / name).write_text(BAD_FILES[name])
+    with pytest.raises(UserError) as error:
+        parse_intrinsics(str(tmp_path / name))
+    assert "\n" not in str(error.value)
+
+
+def test_bytes_that_are_no_text_are_one_line(tmp_path):
+    for name in ("a.json", "a.yaml"):
+        (tmp_path / name).write_bytes(b"\xff\xfe\x00\x01{")
+        with pytest.raises(UserError, match="cannot be read"):
+            parse_intrinsics(str(tmp_path / name))
+
+
+@pytest.mark.parametrize("text", ["", "camera", "575,575", "1,2,3,x", "no/file.json", "x" * 5000])
+def test_text_that_is_neither_numbers_nor_a_file_is_one_line(text):
+    with pytest.raises(UserError):
+        parse_intrinsics(text)
+
+
+def test_intrinsics_of_another_resolution_are_refused():
+    SIZED.need_resolution(480, 640)
+    for rows, columns in ((240, 320), (640, 480), (480, 641)):
+        with pytest.raises(FrameError, match="640 × 480 pixels") as error:
+            SIZED.need_resolution(rows, columns)
+        assert error.value.name == "other-resolution"
+
+
+def test_a_principal_point_far_outside_is_of_another_resolution():
+    WANTED.need_resolution(480, 640)
+    # A crop of an image keeps its intrinsics, so that its own middle may lie off the frame a bit.
+    WANTED.need_resolution(200, 300)
+    for rows, columns in ((480, 200), (120, 640)):
+        with pytest.raises(FrameError, match="another resolution") as error:
+            WANTED.need_resolution(rows, columns)
+        assert error.value.name == "other-resolution"
+
+
+@given(rows=st.integers(1, 5000), columns=st.integers(1, 5000))
+def test_focal_lengths_alone_serve_every_resolution(rows, columns):
+    Intrinsics(575.0, 575.0).need_resolution(rows, columns)
+    Intrinsics(575.0, 575.0, columns / 2, rows / 2, columns, rows).need_resolution(rows, columns)
