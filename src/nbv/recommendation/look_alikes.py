@@ -1,0 +1,151 @@
+"""What another view led to on calibration objects that looked alike, after any number of views.
+
+Calibration objects are turned as the object at hand was: their distributions are multiplied after
+the same rotations. Where the product is then like the belief at hand, the errors that each
+further rotation really led to count. It is `expected_error` with the fusion ``product``, without
+its restriction to one first view.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.recommendation.evidence import Table
+
+
+def in_object_frame(distributions: Table) -> Table:
+    """Return distributions (S, B, B) of views, turned so that index 0 is the true pose.
+
+    View k of B has the azimuth 360 k / B; entry u of the result is the probability of the pose
+    360 u / B degrees ahead of the true one.
+    """
+    n_bins = distributions.shape[-1]
+    index = (np.arange(n_bins)[:, None] + np.arange(n_bins)) % n_bins
+    return np.take_along_axis(distributions, index[None], axis=2)
+
+
+def error_after_deg(so_far: Table, views: Table) -> Table:
+    """Return the error of the product with every further view, (S, B, B) float32, degrees.
+
+    With c of the views so far and c' of a further one, both from `in_object_frame`, the mean
+    direction of the product is that of ``sum_u c(u) c'(u) exp(i u)``: one product of matrices for
+    all pairs of views.
+
+    Parameters
+    ----------
+    so_far : ndarray (S, B, B)
+        Of the fused views, by the first one.
+    views : ndarray (S, B, B)
+        Of single views.
+
+    Returns
+    -------
+    ndarray
+        ``[s, k, d]``: of first view k with a further view at the rotation d, both in bins.
+    """
+    n_bins = views.shape[-1]
+    angles = 2 * np.pi * np.arange(n_bins) / n_bins
+    turned = views.transpose(0, 2, 1)
+    real = np.matmul(so_far * np.cos(angles).astype(np.float32), turned)
+    imaginary = np.matmul(so_far * np.sin(angles).astype(np.float32), turned)
+    error = np.abs(np.degrees(np.arctan2(imaginary, real))).astype(np.float32)
+    further = (np.arange(n_bins)[:, None] + np.arange(n_bins)) % n_bins
+    return np.take_along_axis(error, further[None], axis=2)
+
+
+def error_of_deg(so_far: Table) -> Table:
+    """Return the error of the mean direction of distributions `in_object_frame`, degrees."""
+    n_bins = so_far.shape[-1]
+    angles = 2 * np.pi * np.arange(n_bins) / n_bins
+    moment = so_far @ np.stack([np.cos(angles), np.sin(angles)], axis=1).astype(np.float32)
+    return np.abs(np.degrees(np.arctan2(moment[..., 1], moment[..., 0]))).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class LookAlikes:
+    """Calibration turns after some rotations.
+
+    Attributes
+    ----------
+    so_far : ndarray (S, B, B) float32
+        Distributions of the fused views `in_object_frame`, by the first view; rows sum to 1.
+    views : ndarray (S, B, B) float32
+        The same of single views.
+    """
+
+    so_far: Table
+    views: Table
+
+    @staticmethod
+    def of_views(distributions: Table) -> LookAlikes:
+        """Return the turns after one view, of distributions (S, B, B) of views a bin apart."""
+        views = in_object_frame(np.asarray(distributions, dtype=np.float32))
+        return LookAlikes(views, views)
+
+    def after(self, rotation_bins: int) -> LookAlikes:
+        """Return the turns after one more view, at a rotation from the first one."""
+        both = self.so_far * np.roll(self.views, -rotation_bins, axis=1)
+        return LookAlikes(both / both.sum(axis=2, keepdims=True), self.views)
+
+    @cached_property
+    def seen(self) -> Table:
+        """The distributions in the frame of the first view, (S B, B)."""
+        n_bins = self.views.shape[-1]
+        index = (np.arange(n_bins) - np.arange(n_bins)[:, None]) % n_bins
+        seen = np.take_along_axis(self.so_far, index[None], axis=2)
+        return np.ascontiguousarray(seen.reshape(-1, n_bins))
+
+    @cached_property
+    def errors_deg(self) -> Table:
+        """`error_after_deg` of the turns, (S B, B)."""
+        return error_after_deg(self.so_far, self.views).reshape(-1, self.views.shape[-1])
+
+    @cached_property
+    def error_now_deg(self) -> Table:
+        """`error_of_deg` of the turns, (S B)."""
+        return error_of_deg(self.so_far).ravel()
+
+    def expected_error_deg(
+        self,
+        beliefs: NDArray[np.floating],
+        power: float,
+        pseudo_observations: float,
+        share: NDArray[np.floating] | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the expected error now (n,), and after a view at every rotation (n, B), degrees.
+
+        Parameters
+        ----------
+        beliefs : ndarray (n, B)
+            Of objects at hand that were turned alike, in the frames of their first views.
+        power, pseudo_observations : float
+            See `nbv.recommendation.criteria.expected_error.expected_error`.
+        share : ndarray (S,), optional
+            How much each turn counts; 1 without it.
+        """
+        n_turns, n_bins, _ = self.views.shape
+        of_turn = np.ones(n_turns) if share is None else np.asarray(share, dtype=np.float64)
+        of_view = np.repeat(of_turn, n_bins).astype(np.float32)
+        # The affinity of each belief with each view, whose roots are kept.
+        alike = np.sqrt(np.asarray(beliefs, dtype=np.float32)) @ self._roots.T
+        weight = alike**power * (of_view * np.float32(360.0 / n_bins))
+        prior = pseudo_observations / of_view.sum()
+        total = weight.sum(axis=1, dtype=np.float64) + pseudo_observations
+        after = weight @ self.errors_deg + prior * (of_turn @ self._errors_by_turn)
+        now = weight @ self.error_now_deg + prior * (of_view @ self.error_now_deg)
+        return np.asarray(now / total), np.asarray(after / total[:, None])
+
+    @cached_property
+    def _roots(self) -> Table:
+        """The square roots of `seen`, for `nbv.recommendation.criteria.expected_error.affinity`."""
+        return np.sqrt(self.seen)
+
+    @cached_property
+    def _errors_by_turn(self) -> NDArray[np.float64]:
+        n_turns, n_bins, _ = self.views.shape
+        by_turn = self.errors_deg.reshape(n_turns, n_bins, n_bins)
+        return np.asarray(by_turn.sum(axis=1, dtype=np.float64))

@@ -1,0 +1,56 @@
+"""Errors after a further view against a brute force, and against the criterion of two views."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nbv.angles import circular_distance_deg
+from nbv.recommendation.belief import Belief
+from nbv.recommendation.criteria.expected_error import expected_error
+from nbv.recommendation.evidence import evidence_of_distributions
+from nbv.recommendation.fusion import product
+from nbv.recommendation.look_alikes import LookAlikes
+
+SETTINGS = {"affinity": {"power": 5.0, "pseudo_observations": 30.0}}
+
+
+def turns(rng: np.random.Generator, n: int = 3, bins: int = 24) -> np.ndarray:
+    logits = rng.normal(0.0, 2.0, (n, bins, bins))
+    return np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
+
+
+def test_after_one_view_it_is_the_criterion(rng: np.random.Generator) -> None:
+    distributions = turns(rng)
+    evidence = evidence_of_distributions(distributions, SETTINGS)
+    rows = turns(rng)[0].astype(np.float32)
+    wanted = expected_error(Belief(rows, evidence), evidence, "product")
+    alike = LookAlikes.of_views(distributions)
+    # Here pseudo-observations are views of one degree, there views of the evidence: of 15°.
+    _, found = alike.expected_error_deg(rows, power=5.0, pseudo_observations=15 * 30.0)
+    # Weights below a ten-thousandth are left out.
+    assert found == pytest.approx(wanted, abs=0.1)
+
+
+def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Generator) -> None:
+    distributions, bins, first = turns(rng), 24, 5
+    alike = LookAlikes.of_views(distributions).after(3).after(10)
+    own = distributions[1, first]
+    for turn in (3, 10):
+        own = own * np.roll(distributions[1, (first + turn) % bins], -turn)
+    own /= own.sum()
+    assert alike.seen[bins + first] == pytest.approx(own, rel=1e-4)
+    for turn in range(bins):
+        other = distributions[1, (first + turn) % bins]
+        pose = product(own, other, 15.0 * turn)
+        wanted = circular_distance_deg(pose, 15.0 * first)
+        assert alike.errors_deg[bins + first, turn] == pytest.approx(wanted, abs=0.05)
+
+
+def test_a_turn_that_does_not_count_is_as_if_it_were_not_there(rng: np.random.Generator) -> None:
+    distributions, belief = turns(rng), turns(rng)[0, :1]
+    all_turns, fewer = LookAlikes.of_views(distributions), LookAlikes.of_views(distributions[:2])
+    now, after = all_turns.expected_error_deg(belief, 5.0, 30.0, np.array([1.0, 1.0, 0.0]))
+    wanted_now, wanted = fewer.expected_error_deg(belief, 5.0, 30.0)
+    assert now == pytest.approx(wanted_now, rel=1e-4)
+    assert after == pytest.approx(wanted, rel=1e-4)
