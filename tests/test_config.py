@@ -33,7 +33,14 @@ CHOICES = [f"{path.parent.name}={path.stem}" for path in sorted(CONFIG.glob("*/*
 
 @pytest.mark.parametrize("choice", CHOICES)
 def test_every_choice_composes_and_validates(choice):
-    assert load_config(CONFIG, [choice])["name"]
+    needed = ["estimator.pairs=pairs.csv"] if choice == "estimator=external" else []
+    assert load_config(CONFIG, [choice, *needed])["name"]
+
+
+def test_an_external_estimator_and_its_file_belong_together():
+    for overrides in (["estimator=external"], ["estimator.pairs=pairs.csv"]):
+        with pytest.raises(UserError, match="needs a file of calibration pairs"):
+            load_config(CONFIG, overrides)
 
 
 def test_the_default_is_the_paper():
@@ -68,7 +75,10 @@ def test_every_layout_in_the_schema_is_one_of_shapenet(tmp_path):
 
 
 def test_every_kind_of_estimator_has_its_file():
-    assert {path.stem for path in (CONFIG / "estimator").glob("*.yaml")} == set(networks.KINDS)
+    assert {path.stem for path in (CONFIG / "estimator").glob("*.yaml")} == {
+        *networks.KINDS,
+        "external",
+    }
 
 
 def test_only_an_estimator_that_gives_distributions_has_methods_that_need_them():

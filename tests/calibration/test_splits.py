@@ -178,3 +178,12 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
     (tmp_path / "x.csv").write_text("a,b\n1,2\n")
     with pytest.raises(UserError, match=r"x\.csv"):
         folds.read_splits(tmp_path / "x.csv")
+
+
+@given(n_objects=st.integers(4, 30), seed=st.integers(0, 1000))
+def test_a_calibration_fraction_of_one_leaves_none_to_train_on(n_objects, seed):
+    names = [f"o{place}" for place in range(n_objects)]
+    found = folds.make_splits(names, 2, 1.0, np.random.default_rng(seed))
+    trained = folds.make_splits(names, 2, 0.5, np.random.default_rng(seed))
+    assert set(found["role"]) == {"calibration", "test"}
+    assert found[found["role"] == "test"].equals(trained[trained["role"] == "test"])

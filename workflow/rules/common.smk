@@ -9,10 +9,11 @@ try:
     import nbv
 except ModuleNotFoundError:
     sys.exit(
-        "nbv: error: the package is not installed here: run make, or pip install --editable ."
+        "nbv: error: the package is not installed here: run make, or pip install --editable .[experiment]"
     )
 
 from nbv import provenance
+from nbv.calibration.pairs import objects_of_pairs
 from nbv.config import (
     load_config,
     snakemake_overrides,
@@ -90,6 +91,8 @@ try:
     CONFIG = load_config(BASE / "config", OVERRIDES)
     LAYOUT = Layout(f"results/{CONFIG['name']}")
     CATEGORIES = CONFIG["categories"]
+    # Estimates come from a file of another program.
+    EXTERNAL = CONFIG["estimator"]["kind"] == "external"
     METHODS, EXTENSIONS = CONFIG["methods"], CONFIG["extensions"]
     check_methods(METHODS, EXTENSIONS, CONFIG["gives_distributions"])
     check_sensor(CONFIG["sensor"], CATEGORIES)
@@ -98,7 +101,14 @@ try:
         is_local=workflow.is_main_process and workflow.resource_settings.nodes is None
     )
     check_memory(CONFIG, CONFIG["n_objects"] or 0, MEMORY)
-    OBJECTS = {category: selected_objects(category) for category in CATEGORIES}
+    OBJECTS = (
+        objects_of_pairs(
+            CONFIG["estimator"]["pairs"],
+            {category: CONFIG["elevations_deg"][category] for category in CATEGORIES},
+        )
+        if EXTERNAL
+        else {category: selected_objects(category) for category in CATEGORIES}
+    )
     check_memory(CONFIG, max(map(len, OBJECTS.values())), MEMORY)
 except UserError as error:
     stop(error)
@@ -229,6 +239,28 @@ def stage_of(wildcards):
     return STAGE_SETTINGS[stage_from(start)]
 
 
+# What bundles are made of.
+
+
+def elevations_of_bundle(path, of_ingredient=True):
+    """The path of every elevation of the wildcards' category, without their ingredient."""
+    return lambda wildcards: paths(
+        path,
+        [
+            (
+                wildcards.category,
+                elevation,
+                wildcards.get("ingredient") if of_ingredient else None,
+            )
+            for elevation in CONFIG["elevations_deg"][wildcards.category]
+        ],
+    )
+
+
+def randomisation_of(wildcards):
+    return CONFIG["randomisation"] | INGREDIENTS.get(wildcards.get("ingredient"), {})
+
+
 # What tables and figures are about, and the files that they need.
 
 
@@ -261,14 +293,14 @@ def figure_inputs(wildcards):
 def counted_jobs():
     """Rule and name of every job that the running time counts."""
     by_rule = {
-        "meshes": CATEGORIES,
+        "meshes": [] if EXTERNAL else CATEGORIES,
         "splits": CATEGORIES,
-        "render": [unit_folder(*unit) for unit in UNITS],
+        "render": [] if EXTERNAL else [unit_folder(*unit) for unit in UNITS],
         "pretrain": [f"fold{fold}" for fold in FOLDS] if PRETRAINS else [],
         "pretrain_part": [
             f"fold{fold}/{part}" for fold in FOLDS for part in PARTS if PRETRAINS
         ],
-        "train": [fold_folder(*fold) for fold in folds_of(UNITS)],
+        "train": [] if EXTERNAL else [fold_folder(*fold) for fold in folds_of(UNITS)],
         "train_part": [
             f"{fold_folder(*fold)}/{part}" for fold in folds_of(UNITS) for part in PARTS
         ],

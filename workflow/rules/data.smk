@@ -50,7 +50,7 @@ rule meshes:
 rule splits:
     input:
         sources("split_objects"),
-        meshes=rules.meshes.output[0],
+        meshes=[] if EXTERNAL else rules.meshes.output[0],
     output:
         LAYOUT.splits("{category}"),
     log:
@@ -65,8 +65,14 @@ rule splits:
         runtime=per_attempt(5),
     params:
         **({"crossfit_parts": len(PARTS)} if CROSSFIT else {}),
+        **(
+            {"objects": lambda wildcards: OBJECTS[wildcards.category]}
+            if EXTERNAL
+            else {}
+        ),
         n_folds=CONFIG["n_folds"],
-        calibration_fraction=CONFIG["calibration_fraction"],
+        # What another program estimated needs no training.
+        calibration_fraction=1.0 if EXTERNAL else CONFIG["calibration_fraction"],
         seed=CONFIG["seed"],
     script:
         f"{SCRIPTS}/split_objects.py"

@@ -75,32 +75,56 @@ use rule train as train_part with:
         LAYOUT.benchmark(f"train_part/{fold_folder(*FOLD)}/{{part}}")
 
 
-rule estimate:
-    input:
-        sources("estimate_views"),
-        splits=rules.splits.output[0],
-        depth=rules.render.output.depth,
-        objects=rules.render.output.objects,
-        estimator=rules.train.output[0],
-        of_parts=[LAYOUT.part_estimator(*FOLD, part) for part in PARTS],
-    output:
-        **posteriors_of_fold(),
-        calibration=LAYOUT.estimates(*FOLD, "calibration"),
-        test=LAYOUT.estimates(*FOLD, "test"),
-    log:
-        LAYOUT.log(f"estimate/{fold_folder(*FOLD)}"),
-    benchmark:
-        LAYOUT.benchmark(f"estimate/{fold_folder(*FOLD)}")
-    conda:
-        ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(2000),
-        runtime=per_attempt(10),
-    params:
-        device=CONFIG["estimator"]["device"],
-        precision=CONFIG["estimator"]["precision"],
-    script:
-        f"{SCRIPTS}/estimate_views.py"
+if EXTERNAL:
+
+    rule estimate:
+        input:
+            sources("take_estimates"),
+            splits=rules.splits.output[0],
+            pairs=CONFIG["estimator"]["pairs"],
+        output:
+            calibration=LAYOUT.estimates(*FOLD, "calibration"),
+            test=LAYOUT.estimates(*FOLD, "test"),
+        log:
+            LAYOUT.log(f"estimate/{fold_folder(*FOLD)}"),
+        benchmark:
+            LAYOUT.benchmark(f"estimate/{fold_folder(*FOLD)}")
+        conda:
+            ENVIRONMENT
+        resources:
+            mem_mb=per_attempt(1000),
+            runtime=per_attempt(10),
+        script:
+            f"{SCRIPTS}/take_estimates.py"
+
+else:
+
+    rule estimate:
+        input:
+            sources("estimate_views"),
+            splits=rules.splits.output[0],
+            depth=rules.render.output.depth,
+            objects=rules.render.output.objects,
+            estimator=rules.train.output[0],
+            of_parts=[LAYOUT.part_estimator(*FOLD, part) for part in PARTS],
+        output:
+            **posteriors_of_fold(),
+            calibration=LAYOUT.estimates(*FOLD, "calibration"),
+            test=LAYOUT.estimates(*FOLD, "test"),
+        log:
+            LAYOUT.log(f"estimate/{fold_folder(*FOLD)}"),
+        benchmark:
+            LAYOUT.benchmark(f"estimate/{fold_folder(*FOLD)}")
+        conda:
+            ENVIRONMENT
+        resources:
+            mem_mb=per_attempt(2000),
+            runtime=per_attempt(10),
+        params:
+            device=CONFIG["estimator"]["device"],
+            precision=CONFIG["estimator"]["precision"],
+        script:
+            f"{SCRIPTS}/estimate_views.py"
 
 
 rule estimators:

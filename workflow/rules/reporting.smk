@@ -23,12 +23,14 @@ OF_FOCUS = {
 # Figures show no intervals.
 SHOWN = {"methods": list(METHODS)}
 RESAMPLED = SHOWN | {"n_resamples": CONFIG["n_resamples"], "seed": CONFIG["seed"]}
-# Some figures show the lookup table of Proposed, which another policy does not have.
+# Some figures show the lookup table of Proposed, which another policy does not have; some show
+# depth images, which an external estimator does not have.
 PROPOSED_LOOKUP = METHODS.get(SETTINGS.subject, {}).get("policy")
 SHOWN_FIGURES = [
     name
     for name, kind in FIGURES.items()
     if PROPOSED_LOOKUP in LOOKUP_CRITERIA or "lookups" not in kind.needs
+    if not (EXTERNAL and {"depth", "objects"} & set(kind.needs))
 ]
 
 

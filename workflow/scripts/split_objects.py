@@ -10,7 +10,7 @@ with job(snakemake):
 
     params = snakemake.params
     splits = make_splits(
-        stored_ids(snakemake.input.meshes),
+        params.get("objects") or stored_ids(snakemake.input.meshes),
         params.n_folds,
         params.calibration_fraction,
         rng_for(params.seed, "splits", *snakemake.wildcards),

@@ -115,6 +115,14 @@ def conditionals(
         rows hold more or fewer pairs.
     n_bins : int
         B.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> truth = np.arange(360.0)
+    >>> found = nbv.conditionals(truth, truth, bandwidth_deg=8, pseudo_observations=0)
+    >>> int(found.viewpoint[30].argmax())  # an estimate of 30 degrees is right
+    30
     """
     joint = smooth(pair_counts(estimate_deg, azimuth_deg, n_bins), bandwidth_deg)
     alpha = pseudo_observations * 360.0 / n_bins

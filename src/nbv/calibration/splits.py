@@ -31,14 +31,14 @@ def make_splits(
     """Divide objects into folds; each object is tested in exactly one.
 
     Of a fold's remaining objects, `calibration_fraction` (at least one, and at least one is left
-    to train on) calibrate and the others train; or they are divided into parts. Which objects a
-    fold tests does not depend on that.
+    to train on) calibrate and the others train; or they are divided into parts. A fraction of 1
+    leaves none to train on. Which objects a fold tests does not depend on that.
 
     Parameters
     ----------
     object_ids : sequence of str, distinct
     n_folds : int, 2 or more
-    calibration_fraction : float in (0, 1)
+    calibration_fraction : float in (0, 1]
     rng : numpy.random.Generator
     crossfit_parts : int, 2 or more, optional
         Parts of equal size (to within one object) for cross-fitting; none where held out.
@@ -67,7 +67,8 @@ def make_splits(
         roles = np.where(fold_of == fold, "test", "train").astype(object)
         rest = np.flatnonzero(fold_of != fold)
         if crossfit_parts is None:
-            n_calibration = int(np.clip(round(calibration_fraction * len(rest)), 1, len(rest) - 1))
+            most = len(rest) - (calibration_fraction < 1)
+            n_calibration = int(np.clip(round(calibration_fraction * len(rest)), 1, most))
             roles[rng.choice(rest, n_calibration, replace=False)] = "calibration"
         elif crossfit_parts > len(rest):
             raise UserError(

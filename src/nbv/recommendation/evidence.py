@@ -119,6 +119,14 @@ def gather_evidence(
         See `Evidence`.
     bandwidth_deg, pseudo_observations, n_bins
         See `nbv.calibration.density.conditionals`.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> estimates = np.arange(360.0)[None]  # one object, always right
+    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+    >>> nbv.gather_evidence(estimates, density, bandwidth_deg=8, pseudo_observations=3).n_bins
+    360
     """
     n_views = estimate_deg.shape[1]
     azimuth_deg = np.broadcast_to(np.arange(n_views) * (360.0 / n_views), estimate_deg.shape)

@@ -60,6 +60,12 @@ def average(
     -------
     ndarray
         In [0, 360), in the frame of the first view; the first estimate where the two are antipodal.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> float(nbv.average(10.0, 100.0, 95.0))
+    7.5
     """
     return midpoint_deg(first_deg, wrap_deg(np.subtract(second_deg, delta_deg)))
 
@@ -91,6 +97,18 @@ def posterior(
     ------
     ValueError
         Without evidence.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> truth = np.arange(360.0)
+    >>> estimates = np.where(np.abs(truth - 90) < 60, 90.0, truth)  # blind about 90 degrees
+    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+    >>> evidence = nbv.gather_evidence(
+    ...     estimates[None], density, bandwidth_deg=8, pseudo_observations=3
+    ... )
+    >>> int(nbv.posterior(90.0, 250.0, 180.0, evidence))  # the second view, 70, counts for more
+    78
     """
     if evidence is None:
         raise ValueError("posterior fusion needs evidence")

@@ -124,7 +124,11 @@ def _run_facts(
     yield "Data set", settings["dataset"]["source"]
     yield "Objects", "; ".join(objects)
     yield "Elevations", "; ".join(elevations)
-    yield "Training", _STARTS[settings["estimator"]["warm_start"]]
+    estimator = settings["estimator"]
+    if pairs := estimator.get("pairs"):
+        yield "Estimates", f"of another program, from {pairs}"
+    else:
+        yield "Training", _STARTS[estimator["warm_start"]]
 
 
 def _repairs(density: Mapping[str, Any]) -> str:
