@@ -41,6 +41,9 @@ def test_torch_alone_has_no_hash() -> None:
 def test_the_locked_versions_are_those_that_the_project_asks_for() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     asked = [*project["project"]["dependencies"]]
+    asked += [
+        one for extra in project["project"]["optional-dependencies"].values() for one in extra
+    ]
     asked += [one for group in project["dependency-groups"].values() for one in group]
     versions = locked()
     for text in asked:

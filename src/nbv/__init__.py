@@ -1,8 +1,15 @@
 """Best next-viewpoint recommendation for category-level object pose estimation.
 
-The names in `__all__` are the public API; everything else is internal and may change::
+The names in `__all__` are the public API; everything else is internal and may change. From a depth
+frame to the next view::
 
     import nbv
+
+    recommender = nbv.Recommender.load("mug")
+    answer = recommender.recommend(depth_m, mask=mask, intrinsics=(fx, fy, cx, cy))
+    answer.azimuth_deg, answer.move.rotation_deg
+
+With an estimator of one's own, by the lookup table of its errors::
 
     table = nbv.load_lookup("results/paper/lookup/mug/el00/fold1/pose_ambiguity.npz")
     delta_deg = table.recommend(first_deg)  # turn the camera, estimate again: second_deg
@@ -18,6 +25,14 @@ __version__ = "0.1.0"
 
 # Names and not imports: `import nbv` stays quick, and no job depends on all of these modules.
 _MODULES = {
+    "Recommender": "nbv.bundles.recommender",
+    "Recommendation": "nbv.bundles.recommender",
+    "Move": "nbv.bundles.recommender",
+    "moved_camera": "nbv.bundles.moves",
+    "FrameError": "nbv.frames.errors",
+    "Intrinsics": "nbv.frames.intrinsics",
+    "read_depth": "nbv.frames.depth_files",
+    "example_frame": "nbv.frames.drawn",
     "Conditionals": "nbv.calibration.density",
     "conditionals": "nbv.calibration.density",
     "UserError": "nbv.errors",

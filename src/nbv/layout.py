@@ -136,6 +136,28 @@ class Layout:
         """Return the paper's claims and their verdicts as ``csv`` or ``md``."""
         return f"{self.root}/claims.{kind}"
 
+    def bundle(self, category: str, kind: str, without: str | None = None) -> str:
+        """Return a category's bundle (``safetensors``), or its errors on test objects (``csv``)."""
+        return f"{self._bundles(without)}/{category}.{kind}"
+
+    def bundle_depth(self, category: str, elevation: int | str, without: str | None = None) -> str:
+        """Return the randomised depth images that a bundle learns from."""
+        return f"{self._bundles(without)}/depth/{unit_folder(category, elevation)}.npy"
+
+    def bundle_objects(
+        self, category: str, elevation: int | str, without: str | None = None
+    ) -> str:
+        """Return the ids of the objects in `bundle_depth`, in their order."""
+        return f"{self._bundles(without)}/depth/{unit_folder(category, elevation)}_objects.json"
+
+    def bundle_estimator(self, category: str, without: str | None = None) -> str:
+        """Return the network of a bundle, trained over all elevations."""
+        return f"{self._bundles(without)}/estimators/{category}.safetensors"
+
+    def _bundles(self, without: str | None) -> str:
+        """Return the folder of bundles, or of those that an ingredient is left out of."""
+        return f"{self.root}/bundles" + (f"/without_{without}" if without else "")
+
     def log(self, job: str) -> str:
         """Return a job's log."""
         return f"{self.root}/logs/{job}.log"

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import safetensors
 import safetensors.torch
+import torch
+from numpy.typing import NDArray
 from torch import nn
 
 from nbv.checksums import sha256_of
-from nbv.estimation.hardware import Hardware
+from nbv.errors import UserError
+from nbv.estimation.hardware import Hardware, choose_hardware, use_one_thread
+from nbv.estimation.images import to_input
 from nbv.estimation.networks import build_network
 from nbv.estimation.warm_start import with_category
 from nbv.files import damaged, readable, replacing
@@ -139,3 +144,46 @@ def read_start(
         raise damaged(path, f"it has seen other objects of {category} than what starts from it")
     relative = os.path.relpath(path, Path(output).parent)
     return Start(stored.network, {"path": relative, "sha256": sha256_of(path)})
+
+
+def weights_of(estimator: Estimator) -> dict[str, NDArray[np.float32]]:
+    """Return the weights of an estimator by their names, single precision."""
+    return {
+        name: tensor.detach().cpu().contiguous().numpy().astype(np.float32)
+        for name, tensor in estimator.network.state_dict().items()
+        if tensor.is_floating_point()
+    }
+
+
+def network_of(
+    weights: Mapping[str, NDArray[np.float32]], settings: Mapping[str, Any], image_side: int
+) -> Callable[[NDArray[np.uint8]], tuple[NDArray[np.float32], NDArray[np.float32]]]:
+    """Return the network of some weights, from codes (n, side, side) to outputs and hidden layer.
+
+    It computes on one core of the processor, in single precision.
+
+    Raises
+    ------
+    UserError
+        Where the weights do not fit the settings.
+    """
+    use_one_thread()
+    hardware = choose_hardware("cpu", "float32")
+    network = build_network(settings, image_side).eval()
+    try:
+        tensors = {name: torch.from_numpy(np.array(array)) for name, array in weights.items()}
+        # Without the number of batches that normalisation has seen, which training alone needs.
+        missing, unknown = network.load_state_dict(tensors, strict=False)
+        if unknown or any(not name.endswith("num_batches_tracked") for name in missing):
+            raise RuntimeError("names")
+    except (RuntimeError, TypeError) as error:
+        raise UserError("the weights do not fit the network's settings") from error
+    *before, last = network.children()
+    hidden = nn.Sequential(*before)
+
+    def run(codes: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        with torch.inference_mode():
+            wide = hidden(to_input(codes, hardware))
+            return last(wide).numpy(), wide.numpy()
+
+    return run

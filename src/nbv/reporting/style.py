@@ -38,6 +38,7 @@ RC: Any = {
 _SAVED: Mapping[str, Mapping[str, Any]] = {
     "png": {"dpi": 150, "metadata": {"Software": None}},
     "pdf": {"metadata": {"CreationDate": None}},
+    "svg": {"metadata": {"Date": None}},
 }
 
 INK = "#222222"
@@ -99,7 +100,7 @@ def azimuth_axis(axes: Axes, label: str, vertical: bool = False) -> None:
 
 
 def save_figure(figure: Figure, paths: Mapping[str, Path]) -> None:
-    """Write a figure as ``png`` (150 dpi) and ``pdf``; the same figure gives the same bytes."""
+    """Write a figure as ``png`` (150 dpi), ``pdf`` or ``svg``; a figure gives the same bytes."""
     with mpl.rc_context(RC):
         for kind, path in paths.items():
             with replacing(path) as temporary:

@@ -1,0 +1,1 @@
+"""Bundles: everything that a robot needs for one category, in one file."""

@@ -1,0 +1,70 @@
+"""Beliefs about a pose: from a network's logits, turned, fused and summed up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.calibration.posteriors import LEAST_PROBABILITY
+
+ELEVATION_BANDWIDTH_DEG = 10.0
+
+
+def distributions_of(logits: NDArray[np.floating], temperature: float) -> NDArray[np.float64]:
+    """Return softmax(logits / temperature) (n, B), `LEAST_PROBABILITY` or more in every class."""
+    scaled = logits.astype(np.float64) / temperature
+    p = np.exp(scaled - scaled.max(axis=-1, keepdims=True))
+    p = np.maximum(p / p.sum(axis=-1, keepdims=True), LEAST_PROBABILITY)
+    return np.asarray(p / p.sum(axis=-1, keepdims=True))
+
+
+def turned(rows: NDArray[np.floating], turn_deg: ArrayLike) -> NDArray[np.float64]:
+    """Return p(theta + turn) as a function of theta, (..., B), of distributions (..., B).
+
+    Exact for whole bins; linear in between. ``turn_deg`` is one for all, or one for each row.
+    """
+    n_bins = rows.shape[-1]
+    place = np.asarray(turn_deg, dtype=np.float64) * (n_bins / 360.0)
+    below = np.floor(place)
+    part = (place - below)[..., None]
+    index = (np.arange(n_bins) + below.astype(np.intp)[..., None]) % n_bins
+    shape = np.broadcast_shapes(rows.shape, index.shape)
+    own = np.broadcast_to(rows, shape)
+    at = (np.broadcast_to(each, shape) for each in (index, (index + 1) % n_bins))
+    here, next_ = (np.take_along_axis(own, each, axis=-1) for each in at)
+    return np.asarray((1 - part) * here + part * next_, dtype=np.float64)
+
+
+def fused(
+    distributions: NDArray[np.floating], rotations_deg: Sequence[float]
+) -> NDArray[np.float64]:
+    """Return the product (B,) of the distributions (n, B) of views, in the frame of the first view.
+
+    ``rotations_deg`` are those from the first view to each one.
+    """
+    total = np.log(turned(distributions, rotations_deg)).sum(axis=0)
+    product = np.exp(total - total.max())
+    return np.asarray(product / product.sum())
+
+
+def spread_deg(belief: NDArray[np.floating]) -> float:
+    """Return the circular standard deviation of a belief (B,), degrees: sqrt(-2 log R)."""
+    angles = 2 * np.pi * np.arange(len(belief)) / len(belief)
+    length = abs(complex(belief @ np.cos(angles), belief @ np.sin(angles)))
+    return math.degrees(math.sqrt(max(-2.0 * math.log(max(length, 1e-12)), 0.0)))
+
+
+def elevation_share(known_deg: NDArray[np.floating], elevation_deg: float) -> NDArray[np.float64]:
+    """Return how much calibration turns (S,) count for frames of an elevation.
+
+    A normal kernel of `ELEVATION_BANDWIDTH_DEG`, in which the nearest turn counts 1. A turn of
+    unknown elevation (NaN) counts 1 too, and so do all turns for frames of unknown elevation.
+    """
+    if np.isnan(known_deg).all() or np.isnan(elevation_deg):
+        return np.ones(len(known_deg))
+    apart = ((known_deg - elevation_deg) / ELEVATION_BANDWIDTH_DEG) ** 2
+    share = np.exp(-0.5 * (apart - np.nanmin(apart)))
+    return np.asarray(np.nan_to_num(share, nan=1.0), dtype=np.float64)

@@ -1,0 +1,303 @@
+"""A bundle: a trained network with what its errors on held-out objects taught, in one file.
+
+The file is of the safetensors format: arrays, and metadata as JSON. It holds no code. Calibration
+distributions are kept as logs, one byte each, see `PROBABILITY_STEP`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import safetensors
+import safetensors.numpy
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.angles import nearest_bin
+from nbv.errors import UserError
+from nbv.files import replacing
+from nbv.rendering.camera import Camera
+
+FORMAT = 1
+"""Raised when an older program cannot read a newer file."""
+
+PROBABILITY_STEP = 0.054
+"""Between kept logs of probabilities, in nats: 256 of them reach down to 1e-6."""
+
+_NETWORK = "network."
+
+
+@dataclass(frozen=True)
+class Familiarity:
+    """What the network's last hidden layer does on calibration images.
+
+    Attributes
+    ----------
+    projection : ndarray (H, q) float32
+        From centred hidden activations to q whitened components.
+    offset : ndarray (H,) float32
+        The mean of the hidden activations.
+    centres : ndarray (C, q) float32
+        Mean components of each range of azimuths.
+    threshold : float
+        The distance to the nearest centre that 95 % of calibration images keep.
+    """
+
+    projection: NDArray[np.float32]
+    offset: NDArray[np.float32]
+    centres: NDArray[np.float32]
+    threshold: float
+
+
+@dataclass(frozen=True)
+class PaperTables:
+    """What the paper's lookup tables recommend, one for each elevation.
+
+    Attributes
+    ----------
+    elevation_deg : ndarray (E,) float32
+    rotation_deg : ndarray (E, 360) int16
+        The rotation of least pose ambiguity for each estimate, degrees in [0, 360).
+    """
+
+    elevation_deg: NDArray[np.float32]
+    rotation_deg: NDArray[np.int16]
+
+    def recommend(self, estimate_deg: ArrayLike, elevation_deg: float) -> NDArray[np.float64]:
+        """Return the rotations for estimates, of the table of the nearest elevation.
+
+        Of an elevation that is not known (NaN), the lowest table answers.
+        """
+        apart = np.abs(self.elevation_deg - elevation_deg)
+        table = self.rotation_deg[int(np.nan_to_num(apart).argmin())]
+        rotations = table[nearest_bin(estimate_deg, len(table))]
+        return np.asarray(rotations, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A category's network and calibration.
+
+    Attributes
+    ----------
+    category : str
+    weights : mapping of str to ndarray
+        The network's, by the names of `nbv.estimation.networks.build_network`.
+    estimator : mapping
+        Its settings.
+    camera : Camera
+        What it was trained with.
+    diagonal_m : float
+        Of the bounding box of a usual object, metres.
+    extent_m : (float, float)
+        Between which the diagonal of an object's box in the image is plausible, metres.
+    focal_px : float
+        Of the sensor that training simulated: what is assumed where a camera is not known.
+    temperature : float
+        What logits are divided by.
+    object_ids : tuple of str
+        Of each of S calibration turns: which object it shows.
+    elevation_deg : ndarray (S,)
+        Of each calibration turn; NaN where it is not known.
+    turn_weight : ndarray (S,) float32
+        How much each calibration turn counts.
+    distributions : ndarray (S, B, B) float32
+        p(azimuth | image) of views a bin apart.
+    affinity : mapping
+        ``power`` and ``pseudo_observations`` of the expected error.
+    familiarity : Familiarity
+    paper : PaperTables
+    provenance : mapping
+        Run, commit, versions, settings, and what calibrated it.
+    """
+
+    category: str
+    weights: Mapping[str, NDArray[np.float32]]
+    estimator: Mapping[str, Any]
+    camera: Camera
+    diagonal_m: float
+    extent_m: tuple[float, float]
+    focal_px: float
+    temperature: float
+    object_ids: tuple[str, ...]
+    elevation_deg: NDArray[np.float32]
+    turn_weight: NDArray[np.float32]
+    distributions: NDArray[np.float32]
+    affinity: Mapping[str, float]
+    familiarity: Familiarity
+    paper: PaperTables
+    provenance: Mapping[str, Any]
+
+    @property
+    def n_bins(self) -> int:
+        """B, the number of classes."""
+        return int(self.distributions.shape[-1])
+
+
+def as_steps(distributions: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Return distributions as whole steps of -log p, 0 to 255."""
+    steps = -np.log(np.maximum(distributions, 1e-30)) / PROBABILITY_STEP
+    return np.asarray(np.rint(np.minimum(steps, 255)), dtype=np.uint8)
+
+
+def from_steps(steps: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return what `as_steps` kept, with rows that sum to 1 again."""
+    kept = np.exp(np.arange(256) * -PROBABILITY_STEP).astype(np.float32)[steps]
+    return np.asarray(kept / kept.sum(axis=-1, keepdims=True))
+
+
+def save_bundle(path: str | Path, bundle: Bundle) -> None:
+    """Write a bundle."""
+    about = {
+        "format": FORMAT,
+        "category": bundle.category,
+        "estimator": dict(bundle.estimator),
+        "camera": asdict(bundle.camera),
+        "diagonal_m": bundle.diagonal_m,
+        "extent_m": list(bundle.extent_m),
+        "focal_px": bundle.focal_px,
+        "temperature": bundle.temperature,
+        "object_ids": list(bundle.object_ids),
+        "affinity": dict(bundle.affinity),
+        "familiar_within": bundle.familiarity.threshold,
+        "provenance": dict(bundle.provenance),
+    }
+    arrays: dict[str, NDArray[Any]] = {
+        _NETWORK + name: array for name, array in bundle.weights.items()
+    }
+    arrays |= {
+        "calibration.elevation_deg": bundle.elevation_deg.astype(np.float32),
+        "calibration.weight": bundle.turn_weight.astype(np.float32),
+        "calibration.distributions": as_steps(bundle.distributions),
+        "familiarity.projection": bundle.familiarity.projection,
+        "familiarity.offset": bundle.familiarity.offset,
+        "familiarity.centres": bundle.familiarity.centres,
+        "paper.elevation_deg": bundle.paper.elevation_deg,
+        "paper.rotation_deg": bundle.paper.rotation_deg,
+    }
+    # safetensors writes the memory of an array as it lies, whatever its order.
+    arrays = {name: np.asarray(array, order="C") for name, array in arrays.items()}
+    # As it is read again. It has one entry in the metadata: safetensors orders several at random.
+    about = json.loads(json.dumps(about))
+    about["sha256"] = _digest(about, arrays)
+    metadata = {"nbv": json.dumps(about, sort_keys=True)}
+    with replacing(path) as temporary:
+        temporary.write_bytes(safetensors.numpy.save(arrays, metadata=metadata))
+
+
+def _digest(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the SHA-256 of all that a bundle holds: a damaged weight shows nowhere else."""
+    found = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    for name, array in sorted(arrays.items()):
+        found.update(f"{name} {array.dtype} {array.shape}".encode())
+        found.update(array.tobytes())
+    return found.hexdigest()
+
+
+def load_bundle(path: str | Path) -> Bundle:
+    """Read what `save_bundle` wrote.
+
+    Raises
+    ------
+    UserError
+        Where the file is missing, is no bundle, is damaged or cut short, or is of a newer format.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise UserError(f"{path} does not exist; name a bundle of this package, or a file")
+    try:
+        about, arrays = _read(path)
+        version = about["format"]
+        if version > FORMAT:
+            raise UserError(
+                f"{path} is a bundle of format {version}, this program reads up to {FORMAT}: "
+                "install a newer nbv"
+            )
+        # Bundles of before it was kept have none.
+        digest = about.pop("sha256", None)
+        if digest is not None and digest != _digest(about, arrays):
+            raise ValueError("not the bytes that were written")
+        bundle = _of_parts(about, arrays)
+        _need_sound(bundle)
+    except UserError:
+        raise
+    # No list of what a reader may raise on arbitrary bytes is complete.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{path} is no sound bundle ({reason}); get it again") from error
+    return bundle
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    with safetensors.safe_open(path, framework="numpy") as stored:
+        metadata = stored.metadata() or {}
+        if "nbv" not in metadata:
+            raise UserError(f"{path} is no bundle of nbv")
+        about = json.loads(metadata["nbv"])
+        if "format" not in about:
+            raise UserError(f"{path} is an estimator, no bundle: make one with snakemake bundles")
+        return about, {name: stored.get_tensor(name) for name in sorted(stored.keys())}
+
+
+def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Bundle:
+    low, high = about["extent_m"]
+    return Bundle(
+        category=about["category"],
+        weights={
+            name.removeprefix(_NETWORK): array
+            for name, array in arrays.items()
+            if name.startswith(_NETWORK)
+        },
+        estimator=about["estimator"],
+        camera=Camera(**about["camera"]),
+        diagonal_m=about["diagonal_m"],
+        extent_m=(low, high),
+        focal_px=about["focal_px"],
+        temperature=about["temperature"],
+        object_ids=tuple(about["object_ids"]),
+        elevation_deg=arrays["calibration.elevation_deg"],
+        turn_weight=arrays["calibration.weight"],
+        distributions=from_steps(arrays["calibration.distributions"]),
+        affinity=about["affinity"],
+        familiarity=Familiarity(
+            arrays["familiarity.projection"],
+            arrays["familiarity.offset"],
+            arrays["familiarity.centres"],
+            about["familiar_within"],
+        ),
+        paper=PaperTables(arrays["paper.elevation_deg"], arrays["paper.rotation_deg"]),
+        provenance=about["provenance"],
+    )
+
+
+def _need_sound(bundle: Bundle) -> None:
+    n_turns, n_bins = len(bundle.object_ids), bundle.n_bins
+    if bundle.distributions.shape != (n_turns, n_bins, n_bins) or not n_turns:
+        raise ValueError(f"calibration of {bundle.distributions.shape} for {n_turns} turns")
+    if not bundle.elevation_deg.shape == bundle.turn_weight.shape == (n_turns,):
+        raise ValueError("an elevation or a weight for each turn is missing")
+    if not (bundle.turn_weight > 0).all():
+        raise ValueError("a turn has no weight above 0")
+    n_tables = len(bundle.paper.elevation_deg)
+    if not n_tables or bundle.paper.rotation_deg.shape != (n_tables, 360):
+        raise ValueError("the paper's tables are no tables")
+    if bundle.estimator["n_classes"] != n_bins or 360 % n_bins:
+        raise ValueError(f"{n_bins} bins for {bundle.estimator['n_classes']} classes")
+    numbers = [bundle.diagonal_m, bundle.focal_px, bundle.temperature, bundle.familiarity.threshold]
+    if not all(math.isfinite(number) and number > 0 for number in numbers):
+        raise ValueError("a size, focal length, temperature or threshold is not above 0")
+    arrays = [*bundle.weights.values(), bundle.turn_weight, bundle.paper.elevation_deg]
+    arrays += [bundle.familiarity.projection, bundle.familiarity.offset, bundle.familiarity.centres]
+    if (
+        not all(np.isfinite(array).all() for array in arrays)
+        or np.isinf(bundle.elevation_deg).any()
+    ):
+        raise ValueError("a number is not finite")
+    if not 0 < bundle.extent_m[0] < bundle.extent_m[1]:
+        raise ValueError("the plausible extents are no range")

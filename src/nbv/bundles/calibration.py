@@ -1,0 +1,220 @@
+"""What held-out turns teach about a network: temperature, distributions, what is familiar."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.angles import nearest_bin, signed_difference_deg
+from nbv.bundles.beliefs import distributions_of, turned
+from nbv.bundles.bundle import Bundle, Familiarity, PaperTables
+from nbv.bundles.recommender import unfamiliarity
+from nbv.calibration.pairs import WIDEST_GAP_DEG, full_turn, widest_gap_deg
+from nbv.calibration.posteriors import fit_temperature
+from nbv.errors import UserError
+from nbv.recommendation.belief import mean_direction_deg
+from nbv.recommendation.density_selection import chosen_lookup
+
+FAMILIAR_SHARE = 0.95
+N_COMPONENTS = 32
+N_RANGES = 24
+"""Of azimuths, each with a centre of its own."""
+
+PRIOR_TURNS = 3.0
+"""So many turns of a camera count as much as all turns that a bundle was made with."""
+
+PAPER = "pose_ambiguity"
+
+DENSITY: Mapping[str, Any] = {
+    "pose_likelihood": "given_estimate",
+    "spread": "entropy",
+    "bandwidths_deg": [4, 6, 8, 12, 16],
+    "pseudo_observations": [3, 10, 30, 100],
+    "n_parts": 5,
+    "travel_cost": 0.0,
+    "max_travel_deg": 180.0,
+}
+"""What `config/` sets for the paper's method."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Views of one object, taken at one elevation.
+
+    Attributes
+    ----------
+    object_id, sequence : str
+    elevation_deg : float
+        NaN where it is not known.
+    azimuth_deg : ndarray (n,)
+    logits : ndarray (n, B)
+    hidden : ndarray (n, H)
+    """
+
+    object_id: str
+    sequence: str
+    elevation_deg: float
+    azimuth_deg: NDArray[np.float64]
+    logits: NDArray[np.float32]
+    hidden: NDArray[np.float32]
+
+
+def every(turn: Turn, step: int) -> Turn:
+    """Return every `step`-th view of a turn."""
+    return replace(
+        turn,
+        azimuth_deg=turn.azimuth_deg[::step],
+        logits=turn.logits[::step],
+        hidden=turn.hidden[::step],
+    )
+
+
+def temperature_of(turns: Sequence[Turn]) -> float:
+    """Return the temperature under which the true azimuths of all views are likeliest."""
+    logits = np.concatenate([turn.logits for turn in turns]).astype(np.float64)
+    azimuth_deg = np.concatenate([turn.azimuth_deg for turn in turns])
+    return fit_temperature(logits, azimuth_deg)
+
+
+def bin_apart(azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return distributions (B, B) of views a bin apart, of views (n,) anywhere on a turn.
+
+    Each bin takes the nearest view, whose distribution is turned by what lies between.
+
+    Raises
+    ------
+    UserError
+        Where neighbouring views are farther than `WIDEST_GAP_DEG` apart.
+    """
+    n_bins = rows.shape[1]
+    if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
+        raise UserError(
+            f"views are {gap:.0f}° apart somewhere on the turn; calibration needs one every "
+            f"{WIDEST_GAP_DEG:g}°"
+        )
+    found = np.empty((n_bins, n_bins), dtype=np.float32)
+    for place, azimuth in enumerate(np.arange(n_bins) * (360.0 / n_bins)):
+        apart = signed_difference_deg(azimuth_deg, azimuth)
+        nearest = int(np.abs(apart).argmin())
+        found[place] = turned(rows[nearest], float(apart[nearest]))
+    return found
+
+
+def paper_tables(
+    elevation_deg: NDArray[np.floating],
+    distributions: NDArray[np.floating],
+    density: Mapping[str, Any] = DENSITY,
+) -> PaperTables:
+    """Return the paper's lookup tables of turns, one for each elevation to the nearest degree.
+
+    Parameters
+    ----------
+    elevation_deg : ndarray (S,)
+        Of each turn.
+    distributions : ndarray (S, B, B)
+        p(azimuth | image) of views a bin apart. Their mean directions are the estimates.
+    density : mapping
+        See `nbv.recommendation.density_selection.choose_densities`.
+    """
+    n_bins = distributions.shape[-1]
+    azimuth_deg = np.arange(n_bins) * (360.0 / n_bins)
+    estimates = np.stack([full_turn(azimuth_deg, mean_direction_deg(d)) for d in distributions])
+    of_turn = np.rint(elevation_deg)
+    levels = np.unique(of_turn)
+    tables = [chosen_lookup(estimates[of_turn == level], PAPER, density) for level in levels]
+    rotations = np.stack([table.recommended_delta_deg for table in tables])
+    return PaperTables(levels.astype(np.float32), rotations.astype(np.int16))
+
+
+def fit_familiarity(turns: Sequence[Turn]) -> Familiarity:
+    """Return what calibration images look like to the network.
+
+    Hidden activations are whitened by their covariance within ranges of azimuth. The threshold is
+    taken over objects that were left out, one after the other, where there are two or more.
+    """
+    names = sorted({turn.object_id for turn in turns})
+    left_out = []
+    for name in names if len(names) > 1 else []:
+        others = [turn for turn in turns if turn.object_id != name]
+        projection, offset, centres = _whitening(others)
+        left_out += [
+            unfamiliarity(projection, offset, centres, turn.hidden)
+            for turn in turns
+            if turn.object_id == name
+        ]
+    projection, offset, centres = _whitening(turns)
+    scores = left_out or [unfamiliarity(projection, offset, centres, t.hidden) for t in turns]
+    threshold = float(np.quantile(np.concatenate(scores), FAMILIAR_SHARE))
+    return Familiarity(projection, offset, centres, threshold)
+
+
+def _whitening(
+    turns: Sequence[Turn],
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    hidden = np.concatenate([turn.hidden for turn in turns]).astype(np.float64)
+    azimuth_deg = np.concatenate([turn.azimuth_deg for turn in turns])
+    offset = hidden.mean(axis=0)
+    centred = hidden - offset
+    of_range = nearest_bin(azimuth_deg, N_RANGES)
+    present = np.unique(of_range)
+    centres = np.stack([centred[of_range == one].mean(axis=0) for one in present])
+    within = centred - centres[np.searchsorted(present, of_range)]
+    covariance = within.T @ within / max(len(within) - 1, 1)
+    values, vectors = np.linalg.eigh(covariance)
+    kept = np.argsort(values)[::-1][:N_COMPONENTS]
+    kept = kept[values[kept] > 1e-9 * values.max()]
+    projection = vectors[:, kept] / np.sqrt(values[kept])
+    return (
+        projection.astype(np.float32),
+        offset.astype(np.float32),
+        (centres @ projection).astype(np.float32),
+    )
+
+
+def recalibrated(
+    bundle: Bundle, turns: Sequence[Turn], origin: str, density: Mapping[str, Any] = DENSITY
+) -> Bundle:
+    """Return a bundle with the same network, calibrated by other turns, such as those of a camera.
+
+    Temperature, the paper's tables and the familiar range are those of the turns. The bundle's own
+    calibration turns stay, and count as much as `PRIOR_TURNS` of the others together: a turn or
+    two say too little alone. A turn of unknown elevation counts for all.
+
+    Parameters
+    ----------
+    bundle : Bundle
+    turns : sequence of Turn
+    origin : str
+        Where the turns come from, for the provenance.
+    density : mapping
+        See `paper_tables`.
+    """
+    temperature = temperature_of(turns)
+    rows = np.stack(
+        [bin_apart(t.azimuth_deg, distributions_of(t.logits, temperature)) for t in turns]
+    )
+    prior = bundle.distributions ** np.float32(bundle.temperature / temperature)
+    prior /= prior.sum(axis=-1, keepdims=True)
+    prior_weight = bundle.turn_weight * (PRIOR_TURNS / bundle.turn_weight.sum())
+    elevation_deg = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
+    familiar = bundle.familiarity
+    scores = [
+        unfamiliarity(familiar.projection, familiar.offset, familiar.centres, turn.hidden)
+        for turn in turns
+    ]
+    threshold = float(np.quantile(np.concatenate(scores), FAMILIAR_SHARE))
+    return replace(
+        bundle,
+        temperature=temperature,
+        object_ids=(*(turn.object_id for turn in turns), *bundle.object_ids),
+        elevation_deg=np.concatenate([elevation_deg, bundle.elevation_deg]),
+        turn_weight=np.concatenate([np.ones(len(turns)), prior_weight]).astype(np.float32),
+        distributions=np.concatenate([rows, prior]),
+        familiarity=replace(familiar, threshold=threshold),
+        paper=paper_tables(np.nan_to_num(elevation_deg), rows, density),
+        provenance=dict(bundle.provenance) | {"calibrated_by": origin},
+    )

@@ -1,0 +1,267 @@
+"""How far each way of choosing further views gets on recordings with known azimuths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nbv.angles import circular_distance_deg, direction_deg, signed_difference_deg
+from nbv.bundles.beliefs import distributions_of, turned
+from nbv.bundles.bundle import Bundle, PaperTables
+from nbv.bundles.calibration import Turn
+from nbv.bundles.recommender import MIN_SEPARATION_DEG, turn_share, unfamiliarity
+from nbv.errors import UserError
+from nbv.recommendation.belief import mean_direction_deg
+from nbv.recommendation.fusion import average
+from nbv.recommendation.look_alikes import LookAlikes
+
+SINGLE, RANDOM, FIXED = "single", "random", "best fixed"
+OPPOSITE, SPACED, RECOMMENDED = "opposite", "evenly spaced", "recommended"
+PAPER = "paper's table, averaged"
+"""The second view by the lookup table, both estimates averaged. All others fuse distributions."""
+
+LARGE_ERROR_DEG = 45.0
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a bundle makes of one recording.
+
+    Attributes
+    ----------
+    object_id, sequence : str
+    azimuth_deg : ndarray (n,)
+        The truth.
+    distributions : ndarray (n, B)
+    share : ndarray (S,)
+        How much each calibration turn counts for it.
+    """
+
+    object_id: str
+    sequence: str
+    azimuth_deg: NDArray[np.float64]
+    distributions: NDArray[np.float64]
+    share: NDArray[np.float64]
+
+
+def best_fixed_deg(alike: LookAlikes, share: NDArray[np.float64]) -> float:
+    """Return the one rotation that is best on all calibration views, degrees."""
+    n_turns, n_bins, _ = alike.views.shape
+    of_turn = alike.errors_deg.reshape(n_turns, n_bins, n_bins).mean(axis=1)
+    return float((share @ of_turn).argmin() * (360.0 / n_bins))
+
+
+Chooser = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+"""The next rotations from the first views (n,), of beliefs (n, B) and rotations so far (n, t)."""
+
+
+def follow(seen: Seen, choose: Chooser, n_views: int) -> NDArray[np.float64]:
+    """Return the signed error of the pose after each number of views, from every first frame.
+
+    Each next view is the frame nearest to the chosen rotation that was not taken yet.
+
+    Returns
+    -------
+    ndarray (n, n_views)
+        Degrees in [-180, 180).
+    """
+    n = len(seen.azimuth_deg)
+    taken = np.arange(n)[:, None]
+    turns = (seen.azimuth_deg - seen.azimuth_deg[:, None]) % 360.0
+    logs = np.log(seen.distributions)
+    errors = []
+    for view in range(n_views):
+        beliefs = np.exp(logs - logs.max(axis=1, keepdims=True))
+        beliefs /= beliefs.sum(axis=1, keepdims=True)
+        errors.append(signed_difference_deg(mean_direction_deg(beliefs), seen.azimuth_deg))
+        if view + 1 == n_views:
+            break
+        chosen = choose(beliefs, np.take_along_axis(turns, taken, axis=1))
+        apart = circular_distance_deg(turns, chosen[:, None])
+        np.put_along_axis(apart, taken, np.inf, axis=1)
+        following = apart.argmin(axis=1)
+        rotation = turns[np.arange(n), following]
+        logs = logs + np.log(turned(seen.distributions[following], rotation))
+        taken = np.column_stack([taken, following])
+    return np.stack(errors, axis=1)
+
+
+def recommended(alike: LookAlikes, seen: Seen, affinity: Mapping[str, float]) -> Chooser:
+    """Return the choice of least expected error, given the look-alikes after the same rotations."""
+    n_bins = alike.views.shape[-1]
+    here = np.arange(n_bins) * (360.0 / n_bins)
+
+    def choose(beliefs: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+        bins = np.rint(rotations * (n_bins / 360.0)).astype(int) % n_bins
+        different, of_row = np.unique(bins, axis=0, return_inverse=True)
+        error = np.empty(beliefs.shape)
+        for place, so_far in enumerate(different):
+            turned_alike = alike
+            for rotation in so_far[1:]:
+                turned_alike = turned_alike.after(int(rotation))
+            rows = of_row.ravel() == place
+            error[rows] = turned_alike.expected_error_deg(
+                beliefs[rows], **affinity, share=seen.share
+            )[1]
+        near = circular_distance_deg(here[:, None], rotations[:, None, :]).min(axis=2)
+        return np.asarray(here[np.where(near < MIN_SEPARATION_DEG, np.inf, error).argmin(axis=1)])
+
+    return choose
+
+
+def choosers(
+    alike: LookAlikes,
+    seen: Seen,
+    affinity: Mapping[str, float],
+    n_views: int,
+    rng: np.random.Generator,
+) -> dict[str, Chooser]:
+    """Return the ways to choose that are compared, by name, for `n_views` views in all."""
+    fixed = best_fixed_deg(alike, seen.share)
+
+    def at_steps(step_deg: float) -> Chooser:
+        return lambda beliefs, taken: np.full(len(beliefs), taken.shape[1] * step_deg)
+
+    return {
+        RANDOM: lambda beliefs, taken: rng.uniform(
+            MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG, len(beliefs)
+        ),
+        FIXED: at_steps(fixed),
+        OPPOSITE if n_views == 2 else SPACED: at_steps(360.0 / n_views),
+        RECOMMENDED: recommended(alike, seen, affinity),
+    }
+
+
+def paper_errors(seen: Seen, tables: PaperTables, elevation_deg: float) -> NDArray[np.float64]:
+    """Return the signed error (n,) of the paper's method from every first frame, degrees.
+
+    Parameters
+    ----------
+    seen : Seen
+    tables : PaperTables
+    elevation_deg : float
+        NaN where it is not known.
+    """
+    estimates = mean_direction_deg(seen.distributions)
+    turns = (seen.azimuth_deg - seen.azimuth_deg[:, None]) % 360.0
+    chosen = tables.recommend(estimates, elevation_deg)
+    apart = circular_distance_deg(turns, chosen[:, None])
+    np.fill_diagonal(apart, np.inf)
+    following = apart.argmin(axis=1)
+    rotation = turns[np.arange(len(turns)), following]
+    pose = average(estimates, estimates[following], rotation)
+    return np.asarray(signed_difference_deg(pose, seen.azimuth_deg))
+
+
+def seen_by(bundle: Bundle, turn: Turn) -> Seen:
+    """Return what a bundle makes of a turn: distributions at its temperature."""
+    return Seen(
+        turn.object_id,
+        turn.sequence,
+        turn.azimuth_deg,
+        distributions_of(turn.logits, bundle.temperature),
+        turn_share(bundle, turn.elevation_deg),
+    )
+
+
+def evaluate(
+    bundle: Bundle,
+    turns: Sequence[Turn],
+    n_views: Sequence[int] = (2, 3, 4, 5),
+    n_random: int = 10,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Return the errors of every way to choose views, for each recording.
+
+    Returns
+    -------
+    DataFrame
+        ``object_id, sequence, choice, n_views, mae_deg, median_deg, above_45_percent, offset_deg,
+        mae_without_offset_deg``. The offset is the mean direction of all single-view errors of the
+        recording: what is constant may be the turntable's zero.
+
+    Raises
+    ------
+    UserError
+        Where a number of views is below 2, or above that of a recording's frames.
+    """
+    if min(n_views) < 2:
+        raise UserError(f"{min(n_views)} views: a choice of views needs 2 or more")
+    for turn in turns:
+        if len(turn.azimuth_deg) < max(n_views):
+            raise UserError(
+                f"object {turn.object_id!r}, sequence {turn.sequence!r} has "
+                f"{len(turn.azimuth_deg)} frames, too few for {max(n_views)} views"
+            )
+    rows, alike = [], LookAlikes.of_views(bundle.distributions)
+    for turn in turns:
+        seen = seen_by(bundle, turn)
+        single = follow(seen, lambda beliefs, taken: np.zeros(len(beliefs)), 1)[:, 0]
+        offset = _mean_direction(single)
+        rows.append(_row(seen, SINGLE, 1, single, offset))
+        if 2 in n_views:
+            error = paper_errors(seen, bundle.paper, turn.elevation_deg)
+            rows.append(_row(seen, PAPER, 2, error, offset))
+        for number in n_views:
+            rng = np.random.default_rng(seed)
+            for name, choose in choosers(alike, seen, bundle.affinity, number, rng).items():
+                repeats = n_random if name == RANDOM else 1
+                errors = [follow(seen, choose, number)[:, -1] for _ in range(repeats)]
+                rows.append(_row(seen, name, number, np.concatenate(errors), offset))
+    return pd.DataFrame(rows)
+
+
+def familiarity_of(bundle: Bundle, turns: Sequence[Turn]) -> pd.DataFrame:
+    """Return how often a bundle calls a single frame unfamiliar, and whether that frame was wrong.
+
+    Returns
+    -------
+    DataFrame
+        ``object_id, sequence, n_frames, n_unfamiliar, n_wrong, n_wrong_unfamiliar`` for each
+        recording; wrong is an error above 45 degrees.
+    """
+    known, rows = bundle.familiarity, []
+    for turn in turns:
+        seen = seen_by(bundle, turn)
+        estimates = mean_direction_deg(seen.distributions)
+        is_wrong = circular_distance_deg(estimates, turn.azimuth_deg) > LARGE_ERROR_DEG
+        apart = unfamiliarity(known.projection, known.offset, known.centres, turn.hidden)
+        is_strange = apart > known.threshold
+        rows.append(
+            {
+                "object_id": turn.object_id,
+                "sequence": turn.sequence,
+                "n_frames": len(is_wrong),
+                "n_unfamiliar": int(is_strange.sum()),
+                "n_wrong": int(is_wrong.sum()),
+                "n_wrong_unfamiliar": int((is_wrong & is_strange).sum()),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _mean_direction(error_deg: NDArray[np.float64]) -> float:
+    angles = np.radians(error_deg)
+    mean = direction_deg(np.cos(angles).mean(), np.sin(angles).mean())
+    return float(signed_difference_deg(mean, 0.0))
+
+
+def _row(
+    seen: Seen, choice: str, n_views: int, error_deg: NDArray[np.float64], offset: float
+) -> dict[str, object]:
+    size = np.abs(error_deg)
+    return {
+        "object_id": seen.object_id,
+        "sequence": seen.sequence,
+        "choice": choice,
+        "n_views": n_views,
+        "mae_deg": float(size.mean()),
+        "median_deg": float(np.median(size)),
+        "above_45_percent": float(100 * (size > LARGE_ERROR_DEG).mean()),
+        "offset_deg": offset,
+        "mae_without_offset_deg": float(circular_distance_deg(error_deg, offset).mean()),
+    }

@@ -1,0 +1,122 @@
+"""A bundle from a trained network and held-out turns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.bundles.beliefs import distributions_of
+from nbv.bundles.bundle import Bundle
+from nbv.bundles.calibration import Turn, bin_apart, fit_familiarity, paper_tables, temperature_of
+from nbv.depth_images import DepthImages
+from nbv.estimation.weights import Estimator, network_of, weights_of
+from nbv.frames.crop import pixel_step
+from nbv.rendering.camera import Camera
+
+DEFAULT_FOCAL_PX = 600.0
+"""Of a bundle whose training simulated no sensor."""
+
+# Beyond the extents of calibration images: other objects, tilt and tables.
+_MARGINS = (0.6, 1.5)
+
+
+def turns_of(
+    estimator: Estimator,
+    images: Sequence[DepthImages],
+    elevations_deg: Sequence[float],
+    object_ids: Sequence[str],
+) -> tuple[list[Turn], float, float]:
+    """Return the turns of some objects at every elevation, and the extent of what they show.
+
+    Returns
+    -------
+    list of Turn
+    float, float
+        The least and the largest diagonal of an object's box in an image, pixels, of 98 % of
+        all images.
+    """
+    network = network_of(weights_of(estimator), estimator.settings, estimator.image_side)
+    turns, extents = [], []
+    for elevation, of_elevation in zip(elevations_deg, images, strict=True):
+        for object_id, codes in zip(object_ids, of_elevation.of(object_ids), strict=True):
+            logits, hidden = network(codes)
+            azimuth_deg = np.arange(len(codes), dtype=np.float64) * (360.0 / len(codes))
+            turns.append(
+                Turn(object_id, f"{elevation:g}", float(elevation), azimuth_deg, logits, hidden)
+            )
+            extents.append(_extents(codes))
+    low, high = np.quantile(np.concatenate(extents), (0.01, 0.99))
+    return turns, float(low), float(high)
+
+
+def _extents(codes: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Return the diagonal of the box around what each image shows, pixels, (n,)."""
+    height, width = (_length(np.asarray((codes > 0).any(axis=axis))) for axis in (2, 1))
+    return np.hypot(height, width)
+
+
+def _length(seen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return from the first to the last true value of each row, both included, (n,)."""
+    first, last = seen.argmax(axis=1), seen.shape[1] - seen[:, ::-1].argmax(axis=1)
+    return np.where(seen.any(axis=1), last - first, 0).astype(np.float64)
+
+
+def make_bundle(
+    category: str,
+    estimator: Estimator,
+    turns: Sequence[Turn],
+    extent_px: tuple[float, float],
+    *,
+    camera: Camera,
+    sensor: Mapping[str, Any],
+    affinity: Mapping[str, float],
+    provenance: Mapping[str, Any],
+) -> Bundle:
+    """Return a bundle.
+
+    Parameters
+    ----------
+    category : str
+    estimator : Estimator
+        A classifier.
+    turns : sequence of Turn
+        Of calibration objects, which the estimator has not seen.
+    extent_px : (float, float)
+        From `turns_of`.
+    camera : Camera
+        That of the training.
+    sensor : mapping
+        The configuration's ``sensor``.
+    affinity : mapping
+        The configuration's ``affinity``.
+    provenance : mapping
+    """
+    temperature = temperature_of(turns)
+    elevation_deg = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
+    distributions = np.stack(
+        [bin_apart(t.azimuth_deg, distributions_of(t.logits, temperature)) for t in turns]
+    )
+    diagonal_m = float(sensor["diagonal_m"][category])
+    length_m = pixel_step(camera) * diagonal_m
+    low, high = (share * side * length_m for share, side in zip(_MARGINS, extent_px, strict=True))
+    return Bundle(
+        category=category,
+        weights=weights_of(estimator),
+        estimator=estimator.settings,
+        camera=camera,
+        diagonal_m=diagonal_m,
+        extent_m=(low, high),
+        focal_px=float(sensor["parameters"].get("focal_px", DEFAULT_FOCAL_PX)),
+        temperature=temperature,
+        object_ids=tuple(turn.object_id for turn in turns),
+        elevation_deg=elevation_deg,
+        turn_weight=np.ones(len(turns), dtype=np.float32),
+        distributions=distributions,
+        affinity={key: affinity[key] for key in ("power", "pseudo_observations")},
+        familiarity=fit_familiarity(turns),
+        paper=paper_tables(elevation_deg, distributions),
+        provenance=dict(provenance) | {"trained_on": len(set(estimator.trained_on))},
+    )

@@ -1,0 +1,129 @@
+"""From a rotation about the object to a pose of the camera in the robot's base frame.
+
+Poses are 4 × 4 matrices that take points of the camera's frame to the base frame. The camera's
+frame is the optical one: z forward, x right, y down (ROS REP 103). The object's axis points up; a
+positive rotation is counter-clockwise seen from its tip, so that the camera moves to larger
+azimuths.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.errors import UserError
+
+Pose = NDArray[np.float64]
+
+_ROTATION_TOLERANCE = 1e-3
+
+
+def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
+    """Return a 4 × 4 pose, from (4, 4) or its 16 numbers row by row.
+
+    Raises
+    ------
+    UserError
+        Where it is no rotation with a translation.
+    """
+    try:
+        numbers = np.asarray(values, dtype=np.float64).ravel()
+    except (TypeError, ValueError):
+        raise UserError(f"{name}: no numbers; give the 16 of a 4 × 4 matrix") from None
+    if numbers.size != 16:
+        raise UserError(f"{name}: {numbers.size} numbers; give the 16 of a 4 × 4 matrix")
+    pose = numbers.reshape(4, 4)
+    turn = pose[:3, :3]
+    is_rotation = (
+        np.isfinite(pose).all()
+        and np.allclose(turn @ turn.T, np.eye(3), atol=_ROTATION_TOLERANCE)
+        and np.linalg.det(turn) > 0
+        and np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9)
+    )
+    if not is_rotation:
+        raise UserError(f"{name}: no rotation with a translation; is it transposed or scaled?")
+    return pose
+
+
+def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> Pose:
+    """Return the motion that turns everything about an axis (Rodrigues' formula), (4, 4).
+
+    Parameters
+    ----------
+    point, direction : (3,)
+        Of the axis, in the base frame.
+    angle_deg : float
+        Counter-clockwise seen from the direction's tip.
+
+    Raises
+    ------
+    UserError
+        Where the axis has no direction.
+    """
+    origin = np.asarray(point, dtype=np.float64)
+    axis = np.asarray(direction, dtype=np.float64)
+    length = float(np.linalg.norm(axis))
+    if not (math.isfinite(length) and length > 1e-9 and np.isfinite(origin).all()):
+        raise UserError("axis: give a point and a direction that is not 0")
+    x, y, z = axis / length
+    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = math.radians(angle_deg)
+    turn = np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
+    motion = np.eye(4)
+    motion[:3, :3] = turn
+    motion[:3, 3] = origin - turn @ origin
+    return motion
+
+
+def moved_camera(
+    camera_pose: ArrayLike, point: ArrayLike, direction: ArrayLike, rotation_deg: float
+) -> Pose:
+    """Return the camera's pose after a rotation about the object's axis, (4, 4).
+
+    Parameters
+    ----------
+    camera_pose : (4, 4)
+        From the camera's optical frame to the base frame.
+    point, direction : (3,)
+        Of the object's axis, in the base frame.
+    rotation_deg : float
+        Counter-clockwise seen from the direction's tip.
+
+    Raises
+    ------
+    UserError
+        Where the pose is no rotation with a translation, or the axis has no direction.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> ahead = np.array([[0, 0, 1, -1], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    >>> moved = nbv.moved_camera(ahead, point=(0, 0, 0), direction=(0, 0, 1), rotation_deg=90)
+    >>> bool(np.allclose(moved[:3, 3], [0, -1, 0]))  # from x = -1 to y = -1
+    True
+    """
+    return rotation_about(point, direction, rotation_deg) @ as_pose(camera_pose)
+
+
+def read_pose(path: str | Path) -> Pose:
+    """Read a pose from ``.npy``, ``.json``, or text with 16 numbers; errors as of `as_pose`."""
+    path = Path(path)
+    try:
+        if path.suffix == ".npy":
+            values = np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
+        elif path.suffix == ".json":
+            values = np.asarray(json.loads(path.read_text(encoding="utf-8")), dtype=np.float64)
+        else:
+            text = path.read_text(encoding="utf-8").replace(",", " ")
+            values = np.array([float(number) for number in text.split()])
+    except FileNotFoundError as error:
+        raise UserError(f"{path} does not exist") from error
+    # No list of what a reader may raise on arbitrary bytes is complete.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{path} cannot be read ({reason})") from error
+    return as_pose(values, str(path))

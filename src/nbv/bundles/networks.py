@@ -1,0 +1,75 @@
+"""A bundle's network at work: with onnxruntime where it is installed, else with torch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.bundles.bundle import Bundle
+from nbv.errors import UserError, nearest
+
+Codes = NDArray[np.uint8]
+Outputs = NDArray[np.float32]
+
+Network = Callable[[Codes], tuple[Outputs, Outputs]]
+"""From codes (n, side, side) to logits (n, B) and the last hidden layer (n, H)."""
+
+BACKENDS = ("onnx", "torch")
+
+
+def open_network(bundle: Bundle, backend: str | None = None) -> Network:
+    """Return a bundle's network, on one core of the processor.
+
+    Parameters
+    ----------
+    bundle : Bundle
+    backend : {"onnx", "torch"}, optional
+        None: ``onnx`` where both of its packages are installed, else ``torch``.
+
+    Raises
+    ------
+    UserError
+        For another backend, or where its packages are missing.
+    """
+    if backend is None:
+        has_onnx = all(find_spec(name) is not None for name in ("onnx", "onnxruntime"))
+        backend = "onnx" if has_onnx else "torch"
+    if backend not in BACKENDS:
+        raise UserError(f"backend {backend!r}: {nearest(backend, BACKENDS)}")
+    return _onnx_network(bundle) if backend == "onnx" else _torch_network(bundle)
+
+
+def _onnx_network(bundle: Bundle) -> Network:
+    from nbv.bundles.onnx_graph import onnx_model
+
+    try:
+        import onnxruntime
+    except ImportError as error:
+        raise UserError(f"ONNX needs the packages of nbv[onnx] ({error}); install them") from error
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    session = onnxruntime.InferenceSession(
+        onnx_model(bundle).SerializeToString(), options, providers=["CPUExecutionProvider"]
+    )
+
+    def network(codes: Codes) -> tuple[Outputs, Outputs]:
+        logits, hidden = session.run(
+            ["logits", "hidden"], {"codes": codes[:, None].astype(np.float32)}
+        )
+        return logits, hidden
+
+    return network
+
+
+def _torch_network(bundle: Bundle) -> Network:
+    try:
+        from nbv.estimation.weights import network_of
+    except ImportError as error:
+        raise UserError(
+            f"a network needs the packages of nbv[onnx], or torch ({error}); install one of them"
+        ) from error
+
+    return network_of(bundle.weights, bundle.estimator, bundle.camera.image_side)

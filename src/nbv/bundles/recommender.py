@@ -1,0 +1,397 @@
+"""From depth frames of one object to its pose and to the next view."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.angles import circular_distance_deg, signed_difference_deg, travel_deg, wrap_deg
+from nbv.bundles.beliefs import distributions_of, elevation_share, fused, spread_deg, turned
+from nbv.bundles.bundle import Bundle, load_bundle
+from nbv.bundles.networks import Network, open_network
+from nbv.errors import UserError, nearest
+from nbv.frames.crop import Crop, crop_frame, need_plausible_nearest
+from nbv.frames.depth_files import to_metres
+from nbv.frames.intrinsics import Intrinsics, as_intrinsics
+from nbv.frames.masks import object_mask
+from nbv.recommendation.belief import mean_direction_deg
+from nbv.recommendation.look_alikes import LookAlikes
+
+REACH = 0.75
+"""How far an object reaches behind its nearest point, in diagonals, where nothing masks it."""
+
+MIN_SEPARATION_DEG = 15.0
+"""From every view so far: an estimator errs alike from nearly the same place."""
+
+N_ALTERNATIVES = 5
+
+
+@dataclass(frozen=True)
+class Move:
+    """A rotation of the camera about the object, and what is expected of it.
+
+    Attributes
+    ----------
+    rotation_deg : float
+        From where the camera is now, counter-clockwise seen from above, in (-180, 180].
+    travel_deg : float
+        How far that is, in [0, 180].
+    expected_error_deg : float
+        Of the pose, once the view from there is added.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> nbv.Move(rotation_deg=-90.0, travel_deg=90.0, expected_error_deg=3.0).travel_deg
+    90.0
+    """
+
+    rotation_deg: float
+    travel_deg: float
+    expected_error_deg: float
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """What frames say of an object's pose, and where to look next.
+
+    Attributes
+    ----------
+    azimuth_deg : float
+        Of the camera about the object at the last frame, in [0, 360).
+    spread_deg : float
+        Circular standard deviation of the belief.
+    expected_error_deg : float
+        Of `azimuth_deg`: what objects that looked alike erred in calibration.
+    move : Move
+        The best next view.
+    alternatives : tuple of Move
+        Other views, each the best of its neighbourhood, best first.
+    belief : ndarray (B,)
+        p(azimuth of the camera at the last frame); index b is 360 b / B degrees.
+    error_after_deg : ndarray (B,)
+        Expected error after a further view, by its rotation 360 d / B degrees from the last frame;
+        inf where the camera may not go.
+    unfamiliarity : float
+        How far the least familiar frame is from everything calibrated; above 1 farther than 95 %
+        of calibration images.
+    crops : tuple of ndarray (side, side) uint8
+        What the network saw of each frame.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> frame = nbv.example_frame(azimuth_deg=250.0)
+    >>> answer = nbv.Recommender.load("mug").recommend(frame.depth_m, intrinsics=frame.intrinsics)
+    >>> abs(answer.azimuth_deg - 250.0) < 20, answer.move.expected_error_deg < 20
+    (True, True)
+    """
+
+    azimuth_deg: float
+    spread_deg: float
+    expected_error_deg: float
+    move: Move
+    alternatives: tuple[Move, ...]
+    belief: NDArray[np.float64]
+    error_after_deg: NDArray[np.float64]
+    unfamiliarity: float
+    crops: tuple[NDArray[np.uint8], ...]
+
+    @property
+    def is_unfamiliar(self) -> bool:
+        """Whether a frame is like nothing that was calibrated."""
+        return self.unfamiliarity > 1.0
+
+
+def shipped_bundles() -> dict[str, Path]:
+    """Return the bundles that come with the package, by name."""
+    folder = resources.files("nbv.bundles") / "shipped"
+    if not folder.is_dir():
+        return {}
+    found = {Path(str(item)).stem: Path(str(item)) for item in folder.iterdir()}
+    return {name: path for name, path in sorted(found.items()) if path.suffix == ".safetensors"}
+
+
+def bundle_path(name: str | Path) -> Path:
+    """Return the file of a bundle: that of a shipped one by its name, or the file itself.
+
+    Raises
+    ------
+    UserError
+        Where there is neither.
+    """
+    shipped = shipped_bundles()
+    if str(name) in shipped:
+        return shipped[str(name)]
+    if not Path(name).exists():
+        known = nearest(str(name), shipped) if shipped else "no bundle comes with this nbv"
+        raise UserError(f"bundle {str(name)!r}: there is no such file; {known}")
+    return Path(name)
+
+
+class Recommender:
+    """A bundle, ready for frames.
+
+    Parameters
+    ----------
+    bundle : Bundle
+    backend : {"onnx", "torch"}, optional
+        See `nbv.bundles.networks.open_network`.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> recommender = nbv.Recommender.load("mug")
+    >>> recommender.bundle.category
+    'mug'
+    """
+
+    def __init__(self, bundle: Bundle, backend: str | None = None) -> None:
+        self.bundle = bundle
+        self.network: Network = open_network(bundle, backend)
+
+    @classmethod
+    def load(cls, name: str | Path, backend: str | None = None) -> Recommender:
+        """Return the recommender of a bundle: the name of a shipped one, or a file.
+
+        Raises
+        ------
+        UserError
+            Where there is no such bundle, or it is damaged.
+        """
+        return cls(load_bundle(bundle_path(name)), backend)
+
+    @cached_property
+    def _look_alikes(self) -> LookAlikes:
+        return LookAlikes.of_views(self.bundle.distributions)
+
+    def crop(
+        self,
+        depth_m: ArrayLike,
+        *,
+        mask: ArrayLike | None = None,
+        intrinsics: Intrinsics | Sequence[float] | None = None,
+        near_m: float | None = None,
+        far_m: float | None = None,
+    ) -> Crop:
+        """Return what the network sees of a frame; parameters and errors as of `recommend`."""
+        bundle = self.bundle
+        depth = to_metres(np.asarray(depth_m))
+        camera = bundle.focal_px if intrinsics is None else intrinsics
+        known = as_intrinsics([camera] if isinstance(camera, float) else camera)
+        reach_m = REACH * bundle.diagonal_m
+        if mask is None and far_m is None:
+            need_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
+        inside = object_mask(depth, reach_m, mask, near_m, far_m)
+        return crop_frame(depth, inside, known, bundle.camera, bundle.diagonal_m, bundle.extent_m)
+
+    def distributions(self, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Return p(azimuth | image) (n, B) of crops (n, side, side)."""
+        logits, _ = self.network(codes)
+        return distributions_of(logits, self.bundle.temperature)
+
+    def recommend(
+        self,
+        depth_m: ArrayLike | Sequence[ArrayLike],
+        *,
+        rotations_deg: Sequence[float] = (0.0,),
+        mask: ArrayLike | Sequence[ArrayLike] | None = None,
+        intrinsics: Intrinsics | Sequence[float] | None = None,
+        near_m: float | None = None,
+        far_m: float | None = None,
+        elevation_deg: float | None = None,
+        allowed_deg: ArrayLike | None = None,
+        max_travel_deg: float = 180.0,
+    ) -> Recommendation:
+        """Return the pose that frames show, and the next view.
+
+        Parameters
+        ----------
+        depth_m : (rows, columns), or a sequence of such
+            Depth in metres; NaN or 0 where nothing was measured. Whole numbers are millimetres.
+        rotations_deg : sequence of float
+            Where each frame was taken: degrees about the object from the first frame's place,
+            counter-clockwise seen from above. The first is 0.
+        mask : (rows, columns), or a sequence of such, optional
+            Not 0 where the object is. Without it the object is what lies nearest, or between
+            `near_m` and `far_m`.
+        intrinsics : Intrinsics, (fx, fy, cx, cy) or 3 × 3, optional
+            Pixels. Without it the focal length of the simulated sensor.
+        near_m, far_m : float, optional
+            Metres.
+        elevation_deg : float, optional
+            Of the camera above the object's base plane, where it is known.
+        allowed_deg : array-like, optional
+            Rotations from the last frame's place that the camera may take; all without it.
+        max_travel_deg : float
+
+        Raises
+        ------
+        nbv.frames.errors.FrameError
+            Where a frame cannot be used; it says why.
+        UserError
+            Where the arguments do not fit each other.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> frame = nbv.example_frame()
+        >>> answer = nbv.Recommender.load("mug").recommend(frame.depth_m, mask=frame.mask)
+        >>> 0 <= answer.azimuth_deg < 360
+        True
+        """
+        frames = _as_frames(depth_m)
+        masks = _as_masks(mask, len(frames))
+        _need_rotations(rotations_deg, len(frames))
+        crops = [
+            self.crop(frame, mask=own, intrinsics=intrinsics, near_m=near_m, far_m=far_m)
+            for frame, own in zip(frames, masks, strict=True)
+        ]
+        codes = np.stack([crop.codes for crop in crops])
+        return self.recommend_crops(
+            codes,
+            rotations_deg,
+            elevation_deg=elevation_deg,
+            allowed_deg=allowed_deg,
+            max_travel_deg=max_travel_deg,
+        )
+
+    def recommend_crops(
+        self,
+        codes: NDArray[np.uint8],
+        rotations_deg: Sequence[float] = (0.0,),
+        *,
+        elevation_deg: float | None = None,
+        allowed_deg: ArrayLike | None = None,
+        max_travel_deg: float = 180.0,
+    ) -> Recommendation:
+        """Return what `recommend` does, of crops (n, side, side) uint8."""
+        _need_rotations(rotations_deg, len(codes))
+        if elevation_deg is not None and not math.isfinite(elevation_deg):
+            raise UserError(f"an elevation of {elevation_deg:g}°: give a number, or none")
+        logits, hidden = self.network(codes)
+        belief = fused(distributions_of(logits, self.bundle.temperature), rotations_deg)
+        n_bins = self.bundle.n_bins
+        width = 360.0 / n_bins
+        alike = self._look_alikes
+        for rotation in rotations_deg[1:]:
+            alike = alike.after(round(rotation / width) % n_bins)
+        share = turn_share(self.bundle, elevation_deg)
+        (now,), (after,) = alike.expected_error_deg(
+            belief[None], **self.bundle.affinity, share=share
+        )
+        # From the frame of the first view to that of the last one.
+        last = rotations_deg[-1]
+        turn = round(last / width)
+        error = np.roll(after, -turn)
+        taken = np.asarray(rotations_deg) - last
+        here = np.arange(n_bins, dtype=np.float64) * width
+        error[~self._may_go(here, taken, allowed_deg, max_travel_deg)] = np.inf
+        if not np.isfinite(error).any():
+            raise UserError("no rotation is allowed: widen --allowed or --max-travel")
+        best, *others = _local_best(error, here)
+        return Recommendation(
+            azimuth_deg=float(wrap_deg(mean_direction_deg(belief[None])[0] + last)),
+            spread_deg=spread_deg(belief),
+            expected_error_deg=float(now),
+            move=best,
+            alternatives=tuple(others[:N_ALTERNATIVES]),
+            belief=turned(belief, -last),
+            error_after_deg=error,
+            unfamiliarity=float(self._unfamiliarity(hidden).max()),
+            crops=tuple(codes),
+        )
+
+    def _may_go(
+        self,
+        here: NDArray[np.float64],
+        taken: NDArray[np.float64],
+        allowed_deg: ArrayLike | None,
+        max_travel_deg: float,
+    ) -> NDArray[np.bool_]:
+        may = circular_distance_deg(here[:, None], taken).min(axis=1) >= MIN_SEPARATION_DEG
+        may &= travel_deg(here) <= max_travel_deg
+        if allowed_deg is not None:
+            width = 360.0 / len(here)
+            given = np.asarray(allowed_deg, dtype=np.float64).ravel()
+            if not given.size or not np.isfinite(given).all():
+                raise UserError("allowed rotations: give one at least, in degrees")
+            may &= circular_distance_deg(here[:, None], given).min(axis=1) <= width / 2
+        return np.asarray(may)
+
+    def _unfamiliarity(self, hidden: NDArray[np.float32]) -> NDArray[np.float64]:
+        known = self.bundle.familiarity
+        apart = unfamiliarity(known.projection, known.offset, known.centres, hidden)
+        return apart / known.threshold
+
+
+def unfamiliarity(
+    projection: NDArray[np.float32],
+    offset: NDArray[np.float32],
+    centres: NDArray[np.float32],
+    hidden: NDArray[np.float32],
+) -> NDArray[np.float64]:
+    """Return the distance (n,) of hidden activations (n, H) to the nearest centre.
+
+    Components are whitened, so that this is a Mahalanobis distance (Lee et al., 2018).
+    """
+    places = (hidden - offset) @ projection
+    apart = ((places[:, None] - centres) ** 2).sum(axis=2)
+    return np.asarray(np.sqrt(apart.min(axis=1)), dtype=np.float64)
+
+
+def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float64]:
+    """Return how much each calibration turn (S,) counts for frames of an elevation, or of any."""
+    known = float("nan") if elevation_deg is None else elevation_deg
+    return bundle.turn_weight * elevation_share(bundle.elevation_deg, known)
+
+
+def _need_rotations(rotations_deg: Sequence[float], n: int) -> None:
+    if len(rotations_deg) != n:
+        raise UserError(
+            f"{n} frames need as many rotations, from the first frame's place: 0, …; there are "
+            f"{len(rotations_deg)}"
+        )
+    if not all(math.isfinite(rotation) for rotation in rotations_deg):
+        raise UserError("a rotation is no finite number of degrees")
+    if rotations_deg[0] != 0:
+        raise UserError(f"the first rotation is {rotations_deg[0]:g}; all count from it: 0")
+
+
+def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.generic]]:
+    if isinstance(depth_m, np.ndarray) and depth_m.ndim == 2:
+        return [depth_m]
+    if isinstance(depth_m, list | tuple) and depth_m and isinstance(depth_m[0], np.ndarray):
+        return [np.asarray(frame) for frame in depth_m]
+    values = np.asarray(depth_m)
+    return list(values) if values.ndim == 3 and values.shape[2] > 4 else [values]
+
+
+def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[ArrayLike | None]:
+    if mask is None:
+        return [None] * n
+    masks = [mask] if isinstance(mask, np.ndarray) and mask.ndim == 2 else list(mask)  # type: ignore[arg-type]
+    if len(masks) != n:
+        raise UserError(f"{n} frames and {len(masks)} masks: give one for each frame")
+    return masks
+
+
+def _local_best(error: NDArray[np.float64], here: NDArray[np.float64]) -> list[Move]:
+    """Return the moves that are better than their neighbours, best first."""
+    lower = (error <= np.roll(error, 1)) & (error <= np.roll(error, -1)) & np.isfinite(error)
+    places = np.flatnonzero(lower if lower.any() else np.isfinite(error))
+    order = places[np.lexsort((here[places], travel_deg(here[places]), error[places]))]
+    rotations = (-signed_difference_deg(0.0, here[order])).tolist()
+    found: list[Move] = []
+    for rotation, expected in zip(rotations, error[order].tolist(), strict=True):
+        apart = (abs(rotation - one.rotation_deg) for one in found)
+        if all(min(angle, 360.0 - angle) >= MIN_SEPARATION_DEG for angle in apart):
+            found.append(Move(rotation, abs(rotation), expected))
+    return found

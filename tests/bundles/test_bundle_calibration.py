@@ -1,0 +1,331 @@
+"""What held-out turns teach about a network."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_bundles import BINS, WIDTH, soft_turns
+
+from nbv.angles import circular_distance_deg
+from nbv.bundles.beliefs import distributions_of, turned
+from nbv.bundles.calibration import (
+    DENSITY,
+    N_COMPONENTS,
+    N_RANGES,
+    PRIOR_TURNS,
+    WIDEST_GAP_DEG,
+    Turn,
+    bin_apart,
+    fit_familiarity,
+    paper_tables,
+    recalibrated,
+    temperature_of,
+)
+from nbv.bundles.recommender import Recommender, unfamiliarity
+from nbv.errors import UserError
+from nbv.recommendation.belief import mean_direction_deg
+from nbv.recommendation.density_selection import chosen_lookup
+
+AZIMUTHS = np.arange(BINS) * WIDTH
+# Where the choice of a density does not matter.
+ONE_DENSITY = {**DENSITY, "bandwidths_deg": [8], "pseudo_observations": [10]}
+
+
+def turn(
+    name="a", seed=0, azimuth_deg=AZIMUTHS, elevation=0.0, logits=None, hidden=None, sequence="1"
+):
+    rng = np.random.default_rng(seed)
+    n = len(azimuth_deg)
+    if logits is None:
+        classes = np.arange(BINS) * WIDTH
+        aim = 3.0 * np.cos(np.radians(classes - np.asarray(azimuth_deg)[:, None]))
+        logits = aim + rng.normal(0, 0.5, (n, BINS))
+    hidden = rng.normal(0, 1, (n, 40)).astype(np.float32) if hidden is None else hidden
+    return Turn(name, sequence, elevation, np.asarray(azimuth_deg, float), logits, hidden)
+
+
+# Views a bin apart
+
+
+@given(order=st.permutations(range(BINS)), start=st.integers(-3, 3))
+def test_views_a_bin_apart_stay_as_they_are_in_any_order(order, start):
+    rows = np.random.default_rng(0).dirichlet(np.ones(BINS), BINS)
+    order = np.array(order)
+    azimuth_deg = AZIMUTHS[order] + 360.0 * start
+    assert np.array_equal(bin_apart(azimuth_deg, rows[order]), rows.astype(np.float32))
+
+
+@given(seed=st.integers(0, 10**6), times=st.integers(2, 5))
+def test_views_between_the_bins_do_not_matter_where_bins_have_their_own(seed, times):
+    rng = np.random.default_rng(seed)
+    azimuth_deg = np.arange(BINS * times) * (WIDTH / times)
+    rows = rng.dirichlet(np.ones(BINS), len(azimuth_deg))
+    assert np.array_equal(bin_apart(azimuth_deg, rows), rows[::times].astype(np.float32))
+
+
+@given(seed=st.integers(0, 10**6), base=st.integers(0, BINS - 1))
+def test_a_turn_of_the_object_turns_views_and_rows(seed, base):
+    """Azimuths that all grow by some bins give the same table, rolled along both axes."""
+    rng = np.random.default_rng(seed)
+    azimuth_deg = (np.arange(0, 360, 7.5) + rng.uniform(-3, 3, 48)) % 360
+    rows = rng.dirichlet(np.ones(BINS), 48)
+    moved = bin_apart(azimuth_deg + base * WIDTH, np.roll(rows, base, axis=1))
+    wanted = np.roll(bin_apart(azimuth_deg, rows), (base, base), axis=(0, 1))
+    assert moved == pytest.approx(wanted, abs=1e-6)
+
+
+@given(seed=st.integers(0, 10**6), n=st.integers(30, 200))
+def test_each_bin_takes_its_nearest_view(seed, n):
+    """By a search over all views, for each bin."""
+    rng = np.random.default_rng(seed)
+    azimuth_deg = (np.arange(n) * 360.0 / n + rng.uniform(0, 360.0 / n)) % 360
+    order = rng.permutation(n)
+    azimuth_deg, rows = azimuth_deg[order], rng.dirichlet(np.ones(BINS), n)
+    found = bin_apart(azimuth_deg, rows)
+    assert found.sum(axis=1) == pytest.approx(1.0, abs=1e-5)
+    for bin_, row in enumerate(found):
+        apart = circular_distance_deg(azimuth_deg, bin_ * WIDTH)
+        tied = np.flatnonzero(apart < apart.min() + 1e-9)
+        choices = [
+            turned(rows[view], (azimuth_deg[view] - bin_ * WIDTH + 180) % 360 - 180)
+            for view in tied
+        ]
+        assert min(np.abs(row - choice).max() for choice in choices) < 1e-6
+
+
+@given(offset=st.floats(0.0, 15.0))
+def test_a_sure_network_stays_right(offset):
+    """Views off the bins, each with all its mass at its own azimuth: between two bins."""
+    azimuth_deg = AZIMUTHS + offset
+    rows = np.stack(
+        [
+            np.interp((AZIMUTHS - a + 180) % 360 - 180, [-WIDTH, 0, WIDTH], [0, 1, 0])
+            for a in azimuth_deg
+        ]
+    )
+    rows /= rows.sum(axis=1, keepdims=True)
+    found = mean_direction_deg(bin_apart(azimuth_deg, rows))
+    assert circular_distance_deg(found, AZIMUTHS).max() < 0.1
+
+
+@pytest.mark.parametrize("views", [[0], [0, 180], list(range(0, 340, 5)), list(range(10, 355, 15))])
+def test_a_gap_is_refused(views):
+    views = np.array(views, dtype=float)
+    with pytest.raises(UserError, match="° apart somewhere on the turn") as error:
+        bin_apart(views, np.full((len(views), BINS), 1 / BINS))
+    widest = np.diff(np.sort(views), append=views.min() + 360).max()
+    assert f"{widest:.0f}°" in str(error.value)
+
+
+def test_a_view_every_15_degrees_is_enough():
+    views = np.arange(0, 360, WIDEST_GAP_DEG) + 7.0
+    assert bin_apart(views, np.full((len(views), 120), 1 / 120)).shape == (120, 120)
+
+
+def test_a_gap_over_0_degrees_is_seen():
+    views = np.arange(10.0, 351.0, 10.0)
+    with pytest.raises(UserError, match="20°"):
+        bin_apart(views, np.full((len(views), BINS), 1 / BINS))
+
+
+# Temperature
+
+
+@pytest.mark.parametrize("temperature", [0.3, 1.0, 4.0])
+def test_the_temperature_of_samples_is_found(temperature):
+    """Truths that are drawn from the distributions at a temperature, at the classes' centres."""
+    rng = np.random.default_rng(0)
+    logits = rng.normal(0, 3, (4000, BINS))
+    p = np.exp(logits / temperature)
+    p /= p.sum(axis=1, keepdims=True)
+    truth = np.array([rng.choice(BINS, p=row) for row in p]) * WIDTH
+    halves = [
+        turn(azimuth_deg=truth[part], logits=logits[part]) for part in (np.s_[:1500], np.s_[1500:])
+    ]
+    assert temperature_of(halves) == pytest.approx(temperature, rel=0.1)
+
+
+def test_logits_that_grow_raise_the_temperature():
+    one, other = turn(), turn(logits=5 * turn().logits)
+    assert temperature_of([other]) == pytest.approx(5 * temperature_of([one]), rel=1e-3)
+
+
+# What is familiar
+
+
+def two_kinds(seed=0, n_objects=4, n_hidden=40, noise=0.3):
+    """Hidden activations that turn with the azimuth in two directions of many."""
+    rng = np.random.default_rng(seed)
+    across = rng.normal(0, 1, (2, n_hidden))
+    spread = rng.uniform(0.1, 3.0, n_hidden)
+    turns = []
+    for index in range(n_objects):
+        angle = np.radians(AZIMUTHS)
+        aim = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ across
+        hidden = 5 * aim + noise * spread * rng.normal(0, 1, (BINS, n_hidden))
+        turns.append(turn(f"o{index}", hidden=hidden.astype(np.float32)))
+    return turns
+
+
+def test_components_are_white_within_each_range_of_azimuths():
+    turns = two_kinds(n_objects=30, n_hidden=12)
+    found = fit_familiarity(turns)
+    hidden = np.concatenate([one.hidden for one in turns])
+    assert found.offset == pytest.approx(hidden.mean(axis=0), abs=1e-4)
+    places = (hidden - found.offset) @ found.projection
+    of_range = np.tile(np.arange(BINS), len(turns))
+    within = []
+    for one in range(N_RANGES):
+        members = places[of_range == one]
+        assert found.centres[one] == pytest.approx(members.mean(axis=0), abs=1e-3)
+        within.append(members - members.mean(axis=0))
+    within = np.concatenate(within)
+    covariance = within.T @ within / (len(within) - 1)
+    assert covariance == pytest.approx(np.eye(12), abs=0.01)
+
+
+def test_no_more_components_than_asked_for():
+    found = fit_familiarity(two_kinds(n_hidden=100))
+    assert found.projection.shape == (100, N_COMPONENTS)
+    assert found.centres.shape == (N_RANGES, N_COMPONENTS)
+
+
+def test_the_threshold_is_that_of_objects_left_out():
+    turns = two_kinds(n_objects=3)
+    scores = []
+    for left_out in ("o0", "o1", "o2"):
+        known = fit_familiarity([one for one in turns if one.object_id != left_out])
+        own = next(one.hidden for one in turns if one.object_id == left_out)
+        scores.append(unfamiliarity(known.projection, known.offset, known.centres, own))
+    wanted = np.quantile(np.concatenate(scores), 0.95)
+    assert fit_familiarity(turns).threshold == pytest.approx(wanted, rel=1e-6)
+
+
+def test_two_turns_of_one_object_are_left_out_together():
+    one = two_kinds(n_objects=2)
+    doubled = [*one, turn("o0", hidden=one[0].hidden, elevation=30.0)]
+    known = fit_familiarity([one[1]])
+    scores = [unfamiliarity(known.projection, known.offset, known.centres, one[0].hidden)] * 2
+    # Where its own copy counted, the object left out would be familiar.
+    others = fit_familiarity([one[0], doubled[2]])
+    scores.append(unfamiliarity(others.projection, others.offset, others.centres, one[1].hidden))
+    wanted = np.quantile(np.concatenate(scores), 0.95)
+    assert fit_familiarity(doubled).threshold == pytest.approx(wanted, rel=1e-5)
+
+
+def test_one_object_is_its_own_measure():
+    only = [
+        turn(
+            hidden=np.random.default_rng(0).normal(0, 1, (10 * BINS, 8)).astype(np.float32),
+            azimuth_deg=np.arange(10 * BINS) * 1.5,
+        )
+    ]
+    known = fit_familiarity(only)
+    score = unfamiliarity(known.projection, known.offset, known.centres, only[0].hidden)
+    assert np.mean(score <= known.threshold) == pytest.approx(0.95, abs=0.01)
+
+
+def test_what_was_never_seen_is_unfamiliar():
+    turns = two_kinds(n_objects=6)
+    known = fit_familiarity(turns[:5])
+    held_out = unfamiliarity(known.projection, known.offset, known.centres, turns[5].hidden)
+    strange = np.random.default_rng(1).normal(0, 8, (50, 40)).astype(np.float32)
+    found = unfamiliarity(known.projection, known.offset, known.centres, strange)
+    assert np.mean(held_out <= known.threshold) > 0.6
+    assert found.min() > known.threshold
+
+
+@given(scale=st.floats(0.5, 20.0), seed=st.integers(0, 100))
+def test_familiarity_does_not_depend_on_the_unit_of_activations(scale, seed):
+    turns = two_kinds(seed)
+    scaled = [turn(one.object_id, hidden=one.hidden * np.float32(scale)) for one in turns]
+    assert fit_familiarity(scaled).threshold == pytest.approx(
+        fit_familiarity(turns).threshold, rel=0.02
+    )
+
+
+def test_distances_are_to_the_nearest_centre(rng):
+    hidden, offset = rng.normal(0, 1, (7, 5)), rng.normal(0, 1, 5)
+    projection, centres = rng.normal(0, 1, (5, 3)), rng.normal(0, 1, (4, 3))
+    wanted = [
+        min(np.linalg.norm((row - offset) @ projection - centre) for centre in centres)
+        for row in hidden
+    ]
+    assert unfamiliarity(projection, offset, centres, hidden) == pytest.approx(wanted)
+
+
+# The paper's tables
+
+
+def test_each_elevation_has_the_lookup_table_of_its_own_pairs(bundle):
+    """As made of calibration pairs that are a degree apart."""
+    density = {**DENSITY, "bandwidths_deg": [6, 12], "pseudo_observations": [10]}
+    found = paper_tables(bundle.elevation_deg, bundle.distributions, density)
+    assert found.elevation_deg.tolist() == [0.0, 30.0]
+    angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
+    for elevation, rotations in zip(found.elevation_deg, found.rotation_deg, strict=True):
+        of_level = bundle.distributions[bundle.elevation_deg == elevation]
+        means = np.degrees(np.angle(of_level @ angles))
+        # Views between two bins take the error of the nearer one; of equals, that of the first.
+        view = np.arange(360)
+        near = np.array([np.abs((AZIMUTHS - v + 180) % 360 - 180).argmin() for v in view])
+        estimates = (means[:, near] + view - AZIMUTHS[near]) % 360
+        wanted = chosen_lookup(estimates, "pose_ambiguity", density).recommended_delta_deg
+        assert np.mean(rotations == wanted) > 0.99
+
+
+# A bundle for another camera
+
+
+def test_a_bundle_is_calibrated_again(bundle):
+    logits = 2 * soft_turns(np.random.default_rng(5), 3)
+    hidden = np.random.default_rng(6).normal(0, 1, (3, BINS, 40)).astype(np.float32)
+    turns = [
+        turn("x", logits=logits[0], hidden=hidden[0], elevation=10.0),
+        turn("x", logits=logits[1], hidden=hidden[1], elevation=np.nan),
+        turn("y", logits=logits[2], hidden=hidden[2], elevation=40.0),
+    ]
+    found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY)
+    assert found.object_ids == ("x", "x", "y", *bundle.object_ids)
+    assert np.array_equal(
+        found.elevation_deg, [10.0, np.nan, 40.0, *bundle.elevation_deg], equal_nan=True
+    )
+    assert found.elevation_deg.dtype == found.turn_weight.dtype == np.float32
+    assert found.turn_weight[:3].tolist() == [1.0, 1.0, 1.0]
+    assert found.turn_weight[3:] == pytest.approx(PRIOR_TURNS / len(bundle.object_ids))
+    assert found.temperature == temperature_of(turns)
+    # The bundle's own turns stay, as they are at the new temperature.
+    prior = np.log(bundle.distributions.astype(float)) * bundle.temperature / found.temperature
+    prior -= np.log(np.exp(prior).sum(axis=-1, keepdims=True))
+    assert np.log(found.distributions[3:]) == pytest.approx(prior, abs=1e-3)
+    for row, own in zip(found.distributions[:3], logits, strict=True):
+        assert row == pytest.approx(distributions_of(own, found.temperature), rel=1e-5)
+    known = bundle.familiarity
+    scores = [unfamiliarity(known.projection, known.offset, known.centres, h) for h in hidden]
+    assert found.familiarity.threshold == pytest.approx(np.quantile(np.concatenate(scores), 0.95))
+    assert np.array_equal(found.familiarity.projection, known.projection)
+    wanted = paper_tables(np.array([10.0, 0.0, 40.0]), found.distributions[:3], ONE_DENSITY)
+    assert found.paper.elevation_deg.tolist() == [0.0, 10.0, 40.0]
+    assert np.array_equal(found.paper.rotation_deg, wanted.rotation_deg)
+    assert found.weights is bundle.weights
+    assert found.provenance == {**bundle.provenance, "calibrated_by": "recording.csv"}
+    assert "calibrated_by" not in bundle.provenance
+
+
+def test_without_elevations_all_turns_count_alike(bundle):
+    turns = [turn("x", 1, elevation=np.nan), turn("y", 2, elevation=np.nan)]
+    found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY)
+    found = replace(found, elevation_deg=np.full(len(found.elevation_deg), np.nan, np.float32))
+    codes = np.random.default_rng(0).integers(0, 256, (1, 32, 32)).astype(np.uint8)
+    recommender = Recommender(found, "torch")
+    one, other = (recommender.recommend_crops(codes, elevation_deg=e) for e in (None, 20.0))
+    assert one.move == other.move
+
+
+def test_a_turn_with_a_gap_does_not_calibrate(bundle):
+    with pytest.raises(UserError, match="apart somewhere on the turn"):
+        recalibrated(bundle, [turn(), turn("b", azimuth_deg=AZIMUTHS[3:])], "recording.csv")

@@ -1,0 +1,374 @@
+"""A bundle as a file: what was written comes back, and what was damaged is one line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import safetensors
+import safetensors.numpy
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from made_bundles import made_bundle
+
+from nbv.bundles.bundle import (
+    FORMAT,
+    PROBABILITY_STEP,
+    as_steps,
+    from_steps,
+    load_bundle,
+    save_bundle,
+)
+from nbv.bundles.recommender import Recommender, bundle_path, unfamiliarity
+from nbv.errors import UserError
+
+# Round trips
+
+
+def test_everything_but_distributions_comes_back_exactly(bundle, bundle_file):
+    found = load_bundle(bundle_file)
+    assert set(found.weights) == set(bundle.weights)
+    for name, array in bundle.weights.items():
+        assert found.weights[name].dtype == array.dtype
+        assert found.weights[name].shape == array.shape
+        assert np.array_equal(found.weights[name], array), name
+    for name in ("projection", "offset", "centres"):
+        wanted = getattr(bundle.familiarity, name)
+        assert np.array_equal(getattr(found.familiarity, name), wanted), name
+    assert found.familiarity.threshold == bundle.familiarity.threshold
+    assert np.array_equal(found.elevation_deg, bundle.elevation_deg)
+    for name in (
+        *("category", "estimator", "camera", "diagonal_m", "extent_m", "focal_px", "temperature"),
+        *("object_ids", "affinity", "provenance", "n_bins"),
+    ):
+        assert getattr(found, name) == getattr(bundle, name), name
+
+
+def test_distributions_come_back_within_the_step(bundle, bundle_file):
+    found = load_bundle(bundle_file).distributions
+    assert found.dtype == np.float32
+    assert found.sum(axis=-1) == pytest.approx(1.0, abs=1e-5)
+    # Half a step, and what the rows are divided by to sum to 1 again.
+    ratio = np.log(found) - np.log(bundle.distributions)
+    assert np.abs(ratio - np.median(ratio, axis=-1, keepdims=True)).max() < PROBABILITY_STEP + 1e-4
+    assert np.abs(ratio).max() < 1.5 * PROBABILITY_STEP
+
+
+def test_a_second_round_changes_nothing(bundle_file, tmp_path):
+    once = load_bundle(bundle_file)
+    save_bundle(tmp_path / "twice.safetensors", once)
+    twice = load_bundle(tmp_path / "twice.safetensors")
+    apart = as_steps(once.distributions).astype(int) - as_steps(twice.distributions)
+    assert np.abs(apart).max() <= 1
+    assert all(np.array_equal(once.weights[name], twice.weights[name]) for name in once.weights)
+
+
+def test_the_same_bundle_gives_the_same_bytes(bundle, bundle_file, tmp_path):
+    save_bundle(tmp_path / "again.safetensors", bundle)
+    assert (tmp_path / "again.safetensors").read_bytes() == bundle_file.read_bytes()
+
+
+def test_it_does_not_matter_how_arrays_lie_in_memory(bundle, bundle_file, tmp_path):
+    """safetensors writes memory as it lies: an array in another order came back scrambled."""
+
+    def other_order(array):
+        return np.asfortranarray(array)
+
+    familiarity = replace(
+        bundle.familiarity,
+        projection=other_order(bundle.familiarity.projection),
+        centres=other_order(bundle.familiarity.centres),
+    )
+    changed = replace(
+        bundle,
+        weights={name: other_order(array) for name, array in bundle.weights.items()},
+        distributions=other_order(bundle.distributions),
+        elevation_deg=np.repeat(bundle.elevation_deg, 2)[::2],
+        familiarity=familiarity,
+    )
+    save_bundle(tmp_path / "a.safetensors", changed)
+    assert (tmp_path / "a.safetensors").read_bytes() == bundle_file.read_bytes()
+
+
+def test_what_is_familiar_stays_familiar(bundle, bundle_file, rng):
+    hidden = rng.normal(0, 1, (50, len(bundle.familiarity.offset))).astype(np.float32)
+    loaded = load_bundle(bundle_file).familiarity
+    scores = [
+        unfamiliarity(known.projection, known.offset, known.centres, hidden)
+        for known in (bundle.familiarity, loaded)
+    ]
+    assert np.array_equal(*scores)
+
+
+def test_weights_without_axes_keep_none(tmp_path):
+    weights = {"scale": np.array(3.0, dtype=np.float32), "one": np.ones((1,), dtype=np.float32)}
+    save_bundle(tmp_path / "a.safetensors", made_bundle(weights=weights))
+    found = load_bundle(tmp_path / "a.safetensors").weights
+    assert found["scale"].shape == ()
+    assert found["one"].shape == (1,)
+
+
+def test_provenance_may_be_any_json(tmp_path):
+    provenance = {"versions": {"numpy": "2.4"}, "epochs": {10: "ten", 2: "two"}, "ü": [1.5, None]}
+    save_bundle(tmp_path / "a.safetensors", made_bundle(provenance=provenance))
+    found = load_bundle(tmp_path / "a.safetensors").provenance
+    assert found == {**provenance, "epochs": {"10": "ten", "2": "two"}}
+
+
+def test_a_bundle_serves_from_its_file(recommender, bundle_file):
+    codes = np.random.default_rng(3).integers(0, 256, (4, 32, 32)).astype(np.uint8)
+    loaded = Recommender.load(bundle_file, "torch")
+    assert np.array_equal(loaded.distributions(codes), recommender.distributions(codes))
+
+
+# Steps
+
+
+@given(arrays(np.float64, (4, 24), elements=st.floats(1e-6, 1.0)))
+def test_steps_keep_probabilities_within_half_a_step(values):
+    rows = values / values.sum(axis=1, keepdims=True)
+    steps = as_steps(rows)
+    assert steps.dtype == np.uint8
+    kept = np.exp(-PROBABILITY_STEP * steps.astype(float))
+    in_range = rows > np.exp(-255 * PROBABILITY_STEP)
+    assert np.abs(np.log(kept / rows))[in_range].max() <= PROBABILITY_STEP / 2 + 1e-9
+    assert from_steps(steps) == pytest.approx(kept / kept.sum(axis=1, keepdims=True), rel=1e-4)
+
+
+@given(arrays(np.uint8, (3, 16)))
+def test_steps_of_steps_are_the_same(steps):
+    """Up to the same number of steps in the whole row, which the sum of 1 takes off."""
+    again = as_steps(from_steps(steps)).astype(int)
+    apart = again - steps
+    inside = (again < 255) & (steps < 255)
+    for row, kept in zip(apart, inside, strict=True):
+        if kept.any():
+            assert row[kept].max() - row[kept].min() <= 1
+
+
+def test_impossible_and_certain_have_steps():
+    steps = as_steps(np.array([0.0, 1e-40, 1e-6, 1.0, 1.0 + 1e-7]))
+    assert steps.tolist() == [255, 255, 255, 0, 0]
+    assert np.exp(-255 * PROBABILITY_STEP) == pytest.approx(1e-6, rel=0.1)
+
+
+# Damage
+
+
+def refused(path) -> str:
+    with pytest.raises(UserError) as error:
+        load_bundle(path)
+    message = str(error.value)
+    assert "\n" not in message
+    assert path.name in message
+    return message
+
+
+def written(path, content: bytes):
+    path.write_bytes(content)
+    return path
+
+
+def with_about(bundle_file, path, **changes):
+    """The same arrays with other metadata, and without the digest."""
+    with safetensors.safe_open(bundle_file, framework="numpy") as stored:
+        about = json.loads(stored.metadata()["nbv"])
+        arrays_ = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
+    about.pop("sha256")
+    about |= changes
+    about = {name: value for name, value in about.items() if value is not None}
+    return written(path, safetensors.numpy.save(arrays_, metadata={"nbv": json.dumps(about)}))
+
+
+def test_a_missing_file_is_named(tmp_path):
+    assert "does not exist" in refused(tmp_path / "none.safetensors")
+    assert "does not exist" in refused(tmp_path)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.0001, 0.001, 0.01, 0.1, 0.5, 0.9, 0.9999])
+def test_a_file_that_is_cut_short_is_one_line(bundle_file, tmp_path, share):
+    content = bundle_file.read_bytes()
+    refused(written(tmp_path / "a.safetensors", content[: int(share * len(content))]))
+
+
+def test_a_longer_file_is_one_line(bundle_file, tmp_path):
+    refused(written(tmp_path / "a.safetensors", bundle_file.read_bytes() + b"\0"))
+
+
+def test_other_files_are_no_bundles(bundle, tmp_path):
+    refused(written(tmp_path / "a.safetensors", b"not a bundle at all" * 100))
+    np.save(tmp_path / "a.npy", np.ones(5))
+    refused(tmp_path / "a.npy")
+    plain = safetensors.numpy.save(dict(bundle.weights))
+    assert "no bundle of nbv" in refused(written(tmp_path / "b.safetensors", plain))
+    other = safetensors.numpy.save(dict(bundle.weights), metadata={"format": "pt"})
+    assert "no bundle of nbv" in refused(written(tmp_path / "c.safetensors", other))
+
+
+def test_an_estimator_is_no_bundle(tmp_path):
+    import torch
+    from made_bundles import SIDE, settings
+
+    from nbv.estimation.hardware import choose_hardware
+    from nbv.estimation.networks import build_network
+    from nbv.estimation.weights import Estimator, save_estimator
+
+    torch.manual_seed(0)
+    estimator = Estimator(build_network(settings(), SIDE), settings(), SIDE, ["a"])
+    save_estimator(tmp_path / "e.safetensors", estimator, choose_hardware("cpu", "float32"))
+    assert "is an estimator, no bundle" in refused(tmp_path / "e.safetensors")
+
+
+def test_a_newer_format_says_what_to_do(bundle_file, tmp_path):
+    path = with_about(bundle_file, tmp_path / "a.safetensors", format=FORMAT + 1)
+    message = refused(path)
+    assert f"format {FORMAT + 1}" in message
+    assert "install a newer nbv" in message
+
+
+def test_a_bundle_without_a_digest_is_read(bundle_file, tmp_path):
+    path = with_about(bundle_file, tmp_path / "a.safetensors", provenance={"by": "hand"})
+    assert load_bundle(path).provenance == {"by": "hand"}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"format": "one"},
+        {"camera": None},
+        {"camera": {"lens": 3}},
+        {"extent_m": [0.1]},
+        {"extent_m": [0.2, 0.1]},
+        {"extent_m": [0.0, 0.1]},
+        {"extent_m": [float("nan"), 0.1]},
+        {"diagonal_m": 0.0},
+        {"diagonal_m": "large"},
+        {"focal_px": -600.0},
+        {"temperature": float("nan")},
+        {"temperature": float("inf")},
+        {"familiar_within": 0.0},
+        {"object_ids": []},
+        {"object_ids": ["a"]},
+        {"estimator": {}},
+        {"estimator": {"n_classes": 120}},
+        {"affinity": None},
+    ],
+    ids=str,
+)
+def test_metadata_that_makes_no_sense_is_one_line(bundle_file, tmp_path, changes):
+    path = with_about(bundle_file, tmp_path / "a.safetensors", **changes)
+    assert "no sound bundle" in refused(path)
+
+
+@pytest.mark.parametrize("name", ["weights", "familiarity", "elevation_deg", "turn_weight"])
+def test_numbers_that_are_not_finite_are_one_line(bundle, tmp_path, name):
+    changed = {
+        "weights": {key: array.copy() for key, array in bundle.weights.items()},
+        "familiarity": replace(bundle.familiarity, offset=np.full(40, np.inf, np.float32)),
+        "elevation_deg": bundle.elevation_deg + np.float32(np.inf),
+        "turn_weight": bundle.turn_weight * np.float32(np.inf),
+    }
+    next(iter(changed["weights"].values())).flat[0] = np.nan
+    save_bundle(tmp_path / "a.safetensors", replace(bundle, **{name: changed[name]}))
+    assert "not finite" in refused(tmp_path / "a.safetensors")
+
+
+def test_arrays_that_do_not_fit_are_one_line(bundle, tmp_path):
+    for changes in (
+        {"distributions": bundle.distributions[:-1]},
+        {"distributions": bundle.distributions[:, :-1]},
+        {"elevation_deg": bundle.elevation_deg[:-1]},
+        {"turn_weight": bundle.turn_weight[:-1]},
+        {"turn_weight": np.zeros_like(bundle.turn_weight)},
+        {"object_ids": bundle.object_ids[:-1]},
+        {"estimator": {**bundle.estimator, "n_classes": 12}},
+    ):
+        save_bundle(tmp_path / "a.safetensors", replace(bundle, **changes))
+        assert "no sound bundle" in refused(tmp_path / "a.safetensors")
+
+
+def test_random_damage_is_one_line_or_harmless(bundle, bundle_file, tmp_path):
+    """200 times: bytes that are changed, taken out, put in, or exchanged."""
+    content, rng = bundle_file.read_bytes(), np.random.default_rng(20)
+    header = int.from_bytes(content[:8], "little") + 8
+    n_refused = 0
+    for case in range(200):
+        damaged = bytearray(content)
+        # Half of the time in the header, which is short.
+        end = header if case % 2 else len(content)
+        place, length = int(rng.integers(0, end)), int(rng.integers(1, 40))
+        kind = case // 2 % 5
+        if kind == 0:
+            damaged[place] ^= 1 << int(rng.integers(0, 8))
+        elif kind == 1:
+            damaged[place : place + length] = rng.bytes(length)
+        elif kind == 2:
+            del damaged[place : place + length]
+        elif kind == 3:
+            damaged[place:place] = rng.bytes(length)
+        else:
+            damaged[place : place + length] = bytes(length)
+        path = written(tmp_path / "a.safetensors", bytes(damaged))
+        try:
+            found = load_bundle(path)
+        except UserError as error:
+            message = str(error)
+        else:
+            # Only where nothing that is used has changed: a name that nobody reads.
+            assert all(
+                np.array_equal(found.weights[name], bundle.weights[name]) for name in bundle.weights
+            )
+            assert found.camera == bundle.camera
+            continue
+        n_refused += 1
+        assert "\n" not in message
+        assert "a.safetensors" in message
+    assert n_refused >= 190
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_bit_anywhere_in_an_array_is_noticed(bundle_file, tmp_path, seed):
+    content, rng = bytearray(bundle_file.read_bytes()), np.random.default_rng(seed)
+    header = int.from_bytes(content[:8], "little") + 8
+    for _ in range(20):
+        place, bit = int(rng.integers(header, len(content))), 1 << int(rng.integers(0, 8))
+        content[place] ^= bit
+        assert "no sound bundle" in refused(written(tmp_path / "a.safetensors", bytes(content)))
+        content[place] ^= bit
+    load_bundle(written(tmp_path / "a.safetensors", bytes(content)))
+
+
+# Names
+
+
+def test_a_bundle_is_found_by_its_file(bundle_file, tmp_path, monkeypatch):
+    assert bundle_path(bundle_file) == bundle_file
+    assert bundle_path(str(bundle_file)) == bundle_file
+    monkeypatch.chdir(bundle_file.parent)
+    assert bundle_path(bundle_file.name).resolve() == bundle_file.resolve()
+
+
+def test_shipped_bundles_are_found_by_their_names(tmp_path, monkeypatch):
+    from nbv.bundles import recommender as module
+
+    (tmp_path / "shipped").mkdir()
+    for name in ("mug.safetensors", "chair.safetensors", "README.md"):
+        (tmp_path / "shipped" / name).write_bytes(b"")
+    monkeypatch.setattr(module.resources, "files", lambda package: tmp_path)
+    assert list(module.shipped_bundles()) == ["chair", "mug"]
+    assert bundle_path("mug") == tmp_path / "shipped" / "mug.safetensors"
+    with pytest.raises(UserError, match="did you mean 'mug'"):
+        bundle_path("mugg")
+    with pytest.raises(UserError, match="choose from: chair, mug"):
+        bundle_path("spaceship")
+
+
+def test_without_shipped_bundles_a_name_is_one_line(tmp_path, monkeypatch):
+    from nbv.bundles import recommender as module
+
+    monkeypatch.setattr(module.resources, "files", lambda package: tmp_path)
+    with pytest.raises(UserError, match="no bundle comes with this nbv"):
+        bundle_path("mug")

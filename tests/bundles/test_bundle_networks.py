@@ -1,0 +1,187 @@
+"""A bundle's network: the same outputs from torch, from ONNX, and from the trained network."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from made_bundles import SIDE, made_bundle, random_codes, random_weights, settings
+
+from nbv.angles import circular_distance_deg
+from nbv.bundles.beliefs import distributions_of
+from nbv.bundles.networks import open_network
+from nbv.errors import UserError
+from nbv.estimation.hardware import choose_hardware
+from nbv.estimation.inference import network_outputs
+from nbv.estimation.networks import build_network
+from nbv.estimation.outputs import decode_classes
+from nbv.estimation.weights import Estimator
+from nbv.recommendation.belief import mean_direction_deg
+from nbv.rendering.camera import Camera
+
+KINDS = {
+    "small": (settings(), SIDE),
+    # As in config/estimator/classifier.yaml, with few channels.
+    "five layers": (settings(120, (4, 6, 8, 10, 12), 32), 64),
+    "one layer": (settings(36, (5,), 16), 24),
+    "odd side": (settings(24, (4, 6, 8), 16), 45),
+}
+
+
+def bundle_of(kind: str, seed: int = 0):
+    estimator, side = KINDS[kind]
+    # Logits of a small range: what single precision rounds grows with them.
+    weights = random_weights(estimator, side, seed, sharpness=0.7)
+    camera = Camera(image_side=side)
+    return made_bundle(weights=weights, estimator=estimator, camera=camera)
+
+
+def onnx_network(bundle):
+    pytest.importorskip("onnx")
+    pytest.importorskip("onnxruntime")
+    return open_network(bundle, "onnx")
+
+
+def test_batch_norms_of_the_fixture_are_not_the_identity(bundle):
+    """Else the tests below would not notice where they are left out."""
+    assert np.abs(bundle.weights["0.3.running_mean"]).max() > 0.01
+    assert np.abs(bundle.weights["0.3.running_var"] - 1).max() > 0.1
+    assert np.abs(bundle.weights["0.3.weight"] - 1).max() > 0.1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_onnx_gives_the_outputs_of_torch(kind, rng):
+    bundle = bundle_of(kind)
+    codes = random_codes(rng, 200, bundle.camera.image_side)
+    logits, hidden = onnx_network(bundle)(codes)
+    wanted, wanted_hidden = open_network(bundle, "torch")(codes)
+    assert np.ptp(wanted) > 1
+    assert np.abs(logits - wanted).max() < 1e-4
+    assert np.abs(hidden - wanted_hidden).max() < 1e-4
+    apart = circular_distance_deg(
+        decode_classes(logits.astype(float)), decode_classes(wanted.astype(float))
+    )
+    assert apart.max() < 0.01
+
+
+def test_onnx_gives_the_directions_of_torch(rng):
+    for seed in range(3):
+        bundle = bundle_of("small", seed)
+        codes = random_codes(rng, 200)
+        directions = [
+            mean_direction_deg(distributions_of(network(codes)[0], bundle.temperature))
+            for network in (onnx_network(bundle), open_network(bundle, "torch"))
+        ]
+        assert circular_distance_deg(*directions).max() < 0.01
+
+
+def test_the_graph_is_sound_and_has_no_batch_norm():
+    onnx = pytest.importorskip("onnx")
+    from nbv.bundles.onnx_graph import onnx_model
+
+    bundle = bundle_of("five layers")
+    model = onnx_model(bundle)
+    onnx.checker.check_model(model, full_check=True)
+    kinds = [node.op_type for node in model.graph.node]
+    assert kinds.count("Conv") == 5
+    assert "BatchNormalization" not in kinds
+    (codes,) = model.graph.input
+    shape = [size.dim_param or size.dim_value for size in codes.type.tensor_type.shape.dim]
+    assert shape == ["n", 1, 64, 64]
+    assert [output.name for output in model.graph.output] == ["logits", "hidden"]
+    assert onnx_model(bundle).SerializeToString() == model.SerializeToString()
+
+
+def test_the_graph_is_made_without_torch(bundle_file, tmp_path):
+    pytest.importorskip("onnx")
+    import subprocess
+
+    script = (
+        "import sys; sys.modules['torch'] = None\n"
+        "from nbv.bundles.bundle import load_bundle\n"
+        "from nbv.bundles.onnx_graph import onnx_model\n"
+        f"onnx_model(load_bundle({str(bundle_file)!r}))\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+@pytest.mark.parametrize("backend", ["onnx", "torch"])
+def test_an_image_does_not_depend_on_those_next_to_it(bundle, rng, backend):
+    network = onnx_network(bundle) if backend == "onnx" else open_network(bundle, "torch")
+    codes = random_codes(rng, 7)
+    logits, hidden = network(codes)
+    assert logits.shape == (7, 24)
+    assert hidden.shape == (7, 40)
+    assert logits.dtype == hidden.dtype == np.float32
+    for place in (0, 3, 6):
+        one, _ = network(codes[place : place + 1])
+        assert one[0] == pytest.approx(logits[place], abs=1e-4)
+    # Codes are a whole batch in any memory order.
+    assert network(codes[::-1])[0][::-1] == pytest.approx(logits, abs=1e-4)
+
+
+def test_torch_gives_the_outputs_of_the_trained_network(bundle, rng):
+    """The estimator's own, as the experiments compute them."""
+    network = build_network(bundle.estimator, SIDE)
+    network.load_state_dict({n: torch.from_numpy(a) for n, a in bundle.weights.items()})
+    estimator = Estimator(network.eval(), bundle.estimator, SIDE, [])
+    codes = random_codes(rng, 50)
+    wanted = network_outputs(estimator, codes, choose_hardware("cpu", "float32"))
+    logits, hidden = open_network(bundle, "torch")(codes)
+    assert logits == pytest.approx(wanted, abs=1e-5)
+    assert (hidden >= 0).all()
+    assert (hidden > 0).any()
+    last = bundle.weights["4.weight"], bundle.weights["4.bias"]
+    assert hidden @ last[0].T + last[1] == pytest.approx(logits, abs=1e-4)
+
+
+def test_the_background_is_0_and_the_reference_is_1(bundle):
+    """An image of one code is a constant input: 0, 1 and 255 / 128."""
+    network = open_network(bundle, "torch")
+    own = build_network(bundle.estimator, SIDE)
+    own.load_state_dict({n: torch.from_numpy(a) for n, a in bundle.weights.items()})
+    for code, value in ((0, 0.0), (128, 1.0), (255, 255 / 128)):
+        with torch.inference_mode():
+            wanted = own.eval()(torch.full((1, 1, SIDE, SIDE), value)).numpy()
+        found, _ = network(np.full((1, SIDE, SIDE), code, dtype=np.uint8))
+        assert found == pytest.approx(wanted, abs=1e-5)
+
+
+def test_weights_that_do_not_fit_are_one_line(bundle):
+    for weights in (
+        {name: array for name, array in bundle.weights.items() if name != "2.weight"},
+        {**bundle.weights, "2.weight": bundle.weights["2.weight"][:, :-1]},
+        {**bundle.weights, "9.weight": bundle.weights["2.weight"]},
+    ):
+        with pytest.raises(UserError, match="do not fit"):
+            open_network(replace(bundle, weights=weights), "torch")
+
+
+def test_an_unknown_backend_is_one_line(bundle):
+    with pytest.raises(UserError, match="did you mean 'onnx'"):
+        open_network(bundle, "onyx")
+    with pytest.raises(UserError, match="choose from: onnx, torch"):
+        open_network(bundle, "gpu")
+
+
+@pytest.mark.parametrize("missing", ["onnx", "onnxruntime"])
+def test_without_its_packages_onnx_is_one_line_and_torch_the_default(
+    bundle, rng, monkeypatch, missing
+):
+    other = {"onnx": "onnxruntime", "onnxruntime": "onnx"}[missing]
+    pytest.importorskip(other)
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(UserError, match=r"nbv\[onnx\]"):
+        open_network(bundle, "onnx")
+    codes = random_codes(rng, 2)
+    found, _ = open_network(bundle)(codes)
+    assert np.array_equal(found, open_network(bundle, "torch")(codes)[0])
+
+
+def test_onnx_is_the_default_where_it_is_installed(bundle, rng):
+    codes = random_codes(rng, 2)
+    wanted, _ = onnx_network(bundle)(codes)
+    assert np.array_equal(open_network(bundle)(codes)[0], wanted)

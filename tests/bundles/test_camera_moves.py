@@ -1,0 +1,268 @@
+"""Poses of the camera after a rotation about the object."""
+
+from __future__ import annotations
+
+import io
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
+
+from nbv.bundles.moves import as_pose, moved_camera, read_pose, rotation_about
+from nbv.errors import UserError
+from nbv.rendering.camera import viewpoint_frames
+
+points = arrays(np.float64, (3,), elements=st.floats(-3, 3))
+directions = points.filter(lambda axis: np.linalg.norm(axis) > 1e-3)
+angles = st.floats(-720, 720)
+seeds = st.integers(0, 10**6)
+
+
+def random_pose(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+    pose[:3, 3] = rng.uniform(-2, 2, 3)
+    return pose
+
+
+def camera_at(elevation: float, azimuth: float, distance: float, centre) -> np.ndarray:
+    """An optical frame (z forward, x right, y down) that is directed at a point."""
+    right, up, forward = (axes[0] for axes in viewpoint_frames(elevation, [azimuth]))
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([right, -up, forward], axis=1)
+    pose[:3, 3] = centre - distance * forward
+    return pose
+
+
+def azimuth_of(pose, centre, up=(0.0, 0.0, 1.0)) -> float:
+    """Of a camera about an upright axis, degrees."""
+    turn, _ = Rotation.align_vectors([[0, 0, 1]], [up])
+    x, y, _ = turn.apply(np.asarray(pose)[:3, 3] - centre)
+    return float(np.degrees(np.arctan2(y, x)))
+
+
+# Rotations
+
+
+@given(point=points, direction=directions, angle=angles)
+def test_rotations_are_those_of_scipy(point, direction, angle):
+    motion = rotation_about(point, direction, angle)
+    unit = direction / np.linalg.norm(direction)
+    turn = Rotation.from_rotvec(np.radians(angle) * unit).as_matrix()
+    assert motion[:3, :3] == pytest.approx(turn, abs=1e-9)
+    assert motion[:3, 3] == pytest.approx(point - turn @ point, abs=1e-8)
+    assert motion[3].tolist() == [0, 0, 0, 1]
+
+
+@given(point=points, direction=directions, angle=angles, along=st.floats(-5, 5))
+def test_points_of_the_axis_stay(point, direction, angle, along):
+    on_axis = point + along * direction
+    motion = rotation_about(point, direction, angle)
+    assert (motion @ [*on_axis, 1])[:3] == pytest.approx(on_axis, abs=1e-6)
+
+
+@given(point=points, direction=directions, first=angles, second=angles)
+def test_rotations_about_one_axis_add_up(point, direction, first, second):
+    both = rotation_about(point, direction, first) @ rotation_about(point, direction, second)
+    assert both == pytest.approx(rotation_about(point, direction, first + second), abs=1e-7)
+
+
+@given(point=points, direction=directions, angle=angles, scale=st.floats(0.01, 100.0))
+def test_only_the_direction_of_the_axis_matters(point, direction, angle, scale):
+    one = rotation_about(point, direction, angle)
+    assert rotation_about(point, scale * direction, angle) == pytest.approx(one, abs=1e-7)
+    assert rotation_about(point, -direction, -angle) == pytest.approx(one, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("point", "direction"),
+    [
+        ([0, 0, 0], [0, 0, 0]),
+        ([0, 0, 0], [1e-12, 0, 0]),
+        ([0, 0, 0], [np.nan, 0, 1]),
+        ([np.nan, 0, 0], [0, 0, 1]),
+        ([np.inf, 0, 0], [0, 0, 1]),
+    ],
+)
+def test_an_axis_has_a_point_and_a_direction(point, direction):
+    with pytest.raises(UserError, match="axis"):
+        rotation_about(point, direction, 10.0)
+
+
+# The camera
+
+
+@given(
+    elevation=st.floats(0, 80),
+    azimuth=st.floats(0, 360),
+    centre=points,
+    rotation=st.floats(-179, 179),
+)
+def test_the_azimuth_grows_by_the_rotation(elevation, azimuth, centre, rotation):
+    camera = camera_at(elevation, azimuth, 0.6, centre)
+    target = moved_camera(camera, centre, [0, 0, 1], rotation)
+    gained = azimuth_of(target, centre) - azimuth_of(camera, centre)
+    assert (gained - rotation + 180) % 360 - 180 == pytest.approx(0.0, abs=1e-6)
+    # It is the same camera at the new azimuth: directed at the object and as upright as before.
+    assert target == pytest.approx(camera_at(elevation, azimuth + rotation, 0.6, centre), abs=1e-9)
+
+
+@given(seed=seeds, centre=points, up=directions, rotation=st.floats(-179, 179))
+def test_the_azimuth_grows_about_any_upright_axis(seed, centre, up, rotation):
+    camera = random_pose(seed)
+    apart = np.cross(camera[:3, 3] - centre, up / np.linalg.norm(up))
+    if np.linalg.norm(apart) < 0.05:
+        return
+    target = moved_camera(camera, centre, up, rotation)
+    gained = azimuth_of(target, centre, up) - azimuth_of(camera, centre, up)
+    assert (gained - rotation + 180) % 360 - 180 == pytest.approx(0.0, abs=1e-4)
+
+
+@given(seed=seeds, centre=points, up=directions, rotation=angles)
+def test_distances_to_the_axis_and_along_it_are_kept(seed, centre, up, rotation):
+    camera, unit = random_pose(seed), up / np.linalg.norm(up)
+    target = moved_camera(camera, centre, up, rotation)
+    before, after = camera[:3, 3] - centre, target[:3, 3] - centre
+    assert after @ unit == pytest.approx(before @ unit, abs=1e-8)
+    assert np.linalg.norm(np.cross(after, unit)) == pytest.approx(
+        np.linalg.norm(np.cross(before, unit)), abs=1e-8
+    )
+    # What the camera sees of the axis does not move in its image.
+    for along in (-1.0, 0.0, 2.0):
+        point = [*(centre + along * unit), 1]
+        assert np.linalg.solve(target, point) == pytest.approx(
+            np.linalg.solve(camera, point), abs=1e-6
+        )
+
+
+@given(seed=seeds, centre=points, up=directions, rotation=angles)
+def test_a_rotation_and_its_inverse_lead_back(seed, centre, up, rotation):
+    camera = random_pose(seed)
+    there = moved_camera(camera, centre, up, rotation)
+    assert moved_camera(there, centre, up, -rotation) == pytest.approx(camera, abs=1e-7)
+    assert moved_camera(camera, centre, up, 0.0) == pytest.approx(camera, abs=1e-12)
+
+
+@given(seed=seeds, base=seeds, centre=points, up=directions, rotation=angles)
+def test_another_base_frame_gives_the_same_move(seed, base, centre, up, rotation):
+    camera, change = random_pose(seed), random_pose(base)
+    moved = moved_camera(
+        change @ camera, (change @ [*centre, 1])[:3], change[:3, :3] @ up, rotation
+    )
+    assert moved == pytest.approx(change @ moved_camera(camera, centre, up, rotation), abs=1e-6)
+
+
+# Poses
+
+
+@given(seed=seeds)
+def test_a_pose_is_16_numbers(seed):
+    pose = random_pose(seed)
+    assert np.array_equal(as_pose(pose), pose)
+    assert np.array_equal(as_pose(pose.ravel().tolist()), pose)
+
+
+def bad_poses():
+    pose = random_pose(1)
+    mirrored, scaled, bent, unreal = (pose.copy() for _ in range(4))
+    mirrored[:3, 0] *= -1
+    scaled[:3, :3] *= 1.01
+    bent[0, 0] += 0.05
+    unreal[0, 3] = np.nan
+    millimetres = 1000 * pose
+    return {
+        "transposed": pose.T,
+        "mirrored": mirrored,
+        "scaled": scaled,
+        "bent": bent,
+        "nan": unreal,
+        "all scaled": millimetres,
+        "zeros": np.zeros((4, 4)),
+        "ones": np.ones(16),
+    }
+
+
+@pytest.mark.parametrize("name", bad_poses())
+def test_what_is_no_rotation_with_a_translation_is_refused(name):
+    with pytest.raises(UserError, match="transposed or scaled"):
+        as_pose(bad_poses()[name])
+    with pytest.raises(UserError, match="camera pose"):
+        moved_camera(bad_poses()[name], [0, 0, 0], [0, 0, 1], 30.0)
+
+
+@pytest.mark.parametrize("values", [np.eye(3), np.ones((3, 4)), [], 1.0])
+def test_a_pose_of_another_size_is_refused(values):
+    with pytest.raises(UserError, match="give the 16 of a 4 × 4 matrix"):
+        as_pose(values)
+
+
+@pytest.mark.parametrize("values", ["pose", {"a": 1}, [[1, 2], [3]], [None, "x"]])
+def test_what_is_no_numbers_is_refused(values):
+    with pytest.raises(UserError, match="camera pose"):
+        as_pose(values)
+
+
+def test_rounded_numbers_are_a_pose():
+    as_pose(random_pose(3).round(4))
+
+
+# Files
+
+
+@given(seed=seeds)
+def test_every_form_of_file_gives_the_pose(tmp_path_factory, seed):
+    folder, pose = tmp_path_factory.mktemp("pose"), random_pose(seed)
+    np.save(folder / "a.npy", pose)
+    np.save(folder / "flat.npy", pose.ravel())
+    (folder / "a.json").write_text(json.dumps(pose.tolist()))
+    (folder / "flat.json").write_text(json.dumps(pose.ravel().tolist()))
+    np.savetxt(folder / "a.txt", pose, fmt="%.17g")
+    np.savetxt(folder / "a.csv", pose, fmt="%.17g", delimiter=",")
+    for path in folder.iterdir():
+        assert np.array_equal(read_pose(path), pose), path.name
+
+
+def damaged_poses() -> dict[str, bytes]:
+    buffer = io.BytesIO()
+    np.save(buffer, np.eye(4))
+    npy, archive, objects = buffer.getvalue(), io.BytesIO(), io.BytesIO()
+    np.savez(archive, pose=np.eye(4))
+    np.save(objects, np.array([{}], dtype=object))
+    return {
+        "empty.npy": b"",
+        "empty.json": b"",
+        "empty.txt": b"",
+        "cut.npy": npy[:-8],
+        "archive.npy": archive.getvalue(),
+        "half.npy": archive.getvalue()[:30],
+        "objects.npy": objects.getvalue(),
+        "text.npy": b"1 0 0 0",
+        "names.json": b'{"pose": 1}',
+        "null.json": b"null",
+        "deep.json": b"[" * 100_000,
+        "cut.json": b"[[1, 0, 0, 0], [0, 1",
+        "words.txt": b"one two three",
+        "bytes.txt": b"\xff\xfe\x00",
+        "short.txt": b"1 0 0 0 1 0 0 0 1",
+        "transposed.txt": b"1 0 0 0 0 1 0 0 0 0 1 0 5 5 5 1",
+    }
+
+
+@pytest.mark.parametrize("name", damaged_poses())
+def test_a_damaged_file_is_named_in_one_line(tmp_path, name):
+    (tmp_path / name).write_bytes(damaged_poses()[name])
+    with pytest.raises(UserError, match=name) as error:
+        read_pose(tmp_path / name)
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(UserError, match=r"no\.npy does not exist"):
+        read_pose(tmp_path / "no.npy")
+    with pytest.raises(UserError, match="cannot be read"):
+        read_pose(tmp_path)

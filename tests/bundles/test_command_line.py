@@ -1,0 +1,508 @@
+"""The commands: what they print, what they write, and how they fail."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_bundles import BINS, COLUMNS, FOCAL_PX, ROWS, WIDTH, frame
+
+pytest.importorskip("cyclopts")
+
+from nbv.bundles.bundle import load_bundle, save_bundle
+from nbv.bundles.calibration import DENSITY, recalibrated
+from nbv.bundles.evaluation import evaluate, familiarity_of
+from nbv.bundles.manifest import read_manifest, see
+from nbv.bundles.moves import moved_camera
+from nbv.bundles.recommender import Recommender
+from nbv.calibration.pairs import read_pairs
+from nbv.cli import main
+from nbv.frames.depth_files import read_depth
+from nbv.recommendation.density_selection import chosen_lookup
+from nbv.recommendation.lookup import load_lookup, save_lookup
+
+POSE = [[0.0, 0.0, 1.0, -0.6], [-1.0, 0.0, 0.0, 0.1], [0.0, -1.0, 0.0, 0.2], [0.0, 0.0, 0.0, 1.0]]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch, bundle_file) -> Path:
+    """A folder with four frames, a mask, a pose, and the bundle."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "b.safetensors").write_bytes(bundle_file.read_bytes())
+    for place in range(4):
+        np.save(tmp_path / f"f{place}.npy", frame(place))
+    np.save(tmp_path / "m.npy", frame(0) > 0)
+    (tmp_path / "pose.json").write_text(json.dumps(POSE))
+    return tmp_path
+
+
+@pytest.fixture
+def pairs(here) -> Path:
+    rng = np.random.default_rng(0)
+    views = np.arange(0, 360, 6)
+    rows = [
+        (name, view, round(float((view + rng.normal(0, 12)) % 360), 3))
+        for name in "ab"
+        for view in views
+    ]
+    table = pd.DataFrame(rows, columns=["object_id", "azimuth_deg", "estimate_deg"])
+    table.to_csv(here / "pairs.csv", index=False)
+    return here / "pairs.csv"
+
+
+@pytest.fixture
+def manifest(here) -> Path:
+    """A turn of one object, with a frame every 15 degrees."""
+    (here / "turn").mkdir()
+    rows = []
+    for place in range(BINS):
+        np.save(here / "turn" / f"{place}.npy", frame(place))
+        rows.append(("cup", "1", f"turn/{place}.npy", place * WIDTH, 20.0))
+    names = ["object_id", "sequence", "file", "azimuth_deg", "elevation_deg"]
+    pd.DataFrame(rows, columns=names).to_csv(here / "manifest.csv", index=False)
+    return here / "manifest.csv"
+
+
+def run(capsys, *arguments: str) -> str:
+    """What a command prints that succeeds."""
+    code = main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    assert (code, err) == (0, "")
+    return out
+
+
+def fails(capsys, *arguments: str) -> str:
+    """The one line of a command that fails."""
+    code = main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    assert (code, out) == (2, "")
+    assert err.startswith("nbv: error: ")
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    return err.strip()
+
+
+def same_answer(printed: dict, answer) -> None:
+    assert printed["azimuth_deg"] == pytest.approx(answer.azimuth_deg)
+    assert printed["spread_deg"] == pytest.approx(answer.spread_deg)
+    assert printed["expected_error_deg"] == pytest.approx(answer.expected_error_deg, rel=1e-4)
+    assert printed["belief"] == pytest.approx(answer.belief.tolist(), abs=1e-5)
+    assert printed["unfamiliarity"] == pytest.approx(answer.unfamiliarity, rel=1e-4)
+    moves = [answer.move, *answer.alternatives]
+    for one, move in zip([printed["move"], *printed["alternatives"]], moves, strict=True):
+        assert one["rotation_deg"] == move.rotation_deg
+        assert one["travel_deg"] == move.travel_deg
+        assert one["expected_error_deg"] == pytest.approx(move.expected_error_deg, rel=1e-4)
+    known = [np.inf if error is None else error for error in printed["error_after_deg"]]
+    assert known == pytest.approx(answer.error_after_deg.tolist(), rel=1e-4)
+
+
+# Recommend
+
+
+def test_a_recommendation_as_json_is_that_of_the_recommender(here, capsys):
+    recommender = Recommender.load("b.safetensors")
+    printed = json.loads(run(capsys, "recommend", "f0.npy", "--bundle", "b.safetensors", "--json"))
+    same_answer(printed, recommender.recommend(frame(0)))
+    assert "target_camera_pose" not in printed
+
+
+def test_every_option_of_a_recommendation_counts(here, capsys):
+    (here / "camera.json").write_text(
+        json.dumps(
+            {"fx": 160.0, "fy": 155.0, "cx": 60.0, "cy": 45.0, "width": COLUMNS, "height": ROWS}
+        )
+    )
+    for place in range(2):
+        np.save(here / f"i{place}.npy", np.rint(frame(place) * 1e4).astype(np.uint16))
+    recommender = Recommender.load("b.safetensors")
+    printed = json.loads(
+        run(
+            *(capsys, "recommend", "i0.npy", "i1.npy", "--bundle", "b.safetensors", "--json"),
+            *("--rotations", "0", "-90", "--depth-scale", "0.0001"),
+            *("--intrinsics", "camera.json", "--mask", "m.npy", "m.npy"),
+            *("--elevation", "10", "--allowed", "-60", "45", "180", "--max-travel", "120"),
+        )
+    )
+    answer = recommender.recommend(
+        [read_depth(f"i{place}.npy", 0.0001) for place in range(2)],
+        rotations_deg=[0.0, -90.0],
+        intrinsics=(160.0, 155.0, 60.0, 45.0),
+        mask=[frame(0) > 0] * 2,
+        elevation_deg=10.0,
+        allowed_deg=[-60.0, 45.0, 180.0],
+        max_travel_deg=120.0,
+    )
+    same_answer(printed, answer)
+    assert printed["move"]["rotation_deg"] in (-60.0, 45.0)
+
+
+def test_near_and_far_are_metres(here, capsys):
+    wall = np.where(frame(0) > 0, frame(0), 0.9).astype(np.float32)
+    wall[5:20, 5:20] = 0.2
+    np.save(here / "wall.npy", wall)
+    options = ("--bundle", "b.safetensors", "--json")
+    wanted = run(capsys, "recommend", "f0.npy", *options)
+    assert run(capsys, "recommend", "wall.npy", *options, "--near", "0.3", "--far", "0.8") == wanted
+
+
+def test_the_target_pose_is_a_rotation_about_the_axis(here, capsys):
+    options = ("f0.npy", "--bundle", "b.safetensors", "--json", "--camera-pose", "pose.json")
+    for axis in ((0.1, -0.2, 0.3), (0.1, -0.2, 0.3, 0.0, 0.1, 2.0)):
+        printed = json.loads(run(capsys, "recommend", *options, "--axis", *map(str, axis)))
+        direction = axis[3:] or (0.0, 0.0, 1.0)
+        wanted = moved_camera(POSE, axis[:3], direction, printed["move"]["rotation_deg"])
+        assert np.array(printed["target_camera_pose"]) == pytest.approx(wanted)
+
+
+def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
+    recommender = Recommender.load("b.safetensors")
+    answer = recommender.recommend(frame(0))
+    out = run(
+        *(capsys, "recommend", "f0.npy", "--bundle", "b.safetensors"),
+        *("--camera-pose", "pose.json", "--axis", "0", "0", "0"),
+    )
+    lines = out.splitlines()
+    assert lines[0] == f"camera     not given: a focal length of {FOCAL_PX:g} px is assumed"
+    assert f"azimuth {answer.azimuth_deg:.1f}° about the mug" in lines[1]
+    assert "(1 view)" in lines[1]
+    assert f"turn by {answer.move.rotation_deg:+.0f}°" in lines[2]
+    assert f"expected error {answer.move.expected_error_deg:.1f}°" in lines[2]
+    for move in answer.alternatives:
+        assert f"{move.rotation_deg:+.0f}° ({move.expected_error_deg:.1f}°)" in lines[3]
+    assert lines[4] == "target camera pose in the base frame"
+    target = moved_camera(POSE, [0, 0, 0], [0, 0, 1], answer.move.rotation_deg)
+    found = np.array([[float(number) for number in line.split()] for line in lines[5:]])
+    assert found == pytest.approx(target, abs=1e-5)
+    two = run(
+        *(capsys, "recommend", "f0.npy", "f1.npy", "--rotations", "0", "60"),
+        *("--bundle", "b.safetensors", "--intrinsics", "150"),
+    )
+    assert "(2 views)" in two
+    assert "camera" not in two.splitlines()[0]
+
+
+def test_an_unfamiliar_frame_is_told(here, capsys):
+    """A square of deep holes and high posts."""
+    odd = np.zeros((ROWS, COLUMNS), np.float32)
+    blocks = np.indices((34, 34)) // 2 % 2
+    odd[28:62, 43:77] = 0.6 + 0.05 * (2 * (blocks[0] ^ blocks[1]) - 1)
+    np.save(here / "odd.npy", odd)
+    answer = Recommender.load("b.safetensors").recommend(odd)
+    out = run(capsys, "recommend", "odd.npy", "--bundle", "b.safetensors")
+    assert ("careful" in out) == answer.is_unfamiliar
+    assert answer.is_unfamiliar
+    assert "careful" not in run(capsys, "recommend", "f0.npy", "--bundle", "b.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "give a depth frame"),
+        (["no.npy"], "no.npy does not exist"),
+        (["m.npy"], "m.npy holds bool"),
+        (["f0.npy", "f1.npy"], "2 frames need as many rotations"),
+        (["f0.npy", "--rotations", "0", "90"], "1 frames need as many rotations"),
+        (["f0.npy", "--rotations", "10"], "the first rotation is 10"),
+        (["f0.npy", "--max-travel", "3"], "no rotation is allowed"),
+        (["f0.npy", "--allowed", "0"], "no rotation is allowed"),
+        (["f0.npy", "--far", "0.1"], "empty-mask"),
+        (["f0.npy", "--near", "2", "--far", "1"], "near < far"),
+        (["f0.npy", "--depth-scale", "0.001"], "depths 1000 times as large would fit"),
+        (["f0.npy", "--depth-scale", "-1"], "--depth-scale=-1"),
+        (["f0.npy", "--mask", "m.npy", "m.npy"], "1 frames and 2 masks"),
+        (["f0.npy", "--intrinsics", "wide"], "--intrinsics=wide"),
+        (["f0.npy", "--intrinsics", "1,2,3"], "3 numbers"),
+        (["f0.npy", "--intrinsics", "x" * 5000], "cannot be read"),
+        (["f0.npy", "--elevation", "nan"], "elevation of nan"),
+        (["f0.npy", "--camera-pose", "pose.json"], "--camera-pose and --axis belong together"),
+        (["f0.npy", "--axis", "0", "0", "0"], "--camera-pose and --axis belong together"),
+        (["f0.npy", "--camera-pose", "pose.json", "--axis", "0", "0"], "--axis has 2 numbers"),
+        (
+            ["f0.npy", "--camera-pose", "pose.json", "--axis", "0", "0", "0", "0", "0", "0"],
+            "axis: give a point and a direction",
+        ),
+        (["f0.npy", "--camera-pose", "f0.npy", "--axis", "0", "0", "0"], "give the 16"),
+        (["f0.npy", "--elevation", "high"], "high"),
+        (["f0.npy", "--nearest", "2"], "--nearest"),
+        (["--estimate", "30"], "--estimate and --table belong together"),
+        (["--table", "t.npz"], "--estimate and --table belong together"),
+        (["--table", "t.npz", "--estimate", "30"], "t.npz does not exist"),
+        (["--table", "f0.npy", "--estimate", "30"], "f0.npy"),
+    ],
+)
+def test_what_cannot_be_recommended_is_one_line(here, capsys, arguments, message):
+    assert message in fails(capsys, "recommend", *arguments, "--bundle", "b.safetensors")
+
+
+def test_a_missing_or_damaged_bundle_is_one_line(here, capsys):
+    assert "no-such" in fails(capsys, "recommend", "f0.npy", "--bundle", "no-such")
+    (here / "cut.safetensors").write_bytes((here / "b.safetensors").read_bytes()[:1000])
+    for command in (
+        ("recommend", "f0.npy", "--bundle", "cut.safetensors"),
+        ("inspect", "cut.safetensors"),
+        ("export", "cut.safetensors", "--onnx", "x.onnx"),
+        ("evaluate", "m.csv", "--bundle", "cut.safetensors"),
+        ("calibrate", "m.csv", "--bundle", "cut.safetensors", "--output", "x.safetensors"),
+    ):
+        assert "cut.safetensors" in fails(capsys, *command)
+
+
+# Calibrate
+
+
+@pytest.mark.parametrize("criterion", ["pose_ambiguity", "expected_error"])
+def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion):
+    out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz", "--criterion", criterion)
+    assert out == f"t.npz: {criterion} from 2 objects\n"
+    save_lookup("wanted.npz", chosen_lookup(read_pairs(pairs).estimate_deg, criterion, DENSITY))
+    assert Path("t.npz").read_bytes() == Path("wanted.npz").read_bytes()
+    table = load_lookup("t.npz")
+    for estimate in (0.0, 123.4, -30.0, 719.6):
+        options = ("--estimate", estimate, "--table", "t.npz")
+        printed = json.loads(run(capsys, "recommend", *options, "--json"))
+        rotation = printed["rotation_deg"]
+        assert rotation % 360 == table.recommend(estimate)
+        assert -180 < rotation <= 180
+        assert printed["travel_deg"] == abs(rotation)
+        assert printed["criterion"] == criterion
+        cost = table.cost[round(estimate) % 360, rotation % 360]
+        assert printed["cost"] == pytest.approx(float(cost))
+        told = run(capsys, "recommend", *options)
+        assert told.startswith(f"turn the camera by {rotation:+d}°, travel {abs(rotation)}°")
+
+
+def test_a_table_is_made_of_pairs_alone(pairs, capsys):
+    for arguments, message in (
+        (("no.csv", "--output", "t.npz"), "no.csv does not exist"),
+        (("pairs.csv", "--output", "t.dat"), "--output=t.dat: a lookup table is an .npz file"),
+        (("pairs.csv", "--output", "t"), "an .npz file"),
+        (("pairs.csv",), "--output"),
+        (("pairs.csv", "--output", "t.npz", "--criterion", "eror"), "--criterion=eror"),
+        (
+            ("pairs.csv", "--output", "t.npz", "--criterion", "expected_eror"),
+            "did you mean 'expected_error'?",
+        ),
+    ):
+        assert message in fails(capsys, "calibrate", *arguments)
+    assert not list(Path().glob("*t.*"))
+
+
+def test_an_estimate_is_a_number(pairs, capsys):
+    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz", "--criterion", "expected_error")
+    for estimate in ("nan", "inf"):
+        message = fails(capsys, "recommend", "--estimate", estimate, "--table", "t.npz")
+        assert f"--estimate={estimate}" in message
+
+
+def turns_of(manifest):
+    recommender = Recommender.load("b.safetensors")
+    return [see(recommender, one, None, None, print) for one in read_manifest(manifest)]
+
+
+def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
+    out = run(
+        *(capsys, "calibrate", "manifest.csv"),
+        *("--bundle", "b.safetensors", "--output", "own.safetensors"),
+    )
+    assert out == "own.safetensors: mug, 1 recordings calibrate it\n"
+    wanted = recalibrated(load_bundle("b.safetensors"), turns_of(manifest), "manifest.csv")
+    save_bundle("wanted.safetensors", wanted)
+    assert Path("own.safetensors").read_bytes() == Path("wanted.safetensors").read_bytes()
+    printed = json.loads(
+        run(capsys, "recommend", "f0.npy", "--bundle", "own.safetensors", "--json")
+    )
+    same_answer(printed, Recommender.load("wanted.safetensors").recommend(frame(0)))
+
+
+def test_a_turn_with_a_gap_does_not_calibrate(manifest, capsys):
+    rows = pd.read_csv(manifest).iloc[3:]
+    rows.to_csv("gap.csv", index=False)
+    message = fails(
+        capsys, "calibrate", "gap.csv", "--bundle", "b.safetensors", "--output", "x.safetensors"
+    )
+    assert "60° apart" in message
+    assert not Path("x.safetensors").exists()
+
+
+# Evaluate
+
+
+def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
+    wanted = evaluate(load_bundle("b.safetensors"), turns_of(manifest), [2, 3])
+    out = run(
+        *(capsys, "evaluate", "manifest.csv", "--bundle", "b.safetensors"),
+        *("--views", "2", "3", "--json", "--output", "table.csv"),
+    )
+    printed = json.loads(out)
+    assert pd.DataFrame(printed["errors"]).equals(wanted)
+    familiar = familiarity_of(load_bundle("b.safetensors"), turns_of(manifest))
+    assert pd.DataFrame(printed["familiarity"]).equals(familiar)
+    written = pd.read_csv("table.csv", dtype={"object_id": str, "sequence": str})
+    pd.testing.assert_frame_equal(written, wanted.round(4))
+    text = run(
+        *(capsys, "evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2", "3")
+    )
+    head, numbers, *lines = text.splitlines()
+    assert head.startswith("cup, sequence 1: 24 frames; offset ")
+    assert numbers.split()[-3:] == ["1", "2", "3"]
+    assert len(lines) == wanted["choice"].nunique()
+    for line in lines:
+        choice, *cells = re.split("  +", line.strip())
+        rows = wanted[wanted["choice"] == choice]
+        assert cells == [
+            f"{row.mae_deg:.1f} ({row.mae_without_offset_deg:.1f})" for row in rows.itertuples()
+        ]
+
+
+def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
+    np.save("turn/3.npy", np.zeros((ROWS, COLUMNS), np.float32))
+    options = ("evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2")
+    assert main([*options, "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert len(json.loads(out)["errors"]) == 6
+    assert "3.npy is left out: empty-mask" in err
+    assert "3.npy is left out: empty-mask" in run(capsys, *options)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["no.csv"], "no.csv does not exist"),
+        (["pairs.csv"], "no column 'sequence'"),
+        (["manifest.csv", "--views", "1"], "needs 2 or more"),
+        (["manifest.csv", "--views", "40"], "24 frames, too few for 40 views"),
+        (["manifest.csv", "--views", "two"], "two"),
+        (["manifest.csv", "--intrinsics", "30"], "every frame"),
+    ],
+)
+def test_what_cannot_be_evaluated_is_one_line(manifest, pairs, capsys, arguments, message):
+    code = main(["evaluate", *arguments, "--bundle", "b.safetensors"])
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert message in err
+    assert err.count("\n") == 1
+    assert not out or "left out" in out
+
+
+# Inspect and export
+
+
+def test_inspect_shows_what_a_bundle_holds(here, bundle, capsys):
+    about = json.loads(run(capsys, "inspect", "b.safetensors", "--json"))
+    assert about["file"] == "b.safetensors"
+    assert about["bytes"] == (here / "b.safetensors").stat().st_size
+    assert about["category"] == "mug"
+    assert about["classes"] == BINS
+    assert about["calibration_objects"] == 3
+    assert about["calibration_turns"] == 6
+    assert about["elevations_deg"] == [0.0, 30.0]
+    assert about["temperature"] == bundle.temperature
+    assert {key: about[key] for key in bundle.provenance} == bundle.provenance
+    lines = run(capsys, "inspect", "b.safetensors").splitlines()
+    assert {line.split()[0] for line in lines} == set(about)
+
+
+def test_export_writes_the_network(here, bundle, capsys, rng):
+    pytest.importorskip("onnx")
+    onnxruntime = pytest.importorskip("onnxruntime")
+    run(capsys, "export", "b.safetensors", "--onnx", "deep/x.onnx")
+    session = onnxruntime.InferenceSession("deep/x.onnx", providers=["CPUExecutionProvider"])
+    codes = rng.integers(0, 256, (5, 1, 32, 32)).astype(np.uint8)
+    logits, _ = session.run(["logits", "hidden"], {"codes": codes.astype(np.float32)})
+    wanted, _ = Recommender(bundle, "torch").network(codes[:, 0])
+    assert logits == pytest.approx(wanted, abs=1e-3)
+
+
+def test_a_file_that_cannot_be_written_is_one_line(here, pairs, capsys):
+    pytest.importorskip("onnx")
+    (here / "file").write_text("")
+    assert "file" in fails(capsys, "export", "b.safetensors", "--onnx", "file/x.onnx")
+    message = fails(
+        *(capsys, "calibrate", "pairs.csv", "--output", "file/t.npz"),
+        *("--criterion", "expected_error"),
+    )
+    assert "file" in message
+    assert "Errno" not in message
+
+
+# The program
+
+
+def test_help_and_version_succeed(capsys):
+    text = run(capsys, "--help")
+    for command in ("recommend", "calibrate", "evaluate", "inspect", "export"):
+        assert command in text
+        assert "Usage: nbv" in run(capsys, command, "--help")
+    assert run(capsys, "--version").strip() == __import__("nbv").__version__
+
+
+def test_unknown_commands_and_options_are_one_line(here, capsys):
+    assert "recomend" in fails(capsys, "recomend")
+    for command in ("recommend", "calibrate", "evaluate", "inspect", "export"):
+        fails(capsys, command, "--no-such-option")
+
+
+def test_help_imports_nothing_heavy():
+    script = (
+        "import sys\nfrom nbv.cli import main\ncode = main(['--help'])\n"
+        "heavy = {'numpy', 'torch', 'pandas', 'scipy', 'onnxruntime', 'matplotlib'}\n"
+        "sys.exit(code or ' '.join(heavy & set(sys.modules)) or 0)\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True)
+
+
+# Without the packages of the experiment
+
+WITHOUT = """
+import sys
+from importlib.machinery import PathFinder
+
+class Absent(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        return None if name in sys.argv[1].split() else super().find_spec(name, path, target)
+
+sys.meta_path[sys.meta_path.index(PathFinder)] = Absent
+from nbv.cli import main
+sys.exit(main(sys.argv[2:]))
+"""
+EXPERIMENT = ("torch", "pyrender", "hydra", "omegaconf", "pydantic", "psutil", "grimp")
+EXPERIMENT += ("snakemake", "jinja2")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("recommend", "f0.npy", "--bundle", "b.safetensors", "--plot", "plot.png"),
+        ("recommend", "--estimate", "90", "--table", "table.npz"),
+        ("calibrate", "pairs.csv", "--output", "new.npz"),
+        ("evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2"),
+        ("inspect", "b.safetensors"),
+        ("render", "--example", "--output", "new.npy"),
+        ("export", "b.safetensors", "--onnx", "new.onnx"),
+    ],
+    ids=lambda arguments: " ".join(arguments[:2]),
+)
+def test_a_robot_needs_no_package_of_the_experiment(manifest, pairs, arguments):
+    pytest.importorskip("onnxruntime")
+    if "table.npz" in arguments:
+        main(["calibrate", "pairs.csv", "--output", "table.npz"])
+    command = [sys.executable, "-c", WITHOUT, " ".join(EXPERIMENT), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_without_any_way_to_compute_a_network_it_says_what_to_install(here):
+    absent = "torch onnx onnxruntime"
+    command = [sys.executable, "-c", WITHOUT, absent, "recommend", "f0.npy"]
+    done = subprocess.run([*command, "--bundle", "b.safetensors"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("nbv: error: a network needs the packages of nbv[onnx], or torch")
+    assert done.stderr.count("\n") == 1

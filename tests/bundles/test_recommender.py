@@ -1,0 +1,624 @@
+"""From frames to the pose and the next view."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_bundles import (
+    BINS,
+    COLUMNS,
+    DIAGONAL_M,
+    FOCAL_PX,
+    ROWS,
+    WIDTH,
+    frame,
+    random_codes,
+    random_weights,
+)
+from made_bundles import settings as made_settings
+
+from nbv.angles import circular_distance_deg, travel_deg
+from nbv.bundles.beliefs import distributions_of, elevation_share, spread_deg
+from nbv.bundles.recommender import MIN_SEPARATION_DEG, N_ALTERNATIVES, Recommender, unfamiliarity
+from nbv.errors import UserError
+from nbv.frames.errors import FrameError
+from nbv.frames.intrinsics import Intrinsics
+from nbv.recommendation.belief import mean_direction_deg
+
+HERE = np.arange(BINS) * WIDTH
+FRAMES = [frame(seed) for seed in range(4)]
+seeds = st.integers(0, 10**6)
+whole = st.integers(-BINS, BINS)
+
+
+def codes_of(seed: int, n: int) -> np.ndarray:
+    return random_codes(np.random.default_rng(seed), n)
+
+
+def telling(bundle, sureness: float = 8.0) -> Recommender:
+    """A recommender whose network reads the azimuth's class off the first pixel of a crop."""
+    made = Recommender(bundle, "torch")
+
+    def network(codes):
+        classes = codes[:, 0, 0].astype(int)
+        apart = np.radians((np.arange(BINS) - classes[:, None]) * WIDTH)
+        hidden = np.zeros((len(codes), len(bundle.familiarity.offset)), dtype=np.float32)
+        return (sureness * np.cos(apart)).astype(np.float32), hidden
+
+    made.network = network
+    return made
+
+
+def told(*classes: int) -> np.ndarray:
+    codes = np.zeros((len(classes), 32, 32), dtype=np.uint8)
+    codes[:, 0, 0] = np.array(classes) % BINS
+    return codes
+
+
+# Beliefs
+
+
+@settings(max_examples=25)
+@given(seed=seeds, rotations=st.lists(whole, min_size=0, max_size=3))
+def test_the_belief_is_that_of_the_last_frame(recommender, seed, rotations):
+    rotations = [0.0, *(turn * WIDTH for turn in rotations)]
+    if any_alike(rotations):
+        return
+    codes = codes_of(seed, len(rotations))
+    found = recommender.recommend_crops(codes, rotations)
+    rows = recommender.distributions(codes)
+    # By its definition: the product at the azimuths that each frame then had.
+    wanted = np.ones(BINS)
+    for row, rotation in zip(rows, rotations, strict=True):
+        bins = round((rotation - rotations[-1]) / WIDTH)
+        wanted *= row[(np.arange(BINS) + bins) % BINS]
+    assert found.belief == pytest.approx(wanted / wanted.sum(), rel=1e-6, abs=1e-12)
+    assert found.belief.sum() == pytest.approx(1.0)
+    mean = mean_direction_deg(found.belief[None])[0]
+    assert circular_distance_deg(found.azimuth_deg, mean) < 1e-6
+    assert 0 <= found.azimuth_deg < 360
+    assert found.spread_deg == pytest.approx(spread_deg(found.belief))
+
+
+def any_alike(rotations) -> bool:
+    """Whether a rotation leaves too little room: frames everywhere, or one taken twice."""
+    return len({round(turn / WIDTH) % BINS for turn in rotations}) < len(rotations)
+
+
+@given(first=st.integers(0, BINS - 1), bins=st.integers(1, BINS - 1))
+def test_frames_that_agree_give_the_azimuth_of_the_last(bundle, first, bins):
+    found = telling(bundle).recommend_crops(told(first, first + bins), [0.0, bins * WIDTH])
+    assert circular_distance_deg(found.azimuth_deg, (first + bins) * WIDTH) < 1e-6
+    assert found.belief.argmax() == (first + bins) % BINS
+    one = telling(bundle).recommend_crops(told(first))
+    assert found.spread_deg < one.spread_deg
+
+
+@pytest.mark.parametrize("turn", [-100.0, 7.5, 20.0, 359.0])
+def test_a_rotation_between_the_bins_is_followed(bundle, turn):
+    """The second frame sees the azimuth that the first frame and the rotation imply."""
+    made, first = telling(bundle), 5 * WIDTH
+    classes = np.arange(BINS) * WIDTH
+    second = np.radians(classes - first - turn)
+
+    def network(codes):
+        rows = np.stack([np.cos(np.radians(classes - first)), np.cos(second)])
+        return (5 * rows).astype(np.float32), np.zeros((2, 40), dtype=np.float32)
+
+    made.network = network
+    found = made.recommend_crops(told(0, 0), [0.0, turn])
+    assert circular_distance_deg(found.azimuth_deg, first + turn) < 1.0
+
+
+def test_frames_are_counted_in_the_crops(recommender):
+    codes = codes_of(0, 3)
+    found = recommender.recommend_crops(codes, [0.0, 60.0, 120.0])
+    assert np.array_equal(np.stack(found.crops), codes)
+
+
+# Which frame is called the first
+
+
+@settings(max_examples=25)
+@given(
+    seed=seeds,
+    order=st.permutations(range(2)),
+    bins=st.permutations([0, 3, 8, 13, 18]).map(lambda places: places[:3]),
+)
+def test_it_does_not_matter_which_frame_is_called_the_first(recommender, seed, order, bins):
+    """The same three frames, the same one last: the others in any order, and any place as 0."""
+    codes = codes_of(seed, 3)
+    answers = []
+    for places in ([0, 1, 2], [*order, 2]):
+        rotations = [(bins[place] - bins[places[0]]) * WIDTH for place in places]
+        answers.append(recommender.recommend_crops(codes[places], rotations))
+    one, other = answers
+    assert circular_distance_deg(one.azimuth_deg, other.azimuth_deg) < 1e-6
+    assert one.belief == pytest.approx(other.belief, rel=1e-6, abs=1e-12)
+    assert one.expected_error_deg == pytest.approx(other.expected_error_deg, rel=1e-3)
+    assert one.error_after_deg == pytest.approx(other.error_after_deg, rel=1e-3)
+    assert one.move.expected_error_deg == pytest.approx(other.move.expected_error_deg, rel=1e-3)
+    assert one.unfamiliarity == other.unfamiliarity
+
+
+@settings(max_examples=25)
+@given(seed=seeds, bins=st.integers(2, BINS - 2))
+def test_another_frame_as_the_last_turns_the_answer(recommender, seed, bins):
+    codes = codes_of(seed, 2)
+    one = recommender.recommend_crops(codes, [0.0, bins * WIDTH])
+    other = recommender.recommend_crops(codes[::-1], [0.0, -bins * WIDTH])
+    assert circular_distance_deg(one.azimuth_deg, other.azimuth_deg + bins * WIDTH) < 1e-6
+    assert one.belief == pytest.approx(np.roll(other.belief, bins), rel=1e-6, abs=1e-12)
+    turned_back = np.roll(other.error_after_deg, -bins)
+    assert one.error_after_deg == pytest.approx(turned_back, rel=1e-3)
+
+
+@settings(max_examples=25)
+@given(seed=seeds, turns=st.integers(-3, 3))
+def test_whole_turns_of_the_camera_do_not_matter(recommender, seed, turns):
+    codes = codes_of(seed, 2)
+    one = recommender.recommend_crops(codes, [0.0, 90.0])
+    other = recommender.recommend_crops(codes, [0.0, 90.0 + 360.0 * turns])
+    assert circular_distance_deg(one.azimuth_deg, other.azimuth_deg) < 1e-6
+    assert one.belief == pytest.approx(other.belief)
+    assert np.array_equal(one.error_after_deg, other.error_after_deg)
+    assert one.move == other.move
+
+
+# Expected errors
+
+
+def brute_force(bundle, rows, bins, share=None):
+    """Expected errors now and after each rotation from the last frame, from the definitions."""
+    power, pseudo = bundle.affinity["power"], bundle.affinity["pseudo_observations"]
+    views = bundle.distributions.astype(float)
+    belief = np.ones(BINS)
+    for row, turn in zip(rows, bins, strict=True):
+        belief *= np.roll(row, -turn)
+    belief /= belief.sum()
+    weights, now, after = [], [], []
+    for turn_, own in enumerate(views):
+        for first in range(BINS):
+            product = np.ones(BINS)
+            for turn in bins:
+                product *= np.roll(own[(first + turn) % BINS], -turn)
+            product /= product.sum()
+            alike = WIDTH * np.sqrt(belief * product).sum() ** power
+            weights.append(alike * (1.0 if share is None else share[turn_]))
+            now.append(error_of(product, first))
+            after.append(
+                [
+                    error_of(
+                        product * np.roll(own[(first + bins[-1] + d) % BINS], -bins[-1] - d), first
+                    )
+                    for d in range(BINS)
+                ]
+            )
+    weights, now, after = np.array(weights), np.array(now), np.array(after)
+    prior = np.ones(len(views)) if share is None else share
+    prior = np.repeat(prior, BINS) * pseudo / (prior.sum() * BINS)
+    total = weights + prior
+    return total @ now / total.sum(), total @ after / total.sum()
+
+
+def error_of(product, first) -> float:
+    angles = 2 * np.pi * np.arange(BINS) / BINS
+    mean = np.degrees(np.angle((product * np.exp(1j * angles)).sum()))
+    return abs((mean - first * WIDTH + 180) % 360 - 180)
+
+
+@pytest.mark.parametrize("bins", [(0,), (0, 6), (0, -5), (0, 7, 16)])
+@pytest.mark.parametrize("elevation", [None, 12.0])
+def test_expected_errors_are_those_of_objects_that_look_alike(recommender, bins, elevation):
+    bundle, codes = recommender.bundle, codes_of(7, len(bins))
+    found = recommender.recommend_crops(
+        codes, [turn * WIDTH for turn in bins], elevation_deg=elevation
+    )
+    share = None if elevation is None else elevation_share(bundle.elevation_deg, elevation)
+    now, after = brute_force(bundle, recommender.distributions(codes), bins, share)
+    free = np.isfinite(found.error_after_deg)
+    assert free.sum() == BINS - len(bins)
+    # Views that count for less than a ten-thousandth are left out.
+    assert found.expected_error_deg == pytest.approx(now, rel=2e-3)
+    assert found.error_after_deg[free] == pytest.approx(after[free], rel=2e-3)
+
+
+def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):
+    codes = codes_of(3, 1)
+    for kept, elevation in ((0.0, -200.0), (30.0, 300.0)):
+        of_it = np.flatnonzero(bundle.elevation_deg == kept)
+        only = replace(
+            bundle,
+            distributions=bundle.distributions[of_it],
+            elevation_deg=bundle.elevation_deg[of_it],
+            turn_weight=bundle.turn_weight[of_it],
+            object_ids=tuple(bundle.object_ids[place] for place in of_it),
+        )
+        wanted = Recommender(only, "torch").recommend_crops(codes)
+        found = Recommender(bundle, "torch").recommend_crops(codes, elevation_deg=elevation)
+        assert found.error_after_deg == pytest.approx(wanted.error_after_deg, rel=1e-4)
+        assert found.expected_error_deg == pytest.approx(wanted.expected_error_deg, rel=1e-4)
+        assert found.belief == pytest.approx(wanted.belief)
+
+
+# Where the camera may go
+
+
+def check_moves(found):
+    moves = [found.move, *found.alternatives]
+    assert len(moves) <= 1 + N_ALTERNATIVES
+    errors = [move.expected_error_deg for move in moves]
+    assert errors == sorted(errors)
+    assert found.move.expected_error_deg == np.min(found.error_after_deg)
+    for place, move in enumerate(moves):
+        assert -180 < move.rotation_deg <= 180
+        assert move.travel_deg == abs(move.rotation_deg) == travel_deg(move.rotation_deg)
+        bin_ = round(move.rotation_deg / WIDTH) % BINS
+        assert bin_ * WIDTH == pytest.approx(move.rotation_deg % 360)
+        assert move.expected_error_deg == found.error_after_deg[bin_]
+        # Each is the best of its neighbourhood.
+        assert move.expected_error_deg <= found.error_after_deg[(bin_ + 1) % BINS]
+        assert move.expected_error_deg <= found.error_after_deg[bin_ - 1]
+        for other in moves[:place]:
+            assert circular_distance_deg(move.rotation_deg, other.rotation_deg) >= 15
+
+
+@settings(max_examples=40)
+@given(
+    seed=seeds,
+    rotations=st.lists(st.floats(-400, 400), max_size=3),
+    max_travel=st.floats(60, 180),
+)
+def test_moves_keep_to_what_the_camera_may_do(recommender, seed, rotations, max_travel):
+    rotations = [0.0, *rotations]
+    codes = codes_of(seed, len(rotations))
+    apart = circular_distance_deg(HERE[:, None], np.array(rotations) - rotations[-1]).min(axis=1)
+    wanted = (apart >= MIN_SEPARATION_DEG) & (travel_deg(HERE) <= max_travel)
+    if not wanted.any():
+        with pytest.raises(UserError, match="no rotation is allowed"):
+            recommender.recommend_crops(codes, rotations, max_travel_deg=max_travel)
+        return
+    found = recommender.recommend_crops(codes, rotations, max_travel_deg=max_travel)
+    assert np.array_equal(np.isfinite(found.error_after_deg), wanted)
+    check_moves(found)
+
+
+def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
+    """Three degrees a bin, and errors that have a minimum at nearly every third one."""
+    estimator = made_settings(120, hidden=40)
+    rng = np.random.default_rng(0)
+    rough = replace(
+        bundle,
+        estimator=estimator,
+        weights=random_weights(estimator),
+        distributions=rng.dirichlet(np.full(120, 0.3), (2, 120)).astype(np.float32) + 1e-6,
+        elevation_deg=np.zeros(2, np.float32),
+        turn_weight=np.ones(2, np.float32),
+        object_ids=("a", "b"),
+    )
+    found = Recommender(rough, "torch").recommend_crops(codes_of(0, 2), [0.0, 60.0])
+    minima = (found.error_after_deg < np.roll(found.error_after_deg, 1)) & (
+        found.error_after_deg < np.roll(found.error_after_deg, -1)
+    )
+    assert minima.sum() > 20
+    moves = [found.move, *found.alternatives]
+    assert len(moves) == 1 + N_ALTERNATIVES
+    rotations = np.array([move.rotation_deg for move in moves])
+    apart = circular_distance_deg(rotations[:, None], rotations)
+    assert apart[~np.eye(len(moves), dtype=bool)].min() >= 15
+    # Each is the least error that is far enough from all before it.
+    bins = 3.0 * np.arange(120)
+    for place, move in enumerate(moves):
+        free = minima & (
+            circular_distance_deg(bins[:, None], rotations[:place]).min(axis=1, initial=360) >= 15
+        )
+        assert move.expected_error_deg == found.error_after_deg[free].min()
+
+
+def test_limits_do_not_change_the_errors_of_what_is_left(recommender):
+    codes = codes_of(1, 1)
+    free = recommender.recommend_crops(codes)
+    limited = recommender.recommend_crops(codes, max_travel_deg=90.0, allowed_deg=HERE[::2])
+    left = np.isfinite(limited.error_after_deg)
+    assert 0 < left.sum() < BINS - 1
+    assert np.array_equal(limited.error_after_deg[left], free.error_after_deg[left])
+    assert limited.expected_error_deg == free.expected_error_deg
+    assert np.array_equal(limited.belief, free.belief)
+
+
+@given(seed=seeds, bins=st.lists(st.integers(-BINS, BINS), min_size=1, max_size=5))
+def test_only_allowed_rotations_are_taken(recommender, seed, bins):
+    allowed = [turn * WIDTH for turn in bins]
+    wanted = {turn % BINS for turn in bins} - {0}
+    codes = codes_of(seed, 1)
+    if not wanted:
+        with pytest.raises(UserError, match="no rotation is allowed"):
+            recommender.recommend_crops(codes, allowed_deg=allowed)
+        return
+    found = recommender.recommend_crops(codes, allowed_deg=allowed)
+    assert set(np.flatnonzero(np.isfinite(found.error_after_deg))) == wanted
+    check_moves(found)
+
+
+@given(rotation=st.floats(-720, 720))
+def test_an_allowed_rotation_stands_for_its_nearest_bin(recommender, rotation):
+    if travel_deg(rotation) < 1.5 * WIDTH:
+        return
+    found = recommender.recommend_crops(codes_of(0, 1), allowed_deg=[rotation])
+    assert circular_distance_deg(found.move.rotation_deg, rotation) <= WIDTH / 2 + 1e-9
+    assert np.isfinite(found.error_after_deg).sum() <= 2
+
+
+def test_allowed_rotations_count_from_the_last_frame(recommender):
+    found = recommender.recommend_crops(codes_of(0, 2), [0.0, 90.0], allowed_deg=[90.0, -45.0])
+    assert np.flatnonzero(np.isfinite(found.error_after_deg)).tolist() == [6, 21]
+    # Back to the first frame is no new view.
+    with pytest.raises(UserError, match="no rotation is allowed"):
+        recommender.recommend_crops(codes_of(0, 2), [0.0, 90.0], allowed_deg=[-90.0])
+
+
+def test_where_nothing_is_allowed_is_one_line(recommender):
+    codes = codes_of(0, 1)
+    for options in (
+        {"max_travel_deg": 14.9},
+        {"max_travel_deg": 0.0},
+        {"allowed_deg": [0.0]},
+        {"allowed_deg": [5.0, -7.0, 360.0]},
+        {"allowed_deg": [90.0], "max_travel_deg": 60.0},
+    ):
+        with pytest.raises(UserError, match="widen --allowed or --max-travel"):
+            recommender.recommend_crops(codes, **options)
+    # Frames all round leave nothing.
+    everywhere = np.arange(BINS) * WIDTH
+    with pytest.raises(UserError, match="no rotation is allowed"):
+        recommender.recommend_crops(codes_of(0, BINS), everywhere)
+
+
+@pytest.mark.parametrize("allowed", [[], [np.nan], [30.0, np.inf]])
+def test_allowed_rotations_are_numbers(recommender, allowed):
+    with pytest.raises(UserError, match="allowed rotations"):
+        recommender.recommend_crops(codes_of(0, 1), allowed_deg=allowed)
+
+
+@pytest.mark.parametrize(
+    ("n", "rotations", "message"),
+    [
+        (1, [0.0, 90.0], "1 frames need as many rotations"),
+        (2, [0.0], "2 frames need as many rotations"),
+        (2, [], "there are 0"),
+        (2, [10.0, 20.0], "the first rotation is 10"),
+        (2, [0.0, np.nan], "no finite number"),
+        (2, [0.0, np.inf], "no finite number"),
+    ],
+)
+def test_rotations_that_do_not_fit_the_frames_are_refused(recommender, n, rotations, message):
+    with pytest.raises(UserError, match=message):
+        recommender.recommend_crops(codes_of(0, n), rotations)
+    with pytest.raises(UserError, match=message):
+        recommender.recommend(FRAMES[:n], rotations_deg=rotations)
+
+
+def test_an_elevation_is_a_number(recommender):
+    with pytest.raises(UserError, match="elevation of nan"):
+        recommender.recommend_crops(codes_of(0, 1), elevation_deg=float("nan"))
+
+
+# What is familiar
+
+
+def test_the_least_familiar_frame_counts(recommender):
+    codes = codes_of(11, 3)
+    known = recommender.bundle.familiarity
+    _, hidden = recommender.network(codes)
+    apart = unfamiliarity(known.projection, known.offset, known.centres, hidden)
+    alone = [recommender.recommend_crops(codes[i : i + 1]).unfamiliarity for i in range(3)]
+    assert alone == pytest.approx(apart / known.threshold, rel=1e-5)
+    together = recommender.recommend_crops(codes, [0.0, 60.0, 120.0])
+    assert together.unfamiliarity == pytest.approx(max(alone), rel=1e-5)
+    assert together.is_unfamiliar == (together.unfamiliarity > 1)
+
+
+def test_what_no_calibration_image_resembles_is_unfamiliar(recommender):
+    known = recommender.recommend_crops(codes_of(12, 1))
+    strange = np.indices((1, 32, 32)).sum(axis=0) % 2 * np.uint8(255)
+    assert not known.is_unfamiliar
+    assert recommender.recommend_crops(strange.astype(np.uint8)).is_unfamiliar
+
+
+# Frames
+
+
+def same(one, other):
+    assert np.array_equal(np.stack(one.crops), np.stack(other.crops))
+    assert np.array_equal(one.belief, other.belief)
+    assert one.move == other.move
+    assert one.azimuth_deg == other.azimuth_deg
+
+
+def test_a_frame_may_be_given_in_many_forms(recommender):
+    depth = FRAMES[0]
+    wanted = recommender.recommend(depth)
+    hole = np.where(depth > 0, depth, np.nan)
+    for given_ in (
+        [depth],
+        (depth,),
+        depth[None],
+        depth.astype(np.float64),
+        hole,
+        np.where(depth > 0, depth, -1.0),
+        depth[:, :, None],
+        depth.tolist(),
+        np.asfortranarray(depth),
+    ):
+        same(recommender.recommend(given_), wanted)
+    assert np.isnan(hole).any()
+
+
+def test_whole_numbers_are_millimetres(recommender):
+    millimetres = np.rint(FRAMES[0] * 1000).astype(np.uint16)
+    same(recommender.recommend(millimetres), recommender.recommend(millimetres / 1000))
+
+
+def test_several_frames_may_be_a_list_or_an_array(recommender):
+    rotations = [0.0, 60.0, -60.0]
+    wanted = recommender.recommend(FRAMES[:3], rotations_deg=rotations)
+    same(recommender.recommend(np.stack(FRAMES[:3]), rotations_deg=rotations), wanted)
+    same(recommender.recommend(tuple(FRAMES[:3]), rotations_deg=np.array(rotations)), wanted)
+    crops = np.stack([recommender.crop(depth).codes for depth in FRAMES[:3]])
+    same(recommender.recommend_crops(crops, rotations), wanted)
+
+
+def test_frames_may_have_other_sizes(recommender):
+    wanted = recommender.recommend(FRAMES[:2], rotations_deg=[0.0, 45.0])
+    padded = np.pad(FRAMES[1], ((7, 9), (20, 4)))
+    same(recommender.recommend([FRAMES[0], padded], rotations_deg=[0.0, 45.0]), wanted)
+
+
+def test_frames_are_not_changed(recommender):
+    before = FRAMES[0].copy()
+    recommender.recommend(FRAMES[0], mask=FRAMES[0] > 0)
+    assert np.array_equal(FRAMES[0], before)
+
+
+def test_the_same_frame_gives_the_same_answer(bundle, recommender):
+    same(recommender.recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
+    same(Recommender(bundle, "torch").recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
+
+
+def test_a_mask_takes_the_object_from_its_surroundings(recommender):
+    wanted = recommender.recommend(FRAMES[0])
+    table = np.where(FRAMES[0] > 0, FRAMES[0], 0.55).astype(np.float32)
+    mask = FRAMES[0] > 0
+    same(recommender.recommend(table, mask=mask), wanted)
+    same(recommender.recommend(table, mask=[255 * mask.astype(np.uint8)]), wanted)
+    same(recommender.recommend([table], mask=mask[None]), wanted)
+    with pytest.raises(FrameError, match="mask-at-border"):
+        recommender.recommend(table)
+
+
+def test_near_and_far_take_the_object_from_its_surroundings(recommender):
+    wanted = recommender.recommend(FRAMES[0])
+    wall = np.where(FRAMES[0] > 0, FRAMES[0], 0.9).astype(np.float32)
+    wall[5:20, 5:20] = 0.2
+    same(recommender.recommend(wall, near_m=0.3, far_m=0.8), wanted)
+
+
+def test_without_intrinsics_the_bundle_has_a_focal_length(recommender):
+    wanted = recommender.recommend(FRAMES[0])
+    middle = COLUMNS / 2, ROWS / 2
+    for intrinsics in ([FOCAL_PX], FOCAL_PX, int(FOCAL_PX)):
+        same(recommender.recommend(FRAMES[0], intrinsics=intrinsics), wanted)
+    # With a principal point the object is seen from where the camera is.
+    in_view = recommender.recommend(FRAMES[0], intrinsics=(FOCAL_PX, FOCAL_PX, *middle))
+    for intrinsics in (
+        Intrinsics(FOCAL_PX, FOCAL_PX, *middle, COLUMNS, ROWS),
+        np.array([[FOCAL_PX, 0, middle[0]], [0, FOCAL_PX, middle[1]], [0, 0, 1]]),
+    ):
+        same(recommender.recommend(FRAMES[0], intrinsics=intrinsics), in_view)
+    apart = in_view.crops[0].astype(int) - wanted.crops[0]
+    assert np.abs(apart).max() <= 1
+    other = recommender.recommend(FRAMES[0], intrinsics=1.3 * FOCAL_PX)
+    assert not np.array_equal(other.crops[0], wanted.crops[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("empty-mask", lambda depth: {"depth_m": np.zeros_like(depth)}),
+        ("few-levels", lambda depth: {"depth_m": (depth * 100).astype(np.uint8)}),
+        ("colour-image", lambda depth: {"depth_m": [np.stack([depth] * 3, axis=2)]}),
+        ("implausible-size", lambda depth: {"depth_m": depth, "intrinsics": 50.0}),
+        ("mask-at-border", lambda depth: {"depth_m": depth[:, 60:]}),
+        (
+            "other-resolution",
+            lambda depth: {
+                "depth_m": depth,
+                "intrinsics": Intrinsics(150.0, 150.0, width=9, height=9),
+            },
+        ),
+        ("little-depth", lambda depth: {"depth_m": depth, "mask": np.ones_like(depth)}),
+    ],
+)
+def test_a_frame_that_cannot_be_used_is_refused(recommender, name, change):
+    with pytest.raises(FrameError) as error:
+        recommender.recommend(**change(FRAMES[0]))
+    assert error.value.name == name
+
+
+@pytest.mark.parametrize("unit", [1000.0, 10_000.0, 4000.0, 0.001])
+@pytest.mark.parametrize("surroundings", ["nothing", "wall", "mask"])
+def test_a_wrong_unit_is_named_however_the_object_is_found(recommender, unit, surroundings):
+    """What reaches as far as an object in metres is a sliver of it in millimetres."""
+    depth, options = FRAMES[0], {}
+    if surroundings == "mask":
+        options["mask"] = depth > 0
+    elif surroundings == "wall":
+        depth = np.where(depth > 0, depth, 0.9).astype(np.float32)
+    recommender.recommend(depth, **options)
+    with pytest.raises(FrameError, match="check --depth-scale") as error:
+        recommender.recommend(depth * np.float32(unit), **options)
+    assert error.value.name == "implausible-distance"
+    if surroundings == "mask" or unit != 4000.0:
+        assert f"depths {1 / unit:g} times as large" in str(error.value)
+
+
+def test_what_is_nearest_may_be_nearer_than_the_middle_of_the_object(recommender):
+    """A handle that points to the camera: its own distance would be too short."""
+    depth = frame(0, distance=2.2)
+    depth[depth > 0] -= np.float32(0.1 * DIAGONAL_M)
+    depth[40:46, 55:65] = 1.2 * DIAGONAL_M
+    recommender.recommend(depth, intrinsics=[60.0])
+    with pytest.raises(FrameError, match="implausible-distance"):
+        recommender.recommend(0.3 * depth, intrinsics=[60.0])
+
+
+def test_one_bad_frame_of_several_is_refused(recommender):
+    with pytest.raises(FrameError, match="empty-mask"):
+        recommender.recommend([FRAMES[0], np.zeros_like(FRAMES[0])], rotations_deg=[0.0, 90.0])
+
+
+def test_masks_are_as_many_as_frames(recommender):
+    mask = FRAMES[0] > 0
+    with pytest.raises(UserError, match="2 frames and 1 masks"):
+        recommender.recommend(FRAMES[:2], rotations_deg=[0.0, 90.0], mask=mask)
+    with pytest.raises(UserError, match="1 frames and 2 masks"):
+        recommender.recommend(FRAMES[0], mask=[mask, mask])
+    with pytest.raises(UserError, match="the mask has"):
+        recommender.recommend(FRAMES[0], mask=mask.T)
+
+
+def test_the_unit_and_the_size_of_the_object_go_together(bundle, recommender):
+    """An object twice as large, twice as far away, with a bundle for such objects."""
+    large = replace(
+        bundle,
+        diagonal_m=2 * DIAGONAL_M,
+        extent_m=(2 * bundle.extent_m[0], 2 * bundle.extent_m[1]),
+    )
+    same(Recommender(large, "torch").recommend(2 * FRAMES[0]), recommender.recommend(FRAMES[0]))
+
+
+def test_both_backends_give_the_same_answer(bundle, recommender):
+    pytest.importorskip("onnx")
+    pytest.importorskip("onnxruntime")
+    other = Recommender(bundle, "onnx")
+    for rotations in ([0.0], [0.0, 45.0, -120.0]):
+        frames = FRAMES[: len(rotations)]
+        one = recommender.recommend(frames, rotations_deg=rotations)
+        two = other.recommend(frames, rotations_deg=rotations)
+        assert circular_distance_deg(one.azimuth_deg, two.azimuth_deg) < 0.01
+        assert one.belief == pytest.approx(two.belief, abs=1e-4)
+        assert one.error_after_deg == pytest.approx(two.error_after_deg, rel=1e-3)
+        assert one.unfamiliarity == pytest.approx(two.unfamiliarity, rel=1e-3)
+
+
+def test_distributions_are_those_of_the_logits(recommender):
+    codes = codes_of(5, 4)
+    logits, _ = recommender.network(codes)
+    wanted = distributions_of(logits, recommender.bundle.temperature)
+    assert np.array_equal(recommender.distributions(codes), wanted)
+    belief = recommender.recommend_crops(codes[:1]).belief
+    assert belief == pytest.approx(wanted[0], rel=1e-4)
