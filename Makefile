@@ -2,6 +2,7 @@
 # make test        the test suite               make check   lint, types, imports, workflow lint
 # make bench       the speed benchmarks         make compare a finished run with docs/reference
 # make confirm     several trainings of all data sets, for hours (tools/confirm.sh)
+# make bundles     the bundles that the package ships, for half an hour
 # make test-slurm  the workflow on a real SLURM of one node, where root may install it
 # make coverage    branches that tests reach    make mutation whether tests notice changed code
 # make audit       known vulnerabilities        make licences the licences of what is locked
@@ -18,7 +19,7 @@ PYTEST := $(BIN)/pytest --numprocesses $(CORES) --dist worksteal
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
 
-.PHONY: reproduce quick confirm compare reference bench test test-quick test-slurm soak coverage mutation check lock audit \
+.PHONY: reproduce quick confirm bundles compare reference bench test test-quick test-slurm soak coverage mutation check lock audit \
 	licences clean
 
 reproduce: $(READY)
@@ -32,6 +33,12 @@ confirm: $(READY)
 
 compare: $(READY)
 	$(BIN)/snakemake --cores $(CORES) compare
+
+bundles: $(READY)
+	$(BIN)/snakemake --cores $(CORES) bundles --config experiment=bundles estimator=classifier \
+		randomisation=camera sensor=kinect
+	mkdir -p src/nbv/bundles/shipped
+	cp results/bundles*/bundles/*.safetensors src/nbv/bundles/shipped/
 
 reference: $(READY)
 	$(BIN)/snakemake --cores $(CORES) reference
@@ -58,7 +65,7 @@ mutation: $(AUDIT)
 	$(BIN)/mutmut results
 
 lock: $(AUDIT)
-	$(LOCK) $(UPGRADE) pyproject.toml --group dev --no-emit-package torch --output-file requirements.lock
+	$(LOCK) $(UPGRADE) pyproject.toml --extra experiment --extra onnx --group dev --no-emit-package torch --output-file requirements.lock
 	$(LOCK) $(UPGRADE) --group audit --constraints requirements.lock --output-file requirements-audit.lock
 	$(BIN)/python tools/extra.py slurm | $(LOCK) --no-deps --output-file requirements-slurm.lock -
 

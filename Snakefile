@@ -30,6 +30,7 @@ localrules:
     extensions,
     transfer,
     confirm,
+    bundles,
 
 
 rule all:
@@ -55,6 +56,7 @@ include: "workflow/rules/extensions/ablation.smk"
 include: "workflow/rules/extensions/transfer.smk"
 include: "workflow/rules/extensions/comparisons.smk"
 include: "workflow/rules/extensions/confirmation.smk"
+include: "workflow/rules/bundles.smk"
 
 
 rule extensions:

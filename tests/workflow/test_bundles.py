@@ -1,0 +1,94 @@
+"""Bundles by the real Snakefile, run small."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from safetensors import safe_open
+
+from nbv.bundles.bundle import load_bundle
+from nbv.bundles.recommender import Recommender
+from projects import TINY, Project, copy_of_project
+
+pytestmark = pytest.mark.slow
+
+CAMERA = (
+    *TINY,
+    "categories=[mug]",
+    "elevations_deg.mug=[0,30]",
+    "camera.image_side=32",
+    "++estimator.n_classes=24",
+    "++estimator.target_bandwidth_deg=10",
+    "estimator.kind=classifier",
+    "randomisation.size=0.1",
+    "randomisation.elevation_deg=5",
+    "randomisation.patches=1",
+)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Project:
+    project = copy_of_project(tmp_path_factory.mktemp("bundles"))
+    project.run("--cores", "2", "bundles", overrides=CAMERA)
+    return project
+
+
+def test_a_bundle_is_calibrated_by_objects_that_it_was_not_trained_on(made: Project) -> None:
+    splits = pd.read_csv(made.results / "splits/mug.csv", dtype={"object_id": str})
+    of_role = splits[splits["fold"] == 1].groupby("role")["object_id"].agg(set)
+    with safe_open(made.results / "bundles/estimators/mug.safetensors", "np") as stored:
+        seen = set(json.loads(stored.metadata()["nbv"])["trained_on"])
+    assert {name.split("/")[0] for name in seen} == of_role["train"]
+    bundle = load_bundle(made.results / "bundles/mug.safetensors")
+    assert set(bundle.object_ids) == of_role["calibration"]
+    assert set(pd.read_csv(made.results / "bundles/mug.csv")["object_id"]) == of_role["test"]
+
+
+def test_a_bundle_has_turns_at_every_elevation(made: Project) -> None:
+    bundle = load_bundle(made.results / "bundles/mug.safetensors")
+    assert sorted(set(bundle.elevation_deg.tolist())) == [0.0, 30.0]
+    assert bundle.distributions.sum(axis=-1) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_calibration_distributions_are_those_of_the_network(made: Project) -> None:
+    bundle = load_bundle(made.results / "bundles/mug.safetensors")
+    images = np.load(made.results / "bundles/depth/mug/el30.npy", mmap_mode="r")
+    names = json.loads((made.results / "bundles/depth/mug/el30_objects.json").read_text())
+    place = int(np.flatnonzero(bundle.elevation_deg == 30.0)[0])
+    codes = images[names.index(bundle.object_ids[place]), ::15]
+    found = Recommender(bundle, "torch").distributions(np.asarray(codes))
+    assert bundle.distributions[place] == pytest.approx(found, rel=0.06, abs=1e-6)
+
+
+def test_the_same_settings_give_the_same_bytes(made: Project, tmp_path) -> None:
+    again = copy_of_project(tmp_path)
+    again.run("--cores", "1", "bundles", overrides=CAMERA)
+    path = "bundles/mug.safetensors"
+    assert (again.results / path).read_bytes() == (made.results / path).read_bytes()
+
+
+def test_ingredients_are_left_out_of_training_and_not_of_the_test(made: Project) -> None:
+    left_out = (
+        *CAMERA,
+        "++bundles.ingredients.size.size=0",
+        "++bundles.ingredients.lost.patches=0",
+    )
+    made.run("--cores", "2", "ingredients", overrides=left_out)
+    table = pd.read_csv(made.results / "tables/ingredients.csv")
+    assert table["without"].tolist() == ["nothing", "size", "lost"]
+    for without, mae in zip(
+        ("", "without_size/", "without_lost/"), table["two_views"], strict=True
+    ):
+        rows = pd.read_csv(made.results / f"bundles/{without}mug.csv")
+        rows = rows[(rows["choice"] == "recommended") & (rows["n_views"] == 2)]
+        own = rows.groupby("object_id")["mae_deg"].mean().mean()
+        assert mae == pytest.approx(own if not without else own - table["two_views"][0], abs=1e-3)
+    images = [
+        np.load(made.results / f"bundles/{without}depth/mug/el30.npy", mmap_mode="r")
+        for without in ("", "without_size/", "without_lost/")
+    ]
+    assert not np.array_equal(images[0], images[1])
+    assert not np.array_equal(images[0], images[2])
