@@ -20,6 +20,7 @@ BENCHMARKS = (
     "lookup",
     "evaluation",
     "recommendation",
+    "frames",
     "extensions",
     "workflow",
     "growth",

@@ -1,0 +1,101 @@
+"""From a depth frame in memory to the next view, and from the start of `nbv` to its answer."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from nbv.bundles.bundle import Bundle, load_bundle
+from nbv.bundles.recommender import Recommender, bundle_path
+from nbv.estimation.hardware import use_one_thread
+from nbv.estimation.networks import build_network
+from nbv.frames.drawn import Frame, example_frame
+from performance.figures import Figure, Target
+from performance.timing import take_turns
+
+ONE = Target(1.0, at_most=True)
+# Of the network's forward pass with torch: crop, network, fusion and choice.
+FORWARD = Target(1.5, at_most=True)
+FRAME_MS = {"torch": 5.0, "onnx": 2.0}
+START_S = {"torch": 3.0, "onnx": 1.0}
+HELP_S = 0.3
+
+_START = """
+import sys, numpy as np
+from nbv.bundles.recommender import Recommender
+answer = Recommender.load("mug", sys.argv[1]).recommend(np.load(sys.argv[2]))
+assert ("torch" in sys.modules) == (sys.argv[1] == "torch")
+"""
+
+
+def run(quick: bool) -> list[Figure]:
+    use_one_thread()
+    bundle = load_bundle(bundle_path("mug"))
+    frame = example_frame()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "frame.npy")
+        np.save(path, frame.depth_m)
+        return [*_in_memory(bundle, frame, 20 if quick else 400), *_starts(path, 1 if quick else 7)]
+
+
+def _in_memory(bundle: Bundle, frame: Frame, n_rounds: int) -> list[Figure]:
+    network = build_network(dict(bundle.estimator), bundle.camera.image_side).eval()
+    side = bundle.camera.image_side
+    ready = torch.zeros((1, 1, side, side))
+
+    def forward() -> None:
+        with torch.inference_mode():
+            network(ready)
+
+    def answer(backend: str) -> Callable[[], object]:
+        recommender = Recommender(bundle, backend)
+        return lambda: recommender.recommend(
+            frame.depth_m, mask=frame.mask, intrinsics=frame.intrinsics
+        )
+
+    turns = take_turns([answer("torch"), answer("onnx"), forward], n_rounds)
+    ms = [1e3 * turns.typical(column) for column in range(3)]
+    detail = f"{n_rounds} frames of 640 × 480, one thread"
+    return [
+        Figure(
+            "frame to next view / forward pass",
+            turns.ratio(0, 2),
+            FORWARD,
+            f"{ms[0]:.2f} ms against {ms[2]:.2f} ms with torch; {detail}",
+        ),
+        *(
+            Figure(
+                f"frame to next view, {backend} / {FRAME_MS[backend]:g} ms",
+                ms[column] / FRAME_MS[backend],
+                ONE,
+                f"{ms[column]:.2f} ms; {detail}",
+            )
+            for column, backend in enumerate(("torch", "onnx"))
+        ),
+    ]
+
+
+def _starts(frame: Path, n_rounds: int) -> list[Figure]:
+    def start(*arguments: str) -> Callable[[], object]:
+        return lambda: subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
+
+    help_ = start("-c", "import sys; from nbv.cli import main; sys.exit(main(['--help']))")
+    works = [start("-c", _START, backend, str(frame)) for backend in START_S]
+    turns = take_turns([*works, help_], n_rounds)
+    bounds = {f"start to answer, {backend}": bound for backend, bound in START_S.items()}
+    bounds["nbv --help"] = HELP_S
+    return [
+        Figure(
+            f"{name} / {bound:g} s",
+            turns.typical(column) / bound,
+            ONE,
+            f"{turns.typical(column):.2f} s; {n_rounds} starts",
+        )
+        for column, (name, bound) in enumerate(bounds.items())
+    ]
