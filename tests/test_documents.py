@@ -18,6 +18,7 @@ TERMS = (
     *("warm start", "affinity", "choice", "plan", "shuffle"),
     *("viewpoint", "pose", "view", "estimate", "rotation δ", "calibration pair", "conditional"),
     *("evidence", "belief", "criterion", "cost", "policy", "fusion", "method", "extension", "unit"),
+    *("frame", "bundle", "calibration turn", "recording", "expected error", "unfamiliarity"),
 )
 
 # Each pattern with the word that takes its place. An underscore separates words, and so does a
