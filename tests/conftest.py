@@ -14,6 +14,9 @@ import numpy as np
 import pytest
 
 import synthetic
+from made_bundles import made_bundle
+from nbv.bundles.bundle import Bundle, save_bundle
+from nbv.bundles.recommender import Recommender
 from nbv.experiments.results import load_evaluations
 from projects import Project, copy_of_project
 
@@ -68,3 +71,22 @@ def fresh(tmp_path: Path) -> Project:
     """A project in which nothing has been run."""
     (tmp_path / "project").mkdir()
     return copy_of_project(tmp_path / "project")
+
+
+@pytest.fixture(scope="session")
+def bundle() -> Bundle:
+    """Of random weights: 24 bins, three calibration objects at two elevations."""
+    return made_bundle()
+
+
+@pytest.fixture(scope="session")
+def recommender(bundle: Bundle) -> Recommender:
+    return Recommender(bundle, "torch")
+
+
+@pytest.fixture(scope="session")
+def bundle_file(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The bundle as a file. Not to be changed."""
+    path = tmp_path_factory.mktemp("bundle") / "made.safetensors"
+    save_bundle(path, bundle)
+    return path

@@ -22,13 +22,13 @@ def names(script: str, *chosen: str) -> set[str]:
 
 
 def test_training_depends_on_the_network_and_not_on_rendering_or_criteria():
-    found = names("train*.py")
+    found = names("train_estimator.py")
     assert {"estimation/networks.py", "estimation/training.py", "errors.py"} <= found
     assert not any(name.startswith(("rendering/", "recommendation/")) for name in found)
 
 
 def test_only_the_chosen_renderer_counts():
-    found = names("render*.py", RENDERERS["embree"])
+    found = names("render_depth.py", RENDERERS["embree"])
     assert "rendering/embree.py" in found
     assert "rendering/pyrender.py" not in found
 

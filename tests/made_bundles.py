@@ -16,7 +16,7 @@ from nbv.estimation.networks import build_network
 from nbv.estimation.weights import network_of
 from nbv.rendering.camera import Camera
 
-CONFIG = Path(__file__).parents[2] / "config"
+CONFIG = Path(__file__).parents[1] / "config"
 BINS = 24
 WIDTH = 360.0 / BINS
 SIDE = 32
