@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.bundle import Bundle, PaperTables
-from nbv.bundles.calibration import Turn, bin_apart, fit_familiarity
+from nbv.bundles.calibration import Turn, bin_apart
+from nbv.bundles.familiarity import fit_familiarity
 from nbv.estimation.networks import build_network
-from nbv.estimation.weights import network_of
 from nbv.rendering.camera import Camera
 
 CONFIG = Path(__file__).parents[1] / "config"
@@ -86,16 +86,15 @@ def made_bundle(seed: int = 0, **changes) -> Bundle:
     rng = np.random.default_rng(seed)
     estimator = settings()
     weights = random_weights(estimator, seed=seed)
-    network = network_of(weights, estimator, SIDE)
     names = ("a", "b", "c")
     elevations = (0.0, 30.0)
     turns, rows = [], []
     azimuth_deg = np.arange(BINS) * WIDTH
     for name in names:
         for elevation in elevations:
-            _, hidden = network(random_codes(rng, BINS))
+            codes = random_codes(rng, BINS)
             logits = soft_turns(rng, 1)[0]
-            turns.append(Turn(name, f"{elevation:g}", elevation, azimuth_deg, logits, hidden))
+            turns.append(Turn(name, f"{elevation:g}", elevation, azimuth_deg, logits, codes))
             rows.append(bin_apart(azimuth_deg, distributions_of(logits, 1.0)))
     values = {
         "category": "mug",

@@ -390,7 +390,7 @@ def export(bundle: str = "mug", /, *, onnx: Path) -> None:
     model = onnx_model(load_bundle(bundle_path(bundle)))
     with replacing(onnx) as temporary:
         temporary.write_bytes(model.SerializeToString())
-    _print(f"{onnx}: codes (n, 1, side, side) to logits and hidden")
+    _print(f"{onnx}: codes (n, 1, side, side) to logits")
 
 
 def _camera(intrinsics: str | None) -> Intrinsics | None:

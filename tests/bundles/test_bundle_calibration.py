@@ -8,24 +8,23 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_bundles import BINS, WIDTH, soft_turns
 
+from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.angles import circular_distance_deg
 from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.calibration import (
     DENSITY,
-    N_COMPONENTS,
-    N_RANGES,
+    LEAST_LIMIT,
     PRIOR_TURNS,
     WIDEST_GAP_DEG,
     Turn,
     bin_apart,
-    fit_familiarity,
     paper_tables,
     recalibrated,
     temperature_of,
 )
-from nbv.bundles.recommender import Recommender, unfamiliarity
+from nbv.bundles.familiarity import unfamiliarity
+from nbv.bundles.recommender import Recommender
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.density_selection import chosen_lookup
@@ -36,7 +35,7 @@ ONE_DENSITY = {**DENSITY, "bandwidths_deg": [8], "pseudo_observations": [10]}
 
 
 def turn(
-    name="a", seed=0, azimuth_deg=AZIMUTHS, elevation=0.0, logits=None, hidden=None, sequence="1"
+    name="a", seed=0, azimuth_deg=AZIMUTHS, elevation=0.0, logits=None, codes=None, sequence="1"
 ):
     rng = np.random.default_rng(seed)
     n = len(azimuth_deg)
@@ -44,8 +43,8 @@ def turn(
         classes = np.arange(BINS) * WIDTH
         aim = 3.0 * np.cos(np.radians(classes - np.asarray(azimuth_deg)[:, None]))
         logits = aim + rng.normal(0, 0.5, (n, BINS))
-    hidden = rng.normal(0, 1, (n, 40)).astype(np.float32) if hidden is None else hidden
-    return Turn(name, sequence, elevation, np.asarray(azimuth_deg, float), logits, hidden)
+    codes = random_codes(rng, n) if codes is None else codes
+    return Turn(name, sequence, elevation, np.asarray(azimuth_deg, float), logits, codes)
 
 
 # Views a bin apart
@@ -154,110 +153,6 @@ def test_logits_that_grow_raise_the_temperature():
     assert temperature_of([other]) == pytest.approx(5 * temperature_of([one]), rel=1e-3)
 
 
-# What is familiar
-
-
-def two_kinds(seed=0, n_objects=4, n_hidden=40, noise=0.3):
-    """Hidden activations that turn with the azimuth in two directions of many."""
-    rng = np.random.default_rng(seed)
-    across = rng.normal(0, 1, (2, n_hidden))
-    spread = rng.uniform(0.1, 3.0, n_hidden)
-    turns = []
-    for index in range(n_objects):
-        angle = np.radians(AZIMUTHS)
-        aim = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ across
-        hidden = 5 * aim + noise * spread * rng.normal(0, 1, (BINS, n_hidden))
-        turns.append(turn(f"o{index}", hidden=hidden.astype(np.float32)))
-    return turns
-
-
-def test_components_are_white_within_each_range_of_azimuths():
-    turns = two_kinds(n_objects=30, n_hidden=12)
-    found = fit_familiarity(turns)
-    hidden = np.concatenate([one.hidden for one in turns])
-    assert found.offset == pytest.approx(hidden.mean(axis=0), abs=1e-4)
-    places = (hidden - found.offset) @ found.projection
-    of_range = np.tile(np.arange(BINS), len(turns))
-    within = []
-    for one in range(N_RANGES):
-        members = places[of_range == one]
-        assert found.centres[one] == pytest.approx(members.mean(axis=0), abs=1e-3)
-        within.append(members - members.mean(axis=0))
-    within = np.concatenate(within)
-    covariance = within.T @ within / (len(within) - 1)
-    assert covariance == pytest.approx(np.eye(12), abs=0.01)
-
-
-def test_no_more_components_than_asked_for():
-    found = fit_familiarity(two_kinds(n_hidden=100))
-    assert found.projection.shape == (100, N_COMPONENTS)
-    assert found.centres.shape == (N_RANGES, N_COMPONENTS)
-
-
-def test_the_threshold_is_that_of_objects_left_out():
-    turns = two_kinds(n_objects=3)
-    scores = []
-    for left_out in ("o0", "o1", "o2"):
-        known = fit_familiarity([one for one in turns if one.object_id != left_out])
-        own = next(one.hidden for one in turns if one.object_id == left_out)
-        scores.append(unfamiliarity(known.projection, known.offset, known.centres, own))
-    wanted = np.quantile(np.concatenate(scores), 0.95)
-    assert fit_familiarity(turns).threshold == pytest.approx(wanted, rel=1e-6)
-
-
-def test_two_turns_of_one_object_are_left_out_together():
-    one = two_kinds(n_objects=2)
-    doubled = [*one, turn("o0", hidden=one[0].hidden, elevation=30.0)]
-    known = fit_familiarity([one[1]])
-    scores = [unfamiliarity(known.projection, known.offset, known.centres, one[0].hidden)] * 2
-    # Where its own copy counted, the object left out would be familiar.
-    others = fit_familiarity([one[0], doubled[2]])
-    scores.append(unfamiliarity(others.projection, others.offset, others.centres, one[1].hidden))
-    wanted = np.quantile(np.concatenate(scores), 0.95)
-    assert fit_familiarity(doubled).threshold == pytest.approx(wanted, rel=1e-5)
-
-
-def test_one_object_is_its_own_measure():
-    only = [
-        turn(
-            hidden=np.random.default_rng(0).normal(0, 1, (10 * BINS, 8)).astype(np.float32),
-            azimuth_deg=np.arange(10 * BINS) * 1.5,
-        )
-    ]
-    known = fit_familiarity(only)
-    score = unfamiliarity(known.projection, known.offset, known.centres, only[0].hidden)
-    assert np.mean(score <= known.threshold) == pytest.approx(0.95, abs=0.01)
-
-
-def test_what_was_never_seen_is_unfamiliar():
-    turns = two_kinds(n_objects=6)
-    known = fit_familiarity(turns[:5])
-    held_out = unfamiliarity(known.projection, known.offset, known.centres, turns[5].hidden)
-    strange = np.random.default_rng(1).normal(0, 8, (50, 40)).astype(np.float32)
-    found = unfamiliarity(known.projection, known.offset, known.centres, strange)
-    assert np.mean(held_out <= known.threshold) > 0.6
-    assert found.min() > known.threshold
-
-
-@given(scale=st.floats(0.5, 20.0), seed=st.integers(0, 100))
-def test_familiarity_does_not_depend_on_the_unit_of_activations(scale, seed):
-    turns = two_kinds(seed)
-    scaled = [turn(one.object_id, hidden=one.hidden * np.float32(scale)) for one in turns]
-    assert fit_familiarity(scaled).threshold == pytest.approx(
-        fit_familiarity(turns).threshold, rel=0.02
-    )
-
-
-def test_distances_are_to_the_nearest_centre(rng):
-    hidden, offset = rng.normal(0, 1, (7, 5)), rng.normal(0, 1, 5)
-    projection, centres = rng.normal(0, 1, (5, 3)), rng.normal(0, 1, (4, 3))
-    wanted = [
-        min(np.linalg.norm((row - offset) @ projection - centre) for centre in centres)
-        for row in hidden
-    ]
-    assert unfamiliarity(projection, offset, centres, hidden) == pytest.approx(wanted)
-
-
 # The paper's tables
 
 
@@ -283,11 +178,10 @@ def test_each_elevation_has_the_lookup_table_of_its_own_pairs(bundle):
 
 def test_a_bundle_is_calibrated_again(bundle):
     logits = 2 * soft_turns(np.random.default_rng(5), 3)
-    hidden = np.random.default_rng(6).normal(0, 1, (3, BINS, 40)).astype(np.float32)
     turns = [
-        turn("x", logits=logits[0], hidden=hidden[0], elevation=10.0),
-        turn("x", logits=logits[1], hidden=hidden[1], elevation=np.nan),
-        turn("y", logits=logits[2], hidden=hidden[2], elevation=40.0),
+        turn("x", logits=logits[0], elevation=10.0),
+        turn("x", logits=logits[1], elevation=np.nan),
+        turn("y", logits=logits[2], elevation=40.0),
     ]
     found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY)
     assert found.object_ids == ("x", "x", "y", *bundle.object_ids)
@@ -305,9 +199,10 @@ def test_a_bundle_is_calibrated_again(bundle):
     for row, own in zip(found.distributions[:3], logits, strict=True):
         assert row == pytest.approx(distributions_of(own, found.temperature), rel=1e-5)
     known = bundle.familiarity
-    scores = [unfamiliarity(known.projection, known.offset, known.centres, h) for h in hidden]
-    assert found.familiarity.threshold == pytest.approx(np.quantile(np.concatenate(scores), 0.95))
-    assert np.array_equal(found.familiarity.projection, known.projection)
+    scores = np.concatenate([unfamiliarity(known, one.codes, one.logits) for one in turns])
+    limit = max(np.quantile(scores, 0.95), LEAST_LIMIT)
+    assert found.familiarity.threshold == pytest.approx(limit * known.threshold)
+    assert np.array_equal(found.familiarity.references, known.references)
     wanted = paper_tables(np.array([10.0, 0.0, 40.0]), found.distributions[:3], ONE_DENSITY)
     assert found.paper.elevation_deg.tolist() == [0.0, 10.0, 40.0]
     assert np.array_equal(found.paper.rotation_deg, wanted.rotation_deg)

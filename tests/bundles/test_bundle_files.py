@@ -12,8 +12,8 @@ import safetensors.numpy
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from made_bundles import made_bundle
 
+from made_bundles import made_bundle, random_codes
 from nbv.bundles.bundle import (
     FORMAT,
     PROBABILITY_STEP,
@@ -22,7 +22,8 @@ from nbv.bundles.bundle import (
     load_bundle,
     save_bundle,
 )
-from nbv.bundles.recommender import Recommender, bundle_path, unfamiliarity
+from nbv.bundles.familiarity import unfamiliarity
+from nbv.bundles.recommender import Recommender, bundle_path
 from nbv.errors import UserError
 
 # Round trips
@@ -35,7 +36,7 @@ def test_everything_but_distributions_comes_back_exactly(bundle, bundle_file):
         assert found.weights[name].dtype == array.dtype
         assert found.weights[name].shape == array.shape
         assert np.array_equal(found.weights[name], array), name
-    for name in ("projection", "offset", "centres"):
+    for name in ("mean", "basis", "references", "scales"):
         wanted = getattr(bundle.familiarity, name)
         assert np.array_equal(getattr(found.familiarity, name), wanted), name
     assert found.familiarity.threshold == bundle.familiarity.threshold
@@ -79,8 +80,8 @@ def test_it_does_not_matter_how_arrays_lie_in_memory(bundle, bundle_file, tmp_pa
 
     familiarity = replace(
         bundle.familiarity,
-        projection=other_order(bundle.familiarity.projection),
-        centres=other_order(bundle.familiarity.centres),
+        basis=other_order(bundle.familiarity.basis),
+        references=other_order(bundle.familiarity.references),
     )
     changed = replace(
         bundle,
@@ -94,12 +95,9 @@ def test_it_does_not_matter_how_arrays_lie_in_memory(bundle, bundle_file, tmp_pa
 
 
 def test_what_is_familiar_stays_familiar(bundle, bundle_file, rng):
-    hidden = rng.normal(0, 1, (50, len(bundle.familiarity.offset))).astype(np.float32)
+    codes, logits = random_codes(rng, 50), rng.normal(0, 1, (50, bundle.n_bins))
     loaded = load_bundle(bundle_file).familiarity
-    scores = [
-        unfamiliarity(known.projection, known.offset, known.centres, hidden)
-        for known in (bundle.familiarity, loaded)
-    ]
+    scores = [unfamiliarity(known, codes, logits) for known in (bundle.familiarity, loaded)]
     assert np.array_equal(*scores)
 
 
@@ -210,8 +208,8 @@ def test_other_files_are_no_bundles(bundle, tmp_path):
 
 def test_an_estimator_is_no_bundle(tmp_path):
     import torch
-    from made_bundles import SIDE, settings
 
+    from made_bundles import SIDE, settings
     from nbv.estimation.hardware import choose_hardware
     from nbv.estimation.networks import build_network
     from nbv.estimation.weights import Estimator, save_estimator
@@ -267,7 +265,7 @@ def test_metadata_that_makes_no_sense_is_one_line(bundle_file, tmp_path, changes
 def test_numbers_that_are_not_finite_are_one_line(bundle, tmp_path, name):
     changed = {
         "weights": {key: array.copy() for key, array in bundle.weights.items()},
-        "familiarity": replace(bundle.familiarity, offset=np.full(40, np.inf, np.float32)),
+        "familiarity": replace(bundle.familiarity, mean=np.full(512, np.inf, np.float32)),
         "elevation_deg": bundle.elevation_deg + np.float32(np.inf),
         "turn_weight": bundle.turn_weight * np.float32(np.inf),
     }

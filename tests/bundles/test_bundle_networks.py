@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from made_bundles import SIDE, made_bundle, random_codes, random_weights, settings
 
+from made_bundles import SIDE, made_bundle, random_codes, random_weights, settings
 from nbv.angles import circular_distance_deg
 from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.networks import open_network
@@ -56,11 +56,10 @@ def test_batch_norms_of_the_fixture_are_not_the_identity(bundle):
 def test_onnx_gives_the_outputs_of_torch(kind, rng):
     bundle = bundle_of(kind)
     codes = random_codes(rng, 200, bundle.camera.image_side)
-    logits, hidden = onnx_network(bundle)(codes)
-    wanted, wanted_hidden = open_network(bundle, "torch")(codes)
+    logits = onnx_network(bundle)(codes)
+    wanted = open_network(bundle, "torch")(codes)
     assert np.ptp(wanted) > 1
     assert np.abs(logits - wanted).max() < 1e-4
-    assert np.abs(hidden - wanted_hidden).max() < 1e-4
     apart = circular_distance_deg(
         decode_classes(logits.astype(float)), decode_classes(wanted.astype(float))
     )
@@ -72,7 +71,7 @@ def test_onnx_gives_the_directions_of_torch(rng):
         bundle = bundle_of("small", seed)
         codes = random_codes(rng, 200)
         directions = [
-            mean_direction_deg(distributions_of(network(codes)[0], bundle.temperature))
+            mean_direction_deg(distributions_of(network(codes), bundle.temperature))
             for network in (onnx_network(bundle), open_network(bundle, "torch"))
         ]
         assert circular_distance_deg(*directions).max() < 0.01
@@ -91,7 +90,7 @@ def test_the_graph_is_sound_and_has_no_batch_norm():
     (codes,) = model.graph.input
     shape = [size.dim_param or size.dim_value for size in codes.type.tensor_type.shape.dim]
     assert shape == ["n", 1, 64, 64]
-    assert [output.name for output in model.graph.output] == ["logits", "hidden"]
+    assert [output.name for output in model.graph.output] == ["logits"]
     assert onnx_model(bundle).SerializeToString() == model.SerializeToString()
 
 
@@ -112,15 +111,14 @@ def test_the_graph_is_made_without_torch(bundle_file, tmp_path):
 def test_an_image_does_not_depend_on_those_next_to_it(bundle, rng, backend):
     network = onnx_network(bundle) if backend == "onnx" else open_network(bundle, "torch")
     codes = random_codes(rng, 7)
-    logits, hidden = network(codes)
+    logits = network(codes)
     assert logits.shape == (7, 24)
-    assert hidden.shape == (7, 40)
-    assert logits.dtype == hidden.dtype == np.float32
+    assert logits.dtype == np.float32
     for place in (0, 3, 6):
-        one, _ = network(codes[place : place + 1])
+        one = network(codes[place : place + 1])
         assert one[0] == pytest.approx(logits[place], abs=1e-4)
     # Codes are a whole batch in any memory order.
-    assert network(codes[::-1])[0][::-1] == pytest.approx(logits, abs=1e-4)
+    assert network(codes[::-1])[::-1] == pytest.approx(logits, abs=1e-4)
 
 
 def test_torch_gives_the_outputs_of_the_trained_network(bundle, rng):
@@ -130,12 +128,8 @@ def test_torch_gives_the_outputs_of_the_trained_network(bundle, rng):
     estimator = Estimator(network.eval(), bundle.estimator, SIDE, [])
     codes = random_codes(rng, 50)
     wanted = network_outputs(estimator, codes, choose_hardware("cpu", "float32"))
-    logits, hidden = open_network(bundle, "torch")(codes)
+    logits = open_network(bundle, "torch")(codes)
     assert logits == pytest.approx(wanted, abs=1e-5)
-    assert (hidden >= 0).all()
-    assert (hidden > 0).any()
-    last = bundle.weights["4.weight"], bundle.weights["4.bias"]
-    assert hidden @ last[0].T + last[1] == pytest.approx(logits, abs=1e-4)
 
 
 def test_the_background_is_0_and_the_reference_is_1(bundle):
@@ -146,7 +140,7 @@ def test_the_background_is_0_and_the_reference_is_1(bundle):
     for code, value in ((0, 0.0), (128, 1.0), (255, 255 / 128)):
         with torch.inference_mode():
             wanted = own.eval()(torch.full((1, 1, SIDE, SIDE), value)).numpy()
-        found, _ = network(np.full((1, SIDE, SIDE), code, dtype=np.uint8))
+        found = network(np.full((1, SIDE, SIDE), code, dtype=np.uint8))
         assert found == pytest.approx(wanted, abs=1e-5)
 
 
@@ -177,11 +171,11 @@ def test_without_its_packages_onnx_is_one_line_and_torch_the_default(
     with pytest.raises(UserError, match=r"nbv\[onnx\]"):
         open_network(bundle, "onnx")
     codes = random_codes(rng, 2)
-    found, _ = open_network(bundle)(codes)
-    assert np.array_equal(found, open_network(bundle, "torch")(codes)[0])
+    found = open_network(bundle)(codes)
+    assert np.array_equal(found, open_network(bundle, "torch")(codes))
 
 
 def test_onnx_is_the_default_where_it_is_installed(bundle, rng):
     codes = random_codes(rng, 2)
-    wanted, _ = onnx_network(bundle)(codes)
-    assert np.array_equal(open_network(bundle)(codes)[0], wanted)
+    wanted = onnx_network(bundle)(codes)
+    assert np.array_equal(open_network(bundle)(codes), wanted)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+
 from made_bundles import BINS, COLUMNS, FOCAL_PX, ROWS, WIDTH, frame
 
 pytest.importorskip("cyclopts")
@@ -415,8 +416,8 @@ def test_export_writes_the_network(here, bundle, capsys, rng):
     run(capsys, "export", "b.safetensors", "--onnx", "deep/x.onnx")
     session = onnxruntime.InferenceSession("deep/x.onnx", providers=["CPUExecutionProvider"])
     codes = rng.integers(0, 256, (5, 1, 32, 32)).astype(np.uint8)
-    logits, _ = session.run(["logits", "hidden"], {"codes": codes.astype(np.float32)})
-    wanted, _ = Recommender(bundle, "torch").network(codes[:, 0])
+    (logits,) = session.run(["logits"], {"codes": codes.astype(np.float32)})
+    wanted = Recommender(bundle, "torch").network(codes[:, 0])
     assert logits == pytest.approx(wanted, abs=1e-3)
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+
 from made_bundles import COLUMNS as WIDTH_PX
 from made_bundles import FOCAL_PX, ROWS, frame
-from PIL import Image
 
 pytest.importorskip("cyclopts")
 

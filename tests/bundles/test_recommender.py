@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from made_bundles import (
     BINS,
     COLUMNS,
@@ -20,10 +21,10 @@ from made_bundles import (
     random_weights,
 )
 from made_bundles import settings as made_settings
-
 from nbv.angles import circular_distance_deg, travel_deg
 from nbv.bundles.beliefs import distributions_of, elevation_share, spread_deg
-from nbv.bundles.recommender import MIN_SEPARATION_DEG, N_ALTERNATIVES, Recommender, unfamiliarity
+from nbv.bundles.familiarity import unfamiliarity
+from nbv.bundles.recommender import MIN_SEPARATION_DEG, N_ALTERNATIVES, Recommender
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics
@@ -46,8 +47,7 @@ def telling(bundle, sureness: float = 8.0) -> Recommender:
     def network(codes):
         classes = codes[:, 0, 0].astype(int)
         apart = np.radians((np.arange(BINS) - classes[:, None]) * WIDTH)
-        hidden = np.zeros((len(codes), len(bundle.familiarity.offset)), dtype=np.float32)
-        return (sureness * np.cos(apart)).astype(np.float32), hidden
+        return (sureness * np.cos(apart)).astype(np.float32)
 
     made.network = network
     return made
@@ -413,10 +413,9 @@ def test_an_elevation_is_a_number(recommender):
 def test_the_least_familiar_frame_counts(recommender):
     codes = codes_of(11, 3)
     known = recommender.bundle.familiarity
-    _, hidden = recommender.network(codes)
-    apart = unfamiliarity(known.projection, known.offset, known.centres, hidden)
+    apart = unfamiliarity(known, codes, recommender.network(codes))
     alone = [recommender.recommend_crops(codes[i : i + 1]).unfamiliarity for i in range(3)]
-    assert alone == pytest.approx(apart / known.threshold, rel=1e-5)
+    assert alone == pytest.approx(apart, rel=1e-5)
     together = recommender.recommend_crops(codes, [0.0, 60.0, 120.0])
     assert together.unfamiliarity == pytest.approx(max(alone), rel=1e-5)
     assert together.is_unfamiliar == (together.unfamiliarity > 1)
@@ -617,7 +616,7 @@ def test_both_backends_give_the_same_answer(bundle, recommender):
 
 def test_distributions_are_those_of_the_logits(recommender):
     codes = codes_of(5, 4)
-    logits, _ = recommender.network(codes)
+    logits = recommender.network(codes)
     wanted = distributions_of(logits, recommender.bundle.temperature)
     assert np.array_equal(recommender.distributions(codes), wanted)
     belief = recommender.recommend_crops(codes[:1]).belief

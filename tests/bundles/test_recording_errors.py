@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_bundles import BINS, WIDTH, soft_turns
 
+from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.angles import circular_distance_deg
 from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.calibration import Turn
@@ -22,6 +22,7 @@ from nbv.bundles.evaluation import (
     evaluate,
     familiarity_of,
 )
+from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.recommender import Recommender
 from nbv.errors import UserError
 from nbv.recommendation.fusion import product
@@ -37,8 +38,8 @@ def recording(seed=0, n=BINS, elevation=np.nan, name="cup", logits=None) -> Turn
     azimuth_deg = np.arange(n) * (360.0 / n)
     if logits is None:
         logits = soft_turns(np.random.default_rng(seed), 1, n)[0]
-    hidden = np.zeros((n, 40), dtype=np.float32)
-    return Turn(name, "1", elevation, azimuth_deg, logits.astype(np.float32), hidden)
+    codes = random_codes(np.random.default_rng(seed), n)
+    return Turn(name, "1", elevation, azimuth_deg, logits.astype(np.float32), codes)
 
 
 def sure(azimuth_deg, error_deg=0.0) -> np.ndarray:
@@ -164,10 +165,7 @@ def test_recommended_views_are_those_that_the_recommender_names(bundle, elevatio
     """Frame after frame: the recommender is shown all frames so far and asked where to go."""
     turn = recording(2, elevation=elevation)
     recommender = Recommender(bundle, "torch")
-    recommender.network = lambda codes: (
-        turn.logits[codes[:, 0, 0].astype(int)],
-        np.zeros((len(codes), 40), dtype=np.float32),
-    )
+    recommender.network = lambda codes: turn.logits[codes[:, 0, 0].astype(int)]
     known = None if np.isnan(elevation) else elevation
     wanted = []
     for first in range(BINS):
@@ -313,10 +311,17 @@ def test_unfamiliar_and_wrong_frames_are_counted(bundle):
     azimuth_deg = np.arange(BINS) * WIDTH
     frames = np.arange(BINS)
     turn = recording(logits=sure(azimuth_deg, np.where(frames % 4 == 0, 90.0, 0.0)))
-    known = bundle.familiarity
-    near = known.offset + known.centres[0] @ np.linalg.pinv(known.projection)
-    hidden = np.where((frames % 3 == 0)[:, None], near + 1e3, near).astype(np.float32)
-    (row,) = familiarity_of(bundle, [replace(turn, hidden=hidden)]).to_dict("records")
+    # Far from all crops that were calibrated, and near their middle.
+    familiar = replace(bundle.familiarity, scales=np.array([[50, 1], [0, 1e9]], np.float32))
+    strange = np.indices((32, 32)).sum(axis=0) % 2 * np.uint8(255)
+    mean = bundle.familiarity.mean[:256].reshape(16, 16) > 64
+    usual = np.kron(mean, np.ones((2, 2))).astype(np.uint8) * np.uint8(128)
+    codes = np.where((frames % 3 == 0)[:, None, None], strange, usual).astype(np.uint8)
+    limit = replace(familiar, threshold=1e-6)
+    apart = unfamiliarity(limit, codes, turn.logits)
+    limit = replace(familiar, threshold=float(1e-6 * np.median([apart.min(), apart.max()])))
+    changed = replace(bundle, familiarity=limit)
+    (row,) = familiarity_of(changed, [replace(turn, codes=codes)]).to_dict("records")
     assert row == {
         **{"object_id": "cup", "sequence": "1", "n_frames": 24},
         **{"n_unfamiliar": 8, "n_wrong": 6, "n_wrong_unfamiliar": 2},

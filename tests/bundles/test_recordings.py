@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from made_bundles import FOCAL_PX, frame
 from PIL import Image
 
+from made_bundles import FOCAL_PX, frame
 from nbv.bundles.manifest import read_manifest, see
 from nbv.errors import UserError
 from nbv.frames.intrinsics import Intrinsics
@@ -177,9 +177,9 @@ def crops(recommender, places, **options):
 
 def test_a_turn_has_the_outputs_of_every_frame(recommender, folder):
     turn, lines = seen(recommender, manifest(folder, table(elevation_deg=[20, 20, 20, 20])))
-    logits, hidden = recommender.network(crops(recommender, range(4)))
-    assert np.array_equal(turn.logits, logits)
-    assert np.array_equal(turn.hidden, hidden)
+    seen_crops = crops(recommender, range(4))
+    assert np.array_equal(turn.logits, recommender.network(seen_crops))
+    assert np.array_equal(turn.codes, seen_crops)
     assert turn.azimuth_deg.tolist() == list(AZIMUTHS)
     assert (turn.object_id, turn.sequence, turn.elevation_deg) == ("cup", "1", 20.0)
     assert lines == []
@@ -190,7 +190,7 @@ def test_a_refused_frame_is_told_and_left_out(recommender, folder):
     np.save(folder / "f3.npy", (frame(3) * 100).astype(np.uint8))
     turn, lines = seen(recommender, manifest(folder, table()))
     assert turn.azimuth_deg.tolist() == [0.0, 20.0]
-    logits, _ = recommender.network(crops(recommender, (0, 2)))
+    logits = recommender.network(crops(recommender, (0, 2)))
     assert np.array_equal(turn.logits, logits)
     assert len(lines) == 2
     assert "f1.npy is left out: empty-mask" in lines[0]
@@ -216,7 +216,7 @@ def test_masks_are_used_where_there_are_any(recommender, folder):
     rows = table(mask=["", "m1.png", "m2.png", ""])
     turn, lines = seen(recommender, manifest(folder, rows))
     assert lines == []
-    logits, _ = recommender.network(crops(recommender, range(4)))
+    logits = recommender.network(crops(recommender, range(4)))
     assert np.array_equal(turn.logits, logits)
     _, lines = seen(recommender, manifest(folder, table()))
     assert len(lines) == 1
@@ -230,12 +230,12 @@ def test_intrinsics_of_a_frame_come_before_those_of_all(recommender, folder):
     turn, _ = seen(recommender, manifest(folder, rows), Intrinsics(others, others))
     own = crops(recommender, range(4))
     of_all = crops(recommender, range(4), intrinsics=(others,))
-    logits, _ = recommender.network(np.stack([own[0], of_all[1], own[2], of_all[3]]))
+    logits = recommender.network(np.stack([own[0], of_all[1], own[2], of_all[3]]))
     assert np.array_equal(turn.logits, logits)
 
 
 def test_the_scale_of_whole_numbers_is_that_of_the_recording(recommender, folder):
-    wanted, _ = seen(recommender, manifest(folder, table()))
+    wanted = seen(recommender, manifest(folder, table()))
     for place in range(4):
         np.save(folder / f"f{place}.npy", np.rint(frame(place) * 1e5).astype(np.uint32))
     turn, _ = seen(recommender, manifest(folder, table()), depth_scale=1e-5)

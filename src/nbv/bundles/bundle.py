@@ -20,6 +20,7 @@ import safetensors.numpy
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import nearest_bin
+from nbv.bundles.familiarity import Familiarity
 from nbv.errors import UserError
 from nbv.files import replacing
 from nbv.rendering.camera import Camera
@@ -31,28 +32,6 @@ PROBABILITY_STEP = 0.054
 """Between kept logs of probabilities, in nats: 256 of them reach down to 1e-6."""
 
 _NETWORK = "network."
-
-
-@dataclass(frozen=True)
-class Familiarity:
-    """What the network's last hidden layer does on calibration images.
-
-    Attributes
-    ----------
-    projection : ndarray (H, q) float32
-        From centred hidden activations to q whitened components.
-    offset : ndarray (H,) float32
-        The mean of the hidden activations.
-    centres : ndarray (C, q) float32
-        Mean components of each range of azimuths.
-    threshold : float
-        The distance to the nearest centre that 95 % of calibration images keep.
-    """
-
-    projection: NDArray[np.float32]
-    offset: NDArray[np.float32]
-    centres: NDArray[np.float32]
-    threshold: float
 
 
 @dataclass(frozen=True)
@@ -175,9 +154,10 @@ def save_bundle(path: str | Path, bundle: Bundle) -> None:
         "calibration.elevation_deg": bundle.elevation_deg.astype(np.float32),
         "calibration.weight": bundle.turn_weight.astype(np.float32),
         "calibration.distributions": as_steps(bundle.distributions),
-        "familiarity.projection": bundle.familiarity.projection,
-        "familiarity.offset": bundle.familiarity.offset,
-        "familiarity.centres": bundle.familiarity.centres,
+        "familiarity.mean": bundle.familiarity.mean,
+        "familiarity.basis": bundle.familiarity.basis.astype(np.float16),
+        "familiarity.references": bundle.familiarity.references.astype(np.float16),
+        "familiarity.scales": bundle.familiarity.scales,
         "paper.elevation_deg": bundle.paper.elevation_deg,
         "paper.rotation_deg": bundle.paper.rotation_deg,
     }
@@ -266,9 +246,10 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
         distributions=from_steps(arrays["calibration.distributions"]),
         affinity=about["affinity"],
         familiarity=Familiarity(
-            arrays["familiarity.projection"],
-            arrays["familiarity.offset"],
-            arrays["familiarity.centres"],
+            arrays["familiarity.mean"],
+            arrays["familiarity.basis"].astype(np.float32),
+            arrays["familiarity.references"].astype(np.float32),
+            arrays["familiarity.scales"],
             about["familiar_within"],
         ),
         paper=PaperTables(arrays["paper.elevation_deg"], arrays["paper.rotation_deg"]),
@@ -293,7 +274,8 @@ def _need_sound(bundle: Bundle) -> None:
     if not all(math.isfinite(number) and number > 0 for number in numbers):
         raise ValueError("a size, focal length, temperature or threshold is not above 0")
     arrays = [*bundle.weights.values(), bundle.turn_weight, bundle.paper.elevation_deg]
-    arrays += [bundle.familiarity.projection, bundle.familiarity.offset, bundle.familiarity.centres]
+    known = bundle.familiarity
+    arrays += [known.mean, known.basis, known.references, known.scales]
     if (
         not all(np.isfinite(array).all() for array in arrays)
         or np.isinf(bundle.elevation_deg).any()

@@ -9,20 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.angles import nearest_bin, signed_difference_deg
+from nbv.angles import signed_difference_deg
 from nbv.bundles.beliefs import distributions_of, turned
-from nbv.bundles.bundle import Bundle, Familiarity, PaperTables
-from nbv.bundles.recommender import unfamiliarity
+from nbv.bundles.bundle import Bundle, PaperTables
+from nbv.bundles.familiarity import FAMILIAR_SHARE, unfamiliarity
 from nbv.calibration.pairs import WIDEST_GAP_DEG, full_turn, widest_gap_deg
 from nbv.calibration.posteriors import fit_temperature
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.density_selection import chosen_lookup
 
-FAMILIAR_SHARE = 0.95
-N_COMPONENTS = 32
-N_RANGES = 24
-"""Of azimuths, each with a centre of its own."""
+LEAST_LIMIT = 0.5
+"""Of unfamiliarity, where a camera's own frames are all very familiar."""
 
 PRIOR_TURNS = 3.0
 """So many turns of a camera count as much as all turns that a bundle was made with."""
@@ -52,7 +50,8 @@ class Turn:
         NaN where it is not known.
     azimuth_deg : ndarray (n,)
     logits : ndarray (n, B)
-    hidden : ndarray (n, H)
+    codes : ndarray (n, side, side) uint8
+        The crops.
     """
 
     object_id: str
@@ -60,7 +59,7 @@ class Turn:
     elevation_deg: float
     azimuth_deg: NDArray[np.float64]
     logits: NDArray[np.float32]
-    hidden: NDArray[np.float32]
+    codes: NDArray[np.uint8]
 
 
 def every(turn: Turn, step: int) -> Turn:
@@ -69,7 +68,7 @@ def every(turn: Turn, step: int) -> Turn:
         turn,
         azimuth_deg=turn.azimuth_deg[::step],
         logits=turn.logits[::step],
-        hidden=turn.hidden[::step],
+        codes=turn.codes[::step],
     )
 
 
@@ -130,51 +129,6 @@ def paper_tables(
     return PaperTables(levels.astype(np.float32), rotations.astype(np.int16))
 
 
-def fit_familiarity(turns: Sequence[Turn]) -> Familiarity:
-    """Return what calibration images look like to the network.
-
-    Hidden activations are whitened by their covariance within ranges of azimuth. The threshold is
-    taken over objects that were left out, one after the other, where there are two or more.
-    """
-    names = sorted({turn.object_id for turn in turns})
-    left_out = []
-    for name in names if len(names) > 1 else []:
-        others = [turn for turn in turns if turn.object_id != name]
-        projection, offset, centres = _whitening(others)
-        left_out += [
-            unfamiliarity(projection, offset, centres, turn.hidden)
-            for turn in turns
-            if turn.object_id == name
-        ]
-    projection, offset, centres = _whitening(turns)
-    scores = left_out or [unfamiliarity(projection, offset, centres, t.hidden) for t in turns]
-    threshold = float(np.quantile(np.concatenate(scores), FAMILIAR_SHARE))
-    return Familiarity(projection, offset, centres, threshold)
-
-
-def _whitening(
-    turns: Sequence[Turn],
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    hidden = np.concatenate([turn.hidden for turn in turns]).astype(np.float64)
-    azimuth_deg = np.concatenate([turn.azimuth_deg for turn in turns])
-    offset = hidden.mean(axis=0)
-    centred = hidden - offset
-    of_range = nearest_bin(azimuth_deg, N_RANGES)
-    present = np.unique(of_range)
-    centres = np.stack([centred[of_range == one].mean(axis=0) for one in present])
-    within = centred - centres[np.searchsorted(present, of_range)]
-    covariance = within.T @ within / max(len(within) - 1, 1)
-    values, vectors = np.linalg.eigh(covariance)
-    kept = np.argsort(values)[::-1][:N_COMPONENTS]
-    kept = kept[values[kept] > 1e-9 * values.max()]
-    projection = vectors[:, kept] / np.sqrt(values[kept])
-    return (
-        projection.astype(np.float32),
-        offset.astype(np.float32),
-        (centres @ projection).astype(np.float32),
-    )
-
-
 def recalibrated(
     bundle: Bundle, turns: Sequence[Turn], origin: str, density: Mapping[str, Any] = DENSITY
 ) -> Bundle:
@@ -201,12 +155,9 @@ def recalibrated(
     prior /= prior.sum(axis=-1, keepdims=True)
     prior_weight = bundle.turn_weight * (PRIOR_TURNS / bundle.turn_weight.sum())
     elevation_deg = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
-    familiar = bundle.familiarity
-    scores = [
-        unfamiliarity(familiar.projection, familiar.offset, familiar.centres, turn.hidden)
-        for turn in turns
-    ]
-    threshold = float(np.quantile(np.concatenate(scores), FAMILIAR_SHARE))
+    known = bundle.familiarity
+    scores = [unfamiliarity(known, turn.codes, turn.logits) for turn in turns]
+    limit = max(float(np.quantile(np.concatenate(scores), FAMILIAR_SHARE)), LEAST_LIMIT)
     return replace(
         bundle,
         temperature=temperature,
@@ -214,7 +165,7 @@ def recalibrated(
         elevation_deg=np.concatenate([elevation_deg, bundle.elevation_deg]),
         turn_weight=np.concatenate([np.ones(len(turns)), prior_weight]).astype(np.float32),
         distributions=np.concatenate([rows, prior]),
-        familiarity=replace(familiar, threshold=threshold),
+        familiarity=replace(known, threshold=limit * known.threshold),
         paper=paper_tables(np.nan_to_num(elevation_deg), rows, density),
         provenance=dict(bundle.provenance) | {"calibrated_by": origin},
     )

@@ -13,7 +13,8 @@ from nbv.angles import circular_distance_deg, direction_deg, signed_difference_d
 from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.calibration import Turn
-from nbv.bundles.recommender import MIN_SEPARATION_DEG, turn_share, unfamiliarity
+from nbv.bundles.familiarity import unfamiliarity
+from nbv.bundles.recommender import MIN_SEPARATION_DEG, turn_share
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.fusion import average
@@ -229,8 +230,7 @@ def familiarity_of(bundle: Bundle, turns: Sequence[Turn]) -> pd.DataFrame:
         seen = seen_by(bundle, turn)
         estimates = mean_direction_deg(seen.distributions)
         is_wrong = circular_distance_deg(estimates, turn.azimuth_deg) > LARGE_ERROR_DEG
-        apart = unfamiliarity(known.projection, known.offset, known.centres, turn.hidden)
-        is_strange = apart > known.threshold
+        is_strange = unfamiliarity(known, turn.codes, turn.logits) > 1.0
         rows.append(
             {
                 "object_id": turn.object_id,

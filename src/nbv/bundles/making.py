@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.bundle import Bundle
-from nbv.bundles.calibration import Turn, bin_apart, fit_familiarity, paper_tables, temperature_of
+from nbv.bundles.calibration import Turn, bin_apart, paper_tables, temperature_of
+from nbv.bundles.familiarity import fit_familiarity
 from nbv.depth_images import DepthImages
 from nbv.estimation.weights import Estimator, network_of, weights_of
 from nbv.frames.crop import pixel_step
@@ -42,10 +43,10 @@ def turns_of(
     turns, extents = [], []
     for elevation, of_elevation in zip(elevations_deg, images, strict=True):
         for object_id, codes in zip(object_ids, of_elevation.of(object_ids), strict=True):
-            logits, hidden = network(codes)
+            logits = network(codes)
             azimuth_deg = np.arange(len(codes), dtype=np.float64) * (360.0 / len(codes))
             turns.append(
-                Turn(object_id, f"{elevation:g}", float(elevation), azimuth_deg, logits, hidden)
+                Turn(object_id, f"{elevation:g}", float(elevation), azimuth_deg, logits, codes)
             )
             extents.append(_extents(codes))
     low, high = np.quantile(np.concatenate(extents), (0.01, 0.99))

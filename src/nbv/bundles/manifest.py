@@ -153,12 +153,12 @@ def see(
             f"every frame of object {recording.object_id!r}, sequence {recording.sequence!r} is "
             "refused: see the lines above"
         )
-    logits, hidden = recommender.network(np.stack(codes))
+    crops = np.stack(codes)
     return Turn(
         recording.object_id,
         recording.sequence,
         recording.elevation_deg,
         recording.azimuth_deg[kept],
-        logits,
-        hidden,
+        recommender.network(crops),
+        crops,
     )

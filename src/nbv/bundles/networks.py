@@ -14,8 +14,8 @@ from nbv.errors import UserError, nearest
 Codes = NDArray[np.uint8]
 Outputs = NDArray[np.float32]
 
-Network = Callable[[Codes], tuple[Outputs, Outputs]]
-"""From codes (n, side, side) to logits (n, B) and the last hidden layer (n, H)."""
+Network = Callable[[Codes], Outputs]
+"""From codes (n, side, side) to logits (n, B)."""
 
 BACKENDS = ("onnx", "torch")
 
@@ -55,11 +55,9 @@ def _onnx_network(bundle: Bundle) -> Network:
         onnx_model(bundle).SerializeToString(), options, providers=["CPUExecutionProvider"]
     )
 
-    def network(codes: Codes) -> tuple[Outputs, Outputs]:
-        logits, hidden = session.run(
-            ["logits", "hidden"], {"codes": codes[:, None].astype(np.float32)}
-        )
-        return logits, hidden
+    def network(codes: Codes) -> Outputs:
+        (logits,) = session.run(["logits"], {"codes": codes[:, None].astype(np.float32)})
+        return np.asarray(logits)
 
     return network
 

@@ -19,7 +19,7 @@ _EPSILON = 1e-5
 
 
 def onnx_model(bundle: Bundle) -> ModelProto:
-    """Return the network from ``codes`` (n, 1, side, side) float32 to ``logits`` and ``hidden``.
+    """Return the network from ``codes`` (n, 1, side, side) float32 to ``logits``.
 
     Codes are divided by 128, as `nbv.estimation.images.to_input` does. Batch normalisation is
     folded into the convolutions.
@@ -62,15 +62,11 @@ def onnx_model(bundle: Bundle) -> ModelProto:
         nodes.append(helper.make_node("Gemm", [given, *names], [made], transB=1))
         if place == "2":
             nodes.append(helper.make_node("Relu", ["wide"], ["hidden"]))
-    hidden, logits = weights["2.bias"].size, weights["4.bias"].size
     graph = helper.make_graph(
         nodes,
         f"nbv {bundle.category}",
         [helper.make_tensor_value_info("codes", TensorProto.FLOAT, ["n", 1, side, side])],
-        [
-            helper.make_tensor_value_info("logits", TensorProto.FLOAT, ["n", logits]),
-            helper.make_tensor_value_info("hidden", TensorProto.FLOAT, ["n", hidden]),
-        ],
+        [helper.make_tensor_value_info("logits", TensorProto.FLOAT, ["n", weights["4.bias"].size])],
         constants,
     )
     opset = [helper.make_opsetid("", OPSET)]

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.angles import circular_distance_deg, signed_difference_deg, travel_deg, wrap_deg
 from nbv.bundles.beliefs import distributions_of, elevation_share, fused, spread_deg, turned
 from nbv.bundles.bundle import Bundle, load_bundle
+from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.networks import Network, open_network
 from nbv.errors import UserError, nearest
 from nbv.frames.crop import Crop, crop_frame, need_plausible_nearest
@@ -194,8 +195,7 @@ class Recommender:
 
     def distributions(self, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
         """Return p(azimuth | image) (n, B) of crops (n, side, side)."""
-        logits, _ = self.network(codes)
-        return distributions_of(logits, self.bundle.temperature)
+        return distributions_of(self.network(codes), self.bundle.temperature)
 
     def recommend(
         self,
@@ -276,7 +276,7 @@ class Recommender:
         _need_rotations(rotations_deg, len(codes))
         if elevation_deg is not None and not math.isfinite(elevation_deg):
             raise UserError(f"an elevation of {elevation_deg:g}°: give a number, or none")
-        logits, hidden = self.network(codes)
+        logits = self.network(codes)
         belief = fused(distributions_of(logits, self.bundle.temperature), rotations_deg)
         n_bins = self.bundle.n_bins
         width = 360.0 / n_bins
@@ -305,7 +305,7 @@ class Recommender:
             alternatives=tuple(others[:N_ALTERNATIVES]),
             belief=turned(belief, -last),
             error_after_deg=error,
-            unfamiliarity=float(self._unfamiliarity(hidden).max()),
+            unfamiliarity=float(unfamiliarity(self.bundle.familiarity, codes, logits).max()),
             crops=tuple(codes),
         )
 
@@ -325,26 +325,6 @@ class Recommender:
                 raise UserError("allowed rotations: give one at least, in degrees")
             may &= circular_distance_deg(here[:, None], given).min(axis=1) <= width / 2
         return np.asarray(may)
-
-    def _unfamiliarity(self, hidden: NDArray[np.float32]) -> NDArray[np.float64]:
-        known = self.bundle.familiarity
-        apart = unfamiliarity(known.projection, known.offset, known.centres, hidden)
-        return apart / known.threshold
-
-
-def unfamiliarity(
-    projection: NDArray[np.float32],
-    offset: NDArray[np.float32],
-    centres: NDArray[np.float32],
-    hidden: NDArray[np.float32],
-) -> NDArray[np.float64]:
-    """Return the distance (n,) of hidden activations (n, H) to the nearest centre.
-
-    Components are whitened, so that this is a Mahalanobis distance (Lee et al., 2018).
-    """
-    places = (hidden - offset) @ projection
-    apart = ((places[:, None] - centres) ** 2).sum(axis=2)
-    return np.asarray(np.sqrt(apart.min(axis=1)), dtype=np.float64)
 
 
 def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float64]:

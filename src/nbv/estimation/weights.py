@@ -157,8 +157,8 @@ def weights_of(estimator: Estimator) -> dict[str, NDArray[np.float32]]:
 
 def network_of(
     weights: Mapping[str, NDArray[np.float32]], settings: Mapping[str, Any], image_side: int
-) -> Callable[[NDArray[np.uint8]], tuple[NDArray[np.float32], NDArray[np.float32]]]:
-    """Return the network of some weights, from codes (n, side, side) to outputs and hidden layer.
+) -> Callable[[NDArray[np.uint8]], NDArray[np.float32]]:
+    """Return the network of some weights, from codes (n, side, side) to outputs (n, k).
 
     It computes on one core of the processor, in single precision.
 
@@ -178,12 +178,9 @@ def network_of(
             raise RuntimeError("names")
     except (RuntimeError, TypeError) as error:
         raise UserError("the weights do not fit the network's settings") from error
-    *before, last = network.children()
-    hidden = nn.Sequential(*before)
 
-    def run(codes: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def run(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
         with torch.inference_mode():
-            wide = hidden(to_input(codes, hardware))
-            return last(wide).numpy(), wide.numpy()
+            return np.asarray(network(to_input(codes, hardware)).numpy())
 
     return run
