@@ -128,6 +128,10 @@ def recommend(
         Print JSON.
     """
     if table is not None or estimate is not None:
+        of_frames = {"FRAME": frames, "--allowed": allowed, "--axis": axis, "--plot": plot}
+        of_frames |= {"--camera-pose": camera_pose, "--mask": mask, "--rotations": rotations}
+        if ignored := [name for name, value in of_frames.items() if value is not None]:
+            raise UserError(f"{ignored[0]} does not go with --estimate and --table; leave it out")
         _recommend_by_table(estimate, table, as_json=json)
         return
     if not frames:
@@ -414,7 +418,14 @@ def _recommend_by_table(estimate: float | None, table: Path | None, *, as_json: 
     from nbv.angles import nearest_bin, travel_deg
     from nbv.recommendation.lookup import load_lookup
 
-    lookup = load_lookup(table)
+    if not table.exists():
+        raise UserError(f"{table} does not exist; name the file that nbv calibrate wrote")
+    try:
+        lookup = load_lookup(table)
+    except UserError as error:
+        raise UserError(
+            f"--table={table}: no lookup table; give the .npz file that nbv calibrate wrote"
+        ) from error
     rotation = int(lookup.recommend(estimate))
     cost = float(
         lookup.cost[

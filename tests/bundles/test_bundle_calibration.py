@@ -17,7 +17,6 @@ from nbv.bundles.calibration import (
     LEAST_LIMIT,
     PRIOR_TURNS,
     WIDEST_GAP_DEG,
-    Turn,
     bin_apart,
     paper_tables,
     recalibrated,
@@ -25,6 +24,7 @@ from nbv.bundles.calibration import (
 )
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.recommender import Recommender
+from nbv.bundles.turns import Turn
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.density_selection import chosen_lookup

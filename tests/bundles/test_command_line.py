@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -189,17 +190,12 @@ def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
     assert "camera" not in two.splitlines()[0]
 
 
-def test_an_unfamiliar_frame_is_told(here, capsys):
-    """A square of deep holes and high posts."""
-    odd = np.zeros((ROWS, COLUMNS), np.float32)
-    blocks = np.indices((34, 34)) // 2 % 2
-    odd[28:62, 43:77] = 0.6 + 0.05 * (2 * (blocks[0] ^ blocks[1]) - 1)
-    np.save(here / "odd.npy", odd)
-    answer = Recommender.load("b.safetensors").recommend(odd)
-    out = run(capsys, "recommend", "odd.npy", "--bundle", "b.safetensors")
-    assert ("careful" in out) == answer.is_unfamiliar
-    assert answer.is_unfamiliar
-    assert "careful" not in run(capsys, "recommend", "f0.npy", "--bundle", "b.safetensors")
+@pytest.mark.parametrize(("limit", "is_told"), [(1e-6, True), (1e6, False)])
+def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
+    known = replace(bundle.familiarity, threshold=limit, scales=np.array([[0, 1], [-1e3, 1]]))
+    save_bundle("limit.safetensors", replace(bundle, familiarity=known))
+    out = run(capsys, "recommend", "f0.npy", "--bundle", "limit.safetensors")
+    assert ("careful" in out) == is_told
 
 
 @pytest.mark.parametrize(
@@ -507,3 +503,20 @@ def test_without_any_way_to_compute_a_network_it_says_what_to_install(here):
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("nbv: error: a network needs the packages of nbv[onnx], or torch")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "more", [("f0.npy",), ("--allowed", "90"), ("--axis", "0", "0", "0"), ("--plot", "x.png")]
+)
+def test_what_an_estimate_cannot_use_is_refused(pairs, capsys, more):
+    main(["calibrate", "pairs.csv", "--output", "table.npz"])
+    capsys.readouterr()
+    options = ("recommend", "--estimate", "90", "--table", "table.npz")
+    assert "does not go with --estimate" in fails(capsys, *options, *more)
+
+
+@pytest.mark.parametrize("name", ["pairs.csv", "f0.npy", "b.safetensors"])
+def test_what_is_no_lookup_table_is_not_to_be_deleted(pairs, capsys, name):
+    message = fails(capsys, "recommend", "--estimate", "90", "--table", name)
+    assert "no lookup table; give the .npz file that nbv calibrate wrote" in message
+    assert "delete" not in message

@@ -10,7 +10,6 @@ import pytest
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.angles import circular_distance_deg
 from nbv.bundles.beliefs import distributions_of
-from nbv.bundles.calibration import Turn
 from nbv.bundles.evaluation import (
     FIXED,
     OPPOSITE,
@@ -24,6 +23,7 @@ from nbv.bundles.evaluation import (
 )
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.recommender import Recommender
+from nbv.bundles.turns import Turn
 from nbv.errors import UserError
 from nbv.recommendation.fusion import product
 

@@ -235,7 +235,7 @@ def test_intrinsics_of_a_frame_come_before_those_of_all(recommender, folder):
 
 
 def test_the_scale_of_whole_numbers_is_that_of_the_recording(recommender, folder):
-    wanted = seen(recommender, manifest(folder, table()))
+    wanted, _ = seen(recommender, manifest(folder, table()))
     for place in range(4):
         np.save(folder / f"f{place}.npy", np.rint(frame(place) * 1e5).astype(np.uint32))
     turn, _ = seen(recommender, manifest(folder, table()), depth_scale=1e-5)

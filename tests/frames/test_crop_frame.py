@@ -347,7 +347,9 @@ def test_a_wrong_unit_is_named(unit):
     depth = frame(20.0, 200.0, 5.0) * DIAGONAL_M
     cropped(depth, extent_m=EXTENT_M)
     message = refused("implausible-distance", depth * unit, extent_m=EXTENT_M)
-    assert f"depths {1 / unit:g} times as large would fit: check --depth-scale" in message
+    assert (
+        f"depths {1 / unit:g} times as large would fit: multiply depths or --depth-scale" in message
+    )
 
 
 def test_quarters_of_a_millimetre_may_be_at_a_plausible_distance():

@@ -7,9 +7,9 @@ with job(snakemake):
     from pathlib import Path
 
     from nbv.bundles.bundle import save_bundle
-    from nbv.bundles.calibration import every
     from nbv.bundles.evaluation import evaluate
     from nbv.bundles.making import make_bundle, turns_of
+    from nbv.bundles.turns import every
     from nbv.calibration.splits import objects_with_role, read_splits
     from nbv.depth_images import open_depth
     from nbv.estimation.hardware import choose_hardware, use_one_thread

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from nbv.angles import signed_difference_deg
 from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import FAMILIAR_SHARE, unfamiliarity
+from nbv.bundles.turns import Turn
 from nbv.calibration.pairs import WIDEST_GAP_DEG, full_turn, widest_gap_deg
 from nbv.calibration.posteriors import fit_temperature
 from nbv.errors import UserError
@@ -37,39 +38,6 @@ DENSITY: Mapping[str, Any] = {
     "max_travel_deg": 180.0,
 }
 """What `config/` sets for the paper's method."""
-
-
-@dataclass(frozen=True)
-class Turn:
-    """Views of one object, taken at one elevation.
-
-    Attributes
-    ----------
-    object_id, sequence : str
-    elevation_deg : float
-        NaN where it is not known.
-    azimuth_deg : ndarray (n,)
-    logits : ndarray (n, B)
-    codes : ndarray (n, side, side) uint8
-        The crops.
-    """
-
-    object_id: str
-    sequence: str
-    elevation_deg: float
-    azimuth_deg: NDArray[np.float64]
-    logits: NDArray[np.float32]
-    codes: NDArray[np.uint8]
-
-
-def every(turn: Turn, step: int) -> Turn:
-    """Return every `step`-th view of a turn."""
-    return replace(
-        turn,
-        azimuth_deg=turn.azimuth_deg[::step],
-        logits=turn.logits[::step],
-        codes=turn.codes[::step],
-    )
 
 
 def temperature_of(turns: Sequence[Turn]) -> float:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from nbv.angles import circular_distance_deg, direction_deg, signed_difference_deg
 from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.bundle import Bundle, PaperTables
-from nbv.bundles.calibration import Turn
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.recommender import MIN_SEPARATION_DEG, turn_share
+from nbv.bundles.turns import Turn
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.fusion import average

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.bundles.turns import Turn
 from nbv.rendering.depth_codes import ZERO_CODE
-
-if TYPE_CHECKING:
-    from nbv.bundles.calibration import Turn
 
 FAMILIAR_SHARE = 0.95
 """Of calibration crops: those that are familiar."""

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.bundle import Bundle
-from nbv.bundles.calibration import Turn, bin_apart, paper_tables, temperature_of
+from nbv.bundles.calibration import bin_apart, paper_tables, temperature_of
 from nbv.bundles.familiarity import fit_familiarity
+from nbv.bundles.turns import Turn
 from nbv.depth_images import DepthImages
 from nbv.estimation.weights import Estimator, network_of, weights_of
 from nbv.frames.crop import pixel_step

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from nbv.bundles.calibration import Turn
 from nbv.bundles.recommender import Recommender
+from nbv.bundles.turns import Turn
 from nbv.errors import UserError
 from nbv.frames.depth_files import read_depth, read_mask
 from nbv.frames.errors import FrameError

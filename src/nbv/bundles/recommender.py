@@ -274,8 +274,10 @@ class Recommender:
     ) -> Recommendation:
         """Return what `recommend` does, of crops (n, side, side) uint8."""
         _need_rotations(rotations_deg, len(codes))
-        if elevation_deg is not None and not math.isfinite(elevation_deg):
-            raise UserError(f"an elevation of {elevation_deg:g}°: give a number, or none")
+        if elevation_deg is not None and not -90 <= elevation_deg <= 90:
+            raise UserError(
+                f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
+            )
         logits = self.network(codes)
         belief = fused(distributions_of(logits, self.bundle.temperature), rotations_deg)
         n_bins = self.bundle.n_bins
@@ -295,7 +297,10 @@ class Recommender:
         here = np.arange(n_bins, dtype=np.float64) * width
         error[~self._may_go(here, taken, allowed_deg, max_travel_deg)] = np.inf
         if not np.isfinite(error).any():
-            raise UserError("no rotation is allowed: widen --allowed or --max-travel")
+            raise UserError(
+                "no rotation is allowed: widen --allowed or --max-travel; a view is "
+                f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
+            )
         best, *others = _local_best(error, here)
         return Recommendation(
             azimuth_deg=float(wrap_deg(mean_direction_deg(belief[None])[0] + last)),

@@ -183,7 +183,7 @@ def _implausible_distance(distance_m: float, diagonal_m: float, unit: float | No
 def _help(unit: float | None) -> str:
     if unit is None:
         return "mask the object alone, or is it of another category or size?"
-    return f"depths {unit:g} times as large would fit: check --depth-scale"
+    return f"depths {unit:g} times as large would fit: multiply depths or --depth-scale by it"
 
 
 def _need_inside(

@@ -112,6 +112,6 @@ def _draw_errors(axes: PolarAxes, answer: Recommendation) -> None:
     axes.set_rlabel_position(0)
     rotation = f"{answer.move.rotation_deg:+.0f}".replace("-", "−")
     axes.set_title(
-        "Expected error (degrees) after a turn of the camera\n"
+        "Expected error (degrees) after a turn\n"
         f"best: {rotation}°, {answer.move.expected_error_deg:.1f}°"
     )

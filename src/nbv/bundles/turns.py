@@ -1,0 +1,41 @@
+"""Views of one object all round, and what a network makes of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Views of one object, taken at one elevation.
+
+    Attributes
+    ----------
+    object_id, sequence : str
+    elevation_deg : float
+        NaN where it is not known.
+    azimuth_deg : ndarray (n,)
+    logits : ndarray (n, B)
+    codes : ndarray (n, side, side) uint8
+        The crops.
+    """
+
+    object_id: str
+    sequence: str
+    elevation_deg: float
+    azimuth_deg: NDArray[np.float64]
+    logits: NDArray[np.float32]
+    codes: NDArray[np.uint8]
+
+
+def every(turn: Turn, step: int) -> Turn:
+    """Return every `step`-th view of a turn."""
+    return replace(
+        turn,
+        azimuth_deg=turn.azimuth_deg[::step],
+        logits=turn.logits[::step],
+        codes=turn.codes[::step],
+    )
