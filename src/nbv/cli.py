@@ -1,4 +1,4 @@
-"""The command line: ``nbv recommend``, ``calibrate``, ``evaluate``, ``inspect``, ``export``.
+"""The command line: ``nbv recommend``, ``calibrate``, ``evaluate`` and the like.
 
 Commands import what they use when they run, so that ``nbv --help`` stays quick.
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import replace
 
@@ -171,13 +172,17 @@ def written(path, content: bytes):
 
 
 def with_about(bundle_file, path, **changes):
-    """The same arrays with other metadata, and without the digest."""
+    """The same arrays with other metadata, and with the digest of both."""
     with safetensors.safe_open(bundle_file, framework="numpy") as stored:
         about = json.loads(stored.metadata()["nbv"])
         arrays_ = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
     about.pop("sha256")
     about |= changes
     about = {name: value for name, value in about.items() if value is not None}
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    for name, array in sorted(arrays_.items()):
+        digest.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
+    about = {"sha256": digest.hexdigest()} | about
     return written(path, safetensors.numpy.save(arrays_, metadata={"nbv": json.dumps(about)}))
 
 
@@ -227,9 +232,10 @@ def test_a_newer_format_says_what_to_do(bundle_file, tmp_path):
     assert "install a newer nbv" in message
 
 
-def test_a_bundle_without_a_digest_is_read(bundle_file, tmp_path):
-    path = with_about(bundle_file, tmp_path / "a.safetensors", provenance={"by": "hand"})
-    assert load_bundle(path).provenance == {"by": "hand"}
+def test_a_bundle_without_its_digest_is_refused(bundle_file, tmp_path):
+    path = with_about(bundle_file, tmp_path / "a.safetensors", sha256="")
+    assert "not the bytes that were written" in refused(path)
+    assert load_bundle(with_about(bundle_file, tmp_path / "b.safetensors")).category == "mug"
 
 
 @pytest.mark.parametrize(

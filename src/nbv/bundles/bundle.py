@@ -199,9 +199,7 @@ def load_bundle(path: str | Path) -> Bundle:
                 f"{path} is a bundle of format {version}, this program reads up to {FORMAT}: "
                 "install a newer nbv"
             )
-        # Bundles of before it was kept have none.
-        digest = about.pop("sha256", None)
-        if digest is not None and digest != _digest(about, arrays):
+        if about.pop("sha256") != _digest(about, arrays):
             raise ValueError("not the bytes that were written")
         bundle = _of_parts(about, arrays)
         _need_sound(bundle)

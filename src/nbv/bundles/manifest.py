@@ -11,6 +11,7 @@ import pandas as pd
 
 from nbv.bundles.recommender import Recommender
 from nbv.bundles.turns import Turn
+from nbv.calibration.pairs import read_rows
 from nbv.errors import UserError
 from nbv.frames.depth_files import read_depth, read_mask
 from nbv.frames.errors import FrameError
@@ -64,18 +65,7 @@ def read_manifest(path: str | Path) -> list[Recording]:
         Where a column or a file is missing, or an azimuth is no number.
     """
     path = Path(path)
-    if not path.is_file():
-        raise UserError(f"{path} does not exist; name a manifest with {', '.join(NEEDED)}")
-    try:
-        # Text as it is written: an object may be called NA.
-        table = pd.read_csv(path, dtype=str, keep_default_na=False)
-    except (OSError, ValueError, UnicodeDecodeError) as error:
-        raise UserError(f"{path} cannot be read ({' '.join(str(error).split())})") from error
-    for name in NEEDED:
-        if name not in table:
-            raise UserError(f"{path}: no column {name!r}; it needs {', '.join(NEEDED)}")
-    if table.empty:
-        raise UserError(f"{path} has no rows")
+    table = read_rows(path, NEEDED)
     for name in ("azimuth_deg", *(set(OPTIONAL) - {"mask"})):
         if name in table:
             table[name] = pd.to_numeric(table[name], errors="coerce")

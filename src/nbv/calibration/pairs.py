@@ -58,22 +58,36 @@ def read_pairs(
     return Estimates(tuple(turns), np.stack(list(turns.values())))
 
 
-def _read_table(path: Path) -> pd.DataFrame:
+def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
+    """Read a CSV file that a user wrote, as text: an object may be called NA.
+
+    Raises
+    ------
+    UserError
+        Where it cannot be read, a column of `needed` is missing, or it has no rows.
+    """
     if not path.is_file():
-        raise UserError(f"{path} does not exist; name a file with {', '.join(COLUMNS)}")
+        raise UserError(f"{path} does not exist; name a file with {', '.join(needed)}")
     try:
-        table = pd.read_csv(path, dtype={"object_id": str}, keep_default_na=False)
+        table = pd.read_csv(path, dtype=str, keep_default_na=False)
     except (OSError, ValueError) as error:
         raise UserError(f"{path} cannot be read ({' '.join(str(error).split())})") from error
-    for name in COLUMNS:
+    for name in needed:
         if name not in table:
-            raise UserError(f"{path}: no column {name!r}; it needs {', '.join(COLUMNS)}")
+            raise UserError(f"{path}: no column {name!r}; it needs {', '.join(needed)}")
     if table.empty:
         raise UserError(f"{path} has no rows")
+    return table
+
+
+def _read_table(path: Path) -> pd.DataFrame:
+    table = read_rows(path, COLUMNS)
     for name in COLUMNS[1:]:
         table[name] = pd.to_numeric(table[name], errors="coerce")
         if not (finite := np.isfinite(table[name].to_numpy(dtype=np.float64))).all():
             raise UserError(f"{path}, row {int((~finite).argmax()) + 2}: {name} is no number")
+    if "elevation_deg" in table:
+        table["elevation_deg"] = pd.to_numeric(table["elevation_deg"], errors="coerce")
     return table
 
 
