@@ -8,16 +8,17 @@ cores=${CORES:-2}
 density="density.bandwidths_deg=[4,8,16],density.pseudo_observations=[0.3,3,30,300]"
 kept=()
 
-# Both estimators on one run's objects: name, data set, further settings.
+# Both estimators on one run's objects: name, data set, further settings. The last command tabulates all of them.
 train() {
-    local estimator suffix
+    local estimator suffix file
     for estimator in regressor classifier; do
         suffix=${estimator#regressor}
         suffix=${suffix:+-$suffix}
         # Nobody has trained on objects or folds of this seed.
-        snakemake --cores "$cores" confirm --config name="$1$suffix" estimator="$estimator" "${@:4}" \
+        file=results/$1$suffix/confirmation/estimates.npz
+        snakemake --cores "$cores" "$file" --config name="$1$suffix" estimator="$estimator" "${@:4}" \
             overrides="[confirmation.dataset=$2$suffix,seed=11,elevations_deg.mug=[0],estimator.warm_start=both,$density${3:+,$3}]"
-        kept+=("results/$1$suffix/confirmation/estimates.npz")
+        kept+=("$file")
     done
 }
 
