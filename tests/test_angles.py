@@ -25,6 +25,15 @@ def test_wrapping_keeps_the_direction_and_the_range(angle):
     assert abs(unit(wrapped) - unit(angle)) < 1e-9
 
 
+@given(st.floats(-1e9, 1e9), st.integers(-3, 3))
+def test_wrapping_is_the_remainder_bit_for_bit(angle, turns):
+    near = np.nextafter(360.0 * turns, [-np.inf, np.inf])
+    angles_deg = np.array([angle, 360.0 * turns, *near])
+    remainder = np.mod(angles_deg, 360.0)
+    expected = np.where(remainder >= 360.0, 0.0, remainder)
+    assert angles.wrap_deg(angles_deg).tobytes() == expected.tobytes()
+
+
 @pytest.mark.parametrize("angle", [-1e-17, 360.0, 720.0, -360.0])
 def test_wrapping_never_gives_360(angle):
     assert angles.wrap_deg(angle) == 0.0
