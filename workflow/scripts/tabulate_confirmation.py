@@ -8,6 +8,7 @@ with job(snakemake):
     from nbv.files import read_csv, write_csv
     from nbv.reporting.extensions.confirmation import (
         beliefs_table,
+        bounds_table,
         contrasts_figure,
         contrasts_table,
         densities_table,
@@ -17,22 +18,22 @@ with job(snakemake):
     from nbv.reporting.table import write_table
     from nbv.statistics.confirmation import (
         belief_means,
+        bound_means,
         method_contrasts,
         method_means,
         training_contrasts,
     )
 
     output = snakemake.output
-    columns = ["dataset", "shuffle", "replicate", "category"]
     read = {
         name: pd.concat(
             [
-                read_csv(path).assign(**dict(zip(columns, place, strict=True)))
-                for place, path in zip(snakemake.params.places, snakemake.input[name], strict=True)
+                read_csv(path).assign(**place)
+                for path, place in zip(snakemake.input[name], places, strict=True)
             ],
             ignore_index=True,
         )
-        for name in ("objects", "beliefs", "densities")
+        for name, places in snakemake.params.places.items()
     }
     objects = read["objects"]
     contrasts, of_trainings = method_contrasts(objects), training_contrasts(objects)
@@ -42,6 +43,8 @@ with job(snakemake):
         "beliefs": beliefs_table(belief_means(read["beliefs"])),
         "densities": densities_table(read["densities"]),
     }
+    if "plan_bounds" in read:
+        tables["plan_bounds"] = bounds_table(bound_means(read["plan_bounds"]))
     write_csv(output.trainings_csv, of_trainings)
     for name, table in tables.items():
         write_table(table, {kind: output[f"{name}_{kind}"] for kind in ("csv", "md")})

@@ -9,6 +9,7 @@ from tests.statistics.test_confirmation import SHIFT, objects_frame
 from nbv.experiments.factorial import DENSITY_COLUMNS
 from nbv.reporting.extensions.confirmation import (
     beliefs_table,
+    bounds_table,
     contrasts_figure,
     contrasts_table,
     densities_table,
@@ -17,6 +18,7 @@ from nbv.reporting.extensions.confirmation import (
 from nbv.reporting.table import table_markdown
 from nbv.statistics.confirmation import (
     BELIEF_COLUMNS,
+    BOUNDS_COLUMNS,
     TRAININGS_COLUMNS,
     belief_means,
     method_contrasts,
@@ -128,3 +130,14 @@ def test_without_an_answer_there_is_no_figure(contrasts):
     none = pd.DataFrame(columns=contrasts.columns).astype({"primary": bool})
     with pytest.raises(ValueError, match="no contrast answers a question"):
         contrasts_figure(none)
+
+
+def test_bounds_have_a_row_for_each_number_of_views():
+    row = ("real", "mug", 3, 2.0, 1.25, -0.75, -1.0, -0.5, 0.5, 25, 3)
+    undecided = ("real", "mug", 4, 1.0, 0.75, -0.25, -0.6, 0.1, 0.25, 25, 3)
+    table = bounds_table(pd.DataFrame([row, undecided], columns=list(BOUNDS_COLUMNS)))
+    first, second = table.parts[0].rows
+    texts = ["3", "2.00", "1.25", "−0.75 (−1.00 to −0.50)", "0.50"]
+    assert [cell.text for cell in first] == texts
+    assert first[3].bold
+    assert not second[3].bold

@@ -1,5 +1,6 @@
 # The functions of the extensions' rule files.
 
+import collections
 import functools
 
 from nbv.config import load_condition, read_configuration
@@ -206,16 +207,22 @@ def dataset_name(settings):
     return settings["confirmation"]["dataset"] or settings["name"]
 
 
+# The file that a run's estimates were kept in (None: this run's), what it holds (shuffle, replicate,
+# category and elevation), its data set, and whether it has distributions.
+KeptRun = collections.namedtuple("KeptRun", "path keys dataset distributions")
+
+
 @functools.cache
 def kept_runs():
-    """By run, the file that its estimates were kept in (None: this run's), keys and data set."""
+    """What the statistics are made of, by run."""
     if not CONFIG["confirmation"]["kept"]:
         keys = [
             (shuffle, replicate, *unit)
             for shuffle, replicate in REPLICATES
             for unit in LOWEST_UNITS
         ]
-        return {CONFIG["name"]: (None, keys, dataset_name(CONFIG))}
+        own = KeptRun(None, keys, dataset_name(CONFIG), CONFIG["gives_distributions"])
+        return {CONFIG["name"]: own}
     found = {}
     for path in CONFIG["confirmation"]["kept"]:
         try:
@@ -225,37 +232,65 @@ def kept_runs():
         run = settings["name"]
         if run in found:
             stop(
-                f"confirmation.kept: {path} is of the run {run}, as {found[run][0]} is"
+                f"confirmation.kept: {path} is of the run {run}, as {found[run].path} is"
             )
         keys = list(dict.fromkeys(key[:4] for key in keys))
         dataset = dataset_name(settings)
-        for other, others, name in found.values():
-            if name == dataset and {key[2] for key in keys} & {
-                key[2] for key in others
+        for other in found.values():
+            if other.dataset == dataset and {key[2] for key in keys} & {
+                key[2] for key in other.keys
             }:
                 stop(
-                    f"confirmation.kept: {path} and {other} have the same categories of "
+                    f"confirmation.kept: {path} and {other.path} have the same categories of "
                     f"the data set {dataset}"
                 )
-        found[run] = (path, keys, dataset)
+        found[run] = KeptRun(path, keys, dataset, settings["gives_distributions"])
     return found
 
 
 def kept_file(wildcards):
-    path, *_ = kept_runs()[wildcards.run]
+    path = kept_runs()[wildcards.run].path
     return path or LAYOUT.kept_estimates(wildcards.shuffle, wildcards.replicate)
+
+
+def kept_file_of_all_trainings(wildcards):
+    return kept_runs()[wildcards.run].path or LAYOUT.all_kept_estimates
 
 
 def factorial_files(name):
     return lambda wildcards: [
         LAYOUT.factorial(name, run, *key)
-        for run, (_, keys, _) in kept_runs().items()
-        for key in keys
+        for run, kept in kept_runs().items()
+        for key in kept.keys
     ]
 
 
-def factorial_places():
-    """Data set, shuffle, replicate and category of each of them."""
+def bounded_units():
+    """Run, category and elevation of the units that other trainings can pick plans for."""
     return [
-        (dataset, *key[:3]) for _, keys, dataset in kept_runs().values() for key in keys
+        (run, *unit)
+        for run, kept in kept_runs().items()
+        if kept.distributions
+        for unit in dict.fromkeys(key[2:] for key in kept.keys)
+        if len([key for key in kept.keys if key[2:] == unit]) > 1
     ]
+
+
+def bound_files(wildcards):
+    return [LAYOUT.plan_bound(*unit) for unit in bounded_units()]
+
+
+def statistics_places():
+    """By kind of file, what each one is of."""
+    kept = kept_runs().values()
+    of_training = [
+        {"dataset": run.dataset} | dict(zip(("shuffle", "replicate", "category"), key))
+        for run in kept
+        for key in run.keys
+    ]
+    of_unit = [
+        {"dataset": kept_runs()[run].dataset, "category": category}
+        for run, category, _ in bounded_units()
+    ]
+    places = dict.fromkeys(OF_FACTORIAL, of_training)
+    return places | ({"plan_bounds": of_unit} if of_unit else {})
