@@ -46,6 +46,8 @@ highlight_language = "none"
 default_role = "py:obj"
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+# A default that is a table of the paper is shown by its name.
+autodoc_preserve_defaults = True
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 python_display_short_literal_types = True

@@ -1,16 +1,18 @@
-"""What docstrings call a type is often a shape: `ndarray (n, B) float32` names one class."""
+"""Docstrings and signatures as they are written: a shape is no type, an alias keeps its name."""
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.transforms import SphinxTransform
+from sphinx.util.inspect import stringify_signature
 
 
 class Shapes(SphinxTransform):
-    """Leave the words of a shape as they are; Sphinx would look for a class of each name."""
+    """Leave the words of `ndarray (n, B) float32` alone; Sphinx would look for a class of each."""
 
     default_priority = 400
 
@@ -23,7 +25,24 @@ class Shapes(SphinxTransform):
                 link.replace_self(link.children)
 
 
+def _as_written(
+    app: Sphinx, what: str, name: str, documented: Any, options: Any, *signature: str | None
+) -> tuple[str, str] | None:
+    """Return a signature with its annotations as in the source: `ArrayLike`, not its members."""
+    try:
+        written = inspect.signature(documented)
+    except (TypeError, ValueError):
+        return None
+    parameters = [*written.parameters.values()]
+    if what == "method" and parameters and parameters[0].name == "self":
+        parameters = parameters[1:]
+    text = stringify_signature(written.replace(parameters=parameters))
+    arguments, _, returned = text.partition(" -> ")
+    return arguments, returned
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Read docstrings' types as they are meant."""
+    """Show types as they are meant."""
     app.add_transform(Shapes)
+    app.connect("autodoc-process-signature", _as_written)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

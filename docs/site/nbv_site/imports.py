@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from graphlib import TopologicalSorter
 from typing import Any
 
 from docutils import nodes
@@ -12,7 +14,7 @@ from sphinx.util.docutils import SphinxDirective
 ARROW = re.compile(r"(\w+) --> (\w+)")
 
 
-def _row(cells: list[str]) -> nodes.row:
+def _row(cells: Iterable[str]) -> nodes.row:
     return nodes.row("", *(nodes.entry("", nodes.paragraph("", cell)) for cell in cells))
 
 
@@ -22,14 +24,18 @@ class Imports(SphinxDirective):
     has_content = True
 
     def run(self) -> list[nodes.Node]:
-        """Return one row for each that imports, one column for each that is imported."""
+        """Return a row for each that imports and a column for each that is imported, in order."""
         lines = [line.strip() for line in self.content if line.strip()]
         arrows = [ARROW.fullmatch(line) for line in lines if not line.startswith("graph ")]
         if not all(arrows):
             raise self.error("only lines of the form 'a --> b' are drawn here")
         pairs = {match.groups() for match in arrows if match}
-        importing = sorted({one for one, _ in pairs})
-        imported = sorted({other for _, other in pairs})
+        below: dict[str, list[str]] = {}
+        for one, other in sorted(pairs):
+            below.setdefault(one, []).append(other)
+        order = [*TopologicalSorter(below).static_order()][::-1]
+        importing = [name for name in order if name in below]
+        imported = [name for name in order if any(other == name for _, other in pairs)]
         body = [
             [one, *("●" if (one, other) in pairs else "" for other in imported)]
             for one in importing

@@ -10,7 +10,7 @@ import ast
 import importlib
 import shutil
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ class LinkedFiles(SphinxTransform):
         for link in found:
             if link.get("reftype") != "myst" or link.get("refdomain"):
                 continue
-            path = Path(self.env.relfn2path(link["reftarget"], self.env.docname)[1]).resolve()
+            path = Path(self.env.relfn2path(link["reftarget"], self.env.docname)[1])
             if path.is_file() or path.is_dir():
                 inside = str(path.relative_to(ROOT))
                 link.replace_self(nodes.reference("", "", *link[0].children, **{LINKED: inside}))
@@ -233,6 +233,27 @@ def _pages(app: Sphinx) -> Iterator[tuple[str, dict[str, Any], str]]:
         yield f"{FOLDER}/{inside}", {"title": inside, "body": body}, "page.html"
 
 
+def _navigate_once(
+    known: dict[tuple[Any, ...], str],
+    app: Sphinx,
+    page: str,
+    template: str,
+    context: dict[str, Any],
+    doctree: nodes.document | None,
+) -> None:
+    """Share the navigation among the files of a folder: it is the same, and slow to make."""
+    if page.startswith(f"{FOLDER}/"):
+        make = context["toctree"]
+
+        def toctree(**options: Any) -> str:
+            key = (page.rpartition("/")[0], *sorted(options.items()))
+            if key not in known:
+                known[key] = str(make(**options))
+            return known[key]
+
+        context["toctree"] = toctree
+
+
 def _tell_linkcode(app: Sphinx, config: Config) -> None:
     config["linkcode_resolve"] = source_of
 
@@ -243,4 +264,5 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("config-inited", _tell_linkcode)
     app.connect("doctree-resolved", _resolve)
     app.connect("html-collect-pages", _pages)
+    app.connect("html-page-context", partial(_navigate_once, {}), priority=400)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
