@@ -38,7 +38,7 @@ def _as_written(
         parameters = parameters[1:]
     text = stringify_signature(written.replace(parameters=parameters))
     arguments, _, returned = text.partition(" -> ")
-    return arguments, returned
+    return arguments, "" if what == "class" else returned
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
