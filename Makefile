@@ -113,4 +113,4 @@ $(DOCS): $(READY) requirements-docs.lock
 	touch $@
 
 clean:
-	rm -rf $(VENV) mutants .coverage* .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) build/site build/doctrees mutants .coverage* .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

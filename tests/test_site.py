@@ -106,6 +106,15 @@ def test_every_document_has_a_page(site):
     assert (site / "index.html").read_bytes() == (site / "README.html").read_bytes()
 
 
+def test_the_home_page_leads_to_every_page_for_readers(pages, site):
+    home = pages[site / "index.html"]
+    expected = {path.with_suffix(".html") for path in (ROOT / "docs").glob("*.md")}
+    expected |= {path.with_suffix(".html") for path in (ROOT / "docs/api").glob("*.rst")}
+    expected |= {path.with_suffix(".html") for path in (ROOT / "docs/reference").rglob("README.md")}
+    linked = {urlsplit(link).path for link in home.links}
+    assert not {str(path.relative_to(ROOT)) for path in expected} - linked
+
+
 def test_every_link_and_anchor_of_the_site_leads_somewhere(pages, site):
     broken = []
     for path, page in pages.items():
