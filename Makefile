@@ -8,6 +8,7 @@
 # make audit       known vulnerabilities        make licences the licences of what is locked
 # make lock        the locks again              UPGRADE=--upgrade takes the newest versions
 # make soak        2,000 damaged files, for half an hour at most
+# make docs        the documentation site, build/site/index.html
 
 PYTHON ?= python3
 CORES ?= 2
@@ -15,12 +16,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 AUDIT := $(VENV)/.audit-ready
+DOCS := $(VENV)/.docs-ready
 PYTEST := $(BIN)/pytest --numprocesses $(CORES) --dist worksteal
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
 
 .PHONY: reproduce quick confirm bundles compare reference bench test test-quick test-slurm soak coverage mutation check lock audit \
-	licences clean
+	licences docs clean
 
 reproduce: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -46,7 +48,7 @@ reference: $(READY)
 bench: $(READY)
 	$(BIN)/python -m performance
 
-test: $(READY)
+test: $(READY) $(DOCS)
 	$(PYTEST)
 
 test-quick: $(READY)
@@ -67,18 +69,24 @@ mutation: $(AUDIT)
 lock: $(AUDIT)
 	$(LOCK) $(UPGRADE) pyproject.toml --extra experiment --extra onnx --group dev --no-emit-package torch --output-file requirements.lock
 	$(LOCK) $(UPGRADE) --group audit --constraints requirements.lock --output-file requirements-audit.lock
+	$(LOCK) $(UPGRADE) --group docs --constraints requirements.lock --constraints requirements-audit.lock --output-file requirements-docs.lock
 	$(BIN)/python tools/extra.py slurm | $(LOCK) --no-deps --output-file requirements-slurm.lock -
 
 audit: $(AUDIT)
 	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements.lock
 	$(BIN)/pip-audit --strict --disable-pip --no-deps --requirement requirements-torch.lock
 	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements-slurm.lock
+	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements-docs.lock
 
-licences: $(AUDIT)
+licences: $(AUDIT) $(DOCS)
 	$(BIN)/python tools/licences.py > docs/licences.md
 
 soak: $(READY)
 	$(BIN)/python -m tests.fuzz
+
+docs: $(DOCS)
+	$(BIN)/python -m sphinx --quiet --jobs $(CORES) --fail-on-warning --keep-going --conf-dir docs/site --doctree-dir build/doctrees . build/site
+	@echo "the site: build/site/index.html"
 
 check: $(READY)
 	$(BIN)/ruff check .
@@ -99,5 +107,10 @@ $(AUDIT): $(READY) requirements-audit.lock requirements-slurm.lock
 		--requirement requirements-audit.lock --requirement requirements-slurm.lock
 	touch $@
 
+$(DOCS): $(READY) requirements-docs.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes \
+		--requirement requirements-docs.lock
+	touch $@
+
 clean:
-	rm -rf $(VENV) mutants .coverage* .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) build/site build/doctrees mutants .coverage* .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

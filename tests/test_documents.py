@@ -1,17 +1,24 @@
 """Documents: their links, the files they name, the glossary, and words that have a better one."""
 
+import ast
 import pkgutil
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+import pandas as pd
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = [
-    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
-    *sorted((ROOT / "docs").rglob("*.md")),
-]
+NOT_OURS = {"results", "build", "mutants"}
+DOCUMENTS = sorted(
+    path
+    for part in ROOT.iterdir()
+    if part.name not in NOT_OURS and not part.name.startswith(".")
+    for path in ([part] if part.suffix == ".md" else part.rglob("*.md"))
+)
 PAGES = [path for path in DOCUMENTS if path.name == "README.md" or "reference" not in path.parts]
 
 TERMS = (
@@ -53,7 +60,7 @@ ALLOWED = {
     "tests/workflow/test_messages.py": ("contenders",),
 }
 TREES = ("src", "workflow", "config", "docs", "tests", "performance", "profiles")
-SUFFIXES = {".py", ".smk", ".yaml", ".md", ".j2", ".css", ".html"}
+SUFFIXES = {".py", ".smk", ".yaml", ".md", ".rst", ".j2", ".css", ".html"}
 
 
 def without_code(text: str) -> str:
@@ -63,12 +70,23 @@ def without_code(text: str) -> str:
 def anchors(path: Path) -> set[str]:
     """Return the anchors that GitHub gives the headings of a document."""
     headings = re.findall(r"^#+ (.+)$", without_code(path.read_text("utf-8")), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    found: set[str] = set()
+    seen: Counter[str] = Counter()
+    for heading in headings:
+        plain = re.sub(r"\]\([^)]*\)", "", heading).lower()
+        anchor = re.sub(r"[^\w\- ]", "", plain).replace(" ", "-")
+        found.add(f"{anchor}-{seen[anchor]}" if seen[anchor] else anchor)
+        seen[anchor] += 1
+    return found
 
 
 def links(path: Path) -> list[str]:
+    """Return the links and images of a document that lead into the repository."""
     text = without_code(path.read_text("utf-8"))
-    return [link for link in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in link]
+    found = re.findall(r"\]\(([^)\s]+)\)", text)
+    found += re.findall(r"^\[[^\]]+\]:\s+(\S+)", text, re.MULTILINE)
+    found += re.findall(r"<(?:a|img|source)\b[^>]*?\b(?:href|src|srcset)=\"([^\"]+)\"", text)
+    return [link for link in found if not re.match(r"[a-z]+:", link)]
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
@@ -79,7 +97,30 @@ def test_links_lead_to_files_and_headings(path: Path) -> None:
         target = (path.parent / name).resolve() if name else path
         if not target.exists() or (anchor and anchor not in anchors(target)):
             broken.append(link)
+        elif target.suffix in {".png", ".gif", ".jpg", ".webp"}:
+            with Image.open(target) as image:
+                image.verify()
     assert not broken
+
+
+def defined(module: Path) -> set[str]:
+    """Return the names that a module defines at its top."""
+    found = set()
+    for node in ast.parse(module.read_text("utf-8")).body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", node)]
+        found |= {getattr(one, "name", getattr(one, "id", "")) for one in targets}
+    return found - {""}
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_name_that_links_to_a_module_is_defined_there(path: Path) -> None:
+    text = without_code(path.read_text("utf-8"))
+    missing = [
+        f"{name} in {module}"
+        for name, module in re.findall(r"\[`(\w+)`\]\(([^)\s]+\.py)\)", text)
+        if name not in defined(path.parent / module)
+    ]
+    assert not missing
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
@@ -93,6 +134,27 @@ def test_the_readme_begins_with_the_two_commands() -> None:
     first_block = (ROOT / "README.md").read_text("utf-8").split("```")[1]
     commands = [line.split("  ")[0] for line in first_block.splitlines()]
     assert commands == ["sh", "make reproduce", "make test"]
+
+
+def test_the_readme_has_table_1_of_the_reference_run() -> None:
+    cells = pd.read_csv(ROOT / "docs/reference/paper/tables/table1.csv")
+    expected = []
+    for label, row in cells[cells["metric"] == "mae"].groupby("row_label", sort=False):
+        least = row["value"].min()
+        shown = [
+            f"{f'**{value:.2f}**' if value == least else f'{value:.2f}'} [{published:.2f}]"
+            for value, published in zip(row["value"], row["published"], strict=True)
+        ]
+        expected.append(f"| {label} | {' | '.join(shown)} |")
+    text = (ROOT / "README.md").read_text("utf-8")
+    assert re.findall(r"^\| [A-Z]\w+ \|.*\]\s\|$", text, re.MULTILINE) == expected
+
+
+def test_everything_that_the_paper_numbers_has_its_place() -> None:
+    text = (ROOT / "docs/paper.md").read_text("utf-8")
+    placed = re.findall(r"^\| ((?:Eq\.|Fig\.|Table) \d+) \|", text, re.MULTILINE)
+    numbered = (("Eq.", 10), ("Table", 7), ("Fig.", 9))
+    assert placed == [f"{kind} {n}" for kind, count in numbered for n in range(1, count + 1)]
 
 
 def test_the_glossary_defines_each_term_once() -> None:

@@ -31,9 +31,9 @@ WHERE = {
 HEAD = """\
 # Licences
 
-What nbv is run, tested, checked and audited with: every package that the locks install on Linux
-with Python 3.11. `make PYTHON=python3.11 licences` makes this page of the packages' metadata. nbv
-itself is under the MIT licence and contains no code of these packages.
+What nbv is run, tested, checked, audited and documented with: every package that the locks install
+on Linux with Python 3.11. `make PYTHON=python3.11 licences` makes this page of the packages'
+metadata. nbv itself is under the MIT licence and contains no code of these packages.
 
 The registry's build of torch for Linux also brings NVIDIA's CUDA libraries, under NVIDIA's own
 licence. A build of torch for processors alone brings none.

@@ -20,7 +20,7 @@ def entropy(distributions: Table) -> NDArray[np.float32]:
 
 
 def circular_variance(distributions: Table) -> NDArray[np.float32]:
-    """Return 1 - |mean direction| of each row, in [0, 1]."""
+    """Return 1 - abs(mean direction) of each row, in [0, 1]."""
     angles = 2 * np.pi * np.arange(distributions.shape[1]) / distributions.shape[1]
     cosine = distributions @ np.cos(angles).astype(np.float32)
     sine = distributions @ np.sin(angles).astype(np.float32)

@@ -1,0 +1,1 @@
+"""What the documentation site adds to Sphinx: equations, navigation, and the files it links to."""

@@ -1,0 +1,81 @@
+"""The example of docs/extending.md: its edits are made, and its command is run."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nbv.recommendation.belief import every_belief
+from projects import Project
+from recommendation.made import evidence_of
+
+TEXT = (Path(__file__).parents[1] / "docs/extending.md").read_text("utf-8")
+EXAMPLE = TEXT.partition("## Add a criterion")[2].partition("\n## ")[0]
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", EXAMPLE, re.MULTILINE | re.DOTALL)
+
+
+def test_the_criterion_of_the_example_is_the_expected_entropy_of_the_next_estimate(tmp_path):
+    path = tmp_path / "sharpest.py"
+    path.write_text(blocks("python")[0])
+    spec = importlib.util.spec_from_file_location("sharpest", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    evidence = evidence_of()
+    given = every_belief(evidence)
+    made = module.sharpest(given, evidence, "average")
+    likelihood = evidence.conditionals.estimate
+    n_bins = evidence.n_bins
+    for delta in (0, 1, n_bins - 1):
+        expected = np.zeros(n_bins)
+        for theta in range(n_bins):
+            row = likelihood[(theta + delta) % n_bins]
+            spread = -np.sum(row[row > 0] * np.log(row[row > 0]))
+            expected += given.probabilities[:, theta] * spread
+        np.testing.assert_allclose(made[:, delta], expected, rtol=1e-4)
+
+
+def replace_line(path: Path, text: str) -> None:
+    """Put lines of an example in the place of the first of them."""
+    first = text.splitlines()[0]
+    lines = path.read_text("utf-8").splitlines()
+    assert lines.count(first) == 1
+    place = lines.index(first)
+    path.write_text("\n".join([*lines[:place], text.rstrip(), *lines[place + 1 :], ""]))
+
+
+@pytest.mark.slow
+def test_the_example_adds_a_method_to_the_leaderboard_and_trains_nothing(scratch: Project):
+    new, registry = blocks("python")
+    (configuration,) = blocks("yaml")
+    name = re.match(r'"""(\S+): ', new)
+    assert name is not None
+    (scratch.folder / name[1]).write_text(new)
+    imported, entry = registry.split("\n\n")
+    package = scratch.folder / name[1]
+    criteria = package.with_name("__init__.py")
+    replace_line(criteria, entry)
+    last = "from nbv.recommendation.evidence import Evidence, Table"
+    replace_line(criteria, f"{last}\n{imported}")
+    replace_line(scratch.folder / "config/config.yaml", configuration)
+
+    (command,) = blocks("sh")
+    program, *arguments = command.split()
+    assert program == "snakemake"
+    jobs = scratch.would_run(targets=(arguments[-1],))
+    assert jobs["evaluate_extensions"] == 4
+    assert not {"meshes", "render", "train", "estimate"} & set(jobs)
+    scratch.run(*arguments)
+    board = pd.read_csv(scratch.results / "tables/leaderboard.csv")
+    mine = board[board["method"] == "sharpest"]
+    assert sorted(mine["category"]) == ["chair", "mug"]
+    assert mine["value"].between(0, 180).all()
+    text = (scratch.results / "tables/leaderboard.md").read_text("utf-8")
+    assert "| sharpest |" in text
