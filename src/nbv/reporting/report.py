@@ -241,7 +241,8 @@ def _machine_facts(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 def _tally(verdicts: pd.Series) -> str:
     counts = verdicts.value_counts()
     words = ("hold", "do not hold", "are undecided", "were not run")
-    return ", ".join(f"{counts.get(v, 0)} {w}" for v, w in zip(VERDICTS, words, strict=True))
+    found = [f"{counts[v]} {w}" for v, w in zip(VERDICTS, words, strict=True) if v in counts]
+    return ", ".join(found)
 
 
 def _fragment(path: Path) -> Markup:

@@ -26,7 +26,8 @@ _COLOURS: Mapping[str, str] = {
 }
 _COLOUR = re.compile("|".join(_COLOURS))
 _OF_FILE = {"metadata", "style"}
-_NAME = re.compile(r"^#|(?<=url\(#)")
+_DECIMALS = re.compile(r"(\.\d\d)\d+(?!e)")
+_NAMED = re.compile(r"(?<=url\(#)")
 
 
 def svg_text(figure: Figure) -> str:
@@ -75,6 +76,10 @@ def _local(name: str) -> str:
 def _of_page(key: str, value: str, name: str) -> str:
     if key == "id":
         return f"{name}-{value}"
+    if key in ("d", "transform"):
+        return _DECIMALS.sub(r"\1", value.replace("\n", ""))
     if key == "style":
         value = _COLOUR.sub(lambda found: _COLOURS[found[0]], value)
-    return _NAME.sub(lambda found: f"{found[0]}{name}-", value)
+    if key == "href" and value.startswith("#"):
+        return f"#{name}-{value[1:]}"
+    return _NAMED.sub(f"{name}-", value)

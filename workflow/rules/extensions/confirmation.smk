@@ -175,6 +175,7 @@ rule statistics:
         trainings_csv=LAYOUT.confirmation("trainings", "csv"),
         contrasts_png=LAYOUT.confirmation("contrasts", "png"),
         contrasts_pdf=LAYOUT.confirmation("contrasts", "pdf"),
+        contrasts_svg=LAYOUT.confirmation("contrasts", "svg"),
     log:
         LAYOUT.log("statistics"),
     benchmark:
@@ -186,6 +187,7 @@ rule statistics:
         runtime=per_attempt(10),
     params:
         places=lambda wildcards: factorial_places(),
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_confirmation.py"
 
