@@ -4,6 +4,7 @@
 #   snakemake --cores 2 --config experiment=quick                        the same graph, small
 #   snakemake --cores 2 tables                                           one stage
 #   snakemake --cores 2 extensions                                       the extensions
+#   snakemake --cores 2 animation                                        the method on one object
 #   snakemake --cores 2 transfer                                         trained on × tested on
 #   snakemake --cores 2 confirm                                          several trainings
 #   snakemake --cores 2 verify                                           is any file damaged?
@@ -26,6 +27,7 @@ localrules:
     evaluation,
     tables,
     figures,
+    animation,
     extension_evaluations,
     extensions,
     transfer,
@@ -82,6 +84,7 @@ onsuccess:
     banner(
         "nbv: finished",
         f"results: {LAYOUT.root}/    read first: {LAYOUT.report}",
+        *CAUTION,
     )
 
 

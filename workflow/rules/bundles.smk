@@ -174,6 +174,7 @@ rule ingredients:
         ],
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_ingredients.py"
 

@@ -28,6 +28,7 @@ from nbv.estimation.warm_start import (
     start_of,
 )
 from nbv.experiments.results import ESTIMATED_ROLES
+from nbv.experiments.run_size import too_small
 from nbv.jobs import killed_jobs
 from nbv.layout import Layout, fold_folder, unit_folder
 from nbv.meshes.sources import SOURCES, open_source, select_objects
@@ -115,6 +116,11 @@ except UserError as error:
 except OSError as error:
     stop(f"dataset.root: {error.filename} cannot be read: {error.strerror}")
 
+# What every table, the page and the last lines say of a run whose numbers mean nothing.
+CAUTION = too_small(
+    {category: len(ids) for category, ids in OBJECTS.items()},
+    None if EXTERNAL else CONFIG["estimator"]["epochs"],
+)
 # What decides on a rotation: the conditionals, and the cost of travel.
 DECISION = CONFIG["density"] | CONFIG["recommendation"]
 EXTENSION_DECISION = DECISION | {"affinity": CONFIG["affinity"]}

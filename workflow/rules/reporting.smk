@@ -18,7 +18,7 @@ REFERENCE_UNITS = reference_units(UNITS, SETTINGS)
 OF_ELEVATIONS = {"table2", "table4", "figure6"}
 OF_FOCUS = {
     *("table5", "table6", "table7"),
-    *("figure2", "figure3", "figure7", "figure8", "heatmaps"),
+    *("steps", "figure2", "figure3", "figure7", "figure8", "heatmaps"),
 }
 # Figures show no intervals.
 SHOWN = {"methods": list(METHODS)}
@@ -62,6 +62,7 @@ rule table:
     params:
         settings=lambda wildcards: settings_of(RESAMPLED, wildcards.table),
         evaluations=lambda wildcards: evaluations_of(units_of(wildcards.table)),
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_paper.py"
 
@@ -73,6 +74,7 @@ rule figure:
     output:
         png=LAYOUT.figure("{figure}", "png"),
         pdf=LAYOUT.figure("{figure}", "pdf"),
+        svg=LAYOUT.figure("{figure}", "svg"),
     log:
         LAYOUT.log("figure/{figure}"),
     benchmark:
@@ -113,6 +115,7 @@ rule claims:
         evaluations=evaluations_of(UNITS),
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/judge_claims.py"
 
@@ -150,7 +153,8 @@ rule report:
         runtime=rules.runtime.output.html,
         splits=[LAYOUT.splits(category) for category in CATEGORIES],
         tables=[LAYOUT.table(name, "html") for name in TABLES],
-        figures=[LAYOUT.figure(name, "png") for name in SHOWN_FIGURES],
+        table1=LAYOUT.table("table1", "csv"),
+        figures=[LAYOUT.figure(name, "svg") for name in SHOWN_FIGURES],
     output:
         LAYOUT.report,
     log:
@@ -166,6 +170,7 @@ rule report:
         categories=CATEGORIES,
         tables=list(TABLES),
         figures=SHOWN_FIGURES,
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/build_report.py"
 
@@ -178,3 +183,23 @@ rule tables:
 rule figures:
     input:
         rules.report.input.figures,
+
+
+use rule figure as animate with:
+    output:
+        gif=LAYOUT.figure("{figure}", "gif"),
+    log:
+        LAYOUT.log("animate/{figure}"),
+    benchmark:
+        LAYOUT.benchmark("animate/{figure}")
+    wildcard_constraints:
+        figure="steps",
+
+
+rule animation:
+    input:
+        lambda wildcards: (
+            LAYOUT.figure("steps", "gif")
+            if "steps" in SHOWN_FIGURES
+            else stop("animation needs depth images and a lookup table of proposed")
+        ),

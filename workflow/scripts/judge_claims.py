@@ -16,4 +16,4 @@ with job(snakemake):
     files = zip(params.evaluations, map(Path, given.evaluations), strict=True)
     rng = np.random.default_rng(params.seed)
     claims = evaluate_claims(load_evaluations(dict(files)), rng, params.n_resamples)
-    write_table(claims_table(claims), dict(snakemake.output.items()))
+    write_table(claims_table(claims), dict(snakemake.output.items()), snakemake.params.caution)

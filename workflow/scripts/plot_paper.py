@@ -1,4 +1,4 @@
-"""Draw one of the paper's figures."""
+"""Draw one of the paper's figures, or the animation of it."""
 
 from pathlib import Path
 
@@ -7,6 +7,7 @@ from nbv.jobs import job
 with job(snakemake):
     from nbv.experiments.results import load_evaluations
     from nbv.reporting.paper.figures import FigureInputs, build_figure
+    from nbv.reporting.paper.figures.steps import save_animation
     from nbv.reporting.settings import ReportSettings
     from nbv.reporting.style import save_figure
 
@@ -26,5 +27,8 @@ with job(snakemake):
     }
     evaluations = load_evaluations(files.pop("evaluations"))
     inputs = FigureInputs(evaluations, ReportSettings(**params.settings), **files)
-    figure = build_figure(snakemake.wildcards.figure, inputs)
-    save_figure(figure, dict(snakemake.output.items()))
+    paths = {kind: Path(path) for kind, path in snakemake.output.items()}
+    if "gif" in paths:
+        save_animation(inputs, paths["gif"])
+    else:
+        save_figure(build_figure(snakemake.wildcards.figure, inputs), paths)

@@ -15,4 +15,4 @@ with job(snakemake):
     rows = {row: read_csv(path) for row, path in enumerate(snakemake.input.rows)}
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
     table = ablation_table(ablation_space(), rows, params.category, resampler)
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

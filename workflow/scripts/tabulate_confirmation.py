@@ -47,6 +47,7 @@ with job(snakemake):
         tables["plan_bounds"] = bounds_table(bound_means(read["plan_bounds"]))
     write_csv(output.trainings_csv, of_trainings)
     for name, table in tables.items():
-        write_table(table, {kind: output[f"{name}_{kind}"] for kind in ("csv", "md")})
-    paths = {kind: output[f"contrasts_{kind}"] for kind in ("png", "pdf")}
+        paths = {kind: output[f"{name}_{kind}"] for kind in ("csv", "md")}
+        write_table(table, paths, snakemake.params.caution)
+    paths = {kind: output[f"contrasts_{kind}"] for kind in ("png", "pdf", "svg")}
     save_figure(contrasts_figure(contrasts), paths)

@@ -25,4 +25,4 @@ with job(snakemake):
         for run, evaluations in files["evaluations"].items()
     }
     table = density_comparison(runs, ReportSettings(**params.settings))
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

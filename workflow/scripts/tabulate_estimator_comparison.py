@@ -13,4 +13,4 @@ with job(snakemake):
     files = files_by_run(params.estimates, snakemake.input.estimates)
     runs = {run: load_estimate_errors(found) for run, found in files.items()}
     table = estimator_comparison(runs, ReportSettings(**params.settings))
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

@@ -19,4 +19,4 @@ with job(snakemake):
     choices = {run: load_folds(found) for run, found in choices.items()}
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
     table = extension_gains_table(blocks, choices, params.methods, resampler)
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

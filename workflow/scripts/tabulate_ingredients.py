@@ -28,4 +28,4 @@ with job(snakemake):
             real[key] = evaluate(recommender.bundle, turns, n_views=(2,))
     rng = rng_for(params.seed, "ingredients")
     table = ingredient_table(rendered, real, Resampler.seeded(rng, params.n_resamples))
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

@@ -17,4 +17,4 @@ with job(snakemake):
     blocks = blocks_of({run: load_folds(found) for run, found in files.items()})
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
     table = leaderboard_table(blocks, params.methods, resampler)
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

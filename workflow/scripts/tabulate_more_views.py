@@ -16,5 +16,7 @@ with job(snakemake):
     files = dict(zip(params.folds, snakemake.input.rows, strict=True))
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
     table = more_views_table(rows_by_category(files), resampler)
-    write_table(table, {kind: output[kind] for kind in ("csv", "md", "tex")})
-    save_figure(more_views_figure(table.cells), {kind: output[kind] for kind in ("png", "pdf")})
+    paths = {kind: output[kind] for kind in ("csv", "md", "tex")}
+    write_table(table, paths, params.caution)
+    paths = {kind: output[kind] for kind in ("png", "pdf", "svg")}
+    save_figure(more_views_figure(table.cells), paths)

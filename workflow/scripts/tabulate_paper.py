@@ -14,4 +14,4 @@ with job(snakemake):
     files = zip(params.evaluations, map(Path, given.evaluations), strict=True)
     settings = ReportSettings(**params.settings)
     table = build_table(snakemake.wildcards.table, load_evaluations(dict(files)), settings)
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

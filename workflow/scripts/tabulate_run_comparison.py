@@ -13,4 +13,4 @@ with job(snakemake):
     files = files_by_run(params.evaluations, snakemake.input.evaluations)
     runs = {run: load_evaluations(found) for run, found in files.items()}
     table = run_comparison(runs, ReportSettings(**params.settings))
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

@@ -12,4 +12,4 @@ with job(snakemake):
     evaluations = load_transfer(files, params.unit)
     settings = ReportSettings(**params.settings)
     table = transfer_table(evaluations, params.conditions, params.unit, settings)
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

@@ -11,4 +11,4 @@ with job(snakemake):
     curves = travel_curves(dict(zip(params.folds, snakemake.input.rows, strict=True)))
     write_table(travel_table(curves), {"csv": output.csv})
     figure = travel_figure(curves, tuple(params.methods))
-    save_figure(figure, {kind: output[kind] for kind in ("png", "pdf")})
+    save_figure(figure, {kind: output[kind] for kind in ("png", "pdf", "svg")})

@@ -15,4 +15,4 @@ with job(snakemake):
     rows = rows_by_category({(params.category, fold): path for fold, path in files})
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
     table = view_sphere_table(rows[params.category], params.category, resampler)
-    write_table(table, dict(snakemake.output.items()))
+    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

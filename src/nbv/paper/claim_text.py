@@ -49,7 +49,7 @@ def by_run(claims: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def term_text(term: Term) -> str:
     """Name a method and the images it is judged on."""
-    return f"{method_label(term.method)} ({_where(term)})"
+    return f"{method_label(term.method)} ({place_text(term)})"
 
 
 def summarise(statement: Statement, measured: Measured) -> str:
@@ -88,8 +88,8 @@ def _competition(leaves: Sequence[Comparison], measured: Measured, place: bool =
             continue
         told.add(pair)
         unit = UNIT_OF[leaf.statistic]
-        subject = f"{name}, {_STATISTIC_LABELS[leaf.statistic]} {number(row['value'])}{unit}"
-        same_images = _where(leaf.a) == _where(leaf.b)
+        subject = f"{name}, {STATISTIC_LABELS[leaf.statistic]} {number(row['value'])}{unit}"
+        same_images = place_text(leaf.a) == place_text(leaf.b)
         rival = method_label(leaf.b.method) if same_images else term_text(leaf.b)
         difference = interval_text(row["difference"], row["ci_low"], row["ci_high"])
         rivals.setdefault(subject, []).append(
@@ -101,7 +101,7 @@ def _competition(leaves: Sequence[Comparison], measured: Measured, place: bool =
     )
 
 
-_STATISTIC_LABELS: Mapping[str, str] = {
+STATISTIC_LABELS: Mapping[str, str] = {
     "mae": "MAE",
     "pauc": "pAUC",
     "above_90_percent": "errors above 90°",
@@ -109,6 +109,7 @@ _STATISTIC_LABELS: Mapping[str, str] = {
     "mae_sigma": "σ of MAE",
     "pauc_sigma": "σ of pAUC",
 }
+"""How statistics are named."""
 
 
 def _closest(leaves: Sequence[Comparison], measured: Measured) -> Comparison:
@@ -122,7 +123,8 @@ def _closest(leaves: Sequence[Comparison], measured: Measured) -> Comparison:
     return min(leaves, key=advantage)
 
 
-def _where(term: Term) -> str:
+def place_text(term: Term) -> str:
+    """Name the images that a term is judged on."""
     if len(term.units) > 1:
         where = f"{len(term.units)} categories pooled"
     else:

@@ -93,6 +93,7 @@ CLAIMS: tuple[Claim, ...] = (
         "objects” (Table 1: all but Chair)",
         "Proposed has the lowest MAE in at least four of the five categories at 0°.",
         AtLeast(4, _best_by_category("mae", CATEGORIES)),
+        title="MAE: best in 4 of 5 categories",
     ),
     Claim(
         "mae-chair-third",
@@ -100,6 +101,7 @@ CLAIMS: tuple[Claim, ...] = (
         "“Only in the ‘Chair’ category, the proposed method ranks the third”",
         "Chair at 0°: exactly two methods have a lower MAE than Proposed.",
         ranked("mae", _of("chair"), 3),
+        title="MAE of Chair: third",
     ),
     Claim(
         "mae-elevations",
@@ -108,6 +110,7 @@ CLAIMS: tuple[Claim, ...] = (
         "comparative methods” (Table 2)",
         "Mug: Proposed has the lowest MAE at four or more of the six elevations.",
         AtLeast(4, _best_by_elevation("mae")),
+        title="MAE: best at 4 of 6 elevations",
     ),
     Claim(
         "mae-75-opposite",
@@ -120,6 +123,7 @@ CLAIMS: tuple[Claim, ...] = (
                 Better("mae", _at(75, OPPOSITE), _at(75)),
             ]
         ),
+        title="MAE: Opposite wins at 75° alone",
     ),
     Claim(
         "mae-75-comparable",
@@ -128,6 +132,7 @@ CLAIMS: tuple[Claim, ...] = (
         "Mug at 75°: another method has a lower MAE than Proposed, whose MAE is within 1° of "
         "Opposite's.",
         _not_best_but_comparable("mae", _at(75)),
+        title="MAE at 75°: not best, within 1°",
     ),
     Claim(
         "hidden-range",
@@ -135,6 +140,7 @@ CLAIMS: tuple[Claim, ...] = (
         "“We successfully managed to reduce the pose ambiguity in the difficult observation”",
         "Mug at 0°, viewpoint group 2 (handle hidden): Proposed's MAE is below Single's.",
         Better("mae", Term(PROPOSED, (_MUG,), group=2), Term(SINGLE, (_MUG,), group=2)),
+        title="MAE, handle hidden: below Single",
     ),
     Claim(
         "two-views",
@@ -144,6 +150,7 @@ CLAIMS: tuple[Claim, ...] = (
         "Each two-view method has a lower MAE than Single, in each category at 0° and at each "
         "elevation of Mug.",
         all_of(_two_views_parts("mae")),
+        title="MAE: two views beat one",
     ),
     Claim(
         "two-views-pauc",
@@ -155,6 +162,7 @@ CLAIMS: tuple[Claim, ...] = (
         "The mean of two opposite estimates is 90° from both. So averaging can turn one error of "
         "180° into two of 90°, which have the same MAE and a lower pAUC. Car in the paper's own "
         "Table 3 shows it.",
+        title="pAUC: two views beat one",
     ),
     Claim(
         "better-than-recommenders",
@@ -168,6 +176,7 @@ CLAIMS: tuple[Claim, ...] = (
                 for m in (RANDOM, OPPOSITE)
             ]
         ),
+        title="MAE: below Random and Opposite",
     ),
     Claim(
         "pauc-categories",
@@ -175,6 +184,7 @@ CLAIMS: tuple[Claim, ...] = (
         "“The proposed method achieved the highest pAUCs … for the four object categories”",
         "Proposed has the highest pAUC in at least four of the five categories at 0°.",
         AtLeast(4, _best_by_category("pauc", CATEGORIES)),
+        title="pAUC: best in 4 of 5 categories",
     ),
     Claim(
         "pauc-elevations",
@@ -183,6 +193,7 @@ CLAIMS: tuple[Claim, ...] = (
         "results” (Table 4)",
         "Mug: Proposed has the highest pAUC at five or more of the six elevations.",
         AtLeast(5, _best_by_elevation("pauc")),
+        title="pAUC: best at 5 of 6 elevations",
     ),
     Claim(
         "pauc-75-comparable",
@@ -191,6 +202,7 @@ CLAIMS: tuple[Claim, ...] = (
         "Mug at 75°: another method has a higher pAUC than Proposed, whose pAUC is within 1 point "
         "of Opposite's.",
         _not_best_but_comparable("pauc", _at(75)),
+        title="pAUC at 75°: not best, within 1",
     ),
     Claim(
         "high-elevation-easy",
@@ -198,6 +210,7 @@ CLAIMS: tuple[Claim, ...] = (
         "At 75° “object poses are easily distinguishable from the initial viewpoints”",
         "Mug: Single's MAE at 75° is below Single's at 0°.",
         Better("mae", _at(75, SINGLE), _at(0, SINGLE)),
+        title="MAE of Single: lower at 75°",
     ),
     Claim(
         "groups",
@@ -211,6 +224,7 @@ CLAIMS: tuple[Claim, ...] = (
             ),
         ),
         "The published Table 5 appears to be fold 3 alone.",
+        title="MAE: best in 3 of 4 groups",
     ),
     Claim(
         "examples",
@@ -220,6 +234,7 @@ CLAIMS: tuple[Claim, ...] = (
         "the lowest MAE.",
         best("mae", Term(PROPOSED, (_MUG,), initial_deg=(0, 30, 210, 330))),
         "The paper shows one object; a claim about one object is not a claim about the method.",
+        title="MAE of Table 6's views: best",
     ),
     *(
         Claim(
@@ -229,6 +244,7 @@ CLAIMS: tuple[Claim, ...] = (
             f"‘Airplane’ and ‘Mug’” ({category_label(name)})",
             f"{category_label(name)} at 0°: Proposed has the lowest median error.",
             best("median", _of(name)),
+            title=f"Median of {category_label(name)}: lowest",
         )
         for name in ("airplane", "mug")
     ),
@@ -240,6 +256,7 @@ CLAIMS: tuple[Claim, ...] = (
             f"method” ({category_label(name)})",
             f"{category_label(name)} at 0°: the median errors differ by less than 1°.",
             Comparable("median", _of(name), _of(name, OPPOSITE), MARGIN),
+            title=f"Median of {category_label(name)}: as Opposite",
         )
         for name in ("car", "toilet")
     ),
@@ -249,6 +266,7 @@ CLAIMS: tuple[Claim, ...] = (
         "“However, for ‘Chair’, the proposed method ranked the third”",
         "Chair at 0°: exactly two methods have a lower median error than Proposed.",
         ranked("median", _of("chair"), 3),
+        title="Median of Chair: third",
     ),
     Claim(
         "outliers",
@@ -259,6 +277,7 @@ CLAIMS: tuple[Claim, ...] = (
         all_of([FreeOfOutliers(_of(name)) for name in CATEGORIES]),
         "The paper's whiskers reach to the minimum and maximum, so its boxplot cannot show any "
         "outlier.",
+        title="No outliers of Proposed",
     ),
     Claim(
         "sigma-mae",
@@ -268,6 +287,7 @@ CLAIMS: tuple[Claim, ...] = (
         "Mug at 0°: exactly one method has a lower σ of MAE over folds than Proposed.",
         ranked("mae_sigma", _of("mug"), 2),
         "σ of five folds is itself known poorly: the intervals resample objects within folds.",
+        title="σ of MAE: second lowest",
     ),
     Claim(
         "pauc-folds",
@@ -276,6 +296,7 @@ CLAIMS: tuple[Claim, ...] = (
         "Mug at 0°: Proposed has the highest pAUC in each of folds 2 to 5.",
         all_of([best("pauc", Term(PROPOSED, (_MUG,), fold=f), f"fold {f}") for f in (2, 3, 4, 5)]),
         f"{_FOLD_NOTE} In the published Table 7 it is highest in fold 1 as well.",
+        title="pAUC: best in folds 2 to 5",
     ),
     Claim(
         "sigma-pauc",
@@ -285,6 +306,7 @@ CLAIMS: tuple[Claim, ...] = (
         "Mug at 0°: Proposed has the lowest σ of pAUC over folds.",
         best("pauc_sigma", _of("mug")),
         "σ of five folds is itself known poorly: the intervals resample objects within folds.",
+        title="σ of pAUC: lowest",
     ),
     Claim(
         "outperforms-all",
@@ -294,6 +316,7 @@ CLAIMS: tuple[Claim, ...] = (
         "All five categories at 0°, pooled: Proposed's MAE is below each other method's.",
         best("mae", Term(PROPOSED, _ALL_CATEGORIES)),
         "The paper reports no test of significance.",
+        title="MAE, all categories: best",
     ),
     Claim(
         "stable",
@@ -307,5 +330,6 @@ CLAIMS: tuple[Claim, ...] = (
                 Better("mae_sigma", _of("mug"), _of("mug", SINGLE)),
             ]
         ),
+        title="MAE and σ: below Single's",
     ),
 )

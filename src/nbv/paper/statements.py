@@ -89,13 +89,19 @@ class AtLeast:
     label: str = ""
 
 
+Interval = tuple[float, float, float]
+"""A value, and the low and the high end of its interval."""
+
 Comparison = Better | Comparable | FreeOfOutliers
 Statement = Comparison | AtLeast
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper, what it compares in words, and the same to be evaluated."""
+    """A sentence of the paper, what it compares in words, and the same to be evaluated.
+
+    The title names it where there is no room for the sentence.
+    """
 
     id: str
     section: str
@@ -103,6 +109,7 @@ class Claim:
     compared: str
     statement: Statement
     note: str = ""
+    title: str = ""
 
 
 def all_of(parts: Sequence[Statement], label: str = "") -> AtLeast:
@@ -150,6 +157,66 @@ def combine(count: int, verdicts: Sequence[Verdict]) -> Verdict:
     if possible < count:
         return FAILS
     return NOT_RUN if NOT_RUN in verdicts else UNDECIDED
+
+
+def in_favour(part: Better | Comparable, value: float, low: float, high: float) -> Interval:
+    """Return by how much a difference a - b, with its interval, favours a comparison.
+
+    Parameters
+    ----------
+    part : Better or Comparable
+        What is compared.
+    value, low, high : float
+        The difference and its 95 % interval, in the statistic's unit.
+
+    Returns
+    -------
+    tuple of float
+        Value, low and high, in the same unit. The comparison holds where low is above 0 and does
+        not hold where high is below 0. Of *Comparable*, it is how far the difference is inside
+        the margin.
+    """
+    if isinstance(part, Comparable):
+        inside = min(abs(low), abs(high)) if low * high > 0 else 0.0
+        return (
+            part.margin - abs(value),
+            part.margin - max(abs(low), abs(high)),
+            part.margin - inside,
+        )
+    return (-value, -high, -low) if LOWER_IS_BETTER[part.statistic] else (value, low, high)
+
+
+def deciding(
+    statement: Statement,
+    verdicts: Mapping[Comparison, Verdict],
+    favours: Mapping[Comparison, float],
+) -> Comparison:
+    """Return the comparison that a statement stands or falls with: its verdict is the statement's.
+
+    Of *AtLeast(k, parts)* it is that of the k-th best part: by verdict, and within a verdict by
+    how much the difference favours it.
+
+    Parameters
+    ----------
+    statement : Statement
+        What was judged, decided or not; not one that was not run.
+    verdicts : mapping of Comparison to str
+        Of each of its comparisons.
+    favours : mapping of Comparison to float
+        By how much each is favoured; see `in_favour`.
+    """
+    if not isinstance(statement, AtLeast):
+        return statement
+
+    def merit(part: Statement) -> tuple[int, float]:
+        leaf = deciding(part, verdicts, favours)
+        return _MERIT[combine_statement(part, verdicts)], favours[leaf]
+
+    ranked = sorted(statement.parts, key=merit, reverse=True)
+    return deciding(ranked[statement.count - 1], verdicts, favours)
+
+
+_MERIT: Mapping[Verdict, int] = {HOLDS: 2, UNDECIDED: 1, NOT_RUN: 1, FAILS: 0}
 
 
 def combine_statement(statement: Statement, verdicts: Mapping[Comparison, Verdict]) -> Verdict:

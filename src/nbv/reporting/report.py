@@ -1,12 +1,11 @@
-"""One HTML page with everything: claims first, then tables, figures, settings and cost.
+"""One HTML page with everything: what was found, then claims, tables, figures, settings and cost.
 
 It needs nothing but itself: no scripts, no links outward, figures written into the page.
 """
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +15,23 @@ from markupsafe import Markup
 
 from nbv.config import read_configuration
 from nbv.experiments.results import load_object_ids
-from nbv.files import existing, read_json, readable
+from nbv.files import existing, read_csv, read_json, readable
 from nbv.labels import category_label, interval_text, number
-from nbv.paper.claim_text import VERDICT_RULES, by_run
-from nbv.paper.statements import FAILS, HOLDS, NOT_RUN, UNDECIDED, VERDICTS
+from nbv.paper.claim_text import STATISTIC_LABELS, VERDICT_RULES, by_run
+from nbv.paper.claims import CLAIMS
+from nbv.paper.statements import FAILS, HOLDS, NOT_RUN, UNDECIDED, VERDICTS, Claim, Comparison
 from nbv.paper.verdicts import read_claims
 from nbv.reporting.paper.figures import FIGURES
+from nbv.reporting.paper.forest import (
+    Row,
+    claim_figure,
+    claims_forest,
+    comparisons_of,
+    deciding_comparison,
+)
+from nbv.reporting.paper.table_picture import table_picture
 from nbv.reporting.paper.tables import TABLES
+from nbv.reporting.svg import inline_svg, svg_text
 from nbv.reporting.templating import HTML
 from nbv.statistics.paired import UNIT_OF
 
@@ -30,10 +39,11 @@ _SECTIONS = {
     "claims": "The paper's claims",
     "tables": "Tables",
     "figures": "Figures",
-    "comparisons": "Every comparison",
     "settings": "Settings",
     "runtime": "Running time",
 }
+_MAIN_CLAIM = "outperforms-all"
+_OPENING = "steps"
 _BADGES = {
     HOLDS: {"sign": "✓", "kind": "holds"},
     FAILS: {"sign": "✗", "kind": "fails"},
@@ -60,7 +70,9 @@ def build_report(
     splits: Mapping[str, Path],
     tables: Mapping[str, Path],
     figures: Mapping[str, Path],
+    table1: Path,
     runtime: Path,
+    caution: Sequence[str] = (),
 ) -> str:
     """Return the report of an experiment as one self-contained HTML page.
 
@@ -76,9 +88,13 @@ def build_report(
         HTML fragments of `nbv.reporting.table.write_table`, in the order to show them. The
         paper's tables that are not among them are named as such.
     figures : mapping of name to path
-        PNG files, likewise.
+        SVG files, likewise.
+    table1 : path
+        CSV of Table 1.
     runtime : path
         HTML fragment of `nbv.reporting.runtime.runtime_table`.
+    caution : sequence of str
+        What a reader has to know before any number; see `nbv.experiments.run_size`.
 
     Raises
     ------
@@ -88,28 +104,93 @@ def build_report(
     judged = read_claims(claims).fillna({"note": "", "summary": "", "versus": ""})
     each = judged.drop_duplicates("id")
     run, not_run = by_run(judged)
+    rows = comparisons_of(judged)
     settings = read_configuration(existing(configuration).parent, ("density", "estimator"))
     made_with = read_json(provenance)
+    shown = {name: _figure(name, path) for name, path in figures.items()}
     return HTML.get_template("report.html.j2").render(
         title=f"Best next viewpoint: experiment {settings['name']}",
+        caution=caution,
+        finding=_finding(rows),
+        opening=[
+            *_opening(judged, read_csv(table1)),
+            *(figure for name, figure in shown.items() if name == _OPENING),
+        ],
         repairs=_repairs(settings["density"]),
         sections=_SECTIONS,
         badges=_BADGES,
         run_facts=[*_run_facts(settings, splits), ("Commit", made_with.get("commit") or _UNKNOWN)],
-        claims_run=run.to_dict("records"),
-        claims_not_run=not_run.to_dict("records"),
+        claims_run=[
+            _claim(claim, rows[claim.id], one)
+            for claim, one in _with_claim(run)
+        ],
+        claims_not_run=[_claim(claim, {}, one) for claim, one in _with_claim(not_run)],
         tally=_tally(each["verdict"]),
         point_tally=_tally(each["point_verdict"]),
         verdict_rules=VERDICT_RULES,
         tables={name: _fragment(path) for name, path in tables.items()},
         absent_tables=[name for name in TABLES if name not in tables],
-        figures=[_figure(name, path) for name, path in figures.items()],
+        figures=[figure for name, figure in shown.items() if name != _OPENING],
         absent_figures=[name for name in FIGURES if name not in figures],
-        comparisons=[_comparison(part) for part in judged.to_dict("records")],
         machine_facts=list(_machine_facts(made_with)),
         configuration=configuration.read_text(encoding="utf-8").strip(),
         runtime=_fragment(runtime),
     )
+
+
+def _finding(rows: Mapping[str, Mapping[Comparison, Row]]) -> str:
+    """Say in one sentence what became of the paper's conclusion."""
+    (claim,) = (claim for claim in CLAIMS if claim.id == _MAIN_CLAIM)
+    says = "The paper concludes that Proposed has a lower error than the three other methods"
+    if _MAIN_CLAIM not in rows:
+        return f"{says}. That is about its five categories together, which this run does not have."
+    part = deciding_comparison(claim, rows[_MAIN_CLAIM])
+    row = rows[_MAIN_CLAIM][part]
+    words = {HOLDS: "holds", FAILS: "does not hold", UNDECIDED: "is undecided"}[row["verdict"]]
+    rival = str(row["versus"]).split(" (")[0]
+    difference = interval_text(row["difference"], row["ci_low"], row["ci_high"])
+    return (
+        f"{says}. Here this {words}: over all categories, the mean error of Proposed is "
+        f"{number(row['value'])}°, that of {rival} {number(row['versus_value'])}°; the difference "
+        f"is {difference} degrees."
+    )
+
+
+def _opening(judged: pd.DataFrame, table1: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """Yield the pictures that the page opens with, other than the figure of the method."""
+    published = " Open: as published." if table1["published"].notna().any() else ""
+    picture = svg_text(table_picture(table1))
+    caption = (
+        "Table 1 as a picture. Filled: our mean error by category and method, with its 95 % "
+        f"interval over objects.{published} All methods see the same objects, so their differences "
+        "are known better than these intervals say."
+    )
+    yield {"name": "table1-picture", "caption": caption, "svg": inline_svg(picture, "p1", caption)}
+    if (judged["verdict"] != NOT_RUN).any():
+        caption = (
+            "The paper's claims. By how much the comparison that decides a claim favours it, with "
+            "its 95 % interval: a claim holds where all of the interval is right of 0, does not "
+            "hold where all of it is left."
+        )
+        drawn = svg_text(claims_forest(judged))
+        yield {"name": "claims-forest", "caption": caption, "svg": inline_svg(drawn, "p2", caption)}
+
+
+def _with_claim(each: pd.DataFrame) -> Iterator[tuple[Claim, Row]]:
+    by_id = {claim.id: claim for claim in CLAIMS}
+    for row in each.to_dict("records"):
+        yield by_id[row["id"]], row
+
+
+def _claim(claim: Claim, rows: Mapping[Comparison, Row], one: Row) -> dict[str, Any]:
+    """Return what the page shows of a claim; without rows it was not run."""
+    shown = {**one, "title": claim.title, "svg": None, "comparisons": []}
+    if rows:
+        label = f"{claim.title}: {one['verdict']}. {one['summary']}"
+        drawn = svg_text(claim_figure(claim, rows))
+        shown["svg"] = inline_svg(drawn, f"claim-{claim.id}", label)
+        shown["comparisons"] = [_comparison(row) for row in rows.values()]
+    return shown
 
 
 def _run_facts(
@@ -160,7 +241,8 @@ def _machine_facts(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 def _tally(verdicts: pd.Series) -> str:
     counts = verdicts.value_counts()
     words = ("hold", "do not hold", "are undecided", "were not run")
-    return ", ".join(f"{counts.get(v, 0)} {w}" for v, w in zip(VERDICTS, words, strict=True))
+    found = [f"{counts[v]} {w}" for v, w in zip(VERDICTS, words, strict=True) if v in counts]
+    return ", ".join(found)
 
 
 def _fragment(path: Path) -> Markup:
@@ -169,21 +251,29 @@ def _fragment(path: Path) -> Markup:
         return Markup(path.read_text(encoding="utf-8"))
 
 
-def _figure(name: str, path: Path) -> dict[str, str]:
-    data = base64.b64encode(existing(path).read_bytes()).decode("ascii")
-    return {"name": name, "caption": FIGURES[name].caption, "data": data}
+def _figure(name: str, path: Path) -> dict[str, Any]:
+    caption = FIGURES[name].caption
+    text = existing(path).read_text(encoding="utf-8")
+    return {"name": name, "caption": caption, "svg": inline_svg(text, name, caption)}
 
 
-def _comparison(part: Mapping[Hashable, Any]) -> list[str]:
-    """Return the row of one of the comparisons that claims are made of."""
+def _comparison(part: Row) -> list[str]:
+    """Return the cells of one of the comparisons that a claim is made of."""
     unit = UNIT_OF.get(str(part["statistic"]), "")
-    value, versus = (
-        f"{number(figure)}{unit}" if np.isfinite(figure) else "–"
-        for figure in (part["value"], part["versus_value"])
+    value, versus = (_with_unit(part[key], unit) for key in ("value", "versus_value"))
+    printed, printed_versus = (
+        _with_unit(part[key], unit) for key in ("published_value", "published_versus_value")
     )
     difference = "–"
     if np.isfinite(part["difference"]):
         difference = interval_text(part["difference"], part["ci_low"], part["ci_high"])
-    statistic = str(part["statistic"]).replace("_", " ")
-    subject, other = part["subject"], part["versus"]
-    return [part["id"], statistic, subject, value, other, versus, difference, part["part_verdict"]]
+    statistic = STATISTIC_LABELS.get(str(part["statistic"]), "outliers")
+    compared = f"{part['subject']}, {part['versus']}"
+    published = "–" if printed == "–" else f"{printed}, {printed_versus}"
+    return [
+        compared, statistic, f"{value}, {versus}", difference, published, part["part_verdict"]
+    ]  # fmt: skip
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{number(value)}{unit}" if np.isfinite(value) else "–"

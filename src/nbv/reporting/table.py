@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pandas as pd
@@ -93,16 +93,19 @@ class Table:
         return tuple(row for part in self.parts for row in part.rows)
 
 
-def write_table(table: Table, paths: Mapping[str, Path]) -> None:
+def write_table(table: Table, paths: Mapping[str, Path], caution: Sequence[str] = ()) -> None:
     """Write a table in each of the formats that have a path: ``csv``, ``md``, ``tex``, ``html``.
+
+    The first notes are what a reader has to know before any number, the `caution`.
 
     Raises
     ------
     KeyError
         If a format is none of these.
     """
+    cautious = replace(table, notes=(*caution, *table.notes))
     for kind, path in paths.items():
-        _WRITERS[kind](table, path)
+        _WRITERS[kind](cautious, path)
 
 
 def table_markdown(table: Table) -> str:

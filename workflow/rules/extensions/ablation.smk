@@ -58,5 +58,6 @@ rule ablation:
         category=FOCUS,
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_ablation.py"

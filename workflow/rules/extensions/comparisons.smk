@@ -27,6 +27,7 @@ rule density_comparison:
         lookups=lambda wildcards: compared_keys(proposed_lookup),
         posteriors=lambda wildcards: compared_keys(test_posteriors),
         settings=RESAMPLED,
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_density_comparison.py"
 
@@ -49,6 +50,7 @@ rule run_comparison:
     params:
         evaluations=lambda wildcards: compared_keys(methods_in),
         settings=RESAMPLED,
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_run_comparison.py"
 
@@ -71,5 +73,6 @@ rule estimator_comparison:
     params:
         estimates=lambda wildcards: compared_keys(estimated_roles, UNITS),
         settings=RESAMPLED,
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_estimator_comparison.py"

@@ -202,6 +202,7 @@ rule statistics:
         trainings_csv=LAYOUT.confirmation("trainings", "csv"),
         contrasts_png=LAYOUT.confirmation("contrasts", "png"),
         contrasts_pdf=LAYOUT.confirmation("contrasts", "pdf"),
+        contrasts_svg=LAYOUT.confirmation("contrasts", "svg"),
     log:
         LAYOUT.log("statistics"),
     benchmark:
@@ -213,6 +214,7 @@ rule statistics:
         runtime=per_attempt(10),
     params:
         places=lambda wildcards: statistics_places(),
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_confirmation.py"
 

@@ -23,6 +23,7 @@ rule leaderboard:
         methods=METHODS | EXTENSIONS,
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_leaderboard.py"
 
@@ -50,5 +51,6 @@ rule extension_gains:
         methods=METHODS | EXTENSIONS,
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_extension_gains.py"

@@ -40,6 +40,7 @@ rule more_views:
         tex=LAYOUT.table("more_views", "tex"),
         png=LAYOUT.figure("more_views", "png"),
         pdf=LAYOUT.figure("more_views", "pdf"),
+        svg=LAYOUT.figure("more_views", "svg"),
     log:
         LAYOUT.log("more_views"),
     benchmark:
@@ -53,5 +54,6 @@ rule more_views:
         folds=[(category, fold) for category, _, fold in folds_of(REFERENCE_UNITS)],
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_more_views.py"

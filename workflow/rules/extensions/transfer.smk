@@ -172,6 +172,7 @@ rule transfer_table:
         conditions=TRANSFER["conditions"],
         unit=TRANSFER_UNIT,
         evaluations=TRANSFER_KEYS,
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_transfer.py"
 

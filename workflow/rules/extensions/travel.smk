@@ -24,6 +24,7 @@ rule travel:
         csv=LAYOUT.table("travel", "csv"),
         png=LAYOUT.figure("travel", "png"),
         pdf=LAYOUT.figure("travel", "pdf"),
+        svg=LAYOUT.figure("travel", "svg"),
     log:
         LAYOUT.log("travel"),
     benchmark:

@@ -62,5 +62,6 @@ rule view_sphere:
         category=SPHERE_CATEGORIES[0] if SPHERE_CATEGORIES else "",
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_view_sphere.py"

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from nbv.labels import category_label, interval_text, number
-from nbv.reporting.style import INK, MUTED, RC, new_figure
+from nbv.reporting.style import AGAINST, FOR, INK, OPEN, RC, new_figure
 from nbv.reporting.table import Cell, Part, Table
 
 _INTERVALS = (
@@ -21,7 +21,7 @@ _ROW_IN = 0.22
 _PANEL_IN = 0.75
 _BETTER, _UNDECIDED, _WORSE = "better", "undecided", "worse"
 # Colour and marker: told apart in grey and by those who see no colours.
-_VERDICTS = {_BETTER: ("#0072B2", "o"), _UNDECIDED: (MUTED, "s"), _WORSE: ("#D55E00", "^")}
+_VERDICTS = {_BETTER: (FOR, "o"), _UNDECIDED: (OPEN, "s"), _WORSE: (AGAINST, "X")}
 
 
 def methods_table(means: pd.DataFrame) -> Table:
@@ -225,7 +225,7 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     for axes, (name, part) in zip(drawn, panels, strict=True):
         _forest(axes, part)
         axes.set_title(_contrast(str(name)), loc="left")
-    drawn[-1].set_xlabel("Difference of MAE (°), below 0 is better")
+    drawn[-1].set_xlabel("Difference of MAE (degrees), below 0 is better")
     handles = [
         Line2D([], [], color=colour, marker=marker, linestyle="none", label=verdict)
         for verdict, (colour, marker) in _VERDICTS.items()

@@ -13,48 +13,25 @@ from matplotlib.figure import Figure
 from nbv.experiments.travel import ANY_DIRECTION, pooled_travel
 from nbv.labels import category_label, method_label
 from nbv.reporting.extensions.blocks import rows_by_category
-from nbv.reporting.style import RC, method_style, new_figure
+from nbv.reporting.style import RC, Panels, method_style, panel_grid
 from nbv.reporting.table import Table
 
-_COLUMNS = 3
 _PRODUCT = "_product"
-_BASELINES: Mapping[str, str] = {
-    "random": "random",
-    "bisecting": "opposite",
-    "evenly_spaced": "single",
-    f"{ANY_DIRECTION}_average": "single",
-    f"{ANY_DIRECTION}_posterior": "opposite",
-}
+_PANEL_IN = (3.4, 2.9)
 
 
 def _draw(axes: Axes, x: pd.Series, y: pd.Series, method: str, methods: tuple[str, ...]) -> None:
-    """Draw one curve: baselines in the paper's styles, criteria in the further ones in turn."""
-    others = tuple(name for name in methods if name not in _BASELINES)
-    style = method_style(_BASELINES.get(method, method), others)
+    style = method_style(method, methods)
     axes.plot(x, y, label=method_label(method), marker=style.marker, markersize=4, **style.curve)
 
 
-def _grid(n_panels: int, height_in: float = 2.9) -> tuple[Figure, list[Axes]]:
-    n_columns = min(n_panels, _COLUMNS)
-    n_rows = -(-n_panels // n_columns)
-    figure = new_figure(3.4 * n_columns + 0.4, height_in * n_rows + 0.9)
-    panels = figure.subplots(n_rows, n_columns, squeeze=False).ravel().tolist()
-    for spare in panels[n_panels:]:
-        spare.set_visible(False)
-    return figure, panels[:n_panels]
-
-
-def _legend(figure: Figure, panels: list[Axes]) -> None:
-    """Write the legend below, as wide as the panels are and as high as it has to be."""
+def _add_key(grid: Panels) -> None:
     named = {
         label: handle
-        for axes in panels
+        for axes in grid.panels
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    labels, handles = list(named), list(named.values())
-    n_columns = min(len(panels), _COLUMNS) + 1
-    figure.set_figheight(figure.get_figheight() + 0.2 * (-(-len(labels) // n_columns) - 2))
-    figure.legend(handles, labels, loc="outside lower center", ncols=n_columns)
+    grid.add_key(list(named.values()))
 
 
 @mpl.rc_context(RC)
@@ -64,8 +41,8 @@ def more_views_figure(cells: pd.DataFrame) -> Figure:
     drawn = cells.assign(by_product=by_product, policy=cells["method"].str.removesuffix(_PRODUCT))
     policies = tuple(dict.fromkeys(drawn["policy"]))
     parts = list(drawn.groupby(["by_product", "category"], sort=False))
-    figure, panels = _grid(len(parts))
-    for axes, ((product, category), part) in zip(panels, parts, strict=True):
+    grid = panel_grid(len(parts), *_PANEL_IN)
+    for axes, ((product, category), part) in zip(grid.panels, parts, strict=True):
         for policy, curve in part.groupby("policy", sort=False):
             _draw(axes, curve["n_views"], curve["value"], str(policy), policies)
         fusion = "product" if product else "posterior"
@@ -74,9 +51,9 @@ def more_views_figure(cells: pd.DataFrame) -> Figure:
         axes.set_xticks(sorted(part["n_views"].unique()))
         axes.set_ylim(bottom=0)
         axes.set_xlabel("Number of views")
-        axes.set_ylabel("MAE (°)")
-    _legend(figure, panels)
-    return figure
+        axes.set_ylabel("MAE (degrees)")
+    _add_key(grid)
+    return grid.figure
 
 
 def travel_curves(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFrame]:
@@ -93,10 +70,10 @@ def travel_curves(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFra
 @mpl.rc_context(RC)
 def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) -> Figure:
     """Draw error against mean travel as its cost rises, a panel for each of `travel_curves`."""
-    figure, panels = _grid(len(curves))
-    for axes, (category, rows) in zip(panels, curves.items(), strict=True):
+    grid = panel_grid(len(curves), *_PANEL_IN)
+    for axes, (category, rows) in zip(grid.panels, curves.items(), strict=True):
         for method in methods:
-            rule = "fixed" if method in _BASELINES else "cost"
+            rule = "fixed" if method.startswith(ANY_DIRECTION) else "cost"
             curve = rows[(rows["method"] == method) & (rows["rule"] == rule)]
             curve = curve.sort_values("travel_deg")
             _draw(axes, curve["travel_deg"], curve["error_deg"], method, methods)
@@ -104,10 +81,10 @@ def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) 
         axes.set_xlim(0, 180)
         axes.set_xticks([0, 45, 90, 135, 180])
         axes.set_ylim(bottom=0)
-        axes.set_xlabel("Mean travel (°)")
-        axes.set_ylabel("MAE (°)")
-    _legend(figure, panels)
-    return figure
+        axes.set_xlabel("Mean travel (degrees)")
+        axes.set_ylabel("MAE (degrees)")
+    _add_key(grid)
+    return grid.figure
 
 
 def travel_table(curves: Mapping[str, pd.DataFrame]) -> Table:

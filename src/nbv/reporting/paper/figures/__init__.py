@@ -9,7 +9,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from nbv.errors import UserError, nearest
-from nbv.reporting.paper.figures import choice, errors, heatmaps, views
+from nbv.reporting.paper.figures import choice, errors, heatmaps, steps, views
 from nbv.reporting.paper.figures.inputs import FigureInputs
 from nbv.reporting.style import RC
 
@@ -29,6 +29,14 @@ class FigureKind:
 
 
 FIGURES: Mapping[str, FigureKind] = {
+    "steps": FigureKind(
+        steps.steps,
+        "The method in three steps. One view fits many poses. The lookup table's row for its "
+        "estimate holds the cost of each rotation; the camera takes the one of least cost. Both "
+        "views together fit few poses. The object has the median single-view error of its fold, "
+        "seen from where that error is largest.",
+        ("depth", "objects", "lookups"),
+    ),
     "figure2": FigureKind(
         choice.selection,
         "Figure 2. The criterion (the paper's: ambiguity) selects the next viewpoint: an initial "

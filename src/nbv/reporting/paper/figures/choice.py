@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -10,6 +13,7 @@ from nbv.angles import nearest_bin, wrap_deg
 from nbv.labels import method_label
 from nbv.recommendation.criteria.pose_ambiguity import two_view_poses
 from nbv.recommendation.criteria.spreads import SPREADS
+from nbv.recommendation.lookup import LookupTable
 from nbv.reporting.paper.figures.depth import depth_limits, draw_depth
 from nbv.reporting.paper.figures.inputs import (
     ExampleView,
@@ -17,7 +21,7 @@ from nbv.reporting.paper.figures.inputs import (
     cost_words,
     example_view,
 )
-from nbv.reporting.style import INK, MUTED, azimuth_axis, new_figure
+from nbv.reporting.style import INK, MUTED, azimuth_axis, mark_azimuth, method_style, new_figure
 
 Likelihood = NDArray[np.float32]
 
@@ -46,7 +50,8 @@ def selection(inputs: FigureInputs) -> Figure:
         draw_depth(axes, shown.view(azimuth), limits, title)
     bars = figure.add_subplot(grid[1, 1:])
     values = [row[delta_bin] for delta_bin, _ in candidates]
-    colors = ["#D55E00", "#0072B2", "#bdbdbd"]
+    styles = [method_style(method, ()) for method in ("proposed", "opposite")]
+    colors = [*(style.color for style in styles), "#bdbdbd"]
     drawn = bars.bar(
         range(3),
         values,
@@ -54,7 +59,7 @@ def selection(inputs: FigureInputs) -> Figure:
         color=colors,
         edgecolor=INK,
         linewidth=0.8,
-        hatch=["", "....", "////"],
+        hatch=[*(style.hatch for style in styles), "////"],
     )
     bars.bar_label(drawn, fmt="%.3f", padding=2)
     bars.set_xticks(range(3), [name for _, name in candidates])
@@ -88,14 +93,15 @@ def idea(inputs: FigureInputs) -> Figure:
     n_bins = len(viewpoint)
     step = 360 / n_bins
     first = int(nearest_bin(shown.estimate_deg, n_bins))
-    one = viewpoint[first]
     best = round(int(lookup.recommended_delta_deg[first]) / step)
     worst = int(np.argmax(lookup.cost[first]))
     given = viewpoint if lookup.pose_likelihood == "given_estimate" else estimates
+    one = method_style("single", ()).color
+    two = inputs.style(inputs.settings.subject).color
     curves: list[list[tuple[Likelihood, str, str, str]]] = [
-        [(one, "p(φ | e)", "#E69F00", "solid")],
+        [(viewpoint[first], "p(φ | e)", one, "solid")],
         [
-            (two_view_poses(viewpoint, given, best)[first], "recommended", "#D55E00", "solid"),
+            (two_view_poses(viewpoint, given, best)[first], "recommended", two, "solid"),
             (two_view_poses(viewpoint, given, worst)[first], "worst", MUTED, "dashed"),
         ],
     ]
@@ -106,16 +112,14 @@ def idea(inputs: FigureInputs) -> Figure:
     if seen is not None and np.isfinite(_delta(shown, inputs.settings.subject)):
         delta = round(float(seen["delta_deg"]) / step)
         second = int(nearest_bin(float(seen["next_estimate_deg"]), n_bins))
-        belief = one * np.roll(estimates[:, second], -delta)
-        # As before the second view: two estimates that exclude each other say nothing.
-        belief = belief if belief.any() else np.ones_like(one)
-        curves.append([(belief / belief.sum(), "p(θ | e₁, e₂, δ)", "#D55E00", "solid")])
+        belief = two_view_belief(lookup, first, second, delta)
+        curves.append([(belief, "p(θ | e₁, e₂, δ)", two, "solid")])
         titles.append(f"After the second view at δ = {delta * step:.0f}°")
     figure = new_figure(7.6, 2.1 * len(curves) + 0.4)
     grid = figure.add_gridspec(len(curves), 2, width_ratios=(1, 2.9))
     limits = depth_limits(shown.views)
     unit = " nats" if lookup.spread == "entropy" else ""
-    top = 1.12 * max(float(spread.max()) for row in curves for spread, *_ in row)
+    top = 1.3 * max(float(spread.max()) for row in curves for spread, *_ in row)
     azimuths = np.arange(n_bins) * step
     for row, lines in enumerate(curves):
         azimuth = float(wrap_deg(shown.azimuth_deg + turns[row] * step))
@@ -123,20 +127,47 @@ def idea(inputs: FigureInputs) -> Figure:
         draw_depth(image, shown.view(azimuth), limits)
         image.set_xlabel(f"{captions[row]}, {azimuth:.0f}°")
         axes = figure.add_subplot(grid[row, 1])
-        for spread, name, color, dashes in lines:
+        for line, (spread, name, color, dashes) in enumerate(lines):
             width = float(SPREADS[lookup.spread](spread[np.newaxis])[0])
             label = f"{name}, {width:.2f}{unit}"
             axes.plot(azimuths, spread, color=color, linewidth=1.8, linestyle=dashes, label=label)
-        axes.fill_between(azimuths, lines[0][0], color=lines[0][2], alpha=0.25, linewidth=0)
-        axes.axvline(shown.azimuth_deg, color=INK, linewidth=1.0, linestyle=":", label="true pose")
+            _label_curve(axes, label, line, color, dashes)
+        axes.fill_between(azimuths, lines[0][0], color=lines[0][2], alpha=0.2, linewidth=0)
+        mark_azimuth(axes, shown.azimuth_deg, "true pose")
         axes.set_ylim(0, top)
         axes.set_title(titles[row])
         axes.set_ylabel(f"Probability per {step:g}°")
-        axes.legend(loc="best", fontsize=8)
         last = row == len(curves) - 1
         azimuth_axis(axes, "Pose: azimuth of the first view (degrees)" if last else "")
     figure.suptitle(f"One viewpoint and two: {shown.title}", fontsize=10)
     return figure
+
+
+def two_view_belief(lookup: LookupTable, first: int, second: int, delta: int) -> Likelihood:
+    """Return p(θ | e₁, e₂, δ) by bin, both estimates combined by Bayes' rule.
+
+    Parameters
+    ----------
+    lookup : LookupTable
+        Whose likelihoods.
+    first, second : int
+        Bins of the two estimates.
+    delta : int
+        Bins from the first view to the second.
+    """
+    one, estimates = lookup.viewpoint_likelihood[first], lookup.estimate_likelihood
+    belief = one * np.roll(estimates[:, second], -delta)
+    # As before the second view: two estimates that exclude each other say nothing.
+    belief = belief if belief.any() else np.ones_like(one)
+    return np.asarray(belief / belief.sum())
+
+
+def _label_curve(axes: Axes, label: str, line: int, color: str, dashes: str) -> None:
+    """Name a curve at the right, one line below the other, with a piece of it before the name."""
+    height = 0.9 - 0.13 * line
+    place: Any = {"transform": axes.transAxes}
+    axes.plot([0.62, 0.67], [height] * 2, color=color, linestyle=dashes, linewidth=1.8, **place)
+    axes.text(0.685, height, label, va="center", fontsize=8, **place)
 
 
 def picks(inputs: FigureInputs) -> Figure:

@@ -32,7 +32,7 @@ def shade(codes: Codes, limits: tuple[int, int]) -> NDArray[np.float64]:
 
 def draw_depth(axes: Axes, codes: Codes, limits: tuple[int, int], title: str = "") -> None:
     """Fill the axes with one image in a thin frame."""
-    axes.imshow(shade(codes, limits), cmap="gray", vmin=0.0, vmax=1.0, interpolation="nearest")
+    axes.imshow(shade(codes, limits), cmap="gray", vmin=0.0, vmax=1.0, interpolation="none")
     axes.set_xticks([])
     axes.set_yticks([])
     axes.grid(visible=False)

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from nbv.experiments.results import Unit
@@ -17,12 +16,12 @@ from nbv.labels import method_label
 from nbv.pose_errors import PAUC_LIMIT_DEG
 from nbv.reporting.paper.figures.inputs import FigureInputs
 from nbv.reporting.settings import common_elevation_deg, reference_units, unit_label
-from nbv.reporting.style import INK, MUTED, azimuth_axis, new_figure
+from nbv.reporting.style import INK, MUTED, azimuth_axis, new_figure, panel_grid
 from nbv.statistics import metrics
 from nbv.statistics.paired import PairedErrors, pair_methods
 
 _WINDOW_DEG = 15
-_COLUMNS = 3
+_PANEL_IN = (2.9, 2.6)
 
 
 def boxplots(inputs: FigureInputs) -> Figure:
@@ -33,10 +32,11 @@ def boxplots(inputs: FigureInputs) -> Figure:
     figure = new_figure(max(1.5 * len(units) + 1.2, 6.0), 6.4)
     whole, close = figure.subplots(2, 1)
     errors = {unit: _paired(inputs, unit).errors_deg for unit in units}
+    offsets = (np.arange(len(methods)) - (len(methods) - 1) / 2) * 0.8 / len(methods)
+    places = np.add.outer(np.arange(len(units)), offsets).ravel()
     for axes, whiskers in ((whole, (0, 100)), (close, (5, 95))):
-        for index, method in enumerate(methods):
+        for offset, method in zip(offsets, methods, strict=True):
             style = inputs.style(method)
-            offset = (index - (len(methods) - 1) / 2) * 0.8 / len(methods)
             boxes = axes.boxplot(
                 [errors[unit][method] for unit in units],
                 positions=np.arange(len(units)) + offset,
@@ -67,20 +67,12 @@ def boxplots(inputs: FigureInputs) -> Figure:
     whole.set_yticks([0, 45, 90, 135, 180])
     close.set_title("Close-up: whiskers to the 5th and 95th percentile, cut off where longer")
     close.set_ylim(0, max(_close_limit_deg(e) for unit in units for e in errors[unit].values()))
-    handles: list[Patch | Line2D] = [
-        Patch(
-            facecolor=inputs.style(m).color,
-            hatch=inputs.style(m).hatch,
-            edgecolor=INK,
-            label=method_label(m),
-        )
-        for m in methods
-    ]
-    handles.append(
-        Line2D([], [], marker="D", linestyle="", markerfacecolor="white", color=INK, label="mean")
+    close.set_xticks(places, [method_label(m) for m in methods] * len(units), minor=True)
+    close.tick_params(axis="x", which="minor", length=0, labelsize=8, labelrotation=90)
+    close.tick_params(axis="x", which="major", length=0, pad=52)
+    figure.suptitle(
+        f"Errors at elevation {common}° (box: quartiles, line: median, diamond: mean)", fontsize=10
     )
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    figure.suptitle(f"Errors at elevation {common}° (box: quartiles, line: median)", fontsize=10)
     return figure
 
 
@@ -94,9 +86,9 @@ def accuracy(inputs: FigureInputs) -> Figure:
     """PEA by threshold, up to the 100 degrees that the pAUC integrates over (Eq. 10)."""
     units = reference_units(inputs.evaluations, inputs.settings)
     common = common_elevation_deg(units, inputs.settings)
-    figure, panels = _panels(units, 2.5)
+    grid = panel_grid(len(units), *_PANEL_IN)
     thresholds = np.linspace(0.0, np.sqrt(PAUC_LIMIT_DEG), 401) ** 2
-    for axes, unit in zip(panels, units, strict=True):
+    for axes, unit in zip(grid.panels, units, strict=True):
         sample = _paired(inputs, unit)
         for method in inputs.methods(unit):
             accuracies = metrics.pea(sample.errors_deg[method], thresholds)
@@ -109,17 +101,17 @@ def accuracy(inputs: FigureInputs) -> Figure:
         axes.set_title(unit_label(unit, common))
         axes.set_xlabel("Threshold τ (degrees, root scale)")
         axes.set_ylabel("PEA(τ)")
-    _line_legend(figure, inputs, units)
-    figure.suptitle(f"Pose estimation accuracy at elevation {common}°", fontsize=10)
-    return figure
+    grid.add_key(_key(inputs, units))
+    grid.figure.suptitle(f"Pose estimation accuracy at elevation {common}°", fontsize=10)
+    return grid.figure
 
 
 def by_azimuth(inputs: FigureInputs) -> Figure:
     """Mean error by initial azimuth, smoothed over 15 degrees."""
     units = reference_units(inputs.evaluations, inputs.settings)
     common = common_elevation_deg(units, inputs.settings)
-    figure, panels = _panels(units, 2.5)
-    for axes, unit in zip(panels, units, strict=True):
+    grid = panel_grid(len(units), *_PANEL_IN)
+    for axes, unit in zip(grid.panels, units, strict=True):
         sample = _paired(inputs, unit)
         for position, method in enumerate(inputs.methods(unit)):
             axes.plot(
@@ -139,12 +131,12 @@ def by_azimuth(inputs: FigureInputs) -> Figure:
         axes.set_title(unit_label(unit, common))
         axes.set_ylabel("Mean error (degrees)")
         azimuth_axis(axes, "Initial azimuth (degrees)")
-    _line_legend(figure, inputs, units, markers=True)
-    figure.suptitle(
+    grid.add_key(_key(inputs, units, markers=True))
+    grid.figure.suptitle(
         f"Error by initial azimuth at elevation {common}° (viewpoint groups 1–4 above)",
         fontsize=10,
     )
-    return figure
+    return grid.figure
 
 
 def _mean_by_azimuth(
@@ -160,29 +152,16 @@ def _paired(inputs: FigureInputs, unit: Unit) -> PairedErrors:
     return pair_methods(inputs.evaluations[unit], unit[0])
 
 
-def _panels(units: Sequence[Unit], height_in: float) -> tuple[Figure, list[Axes]]:
-    """Return one panel a unit, at most three abreast; cells left over are removed."""
-    columns = min(len(units), _COLUMNS)
-    rows = -(-len(units) // columns)
-    figure = new_figure(max(2.9 * columns, 6.4), height_in * rows + 0.7)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
-    for spare in panels[len(units) :]:
-        spare.remove()
-    return figure, panels[: len(units)]
-
-
-def _line_legend(
-    figure: Figure, inputs: FigureInputs, units: Sequence[Unit], markers: bool = False
-) -> None:
-    handles = [
+def _key(inputs: FigureInputs, units: Sequence[Unit], markers: bool = False) -> list[Line2D]:
+    styles = {method: inputs.style(method) for method in inputs.methods(units[0])}
+    return [
         Line2D(
             [],
             [],
-            **inputs.style(method).curve,
-            marker=inputs.style(method).marker if markers else "",
+            **style.curve,
+            marker=style.marker if markers else "",
             markersize=4,
             label=method_label(method),
         )
-        for method in inputs.methods(units[0])
+        for method, style in styles.items()
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), handlelength=3.2)

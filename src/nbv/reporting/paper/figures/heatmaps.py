@@ -30,7 +30,7 @@ def lookup_maps(inputs: FigureInputs) -> Figure:
     extent = (-half, 360 - half, -half, 360 - half)
     top = likelihood.max()
     image: Any = {"origin": "lower", "extent": extent, "cmap": "cividis"}
-    image |= {"interpolation": "nearest", "aspect": "auto"}
+    image |= {"interpolation": "none", "aspect": "auto"}
     shown = left.imshow(likelihood.T, norm=LogNorm(top / 10**_DECADES, top), **image)
     left.plot([0, 360], [0, 360], color="black", linewidth=1.0, linestyle=":")
     left.set_title("Viewpoint likelihood V[e, φ]")

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from nbv.reporting.paper.figures.depth import depth_limits, draw_depth
 from nbv.reporting.paper.figures.inputs import FigureInputs
 from nbv.reporting.settings import common_elevation_deg, reference_units, unit_label
-from nbv.reporting.style import INK, MUTED, new_figure
+from nbv.reporting.style import INK, MUTED, SHADE, new_figure
 from nbv.statistics.paired import VIEWPOINT_GROUPS
 
 _AZIMUTHS_DEG = tuple(range(0, 360, 45))
@@ -62,7 +62,7 @@ def groups(inputs: FigureInputs) -> Figure:
     ring.set_axis_off()
     views = inputs.views(unit)
     limits = depth_limits(views[:: max(views.shape[0] // 24, 1)])
-    shades = ("#ffffff", "#e4e4e4", "#ffffff", "#e4e4e4")
+    shades = ("#ffffff", SHADE, "#ffffff", SHADE)
     for shade_color, (group, (start, stop)) in zip(shades, VIEWPOINT_GROUPS.items(), strict=True):
         span = np.radians(np.linspace(start, start + (stop - start) % 360, 60))
         outline = 0.98 * np.stack([np.cos(span), np.sin(span)])
