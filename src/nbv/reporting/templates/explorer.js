@@ -70,10 +70,11 @@ function ownDistribution(azimuth) {
 let latest = 0;
 
 /** Decode what the state needs, then show it. */
-async function show({ keepsLink = false, entry = false } = {}) {
+async function show({ fromLink = false, entry = false } = {}) {
   latest += 1;
   const ticket = latest, place = tablePlace(), { unit: index, object } = state;
   root.dataset.state = "loading";
+  if (!fromLink) $("notice").hidden = true;
   const [outcomes, table, picture, own] = await Promise.all([
     outcomesOf(index),
     once(`table-${index}-${place}`, () =>
@@ -86,7 +87,7 @@ async function show({ keepsLink = false, entry = false } = {}) {
   fillControls();
   fillObject();
   draw();
-  if (!keepsLink) link(entry);
+  link(entry);
   root.dataset.state = "ready";
 }
 
@@ -485,12 +486,16 @@ function ranking({ by, objects }) {
     .sort((a, b) => b.key - a.key || a.object - b.object);
 }
 
+// Where the last jump led, and by which list: the same list once more goes on to its next place.
+let jumped = "";
+
 function jump() {
-  const ranked = ranking(jumps()[Number($("jump").value)]);
-  const now = ranked.findIndex((one) => one.object === state.object && one.view === state.view);
-  const place = (now + 1) % ranked.length;
+  const list = $("jump").value, ranked = ranking(jumps()[Number(list)]);
+  const mark = (one) => [list, state.unit, state.method, one.object, one.view].join(" ");
+  const place = (ranked.findIndex((one) => mark(one) === jumped && mark(state) === jumped) + 1) % ranked.length;
   $("rank").textContent = ranked.length > 1 ? `${place + 1} of ${ranked.length}` : "";
   Object.assign(state, { object: ranked[place].object, view: ranked[place].view });
+  jumped = mark(state);
   show({ entry: true });
 }
 
@@ -581,7 +586,7 @@ function listen() {
   window.addEventListener("hashchange", () => {
     if (window.location.hash.slice(1) === fragment()) return;
     readLink();
-    show({ keepsLink: true });
+    show({ fromLink: true });
   });
 }
 
@@ -645,4 +650,4 @@ readLink();
 listen();
 paintSwatches();
 drawLegend();
-show();
+show({ fromLink: true });
