@@ -4,6 +4,7 @@
 # make confirm     several trainings of all data sets, for hours (tools/confirm.sh)
 # make bundles     the bundles that the package ships, for half an hour
 # make test-slurm  the workflow on a real SLURM of one node, where root may install it
+# make test-browser the pages in a real browser, where there is one or root may install it
 # make coverage    branches that tests reach    make mutation whether tests notice changed code
 # make audit       known vulnerabilities        make licences the licences of what is locked
 # make lock        the locks again              UPGRADE=--upgrade takes the newest versions
@@ -21,8 +22,8 @@ PYTEST := $(BIN)/pytest --numprocesses $(CORES) --dist worksteal
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
 
-.PHONY: reproduce quick confirm bundles compare reference bench test test-quick test-slurm soak coverage mutation check lock audit \
-	licences docs clean
+.PHONY: reproduce quick confirm bundles compare reference bench test test-quick test-slurm test-browser soak coverage mutation \
+	check lock audit licences docs clean
 
 reproduce: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -58,6 +59,11 @@ test-quick: $(READY)
 test-slurm: $(READY)
 	tests/workflow/slurm/install.sh $(BIN)/python
 	$(BIN)/pytest -rs --log-cli-level=INFO --log-cli-format="%(asctime)s %(message)s" tests/workflow/slurm
+
+# Likewise.
+test-browser: $(READY)
+	tests/browser/install.sh
+	$(BIN)/pytest -rs tests/browser
 
 coverage: $(READY)
 	$(PYTEST) -m "not slow" --cov --cov-report=term

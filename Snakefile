@@ -3,6 +3,7 @@
 #   snakemake --cores 2                                                  the paper
 #   snakemake --cores 2 --config experiment=quick                        the same graph, small
 #   snakemake --cores 2 tables                                           one stage
+#   snakemake --cores 2 explorer                                         a page to play with
 #   snakemake --cores 2 extensions                                       the extensions
 #   snakemake --cores 2 animation                                        the method on one object
 #   snakemake --cores 2 transfer                                         trained on × tested on
@@ -45,6 +46,7 @@ include: "workflow/rules/data.smk"
 include: "workflow/rules/estimation.smk"
 include: "workflow/rules/recommendation.smk"
 include: "workflow/rules/reporting.smk"
+include: "workflow/rules/explorer.smk"
 include: "workflow/rules/verification.smk"
 include: "workflow/rules/reference.smk"
 # The paper ends here. What follows is beyond it, and nothing above depends on it.

@@ -201,6 +201,11 @@ class Layout:
         """The page that shows everything."""
         return f"{self.root}/report.html"
 
+    @property
+    def explorer(self) -> str:
+        """The page to play with."""
+        return f"{self.root}/explorer.html"
+
     def _of_fold(
         self, stage: str, category: str, elevation: int | str, fold: int | str, name: str
     ) -> str:

@@ -1,0 +1,529 @@
+"""The explorer in a real browser: what it shows is what the run's files say."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+from urllib.parse import parse_qs, urlencode, urlsplit
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import synthetic
+from conftest import UNITS
+from nbv.angles import circular_distance_deg
+from nbv.calibration.density import Conditionals
+from nbv.calibration.posteriors import posteriors_of, write_posteriors
+from nbv.layout import Layout
+from nbv.recommendation.belief import coarser, first_belief, mean_direction_deg, updated
+from nbv.recommendation.criteria import CRITERIA
+from nbv.recommendation.evidence import Evidence
+from nbv.recommendation.lookup import load_lookup
+from nbv.recommendation.next_views import bisecting_next, recommended_next
+from nbv.reporting.explorer import ExplorerInputs, build_explorer
+from nbv.reporting.explorer.tables import page_table
+
+METHODS = synthetic.METHODS
+EXPLORED = (("mug", 0), ("mug", 30), ("chair", 0))
+WIDTHS = (390, 768, 1280)
+APART_DEG = 15
+
+
+@pytest.fixture(scope="session")
+def path(explored):
+    return explored.results / "explorer.html"
+
+
+@pytest.fixture(scope="session")
+def outcomes(explored):
+    """All evaluation files, a row for each unit, object, first view and method."""
+    layout, frames = Layout(str(explored.results)), []
+    for (category, elevation), fold, method in product(EXPLORED, (1, 2), METHODS):
+        frame = pd.read_csv(layout.evaluation(category, elevation, fold, method))
+        place = {"category": category, "elevation": elevation, "fold": fold, "method": method}
+        frames.append(frame.assign(**place))
+    keys = ["category", "elevation", "object_id", "initial_deg", "method"]
+    return pd.concat(frames).set_index(keys).sort_index()
+
+
+def inputs_of(root: Path, **more) -> ExplorerInputs:
+    """The explorer of a synthetic results tree."""
+    layout = Layout(str(root))
+    folds = (1, 2, 3)
+    return ExplorerInputs(
+        name="synthetic",
+        policies=dict(zip(METHODS, ("none", "random", "opposite", "pose_ambiguity"), strict=True)),
+        evaluations={
+            (*unit, fold, method): Path(layout.evaluation(*unit, fold, method))
+            for unit in UNITS
+            for method in METHODS
+            for fold in folds
+        },
+        lookups={
+            (*unit, fold, "pose_ambiguity"): Path(layout.lookup(*unit, fold, "pose_ambiguity"))
+            for unit in UNITS
+            for fold in folds
+        },
+        min_separation_deg=APART_DEG,
+        n_views=5,
+        **more,
+    )
+
+
+def fragment(**state) -> str:
+    return urlencode(state)
+
+
+def state_of(page) -> dict[str, str]:
+    """What the page's own permanent link says."""
+    return {key: value for key, (value,) in parse_qs(urlsplit(page.url).fragment).items()}
+
+
+def settle(page) -> None:
+    """Wait until the page has drawn, and its link has followed."""
+    page.wait_for_selector("html[data-state=ready]")
+    page.wait_for_function("new URLSearchParams(location.hash.slice(1)).has('category')")
+    page.wait_for_timeout(400)
+
+
+def go_to(page, **state) -> None:
+    page.evaluate(
+        "target => { document.documentElement.dataset.state = 'waiting'; location.hash = target; }",
+        fragment(**state),
+    )
+    page.wait_for_selector("html[data-state=ready]")
+
+
+def cells(page, table: str) -> dict[tuple[str, str], str]:
+    """The text of a table's cells by method and column."""
+    return {
+        tuple(key): text
+        for *key, text in page.eval_on_selector_all(
+            f"#{table} td",
+            "all => all.map(c => [c.parentElement.dataset.method, c.dataset.cell, c.textContent])",
+        )
+    }
+
+
+def degrees(text: str) -> float:
+    return float(text.replace("\N{MINUS SIGN}", "-").rstrip("°% "))
+
+
+def is_rounded(text: str, value: float) -> bool:
+    """Say whether a text is a number rounded to its last decimal."""
+    return (
+        abs(degrees(text) - value)
+        <= 0.5 * 10.0 ** -len(text.rstrip("°% ").partition(".")[2]) + 1e-9
+    )
+
+
+def random_states(outcomes, n: int, seed: int) -> list[dict[str, object]]:
+    rng = np.random.default_rng(seed)
+    rows = outcomes.index.droplevel("method").unique()
+    names = rows.names
+    chosen = [
+        dict(zip(names, rows[i], strict=True)) for i in rng.choice(len(rows), n, replace=False)
+    ]
+    return [
+        {
+            "category": one["category"],
+            "elevation": one["elevation"],
+            "object": one["object_id"],
+            "azimuth": one["initial_deg"],
+            "method": str(rng.choice(METHODS)),
+            "views": int(rng.integers(1, 6)),
+        }
+        for one in chosen
+    ]
+
+
+def test_fifty_random_states_show_the_numbers_of_the_files(visit, path, outcomes):
+    page = visit(path)
+    wrong = []
+    for state in random_states(outcomes, 50, seed=0):
+        go_to(page, **state)
+        place = (state["category"], state["elevation"], state["object"])
+        shown, means = cells(page, "outcomes"), cells(page, "overall")
+        for method in METHODS:
+            row = outcomes.loc[(*place, state["azimuth"], method)]
+            expected = {"pose": row["pose_estimate_deg"], "error": row["error_deg"]}
+            if method == "single":
+                assert {shown[method, "delta"], shown[method, "next"]} == {"–"}
+            else:
+                expected |= {"delta": row["delta_deg"], "next": row["next_estimate_deg"]}
+            wrong += [
+                (state, method, column, shown[method, column], value)
+                for column, value in expected.items()
+                # 359.996 is 0.00 and not 360.00.
+                if not is_rounded(shown[method, column], value)
+                and not is_rounded(shown[method, column], value - 360.0)
+            ]
+            of_unit = outcomes.loc[place[:2]].xs(method, level="method")["error_deg"]
+            above = of_unit > 90
+            expected = {
+                "object": of_unit.loc[place[2]].mean(),
+                "mean": of_unit.mean(),
+                "above": (of_unit * above).mean(),
+                "share": 100 * above.mean(),
+            }
+            wrong += [
+                (state, method, column, means[method, column], value)
+                for column, value in expected.items()
+                if not is_rounded(means[method, column], value)
+            ]
+    assert not wrong
+
+
+def test_dragging_round_the_ring_moves_the_first_view_and_nothing_else(visit, path, outcomes):
+    page = visit(path, fragment(category="mug", azimuth=0, method="opposite"))
+    settle(page)
+    before, picture = state_of(page), page.locator("#ring").screenshot()
+    ring = page.locator("#ring")
+    ring.scroll_into_view_if_needed()
+    box = ring.bounding_box()
+    centre = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    seen = []
+    page.mouse.move(centre[0] + 0.44 * box["width"], centre[1])
+    page.mouse.down()
+    for azimuth in range(0, 211, 15):
+        angle = np.radians(azimuth)
+        page.mouse.move(
+            centre[0] + 0.44 * box["width"] * np.cos(angle),
+            centre[1] - 0.44 * box["width"] * np.sin(angle),
+        )
+        page.wait_for_function(f"document.getElementById('azimuth-text').value === '{azimuth}°'")
+        seen.append(cells(page, "outcomes")["opposite", "error"])
+    page.mouse.up()
+    page.mouse.move(*centre)
+    settle(page)
+    assert state_of(page) == before | {"azimuth": "210"}
+    assert page.locator("#azimuth").input_value() == "210"
+    assert "210°" in page.locator("#view-1 figcaption").inner_text()
+    assert "30°" in page.locator("#view-opposite figcaption").inner_text()
+    assert page.locator("#ring").screenshot() != picture
+    errors = outcomes.loc[("mug", 0, before["object"])].xs("opposite", level="method")["error_deg"]
+    assert all(map(is_rounded, seen, errors.loc[range(0, 211, 15)]))
+
+
+def test_a_finger_on_the_ring_turns_the_camera_and_in_its_middle_scrolls(visit, path):
+    page = visit(path, width=390, has_touch=True, is_mobile=True)
+    settle(page)
+    before = state_of(page)["azimuth"]
+    page.locator("#ring").scroll_into_view_if_needed()
+    touch = page.context.new_cdp_session(page)
+
+    def swipe(start: float, end: tuple[float, float]) -> None:
+        """From a part of the radius to the right of the centre by some pixels."""
+        box = page.locator("#ring").bounding_box()
+        x, y = box["x"] + box["width"] * (0.5 + start / 2), box["y"] + box["height"] / 2
+        points = [(x + end[0] * part, y + end[1] * part) for part in np.linspace(0, 1, 12)]
+        kinds = ["touchStart", *["touchMove"] * 11]
+        for kind, (px, py) in zip(kinds, points, strict=True):
+            event = {"type": kind, "touchPoints": [{"x": px, "y": py}]}
+            touch.send("Input.dispatchTouchEvent", event)
+        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        page.wait_for_timeout(400)
+
+    scrolled = page.evaluate("scrollY")
+    swipe(0.85, (-20, -90))
+    settle(page)
+    assert 20 <= int(state_of(page)["azimuth"]) <= 50
+    assert page.evaluate("scrollY") == scrolled
+    turned = state_of(page)["azimuth"]
+    assert turned != before
+    swipe(0.0, (0, -150))
+    assert page.evaluate("scrollY") > scrolled
+    assert state_of(page)["azimuth"] == turned
+
+
+def page_evidence(table) -> tuple[Evidence, Evidence]:
+    """What the page knows of a table, in its bins and in fewer, for the package's own functions."""
+    stored = page_table(table)
+    of_fine = stored.estimate_likelihood
+    # Bins of 3°, each about its centre: the mean over viewpoints, the sum over estimates.
+    turned = np.roll(of_fine, (1, 1), axis=(0, 1)).reshape(120, 3, 120, 3)
+    of_coarse = turned.mean(axis=1).sum(axis=2)
+    return tuple(
+        Evidence(
+            np.empty((0, len(likelihood))),
+            Conditionals(likelihood.T / likelihood.sum(axis=0)[:, None], likelihood),
+            np.nan,
+            np.nan,
+            {},
+        )
+        for likelihood in (of_fine, of_coarse)
+    )
+
+
+@pytest.mark.parametrize("policy", ["gain", "halves"])
+def test_five_views_are_those_of_the_packages_own_functions(
+    visit, path, outcomes, explored, policy
+):
+    page = visit(path)
+    layout, known = Layout(str(explored.results)), {}
+    for state in random_states(outcomes, 12, seed=1):
+        state |= {"views": 5, "method": "proposed", "next": policy}
+        if policy == "halves":
+            state["method"] = "opposite"
+        go_to(page, **state)
+        place = (state["category"], state["elevation"])
+        rows = outcomes.loc[(*place, state["object"])]
+        first = rows.loc[(state["azimuth"], state["method"])]
+        unit = (*place, int(first["fold"]))
+        if unit not in known:
+            known[unit] = page_evidence(load_lookup(layout.lookup(*unit, "pose_ambiguity")))
+        evidence, coarse = known[unit]
+        shown = page.evaluate(
+            "(({turns, beliefs}) => [turns, beliefs.map(b => [...b])])(explorer.followed())"
+        )
+        estimates = rows.xs("single", level="method")["pose_estimate_deg"].round(2)
+        turns, beliefs = np.array(shown[0], dtype=np.int64), np.array(shown[1])
+        assert turns[1] == first["delta_deg"]
+        belief = first_belief(np.array([estimates.loc[state["azimuth"]]]), evidence)
+        for view, turn in enumerate(turns):
+            taken = turns[None, :view]
+            if view:
+                estimate = estimates.loc[(state["azimuth"] + turn) % 360]
+                if policy == "gain" and view > 1:
+                    cost = CRITERIA["information_gain"](coarser(belief, coarse), coarse, "")[0]
+                    choose = recommended_next("information_gain", coarse, APART_DEG)
+                    best = choose(belief, taken, np.random.default_rng(0))[0]
+                    # Of two that cost the same, rounding decides.
+                    assert abs(cost[turn // 3] - cost[best // 3]) < 1e-5
+                    assert circular_distance_deg(taken, turn).min() >= APART_DEG
+                elif policy == "halves":
+                    assert turn == bisecting_next(belief, taken, np.random.default_rng(0))[0]
+                belief = updated(belief, np.array([estimate]), np.array([turn]), evidence)
+            np.testing.assert_allclose(beliefs[view], belief.probabilities[0], atol=2e-6)
+            # Of the page's own belief: next to no direction of a nearly even one is known.
+            mean = float(mean_direction_deg(beliefs[view : view + 1])[0])
+            line = page.locator(f"#steps tbody tr:nth-child({view + 1}) td").all_inner_texts()
+            assert is_rounded(line[3], mean)
+            assert is_rounded(line[4], float(circular_distance_deg(mean, state["azimuth"])))
+            densest = np.sort(beliefs[view])[::-1].cumsum()
+            assert line[2] == f"{int((densest < 0.9).sum()) + 1}°"
+
+
+def test_a_permanent_link_restores_what_was_shown(visit, path):
+    page = visit(path)
+    page.select_option("#category", "mug")
+    settle(page)
+    page.select_option("#elevation", "30")
+    settle(page)
+    page.select_option("#object", index=5)
+    page.check("[name=method][value=random]")
+    page.check("[name=views][value='4']")
+    page.select_option("#next", "halves")
+    page.locator("#azimuth").fill("123")
+    settle(page)
+    state = state_of(page)
+    chosen = {"category": "mug", "elevation": "30", "azimuth": "123", "method": "random"}
+    assert state.items() >= (chosen | {"views": "4", "next": "halves"}).items()
+    other = visit(path, urlsplit(page.url).fragment)
+    settle(other)
+    assert state_of(other) == state
+    # Not what was said aloud of the last change.
+    shown = "main > :not(#status)"
+    assert other.locator(shown).all_inner_texts() == page.locator(shown).all_inner_texts()
+    page.go_back()
+    settle(page)
+    assert state_of(page)["object"] != state["object"]
+
+
+def test_a_link_to_what_the_run_does_not_have_says_so(visit, path):
+    page = visit(path, fragment(category="spoon", azimuth=400))
+    settle(page)
+    told = page.locator("#notice").inner_text()
+    assert "category=spoon" in told
+    assert "azimuth=400" in told
+    assert state_of(page)["category"] in ("mug", "chair")
+    go_to(page, category="mug", elevation=0)
+    assert page.locator("#notice").is_hidden()
+
+
+def test_jumps_lead_to_the_largest_errors_of_the_files(visit, path, outcomes):
+    page = visit(path, fragment(category="chair", method="proposed"))
+    settle(page)
+    errors = (
+        outcomes.loc[("chair", 0)]
+        .reset_index()
+        .pivot_table("error_deg", ["object_id", "initial_deg"], "method")
+    )
+    page.locator("[data-method=random] .worst").click()
+    settle(page)
+    own = errors.loc[state_of(page)["object"]]["random"]
+    assert own.loc[int(state_of(page)["azimuth"])] >= own.max() - 0.01
+    options = page.locator("#jump option").all_inner_texts()
+    assert len(options) == 5
+    expected = {
+        0: errors["proposed"].loc[[state_of(page)["object"]]],
+        1: errors["proposed"],
+        2: errors["proposed"] - errors["opposite"],
+        4: errors["opposite"] - errors["proposed"],
+    }
+    for index, values in expected.items():
+        page.select_option("#jump", index=index)
+        page.click("#go")
+        settle(page)
+        state = state_of(page)
+        assert values.loc[(state["object"], int(state["azimuth"]))] >= values.max() - 0.02
+    page.select_option("#jump", index=3)
+    page.click("#go")
+    settle(page)
+    by_object = expected[2].groupby("object_id").mean().sort_values()
+    assert state_of(page)["object"] == by_object.index[-1]
+    page.click("#go")
+    settle(page)
+    assert state_of(page)["object"] == by_object.index[-2]
+    assert page.locator("#rank").inner_text() == f"2 of {len(by_object)}"
+
+
+def test_why_one_method_loses_adds_up(visit, path, outcomes):
+    page = visit(path, fragment(category="mug", elevation=0, method="proposed"))
+    settle(page)
+    errors = (
+        outcomes.loc[("mug", 0)]
+        .reset_index()
+        .pivot_table("error_deg", ["object_id", "initial_deg"], "method")
+    )
+    gap = errors["proposed"].mean() - errors["opposite"].mean()
+    better = (errors.groupby("object_id").mean()[["proposed", "opposite"]]).eval(
+        "proposed < opposite"
+    )
+    told = page.locator("#why").inner_text()
+    assert f"is {abs(gap):.2f}° {'above' if gap > 0 else 'below'} that of Opposite" in told
+    assert f"better on {better.sum()} of {len(better)} objects" in told
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_page_fits_without_sideways_scrolling(visit, path, width):
+    page = visit(path, fragment(category="mug", elevation=30, views=5), width=width)
+    settle(page)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    outside = page.eval_on_selector_all(
+        "select, button, input, #ring, #cost, .view:not([hidden]), .band, #objects",
+        """(all, width) => all.filter(one => {
+            const box = one.getBoundingClientRect();
+            return box.width > 0 && (box.left < 0 || box.right > width);
+        }).map(one => one.id || one.className)""",
+        width,
+    )
+    assert not outside
+    small = page.eval_on_selector_all(
+        "select, button", "all => all.filter(one => one.getBoundingClientRect().height < 24).length"
+    )
+    assert small == 0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", WIDTHS[::2])
+def test_axe_finds_nothing_inaccessible(visit, path, width, scheme):
+    from axe_playwright_python.sync_playwright import Axe
+
+    page = visit(path, fragment(category="mug", views=3), width=width, color_scheme=scheme)
+    settle(page)
+    page.click("summary")
+    found = Axe().run(page)
+    assert found.response["passes"]
+    assert not found.violations_count, found.generate_report()
+    # Every picture says what it shows.
+    unnamed = "canvas:not([aria-label]), canvas[aria-label='']"
+    assert page.locator(unnamed).locator("visible=true").count() == 0
+
+
+def test_the_keyboard_alone_reaches_and_changes_everything(visit, path):
+    page = visit(path, fragment(category="mug", azimuth=10, method="proposed", views=2))
+    settle(page)
+    order = []
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        focused = page.evaluate(
+            "(a => a.id || a.name || a.className || a.tagName)(document.activeElement)"
+        )
+        if focused == "BODY":
+            break
+        order.append(focused)
+        if focused == "method":
+            page.keyboard.press("ArrowLeft")
+        if focused == "views":
+            page.keyboard.press("ArrowRight")
+        if focused == "azimuth":
+            for key in ("ArrowRight", "ArrowRight", "End", "ArrowLeft"):
+                page.keyboard.press(key)
+    settle(page)
+    named = [name for name in order if name in ("category", "elevation", "object", "method")]
+    assert named == ["category", "elevation", "object", "method"]
+    then = ["views", "next", "jump", "go", "azimuth", "turn", "scope"]
+    assert [name for name in order if name in then] == then
+    assert order.count("worst") == len(METHODS)
+    expected = {"method": "opposite", "views": "3", "azimuth": "358"}
+    assert state_of(page).items() >= expected.items()
+
+
+def test_turning_by_itself_goes_on_until_it_is_stopped(visit, path):
+    page = visit(path, fragment(azimuth=0))
+    settle(page)
+    page.click("#turn")
+    page.wait_for_function("explorer.state.view > 10")
+    page.click("#turn")
+    settle(page)
+    stopped = page.evaluate("explorer.state.view")
+    page.wait_for_timeout(300)
+    assert page.evaluate("explorer.state.view") == stopped
+    assert state_of(page)["azimuth"] == str(stopped)
+
+
+def test_larger_errors_are_darker(visit, path):
+    page = visit(path)
+    colours = np.array(page.evaluate("Array.from({length: 181}, (_, e) => errorColour(e))"))
+    luminance = colours @ [0.299, 0.587, 0.114]
+    assert (np.diff(luminance) < 0.01).all()
+    assert luminance[0] - luminance[-1] > 200
+
+
+def test_a_classifiers_own_distribution_is_shown(visit, tree, tmp_path):
+    layout, rng, files, kept = Layout(str(tree)), np.random.default_rng(0), {}, {}
+    for category, elevation in UNITS:
+        for fold in (1, 2, 3):
+            rows = pd.read_csv(
+                layout.evaluation(category, elevation, fold, "single"), dtype={"object_id": str}
+            )
+            ids = tuple(rows["object_id"].drop_duplicates())
+            posteriors = posteriors_of(ids, rng.normal(0, 3, (len(ids), 360, 24)), 1.0)
+            key = (category, elevation, fold)
+            files[key] = tmp_path / f"{category}_{elevation}_{fold}.npz"
+            write_posteriors(files[key], posteriors)
+            kept[key] = posteriors
+    page_file = tmp_path / "explorer.html"
+    page_file.write_text(
+        build_explorer(
+            inputs_of(
+                tree,
+                posteriors=files,
+                depth=synthetic.depth_files(tree, UNITS),
+                objects=synthetic.object_files(tree, UNITS),
+            )
+        )
+    )
+    page = visit(page_file, fragment(category="mug", elevation=30, azimuth=44))
+    settle(page)
+    assert page.locator("#key-own").is_visible()
+    for key, posteriors in kept.items():
+        if key[:2] != ("mug", 30):
+            continue
+        for place, name in enumerate(posteriors.object_ids):
+            go_to(page, category="mug", elevation=30, object=name, azimuth=44)
+            shown = np.array(page.evaluate("[...ownDistribution(44)]"))
+            exact = posteriors.distributions[place, 45]  # the class nearest to 44°
+            assert np.abs(shown - exact).max() <= exact.max() * 0.006
+
+
+def test_a_run_without_images_is_shown_without_them(visit, tree, tmp_path):
+    page_file = tmp_path / "explorer.html"
+    page_file.write_text(build_explorer(inputs_of(tree)))
+    page = visit(page_file, fragment(category="chair", views=3))
+    settle(page)
+    assert "no image" in page.locator("#view-1 figcaption").inner_text()
+    assert page.locator("#key-own").is_hidden()
+    assert page.locator("#steps tbody tr").count() == 3

@@ -1,0 +1,32 @@
+"""Make the page to play with."""
+
+from pathlib import Path
+
+from nbv.jobs import job
+
+with job(snakemake):
+    from nbv.files import write_text
+    from nbv.reporting.explorer import ExplorerInputs, build_explorer
+
+    given, params = snakemake.input, snakemake.params
+    keys = {
+        "evaluations": params.evaluations,
+        "lookups": params.lookups,
+        "depth": params.units,
+        "objects": params.units,
+        "posteriors": params.folds,
+    }
+    # The rule declares what the run has: no depth images, or no distributions, in some.
+    files = {
+        name: dict(zip(keys[name], map(Path, found), strict=True))
+        for name, found in given.items()
+        if name in keys and found
+    }
+    inputs = ExplorerInputs(
+        name=params.name,
+        policies=params.policies,
+        min_separation_deg=params.more_views["min_separation_deg"],
+        n_views=params.more_views["n_views"],
+        **files,
+    )
+    write_text(snakemake.output[0], build_explorer(inputs))
