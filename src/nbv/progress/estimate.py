@@ -1,7 +1,8 @@
 """How long a run will still take, from what its own jobs took.
 
 Jobs of one kind take time in proportion to their size. Where no job of a kind is known, a reference
-run's time stands in. The jobs that are left are then put on the cores, as the scheduler will.
+run's time stands in, and where there is none, the median of all other jobs. What is left is then put
+on the cores, as the scheduler will.
 """
 
 from __future__ import annotations
@@ -10,12 +11,13 @@ import heapq
 from collections import defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from statistics import median
 from typing import Literal
 
 START_S = 0.5
 """Seconds that any job takes, however small: Python starts and imports."""
 
-Basis = Literal["this run", "reference", "incomplete", "nothing"]
+Basis = Literal["this run", "reference", "guess"]
 
 
 @dataclass(frozen=True)
@@ -77,9 +79,8 @@ class Estimate:
     left_s : float
         Seconds until the last job ends.
     basis : str
-        Whose times most of what is left goes by: of ``this run``, or of the ``reference`` run.
-        ``incomplete`` where there are jobs of which neither is known, ``nothing`` where all are
-        such: they count as `START_S` each, so that too much seems done and too little left.
+        What most of the time left goes by: times of ``this run``, of the ``reference`` run, or a
+        ``guess``: a job of which neither is known is taken to be like the median of the others.
     """
 
     done: float
@@ -98,12 +99,10 @@ def estimate(jobs: Mapping[int, Job], seen: Seen, cores: int) -> Estimate:
     cores : int
         Jobs that can run at once, 1 or more.
     """
-    rates = _rates(jobs, seen)
+    expected = _expected(jobs, _rates(jobs, seen))
     left: dict[int, float] = {}
-    bases: dict[int, Basis] = {}
     done_s = 0.0
-    for number, job in jobs.items():
-        expected_s, bases[number] = _expected_s(job, rates)
+    for number, (expected_s, _) in expected.items():
         if number in seen.finished:
             took_s = seen.finished[number]
             done_s += expected_s if took_s is None else took_s
@@ -113,21 +112,14 @@ def estimate(jobs: Mapping[int, Job], seen: Seen, cores: int) -> Estimate:
         # A job that takes longer than expected still has something to do.
         left[number] = max(seen.said_left.get(number, expected_s - elapsed_s), START_S)
     ends = _ends(jobs, left, seen, cores)
-    work_s: dict[Basis, float] = defaultdict(float)
+    work_s: dict[Basis, float] = {"this run": 0.0, "reference": 0.0, "guess": 0.0}
     for number in ends:
-        work_s[bases[number]] += left[number]
+        work_s[expected[number][1]] += left[number]
     return Estimate(
         done=done_s / (done_s + sum(left.values())) if left else 1.0,
         left_s=max(ends.values(), default=0.0),
-        basis=_basis_of_all(work_s),
+        basis=max(work_s, key=work_s.__getitem__),
     )
-
-
-def _basis_of_all(work_s: Mapping[Basis, float]) -> Basis:
-    known: Basis = "reference" if work_s["reference"] > work_s["this run"] else "this run"
-    if not work_s["incomplete"]:
-        return known
-    return "incomplete" if work_s[known] else "nothing"
 
 
 def _rates(jobs: Mapping[int, Job], seen: Seen) -> dict[str, float]:
@@ -143,12 +135,19 @@ def _rates(jobs: Mapping[int, Job], seen: Seen) -> dict[str, float]:
     return {kind: seconds[kind] / sizes[kind] for kind in sizes}
 
 
-def _expected_s(job: Job, rates: Mapping[str, float]) -> tuple[float, Basis]:
-    if job.kind in rates:
-        return START_S + rates[job.kind] * job.size, "this run"
-    if job.reference_s is not None:
-        return job.reference_s, "reference"
-    return START_S, "incomplete"
+def _expected(
+    jobs: Mapping[int, Job], rates: Mapping[str, float]
+) -> dict[int, tuple[float, Basis]]:
+    """Return how many seconds each job takes in all, and by whose times."""
+    expected: dict[int, tuple[float, Basis]] = {}
+    for number, job in jobs.items():
+        if job.kind in rates:
+            expected[number] = START_S + rates[job.kind] * job.size, "this run"
+        elif job.reference_s is not None:
+            expected[number] = job.reference_s, "reference"
+    known = [seconds for seconds, _ in expected.values()]
+    guess: tuple[float, Basis] = median(known) if known else START_S, "guess"
+    return {number: expected.get(number, guess) for number in jobs}
 
 
 def _ends(

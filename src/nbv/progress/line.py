@@ -64,7 +64,7 @@ class Line:
 
 def how_far(estimate: Estimate) -> str:
     """Say how much of a run is done, where that is known: ``34 % done, about 48 min left``."""
-    if estimate.basis in ("incomplete", "nothing"):
+    if estimate.basis == "guess":
         return time_left(estimate)
     # 100 % is for the end.
     return f"{min(int(100 * estimate.done), 99):2d} % done, {time_left(estimate)}"
@@ -72,13 +72,10 @@ def how_far(estimate: Estimate) -> str:
 
 def time_left(estimate: Estimate) -> str:
     """Say when a run will end, and by whose times where not by its own."""
-    left = duration(_rounded(estimate.left_s))
-    if estimate.basis == "nothing":
+    if estimate.basis == "guess":
         return "estimating the time left"
-    if estimate.basis == "incomplete":
-        return f"at least {left} left"
     by_reference = " by the reference run's times" if estimate.basis == "reference" else ""
-    return f"about {left} left{by_reference}"
+    return f"about {duration(_rounded(estimate.left_s))} left{by_reference}"
 
 
 _STEPS_S = ((60.0, 5.0), (600.0, 30.0), (3600.0, 60.0), (math.inf, 300.0))
