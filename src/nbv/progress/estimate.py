@@ -1,8 +1,8 @@
 """How long a run will still take, from what its own jobs took.
 
-Jobs of one kind take time in proportion to their size. Where no job of a kind is known, a reference
-run's time stands in, and where there is none, the median of all other jobs. What is left is then put
-on the cores, as the scheduler will.
+Jobs of one kind take time in proportion to their size, and go on as the last ones did. Where no job
+of a kind is known, a reference run's time stands in, and where there is none, the median of all
+other jobs. What is left is then put on the cores, as the scheduler will.
 """
 
 from __future__ import annotations
@@ -16,6 +16,10 @@ from typing import Literal
 
 START_S = 0.5
 """Seconds that any job takes, however small: Python starts and imports."""
+
+# What a job weighs less for each one of its kind that ended after it, because other work on the
+# machine comes and goes. A half is left after three.
+_KEPT = 0.8
 
 Basis = Literal["this run", "reference", "guess"]
 
@@ -52,7 +56,7 @@ class Seen:
     Attributes
     ----------
     finished : mapping of int to float or None
-        Wall-clock seconds; None where nobody timed the job.
+        Wall-clock seconds, in the order in which the jobs ended; None where nobody timed one.
     running : mapping of int to float
         Seconds since the job's start.
     said_left : mapping of int to float
@@ -109,8 +113,9 @@ def estimate(jobs: Mapping[int, Job], seen: Seen, cores: int) -> Estimate:
             continue
         elapsed_s = seen.running.get(number, 0.0)
         done_s += min(elapsed_s, expected_s)
+        left_s = seen.said_left.get(number, expected_s - elapsed_s)
         # A job that takes longer than expected still has something to do.
-        left[number] = max(seen.said_left.get(number, expected_s - elapsed_s), START_S)
+        left[number] = left_s if left_s > 0 else START_S
     ends = _ends(jobs, left, seen, cores)
     work_s: dict[Basis, float] = {"this run": 0.0, "reference": 0.0, "guess": 0.0}
     for number in ends:
@@ -129,9 +134,9 @@ def _rates(jobs: Mapping[int, Job], seen: Seen) -> dict[str, float]:
     known = {number: took_s for number, took_s in seen.finished.items() if took_s is not None}
     known |= {number: seen.running[number] + left_s for number, left_s in seen.said_left.items()}
     for number, took_s in known.items():
-        kind = jobs[number].kind
-        seconds[kind] += max(took_s - START_S, 0.0)
-        sizes[kind] += jobs[number].size
+        job = jobs[number]
+        seconds[job.kind] = _KEPT * seconds[job.kind] + max(took_s - START_S, 0.0)
+        sizes[job.kind] = _KEPT * sizes[job.kind] + job.size
     return {kind: seconds[kind] / sizes[kind] for kind in sizes}
 
 

@@ -63,25 +63,23 @@ class Line:
 
 
 def how_far(estimate: Estimate) -> str:
-    """Say how much of a run is done, where that is known: ``34 % done, about 48 min left``."""
+    """Say how much of a run is done and how long it still takes, as far as that is known.
+
+    ``34 % done, about 48 min left``; ``perhaps`` where most of it goes by the reference run.
+    """
     if estimate.basis == "guess":
-        return time_left(estimate)
+        return "estimating the time left"
     # 100 % is for the end.
-    return f"{min(int(100 * estimate.done), 99):2d} % done, {time_left(estimate)}"
+    percent = min(int(100 * estimate.done), 99)
+    how_sure = "perhaps" if estimate.basis == "reference" else "about"
+    return f"{percent:2d} % done, {how_sure} {time_left(estimate)} left"
 
 
 def time_left(estimate: Estimate) -> str:
-    """Say when a run will end, and by whose times where not by its own."""
-    if estimate.basis == "guess":
-        return "estimating the time left"
-    by_reference = " by the reference run's times" if estimate.basis == "reference" else ""
-    return f"about {duration(_rounded(estimate.left_s))} left{by_reference}"
+    """Return the time left, rounded to what can be known of it: the last digit does not flicker."""
+    step = next(step for limit, step in _STEPS_S if estimate.left_s < limit)
+    return duration(step * max(round(estimate.left_s / step), 1))
 
 
+# Up to how many seconds it is rounded to how many.
 _STEPS_S = ((60.0, 5.0), (600.0, 30.0), (3600.0, 60.0), (math.inf, 300.0))
-
-
-def _rounded(seconds: float) -> float:
-    """Round to what the estimate can know, so that its last digit does not flicker."""
-    step = next(step for limit, step in _STEPS_S if seconds < limit)
-    return step * max(round(seconds / step), 1)

@@ -86,9 +86,14 @@ class RunProgress(logging.Handler):
     def first_estimate(self) -> str:
         """Say how much there is to do, before anything runs."""
         n_left = len(self._planned) - len(self._finished)
-        kept = f" ({len(self._finished):,} are there already)" if self._finished else ""
-        left = time_left(self._estimate)
-        return f"{n_left:,} {'job' if n_left == 1 else 'jobs'} to do{kept}, {left}"
+        there = f" ({len(self._finished):,} already there)" if self._finished else ""
+        usual = f", about {time_left(self._estimate)} by the "
+        usual = {
+            "reference": f"{usual}reference run's times",
+            "this run": f"{usual}times of those",
+            "guess": "",
+        }[self._estimate.basis]
+        return f"{n_left:,} {'job' if n_left == 1 else 'jobs'} to do{there}{usual}"
 
     def emit(self, record: logging.LogRecord) -> None:
         """Take note of a job that starts, ends or fails."""
