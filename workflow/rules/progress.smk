@@ -93,8 +93,13 @@ def reference_means():
 def planned_jobs():
     """Every job of this run by its number, with those that need not run again."""
     dag = workflow.dag
-    numbers = {job: dag.jobid(job) for job in dag.jobs if job.rule.script}
     needed = set(dag.needrun_jobs())
+    # Snakemake numbers what it runs, from 0.
+    numbers = {
+        job: dag.jobid(job) if job in needed else -index
+        for index, job in enumerate(dag.jobs, 1)
+        if job.rule.script
+    }
     jobs = {
         numbers[job]: Job(
             kind=kind_of(job.rule),

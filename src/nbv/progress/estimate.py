@@ -1,8 +1,9 @@
 """How long a run will still take, from what its own jobs took.
 
 Jobs of one kind take time in proportion to their size, and go on as the last ones did. Where no job
-of a kind is known, a reference run's time stands in, and where there is none, the median of all
-other jobs. What is left is then put on the cores, as the scheduler will.
+of a kind is known, a reference run's time stands in, as much longer or shorter as of other kinds of
+job here; where there is none, the median of all other jobs. What is left is then put on the cores,
+as the scheduler will.
 """
 
 from __future__ import annotations
@@ -144,15 +145,31 @@ def _expected(
     jobs: Mapping[int, Job], rates: Mapping[str, float]
 ) -> dict[int, tuple[float, Basis]]:
     """Return how many seconds each job takes in all, and by whose times."""
+    measured = {
+        number: START_S + rates[job.kind] * job.size
+        for number, job in jobs.items()
+        if job.kind in rates
+    }
+    speed = _against_reference(jobs, measured)
     expected: dict[int, tuple[float, Basis]] = {}
     for number, job in jobs.items():
-        if job.kind in rates:
-            expected[number] = START_S + rates[job.kind] * job.size, "this run"
+        if number in measured:
+            expected[number] = measured[number], "this run"
         elif job.reference_s is not None:
-            expected[number] = job.reference_s, "reference"
+            expected[number] = speed * job.reference_s, "reference"
     known = [seconds for seconds, _ in expected.values()]
     guess: tuple[float, Basis] = median(known) if known else START_S, "guess"
     return {number: expected.get(number, guess) for number in jobs}
+
+
+def _against_reference(jobs: Mapping[int, Job], measured: Mapping[int, float]) -> float:
+    """Return how many times as long as in the reference run the median kind of job takes."""
+    times = {
+        job.kind: measured[number] / job.reference_s
+        for number, job in jobs.items()
+        if number in measured and job.reference_s
+    }
+    return median(times.values()) if times else 1.0
 
 
 def _ends(
