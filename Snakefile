@@ -16,7 +16,11 @@ from snakemake.utils import min_version
 min_version("9.0")
 
 
+report: "workflow/report/run.rst"
+
+
 include: "workflow/rules/common.smk"
+include: "workflow/rules/progress.smk"
 
 
 localrules:
@@ -75,14 +79,20 @@ rule extensions:
 onstart:
     lift_rate_limit()
     forget_last_error()
+    follow_run()
     banner(
         f"nbv: experiment {CONFIG['experiment']}, data set {CONFIG['dataset']['source']}, "
         f"{len(UNITS)} units of {CONFIG['n_folds']} folds",
+        *([PROGRESS.first_estimate()] if PROGRESS else []),
         f"results: {LAYOUT.root}/    logs: {LAYOUT.logs}/",
     )
+    if PROGRESS:
+        PROGRESS.begin()
 
 
 onsuccess:
+    if PROGRESS:
+        PROGRESS.end()
     banner(
         "nbv: finished",
         f"results: {LAYOUT.root}/    read first: {LAYOUT.report}",
@@ -91,6 +101,8 @@ onsuccess:
 
 
 onerror:
+    if PROGRESS:
+        PROGRESS.end()
     banner(
         "nbv: stopped",
         *reasons(log),

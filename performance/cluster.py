@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from nbv.config import read_configuration
+from nbv.reporting.runtime import load_measured
 
 REFERENCE = Path(__file__).parents[1] / "docs/reference/paper"
 OF_UNIT = ("estimate", "lookup", "evaluate_baselines", "evaluate_recommended")
@@ -164,12 +163,6 @@ def critical_path_s(size: Size, cost: Costs) -> float:
     """Return the seconds that no number of cores goes below."""
     longest = max(cost.data_s(n) + cost.fold_s(n) for n in size.elevations)
     return longest + cost.report_s + 2 * cost.notice_s
-
-
-def load_measured(path: Path) -> dict[str, tuple[int, float]]:
-    """Read jobs and wall-clock seconds by rule from the ``runtime.csv`` of a run."""
-    table = pd.read_csv(path).set_index("rule")
-    return {str(rule): (int(row.jobs), float(row.wall_s)) for rule, row in table.iterrows()}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -10,7 +10,7 @@ import errno
 import logging
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,8 @@ from nbv.processes import end_with_snakemake
 
 log = logging.getLogger(__name__)
 
+ERASE_LINE = "\r\x1b[K"
+"""Goes back to the start of a terminal's row and empties it."""
 _FINISHED, _FAILED, _STOPPED = "processor time", "error: ", "stopped"
 _FOR_THE_USER: dict[int | None, str] = {
     errno.ENOSPC: "no space left on the disk; free some and run the same command again",
@@ -33,7 +35,10 @@ _FOR_THE_USER: dict[int | None, str] = {
 
 @contextmanager
 def job(snakemake: Any) -> Iterator[None]:
-    """Log a job's progress to the terminal and to its log file; end it with one line on an error.
+    """Log a job's progress to its log file; end it with one line on an error.
+
+    The terminal, on which `nbv.progress` shows how far the run is, gets warnings, errors and what
+    is marked ``extra={"for_terminal": True}``; with ``--config verbose=true`` everything.
 
     The inputs are held to their checksums before, and the outputs get theirs after. A job whose
     Snakemake was killed ends as well.
@@ -51,7 +56,8 @@ def job(snakemake: Any) -> Iterator[None]:
         With status 1, after it has reported an error.
     """
     path = Path(snakemake.log[0])
-    _log_to(path, " ".join([snakemake.rule, "/".join(snakemake.wildcards)]).strip())
+    label = " ".join([snakemake.rule, "/".join(snakemake.wildcards)]).strip()
+    _log_to(path, label, is_verbose(snakemake.config))
     end_with_snakemake()
     try:
         for file in snakemake.input:
@@ -80,6 +86,20 @@ def job(snakemake: Any) -> Iterator[None]:
         log.info(f"{_FINISHED} %.2f s", sum(os.times()[:4]), extra={"log_only": True})
 
 
+def is_verbose(config: Mapping[str, Any]) -> bool:
+    """Say whether ``--config verbose=true`` asked for every message on the terminal.
+
+    Raises
+    ------
+    UserError
+        For a value that is neither true nor false.
+    """
+    verbose = config.get("verbose", False)
+    if not isinstance(verbose, bool):
+        raise UserError(f"--config verbose={verbose}: write true or false")
+    return verbose
+
+
 def killed_jobs(logs: str | Path, since: float) -> list[str]:
     """Return the jobs whose logs end in the middle: they were killed without a word.
 
@@ -103,10 +123,11 @@ def _has_end(path: Path) -> bool:
     return any(end in line for end in ends for line in lines[-1:])
 
 
-def _log_to(path: Path, label: str) -> None:
+def _log_to(path: Path, label: str, verbose: bool) -> None:
     to_terminal = logging.StreamHandler(sys.stderr)
-    to_terminal.addFilter(lambda record: not getattr(record, "log_only", False))
-    _add_handler(to_terminal, label)
+    to_terminal.addFilter(lambda record: _is_for_terminal(record, verbose))
+    # The run's own line stands there.
+    _add_handler(to_terminal, label, ERASE_LINE if sys.stderr.isatty() else "")
     # A full disk makes every write to the log fail; logging would print a traceback for each.
     logging.raiseExceptions = False
     for noisy in ("matplotlib", "fontTools", "trimesh", "OpenGL"):
@@ -118,8 +139,15 @@ def _log_to(path: Path, label: str) -> None:
         _fail(f"{path}: cannot be written ({error.strerror})", path)
 
 
-def _add_handler(handler: logging.Handler, label: str) -> None:
-    handler.setFormatter(logging.Formatter(f"[%(asctime)s {label}] %(message)s", "%H:%M:%S"))
+def _is_for_terminal(record: logging.LogRecord, verbose: bool) -> bool:
+    if getattr(record, "log_only", False):
+        return False
+    return verbose or record.levelno >= logging.WARNING or getattr(record, "for_terminal", False)
+
+
+def _add_handler(handler: logging.Handler, label: str, before: str = "") -> None:
+    line = f"{before}[%(asctime)s {label}] %(message)s"
+    handler.setFormatter(logging.Formatter(line, "%H:%M:%S"))
     logging.getLogger().addHandler(handler)
     logging.getLogger().setLevel(logging.INFO)
 

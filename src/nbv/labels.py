@@ -38,3 +38,13 @@ def interval_text(value: float, low: float, high: float, decimals: int = 2) -> s
     """Return ``value (low to high)``."""
     ends = f"{number(low, decimals)} to {number(high, decimals)}"
     return f"{number(value, decimals)} ({ends})"
+
+
+def duration(seconds: float) -> str:
+    """Return a span of time such as ``1 h 10 min``, ``3 min 20 s`` or ``48 min``."""
+    if seconds >= 3600:
+        counts, units = divmod(round(seconds / 60), 60), ("h", "min")
+    else:
+        counts, units = divmod(round(seconds), 60), ("min", "s")
+    parts = [f"{n} {unit}" for n, unit in zip(counts, units, strict=True) if n]
+    return " ".join(parts) or f"0 {units[1]}"

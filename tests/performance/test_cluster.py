@@ -12,7 +12,6 @@ from performance.cluster import (
     Size,
     costs,
     critical_path_s,
-    load_measured,
     main,
     makespan_s,
     reference_size,
@@ -20,6 +19,7 @@ from performance.cluster import (
 )
 
 from nbv.config import read_configuration
+from nbv.reporting.runtime import load_measured
 
 SECONDS = st.floats(0.1, 500)
 SIZES = st.builds(

@@ -34,6 +34,9 @@ SHOWN_FIGURES = [
 ]
 
 
+include: "captions.smk"
+
+
 JOBS = sorted(counted_jobs(), key=lambda job: Path(job[1]).parts)
 
 
@@ -44,10 +47,14 @@ rule table:
             LAYOUT.evaluation, evaluations_of(units_of(wildcards.table))
         ),
     output:
-        csv=LAYOUT.table("{table}", "csv"),
+        csv=in_report(
+            LAYOUT.table("{table}", "csv"), "Tables", table="{table}", shown="CSV"
+        ),
         md=LAYOUT.table("{table}", "md"),
         tex=LAYOUT.table("{table}", "tex"),
-        html=LAYOUT.table("{table}", "html"),
+        html=in_report(
+            LAYOUT.table("{table}", "html"), "Tables", table="{table}", shown="table"
+        ),
     log:
         LAYOUT.log("table/{table}"),
     benchmark:
@@ -72,7 +79,7 @@ rule figure:
         sources("plot_paper"),
         unpack(figure_inputs),
     output:
-        png=LAYOUT.figure("{figure}", "png"),
+        png=in_report(LAYOUT.figure("{figure}", "png"), "Figures", figure="{figure}"),
         pdf=LAYOUT.figure("{figure}", "pdf"),
         svg=LAYOUT.figure("{figure}", "svg"),
     log:
@@ -100,7 +107,7 @@ rule claims:
         sources("judge_claims"),
         evaluations=paths(LAYOUT.evaluation, evaluations_of(UNITS)),
     output:
-        csv=LAYOUT.claims("csv"),
+        csv=in_report(LAYOUT.claims("csv"), "Claims", shown="CSV"),
         md=LAYOUT.claims("md"),
     log:
         LAYOUT.log("claims"),
@@ -128,7 +135,9 @@ rule runtime:
     output:
         csv=LAYOUT.table("runtime", "csv"),
         md=LAYOUT.table("runtime", "md"),
-        html=LAYOUT.table("runtime", "html"),
+        html=in_report(
+            LAYOUT.table("runtime", "html"), "Running time", "page", shown="table"
+        ),
     log:
         LAYOUT.log("runtime"),
     benchmark:
@@ -156,7 +165,7 @@ rule report:
         table1=LAYOUT.table("table1", "csv"),
         figures=[LAYOUT.figure(name, "svg") for name in SHOWN_FIGURES],
     output:
-        LAYOUT.report,
+        in_report(LAYOUT.report, "Report", "page", shown="page"),
     log:
         LAYOUT.log("report"),
     benchmark:

@@ -14,7 +14,7 @@ with job(snakemake):
     need_intact(snakemake.params.run)
     comparison = compare_runs(reference, run)
     for line in comparison.lines():
-        logging.getLogger(__name__).info("%s", line)
+        logging.getLogger(__name__).info("%s", line, extra={"for_terminal": True})
     if not comparison.agrees:
         raise UserError(
             f"{run} does not agree with {reference} (the lines above, also in "

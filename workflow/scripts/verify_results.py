@@ -20,4 +20,8 @@ with job(snakemake):
             f"{len(damaged)} of {len(states)} files are damaged; make them again: {command}"
         )
     missing = sum(state == "missing" for state in states.values())
-    logging.info("%d files are as written, %d are missing", len(states) - missing, missing)
+    logging.info(
+        "%d files are as written, %d are missing",
+        *(len(states) - missing, missing),
+        extra={"for_terminal": True},
+    )

@@ -227,7 +227,8 @@ def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
 
     That is ``key=value`` pairs such as ``experiment=quick`` (`SHORT_NAMES` are known), and
     ``overrides``, a list (or one
-    string) of Hydra overrides for keys that Snakemake's command line cannot spell.
+    string) of Hydra overrides for keys that Snakemake's command line cannot spell. ``verbose`` is
+    no setting of the configuration (`nbv.jobs.is_verbose`).
 
     Raises
     ------
@@ -236,7 +237,7 @@ def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
     """
     overrides = []
     for key, value in given.items():
-        if key == "overrides":
+        if key in ("overrides", "verbose"):
             continue
         if key in SHORT_NAMES:
             items = value if isinstance(value, list) else _items(str(value))

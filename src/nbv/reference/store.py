@@ -95,7 +95,11 @@ def collect_reference(run: Path, reference: Path) -> list[Path]:
     if commit.endswith("-dirty") or commit == "unknown":
         log.warning("%s was not made at a clean commit but at %s", run, commit)
     size_mb = sum(target.stat().st_size for target in copies) / 1e6
-    log.info("%d files, %.1f MB, are now in %s", len(copies), size_mb, reference)
+    log.info(
+        "%d files, %.1f MB, are now in %s",
+        *(len(copies), size_mb, reference),
+        extra={"for_terminal": True},
+    )
     return sorted(copies)
 
 

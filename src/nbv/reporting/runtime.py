@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from nbv.files import readable
-from nbv.labels import number
+from nbv.labels import duration, number
 from nbv.reporting.table import Cell, Row, Table
 
 RUNTIME_COLUMNS = (
@@ -105,6 +105,13 @@ def summarise_jobs(jobs: pd.DataFrame) -> pd.DataFrame:
     return summary.astype({"side_by_side": "Int64"})
 
 
+def load_measured(path: Path) -> dict[str, tuple[int, float]]:
+    """Read jobs and wall-clock seconds by rule from the ``runtime.csv`` of a run."""
+    with readable(path):
+        table = pd.read_csv(path).set_index("rule")
+    return {str(rule): (int(row.jobs), float(row.wall_s)) for rule, row in table.iterrows()}
+
+
 def runtime_table(jobs: pd.DataFrame) -> Table:
     """Return the table of what the jobs of `load_jobs` cost, rule by rule."""
     runtime = summarise_jobs(jobs)
@@ -166,7 +173,7 @@ def _notes(runtime: pd.DataFrame) -> list[str]:
     at_once, busy = int(total["side_by_side"]), number(100 * efficiency(runtime), 0)
     at_least = "at least " if sampled else ""
     notes = [
-        f"From the first job's start to the last one's end: {_duration(total['elapsed_s'])}, "
+        f"From the first job's start to the last one's end: {duration(total['elapsed_s'])}, "
         f"leaving out pauses of more than {PAUSE_S:.0f} s in which no job ran. At most {at_once} "
         f"{'job' if at_once == 1 else 'jobs'} ran at once; the jobs' own work kept as many "
         f"processors busy for {at_least}{busy} % of that time. Other work on the machine lowers "
@@ -186,10 +193,3 @@ def _notes(runtime: pd.DataFrame) -> list[str]:
         "a short peak may have escaped it."
     )
     return notes
-
-
-def _duration(seconds: float) -> str:
-    if seconds >= 3600:
-        return "{} h {} min".format(*divmod(round(seconds / 60), 60))
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
