@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-
-import numpy as np
 
 MINUS = "\u2212"
 
@@ -28,7 +27,7 @@ def category_label(category: str) -> str:
 
 def number(value: float, decimals: int = 2) -> str:
     """Return a number with a true minus sign; an en dash where there is none."""
-    if not np.isfinite(value):
+    if not math.isfinite(value):
         return "–"
     text = f"{value:.{decimals}f}"
     return text.replace("-", MINUS) if float(text) != 0 else text.lstrip("-")
@@ -38,3 +37,8 @@ def interval_text(value: float, low: float, high: float, decimals: int = 2) -> s
     """Return ``value (low to high)``."""
     ends = f"{number(low, decimals)} to {number(high, decimals)}"
     return f"{number(value, decimals)} ({ends})"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return how many there are of what has a regular plural: ``1 view``, ``2 views``."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
