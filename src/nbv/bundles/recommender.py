@@ -418,7 +418,7 @@ def _reachable(
 def _between(error: NDArray[np.float64], rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the errors (m,) at rotations, of those of the bins (B,); linear between bins."""
     bins = np.arange(len(error)) * (360.0 / len(error))
-    return np.interp(rotation_deg, bins, error, period=360.0)
+    return np.asarray(np.interp(rotation_deg, bins, error, period=360.0))
 
 
 def _is_near_bin(rotation_deg: NDArray[np.float64], n_bins: int) -> NDArray[np.bool_]:
