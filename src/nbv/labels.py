@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-
-import numpy as np
 
 MINUS = "\u2212"
 
@@ -28,7 +27,7 @@ def category_label(category: str) -> str:
 
 def number(value: float, decimals: int = 2) -> str:
     """Return a number with a true minus sign; an en dash where there is none."""
-    if not np.isfinite(value):
+    if not math.isfinite(value):
         return "–"
     text = f"{value:.{decimals}f}"
     return text.replace("-", MINUS) if float(text) != 0 else text.lstrip("-")
@@ -48,3 +47,8 @@ def duration(seconds: float) -> str:
         counts, units = divmod(round(seconds), 60), ("min", "s")
     parts = [f"{n} {unit}" for n, unit in zip(counts, units, strict=True) if n]
     return " ".join(parts) or f"0 {units[1]}"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return how many there are of what has a regular plural: ``1 view``, ``2 views``."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -204,18 +205,28 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         ([], "give a depth frame"),
         (["no.npy"], "no.npy does not exist"),
         (["m.npy"], "m.npy holds bool"),
-        (["f0.npy", "f1.npy"], "2 frames need as many rotations"),
-        (["f0.npy", "--rotations", "0", "90"], "1 frames need as many rotations"),
+        (["f0.npy", "f1.npy"], "2 frames and 1 rotation: give one for each frame"),
+        (["f0.npy", "--rotations", "0", "90"], "1 frame and 2 rotations"),
+        (["f0.npy", "--rotations", "0", "x"], "x: no known kind of file"),
+        (["f0.npy", "--rotations", "zero"], "zero"),
+        (["f0.npy", "--rotations="], "give a number"),
+        (["--mask", "m.npy", "f0.npy"], "frames stand before --mask"),
         (["f0.npy", "--rotations", "10"], "the first rotation is 10"),
         (["f0.npy", "--max-travel", "3"], "no rotation is allowed"),
         (["f0.npy", "--allowed", "0"], "no rotation is allowed"),
         (["f0.npy", "--far", "0.1"], "empty-mask"),
+        (["f0.npy", "--far", "800"], "--far=800: give metres"),
+        (["f0.npy", "--near", "300"], "--near=300: give metres"),
+        (["f0.npy", "--plot", "x.jpg"], "--plot=x.jpg: give a name that ends in .png or .pdf"),
+        (["f0.npy", "--plot", "m.npy/x.png"], "--plot=m.npy/x.png: m.npy is a file and no folder"),
+        (["f0.npy", "--plot", "."], "--plot=.: give a name"),
         (["f0.npy", "--near", "2", "--far", "1"], "near < far"),
         (["f0.npy", "--depth-scale", "0.001"], "depths 1000 times as large would fit"),
         (["f0.npy", "--depth-scale", "-1"], "--depth-scale=-1"),
-        (["f0.npy", "--mask", "m.npy", "m.npy"], "1 frames and 2 masks"),
+        (["f0.npy", "--mask", "m.npy", "m.npy"], "1 frame and 2 masks"),
         (["f0.npy", "--intrinsics", "wide"], "--intrinsics=wide"),
         (["f0.npy", "--intrinsics", "1,2,3"], "3 numbers"),
+        (["f0.npy", "--intrinsics", "nope.json"], "nope.json: the file does not exist"),
         (["f0.npy", "--intrinsics", "x" * 5000], "cannot be read"),
         (["f0.npy", "--elevation", "nan"], "elevation of nan"),
         (["f0.npy", "--camera-pose", "pose.json"], "--camera-pose and --axis belong together"),
@@ -257,7 +268,13 @@ def test_a_missing_or_damaged_bundle_is_one_line(here, capsys):
 @pytest.mark.parametrize("criterion", ["pose_ambiguity", "expected_error"])
 def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion):
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz", "--criterion", criterion)
-    assert out == f"t.npz: {criterion} from 2 objects\n"
+    head, tail = out.splitlines()
+    table = pd.read_csv(pairs)
+    errors = np.radians(table["estimate_deg"] - table["azimuth_deg"])
+    offset = np.degrees(np.arctan2(np.sin(errors).mean(), np.cos(errors).mean()))
+    found = re.fullmatch(r"pairs\.csv: 2 objects; offset ([+-]\d+\.\d)°", head)
+    assert float(found[1]) == pytest.approx(offset, abs=0.1)
+    assert tail == f"t.npz: {criterion} from 2 objects"
     save_lookup("wanted.npz", chosen_lookup(read_pairs(pairs).estimate_deg, criterion, DENSITY))
     assert Path("t.npz").read_bytes() == Path("wanted.npz").read_bytes()
     table = load_lookup("t.npz")
@@ -278,8 +295,14 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
 def test_a_table_is_made_of_pairs_alone(pairs, capsys):
     for arguments, message in (
         (("no.csv", "--output", "t.npz"), "no.csv does not exist"),
-        (("pairs.csv", "--output", "t.dat"), "--output=t.dat: a lookup table is an .npz file"),
-        (("pairs.csv", "--output", "t"), "an .npz file"),
+        (("pairs.csv", "--output", "t.dat"), "--output=t.dat: give a name that ends in .npz"),
+        (("pairs.csv", "--output", "t"), "ends in .npz"),
+        (
+            ("pairs.csv", "--output", "t.safetensors"),
+            "is a bundle, and frames make one with --bund",
+        ),
+        (("pairs.csv", "--output", "t.npz", "--intrinsics", "500"), "--intrinsics is for frames"),
+        (("pairs.csv", "--output", "t.npz", "--depth-scale", "1"), "--depth-scale is for frames"),
         (("pairs.csv",), "--output"),
         (("pairs.csv", "--output", "t.npz", "--criterion", "eror"), "--criterion=eror"),
         (
@@ -308,7 +331,11 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
         *(capsys, "calibrate", "manifest.csv"),
         *("--bundle", "b.safetensors", "--output", "own.safetensors"),
     )
-    assert out == "own.safetensors: mug, 1 recordings calibrate it\n"
+    head, warning, tail = out.splitlines()
+    assert re.fullmatch(r"cup, sequence 1: 24 frames; offset -\d+\.\d°", head)
+    # A network of random weights has no zero.
+    assert warning.startswith("careful    ")
+    assert tail == "own.safetensors: mug, 1 recording calibrates it"
     wanted = recalibrated(load_bundle("b.safetensors"), turns_of(manifest), "manifest.csv")
     save_bundle("wanted.safetensors", wanted)
     assert Path("own.safetensors").read_bytes() == Path("wanted.safetensors").read_bytes()
@@ -326,6 +353,41 @@ def test_a_turn_with_a_gap_does_not_calibrate(manifest, capsys):
     )
     assert "60° apart" in message
     assert not Path("x.safetensors").exists()
+
+
+def test_what_does_not_go_with_frames_is_refused(manifest, capsys):
+    options = ("calibrate", "manifest.csv", "--bundle", "b.safetensors", "--output")
+    assert "ends in .safetensors" in fails(capsys, *options, "own.npz")
+    more = ("own.safetensors", "--criterion", "expected_error")
+    assert "--criterion is for pairs" in fails(capsys, *options, *more)
+    assert "add --bundle mug" in fails(
+        capsys, "calibrate", "manifest.csv", "--output", "own.safetensors"
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "warning"),
+    [
+        (lambda azimuth, estimate: estimate + 14, None),
+        (lambda azimuth, estimate: estimate - 20, "an offset of -"),
+        (lambda azimuth, estimate: estimate + 180, "another zero"),
+        (lambda azimuth, estimate: -estimate, "estimates fall where azimuths grow"),
+        (lambda azimuth, estimate: 70 - estimate, "estimates fall where azimuths grow"),
+    ],
+)
+def test_pairs_in_another_frame_are_told(pairs, capsys, change, warning):
+    table = pd.read_csv(pairs)
+    rng = np.random.default_rng(0)
+    exact = table["azimuth_deg"] + rng.normal(0, 2, len(table))
+    table.assign(estimate_deg=change(table["azimuth_deg"], exact) % 360).to_csv("other.csv")
+    options = ("--output", "t.npz", "--criterion", "expected_error")
+    _head, *told, _tail = run(capsys, "calibrate", "other.csv", *options).splitlines()
+    if warning is None:
+        assert told == []
+    else:
+        (line,) = told
+        assert line.startswith("careful    ")
+        assert warning in line
 
 
 # Evaluate
@@ -376,6 +438,9 @@ def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
         (["manifest.csv", "--views", "1"], "needs 2 or more"),
         (["manifest.csv", "--views", "40"], "24 frames, too few for 40 views"),
         (["manifest.csv", "--views", "two"], "two"),
+        (["manifest.csv", "--views", "2.5"], "2.5"),
+        (["manifest.csv", "--output", "x.json"], "--output=x.json: give a name that ends in .csv"),
+        (["manifest.csv", "--output", "pairs.csv/x.csv"], "pairs.csv is a file and no folder"),
         (["manifest.csv", "--intrinsics", "30"], "every frame"),
     ],
 )
@@ -429,7 +494,88 @@ def test_a_file_that_cannot_be_written_is_one_line(here, pairs, capsys):
     assert "Errno" not in message
 
 
+# Render
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--output", "x.png"), "--output=x.png: give a name that ends in .npy"),
+        (("--output", "x.npy", "--azimuth", "nan"), "an azimuth of nan"),
+        (("--output", "x.npy", "--distance", "800"), "a distance of 800 m"),
+        (("--output", "x.npy", "--diagonal", "170"), "a distance of 0.8 m from an object of 170 m"),
+        (("mesh.obj", "--output", "x.npy"), "give a mesh file, or --example"),
+    ],
+)
+def test_what_cannot_be_rendered_is_one_line(here, capsys, more, message):
+    assert message in fails(capsys, "render", "--example", *more)
+    assert not Path("x.npy").exists()
+
+
 # The program
+
+
+@pytest.mark.parametrize(
+    "rotations",
+    [
+        ["--rotations", "0", "-90"],
+        ["--rotations", "0,-90"],
+        ["--rotations=0,-90"],
+        ["--rotations", "0,", "-90"],
+        ["--rotations", " 0, -90 "],
+        ["--rotations=0", "-90"],
+        ["--rotations", "0", "--rotations", "-90"],
+    ],
+)
+def test_numbers_stand_between_commas_or_spaces(here, capsys, rotations):
+    options = ["--bundle", "b.safetensors", "--json"]
+    wanted = run(capsys, "recommend", "f0.npy", "f1.npy", *options, "--rotations", "0", "-90")
+    assert run(capsys, "recommend", "f0.npy", "f1.npy", *options, *rotations) == wanted
+    assert run(capsys, "recommend", *rotations, "f0.npy", "f1.npy", *options) == wanted
+    assert run(capsys, "recommend", "f0.npy", *rotations, "f1.npy", *options) == wanted
+
+
+def test_a_list_of_numbers_takes_no_frame(here, capsys):
+    more = ("--bundle", "b.safetensors", "--json", "--camera-pose", "pose.json")
+    wanted = run(
+        *(capsys, "recommend", "f0.npy", *more, "--allowed", "-60,45", "--axis", "0,0,0.1"),
+        *("--intrinsics", "150,150,60,45"),
+    )
+    assert wanted == run(
+        *(capsys, "recommend", *more, "--allowed", "-60", "45", "--axis", "0", "0", "0.1"),
+        *("--intrinsics", "150", "150", "60", "45", "f0.npy"),
+    )
+
+
+@pytest.mark.parametrize("command", [["recommend", "f0.npy", "--json"], ["inspect"]])
+def test_a_reader_that_has_seen_enough_is_no_error(here, command):
+    script = "import sys; from nbv.cli import main; sys.exit(main(sys.argv[1:]))"
+    more = ["--bundle", "b.safetensors"] if "recommend" in command else ["b.safetensors"]
+    program = subprocess.Popen(
+        [sys.executable, "-c", script, *command, *more],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    program.stdout.close()
+    assert program.wait() == 0
+    assert program.stderr.read() == b""
+    program.stderr.close()
+
+
+def test_paths_are_checked_before_a_network_runs(here, capsys, monkeypatch):
+    monkeypatch.setattr(Recommender, "load", lambda *_: pytest.fail("too late"))
+    frames = ("recommend", "f0.npy")
+    assert "--plot=x.gif" in fails(capsys, *frames, "--plot", "x.gif")
+    assert "no folder" in fails(capsys, *frames, "--plot", "pose.json/x.png")
+    assert "no-pose.npy" in fails(
+        capsys, *frames, "--camera-pose", "no-pose.npy", "--axis", "0", "0", "0"
+    )
+    (here / "locked").mkdir(mode=0o500)
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "locked")
+    message = fails(capsys, *frames, "--plot", "locked/x.png")
+    assert "may not be written to" in message
+    message = fails(capsys, "evaluate", "m.csv", "--output", "locked/x.csv")
+    assert "may not be written to" in message
 
 
 def test_help_and_version_succeed(capsys):
@@ -506,7 +652,16 @@ def test_without_any_way_to_compute_a_network_it_says_what_to_install(here):
 
 
 @pytest.mark.parametrize(
-    "more", [("f0.npy",), ("--allowed", "90"), ("--axis", "0", "0", "0"), ("--plot", "x.png")]
+    "more",
+    [
+        ("f0.npy",),
+        ("--allowed", "90"),
+        ("--axis", "0", "0", "0"),
+        ("--plot", "x.png"),
+        ("--intrinsics", "500"),
+        ("--far", "1"),
+        ("--elevation", "10"),
+    ],
 )
 def test_what_an_estimate_cannot_use_is_refused(pairs, capsys, more):
     main(["calibrate", "pairs.csv", "--output", "table.npz"])

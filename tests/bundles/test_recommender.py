@@ -346,12 +346,43 @@ def test_only_allowed_rotations_are_taken(recommender, seed, bins):
 
 
 @given(rotation=st.floats(-720, 720))
-def test_an_allowed_rotation_stands_for_its_nearest_bin(recommender, rotation):
-    if travel_deg(rotation) < 1.5 * WIDTH:
+def test_an_allowed_rotation_is_answered_as_it_was_given(recommender, rotation):
+    codes = codes_of(0, 1)
+    if travel_deg(rotation) < MIN_SEPARATION_DEG:
+        with pytest.raises(UserError, match="no rotation is allowed"):
+            recommender.recommend_crops(codes, allowed_deg=[rotation])
         return
-    found = recommender.recommend_crops(codes_of(0, 1), allowed_deg=[rotation])
-    assert circular_distance_deg(found.move.rotation_deg, rotation) <= WIDTH / 2 + 1e-9
-    assert np.isfinite(found.error_after_deg).sum() <= 2
+    found = recommender.recommend_crops(codes, allowed_deg=[rotation])
+    if -180 < rotation <= 180:
+        assert found.move.rotation_deg == rotation
+    assert -180 < found.move.rotation_deg <= 180
+    assert circular_distance_deg(found.move.rotation_deg, rotation) < 1e-9
+    assert found.move.travel_deg == abs(found.move.rotation_deg)
+    assert found.alternatives == ()
+    (bin_,) = np.flatnonzero(np.isfinite(found.error_after_deg))
+    assert circular_distance_deg(bin_ * WIDTH, rotation) <= WIDTH / 2 + 1e-9
+    # The expected error lies between those of the bins on either side.
+    free = recommender.recommend_crops(codes)
+    place = rotation % 360 / WIDTH
+    sides = [free.error_after_deg[int(at) % BINS] for at in (np.floor(place), np.ceil(place))]
+    if np.isfinite(sides).all():
+        assert min(sides) - 1e-9 <= found.move.expected_error_deg <= max(sides) + 1e-9
+
+
+def test_allowed_rotations_are_ranked(recommender):
+    """Dense ones too: of neighbours within a bin the best, of all that are apart the order."""
+    codes = codes_of(2, 1)
+    allowed = np.arange(-180.0, 180.0, 2.5)
+    found = recommender.recommend_crops(codes, allowed_deg=allowed)
+    moves = [found.move, *found.alternatives]
+    assert all(move.rotation_deg in {*allowed, 180.0} for move in moves)
+    free = recommender.recommend_crops(codes)
+    assert found.move.expected_error_deg <= free.move.expected_error_deg
+    few = recommender.recommend_crops(codes, allowed_deg=[40.25, -75.5, 131.0])
+    moves = [few.move, *few.alternatives]
+    assert {move.rotation_deg for move in moves} == {40.25, -75.5, 131.0}
+    errors = [move.expected_error_deg for move in moves]
+    assert errors == sorted(errors)
 
 
 def test_allowed_rotations_count_from_the_last_frame(recommender):
@@ -388,9 +419,13 @@ def test_allowed_rotations_are_numbers(recommender, allowed):
 @pytest.mark.parametrize(
     ("n", "rotations", "message"),
     [
-        (1, [0.0, 90.0], "1 frames need as many rotations"),
-        (2, [0.0], "2 frames need as many rotations"),
-        (2, [], "there are 0"),
+        (1, [0.0, 90.0], "1 frame and 2 rotations: give one for each frame"),
+        (2, [0.0], "2 frames and 1 rotation: give one for each frame"),
+        (2, 0.0, "2 frames and 1 rotation: give one for each frame"),
+        (2, [], "2 frames and 0 rotations"),
+        (1, [[0.0]], "1 frame and 1 rotation"),
+        (1, "here", "'here' are no numbers"),
+        (1, 5.0, "the first rotation is 5"),
         (2, [10.0, 20.0], "the first rotation is 10"),
         (2, [0.0, np.nan], "no finite number"),
         (2, [0.0, np.inf], "no finite number"),
@@ -401,6 +436,15 @@ def test_rotations_that_do_not_fit_the_frames_are_refused(recommender, n, rotati
         recommender.recommend_crops(codes_of(0, n), rotations)
     with pytest.raises(UserError, match=message):
         recommender.recommend(FRAMES[:n], rotations_deg=rotations)
+
+
+@pytest.mark.parametrize("rotations", [0, 0.0, np.float32(0), np.zeros(1), [0], (0.0,)])
+def test_of_one_frame_the_rotation_may_be_a_number(recommender, rotations):
+    same(
+        recommender.recommend(FRAMES[0], rotations_deg=rotations), recommender.recommend(FRAMES[0])
+    )
+    codes = codes_of(0, 1)
+    same(recommender.recommend_crops(codes, rotations), recommender.recommend_crops(codes))
 
 
 def test_an_elevation_is_a_number(recommender):
@@ -590,12 +634,52 @@ def test_one_bad_frame_of_several_is_refused(recommender):
 
 def test_masks_are_as_many_as_frames(recommender):
     mask = FRAMES[0] > 0
-    with pytest.raises(UserError, match="2 frames and 1 masks"):
+    with pytest.raises(UserError, match="2 frames and 1 mask:"):
         recommender.recommend(FRAMES[:2], rotations_deg=[0.0, 90.0], mask=mask)
-    with pytest.raises(UserError, match="1 frames and 2 masks"):
+    with pytest.raises(UserError, match="1 frame and 2 masks"):
         recommender.recommend(FRAMES[0], mask=[mask, mask])
     with pytest.raises(UserError, match="the mask has"):
         recommender.recommend(FRAMES[0], mask=mask.T)
+
+
+def test_a_mask_of_colours_is_refused(recommender):
+    mask = FRAMES[0] > 0
+    for given_ in (np.dstack([mask] * 3), [np.dstack([mask] * 3)], np.dstack([mask] * 4)):
+        with pytest.raises(UserError, match="the mask has 3 axes"):
+            recommender.recommend(FRAMES[0], mask=given_)
+    same(
+        recommender.recommend(FRAMES[0], mask=mask[:, :, None]),
+        recommender.recommend(FRAMES[0], mask=mask),
+    )
+
+
+def test_each_frame_may_have_a_camera_of_its_own(recommender):
+    one, other = (Intrinsics(f, f, 60.0, 45.0) for f in (FOCAL_PX, 1.2 * FOCAL_PX))
+    rotations = [0.0, 60.0]
+    found = recommender.recommend(FRAMES[:2], rotations_deg=rotations, intrinsics=[one, other])
+    crops = [
+        recommender.crop(depth, intrinsics=camera).codes
+        for depth, camera in zip(FRAMES[:2], (one, other), strict=True)
+    ]
+    same(found, recommender.recommend_crops(np.stack(crops), rotations))
+    with pytest.raises(UserError, match="2 frames and 3 cameras"):
+        recommender.recommend(FRAMES[:2], rotations_deg=rotations, intrinsics=[one] * 3)
+
+
+@pytest.mark.parametrize(
+    ("limits", "name"),
+    [({"near_m": 300.0}, "--near=300"), ({"near_m": 0.3, "far_m": 900.0}, "--far=900")],
+)
+def test_limits_in_millimetres_are_refused(recommender, limits, name):
+    with pytest.raises(UserError, match=f"{name}: give metres; the object is 0.18 to 2.4 m away"):
+        recommender.recommend(FRAMES[0], **limits)
+    recommender.recommend(FRAMES[0], near_m=0.3, far_m=np.inf)
+
+
+def test_a_frame_without_any_depth_says_so(recommender):
+    for nothing in (np.nan, 0.0, -1.0, np.inf):
+        with pytest.raises(FrameError, match="the frame has no depth at all"):
+            recommender.recommend(np.full_like(FRAMES[0], nothing))
 
 
 def test_the_unit_and_the_size_of_the_object_go_together(bundle, recommender):

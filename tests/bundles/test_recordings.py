@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from PIL import Image
 from made_bundles import FOCAL_PX, frame
 from nbv.bundles.manifest import read_manifest, see
 from nbv.errors import UserError
+from nbv.frames.depth_files import read_depth
 from nbv.frames.intrinsics import Intrinsics
 
 AZIMUTHS = (0.0, 10.0, 20.0, 350.0)
@@ -87,13 +89,13 @@ def test_names_stay_as_they_are_written(folder):
 def test_the_elevation_is_the_mean_of_what_is_known(folder):
     (known,) = read_manifest(manifest(folder, table(elevation_deg=[20, 22, "", 24])))
     assert known.elevation_deg == 22.0
-    (none,) = read_manifest(manifest(folder, table(elevation_deg=["", "", "high", "nan"])))
+    (none,) = read_manifest(manifest(folder, table(elevation_deg=["", "", " ", "nan"])))
     assert np.isnan(none.elevation_deg)
 
 
 def test_frames_may_have_intrinsics_of_their_own(folder):
     rows = table(
-        fx=[500, "", 600, 500], fy=[510, "", 600, 500], cx=[320, "", "", 320], cy=[240, 1, "", 240]
+        fx=[500, "", 600, 500], fy=[510, "", 600, 500], cx=[320, "", "", 320], cy=[240, "", "", 240]
     )
     (found,) = read_manifest(manifest(folder, rows))
     assert found.intrinsics == (
@@ -162,6 +164,21 @@ def test_a_manifest_without_rows_or_that_does_not_exist_is_one_line(tmp_path):
     assert "does not exist" in refused(tmp_path / "none.csv")
 
 
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ({"mask": ["", "m9.png", "", ""]}, "row 3: mask 'm9.png' does not exist"),
+        ({"fx": [500, "", "wide", 500]}, "row 4: fx is no number"),
+        ({"fx": [500, -500, "", 500]}, "row 3: intrinsics: fx=-500 must be above 0"),
+        ({"fx": [500, "", "", ""], "cx": [320, "", "", 320]}, "row 5: cx without fx"),
+        ({"elevation_deg": [10, "", 100, ""]}, "row 4: elevation_deg=100 lies not between"),
+        ({"elevation_deg": [10, "", "", "high"]}, "row 5: elevation_deg is no number"),
+    ],
+)
+def test_a_cell_that_cannot_be_is_named_with_its_row(folder, columns, message):
+    assert message in refused(manifest(folder, table(**columns)))
+
+
 # What the network makes of them
 
 
@@ -220,18 +237,39 @@ def test_masks_are_used_where_there_are_any(recommender, folder):
     assert np.array_equal(turn.logits, logits)
     _, lines = seen(recommender, manifest(folder, table()))
     assert len(lines) == 1
-    with pytest.raises(UserError, match=r"m9\.png does not exist"):
-        seen(recommender, manifest(folder, table(mask=["", "m9.png", "", ""])))
 
 
 def test_intrinsics_of_a_frame_come_before_those_of_all(recommender, folder):
     others = 1.1 * FOCAL_PX
     rows = table(fx=[FOCAL_PX, "", FOCAL_PX, ""])
-    turn, _ = seen(recommender, manifest(folder, rows), Intrinsics(others, others))
+    turn, _ = seen(recommender, manifest(folder, rows), str(others))
     own = crops(recommender, range(4))
     of_all = crops(recommender, range(4), intrinsics=(others,))
     logits = recommender.network(np.stack([own[0], of_all[1], own[2], of_all[3]]))
     assert np.array_equal(turn.logits, logits)
+
+
+def test_a_scene_of_bop_gives_every_frame_its_own_camera_and_scale(recommender, folder):
+    scene = {}
+    for place in range(4):
+        unit, focal = (1e-4, 2e-4)[place % 2], (1.0, 1.1)[place // 2] * FOCAL_PX
+        np.save(folder / f"00{place}.npy", np.rint(frame(place) / unit).astype(np.uint16))
+        scene[str(place)] = {
+            "cam_K": [focal, 0, 60, 0, focal, 45, 0, 0, 1],
+            "depth_scale": unit * 1000,
+        }
+    (folder / "scene_camera.json").write_text(json.dumps(scene))
+    rows = table(file=[f"00{place}.npy" for place in range(4)])
+    turn, lines = seen(recommender, manifest(folder, rows), str(folder / "scene_camera.json"))
+    wanted = [
+        recommender.crop(
+            read_depth(folder / f"00{place}.npy", (1e-4, 2e-4)[place % 2]),
+            intrinsics=[(1.0, 1.1)[place // 2] * FOCAL_PX] * 2 + [60, 45],
+        ).codes
+        for place in range(4)
+    ]
+    assert lines == []
+    assert np.array_equal(turn.codes, wanted)
 
 
 def test_the_scale_of_whole_numbers_is_that_of_the_recording(recommender, folder):

@@ -128,6 +128,11 @@ def test_the_scale_is_metres_per_unit(tmp_path):
     assert read_depth(tenths, 1e-4) == pytest.approx(METRES / 10)
     np.save(centimetres, 100 * METRES)
     assert read_depth(centimetres, 0.01) == pytest.approx(METRES)
+    # What a camera file says holds for whole numbers alone, where nothing else is said.
+    assert read_depth(tenths, unit_m=1e-4) == pytest.approx(METRES / 10)
+    assert read_depth(tenths, 1e-4, unit_m=7.0) == pytest.approx(METRES / 10)
+    metres = saved(tmp_path / "c.npy", METRES)
+    assert np.array_equal(read_depth(metres, unit_m=7.0), METRES)
 
 
 @given(scale=st.floats(1e-5, 10.0), values=arrays(np.uint16, (3, 4)))

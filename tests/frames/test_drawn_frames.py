@@ -80,6 +80,35 @@ def test_a_mesh_file_is_read_with_its_axes(tmp_path):
     assert np.linalg.norm(size) == pytest.approx(1.0, abs=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("view", "message"),
+    [
+        ((np.nan, 10.0, 0.9), "an azimuth of nan"),
+        ((np.inf, 10.0, 0.9), "an azimuth of inf"),
+        ((0.0, np.nan, 0.9), "an elevation of nan"),
+        ((0.0, 91.0, 0.9), "an elevation of 91"),
+        ((0.0, 10.0, 0.0), "a distance of 0 m"),
+        ((0.0, 10.0, -1.0), "a distance of -1 m"),
+        ((0.0, 10.0, np.nan), "a distance of nan m"),
+        ((0.0, 10.0, 800.0), "0.3 to 4 m are plausible"),
+        ((0.0, 10.0, 0.2), "0.3 to 4 m are plausible"),
+    ],
+)
+def test_an_impossible_view_is_refused(view, message):
+    vertices, faces = shape()
+    mesh = Mesh(vertices.astype(np.float32), faces.astype(np.int32))
+    with pytest.raises(UserError, match=message):
+        draw_frame(mesh, *view, DIAGONAL_M)
+
+
+def test_a_frame_without_the_object_is_refused():
+    """A needle far away falls between the pixels."""
+    vertices = np.array([[0, 0, -0.5], [1e-6, 0, -0.5], [0, 1e-6, 0.5]], dtype=np.float32)
+    needle = Mesh(vertices, np.array([[0, 1, 2]], dtype=np.int32))
+    with pytest.raises(UserError, match="no pixel of the object"):
+        draw_frame(needle, 20.0, 0.0, 3.9, DIAGONAL_M, noise=False)
+
+
 @pytest.mark.parametrize("diagonal", [0.0, -1.0, float("nan"), float("inf")])
 def test_an_impossible_size_is_refused(diagonal):
     vertices, faces = shape()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
-from nbv.frames.intrinsics import Intrinsics, as_intrinsics, parse_intrinsics
+from nbv.frames.intrinsics import DepthCamera, Intrinsics, as_intrinsics, camera_of
 
 FX, FY, CX, CY = 572.41, 573.57, 325.26, 242.05
 K = [FX, 0.0, CX, 0.0, FY, CY, 0.0, 0.0, 1.0]
@@ -68,13 +69,13 @@ FILES = {
 def test_every_camera_file_gives_the_same_camera(tmp_path, name):
     text, wanted = FILES[name]
     (tmp_path / name).write_text(text)
-    assert parse_intrinsics(str(tmp_path / name)) == wanted
+    assert camera_of(str(tmp_path / name)).intrinsics == wanted
 
 
 @given(f=pixels)
 def test_one_number_is_both_focal_lengths(f):
     assert as_intrinsics(f) == as_intrinsics([f]) == Intrinsics(f, f)
-    assert parse_intrinsics(repr(f)) == Intrinsics(f, f)
+    assert camera_of(repr(f)) == DepthCamera(Intrinsics(f, f))
 
 
 @given(fx=pixels, fy=pixels, cx=pixels, cy=pixels)
@@ -83,8 +84,8 @@ def test_numbers_a_matrix_and_a_text_say_the_same(fx, fy, cx, cy):
     matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
     assert as_intrinsics((fx, fy, cx, cy)) == wanted
     assert as_intrinsics(matrix) == as_intrinsics(matrix.ravel().tolist()) == wanted
-    assert parse_intrinsics(f"{fx!r}, {fy!r},{cx!r} ,{cy!r}") == wanted
-    assert parse_intrinsics(",".join(map(repr, matrix.ravel().tolist()))) == wanted
+    assert camera_of(f"{fx!r}, {fy!r},{cx!r} ,{cy!r}").intrinsics == wanted
+    assert camera_of(",".join(map(repr, matrix.ravel().tolist()))).intrinsics == wanted
     assert as_intrinsics(wanted) is wanted
 
 
@@ -124,7 +125,58 @@ def test_the_principal_point_is_finite(bad):
         as_intrinsics([FX, FY, CX, bad])
 
 
+SCENE = {
+    "3": {"cam_K": K, "depth_scale": 0.1, "cam_R_w2c": [1, 0, 0, 0, 1, 0, 0, 0, 1]},
+    "12": {"cam_K": [2 * value for value in K[:8]] + [1], "depth_scale": 1.0},
+}
+
+
+def test_a_scene_has_a_camera_for_each_image(tmp_path):
+    path = tmp_path / "scene_camera.json"
+    path.write_text(json.dumps(SCENE))
+    for frame in ("000003.png", "depth/3.png", Path("scene/depth_0003.tif")):
+        found = camera_of(str(path), frame)
+        assert found.intrinsics == WANTED
+        assert found.unit_m == pytest.approx(1e-4)
+    other = camera_of(str(path), "000012.png")
+    assert other.intrinsics == Intrinsics(2 * FX, 2 * FY, 2 * CX, 2 * CY)
+    assert other.unit_m == 0.001
+    for frame in ("000004.png", "depth.png", "12_depth.png", ""):
+        with pytest.raises(UserError, match="cameras of images 3 to 12, and none for"):
+            camera_of(str(path), frame)
+
+
+def test_where_all_images_have_one_camera_the_name_does_not_matter(tmp_path):
+    path = tmp_path / "scene_camera.json"
+    path.write_text(json.dumps({str(image): SCENE["3"] for image in range(5)}))
+    assert camera_of(str(path), "frame.png") == camera_of(str(path), "000004.png")
+    assert camera_of(str(path), "frame.png").intrinsics == WANTED
+
+
+def test_a_camera_file_says_what_whole_numbers_count(tmp_path):
+    path = tmp_path / "camera.json"
+    for scale in (0.1, 1.0, 2, 0.25):
+        path.write_text(json.dumps({"cam_K": K, "depth_scale": scale}))
+        assert camera_of(str(path)).unit_m == pytest.approx(scale / 1000)
+    for scale in ("0.1", 0, -1, True, float("nan"), [1]):
+        path.write_text(json.dumps({"cam_K": K, "depth_scale": scale}))
+        with pytest.raises(UserError, match=r"camera\.json: depth_scale="):
+            camera_of(str(path))
+
+
+def test_nothing_is_known_of_a_camera_that_is_not_given():
+    assert camera_of(None, "frame.png") == DepthCamera(None, 0.001)
+
+
+@pytest.mark.parametrize("text", ["no.json", "no/camera", "camera.yaml"])
+def test_a_missing_camera_file_is_said_to_be_missing(tmp_path, monkeypatch, text):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=f"--intrinsics={text}: the file does not exist"):
+        camera_of(text)
+
+
 BAD_FILES = {
+    "scene.json": '{"0": [1, 2], "1": {}}',
     "empty.json": "",
     "empty.yaml": "",
     "list.json": "[1, 2, 3, 4]",
@@ -151,7 +203,7 @@ BAD_FILES = {
 def test_a_file_without_a_camera_is_one_line(tmp_path, name):
     (tmp_path / name).write_text(BAD_FILES[name])
     with pytest.raises(UserError) as error:
-        parse_intrinsics(str(tmp_path / name))
+        camera_of(str(tmp_path / name))
     assert "\n" not in str(error.value)
 
 
@@ -159,13 +211,13 @@ def test_bytes_that_are_no_text_are_one_line(tmp_path):
     for name in ("a.json", "a.yaml"):
         (tmp_path / name).write_bytes(b"\xff\xfe\x00\x01{")
         with pytest.raises(UserError, match="cannot be read"):
-            parse_intrinsics(str(tmp_path / name))
+            camera_of(str(tmp_path / name))
 
 
 @pytest.mark.parametrize("text", ["", "camera", "575,575", "1,2,3,x", "no/file.json", "x" * 5000])
 def test_text_that_is_neither_numbers_nor_a_file_is_one_line(text):
     with pytest.raises(UserError):
-        parse_intrinsics(text)
+        camera_of(text)
 
 
 def test_intrinsics_of_another_resolution_are_refused():

@@ -110,10 +110,24 @@ def test_three_tenths_of_a_mask_are_enough():
     assert np.array_equal(object_mask(depth, REACH, box(SQUARE)), box(np.s_[10:16, 12:32]))
 
 
-@pytest.mark.parametrize("shape", [(COLUMNS, ROWS), (ROWS, COLUMNS - 1), (ROWS,), (1, ROWS, 2)])
+@pytest.mark.parametrize("shape", [(COLUMNS, ROWS), (ROWS, COLUMNS - 1)])
 def test_a_mask_of_another_size_is_refused(shape):
     with pytest.raises(UserError, match="64 × 48"):
         object_mask(scene(), REACH, np.ones(shape))
+
+
+@pytest.mark.parametrize("shape", [(ROWS,), (ROWS, COLUMNS, 3), (ROWS, COLUMNS, 4), (1, ROWS, 2)])
+def test_a_mask_has_one_channel(shape):
+    with pytest.raises(UserError, match=f"the mask has {len(shape)} axes; give rows and columns"):
+        object_mask(scene(), REACH, np.ones(shape))
+    one = object_mask(scene(), REACH, box(SQUARE)[:, :, None])
+    assert np.array_equal(one, box(SQUARE))
+
+
+@pytest.mark.parametrize("options", [{}, {"far_m": 1.0}, {"mask": np.ones((ROWS, COLUMNS))}])
+def test_a_frame_without_any_depth_says_so(options):
+    message = refused("empty-mask", np.zeros_like(scene()), REACH, **options)
+    assert "the frame has no depth at all" in message
 
 
 # Between two distances

@@ -39,9 +39,33 @@ def test_recommendations_are_read_at_the_nearest_bin():
     table = lookup.build_lookup(
         evidence_of(hidden_range_estimates(4), 8, 10, 360), "pose_ambiguity"
     )
-    assert table.recommend([359.6, 0.2, 89.5]).tolist() == [
-        table.recommended_delta_deg[k] for k in (0, 0, 90)
-    ]
+    for rotations in (table.recommend, table.least_cost):
+        assert rotations([359.6, 0.2, 89.5]).tolist() == [
+            table.recommended_delta_deg[k] for k in (0, 0, 90)
+        ]
+
+
+@pytest.mark.parametrize("n_bins", [8, 72, 360])
+def test_a_view_from_the_same_place_is_not_recommended(rng, n_bins):
+    """A table whose costs are least at hand, or a bin beside it, as those of one object may be."""
+    cost = rng.uniform(1, 2, (n_bins, n_bins)).astype(np.float32)
+    width = 360 / n_bins
+    near = np.arange(n_bins) % 5
+    for row in np.flatnonzero(near < 3):
+        cost[row, (0, 1, -1)[near[row]]] = 0
+    deltas = lookup.least_cost_delta(cost)
+    rows = np.full((n_bins, n_bins), 1 / n_bins, np.float32)
+    table = lookup.LookupTable(rows, rows, cost, deltas, 8, 3, "given_estimate", "entropy", "made")
+    every = np.arange(n_bins) * width
+    assert table.least_cost(every).tolist() == deltas.tolist()
+    found = table.recommend(every)
+    travel = np.minimum(found, 360 - found)
+    assert travel.min() > width
+    chosen = cost[np.arange(n_bins), np.rint(found / width).astype(int)]
+    assert np.array_equal(chosen, cost[:, 2:-1].min(axis=1))
+    kept = near >= 3
+    free = np.minimum(deltas, 360 - deltas) > width
+    assert np.array_equal(found[kept & free], deltas[kept & free])
 
 
 def test_an_unknown_criterion():

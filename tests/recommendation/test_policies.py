@@ -50,7 +50,7 @@ def test_policies_by_name():
     np.testing.assert_array_equal(alone.pose_deg, turns.estimate_deg)
     table = build_lookup(turns.evidence, "information_gain")
     followed = two_views("information_gain", "average", turns).delta_deg
-    np.testing.assert_array_equal(followed, table.recommend(turns.estimate_deg))
+    np.testing.assert_array_equal(followed, table.least_cost(turns.estimate_deg))
     given = two_views("information_gain", "average", Turns(turns.estimate_deg, lookup=table))
     np.testing.assert_array_equal(given.delta_deg, followed)
 

@@ -73,6 +73,17 @@ def test_nothing_is_rendered_or_trained(foreign) -> None:
     assert "figure9.png" in {path.name for path in (project.results / "figures").iterdir()}
 
 
+@pytest.mark.parametrize("target", ["confirm", "statistics", "estimators", "bundles"])
+def test_what_needs_images_or_trainings_is_refused_before_anything_runs(foreign, target) -> None:
+    project, pairs = foreign
+    chosen = (*TINY, "estimator=external", f"estimator.pairs={pairs}", "name=none")
+    done = project.run(target, "--cores", "1", overrides=chosen, fails=True)
+    (line,) = [one for one in done.stderr.splitlines() if one.startswith("nbv: error")]
+    assert "estimator=external has no meshes, images or trainings" in line
+    assert "Traceback" not in done.stderr
+    assert not (project.folder / "results" / "none").exists()
+
+
 @pytest.mark.parametrize(
     ("columns", "message"),
     [

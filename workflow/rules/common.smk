@@ -185,6 +185,17 @@ def sources(script, settings=CONFIG):
     ]
 
 
+def mesh_sources(wildcards):
+    """The modules that meshes depend on. What starts at meshes ends here without them."""
+    if EXTERNAL:
+        stop(
+            "estimator=external has no meshes, images or trainings, and what was asked for needs "
+            "them: ask for the report (no target), extensions or leaderboard, or choose another "
+            "estimator"
+        )
+    return sources("prepare_meshes")
+
+
 def all_sources():
     """The modules that the results as a whole depend on."""
     scripts = SCRIPTS.glob("*.py")

@@ -25,7 +25,7 @@ rule settings:
 
 rule meshes:
     input:
-        sources("prepare_meshes"),
+        mesh_sources,
     output:
         LAYOUT.meshes("{category}"),
     log:

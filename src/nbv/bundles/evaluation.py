@@ -9,13 +9,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.angles import circular_distance_deg, direction_deg, signed_difference_deg
+from nbv.angles import circular_distance_deg, signed_difference_deg, travel_deg
 from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.recommender import MIN_SEPARATION_DEG, turn_share
 from nbv.bundles.turns import Turn
+from nbv.calibration.offset import constant_offset_deg
 from nbv.errors import UserError
+from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.fusion import average
 from nbv.recommendation.look_alikes import LookAlikes
@@ -50,10 +52,15 @@ class Seen:
 
 
 def best_fixed_deg(alike: LookAlikes, share: NDArray[np.float64]) -> float:
-    """Return the one rotation that is best on all calibration views, degrees."""
+    """Return the one rotation that is best on all calibration views, degrees.
+
+    It is `MIN_SEPARATION_DEG` or more, as all that are chosen.
+    """
     n_turns, n_bins, _ = alike.views.shape
     of_turn = alike.errors_deg.reshape(n_turns, n_bins, n_bins).mean(axis=1)
-    return float((share @ of_turn).argmin() * (360.0 / n_bins))
+    rotation_deg = np.arange(n_bins) * (360.0 / n_bins)
+    error = np.where(travel_deg(rotation_deg) < MIN_SEPARATION_DEG, np.inf, share @ of_turn)
+    return float(rotation_deg[error.argmin()])
 
 
 Chooser = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
@@ -196,13 +203,13 @@ def evaluate(
         if len(turn.azimuth_deg) < max(n_views):
             raise UserError(
                 f"object {turn.object_id!r}, sequence {turn.sequence!r} has "
-                f"{len(turn.azimuth_deg)} frames, too few for {max(n_views)} views"
+                f"{counted(len(turn.azimuth_deg), 'frame')}, too few for {max(n_views)} views"
             )
     rows, alike = [], LookAlikes.of_views(bundle.distributions)
     for turn in turns:
         seen = seen_by(bundle, turn)
         single = follow(seen, lambda beliefs, taken: np.zeros(len(beliefs)), 1)[:, 0]
-        offset = _mean_direction(single)
+        offset = constant_offset_deg(single)
         rows.append(_row(seen, SINGLE, 1, single, offset))
         if 2 in n_views:
             error = paper_errors(seen, bundle.paper, turn.elevation_deg)
@@ -242,12 +249,6 @@ def familiarity_of(bundle: Bundle, turns: Sequence[Turn]) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
-
-
-def _mean_direction(error_deg: NDArray[np.float64]) -> float:
-    angles = np.radians(error_deg)
-    mean = direction_deg(np.cos(angles).mean(), np.sin(angles).mean())
-    return float(signed_difference_deg(mean, 0.0))
 
 
 def _row(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pandas as pd
@@ -15,7 +16,7 @@ from nbv.calibration.pairs import read_rows
 from nbv.errors import UserError
 from nbv.frames.depth_files import read_depth, read_mask
 from nbv.frames.errors import FrameError
-from nbv.frames.intrinsics import Intrinsics
+from nbv.frames.intrinsics import Intrinsics, camera_of
 
 NEEDED = ("object_id", "sequence", "file", "azimuth_deg")
 OPTIONAL = ("mask", "elevation_deg", "fx", "fy", "cx", "cy")
@@ -62,45 +63,78 @@ def read_manifest(path: str | Path) -> list[Recording]:
     Raises
     ------
     UserError
-        Where a column or a file is missing, or an azimuth is no number.
+        Where a column or a file is missing, an azimuth is no number, or another cell holds what it
+        cannot hold; it names the row.
     """
     path = Path(path)
     table = read_rows(path, NEEDED)
-    for name in ("azimuth_deg", *(set(OPTIONAL) - {"mask"})):
+    for name in {"azimuth_deg", *OPTIONAL} - {"mask"}:
         if name in table:
-            table[name] = pd.to_numeric(table[name], errors="coerce")
-    if not np.isfinite(table["azimuth_deg"]).all():
-        row = int((~np.isfinite(table["azimuth_deg"])).to_numpy().argmax())
-        raise UserError(f"{path}, row {row + 2}: azimuth_deg is no number")
-    table["path"] = [str(path.parent / name) for name in table["file"]]
+            table[name] = _numbers(path, table[name])
+    table["path"] = _files(path, table["file"])
     if "mask" in table:
-        table["mask"] = [str(path.parent / name) if name else None for name in table["mask"]]
-    for row, name in enumerate(table["file"]):
-        if not (path.parent / name).is_file():
-            raise UserError(f"{path}, row {row + 2}: file {name!r} does not exist")
-    return list(_recordings(table))
+        table["mask"] = _files(path, table["mask"])
+    intrinsics = list(_intrinsics(path, table))
+    return [
+        Recording(
+            str(object_id),
+            str(sequence),
+            rows.reset_index(drop=True),
+            tuple(intrinsics[place] for place in rows.index),
+        )
+        for (object_id, sequence), rows in table.groupby(["object_id", "sequence"], sort=True)
+    ]
 
 
-def _recordings(table: pd.DataFrame) -> Iterator[Recording]:
-    for (object_id, sequence), rows in table.groupby(["object_id", "sequence"], sort=True):
-        frames = rows.reset_index(drop=True)
-        yield Recording(str(object_id), str(sequence), frames, tuple(_intrinsics(frames)))
+def _refuse(path: Path, place: int, what: str) -> NoReturn:
+    # The first row is that of the names.
+    raise UserError(f"{path}, row {place + 2}: {what}")
 
 
-def _intrinsics(frames: pd.DataFrame) -> Iterator[Intrinsics | None]:
-    known = "fx" in frames
-    for row in frames.to_dict("records"):
-        if not known or not np.isfinite(row["fx"]):
+def _numbers(path: Path, texts: pd.Series[str]) -> pd.Series[float]:
+    """Return a column of numbers; NaN where an optional one is empty."""
+    numbers = pd.to_numeric(texts, errors="coerce").astype(float)
+    name = str(texts.name)
+    for place, (text, number) in enumerate(zip(texts, numbers, strict=True)):
+        is_absent = name in OPTIONAL and text.strip().lower() in ("", "nan")
+        if not (np.isfinite(number) or is_absent):
+            _refuse(path, place, f"{name} is no number")
+        if name == "elevation_deg" and abs(number) > 90:
+            _refuse(path, place, f"elevation_deg={text} lies not between -90 and 90")
+    return numbers
+
+
+def _files(path: Path, names: pd.Series[str]) -> list[str | None]:
+    """Return the files of a column, whose names count from the manifest's folder."""
+    found: list[str | None] = []
+    for place, name in enumerate(names):
+        file = path.parent / name
+        is_absent = names.name in OPTIONAL and not name
+        if not (is_absent or file.is_file()):
+            _refuse(path, place, f"{names.name} {name!r} does not exist")
+        found.append(None if is_absent else str(file))
+    return found
+
+
+def _intrinsics(path: Path, table: pd.DataFrame) -> Iterator[Intrinsics | None]:
+    for place, row in enumerate(table.to_dict("records")):
+        names = ("fx", "fy", "cx", "cy")
+        known = {name: row[name] for name in names if np.isfinite(row.get(name, np.nan))}
+        if not known:
             yield None
-            continue
-        middle = {name: row[name] for name in ("cx", "cy") if np.isfinite(row.get(name, np.nan))}
-        yield Intrinsics(row["fx"], row.get("fy", row["fx"]), **middle)
+        elif "fx" not in known:
+            _refuse(path, place, f"{next(iter(known))} without fx; give fx too")
+        else:
+            try:
+                yield Intrinsics(**{"fy": known["fx"]} | known)
+            except UserError as error:
+                _refuse(path, place, str(error))
 
 
 def see(
     recommender: Recommender,
     recording: Recording,
-    intrinsics: Intrinsics | None,
+    intrinsics: str | None,
     depth_scale: float | None,
     tell: Callable[[str], None],
 ) -> Turn:
@@ -110,8 +144,8 @@ def see(
     ----------
     recommender : Recommender
     recording : Recording
-    intrinsics : Intrinsics or None
-        Of frames for which the manifest has none.
+    intrinsics : str or None
+        Of frames for which the manifest has none; see `nbv.frames.intrinsics.camera_of`.
     depth_scale : float or None
         See `nbv.frames.depth_files.read_depth`.
     tell : callable
@@ -126,12 +160,12 @@ def see(
     for place, (row, own) in enumerate(
         zip(recording.frames.to_dict("records"), recording.intrinsics, strict=True)
     ):
-        mask = row.get("mask")
+        mask, camera = row.get("mask"), camera_of(intrinsics, row["path"])
         try:
             crop = recommender.crop(
-                read_depth(row["path"], depth_scale),
+                read_depth(row["path"], depth_scale, camera.unit_m),
                 mask=read_mask(mask) if isinstance(mask, str) else None,
-                intrinsics=own or intrinsics,
+                intrinsics=own or camera.intrinsics,
             )
         except FrameError as error:
             tell(f"{row['path']} is left out: {error}")

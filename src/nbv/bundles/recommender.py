@@ -8,22 +8,33 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.angles import circular_distance_deg, signed_difference_deg, travel_deg, wrap_deg
+from nbv.angles import (
+    circular_distance_deg,
+    nearest_bin,
+    signed_difference_deg,
+    travel_deg,
+    wrap_deg,
+)
 from nbv.bundles.beliefs import distributions_of, elevation_share, fused, spread_deg, turned
 from nbv.bundles.bundle import Bundle, load_bundle
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.networks import Network, open_network
 from nbv.errors import UserError, nearest
-from nbv.frames.crop import Crop, crop_frame, need_plausible_nearest
+from nbv.frames.crop import Crop, crop_frame, need_metres, need_plausible_nearest
 from nbv.frames.depth_files import to_metres
 from nbv.frames.intrinsics import Intrinsics, as_intrinsics
 from nbv.frames.masks import object_mask
+from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.look_alikes import LookAlikes
+
+IntrinsicsLike = Intrinsics | ArrayLike | None
+"""Intrinsics, or their numbers; None where they are not known."""
 
 REACH = 0.75
 """How far an object reaches behind its nearest point, in diagonals, where nothing masks it."""
@@ -79,7 +90,7 @@ class Recommendation:
         p(azimuth of the camera at the last frame); index b is 360 b / B degrees.
     error_after_deg : ndarray (B,)
         Expected error after a further view, by its rotation 360 d / B degrees from the last frame;
-        inf where the camera may not go.
+        inf where the camera may not go. Of allowed rotations, the nearest of these are finite.
     unfamiliarity : float
         How far the least familiar frame is from everything calibrated; above 1 farther than 95 %
         of calibration images.
@@ -178,7 +189,7 @@ class Recommender:
         depth_m: ArrayLike,
         *,
         mask: ArrayLike | None = None,
-        intrinsics: Intrinsics | Sequence[float] | None = None,
+        intrinsics: IntrinsicsLike = None,
         near_m: float | None = None,
         far_m: float | None = None,
     ) -> Crop:
@@ -188,6 +199,7 @@ class Recommender:
         camera = bundle.focal_px if intrinsics is None else intrinsics
         known = as_intrinsics([camera] if isinstance(camera, float) else camera)
         reach_m = REACH * bundle.diagonal_m
+        need_metres(near_m, far_m, bundle.diagonal_m)
         if mask is None and far_m is None:
             need_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
         inside = object_mask(depth, reach_m, mask, near_m, far_m)
@@ -201,9 +213,9 @@ class Recommender:
         self,
         depth_m: ArrayLike | Sequence[ArrayLike],
         *,
-        rotations_deg: Sequence[float] = (0.0,),
+        rotations_deg: float | Sequence[float] = (0.0,),
         mask: ArrayLike | Sequence[ArrayLike] | None = None,
-        intrinsics: Intrinsics | Sequence[float] | None = None,
+        intrinsics: IntrinsicsLike | Sequence[Intrinsics | None] = None,
         near_m: float | None = None,
         far_m: float | None = None,
         elevation_deg: float | None = None,
@@ -212,18 +224,22 @@ class Recommender:
     ) -> Recommendation:
         """Return the pose that frames show, and the next view.
 
+        A view from nearly the same place is no second view: what hides the pose there hides it
+        again. So the next view is `MIN_SEPARATION_DEG` or more from every view so far.
+
         Parameters
         ----------
         depth_m : (rows, columns), or a sequence of such
             Depth in metres; NaN or 0 where nothing was measured. Whole numbers are millimetres.
         rotations_deg : sequence of float
             Where each frame was taken: degrees about the object from the first frame's place,
-            counter-clockwise seen from above. The first is 0.
+            counter-clockwise seen from above. The first is 0. Of one frame it may be a number.
         mask : (rows, columns), or a sequence of such, optional
             Not 0 where the object is. Without it the object is what lies nearest, or between
             `near_m` and `far_m`.
         intrinsics : Intrinsics, (fx, fy, cx, cy) or 3 × 3, optional
-            Pixels. Without it the focal length of the simulated sensor.
+            Pixels; or a list of Intrinsics, one for each frame. Without it the focal length of the
+            simulated sensor.
         near_m, far_m : float, optional
             Metres.
         elevation_deg : float, optional
@@ -249,10 +265,11 @@ class Recommender:
         """
         frames = _as_frames(depth_m)
         masks = _as_masks(mask, len(frames))
-        _need_rotations(rotations_deg, len(frames))
+        cameras = _as_cameras(intrinsics, len(frames))
+        rotations_deg = _as_rotations(rotations_deg, len(frames))
         crops = [
-            self.crop(frame, mask=own, intrinsics=intrinsics, near_m=near_m, far_m=far_m)
-            for frame, own in zip(frames, masks, strict=True)
+            self.crop(frame, mask=own, intrinsics=camera, near_m=near_m, far_m=far_m)
+            for frame, own, camera in zip(frames, masks, cameras, strict=True)
         ]
         codes = np.stack([crop.codes for crop in crops])
         return self.recommend_crops(
@@ -266,14 +283,14 @@ class Recommender:
     def recommend_crops(
         self,
         codes: NDArray[np.uint8],
-        rotations_deg: Sequence[float] = (0.0,),
+        rotations_deg: float | Sequence[float] = (0.0,),
         *,
         elevation_deg: float | None = None,
         allowed_deg: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
     ) -> Recommendation:
         """Return what `recommend` does, of crops (n, side, side) uint8."""
-        _need_rotations(rotations_deg, len(codes))
+        rotations_deg = _as_rotations(rotations_deg, len(codes))
         if elevation_deg is not None and not -90 <= elevation_deg <= 90:
             raise UserError(
                 f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
@@ -294,14 +311,9 @@ class Recommender:
         turn = round(last / width)
         error = np.roll(after, -turn)
         taken = np.asarray(rotations_deg) - last
-        here = np.arange(n_bins, dtype=np.float64) * width
-        error[~self._may_go(here, taken, allowed_deg, max_travel_deg)] = np.inf
-        if not np.isfinite(error).any():
-            raise UserError(
-                "no rotation is allowed: widen --allowed or --max-travel; a view is "
-                f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
-            )
-        best, *others = _local_best(error, here)
+        may = _reachable(n_bins, taken, allowed_deg, max_travel_deg)
+        best, *others = _local_best(may, _between(error, may), width)
+        error[~_is_near_bin(may, n_bins)] = np.inf
         return Recommendation(
             azimuth_deg=float(wrap_deg(mean_direction_deg(belief[None])[0] + last)),
             spread_deg=spread_deg(belief),
@@ -314,23 +326,6 @@ class Recommender:
             crops=tuple(codes),
         )
 
-    def _may_go(
-        self,
-        here: NDArray[np.float64],
-        taken: NDArray[np.float64],
-        allowed_deg: ArrayLike | None,
-        max_travel_deg: float,
-    ) -> NDArray[np.bool_]:
-        may = circular_distance_deg(here[:, None], taken).min(axis=1) >= MIN_SEPARATION_DEG
-        may &= travel_deg(here) <= max_travel_deg
-        if allowed_deg is not None:
-            width = 360.0 / len(here)
-            given = np.asarray(allowed_deg, dtype=np.float64).ravel()
-            if not given.size or not np.isfinite(given).all():
-                raise UserError("allowed rotations: give one at least, in degrees")
-            may &= circular_distance_deg(here[:, None], given).min(axis=1) <= width / 2
-        return np.asarray(may)
-
 
 def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float64]:
     """Return how much each calibration turn (S,) counts for frames of an elevation, or of any."""
@@ -338,16 +333,22 @@ def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float6
     return bundle.turn_weight * elevation_share(bundle.elevation_deg, known)
 
 
-def _need_rotations(rotations_deg: Sequence[float], n: int) -> None:
-    if len(rotations_deg) != n:
+def _as_rotations(rotations_deg: float | Sequence[float], n: int) -> list[float]:
+    try:
+        given = np.atleast_1d(np.asarray(rotations_deg, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise UserError(f"rotations: {rotations_deg!r} are no numbers of degrees") from None
+    rotations = [float(rotation) for rotation in given.ravel()]
+    if given.shape != (n,):
         raise UserError(
-            f"{n} frames need as many rotations, from the first frame's place: 0, …; there are "
-            f"{len(rotations_deg)}"
+            f"{counted(n, 'frame')} and {counted(len(rotations), 'rotation')}: give one for each "
+            "frame, from the first frame's place: 0, …"
         )
-    if not all(math.isfinite(rotation) for rotation in rotations_deg):
+    if not all(math.isfinite(rotation) for rotation in rotations):
         raise UserError("a rotation is no finite number of degrees")
-    if rotations_deg[0] != 0:
-        raise UserError(f"the first rotation is {rotations_deg[0]:g}; all count from it: 0")
+    if rotations[0] != 0:
+        raise UserError(f"the first rotation is {rotations[0]:g}; all count from it: 0")
+    return rotations
 
 
 def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.generic]]:
@@ -362,20 +363,87 @@ def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.gene
 def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[ArrayLike | None]:
     if mask is None:
         return [None] * n
-    masks = [mask] if isinstance(mask, np.ndarray) and mask.ndim == 2 else list(mask)  # type: ignore[arg-type]
+    is_one = isinstance(mask, np.ndarray) and (mask.ndim == 2 or mask.shape[2:] <= (4,))
+    masks: list[ArrayLike] = [np.asarray(mask)] if is_one else list(mask)  # type: ignore[arg-type]
     if len(masks) != n:
-        raise UserError(f"{n} frames and {len(masks)} masks: give one for each frame")
+        raise UserError(
+            f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"
+        )
     return masks
 
 
-def _local_best(error: NDArray[np.float64], here: NDArray[np.float64]) -> list[Move]:
-    """Return the moves that are better than their neighbours, best first."""
-    lower = (error <= np.roll(error, 1)) & (error <= np.roll(error, -1)) & np.isfinite(error)
-    places = np.flatnonzero(lower if lower.any() else np.isfinite(error))
-    order = places[np.lexsort((here[places], travel_deg(here[places]), error[places]))]
-    rotations = (-signed_difference_deg(0.0, here[order])).tolist()
+def _as_cameras(
+    intrinsics: IntrinsicsLike | Sequence[Intrinsics | None], n: int
+) -> Sequence[IntrinsicsLike]:
+    each = list(intrinsics) if isinstance(intrinsics, list | tuple) else []
+    if not each or not all(one is None or isinstance(one, Intrinsics) for one in each):
+        of_all: Any = intrinsics
+        return [of_all] * n
+    if len(each) != n:
+        raise UserError(
+            f"{counted(n, 'frame')} and {counted(len(each), 'camera')}: give intrinsics for all, "
+            "or for each frame"
+        )
+    return each
+
+
+def _reachable(
+    n_bins: int, taken: NDArray[np.float64], allowed_deg: ArrayLike | None, max_travel_deg: float
+) -> NDArray[np.float64]:
+    """Return the rotations (m,) that the camera may take, in (-180, 180], by size in [0, 360).
+
+    They are all bins, or those of `allowed_deg`, less what travels too far or is too near to a view
+    that was `taken`.
+    """
+    if allowed_deg is None:
+        rotation_deg = np.arange(n_bins) * (360.0 / n_bins)
+    else:
+        given = np.asarray(allowed_deg, dtype=np.float64).ravel()
+        if not given.size or not np.isfinite(given).all():
+            raise UserError("allowed rotations: give one at least, in degrees")
+        rotation_deg = given[np.unique(wrap_deg(given), return_index=True)[1]]
+    # A rotation that is in the range already keeps its bits.
+    is_within = (rotation_deg > -180.0) & (rotation_deg <= 180.0)
+    rotation_deg = np.where(is_within, rotation_deg, -signed_difference_deg(0.0, rotation_deg))
+    apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
+    may = rotation_deg[(apart >= MIN_SEPARATION_DEG) & (travel_deg(rotation_deg) <= max_travel_deg)]
+    if not may.size:
+        raise UserError(
+            "no rotation is allowed: widen --allowed or --max-travel; a view is "
+            f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
+        )
+    return may
+
+
+def _between(error: NDArray[np.float64], rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the errors (m,) at rotations, of those of the bins (B,); linear between bins."""
+    bins = np.arange(len(error)) * (360.0 / len(error))
+    return np.asarray(np.interp(rotation_deg, bins, error, period=360.0))
+
+
+def _is_near_bin(rotation_deg: NDArray[np.float64], n_bins: int) -> NDArray[np.bool_]:
+    """Return whether each bin is the nearest one of a rotation, (B,)."""
+    near = np.zeros(n_bins, dtype=bool)
+    near[nearest_bin(rotation_deg, n_bins)] = True
+    return near
+
+
+def _local_best(
+    rotation_deg: NDArray[np.float64], error: NDArray[np.float64], width: float
+) -> list[Move]:
+    """Return the moves that are better than their neighbours within a bin's width, best first.
+
+    Rotations are sorted by their place in [0, 360).
+    """
+    is_near = circular_distance_deg(np.roll(rotation_deg, -1), rotation_deg) <= width + 1e-9
+    is_better = np.roll(error, -1) < error
+    is_worse = np.roll(error, -1) > error
+    beaten = (is_near & is_better) | np.roll(is_near & is_worse, 1)
+    places = np.flatnonzero(~beaten)
+    travel = np.abs(rotation_deg)
+    order = places[np.lexsort((wrap_deg(rotation_deg[places]), travel[places], error[places]))]
     found: list[Move] = []
-    for rotation, expected in zip(rotations, error[order].tolist(), strict=True):
+    for rotation, expected in zip(rotation_deg[order].tolist(), error[order].tolist(), strict=True):
         apart = (abs(rotation - one.rotation_deg) for one in found)
         if all(min(angle, 360.0 - angle) >= MIN_SEPARATION_DEG for angle in apart):
             found.append(Move(rotation, abs(rotation), expected))

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.errors import UserError
 from nbv.frames.depth_files import DepthImage
 from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics
@@ -30,6 +31,9 @@ CROPPED_DEG = 25.0
 
 NEAREST, FARTHEST = 1.5, 20.0
 """Distances that are plausible, in diagonals."""
+
+# Diagonals: a limit of depth beyond it is none.
+_NO_LIMIT = 100.0
 
 # What mends a wrong unit, the likeliest first: millimetres, tenths and quarters of them,
 # centimetres, and back.
@@ -134,6 +138,30 @@ def _facing(
     across = np.array([[0.0, 0.0, ray[0]], [0.0, 0.0, ray[1]], [-ray[0], -ray[1], 0.0]])
     turn = np.eye(3) + across + across @ across / (1.0 + ray[2])
     return turn.T, principal
+
+
+def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:
+    """Refuse limits of depth that are no metres.
+
+    Parameters
+    ----------
+    near_m, far_m : float, optional
+        See `nbv.frames.masks.object_mask`.
+    diagonal_m : float
+        Of the object's bounding box, metres.
+
+    Raises
+    ------
+    UserError
+        Where the object would lie beyond all plausible distances, or might lie anywhere.
+    """
+    limits = (("--near", near_m, FARTHEST), ("--far", far_m, _NO_LIMIT))
+    for name, limit_m, most in limits:
+        if limit_m is not None and most * diagonal_m < limit_m < math.inf:
+            raise UserError(
+                f"{name}={limit_m:g}: give metres; the object is {NEAREST * diagonal_m:.2g} to "
+                f"{FARTHEST * diagonal_m:.2g} m away"
+            )
 
 
 def need_plausible_nearest(

@@ -28,7 +28,9 @@ _NUMBERS = "biuf"
 _PGM_HEADER = re.compile(rb"P[25]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)")
 
 
-def read_depth(path: str | Path, depth_scale: float | None = None) -> DepthImage:
+def read_depth(
+    path: str | Path, depth_scale: float | None = None, unit_m: float = MILLIMETRE
+) -> DepthImage:
     """Read one depth image.
 
     Parameters
@@ -37,8 +39,9 @@ def read_depth(path: str | Path, depth_scale: float | None = None) -> DepthImage
         ``.npy``, ``.npz`` (one array, or one that is called ``depth``), or a 16-bit image:
         ``.png``, ``.tif``, ``.pgm``.
     depth_scale : float, optional
-        Metres per unit of whole numbers; a millimetre without it. (BOP's ``depth_scale`` counts
-        millimetres: divide it by 1000.)
+        Metres per unit. (BOP's ``depth_scale`` counts millimetres: divide it by 1000.)
+    unit_m : float
+        Metres per unit of whole numbers where there is no `depth_scale`.
 
     Returns
     -------
@@ -60,7 +63,7 @@ def read_depth(path: str | Path, depth_scale: float | None = None) -> DepthImage
     ...     nbv.read_depth(f"{folder}/depth.npy").round(3).tolist()
     [[0.7300000190734863, 0.0]]
     """
-    return to_metres(_read_array(Path(path)), depth_scale, str(path))
+    return to_metres(_read_array(Path(path)), depth_scale, str(path), unit_m)
 
 
 def read_mask(path: str | Path) -> NDArray[np.bool_]:
@@ -82,7 +85,10 @@ def read_mask(path: str | Path) -> NDArray[np.bool_]:
 
 
 def to_metres(
-    values: NDArray[Any], depth_scale: float | None = None, name: str = "depth"
+    values: NDArray[Any],
+    depth_scale: float | None = None,
+    name: str = "depth",
+    unit_m: float = MILLIMETRE,
 ) -> DepthImage:
     """Return a depth image in metres, 0 where nothing was measured; see `read_depth`."""
     values = np.asarray(values)
@@ -98,7 +104,7 @@ def to_metres(
     elif np.issubdtype(values.dtype, np.integer):
         if values.dtype.itemsize == 1:
             raise FrameError("few-levels", f"{name} has 8 bits a pixel, and depth needs 16")
-        scale = MILLIMETRE if depth_scale is None else depth_scale
+        scale = unit_m if depth_scale is None else depth_scale
     else:
         raise UserError(f"{name} holds {values.dtype}, no numbers")
     # What overflows is as far away as what is infinite: nothing was measured.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
+from nbv.frames.crop import FARTHEST, NEAREST
 from nbv.frames.depth_files import DepthImage
 from nbv.frames.intrinsics import Intrinsics
 from nbv.meshes.normalisation import check_mesh, normalise
@@ -76,10 +77,9 @@ def draw_frame(
     Raises
     ------
     UserError
-        Where the object does not fit the frame.
+        Where an angle is none, or the object would be nearer or farther than is plausible.
     """
-    if not (math.isfinite(diagonal_m) and diagonal_m > 0):
-        raise UserError(f"a diagonal of {diagonal_m:g} m: it must be above 0")
+    _need_view(azimuth_deg, elevation_deg, distance_m, diagonal_m)
     focal_px = _KINECT.focal_px
     fov_deg = math.degrees(2 * math.atan(WIDTH / 2 / focal_px))
     camera = Camera(distance_m / diagonal_m, fov_deg, WIDTH, framing="axis")
@@ -90,10 +90,28 @@ def draw_frame(
         depth = _KINECT(depth, camera, diagonal_m, np.random.default_rng(seed))
     above = (WIDTH - HEIGHT) // 2
     depth_m = (depth[0, above : above + HEIGHT] * np.float32(diagonal_m)).astype(np.float32)
+    if not depth_m.any():
+        raise UserError("no pixel of the object is seen in this frame: bring the camera nearer")
     intrinsics = Intrinsics(
         focal_px, focal_px, WIDTH / 2 - 0.5, HEIGHT / 2 - 0.5, width=WIDTH, height=HEIGHT
     )
     return Frame(depth_m, depth_m > 0, intrinsics, azimuth_deg, elevation_deg)
+
+
+def _need_view(
+    azimuth_deg: float, elevation_deg: float, distance_m: float, diagonal_m: float
+) -> None:
+    if not math.isfinite(azimuth_deg):
+        raise UserError(f"an azimuth of {azimuth_deg:g}°: give a number of degrees")
+    if not -90 <= elevation_deg <= 90:
+        raise UserError(f"an elevation of {elevation_deg:g}°: it lies from -90 to 90")
+    if not (math.isfinite(diagonal_m) and diagonal_m > 0):
+        raise UserError(f"a diagonal of {diagonal_m:g} m: it must be above 0")
+    if not NEAREST * diagonal_m <= distance_m <= FARTHEST * diagonal_m:
+        raise UserError(
+            f"a distance of {distance_m:g} m from an object of {diagonal_m:g} m: "
+            f"{NEAREST * diagonal_m:.2g} to {FARTHEST * diagonal_m:.2g} m are plausible"
+        )
 
 
 def example_frame(azimuth_deg: float = 75.0, elevation_deg: float = 15.0) -> Frame:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nbv.errors import UserError
+from nbv.frames.depth_files import MILLIMETRE
 from nbv.frames.errors import FrameError
 
 
@@ -97,32 +99,90 @@ def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
     raise UserError(f"intrinsics: {len(numbers)} numbers; give f, or fx,fy,cx,cy, or a 3x3 matrix")
 
 
-def parse_intrinsics(text: str) -> Intrinsics:
-    """Return intrinsics from ``f``, ``fx,fy,cx,cy`` or the name of a camera file.
+@dataclass(frozen=True)
+class DepthCamera:
+    """What is known of the camera that took a frame.
+
+    Attributes
+    ----------
+    intrinsics : Intrinsics, optional
+    unit_m : float
+        Metres per unit of a frame of whole numbers.
+    """
+
+    intrinsics: Intrinsics | None = None
+    unit_m: float = MILLIMETRE
+
+
+def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
+    """Return the camera of a frame, from ``f``, ``fx,fy,cx,cy`` or the name of a camera file.
 
     A camera file is JSON or YAML: BOP's ``camera.json`` (``fx, fy, cx, cy, width, height``) or
-    ``cam_K``, or ROS's ``CameraInfo`` (``k`` or ``K``, or ``camera_matrix.data``).
+    ``cam_K``, both with ``depth_scale`` or without; BOP's ``scene_camera.json``, which has a camera
+    for each image; or ROS's ``CameraInfo`` (``k`` or ``K``, or ``camera_matrix.data``).
+
+    Parameters
+    ----------
+    text : str or None
+        None where nothing is known.
+    frame : path
+        The number at the end of its name, without the suffix, is that of the image in a
+        ``scene_camera.json``, as BOP names images. Where all images have the same camera, the name
+        does not matter.
 
     Raises
     ------
     UserError
-        Where it is neither.
+        Where the text is none of this, or the file has no camera for the frame.
     """
+    if text is None:
+        return DepthCamera()
     parts = text.split(",")
     try:
-        return as_intrinsics([float(part) for part in parts])
+        return DepthCamera(as_intrinsics([float(part) for part in parts]))
     except ValueError:
         pass
     path = Path(text)
     try:
         if not path.is_file():
-            raise UserError(f"--intrinsics={text}: no numbers fx,fy,cx,cy and no camera file")
-        return _of_mapping(_read_mapping(path), path)
+            raise UserError(f"--intrinsics={text}: {_what_is_missing(path)}")
+        values = _read_mapping(path)
+        return _of_mapping(_of_image(values, path, Path(frame)), path)
     except UserError:
         raise
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise UserError(f"{path} cannot be read ({reason})") from error
+
+
+def _what_is_missing(path: Path) -> str:
+    if path.is_dir():
+        return "this is a folder; name a camera file in it, or give fx,fy,cx,cy"
+    if path.suffix or len(path.parts) > 1:
+        return "the file does not exist; name a camera file, or give fx,fy,cx,cy"
+    return "no numbers fx,fy,cx,cy, and no file of this name exists"
+
+
+def _of_image(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[str, Any]:
+    """Return what a camera file has for a frame: that of its image, where each has its own."""
+    by_image: dict[int, Mapping[str, Any]] = {
+        int(key): value for key, value in values.items() if str(key).isdecimal()
+    }
+    if not by_image or len(by_image) < len(values):
+        return values
+    cameras = list(by_image.values())
+    if not all(isinstance(camera, Mapping) for camera in cameras):
+        raise UserError(f"{path} holds images without a camera")
+    known = [{key: camera.get(key) for key in ("cam_K", "depth_scale")} for camera in cameras]
+    if all(camera == known[0] for camera in known):
+        return known[0]
+    number = re.search(r"\d+$", frame.stem)
+    if number is None or int(number[0]) not in by_image:
+        raise UserError(
+            f"{path} has cameras of images {min(by_image)} to {max(by_image)}, and none for "
+            f"{frame.name}: a frame is named by its image, as 000012.png is; or give fx,fy,cx,cy"
+        )
+    return by_image[int(number[0])]
 
 
 def _read_mapping(path: Path) -> Mapping[str, Any]:
@@ -139,7 +199,7 @@ def _read_mapping(path: Path) -> Mapping[str, Any]:
     return values
 
 
-def _of_mapping(values: Mapping[str, Any], path: Path) -> Intrinsics:
+def _of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
     size = (
         values.get("width", values.get("image_width")),
         values.get("height", values.get("image_height")),
@@ -154,4 +214,15 @@ def _of_mapping(values: Mapping[str, Any], path: Path) -> Intrinsics:
         matrix = [values[name] for name in ("fx", "fy", "cx", "cy")]
     found = as_intrinsics(matrix)
     width, height = (int(side) if isinstance(side, int | float) else None for side in size)
-    return Intrinsics(found.fx, found.fy, found.cx, found.cy, width, height)
+    intrinsics = Intrinsics(found.fx, found.fy, found.cx, found.cy, width, height)
+    return DepthCamera(intrinsics, _unit_m(values.get("depth_scale"), path))
+
+
+def _unit_m(depth_scale: Any, path: Path) -> float:
+    """Return metres per unit, of millimetres per unit as BOP has them."""
+    if depth_scale is None:
+        return MILLIMETRE
+    is_number = isinstance(depth_scale, int | float) and not isinstance(depth_scale, bool)
+    if not (is_number and 0 < depth_scale < math.inf):
+        raise UserError(f"{path}: depth_scale={depth_scale!r} must be above 0 (BOP: millimetres)")
+    return float(depth_scale) * MILLIMETRE

@@ -62,8 +62,19 @@ def object_mask(
         Where mask and frame have different sizes, or the limits are no range.
     """
     inside = depth_m > 0
+    if not inside.any():
+        raise FrameError(
+            "empty-mask", "the frame has no depth at all: is the sensor covered, or too near?"
+        )
     if mask is not None:
         given = np.asarray(mask) != 0
+        if given.ndim == 3 and given.shape[2] == 1:
+            given = given[:, :, 0]
+        if given.ndim != 2:
+            raise UserError(
+                f"the mask has {given.ndim} axes; give rows and columns alone, such as one channel "
+                "of a colour image"
+            )
         if given.shape != depth_m.shape:
             raise UserError(
                 f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}"

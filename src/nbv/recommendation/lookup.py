@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -50,9 +51,30 @@ class LookupTable:
     criterion: str
 
     def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
-        """Return the recommended rotation for each estimate, degrees in [0, 360)."""
+        """Return the rotation to the next view for each estimate, degrees in [0, 360).
+
+        It is that of least cost which travels more than a bin. A view from the same place is no
+        second view: the same image gives the same error again. The cost of a table of few objects
+        may still be least there, because it takes views as independent.
+        """
+        bins = nearest_bin(estimate_deg, len(self.cost))
+        return np.asarray(self._next_view_deg[bins])
+
+    def least_cost(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
+        """Return the rotation of least cost for each estimate (Eq. 2), whatever it travels."""
         bins = nearest_bin(estimate_deg, len(self.cost))
         return np.asarray(self.recommended_delta_deg[bins])
+
+    @cached_property
+    def _next_view_deg(self) -> NDArray[np.int64]:
+        n_bins = len(self.cost)
+        width = 360.0 / n_bins
+        stays = travel_deg(self.recommended_delta_deg) <= width
+        is_far = travel_deg(np.arange(n_bins) * width) > width
+        moving = np.where(is_far, self.cost[stays], np.inf)
+        found = self.recommended_delta_deg.copy()
+        found[stays] = least_cost_delta(moving)
+        return found
 
 
 def least_cost_delta(

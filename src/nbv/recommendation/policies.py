@@ -115,11 +115,11 @@ def _oracle(turns: Turns, fusion: str) -> Rotations:
 def _recommended(criterion: str, turns: Turns, fusion: str) -> Rotations:
     """Return the rotation of least cost at each image's distribution, or at each estimate."""
     if turns.lookup is not None:
-        return turns.lookup.recommend(turns.estimate_deg)
+        return turns.lookup.least_cost(turns.estimate_deg)
     if turns.evidence is None:
         raise ValueError(f"policy {criterion!r} needs a lookup table or evidence")
     if turns.distributions is None:
-        return build_lookup(turns.evidence, criterion, fusion).recommend(turns.estimate_deg)
+        return build_lookup(turns.evidence, criterion, fusion).least_cost(turns.estimate_deg)
     rows = turns.distributions.reshape(-1, turns.evidence.n_bins).astype(np.float32)
     cost = CRITERIA[criterion](Belief(rows, turns.evidence), turns.evidence, fusion)
     return recommended_delta(cost, turns.evidence.settings).reshape(turns.estimate_deg.shape)

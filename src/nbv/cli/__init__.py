@@ -5,26 +5,34 @@ Commands import what they use when they run, so that ``nbv --help`` stays quick.
 
 from __future__ import annotations
 
-import json as json_
 import math
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from cyclopts import App, CycloptsError, Parameter
 
 from nbv import __version__
+from nbv.cli.answers import (
+    recommendation_as_json,
+    say,
+    say_evaluation,
+    say_json,
+    say_names,
+    say_recommendation,
+)
+from nbv.cli.arguments import Numbers, WholeNumbers, joined_numbers, need_writable
 from nbv.errors import UserError
+from nbv.labels import counted
 
 if TYPE_CHECKING:
     import numpy as np
-    import pandas as pd
     from numpy.typing import NDArray
 
-    from nbv.bundles.manifest import Recording
-    from nbv.bundles.recommender import Recommendation, Recommender
-    from nbv.frames.intrinsics import Intrinsics
+    from nbv.bundles.recommender import Recommender
+    from nbv.bundles.turns import Turn
 
 USER_ERROR = 2
 
@@ -36,44 +44,51 @@ app = App(
     result_action="return_value",
 )
 
-Numbers = Annotated[list[float] | None, Parameter(consume_multiple=True)]
+FIGURES = (".png", ".pdf", ".svg")
+
+# Products of small matrices on several threads wait for one another.
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return 0, or 2 after a line that says what the user can mend."""
+    given = sys.argv[1:] if arguments is None else arguments
     try:
-        app(
-            list(sys.argv[1:] if arguments is None else arguments),
-            exit_on_error=False,
-            print_error=False,
-        )
+        app(joined_numbers(given), exit_on_error=False, print_error=False)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read the output has seen enough. The interpreter flushes once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         # Of a file to write: readers name the file themselves.
         where = f"{error.filename}: " if error.filename else ""
-        print(f"nbv: error: {where}{error.strerror}", file=sys.stderr)  # noqa: T201
-        return USER_ERROR
+        return _refused(f"{where}{error.strerror}")
     except (UserError, CycloptsError) as error:
-        message = " ".join(str(error).split())
-        print(f"nbv: error: {message}", file=sys.stderr)  # noqa: T201
-        return USER_ERROR
+        return _refused(" ".join(str(error).split()))
     return 0
+
+
+def _refused(message: str) -> int:
+    print(f"nbv: error: {message}", file=sys.stderr)  # noqa: T201
+    return USER_ERROR
 
 
 def run() -> NoReturn:
     """Run the command of the command line, and exit."""
+    # Before numpy is imported, which reads them once.
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
     sys.exit(main())
 
 
 @app.command
 def recommend(
-    frames: Annotated[list[Path] | None, Parameter(name="FRAME")] = None,
-    /,
-    *,
+    *frames: Annotated[Path, Parameter(name="FRAME", negative=())],
     bundle: str = "mug",
     rotations: Numbers = None,
     depth_scale: float | None = None,
     intrinsics: str | None = None,
-    mask: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
+    mask: Annotated[list[Path] | None, Parameter(consume_multiple=True, negative=())] = None,
     near: float | None = None,
     far: float | None = None,
     elevation: float | None = None,
@@ -97,13 +112,13 @@ def recommend(
     bundle
         A bundle that comes with nbv, or a file.
     rotations
-        Where each frame was taken, from the first frame's place: 0 90 for two frames.
+        Where each frame was taken, from the first frame's place: 0 90, or 0,90, for two frames.
     depth_scale
         Metres per unit of whole numbers; 0.001 without it.
     intrinsics
         fx,fy,cx,cy in pixels, or a camera file (BOP, ROS CameraInfo).
     mask
-        Masks of the object, one for each frame.
+        Masks of the object, one for each frame. The frames stand before this option.
     near
         The object lies beyond this, metres.
     far
@@ -128,38 +143,55 @@ def recommend(
         Print JSON.
     """
     if table is not None or estimate is not None:
-        of_frames = {"FRAME": frames, "--allowed": allowed, "--axis": axis, "--plot": plot}
+        of_frames: dict[str, object] = {
+            "FRAME": frames or None,
+            "--allowed": allowed,
+            "--axis": axis,
+        }
+        of_frames |= {"--plot": plot}
         of_frames |= {"--camera-pose": camera_pose, "--mask": mask, "--rotations": rotations}
+        of_frames |= {"--intrinsics": intrinsics, "--depth-scale": depth_scale, "--near": near}
+        of_frames |= {"--far": far, "--elevation": elevation}
         if ignored := [name for name, value in of_frames.items() if value is not None]:
             raise UserError(f"{ignored[0]} does not go with --estimate and --table; leave it out")
         _recommend_by_table(estimate, table, as_json=json)
         return
     if not frames:
-        raise UserError("give a depth frame, or --estimate with --table")
+        hint = "; frames stand before --mask" if mask is not None else ""
+        raise UserError(f"give a depth frame, or --estimate with --table{hint}")
+    if plot is not None:
+        need_writable("--plot", plot, FIGURES)
+    place = _known_place(camera_pose, axis)
+    from nbv.bundles.moves import moved_camera
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask
+    from nbv.frames.intrinsics import camera_of
 
     recommender = Recommender.load(bundle)
+    cameras = [camera_of(intrinsics, path) for path in frames]
     answer = recommender.recommend(
-        [read_depth(path, depth_scale) for path in frames],
+        [
+            read_depth(path, depth_scale, camera.unit_m)
+            for path, camera in zip(frames, cameras, strict=True)
+        ],
         rotations_deg=rotations if rotations is not None else [0.0],
         mask=None if mask is None else [read_mask(path) for path in mask],
-        intrinsics=_camera(intrinsics),
+        intrinsics=[camera.intrinsics for camera in cameras],
         near_m=near,
         far_m=far,
         elevation_deg=elevation,
         allowed_deg=allowed,
         max_travel_deg=max_travel,
     )
-    target = _target_pose(answer, camera_pose, axis)
-    if json:
-        _print_json(_answer_as_json(answer, target))
-    else:
-        _print_answer(answer, recommender, len(frames), intrinsics is None, target)
+    target = None if place is None else moved_camera(*place, answer.move.rotation_deg)
     if plot is not None:
         from nbv.reporting.recommendation import draw_recommendation
 
         draw_recommendation(answer, plot, recommender.bundle.category)
+    if json:
+        say_json(recommendation_as_json(answer, target))
+    else:
+        say_recommendation(answer, recommender.bundle, intrinsics is not None, target)
 
 
 @app.command
@@ -169,7 +201,7 @@ def calibrate(
     *,
     output: Path,
     bundle: str | None = None,
-    criterion: str = "pose_ambiguity",
+    criterion: str | None = None,
     intrinsics: str | None = None,
     depth_scale: float | None = None,
 ) -> None:
@@ -188,38 +220,43 @@ def calibrate(
     bundle
         The bundle whose network sees the frames.
     criterion
-        Of the lookup table: pose_ambiguity, information_gain, expected_dispersion or
-        expected_error.
+        Of the lookup table: pose_ambiguity (without this option), information_gain,
+        expected_dispersion or expected_error.
     intrinsics
         fx,fy,cx,cy in pixels, or a camera file, for frames.
     depth_scale
         Metres per unit of whole numbers; 0.001 without it.
     """
     if bundle is None:
-        from nbv.bundles.calibration import DENSITY
-        from nbv.calibration.pairs import read_pairs
-        from nbv.errors import nearest
-        from nbv.recommendation.criteria import CRITERIA
-        from nbv.recommendation.density_selection import chosen_lookup
-        from nbv.recommendation.lookup import save_lookup
-
-        if output.suffix != ".npz":
-            raise UserError(f"--output={output}: a lookup table is an .npz file")
-        if criterion not in CRITERIA:
-            raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
-        estimates = read_pairs(source).estimate_deg
-        save_lookup(output, chosen_lookup(estimates, criterion, DENSITY))
-        _print(f"{output}: {criterion} from {len(estimates)} objects")
+        of_frames = {"--intrinsics": intrinsics, "--depth-scale": depth_scale}
+        if ignored := [name for name, value in of_frames.items() if value is not None]:
+            raise UserError(f"{ignored[0]} is for frames, which need --bundle: --bundle mug")
+        if output.suffix.lower() == ".safetensors":
+            raise UserError(
+                f"--output={output} is a bundle, and frames make one with --bundle: add "
+                "--bundle mug; pairs make a table, an .npz file"
+            )
+        need_writable("--output", output, [".npz"])
+        _calibrate_table(source, output, criterion or "pose_ambiguity")
         return
+    if criterion is not None:
+        raise UserError("--criterion is for pairs, which need no --bundle; leave one of them out")
+    need_writable("--output", output, [".safetensors"])
+    from nbv.bundles.beliefs import distributions_of
     from nbv.bundles.bundle import save_bundle
     from nbv.bundles.calibration import recalibrated
-    from nbv.bundles.manifest import see
+    from nbv.recommendation.belief import mean_direction_deg
 
-    recommender, recordings = _opened(bundle, source)
-    camera = _camera(intrinsics)
-    turns = [see(recommender, one, camera, depth_scale, _print) for one in recordings]
-    save_bundle(output, recalibrated(recommender.bundle, turns, str(source)))
-    _print(f"{output}: {recommender.bundle.category}, {len(turns)} recordings calibrate it")
+    recommender, turns = _seen_turns(bundle, source, intrinsics, depth_scale, say)
+    calibrated = recalibrated(recommender.bundle, turns, str(source))
+    for turn in turns:
+        seen = distributions_of(turn.logits, recommender.bundle.temperature)
+        estimate_deg = mean_direction_deg(seen)
+        name = f"{turn.object_id}, sequence {turn.sequence}"
+        _say_offset(name, counted(len(estimate_deg), "frame"), turn.azimuth_deg, estimate_deg)
+    save_bundle(output, calibrated)
+    calibrate_it = "recording calibrates it" if len(turns) == 1 else "recordings calibrate it"
+    say(f"{output}: {recommender.bundle.category}, {len(turns)} {calibrate_it}")
 
 
 @app.command
@@ -228,7 +265,7 @@ def evaluate(
     /,
     *,
     bundle: str = "mug",
-    views: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
+    views: WholeNumbers = None,
     intrinsics: str | None = None,
     depth_scale: float | None = None,
     output: Path | None = None,
@@ -254,25 +291,22 @@ def evaluate(
     json
         Print JSON.
     """
+    if output is not None:
+        need_writable("--output", output, [".csv"])
     from nbv.bundles.evaluation import evaluate as evaluate_
     from nbv.bundles.evaluation import familiarity_of
-    from nbv.bundles.manifest import see
     from nbv.files import write_csv
 
-    recommender, recordings = _opened(bundle, manifest)
-    tell = (lambda line: print(line, file=sys.stderr)) if json else _print  # noqa: T201
-    camera = _camera(intrinsics)
-    turns = [see(recommender, one, camera, depth_scale, tell) for one in recordings]
+    tell = (lambda line: print(line, file=sys.stderr)) if json else say  # noqa: T201
+    recommender, turns = _seen_turns(bundle, manifest, intrinsics, depth_scale, tell)
     found = evaluate_(recommender.bundle, turns, views or [2, 3, 4, 5])
     if output is not None:
         write_csv(output, found)
     familiar = familiarity_of(recommender.bundle, turns)
     if json:
-        _print_json(
-            {"errors": found.to_dict("records"), "familiarity": familiar.to_dict("records")}
-        )
+        say_json({"errors": found.to_dict("records"), "familiarity": familiar.to_dict("records")})
     else:
-        _print_evaluation(found, familiar)
+        say_evaluation(found, familiar)
 
 
 @app.command
@@ -317,6 +351,7 @@ def render(
     """
     if (mesh is None) != example:
         raise UserError("give a mesh file, or --example")
+    need_writable("--output", output, [".npy"])
     import numpy as np
 
     from nbv.files import replacing
@@ -324,12 +359,10 @@ def render(
 
     shape = example_mesh() if mesh is None else read_mesh(mesh, up, front)
     frame = draw_frame(shape, azimuth, elevation, distance, diagonal, noise=noise)
-    if output.suffix != ".npy":
-        raise UserError(f"--output={output}: give a name that ends in .npy")
     with replacing(output) as temporary:
         np.save(temporary, frame.depth_m)
     camera = frame.intrinsics
-    _print(
+    say(
         f"{output}: {frame.mask.sum()} pixels of the object; "
         f"--intrinsics {camera.fx:g},{camera.fy:g},{camera.cx:g},{camera.cy:g}"
     )
@@ -368,11 +401,9 @@ def inspect(bundle: str = "mug", /, *, json: bool = False) -> None:
         **held.provenance,
     }
     if json:
-        _print_json(about)
-        return
-    width = max(map(len, about))
-    for name, value in about.items():
-        _print(f"{name:<{width}}  {value}")
+        say_json(about)
+    else:
+        say_names(about)
 
 
 @app.command
@@ -386,6 +417,7 @@ def export(bundle: str = "mug", /, *, onnx: Path) -> None:
     onnx
         The file to write.
     """
+    need_writable("--onnx", onnx, [".onnx"])
     from nbv.bundles.bundle import load_bundle
     from nbv.bundles.onnx_graph import onnx_model
     from nbv.bundles.recommender import bundle_path
@@ -394,20 +426,50 @@ def export(bundle: str = "mug", /, *, onnx: Path) -> None:
     model = onnx_model(load_bundle(bundle_path(bundle)))
     with replacing(onnx) as temporary:
         temporary.write_bytes(model.SerializeToString())
-    _print(f"{onnx}: codes (n, 1, side, side) to logits")
+    say(f"{onnx}: codes (n, 1, side, side) to logits")
 
 
-def _camera(intrinsics: str | None) -> Intrinsics | None:
-    from nbv.frames.intrinsics import parse_intrinsics
+def _calibrate_table(source: Path, output: Path, criterion: str) -> None:
+    import numpy as np
 
-    return None if intrinsics is None else parse_intrinsics(intrinsics)
+    from nbv.bundles.calibration import DENSITY
+    from nbv.calibration.pairs import read_pairs
+    from nbv.errors import nearest
+    from nbv.recommendation.criteria import CRITERIA
+    from nbv.recommendation.density_selection import chosen_lookup
+    from nbv.recommendation.lookup import save_lookup
+
+    if criterion not in CRITERIA:
+        raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
+    estimates = read_pairs(source).estimate_deg
+    azimuth_deg = np.broadcast_to(np.arange(estimates.shape[1], dtype=np.float64), estimates.shape)
+    save_lookup(output, chosen_lookup(estimates, criterion, DENSITY))
+    _say_offset(str(source), counted(len(estimates), "object"), azimuth_deg, estimates)
+    say(f"{output}: {criterion} from {counted(len(estimates), 'object')}")
 
 
-def _opened(bundle: str, manifest: Path) -> tuple[Recommender, list[Recording]]:
-    from nbv.bundles.manifest import read_manifest
+def _say_offset(
+    name: str, number: str, azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
+) -> None:
+    from nbv.calibration.offset import constant_offset_deg, offset_warning
+
+    say(f"{name}: {number}; offset {constant_offset_deg(estimate_deg - azimuth_deg):+.1f}°")
+    if warning := offset_warning(azimuth_deg, estimate_deg):
+        say(f"careful    {warning}")
+
+
+def _seen_turns(
+    bundle: str,
+    manifest: Path,
+    intrinsics: str | None,
+    depth_scale: float | None,
+    tell: Callable[[str], None],
+) -> tuple[Recommender, list[Turn]]:
+    from nbv.bundles.manifest import read_manifest, see
     from nbv.bundles.recommender import Recommender
 
-    return Recommender.load(bundle), read_manifest(manifest)
+    recommender, recordings = Recommender.load(bundle), read_manifest(manifest)
+    return recommender, [see(recommender, one, intrinsics, depth_scale, tell) for one in recordings]
 
 
 def _recommend_by_table(estimate: float | None, table: Path | None, *, as_json: bool) -> None:
@@ -440,114 +502,24 @@ def _recommend_by_table(estimate: float | None, table: Path | None, *, as_json: 
         "cost": cost,
     }
     if as_json:
-        _print_json(about)
+        say_json(about)
         return
-    _print(
+    say(
         f"turn the camera by {about['rotation_deg']:+d}°, travel {about['travel_deg']:g}° "
         f"({lookup.criterion} {cost:.3f})"
     )
 
 
-def _target_pose(
-    answer: Recommendation, camera_pose: Path | None, axis: list[float] | None
-) -> NDArray[np.float64] | None:
+def _known_place(
+    camera_pose: Path | None, axis: list[float] | None
+) -> tuple[NDArray[np.float64], list[float], list[float]] | None:
+    """Return the camera's pose, and a point and the direction of the object's axis."""
     if camera_pose is None and axis is None:
         return None
     if camera_pose is None or axis is None:
         raise UserError("--camera-pose and --axis belong together")
     if len(axis) not in (3, 6):
         raise UserError(f"--axis has {len(axis)} numbers; give a point, or a point and a direction")
-    from nbv.bundles.moves import moved_camera, read_pose
+    from nbv.bundles.moves import read_pose
 
-    direction = axis[3:] or [0.0, 0.0, 1.0]
-    return moved_camera(read_pose(camera_pose), axis[:3], direction, answer.move.rotation_deg)
-
-
-def _answer_as_json(answer: Recommendation, target: NDArray[np.float64] | None) -> dict[str, Any]:
-    def move(one: Any) -> dict[str, float]:
-        return {
-            "rotation_deg": one.rotation_deg,
-            "travel_deg": one.travel_deg,
-            "expected_error_deg": one.expected_error_deg,
-        }
-
-    about: dict[str, Any] = {
-        "azimuth_deg": answer.azimuth_deg,
-        "spread_deg": answer.spread_deg,
-        "expected_error_deg": answer.expected_error_deg,
-        "move": move(answer.move),
-        "alternatives": [move(one) for one in answer.alternatives],
-        "unfamiliarity": answer.unfamiliarity,
-        "belief": answer.belief.tolist(),
-        "error_after_deg": [None if e == float("inf") else e for e in answer.error_after_deg],
-    }
-    if target is not None:
-        about["target_camera_pose"] = target.tolist()
-    return about
-
-
-def _print_answer(
-    answer: Recommendation,
-    recommender: Recommender,
-    n_frames: int,
-    assumed: bool,
-    target: NDArray[np.float64] | None,
-) -> None:
-    bundle, move = recommender.bundle, answer.move
-    if assumed:
-        _print(f"camera     not given: a focal length of {bundle.focal_px:g} px is assumed")
-    _print(
-        f"pose       azimuth {answer.azimuth_deg:.1f}° about the {bundle.category}; "
-        f"expected error {answer.expected_error_deg:.1f}°, spread {answer.spread_deg:.1f}° "
-        f"({n_frames} {'view' if n_frames == 1 else 'views'})"
-    )
-    _print(
-        f"next view  turn by {move.rotation_deg:+.0f}° (travel {move.travel_deg:.0f}°): "
-        f"expected error {move.expected_error_deg:.1f}°"
-    )
-    if answer.alternatives:
-        others = (
-            f"{m.rotation_deg:+.0f}° ({m.expected_error_deg:.1f}°)" for m in answer.alternatives
-        )
-        _print(f"or         {', '.join(others)}")
-    if answer.is_unfamiliar:
-        _print(
-            f"careful    a frame is like nothing that was calibrated "
-            f"({answer.unfamiliarity:.1f} times the limit): check mask, units and category"
-        )
-    if target is not None:
-        _print("target camera pose in the base frame")
-        for row in target:
-            _print("  " + " ".join(f"{value:9.5f}" for value in row))
-
-
-def _print_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
-    for about in familiar.to_dict("records"):
-        is_own = (found["object_id"] == about["object_id"]) & (
-            found["sequence"] == about["sequence"]
-        )
-        rows = found[is_own]
-        _print(
-            f"{about['object_id']}, sequence {about['sequence']}: {about['n_frames']} frames; "
-            f"offset {rows['offset_deg'].iloc[0]:+.1f}°; {about['n_unfamiliar']} unfamiliar, "
-            f"{about['n_wrong']} wrong by more than 45°, {about['n_wrong_unfamiliar']} both"
-        )
-        numbers = sorted(rows["n_views"].unique())
-        _print(f"  {'MAE (without offset), degrees':<30}" + "".join(f"{n:>15}" for n in numbers))
-        for choice in dict.fromkeys(rows["choice"]):
-            of_choice = rows[rows["choice"] == choice].set_index("n_views")
-            cells = (
-                f"{of_choice['mae_deg'][n]:.1f} ({of_choice['mae_without_offset_deg'][n]:.1f})"
-                if n in of_choice.index
-                else ""
-                for n in numbers
-            )
-            _print(f"  {choice:<30}" + "".join(f"{cell:>15}" for cell in cells))
-
-
-def _print(line: str) -> None:
-    print(line)  # noqa: T201
-
-
-def _print_json(value: Any) -> None:
-    _print(json_.dumps(value, indent=2, ensure_ascii=False))
+    return read_pose(camera_pose), axis[:3], axis[3:] or [0.0, 0.0, 1.0]

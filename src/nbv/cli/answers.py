@@ -1,0 +1,130 @@
+"""What the commands print, for people and as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from nbv.labels import counted
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from nbv.bundles.bundle import Bundle
+    from nbv.bundles.recommender import Move, Recommendation
+
+
+def say(line: str) -> None:
+    """Print a line."""
+    print(line)  # noqa: T201
+
+
+def say_json(value: Any) -> None:
+    """Print JSON, indented."""
+    say(json.dumps(value, indent=2, ensure_ascii=False))
+
+
+def recommendation_as_json(
+    answer: Recommendation, target: NDArray[np.float64] | None
+) -> dict[str, Any]:
+    """Return a recommendation, with the target pose (4, 4) where there is one, for JSON."""
+
+    def move(one: Move) -> dict[str, float]:
+        return {
+            "rotation_deg": one.rotation_deg,
+            "travel_deg": one.travel_deg,
+            "expected_error_deg": one.expected_error_deg,
+        }
+
+    about: dict[str, Any] = {
+        "azimuth_deg": answer.azimuth_deg,
+        "spread_deg": answer.spread_deg,
+        "expected_error_deg": answer.expected_error_deg,
+        "move": move(answer.move),
+        "alternatives": [move(one) for one in answer.alternatives],
+        "unfamiliarity": answer.unfamiliarity,
+        "belief": answer.belief.tolist(),
+        "error_after_deg": [None if e == float("inf") else e for e in answer.error_after_deg],
+    }
+    if target is not None:
+        about["target_camera_pose"] = target.tolist()
+    return about
+
+
+def say_recommendation(
+    answer: Recommendation,
+    bundle: Bundle,
+    is_camera_known: bool,
+    target: NDArray[np.float64] | None,
+) -> None:
+    """Print a recommendation in a few lines."""
+    if not is_camera_known:
+        say(f"camera     not given: a focal length of {bundle.focal_px:g} px is assumed")
+    say(
+        f"pose       azimuth {answer.azimuth_deg:.1f}° about the {bundle.category}; "
+        f"expected error {answer.expected_error_deg:.1f}°, spread {answer.spread_deg:.1f}° "
+        f"({counted(len(answer.crops), 'view')})"
+    )
+    move = answer.move
+    say(
+        f"next view  turn by {move.rotation_deg:+g}° (travel {move.travel_deg:g}°): "
+        f"expected error {move.expected_error_deg:.1f}°"
+    )
+    if answer.alternatives:
+        others = (
+            f"{m.rotation_deg:+g}° ({m.expected_error_deg:.1f}°)" for m in answer.alternatives
+        )
+        say(f"or         {', '.join(others)}")
+    if answer.is_unfamiliar:
+        say(
+            f"careful    a frame is like nothing that was calibrated "
+            f"({answer.unfamiliarity:.1f} times the limit): check mask, units and category"
+        )
+    if target is not None:
+        say("target camera pose in the base frame")
+        for row in target:
+            say("  " + " ".join(f"{value:9.5f}" for value in row))
+
+
+def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
+    """Print the errors of every recording, a line for each way to choose views.
+
+    Parameters
+    ----------
+    found : DataFrame
+        From `nbv.bundles.evaluation.evaluate`.
+    familiar : DataFrame
+        From `nbv.bundles.evaluation.familiarity_of`.
+    """
+    for about in familiar.to_dict("records"):
+        is_own = (found["object_id"] == about["object_id"]) & (
+            found["sequence"] == about["sequence"]
+        )
+        rows = found[is_own]
+        say(
+            f"{about['object_id']}, sequence {about['sequence']}: "
+            f"{counted(about['n_frames'], 'frame')}; "
+            f"offset {rows['offset_deg'].iloc[0]:+.1f}°; {about['n_unfamiliar']} unfamiliar, "
+            f"{about['n_wrong']} wrong by more than 45°, {about['n_wrong_unfamiliar']} both"
+        )
+        numbers = sorted(rows["n_views"].unique())
+        say(f"  {'MAE (without offset), degrees':<30}" + "".join(f"{n:>15}" for n in numbers))
+        for choice in dict.fromkeys(rows["choice"]):
+            of_choice = rows[rows["choice"] == choice].set_index("n_views")
+            cells = (
+                f"{of_choice['mae_deg'][n]:.1f} ({of_choice['mae_without_offset_deg'][n]:.1f})"
+                if n in of_choice.index
+                else ""
+                for n in numbers
+            )
+            say(f"  {choice:<30}" + "".join(f"{cell:>15}" for cell in cells))
+
+
+def say_names(about: Mapping[str, Any]) -> None:
+    """Print names and values, one a line."""
+    width = max(map(len, about))
+    for name, value in about.items():
+        say(f"{name:<{width}}  {value}")

@@ -1,0 +1,80 @@
+"""What stands on the command line: lists of numbers, cameras, and files to write."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter, Token
+
+from nbv.errors import UserError
+
+
+def as_numbers(kind: Any, tokens: Sequence[Token]) -> list[Any]:
+    """Return the numbers of an option, between commas or spaces; `kind` is a list of some type."""
+    (number,) = kind.__args__
+    texts = [text for token in tokens for text in token.value.replace(",", " ").split()]
+    if not texts:
+        raise ValueError("give a number")
+    return [number(text) for text in texts]
+
+
+_LIST = Parameter(converter=as_numbers, n_tokens=1, negative=(), metavar="NUMBER...")
+
+Numbers = Annotated[list[float] | None, _LIST]
+WholeNumbers = Annotated[list[int] | None, _LIST]
+
+OF_NUMBERS = ("--rotations", "--allowed", "--axis", "--views", "--intrinsics")
+
+
+def joined_numbers(arguments: Sequence[str]) -> list[str]:
+    """Return arguments in which the numbers after an option of `OF_NUMBERS` are one.
+
+    The list ends where no number follows: the frame in ``--rotations 0 90 frame.npy`` is none.
+    """
+    found: list[str] = []
+    for argument in arguments:
+        if found and found[-1].split("=")[0] in OF_NUMBERS and _is_numbers(argument):
+            found[-1] += ("," if "=" in found[-1] else "=") + argument
+        else:
+            found.append(argument)
+    return found
+
+
+def _is_numbers(text: str) -> bool:
+    parts = text.replace(",", " ").split()
+    try:
+        return bool([float(part) for part in parts])
+    except ValueError:
+        return False
+
+
+def need_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:
+    """Refuse a file that cannot be written, before anything is computed.
+
+    Parameters
+    ----------
+    option : str
+        Such as ``--plot``.
+    path : path
+        Folders that it needs are made later.
+    kinds : sequence of str
+        The suffixes that it may have; any without it.
+
+    Raises
+    ------
+    UserError
+        Where the suffix is another one, the path is a folder, or a folder above it is no folder or
+        may not be written to.
+    """
+    if kinds and path.suffix.lower() not in kinds:
+        raise UserError(f"{option}={path}: give a name that ends in {' or '.join(kinds)}")
+    if path.is_dir():
+        raise UserError(f"{option}={path}: this is a folder; give the name of a file")
+    folder = next(parent for parent in path.absolute().parents if parent.exists())
+    if not folder.is_dir():
+        raise UserError(f"{option}={path}: {folder.name} is a file and no folder")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UserError(f"{option}={path}: the folder {folder} may not be written to")
