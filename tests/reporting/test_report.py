@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import base64
 import json
 import re
 from html import unescape
@@ -12,6 +11,7 @@ import pytest
 import synthetic
 from conftest import UNITS
 from nbv.errors import UserError
+from nbv.experiments.run_size import too_small
 from nbv.paper.claims import CLAIMS
 from nbv.paper.verdicts import evaluate_claims
 from nbv.reporting.paper.claims import claims_table
@@ -20,12 +20,11 @@ from nbv.reporting.paper.tables import TABLES, build_table
 from nbv.reporting.report import build_report
 from nbv.reporting.runtime import load_jobs, runtime_table
 from nbv.reporting.settings import ReportSettings
+from nbv.reporting.style import new_figure, save_figure
 from nbv.reporting.table import write_table
 
 VOID = {"meta", "img", "br", "link", "hr"}
-PIXEL = base64.b64decode(
-    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNkYPhfDwAChwGA60e6kgAAAABJRU5ErkJggg=="
-)
+FACTS = '<dl class="facts">'
 
 
 class Page(HTMLParser):
@@ -58,10 +57,13 @@ def inputs(tree, evaluations, tmp_path_factory):
     root = tmp_path_factory.mktemp("report")
     tables = {name: root / f"{name}.html" for name in TABLES}
     for name, path in tables.items():
-        write_table(build_table(name, evaluations, ReportSettings(n_resamples=50)), {"html": path})
-    figures = {name: root / f"drawn_{name}.png" for name in FIGURES}
-    for path in figures.values():
-        path.write_bytes(PIXEL)
+        files = {"html": path, "csv": path.with_suffix(".csv")}
+        write_table(build_table(name, evaluations, ReportSettings(n_resamples=50)), files)
+    figures = {name: root / f"drawn_{name}.svg" for name in FIGURES}
+    for name, path in figures.items():
+        drawn = new_figure(1, 1)
+        drawn.subplots().text(0, 0, f"drawn as {name}")
+        save_figure(drawn, {"svg": path})
     claims = evaluate_claims(evaluations, np.random.default_rng(0), 100)
     write_table(claims_table(claims), {"csv": root / "verdicts.csv"})
     job = ("train", next((tree / "benchmarks").rglob("*.tsv")), root / "absent.log")
@@ -73,8 +75,17 @@ def inputs(tree, evaluations, tmp_path_factory):
         "splits": synthetic.split_files(tree, UNITS),
         "tables": tables,
         "figures": figures,
+        "table1": tables["table1"].with_suffix(".csv"),
         "runtime": root / "cost.html",
     }
+
+
+@pytest.fixture(scope="module")
+def wordy(inputs, tmp_path_factory):
+    """The same where no claim was run: its page is made sooner, for tests of words alone."""
+    path = tmp_path_factory.mktemp("wordy") / "claims.csv"
+    write_table(claims_table(evaluate_claims({}, np.random.default_rng(0), 2)), {"csv": path})
+    return inputs | {"claims": path}
 
 
 @pytest.fixture(scope="module")
@@ -94,18 +105,24 @@ def test_it_is_well_formed(page, html):
 
 
 def test_it_needs_nothing_but_itself(page, html):
-    images = [attrs for tag, attrs in page.tags if tag == "img"]
-    assert len(images) == len(FIGURES)
-    for attrs in images:
-        kind, data = attrs["src"].split(",", 1)
-        assert kind == "data:image/png;base64"
-        assert base64.b64decode(data) == PIXEL
-        assert len(attrs["alt"]) > 20
+    drawings = [attrs for tag, attrs in page.tags if tag == "svg"]
+    for attrs in drawings:
+        assert attrs["role"] == "img"
+        assert len(attrs["aria-label"]) > 20
+    for name in FIGURES:
+        assert f"drawn as {name}" in html
     for tag, attrs in page.tags:
-        assert tag not in {"script", "link", "iframe", "object"}
-        assert attrs.get("href", "#").startswith("#")
-    assert "url(" not in html
+        assert tag not in {"script", "link", "iframe", "object", "img"}
+        assert attrs.get("href", "#").startswith(("#", "data:"))
+    assert set(re.findall(r"url\((.)", html)) <= {"#"}
     assert "http" not in html
+
+
+def test_names_inside_drawings_lead_somewhere(page, html):
+    named = set(re.findall(r"url\(#([^)]+)\)", html))
+    named |= {attrs["href"][1:] for tag, attrs in page.tags if tag == "use"}
+    assert named
+    assert named <= page.ids
 
 
 def test_the_contents_lead_somewhere(page):
@@ -115,9 +132,16 @@ def test_the_contents_lead_somewhere(page):
     assert {*TABLES, *FIGURES} <= page.ids
 
 
-def test_claims_come_first_then_tables_then_figures(html):
-    places = [html.index(f'<section id="{key}">') for key in ("claims", "tables", "figures")]
+def test_pictures_come_first_then_claims_tables_and_figures(html):
+    parts = ("claims", "tables", "figures", "settings", "runtime")
+    places = [html.index(f'<section id="{key}">') for key in parts]
     assert places == sorted(places)
+    opening = html[: places[0]]
+    assert re.findall(r'<figure id="([^"]+)"', opening) == [
+        "table1-picture",
+        "claims-forest",
+        "steps",
+    ]
     assert html.count('class="badge') == len(CLAIMS)
 
 
@@ -143,14 +167,14 @@ def test_it_says_what_was_run(page):
 @pytest.mark.parametrize("given", ["estimate", "truth"])
 @pytest.mark.parametrize("candidates", [1, 2])
 @pytest.mark.parametrize("alpha", [0.0, 3.0])
-def test_it_says_at_first_how_proposed_was_repaired(inputs, tmp_path, given, candidates, alpha):
-    settings = json.loads(inputs["configuration"].read_text())
+def test_it_says_at_first_how_proposed_was_repaired(wordy, tmp_path, given, candidates, alpha):
+    settings = json.loads(wordy["configuration"].read_text())
     settings["density"]["pose_likelihood"] = f"given_{given}"
     settings["density"]["bandwidths_deg"] = [8.0, 16.0][:candidates]
     settings["density"]["pseudo_observations"] = [alpha]
     path = tmp_path / "configuration.yaml"
     path.write_text(json.dumps(settings))
-    text = build_report(**inputs | {"configuration": path}).split("</header>")[0]
+    text = build_report(**wordy | {"configuration": path}).split(FACTS)[0]
     assert ("given the estimate and not the truth" in text) == (given == "estimate")
     assert ("by the errors of the decisions" in text) == (candidates > 1)
     as_printed = "Proposed is the paper's method as it is printed." in unescape(text)
@@ -162,45 +186,45 @@ def test_it_is_repeatable(inputs, html):
     assert build_report(**inputs) == html
 
 
-def test_absent_parts_are_named(inputs):
+def test_absent_parts_are_named(wordy):
     fewer = {
-        kind: {name: path for name, path in inputs[kind].items() if name not in ("pea", "table6")}
+        kind: {name: path for name, path in wordy[kind].items() if name not in ("pea", "table6")}
         for kind in ("tables", "figures")
     }
-    text = build_report(**inputs | fewer)
+    text = build_report(**wordy | fewer)
     assert "Not made in this run: pea." in text
     assert "Not made in this run: table6." in text
 
 
-@pytest.mark.parametrize("name", ["claims", "configuration", "provenance", "runtime"])
-def test_what_it_cannot_do_without_is_named(inputs, tmp_path, name):
+@pytest.mark.parametrize("name", ["claims", "configuration", "provenance", "runtime", "table1"])
+def test_what_it_cannot_do_without_is_named(wordy, tmp_path, name):
     absent = tmp_path / "absent.file"
     with pytest.raises(UserError, match=r"absent\.file does not exist"):
-        build_report(**inputs | {name: absent})
+        build_report(**wordy | {name: absent})
 
 
 @pytest.mark.parametrize("kind", ["tables", "figures"])
-def test_a_file_that_was_promised_has_to_be_there(inputs, tmp_path, kind):
-    promised = inputs[kind] | {next(iter(inputs[kind])): tmp_path / "absent.file"}
+def test_a_file_that_was_promised_has_to_be_there(wordy, tmp_path, kind):
+    promised = wordy[kind] | {next(iter(wordy[kind])): tmp_path / "absent.file"}
     with pytest.raises(UserError, match=r"absent\.file does not exist"):
-        build_report(**inputs | {kind: promised})
+        build_report(**wordy | {kind: promised})
 
 
-def test_text_is_escaped(inputs, tmp_path):
+def test_text_is_escaped(wordy, tmp_path):
     path = tmp_path / "configuration.yaml"
-    text = inputs["configuration"].read_text()
+    text = wordy["configuration"].read_text()
     path.write_text(text.replace("procedural", "<script>alert(1)</script>"))
-    found = build_report(**inputs | {"configuration": path})
+    found = build_report(**wordy | {"configuration": path})
     assert "<script" not in found
     assert found.count("&lt;script&gt;alert(1)&lt;/script&gt;") == 2
 
 
 def test_claims_that_were_not_run_come_last_and_folded_away(html):
     claims = html[html.index('<section id="claims">') : html.index('<section id="tables">')]
-    run, absent = claims.split("<details>")
+    run, absent = claims.split('<details class="absent">')
     assert 'class="badge none"' not in run
     assert 'class="badge holds"' in run
-    folded = absent[: absent.index("</details>")]
+    folded = absent[: absent.index("</section>")]
     n_folded = folded.count('class="badge')
     assert folded.count('class="badge none"') == n_folded > 0
     assert f"Not run: {n_folded} of {len(CLAIMS)}" in folded
@@ -209,3 +233,51 @@ def test_claims_that_were_not_run_come_last_and_folded_away(html):
 def test_badges_differ_by_more_than_colour(html):
     badges = dict(re.findall(r'<span class="badge (\w+)">(\S) ', html))
     assert len(badges) == len(set(badges.values())) == 4
+
+
+def test_each_claim_that_was_run_has_a_picture_and_its_numbers_behind_a_fold(html):
+    claims = html[html.index('<section id="claims">') : html.index('<section id="tables">')]
+    run = claims.split('<details class="absent">')[0]
+    articles = run.split("<article")[1:]
+    assert articles
+    for article in articles:
+        assert article.count("<svg") == 1
+        assert article.index("<summary>Numbers") < article.index("<table")
+
+
+def test_it_says_first_that_a_run_is_too_small(wordy, html):
+    caution = too_small({"mug": 9}, 8)
+    warned = build_report(**wordy | {"caution": caution})
+    assert 'class="caution" role="note"' not in html
+    header = warned[: warned.index("</header>")]
+    assert "too small for its numbers to mean anything: 9 objects of mug" in header
+
+
+@pytest.mark.parametrize(
+    ("better", "verdict"), [(5.0, "holds"), (-5.0, "does not hold"), (0.0, "is undecided")]
+)
+def test_it_opens_with_what_became_of_the_conclusion(
+    inputs, evaluations, tmp_path, better, verdict
+):
+    """All five categories, with errors of Proposed that are better than Opposite's by so much."""
+    mug = evaluations["mug", 0]
+    opposite = mug[mug["method"] == "opposite"]["error_deg"].to_numpy()
+    noise = np.random.default_rng(1).normal(0.0, 3.0, opposite.size)
+    changed = mug.copy()
+    changed.loc[mug["method"] == "proposed", "error_deg"] = opposite - better + noise
+    for other in ("single", "random"):
+        changed.loc[mug["method"] == other, "error_deg"] = opposite + 20.0
+    units = {(category, 0): changed for category in ("airplane", "car", "chair", "mug", "toilet")}
+    claims = evaluate_claims(units, np.random.default_rng(0), 100)
+    path = tmp_path / "claims.csv"
+    write_table(claims_table(claims), {"csv": path})
+    header = build_report(**inputs | {"claims": path}).split("</header>")[0]
+    row = claims[(claims["id"] == "outperforms-all") & claims["versus"].str.startswith("Opp")].iloc[
+        0
+    ]
+    assert f"Here this {verdict}" in header
+    assert f"{row['value']:.2f}°, that of Opposite {row['versus_value']:.2f}°" in header
+
+
+def test_without_all_categories_the_conclusion_is_left_open(html):
+    assert "which this run does not have" in html.split("</header>")[0]

@@ -59,7 +59,7 @@ def test_every_format_shows_the_same_cells():
 
 def test_html_escapes_everything_that_is_text():
     page = table_html(replace(TABLE, heading="<b>heading</b>", header=("<i>", "b", "c")))
-    of_a_table = {"table", "caption", "thead", "tbody", "tr", "th", "td"}
+    of_a_table = {"table", "h3", "thead", "tbody", "tr", "th", "td"}
     assert set(re.findall(r"</?(\w+)", page)) == of_a_table | {"div", "strong", "ul", "li"}
     assert "a|b &amp; c_d" in page
     assert "&lt;only&gt;" in page
@@ -138,3 +138,13 @@ def test_latex_compiles(tmp_path):
     )
     command = ["pdflatex", "-halt-on-error", "-interaction=nonstopmode", "all.tex"]
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+
+
+def test_a_caution_is_the_first_note_of_every_format(tmp_path):
+    paths = {kind: tmp_path / f"example.{kind}" for kind in ("md", "tex", "html")}
+    write_table(TABLE, paths, ("Too small.",))
+    for path in paths.values():
+        text = path.read_text()
+        assert 0 < text.index("Too small.") < text.index(TABLE.notes[0].split("<")[0][:10])
+    write_table(TABLE, paths)
+    assert not any("Too small." in path.read_text() for path in paths.values())

@@ -18,7 +18,7 @@ from projects import TINY
 pytestmark = pytest.mark.slow
 
 EVALUATED = ["single", "random", "opposite", "proposed"]
-SHOWN = {"table": 7, "figure": 10, "claims": 1, "runtime": 1, "report": 1}
+SHOWN = {"table": 7, "figure": 11, "claims": 1, "runtime": 1, "report": 1}
 
 
 def test_every_file_is_there_with_its_columns(finished):
@@ -57,11 +57,30 @@ def test_every_file_is_there_with_its_columns(finished):
     for number in range(1, 8):
         for kind in ("csv", "md", "tex"):
             assert (results / "tables" / f"table{number}.{kind}").stat().st_size > 0
-    for name in ("figure2", "figure3", "figure5", "figure6", "figure7", "figure8", "figure9"):
+    for name in (
+        "steps",
+        "figure2",
+        "figure3",
+        "figure5",
+        "figure6",
+        "figure7",
+        "figure8",
+        "figure9",
+    ):
         assert (results / "figures" / f"{name}.png").stat().st_size > 5_000
         assert (results / "figures" / f"{name}.pdf").stat().st_size > 5_000
+        assert "<svg" in (results / "figures" / f"{name}.svg").read_text()[:1000]
     for name in ("claims.csv", "claims.md", "report.html", "configuration.yaml"):
         assert (results / name).stat().st_size > 0
+
+
+def test_a_run_that_is_too_small_says_so_wherever_there_are_numbers(scratch):
+    (scratch.results / "report.html").unlink()
+    done = scratch.run("--cores", "1")
+    said = "This run is too small for its numbers to mean anything: 8 objects of"
+    assert said in done.stderr.strip().splitlines()[-2]
+    for name in ("report.html", "claims.md", *(f"tables/table{n}.md" for n in range(1, 8))):
+        assert said in (scratch.results / name).read_text()
 
 
 def test_a_finished_run_has_nothing_to_do(finished):

@@ -5,7 +5,7 @@ It needs nothing but itself: no scripts, no links outward, figures written into 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -120,10 +120,7 @@ def build_report(
         sections=_SECTIONS,
         badges=_BADGES,
         run_facts=[*_run_facts(settings, splits), ("Commit", made_with.get("commit") or _UNKNOWN)],
-        claims_run=[
-            _claim(claim, rows[claim.id], one)
-            for claim, one in _with_claim(run)
-        ],
+        claims_run=[_claim(claim, rows[claim.id], one) for claim, one in _with_claim(run)],
         claims_not_run=[_claim(claim, {}, one) for claim, one in _with_claim(not_run)],
         tally=_tally(each["verdict"]),
         point_tally=_tally(each["point_verdict"]),
@@ -182,9 +179,9 @@ def _with_claim(each: pd.DataFrame) -> Iterator[tuple[Claim, Row]]:
         yield by_id[row["id"]], row
 
 
-def _claim(claim: Claim, rows: Mapping[Comparison, Row], one: Row) -> dict[str, Any]:
+def _claim(claim: Claim, rows: Mapping[Comparison, Row], one: Row) -> dict[Hashable, Any]:
     """Return what the page shows of a claim; without rows it was not run."""
-    shown = {**one, "title": claim.title, "svg": None, "comparisons": []}
+    shown: dict[Hashable, Any] = {**one, "title": claim.title, "svg": None, "comparisons": []}
     if rows:
         label = f"{claim.title}: {one['verdict']}. {one['summary']}"
         drawn = svg_text(claim_figure(claim, rows))

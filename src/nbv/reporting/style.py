@@ -171,7 +171,7 @@ _ABREAST = (3, 2, 4)
 
 
 def mark_azimuth(axes: Axes, azimuth_deg: float, name: str) -> None:
-    """Mark an azimuth or a rotation by a line, with its name at the top beside it."""
+    """Mark an azimuth or a rotation by a line, with its name at the top next to it."""
     axes.axvline(azimuth_deg, color=INK, linewidth=1.0, linestyle=":")
     right = azimuth_deg < 180
     axes.annotate(

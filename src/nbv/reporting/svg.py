@@ -52,9 +52,8 @@ def inline_svg(text: str, name: str, label: str) -> Markup:
     Returns
     -------
     Markup
-        An ``svg`` element that scales with its place. Ink, grid and paper are the page's custom
-        properties ``--ink``, ``--muted``, ``--line``, ``--shade``, ``--page``, and those of the verdicts,
-        ``--holds``, ``--open`` and ``--fails``; the colours of methods stay.
+        An ``svg`` element that scales with its place. Ink, grid, paper and verdicts have the
+        page's custom properties for colours, such as ``--ink``; the colours of methods stay.
     """
     root = ElementTree.fromstring(text)
     for parent in root.iter():

@@ -121,9 +121,9 @@ def test_the_figure_has_a_panel_for_each_question_and_a_mark_for_each_answer(con
         marks = [line for line in axes.lines if line.get_marker() not in ("None", "")]
         assert [mark.get_xdata()[0] for mark in marks] == part["difference_deg"].tolist()
         for mark, (_, row) in zip(marks, part.iterrows(), strict=True):
-            expected = "^" if row["low"] > 0 else "o" if row["high"] < 0 else "s"
+            expected = "X" if row["low"] > 0 else "o" if row["high"] < 0 else "s"
             assert mark.get_marker() == expected
-    assert "Difference of MAE (°)" in figure.axes[-1].get_xlabel()
+    assert "Difference of MAE (degrees)" in figure.axes[-1].get_xlabel()
 
 
 def test_without_an_answer_there_is_no_figure(contrasts):

@@ -33,7 +33,7 @@ def test_a_curve_for_each_policy_by_number_of_views():
     figure = more_views_figure(cells_of(["random", "information_gain"]))
     (axes,) = figure.axes
     assert (axes.get_title(), axes.get_xlabel()) == ("Mug", "Number of views")
-    assert axes.get_ylabel() == "MAE (°)"
+    assert axes.get_ylabel() == "MAE (degrees)"
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert texts == ["Random", "Information gain"]
     for line in axes.lines:
@@ -48,7 +48,7 @@ def test_a_curve_for_each_travel_cost_and_none_for_limits():
     assert list(fixed.get_ydata()) == [9, 6, 3]
     assert list(costed.get_xdata()) == [70, 120, 170]
     assert list(costed.get_ydata()) == [5, 4, 3]
-    assert figure.axes[0].get_xlabel() == "Mean travel (°)"
+    assert figure.axes[0].get_xlabel() == "Mean travel (degrees)"
 
 
 def test_folds_are_pooled_by_category(tmp_path):

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.image import imread
+from PIL import Image
 
 import synthetic
 from conftest import N_FOLDS, UNITS
@@ -16,7 +17,7 @@ from nbv.errors import UserError
 from nbv.recommendation.evidence import gather_evidence
 from nbv.recommendation.lookup import build_lookup, load_lookup, save_lookup
 from nbv.reporting.paper import examples
-from nbv.reporting.paper.figures import FIGURES, FigureInputs, build_figure
+from nbv.reporting.paper.figures import FIGURES, FigureInputs, build_figure, steps
 from nbv.reporting.paper.figures.depth import depth_limits, shade
 from nbv.reporting.paper.figures.inputs import example_view
 from nbv.reporting.settings import ReportSettings
@@ -67,15 +68,17 @@ def images_of(axes):
 @pytest.mark.parametrize("name", FIGURES)
 def test_figures_are_written_the_same_twice(inputs, tmp_path, name):
     before = dict(mpl.rcParams)
-    paths = [{kind: tmp_path / f"{run}.{kind}" for kind in ("png", "pdf")} for run in "ab"]
+    made_by = b"Software", b"CreationDate", b"dc:date"
+    paths = [{kind: tmp_path / f"{run}.{kind}" for kind in ("png", "pdf", "svg")} for run in "ab"]
     for files in paths:
         save_figure(build_figure(name, inputs), files)
     assert dict(mpl.rcParams) == before
     for kind, path in paths[0].items():
         assert path.read_bytes() == paths[1][kind].read_bytes()
-        assert not any(word in path.read_bytes() for word in (b"Software", b"CreationDate"))
+        assert not any(word in path.read_bytes() for word in made_by)
     image = imread(paths[0]["png"])
     assert image.shape[1] >= 500
+    assert "<text" in paths[0]["svg"].read_text()
     assert np.ptp(image[..., :3]) == 1.0
 
 
@@ -174,8 +177,8 @@ def test_figure8_puts_every_view_where_the_camera_is(inputs):
 def test_figure9_boxes_are_the_quartiles_of_the_errors(inputs, evaluations):
     figure = build_figure("figure9", inputs)
     units = [("mug", 0), ("chair", 0)]
-    texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts == ["Single", "Random", "Opposite", "Proposed", "mean"]
+    texts = [text.get_text() for text in figure.axes[1].get_xticklabels(minor=True)]
+    assert texts == ["Single", "Random", "Opposite", "Proposed"] * len(units)
     for axes, ends in zip(figure.axes, ((0, 100), (5, 95)), strict=True):
         assert [text.get_text() for text in axes.get_xticklabels()] == ["Mug", "Chair"]
         assert len(axes.patches) == len(units) * len(synthetic.METHODS)
@@ -234,9 +237,11 @@ def test_an_extension_is_drawn_with_the_papers_methods(inputs, evaluations):
     joined = {("mug", 0): pd.concat([frame, extra], ignore_index=True)}
     settings = ReportSettings(methods=(*synthetic.METHODS, "error_posterior"))
     more = replace(inputs, evaluations=joined, settings=settings)
-    for name in ("figure9", "pea", "azimuth"):
+    for name in ("pea", "azimuth"):
         (legend,) = build_figure(name, more).legends
         assert "Error posterior" in [text.get_text() for text in legend.get_texts()]
+    boxes = build_figure("figure9", more).axes[1].get_xticklabels(minor=True)
+    assert boxes[-1].get_text() == "Error posterior"
     assert build_figure("figure7", more).axes[-1].get_title() == "Error posterior"
 
 
@@ -296,9 +301,8 @@ def test_figures_name_the_cost_of_the_criterion_that_the_subject_follows(
     assert maps.axes[1].get_title().startswith(title)
     assert maps.axes[-1].get_ylabel() == f"{cost}; lower is better"
     # The spread of the pose, whatever selects the view, is in the unit of the spread.
-    legends = [text.get_text() for axes in build_figure("figure3", few).axes if axes.legend_
-               for text in axes.legend_.get_texts()]  # fmt: skip
-    assert any(text.endswith(" nats") for text in legends) == (spread == "entropy")
+    names = [text.get_text() for axes in build_figure("figure3", few).axes for text in axes.texts]
+    assert any(text.endswith(" nats") for text in names) == (spread == "entropy")
 
 
 def test_of_equal_costs_the_recommended_rotation_is_shown(inputs, drawn_from):
@@ -342,3 +346,48 @@ def test_mistakes_are_named(inputs, tmp_path, evaluations):
         build_figure("figure5", FigureInputs(evaluations, depth=absent, objects=absent))
     with pytest.raises(UserError, match="no lookup table of proposed for mug 0 2"):
         build_figure("heatmaps", replace(inputs, lookups={}))
+
+
+def test_steps_show_the_row_of_the_table_and_both_distributions(inputs):
+    shown, table = example_view(inputs), stored(inputs)
+    first = round(shown.estimate_deg) % 360
+    delta = int(table.recommended_delta_deg[first])
+    one, _, cost, ring, two, _ = build_figure("steps", inputs).axes
+    np.testing.assert_allclose(one.lines[0].get_ydata(), table.viewpoint_likelihood[first])
+    np.testing.assert_allclose(cost.lines[0].get_ydata(), table.cost[first])
+    assert f"least at {delta}°" in [text.get_text() for text in cost.texts]
+    assert [text.get_text() for text in ring.texts] == ["1", "2"]
+    second = round(float(shown.outcomes["proposed"]["next_estimate_deg"])) % 360
+    azimuths = np.arange(360)
+    both = (
+        table.viewpoint_likelihood[first]
+        * table.estimate_likelihood[(azimuths + delta) % 360, second]
+    )
+    np.testing.assert_allclose(two.lines[0].get_ydata(), both / both.sum(), rtol=1e-4)
+
+
+def test_the_animation_turns_from_the_first_view_to_the_recommended_one(inputs):
+    shown, table = example_view(inputs), stored(inputs)
+    delta = int(table.recommended_delta_deg[round(shown.estimate_deg) % 360])
+    frames = list(steps.animation_frames(inputs))
+    views = [int(figure.axes[0].get_xlabel().split()[-1][:-1]) for figure, _ in frames]
+    assert views[0] == shown.azimuth_deg
+    assert views[-1] == (shown.azimuth_deg + delta) % 360
+    turned = np.abs((np.diff(views) + 180) % 360 - 180)
+    assert turned.max() <= 180 / 20
+    assert turned.sum() == circular_distance_deg(delta, 0)
+    likely = [figure.axes[1].lines[0].get_ydata().max() for figure, _ in frames]
+    assert likely[-1] > likely[0]
+    assert all(duration > 0 for _, duration in frames)
+
+
+def test_an_animation_is_written_the_same_twice(inputs, tmp_path, monkeypatch):
+    few = list(steps.animation_frames(inputs))[::25]
+    monkeypatch.setattr(steps, "animation_frames", lambda _: iter(few))
+    paths = [tmp_path / f"{run}.gif" for run in "ab"]
+    for path in paths:
+        steps.save_animation(inputs, path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    with Image.open(paths[0]) as image:
+        assert image.n_frames == len(few)
+        assert image.info["loop"] == 0

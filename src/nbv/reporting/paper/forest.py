@@ -147,7 +147,7 @@ def claim_figure(claim: Claim, rows: Mapping[Comparison, Row]) -> Figure:
     label_rows(axes, labels, [])
     subject = "" if single_group else f"{_subject(list(series))}: "
     comparable = f"; grey: comparable (±{margin:g})" if margin else ""
-    axes.set_xlabel(f"{subject}{drawn[0].quantity}\n{drawn[0].reading}{comparable}")
+    axes.set_xlabel(f"{subject}{drawn[0].quantity}\n{drawn[0].direction}{comparable}")
     if key:
         figure.legend(
             handles=[_key(one) for one in series.values()],
@@ -220,7 +220,7 @@ class _Difference:
     name: str
     method: str
     quantity: str
-    reading: str
+    direction: str
     ours: Interval
     published: float
     margin: float
@@ -242,7 +242,7 @@ def _differences(claim: Claim, rows: Mapping[Comparison, Row]) -> Iterator[_Diff
                 name=method_label(part.a.method),
                 method=part.a.method,
                 quantity="errors above the fence (%)",
-                reading="at 0: no outlier",
+                direction="at 0: no outlier",
                 ours=(value, value, value),
                 published=np.nan,
                 margin=0.0,
@@ -264,7 +264,7 @@ def _differences(claim: Claim, rows: Mapping[Comparison, Row]) -> Iterator[_Diff
             name=_pair_text(a, b),
             method=a.method if same_rival else b.method,
             quantity=f"difference of {'MAE and σ' if several else statistic} ({unit})",
-            reading=f"{side} 0: the first is better",
+            direction=f"{side} 0: the first is better",
             ours=(sign * float(row["difference"]), ends[0], ends[1]),
             published=sign * published,
             margin=part.margin if isinstance(part, Comparable) else 0.0,

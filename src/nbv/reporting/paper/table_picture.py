@@ -34,9 +34,9 @@ def table_picture(cells: pd.DataFrame) -> Figure:
         headings.append(len(labels))
         labels.append(str(name))
         for found in part.to_dict("records"):
-            ends = tuple(float(found[key]) for key in ("value", "ci_low", "ci_high"))
+            ours = float(found["value"]), float(found["ci_low"]), float(found["ci_high"])
             style = method_style(str(found["method"]), methods)
-            draw_estimate(axes, len(labels), style, ends, float(found["published"]))
+            draw_estimate(axes, len(labels), style, ours, float(found["published"]))
             labels.append(method_label(str(found["method"])))
     label_rows(axes, labels, headings)
     axes.set_xlim(left=0)

@@ -69,7 +69,7 @@ class _Steps:
 
     @property
     def one_view(self) -> Curve:
-        return self.lookup.viewpoint_likelihood[self.first]
+        return np.asarray(self.lookup.viewpoint_likelihood[self.first])
 
     def azimuth_deg(self, delta: int) -> float:
         """Return where the camera is after a rotation."""
@@ -95,7 +95,7 @@ def steps(inputs: FigureInputs) -> Figure:
     titles = (
         f"1  One view, estimate {round(found.shown.estimate_deg) % 360}°",
         "2  The table: cost of each turn",
-        f"3  Two views, {delta}° apart",
+        f"3  Two views, δ = {delta}°",
     )
     for row, (title, turned) in enumerate(zip(titles, (0, None, found.best), strict=True)):
         axes = figure.add_subplot(grid[row, 1])
@@ -128,17 +128,18 @@ def animation_frames(inputs: FigureInputs) -> Iterator[tuple[Figure, int]]:
     looked = np.linspace(0, found.n_bins, _LOOKING_FRAMES, endpoint=False).astype(int)
     top = _top([found.one_view, *(found.two_views(int(delta)) for delta in turned)])
     estimate = round(found.shown.estimate_deg) % 360
-    delta = round(best * found.step_deg)
+    delta = round(found.best * found.step_deg)
     one = f"1  One view, estimate {estimate}°: many poses fit it"
     yield _frame(found, one, 0, None, top), _READ_MS
     look = f"2  The lookup table's row for {estimate}°: what does a turn cost?"
     for place in looked:
         yield _frame(found, look, 0, int(place), top), _STEP_MS
-    chosen = f"2  A turn by {delta}° costs least"
+    chosen = f"2  A turn by δ = {delta}° costs least"
     yield _frame(found, chosen, 0, found.best, top), _READ_MS
+    turning = "3  The camera turns, the shorter way"
     for place in turned[1:-1]:
-        yield _frame(found, "3  The camera turns", int(place), found.best, top), _STEP_MS
-    two = f"3  Two views, {delta}° apart: few poses fit both"
+        yield _frame(found, turning, int(place), found.best, top), _STEP_MS
+    two = f"3  Two views, δ = {delta}°: few poses fit both"
     yield _frame(found, two, best, found.best, top), 2 * _READ_MS
 
 
@@ -151,8 +152,11 @@ def save_animation(inputs: FigureInputs, path: Path) -> None:
             figure.savefig(file, format="png", dpi=_DPI, metadata={"Software": None})
             images.append(Image.open(file).convert("RGB"))
         durations.append(duration)
-    # One palette, so that what does not move does not flicker: of a frame with every colour.
-    palette = images[-1].quantize(_COLOURS, dither=Image.Dither.NONE)
+    # One palette, so that what does not move does not flicker: of the first and the last frame.
+    ends = Image.new("RGB", (images[0].width, 2 * images[0].height))
+    ends.paste(images[0], (0, 0))
+    ends.paste(images[-1], (0, images[0].height))
+    palette = ends.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     shared = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     with replacing(path) as temporary:
         shared[0].save(
@@ -171,9 +175,8 @@ def _steps(inputs: FigureInputs) -> _Steps:
     frame, example = inputs.evaluations[shown.unit], shown.example
     of_object = frame[(frame["object_id"] == example.object_id) & (frame["fold"] == example.fold)]
     each = of_object.drop_duplicates("initial_deg")
-    estimates = dict(
-        zip(each["initial_deg"].astype(int), each["initial_estimate_deg"].astype(float), strict=True)
-    )
+    columns = each["initial_deg"].astype(int), each["initial_estimate_deg"].astype(float)
+    estimates = dict(zip(*columns, strict=True))
     lookup = inputs.lookup(example.fold)
     color = inputs.style(inputs.settings.subject).color
     return _Steps(shown, lookup, estimates, cost_words(lookup), color)

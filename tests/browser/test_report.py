@@ -1,0 +1,179 @@
+"""The report in a real browser: it opens without a network, fits, and can be read by everybody."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import synthetic
+from conftest import UNITS
+from nbv.experiments.run_size import too_small
+from nbv.paper.verdicts import evaluate_claims
+from nbv.reporting.paper.claims import claims_table
+from nbv.reporting.paper.figures import FIGURES, FigureInputs, build_figure
+from nbv.reporting.paper.tables import TABLES, build_table
+from nbv.reporting.report import build_report
+from nbv.reporting.runtime import load_jobs, runtime_table
+from nbv.reporting.settings import ReportSettings
+from nbv.reporting.style import save_figure
+from nbv.reporting.table import write_table
+
+WIDTHS = (390, 768, 1280)
+N_FOLDS = 3
+# The edges of the first two cells of a table's rows, and how far its box can be scrolled.
+CELLS = """box => {
+    const row = box.querySelector('tbody tr');
+    box.scrollLeft = 10000;
+    const [first, second] = [...row.children].map(cell => cell.getBoundingClientRect());
+    const place = box.getBoundingClientRect();
+    return {scrolled: box.scrollLeft, left: first.left - place.left,
+            second: second.left - place.left,
+            paper: getComputedStyle(row.children[0]).backgroundColor};
+}"""
+# Text that is cut off or drawn over other text inside a drawing.
+OVERLAPS = """drawing => {
+    const boxes = [...drawing.querySelectorAll('text')].filter(text => text.textContent.trim())
+        .map(text => [text.textContent, text.getBoundingClientRect()]);
+    const edge = drawing.getBoundingClientRect(), wrong = [];
+    for (const [name, box] of boxes)
+        if (box.left < edge.left - 2 || box.right > edge.right + 2)
+            wrong.push(name + ' is cut off');
+    for (let i = 0; i < boxes.length; i++) for (let j = 0; j < i; j++) {
+        const [a, b] = [boxes[i][1], boxes[j][1]];
+        const wide = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+        const high = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+        if (wide > 3 && high > 5) wrong.push(boxes[i][0] + ' over ' + boxes[j][0]);
+    }
+    return wrong;
+}"""
+
+
+@pytest.fixture(scope="session")
+def path(tree, evaluations, tmp_path_factory) -> Path:
+    """The report of the synthetic results tree, with everything on it."""
+    root = tmp_path_factory.mktemp("report")
+    settings = ReportSettings(n_resamples=50)
+    for name in TABLES:
+        kinds = {kind: root / f"{name}.{kind}" for kind in ("html", "csv")}
+        write_table(build_table(name, evaluations, settings), kinds)
+    inputs = FigureInputs(
+        evaluations,
+        depth=synthetic.depth_files(tree, UNITS),
+        objects=synthetic.object_files(tree, UNITS),
+        lookups=synthetic.lookup_files(tree, UNITS, N_FOLDS),
+    )
+    for name in FIGURES:
+        save_figure(build_figure(name, inputs), {"svg": root / f"{name}.svg"})
+    claims = evaluate_claims(evaluations, np.random.default_rng(0), 100)
+    write_table(claims_table(claims), {"csv": root / "claims.csv"})
+    job = ("train", next((tree / "benchmarks").rglob("*.tsv")), root / "absent.log")
+    write_table(runtime_table(load_jobs([job])), {"html": root / "runtime.html"})
+    page = build_report(
+        claims=root / "claims.csv",
+        configuration=tree / "configuration.yaml",
+        provenance=tree / "provenance.json",
+        splits=synthetic.split_files(tree, UNITS),
+        tables={name: root / f"{name}.html" for name in TABLES},
+        figures={name: root / f"{name}.svg" for name in FIGURES},
+        table1=root / "table1.csv",
+        runtime=root / "runtime.html",
+        caution=too_small({"mug": 9}, 8),
+    )
+    (root / "report.html").write_text(page, encoding="utf-8")
+    return root / "report.html"
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_it_fits_and_logs_no_error(visit, path, width):
+    page = visit(path, width=width)
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    page.evaluate("document.querySelectorAll('details').forEach(fold => fold.open = true)")
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
+def test_it_works_where_scripts_are_forbidden(visit, path):
+    page = visit(path, java_script_enabled=False)
+    page.locator("summary", has_text="Numbers").first.click()
+    assert page.locator("article table").first.is_visible()
+
+
+def test_the_first_screen_holds_the_finding_and_all_three_pictures(visit, path):
+    page = visit(path)
+    for name in ("table1-picture", "claims-forest", "steps"):
+        box = page.locator(f"#{name} svg").bounding_box()
+        assert box["y"] + box["height"] < 844
+    assert page.locator(".finding").bounding_box()["y"] < 200
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_text_in_the_pictures_is_large_enough_and_free(visit, path, width):
+    page = visit(path, width=width)
+    for drawing in page.locator(".opening svg, .claim figure svg").all():
+        if not drawing.is_visible():
+            continue
+        assert drawing.evaluate(OVERLAPS) == []
+        sizes = (
+            "one => [...one.querySelectorAll('text')].map(t => t.getBoundingClientRect().height)"
+        )
+        tall = [size for size in drawing.evaluate(sizes) if size]
+        assert min(tall) >= 9
+
+
+def test_tables_scroll_in_their_own_box_and_keep_the_first_column(visit, path):
+    page = visit(path, width=390)
+    boxes = page.locator("#tables .scroll").all()
+    assert len(boxes) == len(TABLES)
+    for box in boxes:
+        found = box.evaluate(CELLS)
+        assert found["scrolled"] > 20
+        assert abs(found["left"]) < 1
+        assert found["second"] < 130
+        assert found["paper"] != "rgba(0, 0, 0, 0)"
+
+
+def test_the_keyboard_goes_from_top_to_bottom_and_scrolls_tables(visit, path):
+    page = visit(path, width=390)
+    focus = "(e => [e.className, e.getBoundingClientRect().top + scrollY])(document.activeElement)"
+    places = []
+    for _ in range(25):
+        page.keyboard.press("Tab")
+        places.append(page.evaluate(focus))
+    assert places[0][0] == "skip"
+    tops = [top for _, top in places[1:]]
+    assert all(later >= earlier - 30 for earlier, later in pairwise(tops))
+    box = page.locator("#tables .scroll").first
+    box.focus()
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_timeout(300)
+    assert box.evaluate("one => one.scrollLeft") > 0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_axe_finds_nothing_inaccessible(visit, path, width, scheme):
+    from axe_playwright_python.sync_playwright import Axe
+
+    page = visit(path, width=width, color_scheme=scheme)
+    page.evaluate("document.querySelectorAll('details').forEach(fold => fold.open = true)")
+    found = Axe().run(page).response["violations"]
+    assert [(one["id"], [node["html"][:120] for node in one["nodes"][:3]]) for one in found] == []
+
+
+def test_dark_paper_is_dark_and_its_ink_light(visit, path):
+    colors = "[getComputedStyle(document.body), getComputedStyle(document.querySelector('svg'))]"
+    for scheme, is_dark in (("light", False), ("dark", True)):
+        page = visit(path, color_scheme=scheme)
+        paper, ink = page.evaluate(f"(([b, s]) => [b.backgroundColor, s.fill])({colors})")
+        levels = [int(one.strip("rgb()").split(",")[0]) for one in (paper, ink)]
+        assert (levels[0] < levels[1]) == is_dark
+
+
+def test_a_run_that_is_too_small_says_so_at_the_top(visit, path):
+    page = visit(path, width=390)
+    note = page.locator(".caution")
+    assert "too small" in note.inner_text()
+    assert note.bounding_box()["y"] < 300
