@@ -387,12 +387,15 @@ function fillCost({ estimates }) {
       label: method.label[0],
     }));
   const { low, high } = drawCost($("cost"), cost, azimuthDeg(), marks, colours);
-  const inUnit = (value) => `${value.toFixed(2).replace("-", MINUS)}${table.unit === "1" ? "" : ` ${table.unit}`}`;
+  // As many decimals as tell the least from the largest.
+  const decimals = Math.min(6, Math.max(2, 1 - Math.floor(Math.log10(Math.max(high - low, 1e-6)))));
+  const inUnit = (value) => `${value.toFixed(decimals).replace("-", MINUS)}${table.unit === "1" ? "" : ` ${table.unit}`}`;
+  const nothing = table.unit === "nats" ? ` A pose of which nothing is known has ${Math.log(bins).toFixed(3)} nats.` : "";
   const criterion = loaded.facts.criterion.replaceAll("_", " ");
   const at = marks.map(({ method, deltaDeg }) =>
     `${method.label[0]} ${method.label} ${inUnit(cost[nearestBin(deltaDeg, bins)])}`).join(", ");
   $("cost-text").textContent = `Cost of a second view from each azimuth, given the estimate ${text(estimates[0])} of `
-    + `view 1: ${criterion}, ${inUnit(low)} (inner circle) to ${inUnit(high)} (outer). Nearer to the centre is better. ${at}.`;
+    + `view 1: ${criterion}, ${inUnit(low)} (inner circle) to ${inUnit(high)} (outer). Nearer to the centre is better. ${at}.${nothing}`;
   $("cost").setAttribute("aria-label", `Cost by azimuth of the second view, ${inUnit(low)} to ${inUnit(high)}: ${at}`);
 }
 
