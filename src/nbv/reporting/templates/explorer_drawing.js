@@ -3,7 +3,7 @@
 
 const DEGREE = Math.PI / 180;
 
-/** The colours of the page's style sheet, as they are now: light or dark. */
+/** The colours of the page's style as they are now: light or dark. */
 function palette() {
   const style = getComputedStyle(document.documentElement);
   const names = ["ink", "muted", "line", "paper", "belief", "own", "tile"];
