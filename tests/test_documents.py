@@ -60,7 +60,7 @@ ALLOWED = {
     "tests/workflow/test_messages.py": ("contenders",),
 }
 TREES = ("src", "workflow", "config", "docs", "tests", "performance", "profiles")
-SUFFIXES = {".py", ".smk", ".yaml", ".md", ".rst", ".j2", ".css", ".html"}
+SUFFIXES = {".py", ".smk", ".yaml", ".md", ".rst", ".j2", ".css", ".js", ".html"}
 
 
 def without_code(text: str) -> str:

@@ -393,7 +393,8 @@ def test_why_one_method_loses_adds_up(visit, path, outcomes):
     )
     told = page.locator("#why").inner_text()
     assert f"is {abs(gap):.2f}° {'above' if gap > 0 else 'below'} that of Opposite" in told
-    assert f"better on {better.sum()} of {len(better)} objects" in told
+    assert f"All {len(better)} objects" in told
+    assert f"better on {better.sum()} objects" in told
 
 
 @pytest.mark.parametrize("width", WIDTHS)

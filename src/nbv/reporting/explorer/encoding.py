@@ -69,7 +69,7 @@ class Quantised:
     high: float
 
     @property
-    def values(self) -> NDArray[np.float64]:
+    def restored(self) -> NDArray[np.float64]:
         """The table as the page has it."""
         return self.low + self.codes.astype(np.float64) * ((self.high - self.low) / 255.0)
 

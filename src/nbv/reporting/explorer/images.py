@@ -19,7 +19,7 @@ COLUMNS = 6
 """Images in a row of the picture."""
 
 _LARGEST_SIDE = 64
-_QUALITY = 40
+_QUALITY = 30
 
 
 @dataclass(frozen=True)

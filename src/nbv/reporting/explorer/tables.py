@@ -46,7 +46,7 @@ class PageTable:
     @property
     def estimate_likelihood(self) -> Table:
         """L[viewpoint, estimate]."""
-        weights = np.exp(self.logs.values)
+        weights = np.exp(self.logs.restored)
         return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
     @property
@@ -94,7 +94,7 @@ def probability_error(stored: PageTable, table: LookupTable) -> float:
 
 def cost_error(stored: PageTable, table: LookupTable) -> float:
     """Return how far the page's costs are off, at the most, in the cost's unit."""
-    return float(np.abs(stored.cost.values - table.cost).max())
+    return float(np.abs(stored.cost.restored - table.cost).max())
 
 
 def own_distributions_text(posteriors: Posteriors) -> str:

@@ -231,9 +231,9 @@ function difference() {
   const means = unit().means[mine.name], others = unit().means[versus.name];
   const better = means.filter((mean, i) => mean < others[i]).length;
   const word = gap > 0 ? "above" : "below";
-  return `The mean error of ${mine.label} is ${text(Math.abs(gap))} ${word} that of ${versus.label}: `
+  return `All ${means.length} objects: the mean error of ${mine.label} is ${text(Math.abs(gap))} ${word} that of ${versus.label}: `
     + `${signed(above)} by errors above 90°, where front and back are confused, and ${signed(gap - above)} `
-    + `by all others. ${mine.label} is better on ${better} of ${means.length} objects.`;
+    + `by all others. ${mine.label} is better on ${better} objects.`;
 }
 
 const scope = () => document.querySelector("[name=scope]:checked").value;
@@ -387,12 +387,15 @@ function fillCost({ estimates }) {
       label: method.label[0],
     }));
   const { low, high } = drawCost($("cost"), cost, azimuthDeg(), marks, colours);
-  const inUnit = (value) => `${value.toFixed(2).replace("-", MINUS)}${table.unit === "1" ? "" : ` ${table.unit}`}`;
+  // As many decimals as tell the least from the largest.
+  const decimals = Math.min(6, Math.max(2, 1 - Math.floor(Math.log10(Math.max(high - low, 1e-6)))));
+  const inUnit = (value) => `${value.toFixed(decimals).replace("-", MINUS)}${table.unit === "1" ? "" : ` ${table.unit}`}`;
+  const nothing = table.unit === "nats" ? ` A pose of which nothing is known has ${inUnit(Math.log(bins))}.` : "";
   const criterion = loaded.facts.criterion.replaceAll("_", " ");
   const at = marks.map(({ method, deltaDeg }) =>
     `${method.label[0]} ${method.label} ${inUnit(cost[nearestBin(deltaDeg, bins)])}`).join(", ");
   $("cost-text").textContent = `Cost of a second view from each azimuth, given the estimate ${text(estimates[0])} of `
-    + `view 1: ${criterion}, ${inUnit(low)} (inner circle) to ${inUnit(high)} (outer). Nearer to the centre is better. ${at}.`;
+    + `view 1: ${criterion}, ${inUnit(low)} (inner circle) to ${inUnit(high)} (outer). Nearer to the centre is better. ${at}.${nothing}`;
   $("cost").setAttribute("aria-label", `Cost by azimuth of the second view, ${inUnit(low)} to ${inUnit(high)}: ${at}`);
 }
 

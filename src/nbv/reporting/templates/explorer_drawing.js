@@ -3,7 +3,7 @@
 
 const DEGREE = Math.PI / 180;
 
-/** The colours of the page's style sheet, as they are now: light or dark. */
+/** The colours of the page's style as they are now: light or dark. */
 function palette() {
   const style = getComputedStyle(document.documentElement);
   const names = ["ink", "muted", "line", "paper", "belief", "own", "tile"];
@@ -93,7 +93,7 @@ function ringLayer(size, ratio, picture, images, geometry, colours) {
     context.moveTo(size / 2, size / 2);
     context.lineTo(...at(size / 2, azimuth, inner));
     context.stroke();
-    const [x, y] = at(size / 2, azimuth + 5, inner - 12);
+    const [x, y] = at(size / 2, azimuth + 7, inner - 12);
     context.fillText(`${azimuth}°`, x, y);
   }
   return layer;
@@ -251,7 +251,11 @@ function drawObjects(canvas, mine, others, chosen, labels, colour, colours) {
   const x = (error) => left + part(error), y = (error) => top + size - part(error);
   context.font = "12px system-ui, sans-serif";
   context.lineWidth = 1;
-  for (const tick of MEAN_TICKS.filter((one) => errorPlace(one) >= least && errorPlace(one) <= most)) {
+  let last = -Infinity;
+  for (const tick of MEAN_TICKS) {
+    const place = errorPlace(tick);
+    if (place < least || place > most || part(tick) - last < 30) continue;
+    last = part(tick);
     context.strokeStyle = colours.line;
     context.beginPath();
     context.moveTo(x(tick), top);
