@@ -47,14 +47,10 @@ rule table:
             LAYOUT.evaluation, evaluations_of(units_of(wildcards.table))
         ),
     output:
-        csv=in_report(
-            LAYOUT.table("{table}", "csv"), "Tables", table="{table}", shown="CSV"
-        ),
+        csv=table_in_report("csv", "numbers"),
         md=LAYOUT.table("{table}", "md"),
         tex=LAYOUT.table("{table}", "tex"),
-        html=in_report(
-            LAYOUT.table("{table}", "html"), "Tables", table="{table}", shown="table"
-        ),
+        html=table_in_report("html", "as in the paper"),
     log:
         LAYOUT.log("table/{table}"),
     benchmark:
@@ -105,7 +101,7 @@ rule claims:
         sources("judge_claims"),
         evaluations=paths(LAYOUT.evaluation, evaluations_of(UNITS)),
     output:
-        csv=in_report(LAYOUT.claims("csv"), "Claims", shown="CSV"),
+        csv=in_report(LAYOUT.claims("csv"), "Claims", form="numbers"),
         md=LAYOUT.claims("md"),
     log:
         LAYOUT.log("claims"),
@@ -133,7 +129,7 @@ rule runtime:
         csv=LAYOUT.table("runtime", "csv"),
         md=LAYOUT.table("runtime", "md"),
         html=in_report(
-            LAYOUT.table("runtime", "html"), "Running time", "page", shown="table"
+            LAYOUT.table("runtime", "html"), "Running time", "page", form="table"
         ),
     log:
         LAYOUT.log("runtime"),
@@ -161,7 +157,7 @@ rule report:
         tables=[LAYOUT.table(name, "html") for name in TABLES],
         figures=[LAYOUT.figure(name, "png") for name in SHOWN_FIGURES],
     output:
-        in_report(LAYOUT.report, "Report", "page", shown="page"),
+        in_report(LAYOUT.report, "Report", "page", form="page"),
     log:
         LAYOUT.log("report"),
     benchmark:
