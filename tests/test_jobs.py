@@ -100,6 +100,8 @@ def test_progress_goes_to_the_log_and_with_verbose_to_the_terminal(snakemake, ca
 def test_verbose_is_true_or_false():
     assert not is_verbose({})
     assert is_verbose({"verbose": True})
+    assert is_verbose({"verbose": "true"})
+    assert not is_verbose({"verbose": "false"})
     with pytest.raises(UserError, match="--config verbose=maybe: write true or false"):
         is_verbose({"verbose": "maybe"})
 
