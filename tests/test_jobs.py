@@ -14,7 +14,7 @@ import pytest
 
 from nbv.checksums import write_checksum
 from nbv.errors import UserError
-from nbv.jobs import job, killed_jobs
+from nbv.jobs import is_verbose, job, killed_jobs
 
 
 @pytest.fixture
@@ -25,6 +25,7 @@ def snakemake(tmp_path):
         log=[str(tmp_path / "logs" / "train" / "mug.log")],
         rule="train",
         wildcards=["mug", "00"],
+        config={},
     )
     root = logging.getLogger()
     for handler in root.handlers[:]:
@@ -79,11 +80,30 @@ def test_a_crash_keeps_its_traceback_in_the_log_alone(snakemake, capsys):
     assert "Traceback" in Path(snakemake.log[0]).read_text()
 
 
-def test_progress_goes_to_the_terminal_and_to_the_log(snakemake, capsys):
+def test_progress_goes_to_the_log_and_with_verbose_to_the_terminal(snakemake, capsys):
+    with job(snakemake):
+        logging.getLogger("nbv.estimation").info("epoch 1")
+        logging.getLogger("nbv.estimation").warning("no depth")
+        logging.getLogger("nbv.reference").info("agrees", extra={"for_terminal": True})
+    printed = capsys.readouterr().err
+    assert "epoch 1" not in printed
+    assert "train mug/00] no depth" in printed
+    assert "train mug/00] agrees" in printed
+    logged = Path(snakemake.log[0]).read_text()
+    assert logged.index("epoch 1") < logged.index("no depth") < logged.index("agrees")
+    snakemake.config = {"verbose": True}
     with job(snakemake):
         logging.getLogger("nbv.estimation").info("epoch 1")
     assert "train mug/00] epoch 1" in capsys.readouterr().err
-    assert "epoch 1" in Path(snakemake.log[0]).read_text()
+
+
+def test_verbose_is_true_or_false():
+    assert not is_verbose({})
+    assert is_verbose({"verbose": True})
+    assert is_verbose({"verbose": "true"})
+    assert not is_verbose({"verbose": "false"})
+    with pytest.raises(UserError, match="--config verbose=maybe: write true or false"):
+        is_verbose({"verbose": "maybe"})
 
 
 def test_inputs_are_held_to_their_checksums_and_outputs_get_theirs(

@@ -94,10 +94,11 @@ def is_verbose(config: Mapping[str, Any]) -> bool:
     UserError
         For a value that is neither true nor false.
     """
-    verbose = config.get("verbose", False)
-    if not isinstance(verbose, bool):
+    # Snakemake's command line hands over "true" as text and "True" as a bool.
+    verbose = str(config.get("verbose", False))
+    if verbose.lower() not in ("true", "false"):
         raise UserError(f"--config verbose={verbose}: write true or false")
-    return verbose
+    return verbose.lower() == "true"
 
 
 def killed_jobs(logs: str | Path, since: float) -> list[str]:

@@ -93,7 +93,7 @@ def test_a_failed_job_is_said_to_end_the_run_unless_the_run_goes_on(monkeypatch)
         progress.begin()
         time.sleep(0.3)
         progress.close()
-        said = "a job failed, waiting for what still runs; 0 of 3 jobs; now train"
+        said = "a job failed; waiting for what still runs: train"
         assert (said in stream.getvalue()) == stops
 
 

@@ -47,14 +47,10 @@ rule table:
             LAYOUT.evaluation, evaluations_of(units_of(wildcards.table))
         ),
     output:
-        csv=in_report(
-            LAYOUT.table("{table}", "csv"), "Tables", table="{table}", shown="CSV"
-        ),
+        csv=table_in_report("csv", "numbers"),
         md=LAYOUT.table("{table}", "md"),
         tex=LAYOUT.table("{table}", "tex"),
-        html=in_report(
-            LAYOUT.table("{table}", "html"), "Tables", table="{table}", shown="table"
-        ),
+        html=table_in_report("html", "as in the paper"),
     log:
         LAYOUT.log("table/{table}"),
     benchmark:
@@ -107,7 +103,7 @@ rule claims:
         sources("judge_claims"),
         evaluations=paths(LAYOUT.evaluation, evaluations_of(UNITS)),
     output:
-        csv=in_report(LAYOUT.claims("csv"), "Claims", shown="CSV"),
+        csv=in_report(LAYOUT.claims("csv"), "Claims", form="numbers"),
         md=LAYOUT.claims("md"),
     log:
         LAYOUT.log("claims"),
@@ -136,7 +132,7 @@ rule runtime:
         csv=LAYOUT.table("runtime", "csv"),
         md=LAYOUT.table("runtime", "md"),
         html=in_report(
-            LAYOUT.table("runtime", "html"), "Running time", "page", shown="table"
+            LAYOUT.table("runtime", "html"), "Running time", "page", form="table"
         ),
     log:
         LAYOUT.log("runtime"),
@@ -165,7 +161,7 @@ rule report:
         table1=LAYOUT.table("table1", "csv"),
         figures=[LAYOUT.figure(name, "svg") for name in SHOWN_FIGURES],
     output:
-        in_report(LAYOUT.report, "Report", "page", shown="page"),
+        in_report(LAYOUT.report, "Report", "page", form="page"),
     log:
         LAYOUT.log("report"),
     benchmark:

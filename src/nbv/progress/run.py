@@ -153,7 +153,7 @@ class RunProgress(logging.Handler):
         running = Counter(self._planned[number].name for number in [*self._started])
         busy = ", ".join(f"{name} × {n}" if n > 1 else name for name, n in sorted(running.items()))
         if self._failed and self._stops_at_failure:
-            return f"a job failed, waiting for what still runs; {self._counts()}; now {busy}"
+            return f"a job failed; waiting for what still runs: {busy}"
         now_running = f"; now {busy}" if busy else ""
         return f"{how_far(self._estimate)}, {self._counts()}{now_running}"
 
