@@ -446,7 +446,8 @@ def _reachable(
     is_within = (rotation_deg > -180.0) & (rotation_deg <= 180.0)
     rotation_deg = np.where(is_within, rotation_deg, -signed_difference_deg(0.0, rotation_deg))
     apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
-    may = rotation_deg[(apart >= MIN_SEPARATION_DEG) & (travel_deg(rotation_deg) <= max_travel_deg)]
+    is_free = (apart >= MIN_SEPARATION_DEG) & (travel_deg(rotation_deg) <= max_travel_deg)
+    may: NDArray[np.float64] = rotation_deg[is_free]
     if not may.size:
         raise UserError(
             "no rotation is allowed: widen --allowed or --max-travel; a view is "
