@@ -85,7 +85,7 @@ def _starts(frame: Path, n_rounds: int) -> list[Figure]:
     def start(*arguments: str) -> Callable[[], object]:
         return lambda: subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
 
-    help_ = start("-c", "import sys; from nbv.cli import main; sys.exit(main(['--help']))")
+    help_ = start("-c", "import sys; from nbv.cli import run; sys.argv[1:] = ['--help']; run()")
     works = [start("-c", _START, backend, str(frame)) for backend in START_S]
     turns = take_turns([*works, help_], n_rounds)
     bounds = {f"start to answer, {backend}": bound for backend, bound in START_S.items()}

@@ -27,8 +27,10 @@ from nbv.bundles.familiarity import fit_familiarity, unfamiliarity
 from nbv.bundles.recommender import MIN_SEPARATION_DEG, N_ALTERNATIVES, Recommender
 from nbv.bundles.turns import Turn
 from nbv.errors import UserError
+from nbv.frames.crop import crop_frame
 from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics
+from nbv.frames.masks import object_mask
 from nbv.recommendation.belief import mean_direction_deg
 
 HERE = np.arange(BINS) * WIDTH
@@ -549,6 +551,36 @@ def test_a_mask_takes_the_object_from_its_surroundings(recommender):
     same(recommender.recommend([table], mask=mask[None]), wanted)
     with pytest.raises(FrameError, match="mask-at-border"):
         recommender.recommend(table)
+
+
+@settings(max_examples=25)
+@given(seed=seeds, kind=st.sampled_from([bool, np.uint8, float]))
+def test_only_the_part_of_a_frame_around_the_mask_is_looked_at(recommender, seed, kind):
+    """And the crop is that of the whole frame, to the bit."""
+    rng = np.random.default_rng(seed)
+    depth = frame(seed, row=int(rng.integers(30, 60)), column=int(rng.integers(35, 85)))
+    mask = (depth > 0) & (rng.random(depth.shape) < 0.98)
+    depth = np.where(depth > 0, depth, rng.uniform(0.5, 0.9)).astype(np.float32)
+    bundle = recommender.bundle
+    camera = Intrinsics(FOCAL_PX, 0.97 * FOCAL_PX, 58.3, 46.1)
+    inside = object_mask(depth, 1.0, mask)
+    sizes = bundle.diagonal_m, bundle.extent_m
+    wanted = crop_frame(depth, inside, camera, bundle.camera, *sizes)
+    found = recommender.crop(depth, mask=3 * mask.astype(kind), intrinsics=camera)
+    assert np.array_equal(found.codes, wanted.codes)
+    assert found.distance_m == wanted.distance_m
+    assert found.extent_m == wanted.extent_m
+
+
+def test_a_repeated_sequence_of_rotations_has_the_same_answer(bundle):
+    """What calibration turns make of rotations is kept: no answer depends on those before it."""
+    kept = Recommender(bundle, "torch")
+    for rotations in ([0.0], [0.0, 60.0], [0.0, 90.0], [0.0, 60.0, 120.0], [0.0], [0.0, 60.0]):
+        codes = codes_of(len(rotations), len(rotations))
+        fresh = Recommender(bundle, "torch").recommend_crops(codes, rotations)
+        found = kept.recommend_crops(codes, rotations)
+        assert np.array_equal(found.error_after_deg, fresh.error_after_deg)
+        same(found, fresh)
 
 
 def test_near_and_far_take_the_object_from_its_surroundings(recommender):

@@ -54,3 +54,20 @@ def test_a_turn_that_does_not_count_is_as_if_it_were_not_there(rng: np.random.Ge
     wanted_now, wanted = fewer.expected_error_deg(belief, 5.0, 30.0)
     assert now == pytest.approx(wanted_now, rel=1e-4)
     assert after == pytest.approx(wanted, rel=1e-4)
+
+
+@pytest.mark.parametrize("sharpness", [1.0, 6.0])
+def test_one_belief_alone_and_among_others_has_the_same_errors(sharpness: float) -> None:
+    """Alone, views that are not alike are left out: of a sharp belief nearly all."""
+    rng = np.random.default_rng(1)
+    apart = np.arange(24) - np.arange(24)[:, None]
+    logits = sharpness * np.cos(np.radians(15 * apart)) + rng.normal(0, 0.3, (5, 24, 24))
+    distributions = np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
+    alike = LookAlikes.of_views(distributions)
+    beliefs = distributions[0, ::6]
+    options = {"power": 16.0, "pseudo_observations": 30.0, "share": rng.uniform(0.1, 1, 5)}
+    now, after = alike.expected_error_deg(beliefs, **options)
+    for place in range(len(beliefs)):
+        (own_now,), (own,) = alike.expected_error_deg(beliefs[place : place + 1], **options)
+        assert own_now == pytest.approx(now[place], rel=1e-5)
+        assert own == pytest.approx(after[place], rel=1e-5)

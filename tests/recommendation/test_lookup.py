@@ -47,7 +47,7 @@ def test_recommendations_are_read_at_the_nearest_bin():
 
 @pytest.mark.parametrize("n_bins", [8, 72, 360])
 def test_a_view_from_the_same_place_is_not_recommended(rng, n_bins):
-    """A table whose costs are least at hand, or a bin beside it, as those of one object may be."""
+    """A table whose costs are least at hand, or a bin next to it, as those of one object may be."""
     cost = rng.uniform(1, 2, (n_bins, n_bins)).astype(np.float32)
     width = 360 / n_bins
     near = np.arange(n_bins) % 5

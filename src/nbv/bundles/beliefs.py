@@ -28,6 +28,9 @@ def turned(rows: NDArray[np.floating], turn_deg: ArrayLike) -> NDArray[np.float6
     """
     n_bins = rows.shape[-1]
     place = np.asarray(turn_deg, dtype=np.float64) * (n_bins / 360.0)
+    if not place.any():  # a single frame, mostly
+        shape = np.broadcast_shapes(rows.shape, (*place.shape, n_bins))
+        return np.array(np.broadcast_to(rows, shape), dtype=np.float64)
     below = np.floor(place)
     part = (place - below)[..., None]
     index = (np.arange(n_bins) + below.astype(np.intp)[..., None]) % n_bins

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,15 @@ from nbv.bundles.bundle import Bundle, load_bundle
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.networks import Network, open_network
 from nbv.errors import UserError, nearest
-from nbv.frames.crop import Crop, crop_frame, need_metres, need_plausible_nearest
-from nbv.frames.depth_files import to_metres
+from nbv.frames.crop import (
+    Crop,
+    Window,
+    crop_frame,
+    need_metres,
+    need_plausible_nearest,
+    window_of,
+)
+from nbv.frames.depth_files import DepthImage, to_metres
 from nbv.frames.intrinsics import Intrinsics, as_intrinsics
 from nbv.frames.masks import object_mask
 from nbv.labels import counted
@@ -43,6 +50,9 @@ MIN_SEPARATION_DEG = 15.0
 """From every view so far: an estimator errs alike from nearly the same place."""
 
 N_ALTERNATIVES = 5
+
+N_KEPT = 6
+"""Sequences of rotations whose look-alikes are kept: 20 MB each, of a bundle as large as `mug`."""
 
 
 @dataclass(frozen=True)
@@ -181,8 +191,19 @@ class Recommender:
         return cls(load_bundle(bundle_path(name)), backend)
 
     @cached_property
-    def _look_alikes(self) -> LookAlikes:
-        return LookAlikes.of_views(self.bundle.distributions)
+    def _look_alikes(self) -> Callable[[tuple[int, ...]], LookAlikes]:
+        """Calibration turns after some rotations from the first view, in bins.
+
+        The errors after them take longer to find than all else, so some are kept.
+        """
+
+        @lru_cache(maxsize=N_KEPT)
+        def after(bins: tuple[int, ...]) -> LookAlikes:
+            if not bins:
+                return LookAlikes.of_views(self.bundle.distributions)
+            return after(bins[:-1]).after(bins[-1])
+
+        return after
 
     def crop(
         self,
@@ -195,15 +216,16 @@ class Recommender:
     ) -> Crop:
         """Return what the network sees of a frame; parameters and errors as of `recommend`."""
         bundle = self.bundle
-        depth = to_metres(np.asarray(depth_m))
+        depth, given, window = _in_window(np.asarray(depth_m), mask)
         camera = bundle.focal_px if intrinsics is None else intrinsics
         known = as_intrinsics([camera] if isinstance(camera, float) else camera)
         reach_m = REACH * bundle.diagonal_m
         need_metres(near_m, far_m, bundle.diagonal_m)
         if mask is None and far_m is None:
             need_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
-        inside = object_mask(depth, reach_m, mask, near_m, far_m)
-        return crop_frame(depth, inside, known, bundle.camera, bundle.diagonal_m, bundle.extent_m)
+        inside = object_mask(depth, reach_m, given, near_m, far_m)
+        sizes = bundle.diagonal_m, bundle.extent_m
+        return crop_frame(depth, inside, known, bundle.camera, *sizes, window)
 
     def distributions(self, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
         """Return p(azimuth | image) (n, B) of crops (n, side, side)."""
@@ -299,9 +321,9 @@ class Recommender:
         belief = fused(distributions_of(logits, self.bundle.temperature), rotations_deg)
         n_bins = self.bundle.n_bins
         width = 360.0 / n_bins
-        alike = self._look_alikes
-        for rotation in rotations_deg[1:]:
-            alike = alike.after(round(rotation / width) % n_bins)
+        alike = self._look_alikes(
+            tuple(round(rotation / width) % n_bins for rotation in rotations_deg[1:])
+        )
         share = turn_share(self.bundle, elevation_deg)
         (now,), (after,) = alike.expected_error_deg(
             belief[None], **self.bundle.affinity, share=share
@@ -319,7 +341,7 @@ class Recommender:
             spread_deg=spread_deg(belief),
             expected_error_deg=float(now),
             move=best,
-            alternatives=tuple(others[:N_ALTERNATIVES]),
+            alternatives=tuple(others),
             belief=turned(belief, -last),
             error_after_deg=error,
             unfamiliarity=float(unfamiliarity(self.bundle.familiarity, codes, logits).max()),
@@ -331,6 +353,24 @@ def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float6
     """Return how much each calibration turn (S,) counts for frames of an elevation, or of any."""
     known = float("nan") if elevation_deg is None else elevation_deg
     return bundle.turn_weight * elevation_share(bundle.elevation_deg, known)
+
+
+def _in_window(
+    depth_m: NDArray[Any], mask: ArrayLike | None
+) -> tuple[DepthImage, ArrayLike | None, Window | None]:
+    """Return depth in metres and the mask, in a window around it: most of a frame is not looked at.
+
+    Without a mask that fits, or without depth in it, they are the whole frame's.
+    """
+    given = None if mask is None else np.asarray(mask)
+    if given is not None and given.shape == depth_m.shape and depth_m.ndim == 2:
+        is_given = given if given.dtype == np.bool_ else given != 0
+        if is_given.any():
+            window, place = window_of(is_given)
+            part = to_metres(depth_m[place])
+            if part.any():
+                return part, is_given[place], window
+    return to_metres(depth_m), given, None
 
 
 def _as_rotations(rotations_deg: float | Sequence[float], n: int) -> list[float]:
@@ -406,7 +446,8 @@ def _reachable(
     is_within = (rotation_deg > -180.0) & (rotation_deg <= 180.0)
     rotation_deg = np.where(is_within, rotation_deg, -signed_difference_deg(0.0, rotation_deg))
     apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
-    may = rotation_deg[(apart >= MIN_SEPARATION_DEG) & (travel_deg(rotation_deg) <= max_travel_deg)]
+    is_free = (apart >= MIN_SEPARATION_DEG) & (travel_deg(rotation_deg) <= max_travel_deg)
+    may: NDArray[np.float64] = rotation_deg[is_free]
     if not may.size:
         raise UserError(
             "no rotation is allowed: widen --allowed or --max-travel; a view is "
@@ -447,4 +488,6 @@ def _local_best(
         apart = (abs(rotation - one.rotation_deg) for one in found)
         if all(min(angle, 360.0 - angle) >= MIN_SEPARATION_DEG for angle in apart):
             found.append(Move(rotation, abs(rotation), expected))
+        if len(found) > N_ALTERNATIVES:
+            break
     return found

@@ -59,6 +59,31 @@ class Crop:
     extent_m: float
 
 
+@dataclass(frozen=True)
+class Window:
+    """A part of a frame.
+
+    Attributes
+    ----------
+    top, left : int
+        Of its first pixel in the frame.
+    frame_shape : (int, int)
+        Rows and columns of the whole frame.
+    """
+
+    top: int
+    left: int
+    frame_shape: tuple[int, int]
+
+
+def window_of(mask: Mask) -> tuple[Window, tuple[slice, slice]]:
+    """Return the smallest window around a mask that is not empty, and its slices of the frame."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    top, left = int(rows[0]), int(columns[0])
+    window = Window(top, left, (mask.shape[0], mask.shape[1]))
+    return window, (slice(top, int(rows[-1]) + 1), slice(left, int(columns[-1]) + 1))
+
+
 def pixel_step(camera: Camera) -> float:
     """Return the size of a crop's pixel on the object, in diagonals."""
     return camera.distance / camera.focal_px
@@ -71,13 +96,14 @@ def crop_frame(
     camera: Camera,
     diagonal_m: float,
     extent_m: tuple[float, float] = (0.0, math.inf),
+    window: Window | None = None,
 ) -> Crop:
     """Return the crop of one object.
 
     Parameters
     ----------
     depth_m : (rows, columns) float32
-        Metres.
+        Metres; of the whole frame, or of a window of it that holds the mask.
     mask : (rows, columns) bool
         See `nbv.frames.masks.object_mask`.
     intrinsics : Intrinsics
@@ -87,6 +113,8 @@ def crop_frame(
         Of the object's bounding box, metres; that of a usual object of the category.
     extent_m : (float, float)
         Between which the object's extent in the image is plausible, metres.
+    window : Window, optional
+        Where `depth_m` and `mask` lie in the frame; without it they are the frame.
 
     Raises
     ------
@@ -94,10 +122,12 @@ def crop_frame(
         ``mask-at-border``, ``other-resolution``, ``implausible-distance`` or ``implausible-size``.
     """
     rows, columns = depth_m.shape
-    intrinsics.need_resolution(rows, columns)
-    where_row, where_column = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    top, bottom, left, right = where_row[0], where_row[-1], where_column[0], where_column[-1]
-    _need_inside(top, bottom, left, right, depth_m.shape, intrinsics)
+    window = window or Window(0, 0, (rows, columns))
+    intrinsics.need_resolution(*window.frame_shape)
+    seen, (of_rows, of_columns) = window_of(mask)
+    top, bottom = window.top + seen.top, window.top + of_rows.stop - 1
+    left, right = window.left + seen.left, window.left + of_columns.stop - 1
+    _need_inside(top, bottom, left, right, window.frame_shape, intrinsics)
     middle = (left + right + 1) / 2, (top + bottom + 1) / 2
     turn, principal = _facing(intrinsics, *middle)
     distance_m = float(np.median(depth_m[mask])) / turn[2, 2]
@@ -110,11 +140,11 @@ def crop_frame(
     grid = np.arange(camera.image_side) + 0.5 - camera.image_side / 2
     grid *= pixel_step(camera) * diagonal_m / away_m
     # Rays of a camera that is directed at the object, in the frame of the one that is not.
-    across, down, ahead = np.moveaxis(
-        grid[None, :, None] * turn[0] + grid[:, None, None] * turn[1] + turn[2], 2, 0
+    across, down, ahead = (
+        grid * turn[0, axis] + grid[:, None] * turn[1, axis] + turn[2, axis] for axis in range(3)
     )
-    column = np.floor(principal[0] + intrinsics.fx * across / ahead).astype(int)
-    row = np.floor(principal[1] + intrinsics.fy * down / ahead).astype(int)
+    column = np.floor(principal[0] + intrinsics.fx * across / ahead).astype(int) - window.left
+    row = np.floor(principal[1] + intrinsics.fy * down / ahead).astype(int) - window.top
     inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns) & (ahead > 0)
     at = row.clip(0, rows - 1), column.clip(0, columns - 1)
     depth = np.where(inside & mask[at], depth_m[at] / (diagonal_m * ahead), 0.0)

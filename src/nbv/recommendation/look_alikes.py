@@ -16,6 +16,12 @@ from numpy.typing import NDArray
 
 from nbv.recommendation.evidence import Table
 
+NEGLIGIBLE = 1e-10
+"""Of the largest weight: what is left out is less than what single precision rounds."""
+
+# Of all views: for more, their errors are read as they lie.
+_FEW = 0.15
+
 
 def in_object_frame(distributions: Table) -> Table:
     """Return distributions (S, B, B) of views, turned so that index 0 is the true pose.
@@ -92,14 +98,6 @@ class LookAlikes:
         return LookAlikes(both / both.sum(axis=2, keepdims=True), self.views)
 
     @cached_property
-    def seen(self) -> Table:
-        """The distributions in the frame of the first view, (S B, B)."""
-        n_bins = self.views.shape[-1]
-        index = (np.arange(n_bins) - np.arange(n_bins)[:, None]) % n_bins
-        seen = np.take_along_axis(self.so_far, index[None], axis=2)
-        return np.ascontiguousarray(seen.reshape(-1, n_bins))
-
-    @cached_property
     def errors_deg(self) -> Table:
         """`error_after_deg` of the turns, (S B, B)."""
         return error_after_deg(self.so_far, self.views).reshape(-1, self.views.shape[-1])
@@ -129,15 +127,24 @@ class LookAlikes:
         """
         n_turns, n_bins, _ = self.views.shape
         of_turn = np.ones(n_turns) if share is None else np.asarray(share, dtype=np.float64)
-        of_view = np.repeat(of_turn, n_bins).astype(np.float32)
         # The affinity of each belief with each view, whose roots are kept.
-        alike = np.sqrt(np.asarray(beliefs, dtype=np.float32)) @ self._roots.T
-        weight = alike**power * (of_view * np.float32(360.0 / n_bins))
-        prior = pseudo_observations / of_view.sum()
+        weight = np.sqrt(np.asarray(beliefs, dtype=np.float32)) @ self._roots.T
+        weight **= power
+        of_views = (of_turn * (360.0 / n_bins)).astype(np.float32)[:, None]
+        weight.reshape(-1, n_turns, n_bins)[:] *= of_views
         total = weight.sum(axis=1, dtype=np.float64) + pseudo_observations
-        after = weight @ self.errors_deg + prior * (of_turn @ self._errors_by_turn)
-        now = weight @ self.error_now_deg + prior * (of_view @ self.error_now_deg)
+        prior = pseudo_observations / (of_turn.sum() * n_bins)
+        now = weight @ self.error_now_deg + prior * (of_turn @ self._error_now_by_turn)
+        after = _weighted(weight, self.errors_deg) + prior * (of_turn @ self._errors_by_turn)
         return np.asarray(now / total), np.asarray(after / total[:, None])
+
+    @property
+    def seen(self) -> Table:
+        """The distributions in the frame of the first view, (S B, B)."""
+        n_bins = self.views.shape[-1]
+        index = (np.arange(n_bins) - np.arange(n_bins)[:, None]) % n_bins
+        seen = np.take_along_axis(self.so_far, index[None], axis=2)
+        return np.ascontiguousarray(seen.reshape(-1, n_bins))
 
     @cached_property
     def _roots(self) -> Table:
@@ -145,7 +152,26 @@ class LookAlikes:
         return np.sqrt(self.seen)
 
     @cached_property
+    def _error_now_by_turn(self) -> NDArray[np.float64]:
+        n_turns, n_bins, _ = self.views.shape
+        by_turn = self.error_now_deg.reshape(n_turns, n_bins)
+        return np.asarray(by_turn.sum(axis=1, dtype=np.float64))
+
+    @cached_property
     def _errors_by_turn(self) -> NDArray[np.float64]:
         n_turns, n_bins, _ = self.views.shape
         by_turn = self.errors_deg.reshape(n_turns, n_bins, n_bins)
         return np.asarray(by_turn.sum(axis=1, dtype=np.float64))
+
+
+def _weighted(weight: Table, errors_deg: Table) -> Table:
+    """Return the sums of errors (m, B) by weights (n, m), (n, B).
+
+    Where few weights of a row are above `NEGLIGIBLE`, the others are left out: reading the errors
+    takes longer than adding them up.
+    """
+    if len(weight) == 1:
+        heavy = np.flatnonzero(weight[0] > NEGLIGIBLE * weight[0].max())
+        if len(heavy) < _FEW * weight.shape[1]:
+            return weight[:, heavy] @ errors_deg[heavy]
+    return weight @ errors_deg

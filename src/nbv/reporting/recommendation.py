@@ -96,21 +96,24 @@ def _draw_errors(axes: PolarAxes, answer: Recommendation) -> None:
         marker="D",
         color=_MOVE,
         linestyle="none",
+        label="recommended",
     )
-    for move in answer.alternatives:
+    if answer.alternatives:
         axes.plot(
-            math.radians(move.rotation_deg),
-            move.expected_error_deg,
+            np.radians([move.rotation_deg for move in answer.alternatives]),
+            [move.expected_error_deg for move in answer.alternatives],
             marker="o",
             markerfacecolor="none",
             color=MUTED,
             linestyle="none",
+            label="alternatives",
         )
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=2, handletextpad=0.1)
     axes.set_ylim(0, 1.05 * float(np.nanmax(error)))
     axes.yaxis.set_major_locator(MaxNLocator(4))
     # Where no curve is: next to the camera's own place.
     axes.set_rlabel_position(0)
-    rotation = f"{answer.move.rotation_deg:+.0f}".replace("-", "−")
+    rotation = f"{answer.move.rotation_deg:+g}".replace("-", "−")
     axes.set_title(
         "Expected error (degrees) after a turn\n"
         f"best: {rotation}°, {answer.move.expected_error_deg:.1f}°"
