@@ -153,6 +153,10 @@ def test_an_edit_of_a_criterion_leaves_training_alone(scratch):
     assert not {"meshes", "render", "train", "estimate"} & set(jobs)
 
 
+def test_the_explorer_is_made_on_request_of_what_a_finished_run_has(finished):
+    assert finished.would_run(targets=("explorer",)) == {"explorer": 1}
+
+
 def test_a_comment_elsewhere_reruns_nothing(scratch):
     for name in ("src/nbv/rendering/pyrender.py", "Snakefile", "config/config.yaml"):
         path = scratch.folder / name

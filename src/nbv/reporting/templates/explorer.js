@@ -14,7 +14,7 @@ const state = { unit: 0, object: 0, view: 0, method: "", views: 2, next: "gain" 
 let loaded = null;
 let colours = palette();
 
-const text = (value, decimals = 2) => `${value.toFixed(decimals).replace("-", MINUS)}°`;
+const text = (value) => (value === null ? "–" : `${value.toFixed(2).replace("-", MINUS)}°`);
 const unit = () => units[state.unit];
 const stepDeg = () => 360 / unit().views;
 const azimuthDeg = () => state.view * stepDeg();
@@ -287,7 +287,7 @@ function row(cells) {
   return made;
 }
 
-const distanceText = (poseDeg) => text(distanceDeg(poseDeg, azimuthDeg()));
+const distanceText = (poseDeg) => text(poseDeg === null ? null : distanceDeg(poseDeg, azimuthDeg()));
 
 function fillOutcomes() {
   const { outcomes } = loaded, { views } = unit();
@@ -365,7 +365,7 @@ function drawRing({ turns, beliefs }) {
   drawBeliefs(context, centre, geometry.inner, beliefs, own, colours);
   drawRay(context, centre, azimuthDeg(), geometry.inner, colours.ink, []);
   const mean = meanDirection(beliefs[beliefs.length - 1]);
-  drawRay(context, centre, mean, geometry.inner, colours.belief, [5, 4]);
+  if (mean !== null) drawRay(context, centre, mean, geometry.inner, colours.belief, [5, 4]);
   const colour = colourOf(methodNamed(state.method), colours);
   for (let i = turns.length - 1; i >= 0; i -= 1) {
     drawCamera(context, centre, azimuthDeg() + turns[i], geometry.inner + 11, String(i + 1), i ? colour : colours.ink, colours);

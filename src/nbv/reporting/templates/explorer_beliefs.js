@@ -56,7 +56,7 @@ function updatedBelief(belief, table, estimateDeg, deltaDeg) {
   return toSumOne(found);
 }
 
-/** The mean direction of a belief, degrees in [0, 360). */
+/** The mean direction of a belief, degrees in [0, 360); null where its directions cancel out. */
 function meanDirection(belief) {
   let x = 0, y = 0;
   for (let i = 0; i < belief.length; i += 1) {
@@ -64,6 +64,7 @@ function meanDirection(belief) {
     x += belief[i] * Math.cos(angle);
     y += belief[i] * Math.sin(angle);
   }
+  if (Math.hypot(x, y) < 1e-9) return null;
   return modulo((Math.atan2(y, x) * 180) / Math.PI, 360);
 }
 
