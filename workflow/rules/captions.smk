@@ -36,7 +36,7 @@ config["captions"] = {
 }
 
 
-def in_report(path, category, caption="result", **labels):
+def in_report(path, category, caption, labels):
     """A file that Snakemake's report shows under a category, with labels to choose it by."""
     return report(
         path, caption=f"../report/{caption}.rst", category=category, labels=labels
@@ -48,7 +48,10 @@ def table_in_report(kind, form):
     return in_report(
         LAYOUT.table("{table}", kind),
         "Tables",
-        table=lambda wildcards: numbered(wildcards.table),
-        shows=lambda wildcards: TABLES_SHOW[wildcards.table],
-        form=form,
+        "result",
+        lambda wildcards: {
+            "table": numbered(wildcards.table),
+            "shows": TABLES_SHOW[wildcards.table],
+            "form": form,
+        },
     )

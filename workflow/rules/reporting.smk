@@ -75,7 +75,12 @@ rule figure:
         sources("plot_paper"),
         unpack(figure_inputs),
     output:
-        png=in_report(LAYOUT.figure("{figure}", "png"), "Figures", figure="{figure}"),
+        png=in_report(
+            LAYOUT.figure("{figure}", "png"),
+            "Figures",
+            "result",
+            {"figure": "{figure}"},
+        ),
         pdf=LAYOUT.figure("{figure}", "pdf"),
         svg=LAYOUT.figure("{figure}", "svg"),
     log:
@@ -103,7 +108,7 @@ rule claims:
         sources("judge_claims"),
         evaluations=paths(LAYOUT.evaluation, evaluations_of(UNITS)),
     output:
-        csv=in_report(LAYOUT.claims("csv"), "Claims", form="numbers"),
+        csv=in_report(LAYOUT.claims("csv"), "Claims", "result", {"form": "numbers"}),
         md=LAYOUT.claims("md"),
     log:
         LAYOUT.log("claims"),
@@ -132,7 +137,7 @@ rule runtime:
         csv=LAYOUT.table("runtime", "csv"),
         md=LAYOUT.table("runtime", "md"),
         html=in_report(
-            LAYOUT.table("runtime", "html"), "Running time", "page", form="table"
+            LAYOUT.table("runtime", "html"), "Running time", "page", {"form": "table"}
         ),
     log:
         LAYOUT.log("runtime"),
@@ -161,7 +166,7 @@ rule report:
         table1=LAYOUT.table("table1", "csv"),
         figures=[LAYOUT.figure(name, "svg") for name in SHOWN_FIGURES],
     output:
-        in_report(LAYOUT.report, "Report", "page", form="page"),
+        in_report(LAYOUT.report, "Report", "page", {"form": "page"}),
     log:
         LAYOUT.log("report"),
     benchmark:
