@@ -99,7 +99,7 @@ def accuracy(inputs: FigureInputs) -> Figure:
         axes.set_ylim(0, 1.01)
         axes.set_title(unit_label(unit, common))
         axes.set_xlabel("Threshold τ (degrees, root scale)")
-        axes.set_ylabel("PEA(τ)")
+        axes.set_ylabel("PEA(τ) (fraction)")
     grid.add_key(_key(inputs, units))
     grid.figure.suptitle(f"Pose estimation accuracy at elevation {common}°", fontsize=10)
     return grid.figure
