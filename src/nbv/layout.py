@@ -134,7 +134,7 @@ class Layout:
         return f"{self.root}/tables/{name}.{kind}"
 
     def figure(self, name: str, kind: str) -> str:
-        """Return a figure as ``png`` or ``pdf``."""
+        """Return a figure as ``png``, ``pdf`` or ``svg``, or an animation as ``gif``."""
         return f"{self.root}/figures/{name}.{kind}"
 
     def claims(self, kind: str) -> str:
