@@ -185,6 +185,16 @@ def sources(script, settings=CONFIG):
     ]
 
 
+def templates_of(name):
+    """The files that a page is filled into; no import shows them."""
+    folder = Path(nbv.__file__).parent / "reporting/templates"
+    here = Path.cwd()
+    return [
+        str(file.relative_to(here)) if file.is_relative_to(here) else str(file)
+        for file in sorted(folder.glob(f"{name}*"))
+    ]
+
+
 def mesh_sources(wildcards):
     """The modules that meshes depend on. What starts at meshes ends here without them."""
     if EXTERNAL:

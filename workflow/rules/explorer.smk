@@ -5,16 +5,6 @@ EXPLORED_LOOKUPS = [
 ]
 
 
-def templates_of(name):
-    """The files that a page is filled into; no import shows them."""
-    folder = Path(nbv.__file__).parent / "reporting/templates"
-    here = Path.cwd()
-    return [
-        str(file.relative_to(here)) if file.is_relative_to(here) else str(file)
-        for file in sorted(folder.glob(f"{name}*"))
-    ]
-
-
 rule explorer:
     input:
         sources("build_explorer"),
