@@ -75,7 +75,7 @@ def loop_over_images(test: Estimates, table: LookupTable) -> pd.DataFrame:
     rows = []
     for name, estimates in zip(test.object_ids, test.estimate_deg, strict=True):
         for initial, estimate in enumerate(estimates):
-            delta = int(table.recommend(estimate))
+            delta = int(table.least_cost(estimate))
             second = estimates[(initial + delta) % 360]
             pose = round(float(average(estimate, second, delta)), 4) % 360.0
             error = float(circular_distance_deg(pose, initial))
