@@ -107,7 +107,8 @@ def planned_jobs():
             needs=frozenset(
                 numbers[other] for other in dag.dependencies[job] if other in numbers
             ),
-            priority=job.priority,
+            # Snakemake gives none to some jobs that need not run.
+            priority=job.priority if job in needed else 0,
         )
         for job in numbers
     }

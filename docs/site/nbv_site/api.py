@@ -29,6 +29,8 @@ def _as_written(
     app: Sphinx, what: str, name: str, documented: Any, options: Any, *signature: str | None
 ) -> tuple[str, str] | None:
     """Return a signature with its annotations as in the source: `ArrayLike`, not its members."""
+    if what not in {"class", "exception", "function", "method"}:
+        return None
     try:
         written = inspect.signature(documented)
     except (TypeError, ValueError):
