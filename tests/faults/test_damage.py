@@ -25,6 +25,7 @@ KINDS = {
     "table_html": "tables/table1.html",
     "figure_png": "figures/figure5.png",
     "figure_pdf": "figures/figure5.pdf",
+    "figure_svg": "figures/figure5.svg",
     "claims": "claims.csv",
     "configuration": "configuration.yaml",
     "provenance": "provenance.json",
@@ -42,7 +43,7 @@ READ_FOR = {
     "lookup": "evaluation/mug/el00/fold1/proposed.csv",
     "evaluation": "tables/table1.csv",
     "table_html": "report.html",
-    "figure_png": "report.html",
+    "figure_svg": "report.html",
     "claims": "report.html",
     "configuration": "report.html",
     "provenance": "report.html",
@@ -109,7 +110,7 @@ def test_a_job_notices_what_it_reads(scratch, kind):
 @pytest.mark.slow
 def test_the_same_command_goes_on_from_damage(scratch):
     before = scratch.outcome()
-    for kind in ("depth", "test", "figure_png"):
+    for kind in ("depth", "test", "figure_svg"):
         damage(scratch.results / KINDS[kind], flip)
     # So that there is something to do.
     (scratch.results / "report.html").unlink()

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 LOOKUPS = tuple(f"results/tiny/lookup/mug/el00/fold{k}/pose_ambiguity.npz" for k in (1, 2))
 TWO_JOBS = ("--cores", "2", "--force", *LOOKUPS)
 LAST_LINE = re.compile(
-    r"^\[\d\d:\d\d:\d\d nbv\] 100 % done in [\dminh s]+, (\d+) of \1 jobs$", re.M
+    r"(?:^|\x1b\[K)\[\d\d:\d\d:\d\d nbv\] 100 % done in [\dminh s]+, (\d+) of \1 jobs$", re.M
 )
 CHATTER = ("Select jobs", "Finished jobid", "steps (", "Building DAG", "Job stats", "rule lookup:")
 
