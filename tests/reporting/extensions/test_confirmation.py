@@ -117,7 +117,8 @@ def test_the_figure_has_a_panel_for_each_question_and_a_mark_for_each_answer(con
     assert len(figure.axes) == primary["contrast"].nunique()
     for axes, (_, part) in zip(figure.axes, primary.groupby("contrast", sort=False), strict=True):
         labels = [label.get_text() for label in axes.get_yticklabels()]
-        assert len(labels) == len(part)
+        assert len(set(labels)) == len(part)
+        assert {label.split(", ")[0] for label in labels} == {"Mug", "Car", "All"}
         marks = [line for line in axes.lines if line.get_marker() not in ("None", "")]
         assert [mark.get_xdata()[0] for mark in marks] == part["difference_deg"].tolist()
         for mark, (_, row) in zip(marks, part.iterrows(), strict=True):

@@ -235,15 +235,16 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
 
 
 def _forest(axes: Axes, contrasts: pd.DataFrame) -> None:
-    several = len(set(contrasts["fusion"])) > 1
+    # A row is named by what tells it from the others.
+    told = [name for name in ("dataset", "fusion") if len(set(contrasts[name])) > 1]
     labels = []
     for place, (_, row) in enumerate(contrasts.iterrows()):
         verdict = _WORSE if row["low"] > 0 else _BETTER if row["high"] < 0 else _UNDECIDED
         colour, marker = _VERDICTS[verdict]
         axes.plot([row["low"], row["high"]], [place, place], color=colour, linewidth=1.4)
         axes.plot(row["difference_deg"], place, color=colour, marker=marker, markersize=5)
-        fusion = f", {row['fusion']}" if several else ""
-        labels.append(f"{row['dataset']}, {category_label(str(row['category']))}{fusion}")
+        names = [category_label(str(row["category"])), *(str(row[name]) for name in told)]
+        labels.append(", ".join(names))
     axes.axvline(0.0, color=INK, linewidth=0.8)
     axes.set_yticks(range(len(labels)), labels)
     axes.set_ylim(len(labels) - 0.5, -0.5)
