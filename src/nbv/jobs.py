@@ -137,7 +137,8 @@ def _log_to(path: Path, label: str, verbose: bool) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         _add_handler(logging.FileHandler(path, mode="w", encoding="utf-8"), label)
     except OSError as error:
-        _fail(f"{path}: cannot be written ({error.strerror})", path)
+        reason = _FOR_THE_USER.get(error.errno, f"cannot be written ({error.strerror})")
+        _fail(f"{path}: {reason}", path)
 
 
 def _is_for_terminal(record: logging.LogRecord, verbose: bool) -> bool:

@@ -124,7 +124,7 @@ def test_a_disk_that_fills_in_every_stage(finished, fresh, small_disk):
         printed = fresh.run(*COMMAND, fails=True).stderr
         assert "no space left on the disk; free some and run the same command again" in printed
         assert "Traceback" not in printed
-        stages |= set(re.findall(r"\d (\w+)[^\]]*\] error: \S+ no space", printed))
+        stages |= set(re.findall(r"\d (\w+)[^\]\n]*\] error: \S+ no space", printed))
     assert len(stages) >= 3, stages
     small_disk(10 * pages * 4096)
     fresh.run(*COMMAND)
