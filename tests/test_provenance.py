@@ -45,6 +45,19 @@ def test_an_edit_of_the_schema_does_not_rerun_the_splits():
     assert not any(name.startswith("config") for name in found)
 
 
+def test_a_page_depends_on_its_templates_and_on_no_other_page():
+    report, explorer, table = (
+        {name.rpartition("/")[2] for name in names(script) if "/templates/" in name}
+        for script in ("build_report.py", "build_explorer.py", "tabulate_paper.py")
+    )
+    assert {"report.html.j2", "report.css"} <= report
+    assert {"explorer.html.j2", "explorer.css", "explorer_drawing.js"} <= explorer
+    assert {"table.html.j2", "table.md.j2", "table.tex.j2"} <= table
+    everything = {path.name for path in Path(nbv.__file__).parent.glob("**/templates/*")}
+    assert report | explorer | table == everything
+    assert not report & explorer
+
+
 def test_imports_are_followed_to_their_end_and_with_packages(tmp_path):
     """The files are those that a fresh Python loads, for modules that import nothing later."""
     script = tmp_path / "script.py"

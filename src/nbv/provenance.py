@@ -33,7 +33,8 @@ def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
     Files are parsed and not run. A registry names optional modules in strings, which no import
     shows: `chosen` gives those that a configuration chooses, as entries such as
     ``nbv.rendering.embree:EmbreeRenderer``. Paths are sorted, with the ``__init__`` files of the
-    packages that hold the modules.
+    packages that hold the modules, and with the templates that a module fills in: those of its
+    name, in the folder ``templates`` next to it.
     """
     imports = _imports()
     found: set[str] = set()
@@ -43,7 +44,7 @@ def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
         if module in imports and module not in found:
             found.add(module)
             waiting += [module.rpartition(".")[0], *imports[module]]
-    return sorted(map(_file_of, found))
+    return sorted({file for module in found for file in _files_of(module)})
 
 
 @functools.cache
@@ -64,9 +65,10 @@ def _imported_names(script: str | Path) -> Iterator[str]:
             yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
 
 
-def _file_of(module: str) -> str:
+def _files_of(module: str) -> Iterator[str]:
     path = Path(__file__).parents[1].joinpath(*module.split("."))
-    return str(path / "__init__.py" if path.is_dir() else path.with_suffix(".py"))
+    yield str(path / "__init__.py" if path.is_dir() else path.with_suffix(".py"))
+    yield from map(str, path.parent.glob(f"templates/{path.name}[._]*"))
 
 
 def git_commit(directory: str | Path = Path(__file__).parent) -> str:

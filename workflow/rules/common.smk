@@ -167,7 +167,7 @@ wildcard_constraints:
 
 
 def sources(script, settings=CONFIG):
-    """The modules that a script depends on, as inputs: an edit reruns what uses them."""
+    """The files of nbv that a script depends on, as inputs: an edit reruns what uses them."""
     sensor = settings["sensor"]["name"]
     chosen = {
         "prepare_meshes": [SOURCES[settings["dataset"]["source"]]],
@@ -182,16 +182,6 @@ def sources(script, settings=CONFIG):
     return [
         str(Path(file).relative_to(here)) if Path(file).is_relative_to(here) else file
         for file in files
-    ]
-
-
-def templates_of(name):
-    """The files that a page is filled into; no import shows them."""
-    folder = Path(nbv.__file__).parent / "reporting/templates"
-    here = Path.cwd()
-    return [
-        str(file.relative_to(here)) if file.is_relative_to(here) else str(file)
-        for file in sorted(folder.glob(f"{name}*"))
     ]
 
 

@@ -8,7 +8,6 @@ EXPLORED_LOOKUPS = [
 rule explorer:
     input:
         sources("build_explorer"),
-        templates_of("explorer"),
         evaluations=paths(LAYOUT.evaluation, evaluations_of(UNITS)),
         lookups=paths(LAYOUT.lookup, EXPLORED_LOOKUPS),
         depth=[] if EXTERNAL else paths(LAYOUT.depth, UNITS),
