@@ -14,11 +14,11 @@ from matplotlib.ticker import MaxNLocator
 from nbv.bundles.recommender import Recommendation
 from nbv.errors import UserError
 from nbv.rendering.depth_codes import decode_depth
-from nbv.reporting.style import INK, MUTED, RC, new_figure, save_figure
+from nbv.reporting.style import INK, MUTED, RC, method_style, new_figure, save_figure
 
 KINDS = ("png", "pdf", "svg")
 
-_BELIEF, _ERROR, _MOVE = "#0072B2", "#E69F00", "#D55E00"
+_METHOD = method_style("expected_error", ())
 _MOST_CROPS = 4
 
 
@@ -77,8 +77,8 @@ def _closed(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _draw_belief(axes: PolarAxes, answer: Recommendation, category: str) -> None:
     # The radius is a square root, so that areas are probabilities.
     angles, radius = _closed(np.sqrt(answer.belief))
-    axes.fill(angles, radius, color=_BELIEF, alpha=0.35)
-    axes.plot(angles, radius, color=_BELIEF)
+    axes.fill(angles, radius, color=INK, alpha=0.2)
+    axes.plot(angles, radius, color=INK)
     axes.plot(2 * [math.radians(answer.azimuth_deg)], [0, radius.max()], color=INK, linewidth=1)
     axes.set_yticklabels([])
     axes.set_title(
@@ -89,12 +89,14 @@ def _draw_belief(axes: PolarAxes, answer: Recommendation, category: str) -> None
 
 def _draw_errors(axes: PolarAxes, answer: Recommendation) -> None:
     error = np.where(np.isfinite(answer.error_after_deg), answer.error_after_deg, np.nan)
-    axes.plot(*_closed(error), color=_ERROR)
+    axes.plot(*_closed(error), color=INK, linewidth=1.3)
     axes.plot(
         math.radians(answer.move.rotation_deg),
         answer.move.expected_error_deg,
         marker="D",
-        color=_MOVE,
+        color=_METHOD.color,
+        markeredgecolor=INK,
+        markersize=7,
         linestyle="none",
         label="recommended",
     )
