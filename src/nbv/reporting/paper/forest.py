@@ -133,9 +133,10 @@ def claim_figure(claim: Claim, rows: Mapping[Comparison, Row]) -> Figure:
     per_row = 1 if single_group else len(series)
     key = per_row > 1
     height = _ROW_IN * len(labels) * max(1.0, 0.6 * per_row)
-    figure = new_figure(WIDTH_IN, height + 0.8 + (0.22 if key else 0.0))
-    axes = figure.subplots()
     margin = max(one.margin for one in drawn)
+    further_in = (0.22 if key else 0.0) + (0.16 if margin else 0.0)
+    figure = new_figure(WIDTH_IN, height + 0.8 + further_in)
+    axes = figure.subplots()
     if margin:
         axes.axvspan(-margin, margin, color=SHADE, linewidth=0)
     for one in drawn:
@@ -146,7 +147,7 @@ def claim_figure(claim: Claim, rows: Mapping[Comparison, Row]) -> Figure:
     axes.axvline(0, color=INK, linewidth=0.9)
     label_rows(axes, labels, [])
     subject = "" if single_group else f"{_subject(list(series))}: "
-    comparable = f"; grey: comparable (±{margin:g})" if margin else ""
+    comparable = f"\ngrey: comparable (±{margin:g})" if margin else ""
     axes.set_xlabel(f"{subject}{drawn[0].quantity}\n{drawn[0].direction}{comparable}")
     if key:
         figure.legend(
@@ -207,7 +208,7 @@ def _decided(claim: Claim, rows: Mapping[Comparison, Row]) -> _Decided:
     part = deciding_comparison(claim, rows)
     verdict = rows[part]["verdict"]
     if isinstance(part, FreeOfOutliers):
-        text = f"{number(rows[part]['value'], 0)} % of errors are"
+        text = f"{number(rows[part]['value'], 0)} % are outliers"
         return _Decided(claim.title, verdict, None, text)
     return _Decided(claim.title, verdict, _favour(part, rows[part]))
 
