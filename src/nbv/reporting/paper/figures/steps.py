@@ -252,7 +252,10 @@ def _draw_ring(axes: Axes, found: _Steps, deltas: Sequence[int]) -> None:
         place = np.cos(angle), np.sin(angle)
         axes.plot([0.35 * place[0], place[0]], [0.35 * place[1], place[1]], color=color, lw=0.9)
         axes.plot(*place, marker="o", color=color, markersize=8)
-        axes.text(1.28 * place[0], 1.28 * place[1], str(number), ha="center", va="center")
+        # Two numbers need this angle between them.
+        aside = np.copysign(max(0.0, 25.0 - abs(turn)), turn) if number > 1 else 0.0
+        named = angle + np.radians(aside)
+        axes.text(1.28 * np.cos(named), 1.28 * np.sin(named), str(number), ha="center", va="center")
         if number > 1:
             arc = np.radians(start + np.linspace(0, turn, 60))
             axes.plot(1.06 * np.cos(arc), 1.06 * np.sin(arc), color=color, linewidth=1.8)
