@@ -206,6 +206,20 @@ def test_dragging_round_the_ring_moves_the_first_view_and_nothing_else(visit, pa
     assert all(map(is_rounded, seen, errors.loc[range(0, 211, 15)]))
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_every_image_is_that_of_its_view(visit, path, method):
+    page = visit(path)
+    for n_views in range(1, 6):
+        go_to(page, category="mug", elevation=0, azimuth=0, method=method, views=n_views)
+        turns = page.evaluate("window.explorer.followed().turns")
+        captions = page.locator("#views figure:visible figcaption").all_inner_texts()
+        assert len(captions) == max(len(turns), 2) + 1
+        assert captions[0].startswith("View 1 from 0° ")
+        assert captions[-1].startswith("Opposite: from 180° ")
+        for place, delta in list(enumerate(turns, 1))[2:]:
+            assert captions[place - 1].startswith(f"View {place}: {delta:g}° on, from {delta:g}° ")
+
+
 def test_a_finger_on_the_ring_turns_the_camera_and_in_its_middle_scrolls(visit, path):
     page = visit(path, width=390, has_touch=True, is_mobile=True)
     settle(page)

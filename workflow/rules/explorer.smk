@@ -36,5 +36,6 @@ rule explorer:
         units=UNITS,
         folds=folds_of(UNITS),
         more_views=CONFIG["more_views"],
+        caution=CAUTION,
     script:
         f"{SCRIPTS}/build_explorer.py"

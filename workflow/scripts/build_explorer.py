@@ -27,6 +27,7 @@ with job(snakemake):
         policies=params.policies,
         min_separation_deg=params.more_views["min_separation_deg"],
         n_views=params.more_views["n_views"],
+        caution=params.caution,
         **files,
     )
     write_text(snakemake.output[0], build_explorer(inputs))

@@ -6,7 +6,7 @@ what a page works out by itself are beliefs after several views (``explorer_beli
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -66,6 +66,8 @@ class ExplorerInputs:
         Depth images and the ids of their objects; none where the estimates are of another program.
     posteriors : mapping of (category, elevation_deg, fold) to Path
         Distributions of test images, where the estimator gives them.
+    caution : sequence of str
+        What a reader has to know before any number; see `nbv.experiments.run_size`.
     """
 
     name: str
@@ -77,6 +79,7 @@ class ExplorerInputs:
     depth: Mapping[Unit, Path] = field(default_factory=dict)
     objects: Mapping[Unit, Path] = field(default_factory=dict)
     posteriors: Mapping[tuple[str, int, int], Path] = field(default_factory=dict)
+    caution: Sequence[str] = ()
 
 
 class _Chunks:
@@ -135,6 +138,7 @@ def build_explorer(inputs: ExplorerInputs) -> str:
     }
     return HTML.get_template("explorer.html.j2").render(
         name=inputs.name,
+        caution=inputs.caution,
         facts=facts,
         units=units,
         methods=facts["methods"],

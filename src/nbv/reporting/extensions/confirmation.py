@@ -224,11 +224,13 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     drawn = figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights).ravel().tolist()
     for axes, (name, part) in zip(drawn, panels, strict=True):
         _forest(axes, part)
-        axes.set_title(_contrast(str(name)), loc="left")
+        axes.set_title(f"{_contrast(str(name))} (degrees)", loc="left")
     drawn[-1].set_xlabel("Difference of MAE (degrees), below 0 is better")
+    found = {_verdict(row) for _, row in answers.iterrows()}
     handles = [
         Line2D([], [], color=colour, marker=marker, linestyle="none", label=verdict)
         for verdict, (colour, marker) in _VERDICTS.items()
+        if verdict in found
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
@@ -239,8 +241,7 @@ def _forest(axes: Axes, contrasts: pd.DataFrame) -> None:
     told = [name for name in ("dataset", "fusion") if len(set(contrasts[name])) > 1]
     labels = []
     for place, (_, row) in enumerate(contrasts.iterrows()):
-        verdict = _WORSE if row["low"] > 0 else _BETTER if row["high"] < 0 else _UNDECIDED
-        colour, marker = _VERDICTS[verdict]
+        colour, marker = _VERDICTS[_verdict(row)]
         axes.plot([row["low"], row["high"]], [place, place], color=colour, linewidth=1.4)
         axes.plot(row["difference_deg"], place, color=colour, marker=marker, markersize=5)
         names = [category_label(str(row["category"])), *(str(row[name]) for name in told)]
@@ -249,6 +250,10 @@ def _forest(axes: Axes, contrasts: pd.DataFrame) -> None:
     axes.set_yticks(range(len(labels)), labels)
     axes.set_ylim(len(labels) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
+
+
+def _verdict(row: pd.Series) -> str:
+    return _WORSE if row["low"] > 0 else _BETTER if row["high"] < 0 else _UNDECIDED
 
 
 def _mean(row: pd.Series) -> str:

@@ -231,7 +231,8 @@ def _differences(claim: Claim, rows: Mapping[Comparison, Row]) -> Iterator[_Diff
     labels = dict(_labels(claim.statement))
     several = len({part.statistic for part in rows if not isinstance(part, FreeOfOutliers)}) > 1
     pairs = {part: _pair(part) for part in rows if not isinstance(part, FreeOfOutliers)}
-    same_rival = len({b.method for _, b in pairs.values()}) == 1
+    # A difference has its rival's colour, unless what differs is compared with one rival.
+    several_methods = len({a.method for a, _ in pairs.values()}) > 1
     told: set[tuple[str, Term, Term]] = set()
     for part, row in rows.items():
         if row["part_verdict"] == statements.NOT_RUN:
@@ -263,7 +264,7 @@ def _differences(claim: Claim, rows: Mapping[Comparison, Row]) -> Iterator[_Diff
         yield _Difference(
             group=group,
             name=_pair_text(a, b),
-            method=a.method if same_rival else b.method,
+            method=a.method if several_methods else b.method,
             quantity=f"difference of {'MAE and σ' if several else statistic} ({unit})",
             direction=f"{side} 0: the first is better",
             ours=(sign * float(row["difference"]), ends[0], ends[1]),

@@ -232,7 +232,7 @@ function difference() {
   const better = means.filter((mean, i) => mean < others[i]).length;
   const word = gap > 0 ? "above" : "below";
   return `All ${means.length} objects: the mean error of ${mine.label} is ${text(Math.abs(gap))} ${word} that of ${versus.label}: `
-    + `${signed(above)} by errors above 90°, where front and back are confused, and ${signed(gap - above)} `
+    + `${signed(above)} by errors above 90° (often front for back), and ${signed(gap - above)} `
     + `by all others. ${mine.label} is better on ${better} objects.`;
 }
 
@@ -336,17 +336,16 @@ function recommending() {
 }
 
 function drawViews({ turns }) {
-  const first = azimuthDeg(), mine = methodNamed(state.method), shown = recommending();
-  for (let i = 3; i <= facts.mostViews; i += 1) $(`view-${i}`).hidden = i > turns.length;
+  const first = azimuthDeg(), shown = recommending();
+  const drawTurned = (place, delta, who, method) => {
+    const azimuth = (first + delta) % 360;
+    drawView(`view-${place}`, azimuth, `${who}: ${delta}° on, from ${azimuth}°`, colourOf(method, colours));
+  };
   drawView("view-1", first, `View 1 from ${first}°`, colours.ink);
-  if (shown !== mine || turns.length < 2) {
-    const delta = loaded.outcomes.turn[shown.name][here()] * stepDeg();
-    drawView("view-2", (first + delta) % 360, `${shown.label}: ${delta}° on, from ${(first + delta) % 360}°`, colourOf(shown, colours));
-  } else {
-    turns.slice(1).forEach((delta, i) => {
-      const who = i ? `View ${i + 2}` : mine.label;
-      drawView(`view-${i + 2}`, (first + delta) % 360, `${who}: ${delta}° on, from ${(first + delta) % 360}°`, colourOf(mine, colours));
-    });
+  drawTurned(2, loaded.outcomes.turn[shown.name][here()] * stepDeg(), shown.label, shown);
+  for (let i = 3; i <= facts.mostViews; i += 1) {
+    $(`view-${i}`).hidden = i > turns.length;
+    if (i <= turns.length) drawTurned(i, turns[i - 1], `View ${i}`, methodNamed(state.method));
   }
   const opposite = methodNamed(REFERENCE);
   drawView("view-opposite", (first + 180) % 360, `Opposite: from ${(first + 180) % 360}°`, opposite ? colourOf(opposite, colours) : colours.line);
