@@ -29,6 +29,7 @@ _MODULES = {
     "Recommendation": "nbv.bundles.recommender",
     "Move": "nbv.bundles.recommender",
     "moved_camera": "nbv.bundles.moves",
+    "BundleError": "nbv.bundles.bundle",
     "FrameError": "nbv.frames.errors",
     "Intrinsics": "nbv.frames.intrinsics",
     "read_depth": "nbv.frames.depth_files",

@@ -1,4 +1,4 @@
-"""The one exception that is the user's to mend, and the help it gives."""
+"""Mistakes that are the user's to mend, and the help they give."""
 
 from __future__ import annotations
 
@@ -15,6 +15,20 @@ class UserError(Exception):
     def __init__(self, message: str) -> None:
         shown = (c if c.isprintable() else ascii(c)[1:-1] for c in message)
         super().__init__("".join(shown))
+
+
+class NamedError(UserError):
+    """A mistake that has a name, for programs.
+
+    Attributes
+    ----------
+    name : str
+        Stable, such as ``empty-mask``; the message starts with it.
+    """
+
+    def __init__(self, name: str, message: str) -> None:
+        super().__init__(f"{name}: {message}")
+        self.name = name
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:

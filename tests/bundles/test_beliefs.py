@@ -18,6 +18,7 @@ from nbv.bundles.beliefs import (
     distributions_of,
     elevation_share,
     fused,
+    log_bayes_factor,
     spread_deg,
     turned,
 )
@@ -262,3 +263,46 @@ def test_what_has_no_known_elevation_counts_whole():
     assert elevation_share(known, 40.0) == pytest.approx([np.exp(-8.0), 1.0, 1.0])
     assert elevation_share(known, np.nan).tolist() == [1.0, 1.0, 1.0]
     assert elevation_share(np.full(3, np.nan), 40.0).tolist() == [1.0, 1.0, 1.0]
+
+
+# Whether views fit together
+
+
+@given(st.integers(0, 99), st.lists(whole, min_size=2, max_size=2))
+def test_the_bayes_factor_is_a_sum_over_poses(seed, bins):
+    rows = beliefs(seed)
+    places = [0, *bins]
+    products = [
+        math.prod(row[(pose + place) % BINS] for row, place in zip(rows, places, strict=True))
+        for pose in range(BINS)
+    ]
+    found = math.exp(log_bayes_factor(rows, [WIDTH * place for place in places]))
+    assert found == pytest.approx(BINS**2 * sum(products), rel=1e-9)
+
+
+@given(st.integers(0, 99), st.integers(-20, 20))
+def test_views_without_news_leave_it_as_it_is(seed, place):
+    one = beliefs(seed, 1)
+    assert log_bayes_factor(one, [0.0]) == pytest.approx(0, abs=1e-9)
+    with_another = np.concatenate([one, uniform[None]])
+    assert log_bayes_factor(with_another, [0.0, WIDTH * place]) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("least", [0.02, 0.1, 0.5])
+def test_right_rotations_are_seldom_called_contradictory(least):
+    """Markov's inequality, for distributions that are calibrated."""
+    rng = np.random.default_rng(5)
+    # The share of poses that give an answer, by answer: what a calibrated network says of it.
+    given_pose = rng.dirichlet(np.full(BINS, 0.1), BINS).T
+    posterior = given_pose / given_pose.sum(axis=1, keepdims=True)
+    n, below, below_wrong = 4000, 0, 0
+    for pose, place, wrong in rng.integers(BINS, size=(n, 3)):
+        answers = [
+            rng.choice(BINS, p=given_pose[:, at] / given_pose[:, at].sum())
+            for at in (pose, (pose + place) % BINS)
+        ]
+        rows = posterior[answers] * (1 - 1e-9) + 1e-9 / BINS
+        below += log_bayes_factor(rows, [0.0, WIDTH * place]) < math.log(least)
+        below_wrong += log_bayes_factor(rows, [0.0, WIDTH * wrong]) < math.log(least)
+    assert below / n <= least + 3 * math.sqrt(least / n)
+    assert below_wrong > 2 * below

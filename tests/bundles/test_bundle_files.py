@@ -18,6 +18,7 @@ from made_bundles import made_bundle, random_codes
 from nbv.bundles.bundle import (
     FORMAT,
     PROBABILITY_STEP,
+    BundleError,
     as_steps,
     from_steps,
     load_bundle,
@@ -157,12 +158,14 @@ def test_impossible_and_certain_have_steps():
 # Damage
 
 
-def refused(path) -> str:
-    with pytest.raises(UserError) as error:
+def refused(path, name="damaged-bundle") -> str:
+    with pytest.raises(BundleError) as error:
         load_bundle(path)
     message = str(error.value)
     assert "\n" not in message
     assert path.name in message
+    assert error.value.name == name
+    assert message.startswith(f"{name}: ")
     return message
 
 
@@ -187,8 +190,8 @@ def with_about(bundle_file, path, **changes):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    assert "does not exist" in refused(tmp_path / "none.safetensors")
-    assert "does not exist" in refused(tmp_path)
+    assert "does not exist" in refused(tmp_path / "none.safetensors", "no-bundle")
+    assert "does not exist" in refused(tmp_path, "no-bundle")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.0001, 0.001, 0.01, 0.1, 0.5, 0.9, 0.9999])
@@ -206,9 +209,9 @@ def test_other_files_are_no_bundles(bundle, tmp_path):
     np.save(tmp_path / "a.npy", np.ones(5))
     refused(tmp_path / "a.npy")
     plain = safetensors.numpy.save(dict(bundle.weights))
-    assert "no bundle of nbv" in refused(written(tmp_path / "b.safetensors", plain))
+    assert "no bundle of nbv" in refused(written(tmp_path / "b.safetensors", plain), "no-bundle")
     other = safetensors.numpy.save(dict(bundle.weights), metadata={"format": "pt"})
-    assert "no bundle of nbv" in refused(written(tmp_path / "c.safetensors", other))
+    assert "no bundle of nbv" in refused(written(tmp_path / "c.safetensors", other), "no-bundle")
 
 
 def test_an_estimator_is_no_bundle(tmp_path):
@@ -222,12 +225,12 @@ def test_an_estimator_is_no_bundle(tmp_path):
     torch.manual_seed(0)
     estimator = Estimator(build_network(settings(), SIDE), settings(), SIDE, ["a"])
     save_estimator(tmp_path / "e.safetensors", estimator, choose_hardware("cpu", "float32"))
-    assert "is an estimator, no bundle" in refused(tmp_path / "e.safetensors")
+    assert "is an estimator, no bundle" in refused(tmp_path / "e.safetensors", "no-bundle")
 
 
 def test_a_newer_format_says_what_to_do(bundle_file, tmp_path):
     path = with_about(bundle_file, tmp_path / "a.safetensors", format=FORMAT + 1)
-    message = refused(path)
+    message = refused(path, "newer-bundle")
     assert f"format {FORMAT + 1}" in message
     assert "install a newer nbv" in message
 

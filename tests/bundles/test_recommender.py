@@ -28,6 +28,7 @@ from nbv.bundles.recommender import MIN_SEPARATION_DEG, N_ALTERNATIVES, Recommen
 from nbv.bundles.turns import Turn
 from nbv.errors import UserError
 from nbv.frames.crop import crop_frame
+from nbv.frames.drawn import example_frame
 from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics
 from nbv.frames.masks import object_mask
@@ -273,8 +274,9 @@ def check_moves(found):
 @settings(max_examples=40)
 @given(
     seed=seeds,
-    rotations=st.lists(st.floats(-400, 400), max_size=3),
-    max_travel=st.floats(60, 180),
+    # Nearer to a limit than this, rounding decides.
+    rotations=st.lists(st.floats(-400, 400).map(lambda degrees: round(degrees, 3)), max_size=3),
+    max_travel=st.floats(60, 180).map(lambda degrees: round(degrees, 3)),
 )
 def test_moves_keep_to_what_the_camera_may_do(recommender, seed, rotations, max_travel):
     rotations = [0.0, *rotations]
@@ -421,14 +423,14 @@ def test_allowed_rotations_are_numbers(recommender, allowed):
 @pytest.mark.parametrize(
     ("n", "rotations", "message"),
     [
-        (1, [0.0, 90.0], "1 frame and 2 rotations: give one for each frame"),
-        (2, [0.0], "2 frames and 1 rotation: give one for each frame"),
-        (2, 0.0, "2 frames and 1 rotation: give one for each frame"),
+        (1, [0.0, 90.0], "1 frame and 2 rotations; give one for each frame"),
+        (2, [0.0], "2 frames and 1 rotation; give one for each frame"),
+        (2, 0.0, "2 frames and 1 rotation; give one for each frame"),
         (2, [], "2 frames and 0 rotations"),
         (1, [[0.0]], "1 frame and 1 rotation"),
         (1, "here", "'here' are no numbers"),
-        (1, 5.0, "the first rotation is 5"),
-        (2, [10.0, 20.0], "the first rotation is 10"),
+        (1, 5.0, "the first is 5"),
+        (2, [10.0, 20.0], "the first is 10"),
         (2, [0.0, np.nan], "no finite number"),
         (2, [0.0, np.inf], "no finite number"),
     ],
@@ -452,6 +454,33 @@ def test_of_one_frame_the_rotation_may_be_a_number(recommender, rotations):
 def test_an_elevation_is_a_number(recommender):
     with pytest.raises(UserError, match="elevation of nan"):
         recommender.recommend_crops(codes_of(0, 1), elevation_deg=float("nan"))
+
+
+# What is doubted
+
+
+def test_a_turn_the_wrong_way_contradicts_the_frames():
+    recommender = Recommender.load("mug")
+    frames = [example_frame(azimuth_deg=azimuth).depth_m for azimuth in (75.0, 165.0)]
+    intrinsics = example_frame().intrinsics
+    right, wrong = (
+        recommender.recommend(frames, rotations_deg=[0.0, turn], intrinsics=intrinsics)
+        for turn in (90.0, -90.0)
+    )
+    assert right.bayes_factor > 0.5
+    assert not right.warnings
+    assert wrong.bayes_factor < 0.05
+    (warning,) = wrong.warnings
+    assert "contradict" in warning
+
+
+def test_intrinsics_of_twice_the_resolution_are_doubted():
+    frame, recommender = example_frame(azimuth_deg=250.0), Recommender.load("mug")
+    camera = frame.intrinsics
+    doubled = [2 * camera.fx, 2 * camera.fy, 2 * camera.cx, 2 * camera.cy]
+    answer = recommender.recommend(frame.depth_m, intrinsics=doubled)
+    assert any("another resolution" in warning for warning in answer.warnings)
+    assert not recommender.recommend(frame.depth_m, intrinsics=camera).warnings
 
 
 # What is familiar

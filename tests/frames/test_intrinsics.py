@@ -242,3 +242,13 @@ def test_a_principal_point_far_outside_is_of_another_resolution():
 def test_focal_lengths_alone_serve_every_resolution(rows, columns):
     Intrinsics(575.0, 575.0).need_resolution(rows, columns)
     Intrinsics(575.0, 575.0, columns / 2, rows / 2, columns, rows).need_resolution(rows, columns)
+
+
+def test_a_principal_point_off_the_middle_is_doubted():
+    """Twice the resolution, or half of it; a camera's own tolerance is not doubted."""
+    assert not WANTED.doubts(480, 640)
+    assert not Intrinsics(575.0, 575.0).doubts(480, 640)
+    for factor in (0.5, 2.0):
+        (doubt,) = Intrinsics(FX * factor, FY * factor, CX * factor, CY * factor).doubts(480, 640)
+        assert "640 × 480" in doubt
+        assert "another resolution" in doubt

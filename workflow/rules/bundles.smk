@@ -96,6 +96,7 @@ rule bundle:
         camera=CONFIG["camera"],
         sensor=CONFIG["sensor"],
         affinity=CONFIG["affinity"],
+        settings=bundle_settings,
         device=CONFIG["estimator"]["device"],
         precision=CONFIG["estimator"]["precision"],
     script:

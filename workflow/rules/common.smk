@@ -278,6 +278,12 @@ def randomisation_of(wildcards):
     return CONFIG["randomisation"] | INGREDIENTS.get(wildcards.get("ingredient"), {})
 
 
+def bundle_settings(wildcards):
+    """What a bundle says of its training."""
+    said = {key: CONFIG[key] for key in ("dataset", "sensor", "seed")}
+    return said | {"randomisation": randomisation_of(wildcards)}
+
+
 # What tables and figures are about, and the files that they need.
 
 

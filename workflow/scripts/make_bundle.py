@@ -43,7 +43,8 @@ with job(snakemake):
         camera=Camera(**params.camera),
         sensor=params.sensor,
         affinity=params.affinity,
-        provenance=json.loads(Path(given.provenance).read_text(encoding="utf-8")),
+        provenance=json.loads(Path(given.provenance).read_text(encoding="utf-8"))
+        | {"settings": params.settings},
     )
     save_bundle(snakemake.output.bundle, bundle)
     # As on a turntable: a view every 15 degrees.

@@ -48,9 +48,36 @@ def fused(
 
     ``rotations_deg`` are those from the first view to each one.
     """
-    total = np.log(turned(distributions, rotations_deg)).sum(axis=0)
+    total = _log_product(distributions, rotations_deg)
     product = np.exp(total - total.max())
     return np.asarray(product / product.sum())
+
+
+def log_bayes_factor(distributions: NDArray[np.floating], rotations_deg: Sequence[float]) -> float:
+    """Return how much more probable views are of one pose than of unrelated poses.
+
+    The natural logarithm of B^(n - 1) sum_theta prod_i p_i(theta + rotation_i), which is 0 for one
+    view. Where distributions are calibrated and the rotations right, it is below log t with a
+    probability of t at the most (Markov's inequality).
+
+    Parameters
+    ----------
+    distributions : (n, B)
+        Above 0.
+    rotations_deg : sequence of float
+        From the first view to each one.
+    """
+    total = _log_product(distributions, rotations_deg)
+    n, n_bins = distributions.shape
+    most = float(total.max())
+    evidence = float(np.exp(total - most).sum())
+    return most + math.log(evidence) + float(n - 1) * math.log(n_bins)
+
+
+def _log_product(
+    distributions: NDArray[np.floating], rotations_deg: Sequence[float]
+) -> NDArray[np.float64]:
+    return np.asarray(np.log(turned(distributions, rotations_deg)).sum(axis=0))
 
 
 def spread_deg(belief: NDArray[np.floating]) -> float:

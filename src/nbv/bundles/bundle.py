@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import nearest_bin
 from nbv.bundles.familiarity import Familiarity
-from nbv.errors import UserError
+from nbv.errors import NamedError
 from nbv.files import replacing
 from nbv.rendering.camera import Camera
 
@@ -180,35 +180,55 @@ def _digest(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str
     return found.hexdigest()
 
 
+class BundleError(NamedError):
+    """A file that is no sound bundle; its name is the reason.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> try:
+    ...     nbv.Recommender.load("cup")
+    ... except nbv.BundleError as error:
+    ...     error.name
+    'no-bundle'
+    """
+
+
 def load_bundle(path: str | Path) -> Bundle:
     """Read what `save_bundle` wrote.
 
     Raises
     ------
-    UserError
-        Where the file is missing, is no bundle, is damaged or cut short, or is of a newer format.
+    BundleError
+        ``no-bundle`` where the file is missing or another one, ``damaged-bundle`` also where it is
+        cut short, ``newer-bundle`` where it is of a newer format.
     """
     path = Path(path)
     if not path.is_file():
-        raise UserError(f"{path} does not exist; name a bundle of this package, or a file")
+        raise BundleError(
+            "no-bundle", f"{path} does not exist; name a bundle of this package, or a file"
+        )
     try:
         about, arrays = _read(path)
         version = about["format"]
         if version > FORMAT:
-            raise UserError(
+            raise BundleError(
+                "newer-bundle",
                 f"{path} is a bundle of format {version}, this program reads up to {FORMAT}: "
-                "install a newer nbv"
+                "install a newer nbv",
             )
         if about.pop("sha256") != _digest(about, arrays):
             raise ValueError("not the bytes that were written")
         bundle = _of_parts(about, arrays)
         _need_sound(bundle)
-    except UserError:
+    except BundleError:
         raise
     # No list of what a reader may raise on arbitrary bytes is complete.
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise UserError(f"{path} is no sound bundle ({reason}); get it again") from error
+        raise BundleError(
+            "damaged-bundle", f"{path} is no sound bundle ({reason}); get it again"
+        ) from error
     return bundle
 
 
@@ -216,10 +236,12 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     with safetensors.safe_open(path, framework="numpy") as stored:
         metadata = stored.metadata() or {}
         if "nbv" not in metadata:
-            raise UserError(f"{path} is no bundle of nbv")
+            raise BundleError("no-bundle", f"{path} is no bundle of nbv")
         about = json.loads(metadata["nbv"])
         if "format" not in about:
-            raise UserError(f"{path} is an estimator, no bundle: make one with snakemake bundles")
+            raise BundleError(
+                "no-bundle", f"{path} is an estimator, no bundle: make one with snakemake bundles"
+            )
         return about, {name: stored.get_tensor(name) for name in sorted(stored.keys())}
 
 

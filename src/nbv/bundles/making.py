@@ -83,7 +83,7 @@ def make_bundle(
     ----------
     category : str
     estimator : Estimator
-        A classifier.
+        A classifier, trained on ``<object id>/<elevation>``.
     turns : sequence of Turn
         Of calibration objects, which the estimator has not seen.
     extent_px : (float, float)
@@ -97,6 +97,8 @@ def make_bundle(
     provenance : mapping
     """
     temperature = temperature_of(turns)
+    # An object counts once; the estimator has it once for each elevation.
+    n_objects = len({name.rpartition("/")[0] for name in estimator.trained_on})
     elevation_deg = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
     distributions = np.stack(
         [bin_apart(t.azimuth_deg, distributions_of(t.logits, temperature)) for t in turns]
@@ -120,5 +122,5 @@ def make_bundle(
         affinity={key: affinity[key] for key in ("power", "pseudo_observations")},
         familiarity=fit_familiarity(turns),
         paper=paper_tables(elevation_deg, distributions),
-        provenance=dict(provenance) | {"trained_on": len(set(estimator.trained_on))},
+        provenance=dict(provenance) | {"training_objects": n_objects},
     )

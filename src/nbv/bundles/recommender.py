@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
@@ -20,8 +20,15 @@ from nbv.angles import (
     travel_deg,
     wrap_deg,
 )
-from nbv.bundles.beliefs import distributions_of, elevation_share, fused, spread_deg, turned
-from nbv.bundles.bundle import Bundle, load_bundle
+from nbv.bundles.beliefs import (
+    distributions_of,
+    elevation_share,
+    fused,
+    log_bayes_factor,
+    spread_deg,
+    turned,
+)
+from nbv.bundles.bundle import Bundle, BundleError, load_bundle
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.networks import Network, open_network
 from nbv.errors import UserError, nearest
@@ -34,6 +41,7 @@ from nbv.frames.crop import (
     window_of,
 )
 from nbv.frames.depth_files import DepthImage, to_metres
+from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics, as_intrinsics
 from nbv.frames.masks import object_mask
 from nbv.labels import counted
@@ -50,6 +58,9 @@ MIN_SEPARATION_DEG = 15.0
 """From every view so far: an estimator errs alike from nearly the same place."""
 
 N_ALTERNATIVES = 5
+
+LEAST_BAYES_FACTOR = 0.05
+"""Below it frames contradict each other. Of right ones, one in 20 at the most is below."""
 
 N_KEPT = 6
 """Sequences of rotations whose look-alikes are kept: 20 MB each, of a bundle as large as `mug`."""
@@ -104,6 +115,11 @@ class Recommendation:
     unfamiliarity : float
         How far the least familiar frame is from everything calibrated; above 1 farther than 95 %
         of calibration images.
+    bayes_factor : float
+        How many times as probable the frames are of one pose, at their rotations, as of poses that
+        have nothing in common; 1 for one frame.
+    warnings : tuple of str
+        What may be wrong with the frames, a sentence each.
     crops : tuple of ndarray (side, side) uint8
         What the network saw of each frame.
 
@@ -124,6 +140,8 @@ class Recommendation:
     belief: NDArray[np.float64]
     error_after_deg: NDArray[np.float64]
     unfamiliarity: float
+    bayes_factor: float
+    warnings: tuple[str, ...]
     crops: tuple[NDArray[np.uint8], ...]
 
     @property
@@ -154,7 +172,7 @@ def bundle_path(name: str | Path) -> Path:
         return shipped[str(name)]
     if not Path(name).exists():
         known = nearest(str(name), shipped) if shipped else "no bundle comes with this nbv"
-        raise UserError(f"bundle {str(name)!r}: there is no such file; {known}")
+        raise BundleError("no-bundle", f"{str(name)!r}: there is no such file; {known}")
     return Path(name)
 
 
@@ -294,13 +312,15 @@ class Recommender:
             for frame, own, camera in zip(frames, masks, cameras, strict=True)
         ]
         codes = np.stack([crop.codes for crop in crops])
-        return self.recommend_crops(
+        answer = self.recommend_crops(
             codes,
             rotations_deg,
             elevation_deg=elevation_deg,
             allowed_deg=allowed_deg,
             max_travel_deg=max_travel_deg,
         )
+        doubts = (doubt for crop in crops for doubt in crop.doubts)
+        return replace(answer, warnings=(*dict.fromkeys(doubts), *answer.warnings))
 
     def recommend_crops(
         self,
@@ -318,7 +338,8 @@ class Recommender:
                 f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
             )
         logits = self.network(codes)
-        belief = fused(distributions_of(logits, self.bundle.temperature), rotations_deg)
+        distributions = distributions_of(logits, self.bundle.temperature)
+        belief = fused(distributions, rotations_deg)
         n_bins = self.bundle.n_bins
         width = 360.0 / n_bins
         alike = self._look_alikes(
@@ -336,6 +357,8 @@ class Recommender:
         may = _reachable(n_bins, taken, allowed_deg, max_travel_deg)
         best, *others = _local_best(may, _between(error, may), width)
         error[~_is_near_bin(may, n_bins)] = np.inf
+        unfamiliar = float(unfamiliarity(self.bundle.familiarity, codes, logits).max())
+        bayes_factor = math.exp(log_bayes_factor(distributions, rotations_deg))
         return Recommendation(
             azimuth_deg=float(wrap_deg(mean_direction_deg(belief[None])[0] + last)),
             spread_deg=spread_deg(belief),
@@ -344,7 +367,9 @@ class Recommender:
             alternatives=tuple(others),
             belief=turned(belief, -last),
             error_after_deg=error,
-            unfamiliarity=float(unfamiliarity(self.bundle.familiarity, codes, logits).max()),
+            unfamiliarity=unfamiliar,
+            bayes_factor=bayes_factor,
+            warnings=_warnings(unfamiliar, bayes_factor),
             crops=tuple(codes),
         )
 
@@ -353,6 +378,22 @@ def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float6
     """Return how much each calibration turn (S,) counts for frames of an elevation, or of any."""
     known = float("nan") if elevation_deg is None else elevation_deg
     return bundle.turn_weight * elevation_share(bundle.elevation_deg, known)
+
+
+def _warnings(unfamiliar: float, bayes_factor: float) -> tuple[str, ...]:
+    found = []
+    if unfamiliar > 1.0:
+        found.append(
+            f"a frame is like nothing that was calibrated ({unfamiliar:.1f} times the limit): "
+            "check mask, units and category"
+        )
+    if bayes_factor < LEAST_BAYES_FACTOR:
+        found.append(
+            f"the frames contradict each other (Bayes factor {bayes_factor:.1g}): check the "
+            "rotations and their sign (counter-clockwise seen from above), and that all frames "
+            "are of one object"
+        )
+    return tuple(found)
 
 
 def _in_window(
@@ -377,17 +418,18 @@ def _as_rotations(rotations_deg: float | Sequence[float], n: int) -> list[float]
     try:
         given = np.atleast_1d(np.asarray(rotations_deg, dtype=np.float64))
     except (TypeError, ValueError):
-        raise UserError(f"rotations: {rotations_deg!r} are no numbers of degrees") from None
+        raise FrameError("rotations", f"{rotations_deg!r} are no numbers of degrees") from None
     rotations = [float(rotation) for rotation in given.ravel()]
     if given.shape != (n,):
-        raise UserError(
-            f"{counted(n, 'frame')} and {counted(len(rotations), 'rotation')}: give one for each "
-            "frame, from the first frame's place: 0, …"
+        raise FrameError(
+            "rotations",
+            f"{counted(n, 'frame')} and {counted(len(rotations), 'rotation')}; give one for each "
+            "frame, from the first frame's place: 0, …",
         )
     if not all(math.isfinite(rotation) for rotation in rotations):
-        raise UserError("a rotation is no finite number of degrees")
+        raise FrameError("rotations", "one is no finite number of degrees")
     if rotations[0] != 0:
-        raise UserError(f"the first rotation is {rotations[0]:g}; all count from it: 0")
+        raise FrameError("rotations", f"the first is {rotations[0]:g}; all count from it: 0")
     return rotations
 
 

@@ -46,6 +46,8 @@ def recommendation_as_json(
         "move": move(answer.move),
         "alternatives": [move(one) for one in answer.alternatives],
         "unfamiliarity": answer.unfamiliarity,
+        "bayes_factor": answer.bayes_factor,
+        "warnings": list(answer.warnings),
         "belief": answer.belief.tolist(),
         "error_after_deg": [None if e == float("inf") else e for e in answer.error_after_deg],
     }
@@ -78,11 +80,8 @@ def say_recommendation(
             f"{m.rotation_deg:+g}° ({m.expected_error_deg:.1f}°)" for m in answer.alternatives
         )
         say(f"or         {', '.join(others)}")
-    if answer.is_unfamiliar:
-        say(
-            f"careful    a frame is like nothing that was calibrated "
-            f"({answer.unfamiliarity:.1f} times the limit): check mask, units and category"
-        )
+    for warning in answer.warnings:
+        say(f"careful    {warning}")
     if target is not None:
         say("target camera pose in the base frame")
         for row in target:

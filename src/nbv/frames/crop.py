@@ -52,11 +52,14 @@ class Crop:
         The median depth of the object, metres.
     extent_m : float
         The diagonal of the object's bounding box in the image, metres.
+    doubts : tuple of str
+        What may be wrong with the frame, a sentence each.
     """
 
     codes: NDArray[np.uint8]
     distance_m: float
     extent_m: float
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -148,7 +151,8 @@ def crop_frame(
     inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns) & (ahead > 0)
     at = row.clip(0, rows - 1), column.clip(0, columns - 1)
     depth = np.where(inside & mask[at], depth_m[at] / (diagonal_m * ahead), 0.0)
-    return Crop(encode_depth(depth[None].astype(np.float32), camera)[0], distance_m, extent)
+    codes = encode_depth(depth[None].astype(np.float32), camera)[0]
+    return Crop(codes, distance_m, extent, intrinsics.doubts(*window.frame_shape))
 
 
 def _facing(
@@ -240,7 +244,10 @@ def _implausible_distance(distance_m: float, diagonal_m: float, unit: float | No
 
 def _help(unit: float | None) -> str:
     if unit is None:
-        return "mask the object alone, or is it of another category or size?"
+        return (
+            "mask the object alone; are the intrinsics those of this resolution, and is it of this "
+            "category and size?"
+        )
     return f"depths {unit:g} times as large would fit: multiply depths or --depth-scale by it"
 
 

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from nbv.errors import UserError
+from nbv.errors import NamedError
 
 
-class FrameError(UserError):
-    """A frame that no estimate should be made of.
-
-    Attributes
-    ----------
-    name : str
-        Of the reason, such as ``empty-mask``; stable, for programs.
+class FrameError(NamedError):
+    """Frames that no estimate should be made of; its name is the reason.
 
     Examples
     --------
@@ -23,7 +18,3 @@ class FrameError(UserError):
     ...     error.name
     'empty-mask'
     """
-
-    def __init__(self, name: str, message: str) -> None:
-        super().__init__(f"{name}: {message}")
-        self.name = name

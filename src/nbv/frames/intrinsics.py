@@ -17,6 +17,9 @@ from nbv.errors import UserError
 from nbv.frames.depth_files import MILLIMETRE
 from nbv.frames.errors import FrameError
 
+OFF_CENTRE = 0.2
+"""How far a principal point lies from the middle of an image, in its sides, to be remarkable."""
+
 
 @dataclass(frozen=True)
 class Intrinsics:
@@ -26,7 +29,7 @@ class Intrinsics:
     ----------
     fx, fy : float
     cx, cy : float, optional
-        None: the middle of the image.
+        None: the middle of the object, as if the camera were directed at it.
     width, height : int, optional
         Of the images that they are for, where that is known.
 
@@ -68,8 +71,23 @@ class Intrinsics:
                 raise FrameError(
                     "other-resolution",
                     f"the principal point {name}={value:g} lies far outside a frame of {columns} × "
-                    f"{rows} pixels: are the intrinsics of another resolution?",
+                    f"{rows} pixels: are the intrinsics of another resolution? Of a frame that "
+                    "is cut out of a larger one, give the focal length alone",
                 )
+
+    def doubts(self, rows: int, columns: int) -> tuple[str, ...]:
+        """Return a sentence where they may be for another image than one of this size, or none."""
+        off = [
+            value is not None and abs(value - (size - 1) / 2) > OFF_CENTRE * size
+            for value, size in ((self.cx, columns), (self.cy, rows))
+        ]
+        if not any(off):
+            return ()
+        return (
+            f"the principal point ({self.cx:g}, {self.cy:g}) is far from the middle of {columns} × "
+            f"{rows} pixels: is the frame cut out of a larger one, or are the intrinsics of "
+            "another resolution?",
+        )
 
 
 def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
