@@ -111,14 +111,22 @@ def test_densities_are_counted_over_folds_and_trainings():
     ]
 
 
-def test_the_figure_has_a_panel_for_each_question_and_a_mark_for_each_answer(contrasts):
-    figure = contrasts_figure(contrasts)
-    primary = contrasts[contrasts["primary"]]
-    assert len(figure.axes) == primary["contrast"].nunique()
-    for axes, (_, part) in zip(figure.axes, primary.groupby("contrast", sort=False), strict=True):
+def test_a_panel_for_each_question_and_data_set_and_a_mark_for_each_answer(contrasts):
+    """A data set that does not answer a question leaves no empty panel."""
+    other = contrasts[contrasts["fusion"] == "product"].assign(dataset="embedded")
+    both = pd.concat([contrasts, other], ignore_index=True)
+    figure = contrasts_figure(both)
+    primary = both[both["primary"]]
+    panels = {
+        (row, dataset): own
+        for row, (_, part) in enumerate(primary.groupby(["contrast", "fusion"], sort=False))
+        for dataset, own in part.groupby("dataset", sort=False)
+    }
+    assert len(figure.axes) == len(panels)
+    for axes, ((_, dataset), part) in zip(figure.axes, panels.items(), strict=True):
+        assert dataset in axes.get_title(loc="left")
         labels = [label.get_text() for label in axes.get_yticklabels()]
-        assert len(set(labels)) == len(part)
-        assert {label.split(", ")[0] for label in labels} == {"Mug", "Car", "All"}
+        assert labels == [category.capitalize() for category in part["category"]]
         marks = [line for line in axes.lines if line.get_marker() not in ("None", "")]
         assert [mark.get_xdata()[0] for mark in marks] == part["difference_deg"].tolist()
         for mark, (_, row) in zip(marks, part.iterrows(), strict=True):

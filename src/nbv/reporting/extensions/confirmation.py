@@ -17,7 +17,7 @@ from nbv.reporting.table import Cell, Part, Table
 _INTERVALS = (
     "Intervals are 95 % and contain the chance of objects and of trainings (docs/method.md)."
 )
-_ROW_IN = 0.22
+_ROW_IN = 0.18
 _PANEL_IN = 0.75
 _BETTER, _UNDECIDED, _WORSE = "better", "undecided", "worse"
 # Colour and marker: told apart in grey and by those who see no colours.
@@ -203,7 +203,9 @@ def _agreement(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Iterator[
 
 @mpl.rc_context(RC)
 def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
-    """Draw the contrasts that answer the questions of docs/protocol.md, a panel for each.
+    """Draw the contrasts that answer the questions of docs/protocol.md.
+
+    A row for each contrast and fusion, a panel in it for each data set.
 
     Parameters
     ----------
@@ -216,16 +218,27 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
         Where none of them is there.
     """
     answers = contrasts[contrasts["primary"]]
-    panels = list(answers.groupby("contrast", sort=False))
-    if not panels:
+    rows = [
+        (key, [own for _, own in part.groupby("dataset", sort=False)])
+        for key, part in answers.groupby(["contrast", "fusion"], sort=False)
+    ]
+    if not rows:
         raise ValueError("no contrast answers a question")
-    heights = [_PANEL_IN + _ROW_IN * len(part) for _, part in panels]
-    figure = new_figure(6.4, sum(heights) + 0.5)
-    drawn = figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights).ravel().tolist()
-    for axes, (name, part) in zip(drawn, panels, strict=True):
-        _forest(axes, part)
-        axes.set_title(f"{_contrast(str(name))} (degrees)", loc="left")
-    drawn[-1].set_xlabel("Difference of MAE (degrees), below 0 is better")
+    n_columns = max(len(panels) for _, panels in rows)
+    heights = [_PANEL_IN + _ROW_IN * max(map(len, panels)) for _, panels in rows]
+    figure = new_figure(max(4.2 * n_columns, 5.4), sum(heights) + 0.5)
+    cells = figure.subplots(
+        len(rows), n_columns, squeeze=False, height_ratios=heights, sharex="row"
+    )
+    for of_row, ((contrast, fusion), panels) in zip(cells, rows, strict=True):
+        for place, (axes, part) in enumerate(zip(of_row, panels, strict=False)):
+            _forest(axes, part)
+            question = "" if place else f"{_contrast(str(contrast))}, {fusion}"
+            axes.set_title(f"{question}\n{part['dataset'].iloc[0]} (degrees)", loc="left")
+        for spare in of_row[len(panels) :]:
+            spare.remove()
+    for axes in cells[-1][: len(rows[-1][1])]:
+        axes.set_xlabel("Difference of MAE (degrees), below 0 is better")
     found = {_verdict(row) for _, row in answers.iterrows()}
     handles = [
         Line2D([], [], color=colour, marker=marker, linestyle="none", label=verdict)
@@ -237,16 +250,12 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
 
 
 def _forest(axes: Axes, contrasts: pd.DataFrame) -> None:
-    # A row is named by what tells it from the others.
-    told = [name for name in ("dataset", "fusion") if len(set(contrasts[name])) > 1]
-    labels = []
     for place, (_, row) in enumerate(contrasts.iterrows()):
         colour, marker = _VERDICTS[_verdict(row)]
         axes.plot([row["low"], row["high"]], [place, place], color=colour, linewidth=1.4)
         axes.plot(row["difference_deg"], place, color=colour, marker=marker, markersize=5)
-        names = [category_label(str(row["category"])), *(str(row[name]) for name in told)]
-        labels.append(", ".join(names))
     axes.axvline(0.0, color=INK, linewidth=0.8)
+    labels = [category_label(str(category)) for category in contrasts["category"]]
     axes.set_yticks(range(len(labels)), labels)
     axes.set_ylim(len(labels) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
