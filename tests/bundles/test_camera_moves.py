@@ -12,7 +12,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from nbv.bundles.moves import as_pose, moved_camera, read_pose, rotation_about
+from nbv.bundles.moves import (
+    as_pose,
+    as_rotations,
+    moved_camera,
+    read_pose,
+    read_rotations,
+    rotation_about,
+)
 from nbv.errors import UserError
 from nbv.rendering.camera import viewpoint_frames
 
@@ -211,6 +218,38 @@ def test_rounded_numbers_are_a_pose():
     as_pose(random_pose(3).round(4))
 
 
+# Rotations from a mask
+
+
+@given(mask=st.lists(st.booleans(), min_size=1, max_size=400).filter(any))
+def test_an_entry_of_a_mask_is_its_share_of_the_circle(mask):
+    wanted = [360 * place / len(mask) for place, may in enumerate(mask) if may]
+    assert as_rotations(mask) == pytest.approx(wanted)
+    assert as_rotations(np.array(wanted)) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ([], "give one at least"),
+        ([False, False], "give one at least"),
+        (np.zeros(0, dtype=bool), "give one at least"),
+        ([30.0, np.nan], "give one at least, in degrees"),
+        (np.ones((4, 4), dtype=bool), "a mask of 2 axes"),
+        (["30", "60"], "neither numbers of degrees nor booleans"),
+        ([1j], "neither numbers of degrees nor booleans"),
+        ([[1.0], [2.0, 3.0]], "rows of different lengths"),
+    ],
+)
+def test_what_is_no_rotation_is_refused_in_an_array_and_in_a_file(tmp_path, values, message):
+    with pytest.raises(UserError, match=f"^allowed rotations: .*{message}"):
+        as_rotations(values)
+    if message != "rows of different lengths":
+        np.save(tmp_path / "a.npy", values)
+        with pytest.raises(UserError, match=rf"a\.npy: .*{message}"):
+            read_rotations(tmp_path / "a.npy")
+
+
 # Files
 
 
@@ -258,6 +297,9 @@ def test_a_damaged_file_is_named_in_one_line(tmp_path, name):
     (tmp_path / name).write_bytes(damaged_poses()[name])
     with pytest.raises(UserError, match=name) as error:
         read_pose(tmp_path / name)
+    assert "\n" not in str(error.value)
+    with pytest.raises(UserError, match=name) as error:
+        read_rotations(tmp_path / name)
     assert "\n" not in str(error.value)
 
 

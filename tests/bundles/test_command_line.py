@@ -155,6 +155,19 @@ def test_near_and_far_are_metres(here, capsys):
     assert run(capsys, "recommend", "wall.npy", *options, "--near", "0.3", "--far", "0.8") == wanted
 
 
+def test_allowed_rotations_may_stand_in_a_file(here, capsys):
+    mask = np.zeros(8, dtype=bool)
+    mask[[2, 5]] = True
+    np.save("mask.npy", mask)
+    np.save("degrees.npy", np.array([90.0, -135.0]))
+    np.save("whole.npy", np.array([90, 225], dtype=np.int16))
+    options = ("--bundle", "b.safetensors", "--json")
+    wanted = run(capsys, "recommend", "f0.npy", *options, "--allowed", "90", "-135")
+    for name in ("mask.npy", "degrees.npy", "whole.npy"):
+        assert run(capsys, "recommend", "f0.npy", *options, "--allowed", name) == wanted
+        assert run(capsys, "recommend", "--allowed", name, "f0.npy", *options) == wanted
+
+
 def test_the_target_pose_is_a_rotation_about_the_axis(here, capsys):
     options = ("f0.npy", "--bundle", "b.safetensors", "--json", "--camera-pose", "pose.json")
     for axis in ((0.1, -0.2, 0.3), (0.1, -0.2, 0.3, 0.0, 0.1, 2.0)):
@@ -214,6 +227,11 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         (["f0.npy", "--rotations", "10"], "the first rotation is 10"),
         (["f0.npy", "--max-travel", "3"], "no rotation is allowed"),
         (["f0.npy", "--allowed", "0"], "no rotation is allowed"),
+        (["f0.npy", "--allowed", "left"], "left: give rotations in degrees, or a .npy file"),
+        (["f0.npy", "--allowed", "no.npy"], "no.npy does not exist"),
+        (["f0.npy", "--allowed", "pose.json"], "pose.json: give rotations in degrees, or a .npy"),
+        (["f0.npy", "--allowed", "m.npy"], "m.npy: a mask of 2 axes"),
+        (["f0.npy", "--allowed="], "give a number"),
         (["f0.npy", "--far", "0.1"], "empty-mask"),
         (["f0.npy", "--far", "800"], "--far=800: give metres"),
         (["f0.npy", "--near", "300"], "--near=300: give metres"),

@@ -23,7 +23,13 @@ from nbv.cli.answers import (
     say_names,
     say_recommendation,
 )
-from nbv.cli.arguments import Numbers, WholeNumbers, joined_numbers, need_writable
+from nbv.cli.arguments import (
+    Numbers,
+    Rotations,
+    WholeNumbers,
+    joined_numbers,
+    need_writable,
+)
 from nbv.errors import UserError
 from nbv.labels import counted
 
@@ -92,7 +98,7 @@ def recommend(
     near: float | None = None,
     far: float | None = None,
     elevation: float | None = None,
-    allowed: Numbers = None,
+    allowed: Rotations = None,
     max_travel: float = 180.0,
     camera_pose: Path | None = None,
     axis: Numbers = None,
@@ -126,7 +132,8 @@ def recommend(
     elevation
         Degrees of the camera above the object's base plane, where it is known.
     allowed
-        Rotations from the last frame that the camera may take.
+        Rotations from the last frame that the camera may take: degrees, or a .npy file of degrees
+        or of n booleans, where entry k is the rotation 360 k / n.
     max_travel
         Degrees that the camera may travel.
     camera_pose
@@ -162,11 +169,12 @@ def recommend(
     if plot is not None:
         need_writable("--plot", plot, FIGURES)
     place = _known_place(camera_pose, axis)
-    from nbv.bundles.moves import moved_camera
+    from nbv.bundles.moves import moved_camera, read_rotations
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask
     from nbv.frames.intrinsics import camera_of
 
+    may_take = read_rotations(allowed) if isinstance(allowed, Path) else allowed
     recommender = Recommender.load(bundle)
     cameras = [camera_of(intrinsics, path) for path in frames]
     answer = recommender.recommend(
@@ -180,7 +188,7 @@ def recommend(
         near_m=near,
         far_m=far,
         elevation_deg=elevation,
-        allowed_deg=allowed,
+        allowed_deg=may_take,
         max_travel_deg=max_travel,
     )
     target = None if place is None else moved_camera(*place, answer.move.rotation_deg)
