@@ -110,6 +110,31 @@ def moved_camera(
     return rotation_about(point, direction, rotation_deg) @ as_pose(camera_pose)
 
 
+def elevation_from_gravity(gravity: ArrayLike) -> float:
+    """Return the elevation, degrees, of a camera that is directed at the object.
+
+    It is the arcsine of the forward component of the unit vector that points down: a camera that
+    is inclined downwards is above the object.
+
+    Parameters
+    ----------
+    gravity : (3,)
+        The direction down in the camera's optical frame, of any length above 0.
+
+    Raises
+    ------
+    UserError
+        Where it is not three finite numbers, or has no length.
+    """
+    down = np.asarray(gravity, dtype=np.float64)
+    if down.shape != (3,) or not np.isfinite(down).all():
+        raise UserError("gravity: give three finite numbers, the direction down: x,y,z")
+    if not down.any():
+        raise UserError("gravity: 0,0,0 is no direction")
+    right, below, forward = (down / np.abs(down).max()).tolist()
+    return math.degrees(math.atan2(forward, math.hypot(right, below)))
+
+
 def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[np.float64]:
     """Return rotations (m,) in degrees, from numbers or from a mask over the circle.
 

@@ -38,7 +38,7 @@ Rotations = Annotated[
     list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FILE")
 ]
 
-OF_NUMBERS = ("--rotations", "--allowed", "--axis", "--views", "--intrinsics")
+OF_NUMBERS = ("--rotations", "--allowed", "--axis", "--gravity", "--views", "--intrinsics")
 
 
 def joined_numbers(arguments: Sequence[str]) -> list[str]:
