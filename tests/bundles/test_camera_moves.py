@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from nbv.bundles.moves import (
     as_pose,
     as_rotations,
+    elevation_from_gravity,
     moved_camera,
     read_pose,
     read_rotations,
@@ -162,6 +163,18 @@ def test_another_base_frame_gives_the_same_move(seed, base, centre, up, rotation
         change @ camera, (change @ [*centre, 1])[:3], change[:3, :3] @ up, rotation
     )
     assert moved == pytest.approx(change @ moved_camera(camera, centre, up, rotation), abs=1e-6)
+
+
+@given(
+    elevation=st.floats(-90, 90),
+    azimuth=st.floats(0, 360),
+    length=st.floats(1e-200, 1e200),
+)
+def test_the_direction_down_in_the_camera_tells_its_elevation(elevation, azimuth, length):
+    camera = camera_at(elevation, azimuth, 0.6, np.zeros(3))
+    down = camera[:3, :3].T @ [0.0, 0.0, -1.0]
+    assert down == pytest.approx(-camera[2, :3])
+    assert elevation_from_gravity(length * down) == pytest.approx(elevation, abs=1e-6)
 
 
 # Poses
