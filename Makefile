@@ -43,7 +43,7 @@ bundles: $(READY)
 	$(BIN)/snakemake --cores $(CORES) bundles --config experiment=bundles estimator=classifier \
 		randomisation=camera sensor=kinect
 	mkdir -p src/nbv/bundles/shipped
-	cp results/bundles*/bundles/*.safetensors src/nbv/bundles/shipped/
+	cp results/bundles-classifier/bundles/mug.safetensors src/nbv/bundles/shipped/
 
 reference: $(READY)
 	$(BIN)/snakemake --cores $(CORES) reference

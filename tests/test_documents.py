@@ -11,6 +11,8 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+import nbv
+
 ROOT = Path(__file__).parents[1]
 NOT_OURS = {"results", "build", "mutants"}
 DOCUMENTS = sorted(
@@ -128,6 +130,21 @@ def test_source_files_that_a_document_names_exist(path: Path) -> None:
     example = "src/nbv/recommendation/criteria/sharpest.py"
     named = re.findall(r"\b(?:src/nbv|config|tests)/[\w/]+(?:\.\w+)?", path.read_text("utf-8"))
     assert not [name for name in set(named) - {example} if not (ROOT / name).exists()]
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/camera.md", "docs/five-minutes.md"])
+def test_the_python_of_a_document_takes_public_names_alone(name: str) -> None:
+    text = (ROOT / name).read_text("utf-8")
+    snippets = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    assert snippets
+    for snippet in snippets:
+        used = {
+            node.attr
+            for node in ast.walk(ast.parse(snippet))
+            if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "nbv"
+        }
+        assert used
+        assert used <= set(nbv.__all__)
 
 
 def test_the_readme_begins_with_the_two_commands() -> None:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import replace
+from fnmatch import fnmatch
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,9 +27,39 @@ from nbv.bundles.bundle import (
     load_bundle,
     save_bundle,
 )
+from nbv.bundles.evaluation import best_fixed_deg
 from nbv.bundles.familiarity import unfamiliarity
-from nbv.bundles.recommender import Recommender, bundle_path
+from nbv.bundles.recommender import Recommender, bundle_path, turn_share
 from nbv.errors import UserError
+from nbv.recommendation.look_alikes import LookAlikes
+
+BUNDLES = Path(__file__).parents[2] / "docs" / "bundles.md"
+
+# What the document says
+
+
+def test_the_document_names_every_array_of_a_bundle():
+    rows = [line for line in BUNDLES.read_text("utf-8").splitlines() if line.startswith("| `")]
+    documented = [name for row in rows for name in re.findall(r"`([^`]+)`", row.split("|")[1])]
+    with safetensors.safe_open(bundle_path("mug"), framework="numpy") as stored:
+        held = set(stored.keys())
+    assert {name for name in held if any(fnmatch(name, one) for one in documented)} == held
+    assert [one for one in documented if not any(fnmatch(name, one) for name in held)] == []
+
+
+def test_the_best_fixed_rotation_of_the_shipped_bundle_is_as_documented():
+    held = load_bundle(bundle_path("mug"))
+    alike = LookAlikes.of_views(held.distributions)
+    found = {
+        elevation: best_fixed_deg(alike, turn_share(held, elevation))
+        for elevation in (None, 0.0, 15.0, 30.0, 45.0, 60.0)
+    }
+    assert found.pop(None) == 180.0
+    assert (min(found.values()), max(found.values())) == (174.0, 186.0)
+    text = " ".join(BUNDLES.read_text("utf-8").split())
+    assert "is 180° where the elevation is not known" in text
+    assert "174 to 186° at each elevation" in text
+
 
 # Round trips
 

@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from nbv.bundles.moves import as_pose, moved_camera, read_pose, rotation_about
+from nbv.bundles.moves import (
+    as_pose,
+    as_rotations,
+    elevation_from_gravity,
+    moved_camera,
+    read_pose,
+    read_rotations,
+    rotation_about,
+)
 from nbv.errors import UserError
 from nbv.rendering.camera import viewpoint_frames
 
@@ -157,6 +165,18 @@ def test_another_base_frame_gives_the_same_move(seed, base, centre, up, rotation
     assert moved == pytest.approx(change @ moved_camera(camera, centre, up, rotation), abs=1e-6)
 
 
+@given(
+    elevation=st.floats(-90, 90),
+    azimuth=st.floats(0, 360),
+    length=st.floats(1e-200, 1e200),
+)
+def test_the_direction_down_in_the_camera_tells_its_elevation(elevation, azimuth, length):
+    camera = camera_at(elevation, azimuth, 0.6, np.zeros(3))
+    down = camera[:3, :3].T @ [0.0, 0.0, -1.0]
+    assert down == pytest.approx(-camera[2, :3])
+    assert elevation_from_gravity(length * down) == pytest.approx(elevation, abs=1e-6)
+
+
 # Poses
 
 
@@ -211,6 +231,38 @@ def test_rounded_numbers_are_a_pose():
     as_pose(random_pose(3).round(4))
 
 
+# Rotations from a mask
+
+
+@given(mask=st.lists(st.booleans(), min_size=1, max_size=400).filter(any))
+def test_an_entry_of_a_mask_is_its_share_of_the_circle(mask):
+    wanted = [360 * place / len(mask) for place, may in enumerate(mask) if may]
+    assert as_rotations(mask) == pytest.approx(wanted)
+    assert as_rotations(np.array(wanted)) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ([], "give one at least"),
+        ([False, False], "give one at least"),
+        (np.zeros(0, dtype=bool), "give one at least"),
+        ([30.0, np.nan], "give one at least, in degrees"),
+        (np.ones((4, 4), dtype=bool), "a mask of 2 axes"),
+        (["30", "60"], "neither numbers of degrees nor booleans"),
+        ([1j], "neither numbers of degrees nor booleans"),
+        ([[1.0], [2.0, 3.0]], "rows of different lengths"),
+    ],
+)
+def test_what_is_no_rotation_is_refused_in_an_array_and_in_a_file(tmp_path, values, message):
+    with pytest.raises(UserError, match=f"^allowed rotations: .*{message}"):
+        as_rotations(values)
+    if message != "rows of different lengths":
+        np.save(tmp_path / "a.npy", values)
+        with pytest.raises(UserError, match=rf"a\.npy: .*{message}"):
+            read_rotations(tmp_path / "a.npy")
+
+
 # Files
 
 
@@ -258,6 +310,9 @@ def test_a_damaged_file_is_named_in_one_line(tmp_path, name):
     (tmp_path / name).write_bytes(damaged_poses()[name])
     with pytest.raises(UserError, match=name) as error:
         read_pose(tmp_path / name)
+    assert "\n" not in str(error.value)
+    with pytest.raises(UserError, match=name) as error:
+        read_rotations(tmp_path / name)
     assert "\n" not in str(error.value)
 
 

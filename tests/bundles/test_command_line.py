@@ -22,7 +22,7 @@ from nbv.bundles.bundle import load_bundle, save_bundle
 from nbv.bundles.calibration import DENSITY, recalibrated
 from nbv.bundles.evaluation import evaluate, familiarity_of
 from nbv.bundles.manifest import read_manifest, see
-from nbv.bundles.moves import moved_camera
+from nbv.bundles.moves import elevation_from_gravity, moved_camera
 from nbv.bundles.recommender import Recommender
 from nbv.calibration.pairs import read_pairs
 from nbv.cli import main
@@ -106,6 +106,9 @@ def same_answer(printed: dict, answer) -> None:
     assert known == pytest.approx(answer.error_after_deg.tolist(), rel=1e-4)
 
 
+ASSUMED = f"camera     not given for 24 frames: a focal length of {FOCAL_PX:g} px is assumed"
+
+
 # Recommend
 
 
@@ -114,6 +117,8 @@ def test_a_recommendation_as_json_is_that_of_the_recommender(here, capsys):
     printed = json.loads(run(capsys, "recommend", "f0.npy", "--bundle", "b.safetensors", "--json"))
     same_answer(printed, recommender.recommend(frame(0)))
     assert "target_camera_pose" not in printed
+    assert "target_camera_pose" not in printed["move"]
+    assert printed["assumed_focal_px"] == FOCAL_PX
 
 
 def test_every_option_of_a_recommendation_counts(here, capsys):
@@ -144,6 +149,7 @@ def test_every_option_of_a_recommendation_counts(here, capsys):
     )
     same_answer(printed, answer)
     assert printed["move"]["rotation_deg"] in (-60.0, 45.0)
+    assert printed["assumed_focal_px"] is None
 
 
 def test_near_and_far_are_metres(here, capsys):
@@ -155,13 +161,49 @@ def test_near_and_far_are_metres(here, capsys):
     assert run(capsys, "recommend", "wall.npy", *options, "--near", "0.3", "--far", "0.8") == wanted
 
 
+def test_allowed_rotations_may_stand_in_a_file(here, capsys):
+    mask = np.zeros(8, dtype=bool)
+    mask[[2, 5]] = True
+    np.save("mask.npy", mask)
+    np.save("degrees.npy", np.array([90.0, -135.0]))
+    np.save("whole.npy", np.array([90, 225], dtype=np.int16))
+    options = ("--bundle", "b.safetensors", "--json")
+    wanted = run(capsys, "recommend", "f0.npy", *options, "--allowed", "90", "-135")
+    for name in ("mask.npy", "degrees.npy", "whole.npy"):
+        assert run(capsys, "recommend", "f0.npy", *options, "--allowed", name) == wanted
+        assert run(capsys, "recommend", "--allowed", name, "f0.npy", *options) == wanted
+
+
 def test_the_target_pose_is_a_rotation_about_the_axis(here, capsys):
     options = ("f0.npy", "--bundle", "b.safetensors", "--json", "--camera-pose", "pose.json")
     for axis in ((0.1, -0.2, 0.3), (0.1, -0.2, 0.3, 0.0, 0.1, 2.0)):
         printed = json.loads(run(capsys, "recommend", *options, "--axis", *map(str, axis)))
         direction = axis[3:] or (0.0, 0.0, 1.0)
-        wanted = moved_camera(POSE, axis[:3], direction, printed["move"]["rotation_deg"])
-        assert np.array(printed["target_camera_pose"]) == pytest.approx(wanted)
+        moves = [printed["move"], *printed["alternatives"]]
+        assert len(moves) > 1
+        for move in moves:
+            wanted = moved_camera(POSE, axis[:3], direction, move["rotation_deg"])
+            assert np.array(move["target_camera_pose"]) == pytest.approx(wanted)
+        assert printed["target_camera_pose"] == printed["move"]["target_camera_pose"]
+
+
+@pytest.mark.parametrize(
+    ("gravity", "elevation"),
+    [
+        (("0", "9.81", "0"), 0.0),
+        (("0,1,1",), 45.0),
+        (("-3", "0", "-3"), -45.0),
+        (("1", "1.41421356", "1"), 30.0),
+        (("0", "0", "1e-300"), 90.0),
+    ],
+)
+def test_the_direction_down_gives_the_elevation(here, capsys, gravity, elevation):
+    assert elevation_from_gravity(",".join(gravity).split(",")) == pytest.approx(elevation)
+    options = ("recommend", "f0.npy", "--bundle", "b.safetensors", "--json")
+    printed = json.loads(run(capsys, *options, "--gravity", *gravity))
+    same_answer(
+        printed, Recommender.load("b.safetensors").recommend(frame(0), elevation_deg=elevation)
+    )
 
 
 def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
@@ -214,6 +256,11 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         (["f0.npy", "--rotations", "10"], "the first is 10"),
         (["f0.npy", "--max-travel", "3"], "no rotation is allowed"),
         (["f0.npy", "--allowed", "0"], "no rotation is allowed"),
+        (["f0.npy", "--allowed", "left"], "left: give rotations in degrees, or a .npy file"),
+        (["f0.npy", "--allowed", "no.npy"], "no.npy does not exist"),
+        (["f0.npy", "--allowed", "pose.json"], "pose.json: give rotations in degrees, or a .npy"),
+        (["f0.npy", "--allowed", "m.npy"], "m.npy: a mask of 2 axes"),
+        (["f0.npy", "--allowed="], "give a number"),
         (["f0.npy", "--far", "0.1"], "empty-mask"),
         (["f0.npy", "--far", "800"], "--far=800: give metres"),
         (["f0.npy", "--near", "300"], "--near=300: give metres"),
@@ -238,15 +285,30 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         ),
         (["f0.npy", "--camera-pose", "f0.npy", "--axis", "0", "0", "0"], "give the 16"),
         (["f0.npy", "--elevation", "high"], "high"),
+        (["f0.npy", "--gravity", "0", "1"], "gravity: give three finite numbers"),
+        (["f0.npy", "--gravity", "0", "1", "0", "0"], "gravity: give three finite numbers"),
+        (["f0.npy", "--gravity", "0,nan,1"], "gravity: give three finite numbers"),
+        (["f0.npy", "--gravity", "0,0,inf"], "gravity: give three finite numbers"),
+        (["f0.npy", "--gravity", "0,0,0"], "gravity: 0,0,0 is no direction"),
+        (["f0.npy", "--gravity", "0,1,0", "--elevation", "0"], "leave --gravity or --elevation"),
         (["f0.npy", "--nearest", "2"], "--nearest"),
+    ],
+)
+def test_what_cannot_be_recommended_is_one_line(here, capsys, arguments, message):
+    assert message in fails(capsys, "recommend", *arguments, "--bundle", "b.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
         (["--estimate", "30"], "--estimate and --table belong together"),
         (["--table", "t.npz"], "--estimate and --table belong together"),
         (["--table", "t.npz", "--estimate", "30"], "t.npz does not exist"),
         (["--table", "f0.npy", "--estimate", "30"], "f0.npy"),
     ],
 )
-def test_what_cannot_be_recommended_is_one_line(here, capsys, arguments, message):
-    assert message in fails(capsys, "recommend", *arguments, "--bundle", "b.safetensors")
+def test_a_table_that_is_not_there_is_one_line(here, capsys, arguments, message):
+    assert message in fails(capsys, "recommend", *arguments)
 
 
 def test_a_missing_or_damaged_bundle_is_one_line(here, capsys):
@@ -275,6 +337,12 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
     found = re.fullmatch(r"pairs\.csv: 2 objects; offset ([+-]\d+\.\d)°", head)
     assert float(found[1]) == pytest.approx(offset, abs=0.1)
     assert tail == f"t.npz: {criterion} from 2 objects"
+    options = ("--output", "json.npz", "--criterion", criterion, "--json")
+    printed = json.loads(run(capsys, "calibrate", "pairs.csv", *options))
+    assert printed.pop("offset_deg") == pytest.approx(offset, abs=0.1)
+    wanted = {"file": "json.npz", "criterion": criterion, "n_objects": 2, "warning": None}
+    assert printed == wanted
+    assert Path("json.npz").read_bytes() == Path("t.npz").read_bytes()
     save_lookup("wanted.npz", chosen_lookup(read_pairs(pairs).estimate_deg, criterion, DENSITY))
     assert Path("t.npz").read_bytes() == Path("wanted.npz").read_bytes()
     table = load_lookup("t.npz")
@@ -303,6 +371,8 @@ def test_a_table_is_made_of_pairs_alone(pairs, capsys):
         ),
         (("pairs.csv", "--output", "t.npz", "--intrinsics", "500"), "--intrinsics is for frames"),
         (("pairs.csv", "--output", "t.npz", "--depth-scale", "1"), "--depth-scale is for frames"),
+        (("pairs.csv", "--output", "t.npz", "--near", "1"), "--near is for frames"),
+        (("pairs.csv", "--output", "t.npz", "--far", "1"), "--far is for frames"),
         (("pairs.csv",), "--output"),
         (("pairs.csv", "--output", "t.npz", "--criterion", "eror"), "--criterion=eror"),
         (
@@ -331,7 +401,8 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
         *(capsys, "calibrate", "manifest.csv"),
         *("--bundle", "b.safetensors", "--output", "own.safetensors"),
     )
-    head, warning, tail = out.splitlines()
+    camera, head, warning, tail = out.splitlines()
+    assert camera == ASSUMED
     assert re.fullmatch(r"cup, sequence 1: 24 frames; offset -\d+\.\d°", head)
     # A network of random weights has no zero.
     assert warning.startswith("careful    ")
@@ -339,6 +410,19 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
     wanted = recalibrated(load_bundle("b.safetensors"), turns_of(manifest), "manifest.csv")
     save_bundle("wanted.safetensors", wanted)
     assert Path("own.safetensors").read_bytes() == Path("wanted.safetensors").read_bytes()
+    options = ("--bundle", "b.safetensors", "--output", "json.safetensors", "--json")
+    about = json.loads(run(capsys, "calibrate", "manifest.csv", *options))
+    (recording,) = about.pop("recordings")
+    assert about == {
+        "file": "json.safetensors",
+        "category": "mug",
+        "n_objects": 1,
+        "assumed_focal_px": FOCAL_PX,
+    }
+    assert f"{recording.pop('offset_deg'):+.1f}°" in head
+    assert f"careful    {recording.pop('warning')}" == warning
+    assert recording == {"object_id": "cup", "sequence": "1", "n_frames": 24}
+    assert Path("json.safetensors").read_bytes() == Path("wanted.safetensors").read_bytes()
     printed = json.loads(
         run(capsys, "recommend", "f0.npy", "--bundle", "own.safetensors", "--json")
     )
@@ -363,6 +447,52 @@ def test_what_does_not_go_with_frames_is_refused(manifest, capsys):
     assert "add --bundle mug" in fails(
         capsys, "calibrate", "manifest.csv", "--output", "own.safetensors"
     )
+    message = fails(capsys, "calibrate", "manifest.csv", "--output", "own.npz")
+    assert "manifest.csv is a manifest of frames, which need --bundle" in message
+    assert "--bundle mug" in message
+    # Pairs may have the columns of a manifest too.
+    pd.read_csv(manifest).assign(estimate_deg="north").to_csv("both.csv")
+    message = fails(capsys, "calibrate", "both.csv", "--output", "own.npz")
+    assert "row 2: estimate_deg is no number" in message
+
+
+def test_the_camera_is_assumed_where_neither_manifest_nor_option_has_it(manifest, capsys):
+    rows = pd.read_csv(manifest)
+    rows.assign(fx=[FOCAL_PX] * 20 + [np.nan] * 4).to_csv("some.csv")
+    rows.assign(fx=FOCAL_PX).to_csv("all.csv")
+    options = ("--bundle", "b.safetensors")
+    commands = {
+        "evaluate": ("--views", "2"),
+        "calibrate": ("--output", "own.safetensors"),
+    }
+    for command, more in commands.items():
+        for file, intrinsics, wanted in (
+            ("manifest.csv", (), ASSUMED),
+            ("some.csv", (), ASSUMED.replace("24 frames", "4 frames")),
+            ("all.csv", (), None),
+            ("manifest.csv", ("--intrinsics", FOCAL_PX), None),
+        ):
+            arguments = (capsys, command, file, *options, *more, *intrinsics)
+            told = [line for line in run(*arguments).splitlines() if line.startswith("camera")]
+            assert told == ([] if wanted is None else [wanted])
+            printed = json.loads(run(*arguments, "--json"))
+            assert printed["assumed_focal_px"] == (None if wanted is None else FOCAL_PX)
+
+
+@pytest.mark.parametrize("command", ["evaluate", "calibrate"])
+def test_near_and_far_hold_for_every_frame_of_a_recording(manifest, capsys, command):
+    more = ("--views", "2") if command == "evaluate" else ("--output", "own.safetensors")
+    options = ("--bundle", "b.safetensors", *more, "--json")
+    wanted = json.loads(run(capsys, command, "manifest.csv", *options))
+    for place in range(BINS):
+        wall = np.where(frame(place) > 0, frame(place), 0.9).astype(np.float32)
+        wall[5:20, 5:20] = 0.2
+        np.save(f"turn/{place}.npy", wall)
+    limits = ("--near", "0.3", "--far", "0.8")
+    assert json.loads(run(capsys, command, "manifest.csv", *options, *limits)) == wanted
+    for wrong in ((), ("--far", "0.8"), ("--near", "0.3", "--far", "0.31")):
+        assert main([command, "manifest.csv", *options, *wrong]) == 2
+        assert "every frame" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -408,7 +538,8 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
     text = run(
         *(capsys, "evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2", "3")
     )
-    head, numbers, *lines = text.splitlines()
+    camera, head, numbers, *lines = text.splitlines()
+    assert camera == ASSUMED
     assert head.startswith("cup, sequence 1: 24 frames; offset ")
     assert numbers.split()[-3:] == ["1", "2", "3"]
     assert len(lines) == wanted["choice"].nunique()
@@ -474,7 +605,14 @@ def test_inspect_shows_what_a_bundle_holds(here, bundle, capsys):
 def test_export_writes_the_network(here, bundle, capsys, rng):
     pytest.importorskip("onnx")
     onnxruntime = pytest.importorskip("onnxruntime")
-    run(capsys, "export", "b.safetensors", "--onnx", "deep/x.onnx")
+    told = run(capsys, "export", "b.safetensors", "--onnx", "deep/x.onnx")
+    assert told == "deep/x.onnx: codes (n, 1, side, side) to logits\n"
+    printed = json.loads(run(capsys, "export", "b.safetensors", "--onnx", "deep/x.onnx", "--json"))
+    assert printed == {
+        "file": "deep/x.onnx",
+        "input": {"name": "codes", "shape": ["n", 1, 32, 32]},
+        "output": {"name": "logits", "shape": ["n", BINS]},
+    }
     session = onnxruntime.InferenceSession("deep/x.onnx", providers=["CPUExecutionProvider"])
     codes = rng.integers(0, 256, (5, 1, 32, 32)).astype(np.uint8)
     (logits,) = session.run(["logits"], {"codes": codes.astype(np.float32)})
@@ -495,6 +633,18 @@ def test_a_file_that_cannot_be_written_is_one_line(here, pairs, capsys):
 
 
 # Render
+
+
+def test_a_drawn_frame_is_told(here, capsys):
+    told = run(capsys, "render", "--example", "--output", "x.npy")
+    printed = json.loads(run(capsys, "render", "--example", "--output", "y.npy", "--json"))
+    assert Path("x.npy").read_bytes() == Path("y.npy").read_bytes()
+    n_pixels = np.count_nonzero(np.load("y.npy"))
+    camera = {"fx": 585.0, "fy": 585.0, "cx": 319.5, "cy": 239.5, "width": 640, "height": 480}
+    assert printed == {"file": "y.npy", "intrinsics": camera, "object_pixels": n_pixels}
+    assert told == f"x.npy: {n_pixels} pixels of the object; --intrinsics 585,585,319.5,239.5\n"
+    text = " ".join(run(capsys, "render", "--help").split())
+    assert "first Kinect: 640 x 480 pixels, a focal length of 585 px" in text
 
 
 @pytest.mark.parametrize(
@@ -661,13 +811,18 @@ def test_without_any_way_to_compute_a_network_it_says_what_to_install(here):
         ("--intrinsics", "500"),
         ("--far", "1"),
         ("--elevation", "10"),
+        ("--gravity", "0", "1", "0"),
+        ("--max-travel", "90"),
+        ("--bundle", "b.safetensors"),
+        ("--allowed", "mask.npy"),
     ],
 )
 def test_what_an_estimate_cannot_use_is_refused(pairs, capsys, more):
     main(["calibrate", "pairs.csv", "--output", "table.npz"])
     capsys.readouterr()
     options = ("recommend", "--estimate", "90", "--table", "table.npz")
-    assert "does not go with --estimate" in fails(capsys, *options, *more)
+    message = fails(capsys, *options, *more)
+    assert f"{'FRAME' if more == ('f0.npy',) else more[0]} does not go with --estimate" in message
 
 
 @pytest.mark.parametrize("name", ["pairs.csv", "f0.npy", "b.safetensors"])

@@ -389,6 +389,20 @@ def test_allowed_rotations_are_ranked(recommender):
     assert errors == sorted(errors)
 
 
+@given(seed=seeds, mask=st.lists(st.booleans(), min_size=2, max_size=50))
+def test_booleans_are_a_mask_over_the_circle(recommender, seed, mask):
+    codes = codes_of(seed, 1)
+    allowed = [360 * place / len(mask) for place, may in enumerate(mask) if may]
+    if not any(travel_deg(rotation) >= MIN_SEPARATION_DEG for rotation in allowed):
+        with pytest.raises(UserError, match="allowed"):
+            recommender.recommend_crops(codes, allowed_deg=np.array(mask))
+        return
+    found = recommender.recommend_crops(codes, allowed_deg=np.array(mask))
+    wanted = recommender.recommend_crops(codes, allowed_deg=allowed)
+    assert [found.move, *found.alternatives] == [wanted.move, *wanted.alternatives]
+    assert np.array_equal(found.error_after_deg, wanted.error_after_deg)
+
+
 def test_allowed_rotations_count_from_the_last_frame(recommender):
     found = recommender.recommend_crops(codes_of(0, 2), [0.0, 90.0], allowed_deg=[90.0, -45.0])
     assert np.flatnonzero(np.isfinite(found.error_after_deg)).tolist() == [6, 21]

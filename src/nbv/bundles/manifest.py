@@ -86,6 +86,14 @@ def read_manifest(path: str | Path) -> list[Recording]:
     ]
 
 
+def is_manifest(path: str | Path) -> bool:
+    """Return whether a file has the columns of a manifest, and no estimates."""
+    try:
+        return "estimate_deg" not in read_rows(Path(path), NEEDED)
+    except UserError:
+        return False
+
+
 def _refuse(path: Path, place: int, what: str) -> NoReturn:
     # The first row is that of the names.
     raise UserError(f"{path}, row {place + 2}: {what}")
@@ -137,6 +145,8 @@ def see(
     intrinsics: str | None,
     depth_scale: float | None,
     tell: Callable[[str], None],
+    near_m: float | None = None,
+    far_m: float | None = None,
 ) -> Turn:
     """Return what a network makes of a recording; frames that are refused are told and left out.
 
@@ -150,6 +160,8 @@ def see(
         See `nbv.frames.depth_files.read_depth`.
     tell : callable
         Takes a line of text.
+    near_m, far_m : float, optional
+        The object lies between them in every frame, metres.
 
     Raises
     ------
@@ -166,6 +178,8 @@ def see(
                 read_depth(row["path"], depth_scale, camera.unit_m),
                 mask=read_mask(mask) if isinstance(mask, str) else None,
                 intrinsics=own or camera.intrinsics,
+                near_m=near_m,
+                far_m=far_m,
             )
         except FrameError as error:
             tell(f"{row['path']} is left out: {error}")

@@ -1,4 +1,4 @@
-"""From a rotation about the object to a pose of the camera in the robot's base frame.
+"""Rotations about the object, and poses of the camera in the robot's base frame.
 
 Poses are 4 × 4 matrices that take points of the camera's frame to the base frame. The camera's
 frame is the optical one: z forward, x right, y down (ROS REP 103). The object's axis points up; a
@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -109,21 +110,88 @@ def moved_camera(
     return rotation_about(point, direction, rotation_deg) @ as_pose(camera_pose)
 
 
+def elevation_from_gravity(gravity: ArrayLike) -> float:
+    """Return the elevation, degrees, of a camera that is directed at the object.
+
+    It is the arcsine of the forward component of the unit vector that points down: a camera that
+    is inclined downwards is above the object.
+
+    Parameters
+    ----------
+    gravity : (3,)
+        The direction down in the camera's optical frame, of any length above 0.
+
+    Raises
+    ------
+    UserError
+        Where it is not three finite numbers, or has no length.
+    """
+    down = np.asarray(gravity, dtype=np.float64)
+    if down.shape != (3,) or not np.isfinite(down).all():
+        raise UserError("gravity: give three finite numbers, the direction down: x,y,z")
+    if not down.any():
+        raise UserError("gravity: 0,0,0 is no direction")
+    right, below, forward = (down / np.abs(down).max()).tolist()
+    return math.degrees(math.atan2(forward, math.hypot(right, below)))
+
+
+def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[np.float64]:
+    """Return rotations (m,) in degrees, from numbers or from a mask over the circle.
+
+    Parameters
+    ----------
+    values : array-like
+        Rotations in degrees; or (n,) bool, where entry k says whether 360 k / n degrees is one.
+    name : str
+        Of what they are, for messages.
+
+    Raises
+    ------
+    UserError
+        Where they are neither, one is not finite, or there is none.
+    """
+    try:
+        given = np.asarray(values)
+    except ValueError:
+        raise UserError(f"{name}: rows of different lengths") from None
+    if given.dtype == np.bool_:
+        if given.ndim != 1:
+            raise UserError(f"{name}: a mask of {given.ndim} axes; it has one, all round")
+        given = 360.0 * np.flatnonzero(given) / max(given.size, 1)
+    elif given.dtype.kind not in "iuf":
+        raise UserError(f"{name}: neither numbers of degrees nor booleans")
+    rotations = given.astype(np.float64).ravel()
+    if not rotations.size or not np.isfinite(rotations).all():
+        raise UserError(f"{name}: give one at least, in degrees")
+    return rotations
+
+
+def read_rotations(path: str | Path) -> NDArray[np.float64]:
+    """Read rotations in degrees, or a mask of them, from ``.npy``; errors as of `as_rotations`."""
+    path = Path(path)
+    if path.suffix != ".npy":
+        raise UserError(f"{path}: give rotations in degrees, or a .npy file")
+    return as_rotations(_loaded(path), str(path))
+
+
 def read_pose(path: str | Path) -> Pose:
     """Read a pose from ``.npy``, ``.json``, or text with 16 numbers; errors as of `as_pose`."""
     path = Path(path)
+    return as_pose(_loaded(path), str(path))
+
+
+def _loaded(path: Path) -> NDArray[Any]:
+    """Return the numbers of a file: ``.npy``, ``.json``, or text."""
     try:
         if path.suffix == ".npy":
-            values = np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
-        elif path.suffix == ".json":
-            values = np.asarray(json.loads(path.read_text(encoding="utf-8")), dtype=np.float64)
-        else:
-            text = path.read_text(encoding="utf-8").replace(",", " ")
-            values = np.array([float(number) for number in text.split()])
+            return np.asarray(np.load(path, allow_pickle=False))
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".json":
+            return np.asarray(json.loads(text), dtype=np.float64)
+        return np.array([float(number) for number in text.replace(",", " ").split()])
     except FileNotFoundError as error:
         raise UserError(f"{path} does not exist") from error
     # No list of what a reader may raise on arbitrary bytes is complete.
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise UserError(f"{path} cannot be read ({reason})") from error
-    return as_pose(values, str(path))

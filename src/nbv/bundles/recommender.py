@@ -30,6 +30,7 @@ from nbv.bundles.beliefs import (
 )
 from nbv.bundles.bundle import Bundle, BundleError, load_bundle
 from nbv.bundles.familiarity import unfamiliarity
+from nbv.bundles.moves import as_rotations
 from nbv.bundles.networks import Network, open_network
 from nbv.errors import UserError, nearest
 from nbv.frames.crop import (
@@ -285,7 +286,8 @@ class Recommender:
         elevation_deg : float, optional
             Of the camera above the object's base plane, where it is known.
         allowed_deg : array-like, optional
-            Rotations from the last frame's place that the camera may take; all without it.
+            Rotations from the last frame's place that the camera may take; all without it. An
+            array of n booleans is a mask over the circle: entry k is the rotation 360 k / n.
         max_travel_deg : float
 
         Raises
@@ -480,9 +482,7 @@ def _reachable(
     if allowed_deg is None:
         rotation_deg = np.arange(n_bins) * (360.0 / n_bins)
     else:
-        given = np.asarray(allowed_deg, dtype=np.float64).ravel()
-        if not given.size or not np.isfinite(given).all():
-            raise UserError("allowed rotations: give one at least, in degrees")
+        given = as_rotations(allowed_deg)
         rotation_deg = given[np.unique(wrap_deg(given), return_index=True)[1]]
     # A rotation that is in the range already keeps its bits.
     is_within = (rotation_deg > -180.0) & (rotation_deg <= 180.0)

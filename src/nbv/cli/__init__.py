@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -18,12 +19,19 @@ from nbv import __version__
 from nbv.cli.answers import (
     recommendation_as_json,
     say,
+    say_assumed_camera,
     say_evaluation,
     say_json,
     say_names,
     say_recommendation,
 )
-from nbv.cli.arguments import Numbers, WholeNumbers, joined_numbers, need_writable
+from nbv.cli.arguments import (
+    Numbers,
+    Rotations,
+    WholeNumbers,
+    joined_numbers,
+    need_writable,
+)
 from nbv.errors import UserError
 from nbv.labels import counted
 
@@ -35,6 +43,11 @@ if TYPE_CHECKING:
     from nbv.bundles.turns import Turn
 
 USER_ERROR = 2
+
+SHIPPED = "mug"
+"""The bundle that is taken where none is named."""
+
+ANY_TRAVEL_DEG = 180.0
 
 app = App(
     name="nbv",
@@ -84,7 +97,7 @@ def run() -> NoReturn:
 @app.command
 def recommend(
     *frames: Annotated[Path, Parameter(name="FRAME", negative=())],
-    bundle: str = "mug",
+    bundle: str = SHIPPED,
     rotations: Numbers = None,
     depth_scale: float | None = None,
     intrinsics: str | None = None,
@@ -92,8 +105,9 @@ def recommend(
     near: float | None = None,
     far: float | None = None,
     elevation: float | None = None,
-    allowed: Numbers = None,
-    max_travel: float = 180.0,
+    gravity: Numbers = None,
+    allowed: Rotations = None,
+    max_travel: float = ANY_TRAVEL_DEG,
     camera_pose: Path | None = None,
     axis: Numbers = None,
     estimate: float | None = None,
@@ -114,9 +128,11 @@ def recommend(
     rotations
         Where each frame was taken, from the first frame's place: 0 90, or 0,90, for two frames.
     depth_scale
-        Metres per unit of whole numbers; 0.001 without it.
+        Metres per unit of a frame's numbers. Without it 1 for numbers with a decimal point, and for
+        whole numbers what the camera file says, or 0.001.
     intrinsics
-        fx,fy,cx,cy in pixels, or a camera file (BOP, ROS CameraInfo).
+        fx,fy,cx,cy in pixels, the focal length alone, or a camera file (BOP, ROS CameraInfo). The
+        focal length alone is for a frame that was cut out of a larger image.
     mask
         Masks of the object, one for each frame. The frames stand before this option.
     near
@@ -125,8 +141,12 @@ def recommend(
         The object lies nearer than this, metres.
     elevation
         Degrees of the camera above the object's base plane, where it is known.
+    gravity
+        Instead of the elevation: the direction down in the camera's optical frame, x,y,z (x right,
+        y down, z forward). An accelerometer at rest reports the opposite direction.
     allowed
-        Rotations from the last frame that the camera may take.
+        Rotations from the last frame that the camera may take: degrees, or a .npy file of degrees
+        or of n booleans, where entry k is the rotation 360 k / n.
     max_travel
         Degrees that the camera may travel.
     camera_pose
@@ -147,11 +167,13 @@ def recommend(
             "FRAME": frames or None,
             "--allowed": allowed,
             "--axis": axis,
+            "--bundle": None if bundle == SHIPPED else bundle,
+            "--max-travel": None if max_travel == ANY_TRAVEL_DEG else max_travel,
         }
         of_frames |= {"--plot": plot}
         of_frames |= {"--camera-pose": camera_pose, "--mask": mask, "--rotations": rotations}
         of_frames |= {"--intrinsics": intrinsics, "--depth-scale": depth_scale, "--near": near}
-        of_frames |= {"--far": far, "--elevation": elevation}
+        of_frames |= {"--far": far, "--elevation": elevation, "--gravity": gravity}
         if ignored := [name for name, value in of_frames.items() if value is not None]:
             raise UserError(f"{ignored[0]} does not go with --estimate and --table; leave it out")
         _recommend_by_table(estimate, table, as_json=json)
@@ -161,12 +183,17 @@ def recommend(
         raise UserError(f"give a depth frame, or --estimate with --table{hint}")
     if plot is not None:
         need_writable("--plot", plot, FIGURES)
+    if gravity is not None and elevation is not None:
+        raise UserError("--gravity gives the elevation; leave --gravity or --elevation out")
     place = _known_place(camera_pose, axis)
-    from nbv.bundles.moves import moved_camera
+    from nbv.bundles.moves import elevation_from_gravity, moved_camera, read_rotations
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask
     from nbv.frames.intrinsics import camera_of
 
+    if gravity is not None:
+        elevation = elevation_from_gravity(gravity)
+    may_take = read_rotations(allowed) if isinstance(allowed, Path) else allowed
     recommender = Recommender.load(bundle)
     cameras = [camera_of(intrinsics, path) for path in frames]
     answer = recommender.recommend(
@@ -180,18 +207,21 @@ def recommend(
         near_m=near,
         far_m=far,
         elevation_deg=elevation,
-        allowed_deg=allowed,
+        allowed_deg=may_take,
         max_travel_deg=max_travel,
     )
-    target = None if place is None else moved_camera(*place, answer.move.rotation_deg)
+    moves = [answer.move, *answer.alternatives]
+    targets = place and [moved_camera(*place, move.rotation_deg) for move in moves]
     if plot is not None:
         from nbv.reporting.recommendation import draw_recommendation
 
         draw_recommendation(answer, plot, recommender.bundle.category)
     if json:
-        say_json(recommendation_as_json(answer, target))
+        assumed_px = recommender.bundle.focal_px if intrinsics is None else None
+        say_json(recommendation_as_json(answer, assumed_px, targets))
     else:
-        say_recommendation(answer, recommender.bundle, intrinsics is not None, target)
+        known, target = intrinsics is not None, targets[0] if targets else None
+        say_recommendation(answer, recommender.bundle, known, target)
 
 
 @app.command
@@ -204,6 +234,9 @@ def calibrate(
     criterion: str | None = None,
     intrinsics: str | None = None,
     depth_scale: float | None = None,
+    near: float | None = None,
+    far: float | None = None,
+    json: bool = False,
 ) -> None:
     """Learn from known azimuths what an estimator's errors are.
 
@@ -223,12 +256,20 @@ def calibrate(
         Of the lookup table: pose_ambiguity (without this option), information_gain,
         expected_dispersion or expected_error.
     intrinsics
-        fx,fy,cx,cy in pixels, or a camera file, for frames.
+        Of frames: fx,fy,cx,cy in pixels, the focal length alone, or a camera file.
     depth_scale
-        Metres per unit of whole numbers; 0.001 without it.
+        Metres per unit of a frame's numbers. Without it 1 for numbers with a decimal point, and for
+        whole numbers what the camera file says, or 0.001.
+    near
+        The object lies beyond this, metres.
+    far
+        The object lies nearer than this, metres.
+    json
+        Print JSON.
     """
     if bundle is None:
         of_frames = {"--intrinsics": intrinsics, "--depth-scale": depth_scale}
+        of_frames |= {"--near": near, "--far": far}
         if ignored := [name for name, value in of_frames.items() if value is not None]:
             raise UserError(f"{ignored[0]} is for frames, which need --bundle: --bundle mug")
         if output.suffix.lower() == ".safetensors":
@@ -237,7 +278,7 @@ def calibrate(
                 "--bundle mug; pairs make a table, an .npz file"
             )
         need_writable("--output", output, [".npz"])
-        _calibrate_table(source, output, criterion or "pose_ambiguity")
+        _calibrate_table(source, output, criterion or "pose_ambiguity", as_json=json)
         return
     if criterion is not None:
         raise UserError("--criterion is for pairs, which need no --bundle; leave one of them out")
@@ -247,16 +288,36 @@ def calibrate(
     from nbv.bundles.calibration import recalibrated
     from nbv.recommendation.belief import mean_direction_deg
 
-    recommender, turns = _seen_turns(bundle, source, intrinsics, depth_scale, say)
-    calibrated = recalibrated(recommender.bundle, turns, str(source))
+    recommender, turns, n_assumed = _seen_turns(
+        bundle, source, intrinsics, depth_scale, near, far, as_json=json
+    )
+    held = recommender.bundle
+    calibrated = recalibrated(held, turns, str(source))
+    recordings: list[dict[str, Any]] = []
     for turn in turns:
-        seen = distributions_of(turn.logits, recommender.bundle.temperature)
-        estimate_deg = mean_direction_deg(seen)
-        name = f"{turn.object_id}, sequence {turn.sequence}"
-        _say_offset(name, counted(len(estimate_deg), "frame"), turn.azimuth_deg, estimate_deg)
+        estimate_deg = mean_direction_deg(distributions_of(turn.logits, held.temperature))
+        about = {"object_id": turn.object_id, "sequence": turn.sequence}
+        counts = {"n_frames": len(estimate_deg)}
+        recordings.append(about | counts | _offset(turn.azimuth_deg, estimate_deg))
     save_bundle(output, calibrated)
+    if json:
+        say_json(
+            {
+                "file": str(output),
+                "category": held.category,
+                "n_objects": len({turn.object_id for turn in turns}),
+                "recordings": recordings,
+                "assumed_focal_px": held.focal_px if n_assumed else None,
+            }
+        )
+        return
+    if n_assumed:
+        say_assumed_camera(held.focal_px, n_assumed)
+    for one in recordings:
+        name = f"{one['object_id']}, sequence {one['sequence']}"
+        _say_offset(name, counted(one["n_frames"], "frame"), one)
     calibrate_it = "recording calibrates it" if len(turns) == 1 else "recordings calibrate it"
-    say(f"{output}: {recommender.bundle.category}, {len(turns)} {calibrate_it}")
+    say(f"{output}: {held.category}, {len(turns)} {calibrate_it}")
 
 
 @app.command
@@ -264,10 +325,12 @@ def evaluate(
     manifest: Annotated[Path, Parameter(name="MANIFEST")],
     /,
     *,
-    bundle: str = "mug",
+    bundle: str = SHIPPED,
     views: WholeNumbers = None,
     intrinsics: str | None = None,
     depth_scale: float | None = None,
+    near: float | None = None,
+    far: float | None = None,
     output: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -283,9 +346,14 @@ def evaluate(
     views
         Numbers of views; 2 3 4 5 without it.
     intrinsics
-        fx,fy,cx,cy in pixels, or a camera file.
+        fx,fy,cx,cy in pixels, the focal length alone, or a camera file.
     depth_scale
-        Metres per unit of whole numbers; 0.001 without it.
+        Metres per unit of a frame's numbers. Without it 1 for numbers with a decimal point, and for
+        whole numbers what the camera file says, or 0.001.
+    near
+        The object lies beyond this, metres.
+    far
+        The object lies nearer than this, metres.
     output
         Write the table as CSV too.
     json
@@ -297,16 +365,26 @@ def evaluate(
     from nbv.bundles.evaluation import familiarity_of
     from nbv.files import write_csv
 
-    tell = (lambda line: print(line, file=sys.stderr)) if json else say  # noqa: T201
-    recommender, turns = _seen_turns(bundle, manifest, intrinsics, depth_scale, tell)
-    found = evaluate_(recommender.bundle, turns, views or [2, 3, 4, 5])
+    recommender, turns, n_assumed = _seen_turns(
+        bundle, manifest, intrinsics, depth_scale, near, far, as_json=json
+    )
+    held = recommender.bundle
+    found = evaluate_(held, turns, views or [2, 3, 4, 5])
     if output is not None:
         write_csv(output, found)
-    familiar = familiarity_of(recommender.bundle, turns)
+    familiar = familiarity_of(held, turns)
     if json:
-        say_json({"errors": found.to_dict("records"), "familiarity": familiar.to_dict("records")})
-    else:
-        say_evaluation(found, familiar)
+        say_json(
+            {
+                "errors": found.to_dict("records"),
+                "familiarity": familiar.to_dict("records"),
+                "assumed_focal_px": held.focal_px if n_assumed else None,
+            }
+        )
+        return
+    if n_assumed:
+        say_assumed_camera(held.focal_px, n_assumed)
+    say_evaluation(found, familiar)
 
 
 @app.command
@@ -323,8 +401,12 @@ def render(
     up: str = "+z",
     front: str = "+x",
     noise: bool = True,
+    json: bool = False,
 ) -> None:
     """Write the depth frame that a depth camera would take of a mesh.
+
+    The camera is the first Kinect: 640 x 480 pixels, a focal length of 585 px. It is directed at
+    the object.
 
     Parameters
     ----------
@@ -348,6 +430,8 @@ def render(
         The axis of the file that points to the front.
     noise
         Whether the sensor's noise is there.
+    json
+        Print JSON.
     """
     if (mesh is None) != example:
         raise UserError("give a mesh file, or --example")
@@ -361,15 +445,19 @@ def render(
     frame = draw_frame(shape, azimuth, elevation, distance, diagonal, noise=noise)
     with replacing(output) as temporary:
         np.save(temporary, frame.depth_m)
-    camera = frame.intrinsics
+    camera, n_pixels = frame.intrinsics, int(frame.mask.sum())
+    if json:
+        about = {"file": str(output), "intrinsics": asdict(camera), "object_pixels": n_pixels}
+        say_json(about)
+        return
     say(
-        f"{output}: {frame.mask.sum()} pixels of the object; "
+        f"{output}: {n_pixels} pixels of the object; "
         f"--intrinsics {camera.fx:g},{camera.fy:g},{camera.cx:g},{camera.cy:g}"
     )
 
 
 @app.command
-def inspect(bundle: str = "mug", /, *, json: bool = False) -> None:
+def inspect(bundle: str = SHIPPED, /, *, json: bool = False) -> None:
     """Show what a bundle holds and where it comes from.
 
     Parameters
@@ -407,7 +495,7 @@ def inspect(bundle: str = "mug", /, *, json: bool = False) -> None:
 
 
 @app.command
-def export(bundle: str = "mug", /, *, onnx: Path) -> None:
+def export(bundle: str = SHIPPED, /, *, onnx: Path, json: bool = False) -> None:
     """Write a bundle's network as ONNX: from crops to logits.
 
     Parameters
@@ -416,6 +504,8 @@ def export(bundle: str = "mug", /, *, onnx: Path) -> None:
         A bundle that comes with nbv, or a file.
     onnx
         The file to write.
+    json
+        Print JSON.
     """
     need_writable("--onnx", onnx, [".onnx"])
     from nbv.bundles.bundle import load_bundle
@@ -426,13 +516,24 @@ def export(bundle: str = "mug", /, *, onnx: Path) -> None:
     model = onnx_model(load_bundle(bundle_path(bundle)))
     with replacing(onnx) as temporary:
         temporary.write_bytes(model.SerializeToString())
+    if json:
+        ends = {"input": model.graph.input[0], "output": model.graph.output[0]}
+        say_json({"file": str(onnx)} | {end: _tensor(value) for end, value in ends.items()})
+        return
     say(f"{onnx}: codes (n, 1, side, side) to logits")
 
 
-def _calibrate_table(source: Path, output: Path, criterion: str) -> None:
+def _tensor(value: Any) -> dict[str, Any]:
+    """Return the name and the shape of an ONNX graph's input or output; n is any number."""
+    sides = value.type.tensor_type.shape.dim
+    return {"name": value.name, "shape": [side.dim_param or side.dim_value for side in sides]}
+
+
+def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool) -> None:
     import numpy as np
 
     from nbv.bundles.calibration import DENSITY
+    from nbv.bundles.manifest import is_manifest
     from nbv.calibration.pairs import read_pairs
     from nbv.errors import nearest
     from nbv.recommendation.criteria import CRITERIA
@@ -441,21 +542,39 @@ def _calibrate_table(source: Path, output: Path, criterion: str) -> None:
 
     if criterion not in CRITERIA:
         raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
-    estimates = read_pairs(source).estimate_deg
+    try:
+        estimates = read_pairs(source).estimate_deg
+    except UserError as error:
+        if not is_manifest(source):
+            raise
+        raise UserError(
+            f"{source} is a manifest of frames, which need --bundle, for instance --bundle "
+            f"{SHIPPED}, and an --output that ends in .safetensors"
+        ) from error
     azimuth_deg = np.broadcast_to(np.arange(estimates.shape[1], dtype=np.float64), estimates.shape)
     save_lookup(output, chosen_lookup(estimates, criterion, DENSITY))
-    _say_offset(str(source), counted(len(estimates), "object"), azimuth_deg, estimates)
-    say(f"{output}: {criterion} from {counted(len(estimates), 'object')}")
+    offset, number = _offset(azimuth_deg, estimates), counted(len(estimates), "object")
+    if as_json:
+        about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)}
+        say_json(about | offset)
+        return
+    _say_offset(str(source), number, offset)
+    say(f"{output}: {criterion} from {number}")
 
 
-def _say_offset(
-    name: str, number: str, azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
-) -> None:
+def _offset(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]) -> dict[str, Any]:
     from nbv.calibration.offset import constant_offset_deg, offset_warning
 
-    say(f"{name}: {number}; offset {constant_offset_deg(estimate_deg - azimuth_deg):+.1f}°")
-    if warning := offset_warning(azimuth_deg, estimate_deg):
-        say(f"careful    {warning}")
+    return {
+        "offset_deg": constant_offset_deg(estimate_deg - azimuth_deg),
+        "warning": offset_warning(azimuth_deg, estimate_deg) or None,
+    }
+
+
+def _say_offset(name: str, number: str, offset: Mapping[str, Any]) -> None:
+    say(f"{name}: {number}; offset {offset['offset_deg']:+.1f}°")
+    if offset["warning"]:
+        say(f"careful    {offset['warning']}")
 
 
 def _seen_turns(
@@ -463,13 +582,20 @@ def _seen_turns(
     manifest: Path,
     intrinsics: str | None,
     depth_scale: float | None,
-    tell: Callable[[str], None],
-) -> tuple[Recommender, list[Turn]]:
+    near: float | None,
+    far: float | None,
+    *,
+    as_json: bool,
+) -> tuple[Recommender, list[Turn], int]:
+    """Return what a bundle makes of recordings, and of how many frames the camera is assumed."""
     from nbv.bundles.manifest import read_manifest, see
     from nbv.bundles.recommender import Recommender
 
+    tell = (lambda line: print(line, file=sys.stderr)) if as_json else say  # noqa: T201
     recommender, recordings = Recommender.load(bundle), read_manifest(manifest)
-    return recommender, [see(recommender, one, intrinsics, depth_scale, tell) for one in recordings]
+    turns = [see(recommender, one, intrinsics, depth_scale, tell, near, far) for one in recordings]
+    cameras = [camera for one in recordings for camera in one.intrinsics]
+    return recommender, turns, cameras.count(None) if intrinsics is None else 0
 
 
 def _recommend_by_table(estimate: float | None, table: Path | None, *, as_json: bool) -> None:

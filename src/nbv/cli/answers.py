@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from nbv.labels import counted
@@ -27,12 +27,29 @@ def say_json(value: Any) -> None:
     say(json.dumps(value, indent=2, ensure_ascii=False))
 
 
-def recommendation_as_json(
-    answer: Recommendation, target: NDArray[np.float64] | None
-) -> dict[str, Any]:
-    """Return a recommendation, with the target pose (4, 4) where there is one, for JSON."""
+def say_assumed_camera(focal_px: float, n_frames: int | None = None) -> None:
+    """Say which focal length is assumed, and of how many frames where that is known."""
+    of_frames = "" if n_frames is None else f" for {counted(n_frames, 'frame')}"
+    say(f"camera     not given{of_frames}: a focal length of {focal_px:g} px is assumed")
 
-    def move(one: Move) -> dict[str, float]:
+
+def recommendation_as_json(
+    answer: Recommendation,
+    assumed_focal_px: float | None,
+    targets: Sequence[NDArray[np.float64]] | None,
+) -> dict[str, Any]:
+    """Return a recommendation for JSON.
+
+    Parameters
+    ----------
+    answer : Recommendation
+    assumed_focal_px : float or None
+        None where intrinsics were given.
+    targets : sequence of ndarray (4, 4), optional
+        The camera's pose after the move and after each alternative.
+    """
+
+    def move(one: Move) -> dict[str, Any]:
         return {
             "rotation_deg": one.rotation_deg,
             "travel_deg": one.travel_deg,
@@ -48,11 +65,14 @@ def recommendation_as_json(
         "unfamiliarity": answer.unfamiliarity,
         "bayes_factor": answer.bayes_factor,
         "warnings": list(answer.warnings),
+        "assumed_focal_px": assumed_focal_px,
         "belief": answer.belief.tolist(),
         "error_after_deg": [None if e == float("inf") else e for e in answer.error_after_deg],
     }
-    if target is not None:
-        about["target_camera_pose"] = target.tolist()
+    if targets is not None:
+        for one, target in zip([about["move"], *about["alternatives"]], targets, strict=True):
+            one["target_camera_pose"] = target.tolist()
+        about["target_camera_pose"] = targets[0].tolist()
     return about
 
 
@@ -64,7 +84,7 @@ def say_recommendation(
 ) -> None:
     """Print a recommendation in a few lines."""
     if not is_camera_known:
-        say(f"camera     not given: a focal length of {bundle.focal_px:g} px is assumed")
+        say_assumed_camera(bundle.focal_px)
     say(
         f"pose       azimuth {answer.azimuth_deg:.1f}° about the {bundle.category}; "
         f"expected error {answer.expected_error_deg:.1f}°, spread {answer.spread_deg:.1f}° "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,12 +21,24 @@ def as_numbers(kind: Any, tokens: Sequence[Token]) -> list[Any]:
     return [number(text) for text in texts]
 
 
-_LIST = Parameter(converter=as_numbers, n_tokens=1, negative=(), metavar="NUMBER...")
+def as_rotations_or_file(_kind: Any, tokens: Sequence[Token]) -> list[float] | Path:
+    """Return the numbers of an option, or the file that its one value names."""
+    if len(tokens) == 1 and tokens[0].value and not _is_numbers(tokens[0].value):
+        return Path(tokens[0].value)
+    return as_numbers(list[float], tokens)
 
-Numbers = Annotated[list[float] | None, _LIST]
-WholeNumbers = Annotated[list[int] | None, _LIST]
 
-OF_NUMBERS = ("--rotations", "--allowed", "--axis", "--views", "--intrinsics")
+def _list_parameter(converter: Callable[..., Any], metavar: str) -> Parameter:
+    return Parameter(converter=converter, n_tokens=1, negative=(), metavar=metavar)
+
+
+Numbers = Annotated[list[float] | None, _list_parameter(as_numbers, "NUMBER...")]
+WholeNumbers = Annotated[list[int] | None, _list_parameter(as_numbers, "NUMBER...")]
+Rotations = Annotated[
+    list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FILE")
+]
+
+OF_NUMBERS = ("--rotations", "--allowed", "--axis", "--gravity", "--views", "--intrinsics")
 
 
 def joined_numbers(arguments: Sequence[str]) -> list[str]:

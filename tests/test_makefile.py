@@ -1,0 +1,28 @@
+"""What the targets of the Makefile do, without doing it."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from nbv.config.compose import load_config
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not here")
+def test_the_package_ships_the_bundles_that_make_bundles_made_and_no_others():
+    command = ["make", "--dry-run", "bundles"]
+    shown = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    shown = shown.replace("\\\n", " ")
+    (made,) = re.findall(r"snakemake .* bundles --config (.+)", shown)
+    settings = load_config(ROOT / "config", made.split())
+    (copied,) = re.findall(r"^cp (.+) src/nbv/bundles/shipped/$", shown, re.MULTILINE)
+    assert copied.split() == [
+        f"results/{settings['name']}/bundles/{category}.safetensors"
+        for category in settings["categories"]
+    ]
