@@ -221,6 +221,14 @@ def test_without_elevations_all_turns_count_alike(bundle):
     assert one.move == other.move
 
 
+def test_the_cameras_focal_length_is_kept_where_it_is_known(bundle):
+    unknown, *known = (
+        replace(turn(name), focal_px=f) for name, f in zip("abc", (np.nan, 610, 620), strict=True)
+    )
+    assert recalibrated(bundle, [unknown], "r", ONE_DENSITY).focal_px == bundle.focal_px
+    assert recalibrated(bundle, [unknown, *known], "r", ONE_DENSITY).focal_px == 615
+
+
 def test_a_turn_with_a_gap_does_not_calibrate(bundle):
     with pytest.raises(UserError, match="apart somewhere on the turn"):
         recalibrated(bundle, [turn(), turn("b", azimuth_deg=AZIMUTHS[3:])], "recording.csv")

@@ -102,7 +102,8 @@ def recalibrated(
 ) -> Bundle:
     """Return a bundle with the same network, calibrated by other turns, such as those of a camera.
 
-    Temperature, the paper's tables and the familiar range are those of the turns. The bundle's own
+    Temperature, the paper's tables, the familiar range and, where it is known, the focal length of
+    frames without intrinsics are those of the turns. The bundle's own
     calibration turns stay, and count as much as `PRIOR_TURNS` of the others together: a turn or
     two say too little alone. A turn of unknown elevation counts for all.
 
@@ -125,9 +126,11 @@ def recalibrated(
     elevation_deg = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
     known = bundle.familiarity
     scores = [unfamiliarity(known, turn.codes, turn.logits) for turn in turns]
+    focal_px = [turn.focal_px for turn in turns if np.isfinite(turn.focal_px)]
     limit = max(float(np.quantile(np.concatenate(scores), FAMILIAR_SHARE)), LEAST_LIMIT)
     return replace(
         bundle,
+        focal_px=float(np.median(focal_px)) if focal_px else bundle.focal_px,
         temperature=temperature,
         object_ids=(*(turn.object_id for turn in turns), *bundle.object_ids),
         elevation_deg=np.concatenate([elevation_deg, bundle.elevation_deg]),

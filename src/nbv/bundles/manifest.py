@@ -168,16 +168,17 @@ def see(
     UserError
         Where a file cannot be read, or no frame is left.
     """
-    codes, kept = [], []
+    codes, kept, focal_px = [], [], []
     for place, (row, own) in enumerate(
         zip(recording.frames.to_dict("records"), recording.intrinsics, strict=True)
     ):
         mask, camera = row.get("mask"), camera_of(intrinsics, row["path"])
+        known = own or camera.intrinsics
         try:
             crop = recommender.crop(
                 read_depth(row["path"], depth_scale, camera.unit_m),
                 mask=read_mask(mask) if isinstance(mask, str) else None,
-                intrinsics=own or camera.intrinsics,
+                intrinsics=known,
                 near_m=near_m,
                 far_m=far_m,
             )
@@ -186,6 +187,7 @@ def see(
             continue
         codes.append(crop.codes)
         kept.append(place)
+        focal_px.append(known.fx if known else float("nan"))
     if not kept:
         raise UserError(
             f"every frame of object {recording.object_id!r}, sequence {recording.sequence!r} is "
@@ -199,4 +201,5 @@ def see(
         recording.azimuth_deg[kept],
         recommender.network(crops),
         crops,
+        float(np.median(focal_px)),
     )

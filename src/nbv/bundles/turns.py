@@ -21,6 +21,8 @@ class Turn:
     logits : ndarray (n, B)
     codes : ndarray (n, side, side) uint8
         The crops.
+    focal_px : float
+        Of the camera, pixels; NaN where it is not known.
     """
 
     object_id: str
@@ -29,6 +31,7 @@ class Turn:
     azimuth_deg: NDArray[np.float64]
     logits: NDArray[np.float32]
     codes: NDArray[np.uint8]
+    focal_px: float = float("nan")
 
 
 def every(turn: Turn, step: int) -> Turn:
