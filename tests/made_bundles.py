@@ -115,7 +115,7 @@ def made_bundle(seed: int = 0, **changes) -> Bundle:
         "paper": PaperTables(
             np.array([0, 30], dtype=np.float32), rng.integers(15, 346, (2, 360)).astype(np.int16)
         ),
-        "provenance": {"run": "made", "commit": "0" * 40},
+        "provenance": {"run": "made", "commit": "0" * 40, "packages": {"numpy": "2"}},
     }
     return Bundle(**{**values, **changes})
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from nbv.labels import counted
@@ -143,7 +143,16 @@ def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
 
 
 def say_names(about: Mapping[str, Any]) -> None:
-    """Print names and values, one a line."""
-    width = max(map(len, about))
-    for name, value in about.items():
+    """Print names and values, one a line; of a mapping its own names and values."""
+    shown = dict(_flat(about))
+    width = max(map(len, shown))
+    for name, value in shown.items():
         say(f"{name:<{width}}  {value}")
+
+
+def _flat(about: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in about.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{before}{name}.")
+        else:
+            yield f"{before}{name}", value
