@@ -95,7 +95,13 @@ onsuccess:
         PROGRESS.end()
     banner(
         "nbv: finished",
-        f"results: {LAYOUT.root}/    read first: {LAYOUT.report}",
+        f"results: {LAYOUT.root}/"
+        # A run of some tables alone has none.
+        + (
+            f"    read first: {LAYOUT.report}"
+            if Path(LAYOUT.report).is_file()
+            else ""
+        ),
         *CAUTION,
     )
 

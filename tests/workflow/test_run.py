@@ -78,7 +78,9 @@ def test_a_run_that_is_too_small_says_so_wherever_there_are_numbers(scratch):
     (scratch.results / "report.html").unlink()
     done = scratch.run("--cores", "1")
     said = "This run is too small for its numbers to mean anything: 8 objects of"
-    assert said in done.stderr.split("nbv: finished")[1]
+    end = done.stderr.split("nbv: finished")[1]
+    assert said in end
+    assert f"read first: results/{scratch.results.name}/report.html" in end
     for name in ("report.html", "claims.md", *(f"tables/table{n}.md" for n in range(1, 8))):
         assert said in (scratch.results / name).read_text()
 
