@@ -44,7 +44,7 @@ CONTRASTS_COLUMNS = (
     *PLACE,
     "contrast",
     "fusion",
-    "primary",
+    "question",
     "difference_deg",
     "low",
     "high",
@@ -95,11 +95,19 @@ Method = tuple[str, str, int]
 
 @dataclass(frozen=True)
 class Contrast:
-    """One method less another; a primary one answers a question of docs/protocol.md."""
+    """One method less another.
+
+    Attributes
+    ----------
+    method, other : (str, str, int)
+        Choice of views, fusion, number of views.
+    question : int
+        Of docs/protocol.md, which this contrast answers; 0: none.
+    """
 
     method: Method
     other: Method
-    primary: bool = False
+    question: int = 0
 
     @property
     def name(self) -> str:
@@ -118,15 +126,17 @@ def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
         adaptive, paper = (("expected_error", fusion, 2), ("given_estimate", fusion, 2))
         opposite = ("opposite", fusion, 2)
         best_fixed = ("fixed", fusion, 2)
-        found.append(Contrast(adaptive, best_fixed, primary=has_product == (fusion == "product")))
+        answers = has_product == (fusion == "product")
+        found.append(Contrast(adaptive, best_fixed, question=1 if answers else 0))
         found += [Contrast(adaptive, (other, fusion, 2)) for other in ("opposite", "random")]
-        found.append(Contrast(paper, opposite, primary=fusion == "average" and not has_product))
+        answers = fusion == "average" and not has_product
+        found.append(Contrast(paper, opposite, question=2 if answers else 0))
         found.append(Contrast(paper, ("fixed", fusion, 2)))
     paper = ("given_estimate", "average", 2)
     found += [
         Contrast(paper, ("none", "none", 1)),
-        Contrast(("as_printed", "average", 2), paper, primary=not has_product),
-        Contrast(("expected_error", "product", 2), paper, primary=True),
+        Contrast(("as_printed", "average", 2), paper, question=0 if has_product else 3),
+        Contrast(("expected_error", "product", 2), paper, question=4),
     ]
     for n_views in sorted({n for *_, n in methods if n > 2}):
         for choice, fusion in (
@@ -135,8 +145,8 @@ def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
             ("expected_error", "product"),
         ):
             even = ("evenly_spaced", fusion, n_views)
-            primary = choice == "expected_error"
-            found.append(Contrast((choice, fusion, n_views), even, primary))
+            question = 5 if choice == "expected_error" else 0
+            found.append(Contrast((choice, fusion, n_views), even, question))
     known = set(methods)
     return [one for one in found if {one.method, one.other} <= known]
 
@@ -231,7 +241,7 @@ def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
             found[contrast] = crossed_mean(*(a - b for a, b in zip(mine, other, strict=True)))
         over_all = place[1] == ALL
         secondary = {
-            one.name + one.method[1]: one for one in found if not (one.primary and over_all)
+            one.name + one.method[1]: one for one in found if not (one.question and over_all)
         }
         adjusted = holm({name: found[one].p_value for name, one in secondary.items()})
         for contrast, mean in found.items():
@@ -242,7 +252,7 @@ def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
                     *place,
                     contrast.name,
                     contrast.method[1],
-                    contrast.primary,
+                    contrast.question,
                     *(interval.value, interval.low, interval.high, p_value),
                     *(mean.n_objects, mean.n_trainings),
                 )

@@ -116,15 +116,20 @@ def test_a_panel_for_each_question_and_data_set_and_a_mark_for_each_answer(contr
     other = contrasts[contrasts["fusion"] == "product"].assign(dataset="embedded")
     both = pd.concat([contrasts, other], ignore_index=True)
     figure = contrasts_figure(both)
-    primary = both[both["primary"]]
+    answers = both[both["question"] > 0].sort_values("question", kind="stable")
     panels = {
         (row, dataset): own
-        for row, (_, part) in enumerate(primary.groupby(["contrast", "fusion"], sort=False))
+        for row, (_, part) in enumerate(answers.groupby(["contrast", "fusion"], sort=False))
         for dataset, own in part.groupby("dataset", sort=False)
     }
     assert len(figure.axes) == len(panels)
-    for axes, ((_, dataset), part) in zip(figure.axes, panels.items(), strict=True):
-        assert dataset in axes.get_title(loc="left")
+    first_in_row = set()
+    for axes, ((row, dataset), part) in zip(figure.axes, panels.items(), strict=True):
+        title = axes.get_title(loc="left")
+        assert dataset in title
+        if row not in first_in_row:
+            assert title.startswith(f"{part['question'].iloc[0]}. ")
+        first_in_row.add(row)
         labels = [label.get_text() for label in axes.get_yticklabels()]
         assert labels == [category.capitalize() for category in part["category"]]
         marks = [line for line in axes.lines if line.get_marker() not in ("None", "")]
@@ -136,7 +141,7 @@ def test_a_panel_for_each_question_and_data_set_and_a_mark_for_each_answer(contr
 
 
 def test_without_an_answer_there_is_no_figure(contrasts):
-    none = pd.DataFrame(columns=contrasts.columns).astype({"primary": bool})
+    none = pd.DataFrame(columns=contrasts.columns).astype({"question": int})
     with pytest.raises(ValueError, match="no contrast answers a question"):
         contrasts_figure(none)
 

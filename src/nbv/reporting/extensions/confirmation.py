@@ -205,7 +205,8 @@ def _agreement(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Iterator[
 def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     """Draw the contrasts that answer the questions of docs/protocol.md.
 
-    A row for each contrast and fusion, a panel in it for each data set.
+    A row for each contrast and fusion, in the order of the questions; a panel in it for each data
+    set.
 
     Parameters
     ----------
@@ -217,10 +218,10 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     ValueError
         Where none of them is there.
     """
-    answers = contrasts[contrasts["primary"]]
+    answers = contrasts[contrasts["question"] > 0].sort_values("question", kind="stable")
     rows = [
         (key, [own for _, own in part.groupby("dataset", sort=False)])
-        for key, part in answers.groupby(["contrast", "fusion"], sort=False)
+        for key, part in answers.groupby(["question", "contrast", "fusion"], sort=False)
     ]
     if not rows:
         raise ValueError("no contrast answers a question")
@@ -230,11 +231,11 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     cells = figure.subplots(
         len(rows), n_columns, squeeze=False, height_ratios=heights, sharex="row"
     )
-    for of_row, ((contrast, fusion), panels) in zip(cells, rows, strict=True):
+    for of_row, ((question, contrast, fusion), panels) in zip(cells, rows, strict=True):
         for place, (axes, part) in enumerate(zip(of_row, panels, strict=False)):
             _forest(axes, part)
-            question = "" if place else f"{_contrast(str(contrast))}, {fusion}"
-            axes.set_title(f"{question}\n{part['dataset'].iloc[0]} (degrees)", loc="left")
+            asked = "" if place else f"{question}. {_contrast(str(contrast))}, {fusion}"
+            axes.set_title(f"{asked}\n{part['dataset'].iloc[0]} (degrees)", loc="left")
         for spare in of_row[len(panels) :]:
             spare.remove()
     for axes in cells[-1][: len(rows[-1][1])]:
