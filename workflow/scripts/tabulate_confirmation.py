@@ -7,6 +7,7 @@ with job(snakemake):
 
     from nbv.files import read_csv, write_csv
     from nbv.reporting.extensions.confirmation import (
+        answers_figure,
         beliefs_table,
         bounds_table,
         contrasts_figure,
@@ -49,5 +50,7 @@ with job(snakemake):
     for name, table in tables.items():
         paths = {kind: output[f"{name}_{kind}"] for kind in ("csv", "md")}
         write_table(table, paths, snakemake.params.caution)
-    paths = {kind: output[f"contrasts_{kind}"] for kind in ("png", "pdf", "svg")}
-    save_figure(contrasts_figure(contrasts), paths)
+    figures = {"answers": answers_figure(contrasts), "contrasts": contrasts_figure(contrasts)}
+    for name, figure in figures.items():
+        paths = {kind: output[f"{name}_{kind}"] for kind in ("png", "pdf", "svg")}
+        save_figure(figure, paths)

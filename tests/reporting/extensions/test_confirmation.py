@@ -7,7 +7,9 @@ import pytest
 from tests.statistics.test_confirmation import SHIFT, objects_frame
 
 from nbv.experiments.factorial import DENSITY_COLUMNS
+from nbv.labels import interval_text
 from nbv.reporting.extensions.confirmation import (
+    answers_figure,
     beliefs_table,
     bounds_table,
     contrasts_figure,
@@ -116,7 +118,7 @@ def test_a_panel_for_each_question_and_data_set_and_a_mark_for_each_answer(contr
     other = contrasts[contrasts["fusion"] == "product"].assign(dataset="embedded")
     both = pd.concat([contrasts, other], ignore_index=True)
     figure = contrasts_figure(both)
-    answers = both[both["question"] > 0].sort_values("question", kind="stable")
+    answers = both[both["question"] > 0].sort_values(["question", "fusion"], kind="stable")
     panels = {
         (row, dataset): own
         for row, (_, part) in enumerate(answers.groupby(["contrast", "fusion"], sort=False))
@@ -140,10 +142,30 @@ def test_a_panel_for_each_question_and_data_set_and_a_mark_for_each_answer(contr
     assert "Difference of MAE (degrees)" in figure.axes[-1].get_xlabel()
 
 
-def test_without_an_answer_there_is_no_figure(contrasts):
+def test_answers_are_over_all_categories_with_their_numbers(contrasts):
+    """A data set of one category has no others to be pooled with."""
+    lone = contrasts[contrasts["category"] == "mug"].assign(dataset="embedded")
+    figure = answers_figure(pd.concat([contrasts, lone], ignore_index=True))
+    (axes,) = figure.axes
+    pooled = pd.concat([contrasts[contrasts["category"] == "all"], lone])
+    pooled = pooled[pooled["question"] > 0].sort_values(["question", "fusion"], kind="stable")
+    assert len(pooled) == 6
+    texts = [
+        interval_text(row["difference_deg"], row["low"], row["high"])
+        for _, of_question in pooled.groupby(["question", "contrast", "fusion"], sort=False)
+        for _, row in of_question.iterrows()
+    ]
+    assert [text.get_text() for text in axes.texts] == texts
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert [label for label in labels if label in ("real", "embedded")] == ["real", "embedded"] * 3
+    assert [label[0] for label in labels if label[0].isdigit()] == ["1", "4", "5"]
+
+
+@pytest.mark.parametrize("drawn", [answers_figure, contrasts_figure])
+def test_without_an_answer_there_is_no_figure(contrasts, drawn):
     none = pd.DataFrame(columns=contrasts.columns).astype({"question": int})
     with pytest.raises(ValueError, match="no contrast answers a question"):
-        contrasts_figure(none)
+        drawn(none)
 
 
 def test_bounds_have_a_row_for_each_number_of_views():

@@ -200,9 +200,11 @@ rule statistics:
             if bounded_units()
         },
         trainings_csv=LAYOUT.confirmation("trainings", "csv"),
-        contrasts_png=LAYOUT.confirmation("contrasts", "png"),
-        contrasts_pdf=LAYOUT.confirmation("contrasts", "pdf"),
-        contrasts_svg=LAYOUT.confirmation("contrasts", "svg"),
+        **{
+            f"{name}_{kind}": LAYOUT.confirmation(name, kind)
+            for name in ("answers", "contrasts")
+            for kind in ("png", "pdf", "svg")
+        },
     log:
         LAYOUT.log("statistics"),
     benchmark:

@@ -11,12 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from nbv.labels import category_label, interval_text, number
-from nbv.reporting.style import AGAINST, FOR, INK, OPEN, RC, new_figure
+from nbv.reporting.style import AGAINST, FOR, INK, OPEN, RC, label_rows, new_figure
 from nbv.reporting.table import Cell, Part, Table
+from nbv.statistics.confirmation import ALL
 
 _INTERVALS = (
     "Intervals are 95 % and contain the chance of objects and of trainings (docs/method.md)."
 )
+_DIFFERENCE = "Difference of MAE (degrees), below 0 is better"
 _ROW_IN = 0.18
 _PANEL_IN = 0.75
 _BETTER, _UNDECIDED, _WORSE = "better", "undecided", "worse"
@@ -202,8 +204,54 @@ def _agreement(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Iterator[
 
 
 @mpl.rc_context(RC)
+def answers_figure(contrasts: pd.DataFrame) -> Figure:
+    """Draw the answers over all categories to the questions of docs/protocol.md.
+
+    A heading for each question and fusion, a row below it for each data set.
+
+    Parameters
+    ----------
+    contrasts : DataFrame
+        Of `nbv.statistics.confirmation.method_contrasts`.
+
+    Raises
+    ------
+    ValueError
+        Where none of them answers a question.
+    """
+    answers = _answers(contrasts)
+    # A data set of one category has no rows over all.
+    several = answers.groupby("dataset")["category"].transform("nunique") > 1
+    answers = answers[~several | (answers["category"] == ALL)]
+    labels: list[str] = []
+    headings = []
+    groups = answers.groupby(["question", "contrast", "fusion"], sort=False)
+    figure = new_figure(7.4, _ROW_IN * (len(answers) + len(groups)) + 0.9)
+    axes = figure.subplots()
+    for (question, contrast, fusion), part in groups:
+        headings.append(len(labels))
+        labels.append(f"{question}. {_contrast(str(contrast))}, {fusion}")
+        for _, row in part.iterrows():
+            _draw_difference(axes, row, len(labels))
+            text = interval_text(row["difference_deg"], row["low"], row["high"])
+            axes.annotate(
+                text,
+                (1.02, len(labels)),
+                xycoords=axes.get_yaxis_transform(),
+                va="center",
+                fontsize=8,
+            )
+            labels.append(str(row["dataset"]))
+    axes.axvline(0.0, color=INK, linewidth=0.8)
+    label_rows(axes, labels, headings)
+    axes.set_xlabel(_DIFFERENCE)
+    _verdict_key(figure, answers)
+    return figure
+
+
+@mpl.rc_context(RC)
 def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
-    """Draw the contrasts that answer the questions of docs/protocol.md.
+    """Draw, by category, the contrasts that answer the questions of docs/protocol.md.
 
     A row for each contrast and fusion, in the order of the questions; a panel in it for each data
     set.
@@ -216,15 +264,13 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     Raises
     ------
     ValueError
-        Where none of them is there.
+        Where none of them answers a question.
     """
-    answers = contrasts[contrasts["question"] > 0].sort_values("question", kind="stable")
+    answers = _answers(contrasts)
     rows = [
         (key, [own for _, own in part.groupby("dataset", sort=False)])
         for key, part in answers.groupby(["question", "contrast", "fusion"], sort=False)
     ]
-    if not rows:
-        raise ValueError("no contrast answers a question")
     n_columns = max(len(panels) for _, panels in rows)
     heights = [_PANEL_IN + _ROW_IN * max(map(len, panels)) for _, panels in rows]
     figure = new_figure(max(4.2 * n_columns, 5.4), sum(heights) + 0.5)
@@ -239,22 +285,39 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
         for spare in of_row[len(panels) :]:
             spare.remove()
     for axes in cells[-1][: len(rows[-1][1])]:
-        axes.set_xlabel("Difference of MAE (degrees), below 0 is better")
-    found = {_verdict(row) for _, row in answers.iterrows()}
+        axes.set_xlabel(_DIFFERENCE)
+    _verdict_key(figure, answers)
+    return figure
+
+
+def _answers(contrasts: pd.DataFrame) -> pd.DataFrame:
+    answers = contrasts[contrasts["question"] > 0].sort_values(
+        ["question", "fusion"], kind="stable"
+    )
+    if answers.empty:
+        raise ValueError("no contrast answers a question")
+    return answers
+
+
+def _verdict_key(figure: Figure, contrasts: pd.DataFrame) -> None:
+    found = {_verdict(row) for _, row in contrasts.iterrows()}
     handles = [
         Line2D([], [], color=colour, marker=marker, linestyle="none", label=verdict)
         for verdict, (colour, marker) in _VERDICTS.items()
         if verdict in found
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    return figure
+
+
+def _draw_difference(axes: Axes, row: pd.Series, place: int) -> None:
+    colour, marker = _VERDICTS[_verdict(row)]
+    axes.plot([row["low"], row["high"]], [place, place], color=colour, linewidth=1.4)
+    axes.plot(row["difference_deg"], place, color=colour, marker=marker, markersize=5)
 
 
 def _forest(axes: Axes, contrasts: pd.DataFrame) -> None:
     for place, (_, row) in enumerate(contrasts.iterrows()):
-        colour, marker = _VERDICTS[_verdict(row)]
-        axes.plot([row["low"], row["high"]], [place, place], color=colour, linewidth=1.4)
-        axes.plot(row["difference_deg"], place, color=colour, marker=marker, markersize=5)
+        _draw_difference(axes, row, place)
     axes.axvline(0.0, color=INK, linewidth=0.8)
     labels = [category_label(str(category)) for category in contrasts["category"]]
     axes.set_yticks(range(len(labels)), labels)
