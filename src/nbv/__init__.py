@@ -26,8 +26,9 @@ __version__ = "0.1.0"
 # Names and not imports: `import nbv` stays quick, and no job depends on all of these modules.
 _MODULES = {
     "Recommender": "nbv.bundles.recommender",
-    "Recommendation": "nbv.bundles.recommender",
-    "Move": "nbv.bundles.recommender",
+    "Recommendation": "nbv.bundles.next_view",
+    "Move": "nbv.bundles.next_view",
+    "DistributionTable": "nbv.bundles.distribution_tables",
     "moved_camera": "nbv.bundles.moves",
     "BundleError": "nbv.bundles.bundle",
     "FrameError": "nbv.frames.errors",

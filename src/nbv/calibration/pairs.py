@@ -45,7 +45,7 @@ def read_pairs(
         than `WIDEST_GAP_DEG`.
     """
     path = Path(path)
-    table = _read_table(path)
+    table = read_pair_rows(path)
     for name, wanted in (("category", category), ("elevation_deg", elevation_deg)):
         if wanted is not None and name in table:
             table = table[table[name] == wanted]
@@ -80,7 +80,8 @@ def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
     return table
 
 
-def _read_table(path: Path) -> pd.DataFrame:
+def read_pair_rows(path: Path) -> pd.DataFrame:
+    """Read the rows of a file of pairs; errors as of `read_pairs`."""
     table = read_rows(path, COLUMNS)
     for name in COLUMNS[1:]:
         table[name] = pd.to_numeric(table[name], errors="coerce")
@@ -108,7 +109,7 @@ def objects_of_pairs(
         Of `read_pairs`; where a column is missing that tells categories or elevations apart; where
         an object is missing at an elevation.
     """
-    columns = _read_table(Path(path)).columns
+    columns = read_pair_rows(Path(path)).columns
     several = {
         "category": ("categories", len(elevations_deg)),
         "elevation_deg": ("elevations", max(map(len, elevations_deg.values()))),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -17,35 +17,36 @@ from cyclopts import App, CycloptsError, Parameter
 
 from nbv import __version__
 from nbv.cli.answers import (
+    offset_of,
     recommendation_as_json,
     say,
     say_assumed_camera,
     say_evaluation,
     say_json,
     say_names,
+    say_offset,
     say_recommendation,
+    target_poses,
 )
 from nbv.cli.arguments import (
+    SHIPPED,
     Numbers,
     Rotations,
     WholeNumbers,
+    allowed_rotations,
     joined_numbers,
     need_writable,
 )
+from nbv.cli.own_estimator import calibrate_table, recommend_by_distributions, recommend_by_table
 from nbv.errors import UserError
 from nbv.labels import counted
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from nbv.bundles.recommender import Recommender
     from nbv.bundles.turns import Turn
+    from nbv.cli.answers import Place
 
 USER_ERROR = 2
-
-SHIPPED = "mug"
-"""The bundle that is taken where none is named."""
 
 ANY_TRAVEL_DEG = 180.0
 
@@ -111,6 +112,7 @@ def recommend(
     camera_pose: Path | None = None,
     axis: Numbers = None,
     estimate: float | None = None,
+    distribution: Path | None = None,
     table: Path | None = None,
     plot: Path | None = None,
     json: bool = False,
@@ -155,6 +157,9 @@ def recommend(
         The object's upright axis in the base frame: a point, or a point and a direction.
     estimate
         Instead of frames: the azimuth that your own estimator gave, degrees.
+    distribution
+        Instead of frames: a file of the distributions that your own estimator gave, a row for each
+        view. CSV with columns p0, p1, ..., or .npy.
     table
         The lookup table that nbv calibrate made of that estimator.
     plot
@@ -162,38 +167,51 @@ def recommend(
     json
         Print JSON.
     """
-    if table is not None or estimate is not None:
+    if (table, estimate, distribution) != (None, None, None):
         of_frames: dict[str, object] = {
             "FRAME": frames or None,
+            "--bundle": None if bundle == SHIPPED else bundle,
+        }
+        of_frames |= {"--plot": plot, "--mask": mask, "--near": near, "--far": far}
+        of_frames |= {"--intrinsics": intrinsics, "--depth-scale": depth_scale}
+        of_frames |= {"--elevation": elevation, "--gravity": gravity}
+        of_views = {
             "--allowed": allowed,
             "--axis": axis,
-            "--bundle": None if bundle == SHIPPED else bundle,
+            "--camera-pose": camera_pose,
             "--max-travel": None if max_travel == ANY_TRAVEL_DEG else max_travel,
+            "--rotations": rotations,
         }
-        of_frames |= {"--plot": plot}
-        of_frames |= {"--camera-pose": camera_pose, "--mask": mask, "--rotations": rotations}
-        of_frames |= {"--intrinsics": intrinsics, "--depth-scale": depth_scale, "--near": near}
-        of_frames |= {"--far": far, "--elevation": elevation, "--gravity": gravity}
+        if distribution is None:
+            of_frames |= of_views
         if ignored := [name for name, value in of_frames.items() if value is not None]:
-            raise UserError(f"{ignored[0]} does not go with --estimate and --table; leave it out")
-        _recommend_by_table(estimate, table, as_json=json)
+            own = "--estimate" if distribution is None else "--distribution"
+            raise UserError(f"{ignored[0]} does not go with {own} and --table; leave it out")
+        if distribution is None:
+            recommend_by_table(estimate, table, as_json=json)
+            return
+        if estimate is not None:
+            raise UserError("--estimate and --distribution: give one of them")
+        place = _known_place(camera_pose, axis)
+        recommend_by_distributions(
+            distribution, table, rotations, allowed, max_travel, place, as_json=json
+        )
         return
     if not frames:
         hint = "; frames stand before --mask" if mask is not None else ""
-        raise UserError(f"give a depth frame, or --estimate with --table{hint}")
+        raise UserError(f"give a depth frame, or --estimate or --distribution with --table{hint}")
     if plot is not None:
         need_writable("--plot", plot, FIGURES)
     if gravity is not None and elevation is not None:
         raise UserError("--gravity gives the elevation; leave --gravity or --elevation out")
     place = _known_place(camera_pose, axis)
-    from nbv.bundles.moves import elevation_from_gravity, moved_camera, read_rotations
+    from nbv.bundles.moves import elevation_from_gravity
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask
     from nbv.frames.intrinsics import camera_of
 
     if gravity is not None:
         elevation = elevation_from_gravity(gravity)
-    may_take = read_rotations(allowed) if isinstance(allowed, Path) else allowed
     recommender = Recommender.load(bundle)
     cameras = [camera_of(intrinsics, path) for path in frames]
     answer = recommender.recommend(
@@ -207,21 +225,21 @@ def recommend(
         near_m=near,
         far_m=far,
         elevation_deg=elevation,
-        allowed_deg=may_take,
+        allowed_deg=allowed_rotations(allowed),
         max_travel_deg=max_travel,
     )
-    moves = [answer.move, *answer.alternatives]
-    targets = place and [moved_camera(*place, move.rotation_deg) for move in moves]
+    targets = target_poses(answer, place)
     if plot is not None:
         from nbv.reporting.recommendation import draw_recommendation
 
         draw_recommendation(answer, plot, recommender.bundle.category)
+    focal_px = recommender.bundle.focal_px if intrinsics is None else None
     if json:
-        assumed_px = recommender.bundle.focal_px if intrinsics is None else None
-        say_json(recommendation_as_json(answer, assumed_px, targets))
-    else:
-        known, target = intrinsics is not None, targets[0] if targets else None
-        say_recommendation(answer, recommender.bundle, known, target)
+        say_json(recommendation_as_json(answer, focal_px, targets))
+        return
+    if focal_px is not None:
+        say_assumed_camera(focal_px)
+    say_recommendation(answer, recommender.bundle.category, targets)
 
 
 @app.command
@@ -241,8 +259,9 @@ def calibrate(
     """Learn from known azimuths what an estimator's errors are.
 
     From pairs (object_id, azimuth_deg, estimate_deg) of any estimator it makes a lookup table for
-    nbv recommend --estimate. From a manifest of frames (object_id, sequence, file, azimuth_deg) and
-    a bundle it makes the bundle for your camera.
+    nbv recommend --estimate; with columns p0, p1, ..., the probabilities of the azimuths 360 k / B,
+    also what nbv recommend --distribution needs. From a manifest of frames (object_id, sequence,
+    file, azimuth_deg) and a bundle it makes the bundle for your camera.
 
     Parameters
     ----------
@@ -278,7 +297,7 @@ def calibrate(
                 "--bundle mug; pairs make a table, an .npz file"
             )
         need_writable("--output", output, [".npz"])
-        _calibrate_table(source, output, criterion or "pose_ambiguity", as_json=json)
+        calibrate_table(source, output, criterion or "pose_ambiguity", as_json=json)
         return
     if criterion is not None:
         raise UserError("--criterion is for pairs, which need no --bundle; leave one of them out")
@@ -298,7 +317,7 @@ def calibrate(
         estimate_deg = mean_direction_deg(distributions_of(turn.logits, held.temperature))
         about = {"object_id": turn.object_id, "sequence": turn.sequence}
         counts = {"n_frames": len(estimate_deg)}
-        recordings.append(about | counts | _offset(turn.azimuth_deg, estimate_deg))
+        recordings.append(about | counts | offset_of(turn.azimuth_deg, estimate_deg))
     save_bundle(output, calibrated)
     if json:
         say_json(
@@ -315,7 +334,7 @@ def calibrate(
         say_assumed_camera(held.focal_px, n_assumed)
     for one in recordings:
         name = f"{one['object_id']}, sequence {one['sequence']}"
-        _say_offset(name, counted(one["n_frames"], "frame"), one)
+        say_offset(name, counted(one["n_frames"], "frame"), one)
     calibrate_it = "recording calibrates it" if len(turns) == 1 else "recordings calibrate it"
     say(f"{output}: {held.category}, {len(turns)} {calibrate_it}")
 
@@ -529,54 +548,6 @@ def _tensor(value: Any) -> dict[str, Any]:
     return {"name": value.name, "shape": [side.dim_param or side.dim_value for side in sides]}
 
 
-def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool) -> None:
-    import numpy as np
-
-    from nbv.bundles.calibration import DENSITY
-    from nbv.bundles.manifest import is_manifest
-    from nbv.calibration.pairs import read_pairs
-    from nbv.errors import nearest
-    from nbv.recommendation.criteria import CRITERIA
-    from nbv.recommendation.density_selection import chosen_lookup
-    from nbv.recommendation.lookup import save_lookup
-
-    if criterion not in CRITERIA:
-        raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
-    try:
-        estimates = read_pairs(source).estimate_deg
-    except UserError as error:
-        if not is_manifest(source):
-            raise
-        raise UserError(
-            f"{source} is a manifest of frames, which need --bundle, for instance --bundle "
-            f"{SHIPPED}, and an --output that ends in .safetensors"
-        ) from error
-    azimuth_deg = np.broadcast_to(np.arange(estimates.shape[1], dtype=np.float64), estimates.shape)
-    save_lookup(output, chosen_lookup(estimates, criterion, DENSITY))
-    offset, number = _offset(azimuth_deg, estimates), counted(len(estimates), "object")
-    if as_json:
-        about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)}
-        say_json(about | offset)
-        return
-    _say_offset(str(source), number, offset)
-    say(f"{output}: {criterion} from {number}")
-
-
-def _offset(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]) -> dict[str, Any]:
-    from nbv.calibration.offset import constant_offset_deg, offset_warning
-
-    return {
-        "offset_deg": constant_offset_deg(estimate_deg - azimuth_deg),
-        "warning": offset_warning(azimuth_deg, estimate_deg) or None,
-    }
-
-
-def _say_offset(name: str, number: str, offset: Mapping[str, Any]) -> None:
-    say(f"{name}: {number}; offset {offset['offset_deg']:+.1f}°")
-    if offset["warning"]:
-        say(f"careful    {offset['warning']}")
-
-
 def _seen_turns(
     bundle: str,
     manifest: Path,
@@ -598,48 +569,7 @@ def _seen_turns(
     return recommender, turns, cameras.count(None) if intrinsics is None else 0
 
 
-def _recommend_by_table(estimate: float | None, table: Path | None, *, as_json: bool) -> None:
-    if table is None or estimate is None:
-        raise UserError("--estimate and --table belong together")
-    if not math.isfinite(estimate):
-        raise UserError(f"--estimate={estimate:g}: give an azimuth in degrees")
-    from nbv.angles import nearest_bin, travel_deg
-    from nbv.recommendation.lookup import load_lookup
-
-    if not table.exists():
-        raise UserError(f"{table} does not exist; name the file that nbv calibrate wrote")
-    try:
-        lookup = load_lookup(table)
-    except UserError as error:
-        raise UserError(
-            f"--table={table}: no lookup table; give the .npz file that nbv calibrate wrote"
-        ) from error
-    rotation = int(lookup.recommend(estimate))
-    cost = float(
-        lookup.cost[
-            nearest_bin(estimate, len(lookup.cost)), nearest_bin(rotation, len(lookup.cost))
-        ]
-    )
-    about = {
-        "estimate_deg": estimate,
-        "rotation_deg": rotation if rotation <= 180 else rotation - 360,
-        "travel_deg": float(travel_deg(rotation)),
-        "criterion": lookup.criterion,
-        "cost": cost,
-    }
-    if as_json:
-        say_json(about)
-        return
-    say(
-        f"turn the camera by {about['rotation_deg']:+d}°, travel {about['travel_deg']:g}° "
-        f"({lookup.criterion} {cost:.3f})"
-    )
-
-
-def _known_place(
-    camera_pose: Path | None, axis: list[float] | None
-) -> tuple[NDArray[np.float64], list[float], list[float]] | None:
-    """Return the camera's pose, and a point and the direction of the object's axis."""
+def _known_place(camera_pose: Path | None, axis: list[float] | None) -> Place | None:
     if camera_pose is None and axis is None:
         return None
     if camera_pose is None or axis is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,11 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from nbv.bundles.bundle import Bundle
-    from nbv.bundles.recommender import Move, Recommendation
+    from nbv.bundles.next_view import Move, Recommendation
+
+
+Place = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
+"""A camera's pose in the base frame, and a point and the direction of the object's axis."""
 
 
 def say(line: str) -> None:
@@ -31,6 +35,16 @@ def say_assumed_camera(focal_px: float, n_frames: int | None = None) -> None:
     """Say which focal length is assumed, and of how many frames where that is known."""
     of_frames = "" if n_frames is None else f" for {counted(n_frames, 'frame')}"
     say(f"camera     not given{of_frames}: a focal length of {focal_px:g} px is assumed")
+
+
+def target_poses(answer: Recommendation, place: Place | None) -> list[NDArray[np.float64]] | None:
+    """Return the camera's poses (4, 4) after the move and each alternative, where it is known."""
+    from nbv.bundles.moves import moved_camera
+
+    if place is None:
+        return None
+    moves = (answer.move, *answer.alternatives)
+    return [moved_camera(*place, move.rotation_deg) for move in moves]
 
 
 def recommendation_as_json(
@@ -62,7 +76,7 @@ def recommendation_as_json(
         "expected_error_deg": answer.expected_error_deg,
         "move": move(answer.move),
         "alternatives": [move(one) for one in answer.alternatives],
-        "unfamiliarity": answer.unfamiliarity,
+        "unfamiliarity": None if math.isnan(answer.unfamiliarity) else answer.unfamiliarity,
         "bayes_factor": answer.bayes_factor,
         "warnings": list(answer.warnings),
         "assumed_focal_px": assumed_focal_px,
@@ -77,18 +91,13 @@ def recommendation_as_json(
 
 
 def say_recommendation(
-    answer: Recommendation,
-    bundle: Bundle,
-    is_camera_known: bool,
-    target: NDArray[np.float64] | None,
+    answer: Recommendation, thing: str, targets: Sequence[NDArray[np.float64]] | None
 ) -> None:
-    """Print a recommendation in a few lines."""
-    if not is_camera_known:
-        say_assumed_camera(bundle.focal_px)
+    """Print a recommendation for a thing, such as a mug, in a few lines."""
     say(
-        f"pose       azimuth {answer.azimuth_deg:.1f}° about the {bundle.category}; "
+        f"pose       azimuth {answer.azimuth_deg:.1f}° about the {thing}; "
         f"expected error {answer.expected_error_deg:.1f}°, spread {answer.spread_deg:.1f}° "
-        f"({counted(len(answer.crops), 'view')})"
+        f"({counted(answer.n_views, 'view')})"
     )
     move = answer.move
     say(
@@ -102,10 +111,29 @@ def say_recommendation(
         say(f"or         {', '.join(others)}")
     for warning in answer.warnings:
         say(f"careful    {warning}")
-    if target is not None:
+    if targets is not None:
         say("target camera pose in the base frame")
-        for row in target:
+        for row in targets[0]:
             say("  " + " ".join(f"{value:9.5f}" for value in row))
+
+
+def offset_of(
+    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Return the offset that estimates have in common, and what is to be said of it."""
+    from nbv.calibration.offset import constant_offset_deg, offset_warning
+
+    return {
+        "offset_deg": constant_offset_deg(estimate_deg - azimuth_deg),
+        "warning": offset_warning(azimuth_deg, estimate_deg) or None,
+    }
+
+
+def say_offset(name: str, number: str, offset: Mapping[str, Any]) -> None:
+    """Print `offset_of` of some recording or file."""
+    say(f"{name}: {number}; offset {offset['offset_deg']:+.1f}°")
+    if offset["warning"]:
+        say(f"careful    {offset['warning']}")
 
 
 def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:

@@ -38,6 +38,9 @@ Rotations = Annotated[
     list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FILE")
 ]
 
+SHIPPED = "mug"
+"""The bundle that is taken where none is named."""
+
 OF_NUMBERS = ("--rotations", "--allowed", "--axis", "--gravity", "--views", "--intrinsics")
 
 
@@ -61,6 +64,13 @@ def _is_numbers(text: str) -> bool:
         return bool([float(part) for part in parts])
     except ValueError:
         return False
+
+
+def allowed_rotations(given: list[float] | Path | None) -> Any:
+    """Return the rotations of ``--allowed``, read where it names a file."""
+    from nbv.bundles.moves import read_rotations
+
+    return read_rotations(given) if isinstance(given, Path) else given
 
 
 def need_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:

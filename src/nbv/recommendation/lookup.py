@@ -156,9 +156,15 @@ def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") ->
     )
 
 
-def save_lookup(path: str | Path, table: LookupTable) -> None:
-    """Write a table as `.npz`, one array for each of its attributes; see `load_lookup`."""
-    write_arrays(path, {item.name: np.asarray(getattr(table, item.name)) for item in fields(table)})
+def save_lookup(
+    path: str | Path, table: LookupTable, further: Mapping[str, NDArray[Any]] | None = None
+) -> None:
+    """Write a table as `.npz`, one array for each of its attributes; see `load_lookup`.
+
+    ``further`` arrays are kept in the same file.
+    """
+    arrays = {item.name: np.asarray(getattr(table, item.name)) for item in fields(table)}
+    write_arrays(path, arrays | dict(further or {}))
 
 
 def load_lookup(path: str | Path) -> LookupTable:

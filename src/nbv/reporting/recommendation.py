@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 
-from nbv.bundles.recommender import Recommendation
+from nbv.bundles.next_view import Recommendation
 from nbv.errors import UserError
 from nbv.rendering.depth_codes import decode_depth
 from nbv.reporting.style import INK, MUTED, RC, method_style, new_figure, save_figure

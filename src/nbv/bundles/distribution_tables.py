@@ -1,0 +1,175 @@
+"""What the distributions of any estimator, on calibration objects, say of its next ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.bundles.beliefs import distributions_of
+from nbv.bundles.calibration import bin_apart
+from nbv.bundles.next_view import (
+    AfterRotations,
+    Recommendation,
+    after_rotations,
+    as_rotation_list,
+    next_view,
+)
+from nbv.calibration.distributions import as_distributions
+from nbv.calibration.posteriors import LEAST_PROBABILITY, fit_temperature
+from nbv.errors import UserError
+from nbv.files import need_distributions, read_arrays, readable
+
+AFFINITY: Mapping[str, float] = {"power": 16.0, "pseudo_observations": 90.0}
+"""What `config/` sets for the expected error given a distribution."""
+
+_PREFIX = "distribution."
+_NAMES = tuple(_PREFIX + name for name in ("object_ids", "temperature", "of_views"))
+
+
+@dataclass(frozen=True)
+class DistributionTable:
+    """The distributions that an estimator gave of calibration objects.
+
+    `recommend` does for distributions of any estimator what `nbv.Recommender` does for frames.
+
+    Attributes
+    ----------
+    object_ids : tuple of str
+        Of each of S calibration turns: which object it shows.
+    temperature : float
+        p^(1/T) is calibrated; above 1 the estimator was too sure of itself.
+    distributions : ndarray (S, B, B) float32
+        Calibrated p(azimuth | image) of views a bin apart.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> apart = np.radians(np.subtract.outer(np.arange(36) * 10.0, np.arange(36) * 10.0))
+    >>> turn = np.exp(4 * np.cos(apart))
+    >>> turn[:9] = turn[4]  # from these views every answer is the same
+    >>> turn /= turn.sum(axis=1, keepdims=True)
+    >>> table = nbv.DistributionTable.of_pairs({"mug-17": (np.arange(36) * 10.0, turn)})
+    >>> answer = table.recommend(turn[4])
+    >>> answer.move.expected_error_deg < answer.expected_error_deg
+    True
+    """
+
+    object_ids: tuple[str, ...]
+    temperature: float
+    distributions: NDArray[np.float32]
+
+    @classmethod
+    def of_pairs(cls, turns: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> DistributionTable:
+        """Return the table of calibration objects.
+
+        Parameters
+        ----------
+        turns : mapping of str to (azimuth_deg, probabilities)
+            For each object the true azimuths (n,) of its views, and what the estimator gave of
+            them: (n, B), where class k is the azimuth 360 k / B. Views are 15° apart or closer.
+
+        Raises
+        ------
+        UserError
+            Where views are farther apart, probabilities are no distributions, or objects have
+            different numbers of classes.
+        """
+        known = {
+            name: (np.asarray(azimuth, dtype=np.float64), as_distributions(rows, f"object {name}"))
+            for name, (azimuth, rows) in turns.items()
+        }
+        widths = {rows.shape[1] for _, rows in known.values()}
+        if len(widths) != 1:
+            raise UserError(f"objects have {sorted(widths)} classes; give all the same number")
+        temperature = fit_temperature(
+            _logs(np.concatenate([rows for _, rows in known.values()])),
+            np.concatenate([azimuth for azimuth, _ in known.values()]),
+        )
+        turned = [
+            bin_apart(azimuth, distributions_of(_logs(rows), temperature))
+            for azimuth, rows in known.values()
+        ]
+        return cls(tuple(known), temperature, np.stack(turned))
+
+    @cached_property
+    def _calibrated(self) -> AfterRotations:
+        return after_rotations(self.distributions)
+
+    def recommend(
+        self,
+        probabilities: ArrayLike,
+        rotations_deg: float | Sequence[float] = (0.0,),
+        *,
+        allowed_deg: ArrayLike | None = None,
+        max_travel_deg: float = 180.0,
+    ) -> Recommendation:
+        """Return the pose that views show, and the next view.
+
+        Parameters
+        ----------
+        probabilities : (B,), or (n, B)
+            What the estimator gave of each view of the object.
+        rotations_deg, allowed_deg, max_travel_deg
+            See `nbv.Recommender.recommend`.
+
+        Returns
+        -------
+        Recommendation
+            No frame was seen: `unfamiliarity` is NaN, and there are no crops.
+
+        Raises
+        ------
+        UserError
+            Where probabilities are no distributions of this estimator, or the arguments do not fit
+            each other.
+        """
+        rows = as_distributions(np.atleast_2d(np.asarray(probabilities)), "the view")
+        if rows.shape[1] != (n_bins := self.distributions.shape[-1]):
+            raise UserError(
+                f"{rows.shape[1]} probabilities; calibration objects have {n_bins}: give those of "
+                "the same estimator"
+            )
+        return next_view(
+            distributions_of(_logs(rows), self.temperature),
+            as_rotation_list(rotations_deg, len(rows), "view"),
+            self._calibrated,
+            AFFINITY,
+            allowed_deg=allowed_deg,
+            max_travel_deg=max_travel_deg,
+        )
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return what a file keeps of the table, by name; see `load`."""
+        kept = np.asarray(self.object_ids), np.asarray(self.temperature), self.distributions
+        return dict(zip(_NAMES, kept, strict=True))
+
+    @classmethod
+    def load(cls, path: str | Path) -> DistributionTable:
+        """Read the table that ``nbv calibrate`` made of pairs with distributions.
+
+        Raises
+        ------
+        UserError
+            Where the file cannot be read, or has no such table.
+        """
+        stored = read_arrays(path)
+        if any(name not in stored for name in _NAMES):
+            raise UserError(
+                f"{path} holds no distributions: make it with nbv calibrate, of pairs that have "
+                "columns p0, p1, …"
+            )
+        with readable(path):
+            object_ids, temperature, rows = (stored[name] for name in _NAMES)
+            n_bins = rows.shape[-1]
+            need_distributions(path, rows, (len(object_ids), n_bins, n_bins))
+            return cls(tuple(map(str, object_ids)), float(temperature), rows)
+
+
+def _logs(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.log(np.maximum(rows, LEAST_PROBABILITY)))

@@ -1,0 +1,307 @@
+"""From the distributions of one object's views to its pose and the next view."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.angles import (
+    circular_distance_deg,
+    nearest_bin,
+    signed_difference_deg,
+    travel_deg,
+    wrap_deg,
+)
+from nbv.bundles.beliefs import fused, log_bayes_factor, spread_deg, turned
+from nbv.bundles.moves import as_rotations
+from nbv.errors import UserError
+from nbv.frames.errors import FrameError
+from nbv.labels import counted
+from nbv.recommendation.belief import mean_direction_deg
+from nbv.recommendation.look_alikes import LookAlikes
+
+MIN_SEPARATION_DEG = 15.0
+"""From every view so far: an estimator errs alike from nearly the same place."""
+
+N_ALTERNATIVES = 5
+
+LEAST_BAYES_FACTOR = 0.05
+"""Below it views contradict each other. Of right ones, one in 20 at the most is below."""
+
+N_KEPT = 6
+"""Sequences of rotations whose look-alikes are kept: 20 MB each, of a bundle as large as `mug`."""
+
+AfterRotations = Callable[[tuple[int, ...]], LookAlikes]
+"""Calibration turns after rotations from the first view, in bins."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """A rotation of the camera about the object, and what is expected of it.
+
+    Attributes
+    ----------
+    rotation_deg : float
+        From where the camera is now, counter-clockwise seen from above, in (-180, 180].
+    travel_deg : float
+        How far that is, in [0, 180].
+    expected_error_deg : float
+        Of the pose, once the view from there is added.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> nbv.Move(rotation_deg=-90.0, travel_deg=90.0, expected_error_deg=3.0).travel_deg
+    90.0
+    """
+
+    rotation_deg: float
+    travel_deg: float
+    expected_error_deg: float
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """What frames say of an object's pose, and where to look next.
+
+    Attributes
+    ----------
+    azimuth_deg : float
+        Of the camera about the object at the last frame, in [0, 360).
+    spread_deg : float
+        Circular standard deviation of the belief.
+    expected_error_deg : float
+        Of `azimuth_deg`: what objects that looked alike erred in calibration.
+    move : Move
+        The best next view.
+    alternatives : tuple of Move
+        Other views, each the best of its neighbourhood, best first.
+    belief : ndarray (B,)
+        p(azimuth of the camera at the last frame); index b is 360 b / B degrees.
+    error_after_deg : ndarray (B,)
+        Expected error after a further view, by its rotation 360 d / B degrees from the last frame;
+        inf where the camera may not go. Of allowed rotations, the nearest of these are finite.
+    unfamiliarity : float
+        How far the least familiar frame is from everything calibrated; above 1 farther than 95 %
+        of calibration images. NaN where no frame was seen.
+    bayes_factor : float
+        How many times as probable the frames are of one pose, at their rotations, as of poses that
+        have nothing in common; 1 for one frame.
+    warnings : tuple of str
+        What may be wrong with the frames, a sentence each.
+    n_views : int
+        How many views the belief is fused of.
+    crops : tuple of ndarray (side, side) uint8
+        What the network saw of each frame; none where no frame was seen.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> frame = nbv.example_frame(azimuth_deg=250.0)
+    >>> answer = nbv.Recommender.load("mug").recommend(frame.depth_m, intrinsics=frame.intrinsics)
+    >>> abs(answer.azimuth_deg - 250.0) < 20, answer.move.expected_error_deg < 20
+    (True, True)
+    """
+
+    azimuth_deg: float
+    spread_deg: float
+    expected_error_deg: float
+    move: Move
+    alternatives: tuple[Move, ...]
+    belief: NDArray[np.float64]
+    error_after_deg: NDArray[np.float64]
+    unfamiliarity: float
+    bayes_factor: float
+    warnings: tuple[str, ...]
+    n_views: int
+    crops: tuple[NDArray[np.uint8], ...] = ()
+
+    @property
+    def is_unfamiliar(self) -> bool:
+        """Whether a frame is like nothing that was calibrated."""
+        return self.unfamiliarity > 1.0
+
+
+def after_rotations(distributions: NDArray[np.float32]) -> AfterRotations:
+    """Return what gives the calibration turns after some rotations, of distributions (S, B, B).
+
+    The errors after them take longer to find than all else, so `N_KEPT` of them are kept.
+    """
+
+    @lru_cache(maxsize=N_KEPT)
+    def after(bins: tuple[int, ...]) -> LookAlikes:
+        if not bins:
+            return LookAlikes.of_views(distributions)
+        return after(bins[:-1]).after(bins[-1])
+
+    return after
+
+
+def next_view(
+    distributions: NDArray[np.float64],
+    rotations_deg: Sequence[float],
+    calibrated: AfterRotations,
+    affinity: Mapping[str, float],
+    share: NDArray[np.floating] | None = None,
+    *,
+    allowed_deg: ArrayLike | None = None,
+    max_travel_deg: float = 180.0,
+) -> Recommendation:
+    """Return the pose that views show, and the next view.
+
+    Views are fused by product. The next one has the least error that calibration objects, turned
+    alike, made after it (`nbv.recommendation.look_alikes`).
+
+    Parameters
+    ----------
+    distributions : ndarray (n, B)
+        p(azimuth | image) of each view, above 0.
+    rotations_deg : sequence of float
+        From the first view to each one; the first is 0.
+    calibrated : AfterRotations
+        See `after_rotations`.
+    affinity : mapping
+        ``power`` and ``pseudo_observations``.
+    share : ndarray (S,), optional
+        How much each calibration turn counts.
+    allowed_deg, max_travel_deg
+        See `nbv.Recommender.recommend`.
+
+    Raises
+    ------
+    UserError
+        Where no rotation is allowed.
+    """
+    belief = fused(distributions, rotations_deg)
+    n_bins = len(belief)
+    width = 360.0 / n_bins
+    alike = calibrated(tuple(round(turn / width) % n_bins for turn in rotations_deg[1:]))
+    (now,), (after,) = alike.expected_error_deg(belief[None], **affinity, share=share)
+    # From the frame of the first view to that of the last one.
+    last = rotations_deg[-1]
+    error = np.roll(after, -round(last / width))
+    taken = np.asarray(rotations_deg) - last
+    may = _reachable(n_bins, taken, allowed_deg, max_travel_deg)
+    best, *others = _local_best(may, _between(error, may), width)
+    error[~_is_near_bin(may, n_bins)] = np.inf
+    bayes_factor = math.exp(log_bayes_factor(distributions, rotations_deg))
+    return Recommendation(
+        azimuth_deg=float(wrap_deg(mean_direction_deg(belief[None])[0] + last)),
+        spread_deg=spread_deg(belief),
+        expected_error_deg=float(now),
+        move=best,
+        alternatives=tuple(others),
+        belief=turned(belief, -last),
+        error_after_deg=error,
+        unfamiliarity=math.nan,
+        bayes_factor=bayes_factor,
+        warnings=_contradictions(bayes_factor),
+        n_views=len(distributions),
+    )
+
+
+def _contradictions(bayes_factor: float) -> tuple[str, ...]:
+    if bayes_factor >= LEAST_BAYES_FACTOR:
+        return ()
+    return (
+        f"the views contradict each other (Bayes factor {bayes_factor:.1g}): check the "
+        "rotations and their sign (counter-clockwise seen from above), and that all "
+        "are of one object",
+    )
+
+
+def as_rotation_list(
+    rotations_deg: float | Sequence[float], n: int, noun: str = "frame"
+) -> list[float]:
+    """Return the rotations of n views from the first one.
+
+    Raises
+    ------
+    FrameError
+        ``rotations``: where there are not n numbers, or the first is not 0.
+    """
+    try:
+        given = np.atleast_1d(np.asarray(rotations_deg, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise FrameError("rotations", f"{rotations_deg!r} are no numbers of degrees") from None
+    rotations = [float(rotation) for rotation in given.ravel()]
+    if given.shape != (n,):
+        raise FrameError(
+            "rotations",
+            f"{counted(n, noun)} and {counted(len(rotations), 'rotation')}; give one for each "
+            f"{noun}, from the first {noun}'s place: 0, …",
+        )
+    if not all(math.isfinite(rotation) for rotation in rotations):
+        raise FrameError("rotations", "one is no finite number of degrees")
+    if rotations[0] != 0:
+        raise FrameError("rotations", f"the first is {rotations[0]:g}; all count from it: 0")
+    return rotations
+
+
+def _reachable(
+    n_bins: int, taken: NDArray[np.float64], allowed_deg: ArrayLike | None, max_travel_deg: float
+) -> NDArray[np.float64]:
+    """Return the rotations (m,) that the camera may take, in (-180, 180], by size in [0, 360).
+
+    They are all bins, or those of `allowed_deg`, less what travels too far or is too near to a view
+    that was `taken`.
+    """
+    if allowed_deg is None:
+        rotation_deg = np.arange(n_bins) * (360.0 / n_bins)
+    else:
+        given = as_rotations(allowed_deg)
+        rotation_deg = given[np.unique(wrap_deg(given), return_index=True)[1]]
+    # A rotation that is in the range already keeps its bits.
+    is_within = (rotation_deg > -180.0) & (rotation_deg <= 180.0)
+    rotation_deg = np.where(is_within, rotation_deg, -signed_difference_deg(0.0, rotation_deg))
+    apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
+    is_free = (apart >= MIN_SEPARATION_DEG) & (travel_deg(rotation_deg) <= max_travel_deg)
+    may: NDArray[np.float64] = rotation_deg[is_free]
+    if not may.size:
+        raise UserError(
+            "no rotation is allowed: widen --allowed or --max-travel; a view is "
+            f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
+        )
+    return may
+
+
+def _between(error: NDArray[np.float64], rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the errors (m,) at rotations, of those of the bins (B,); linear between bins."""
+    bins = np.arange(len(error)) * (360.0 / len(error))
+    return np.asarray(np.interp(rotation_deg, bins, error, period=360.0))
+
+
+def _is_near_bin(rotation_deg: NDArray[np.float64], n_bins: int) -> NDArray[np.bool_]:
+    """Return whether each bin is the nearest one of a rotation, (B,)."""
+    near = np.zeros(n_bins, dtype=bool)
+    near[nearest_bin(rotation_deg, n_bins)] = True
+    return near
+
+
+def _local_best(
+    rotation_deg: NDArray[np.float64], error: NDArray[np.float64], width: float
+) -> list[Move]:
+    """Return the moves that are better than their neighbours within a bin's width, best first.
+
+    Rotations are sorted by their place in [0, 360).
+    """
+    is_near = circular_distance_deg(np.roll(rotation_deg, -1), rotation_deg) <= width + 1e-9
+    is_better = np.roll(error, -1) < error
+    is_worse = np.roll(error, -1) > error
+    beaten = (is_near & is_better) | np.roll(is_near & is_worse, 1)
+    places = np.flatnonzero(~beaten)
+    travel = np.abs(rotation_deg)
+    order = places[np.lexsort((wrap_deg(rotation_deg[places]), travel[places], error[places]))]
+    found: list[Move] = []
+    for rotation, expected in zip(rotation_deg[order].tolist(), error[order].tolist(), strict=True):
+        apart = (abs(rotation - one.rotation_deg) for one in found)
+        if all(min(angle, 360.0 - angle) >= MIN_SEPARATION_DEG for angle in apart):
+            found.append(Move(rotation, abs(rotation), expected))
+        if len(found) > N_ALTERNATIVES:
+            break
+    return found

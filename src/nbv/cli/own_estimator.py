@@ -1,0 +1,137 @@
+"""Commands for the estimates and distributions of an estimator of the user's own."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nbv.cli.answers import (
+    offset_of,
+    recommendation_as_json,
+    say,
+    say_json,
+    say_offset,
+    say_recommendation,
+    target_poses,
+)
+from nbv.cli.arguments import SHIPPED, allowed_rotations
+from nbv.errors import UserError, nearest
+from nbv.labels import counted
+
+if TYPE_CHECKING:
+    from nbv.cli.answers import Place
+
+
+def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool) -> None:
+    """Make the tables of calibration pairs; see ``nbv calibrate``."""
+    import numpy as np
+
+    from nbv.bundles.calibration import DENSITY
+    from nbv.bundles.distribution_tables import DistributionTable
+    from nbv.bundles.manifest import is_manifest
+    from nbv.calibration.distributions import read_pair_distributions
+    from nbv.calibration.pairs import read_pairs
+    from nbv.recommendation.criteria import CRITERIA
+    from nbv.recommendation.density_selection import chosen_lookup
+    from nbv.recommendation.lookup import save_lookup
+
+    if criterion not in CRITERIA:
+        raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
+    try:
+        estimates = read_pairs(source).estimate_deg
+    except UserError as error:
+        if not is_manifest(source):
+            raise
+        raise UserError(
+            f"{source} is a manifest of frames, which need --bundle, for instance --bundle "
+            f"{SHIPPED}, and an --output that ends in .safetensors"
+        ) from error
+    azimuth_deg = np.broadcast_to(np.arange(estimates.shape[1], dtype=np.float64), estimates.shape)
+    turns = read_pair_distributions(source)
+    given = DistributionTable.of_pairs(turns) if turns else None
+    lookup = chosen_lookup(estimates, criterion, DENSITY)
+    save_lookup(output, lookup, given.arrays() if given else None)
+    offset, number = offset_of(azimuth_deg, estimates), counted(len(estimates), "object")
+    if as_json:
+        about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)}
+        say_json(about | {"temperature": given.temperature if given else None} | offset)
+        return
+    say_offset(str(source), number, offset)
+    say(f"{output}: {criterion} from {number}")
+    if given:
+        classes = given.distributions.shape[-1]
+        say(f"distributions of {classes} classes, temperature {given.temperature:.2f}")
+
+
+def recommend_by_table(estimate: float | None, table: Path | None, *, as_json: bool) -> None:
+    """Say the next view that a lookup table has for an estimate; see ``nbv recommend``."""
+    if table is None or estimate is None:
+        raise UserError("--estimate and --table belong together")
+    if not math.isfinite(estimate):
+        raise UserError(f"--estimate={estimate:g}: give an azimuth in degrees")
+    from nbv.angles import nearest_bin, travel_deg
+    from nbv.recommendation.lookup import load_lookup
+
+    path = _existing(table)
+    try:
+        lookup = load_lookup(path)
+    except UserError as error:
+        raise UserError(
+            f"--table={table}: no lookup table; give the .npz file that nbv calibrate wrote"
+        ) from error
+    rotation = int(lookup.recommend(estimate))
+    cost = float(
+        lookup.cost[
+            nearest_bin(estimate, len(lookup.cost)), nearest_bin(rotation, len(lookup.cost))
+        ]
+    )
+    about = {
+        "estimate_deg": estimate,
+        "rotation_deg": rotation if rotation <= 180 else rotation - 360,
+        "travel_deg": float(travel_deg(rotation)),
+        "criterion": lookup.criterion,
+        "cost": cost,
+    }
+    if as_json:
+        say_json(about)
+        return
+    say(
+        f"turn the camera by {about['rotation_deg']:+d}°, travel {about['travel_deg']:g}° "
+        f"({lookup.criterion} {cost:.3f})"
+    )
+
+
+def recommend_by_distributions(
+    distribution: Path,
+    table: Path | None,
+    rotations: list[float] | None,
+    allowed: list[float] | Path | None,
+    max_travel: float,
+    place: Place | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Say the pose and the next view that distributions show; see ``nbv recommend``."""
+    from nbv.bundles.distribution_tables import DistributionTable
+    from nbv.calibration.distributions import read_distributions
+
+    if table is None:
+        raise UserError("--distribution and --table belong together")
+    answer = DistributionTable.load(_existing(table)).recommend(
+        read_distributions(distribution),
+        rotations if rotations is not None else [0.0],
+        allowed_deg=allowed_rotations(allowed),
+        max_travel_deg=max_travel,
+    )
+    targets = target_poses(answer, place)
+    if as_json:
+        say_json(recommendation_as_json(answer, None, targets))
+        return
+    say_recommendation(answer, "object", targets)
+
+
+def _existing(table: Path) -> Path:
+    if not table.exists():
+        raise UserError(f"{table} does not exist; name the file that nbv calibrate wrote")
+    return table

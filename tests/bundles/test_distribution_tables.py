@@ -1,0 +1,243 @@
+"""Distributions of any estimator: calibration, and the next view."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.bundles.test_command_line import POSE, fails, run, same_move
+
+from made_bundles import BINS, WIDTH, random_codes, soft_turns
+from nbv.angles import circular_distance_deg
+from nbv.bundles.distribution_tables import AFFINITY, DistributionTable
+from nbv.bundles.moves import moved_camera
+from nbv.bundles.recommender import Recommender
+from nbv.calibration.distributions import read_distributions, read_pair_distributions
+from nbv.config import load_config
+from nbv.errors import UserError
+from nbv.frames.errors import FrameError
+from nbv.recommendation.lookup import load_lookup
+
+AZIMUTHS = np.arange(BINS) * WIDTH
+CONFIG = Path(__file__).parents[2] / "config"
+
+
+def softmax(logits):
+    p = np.exp(logits - logits.max(axis=-1, keepdims=True))
+    return p / p.sum(axis=-1, keepdims=True)
+
+
+def turns(seed=0, n=3, sharpness=1.0):
+    logits = soft_turns(np.random.default_rng(seed), n) * sharpness
+    return {f"o{k}": (AZIMUTHS, softmax(own)) for k, own in enumerate(logits)}
+
+
+@pytest.fixture(scope="module")
+def table():
+    return DistributionTable.of_pairs(turns())
+
+
+def test_the_affinity_is_that_of_the_experiments():
+    config = load_config(CONFIG)["affinity"]
+    assert {key: config[key] for key in AFFINITY} == dict(AFFINITY)
+
+
+@pytest.mark.parametrize("rotations", [[0.0], [0.0, 90.0], [0.0, 90.0, -40.0]])
+def test_it_answers_as_a_bundle_does_of_frames(bundle, rotations):
+    """A bundle's own network, as if it were another estimator."""
+    same = replace(bundle, affinity=AFFINITY)
+    recommender = Recommender(same)
+    codes = random_codes(np.random.default_rng(5), len(rotations))
+    wanted = recommender.recommend_crops(codes, rotations, max_travel_deg=150.0)
+    table = DistributionTable(same.object_ids, same.temperature, same.distributions)
+    of_network = softmax(recommender.network(codes).astype(np.float64))
+    found = table.recommend(of_network, rotations, max_travel_deg=150.0)
+    for name in ("azimuth_deg", "spread_deg", "expected_error_deg", "belief", "bayes_factor"):
+        assert getattr(found, name) == pytest.approx(getattr(wanted, name), rel=1e-3, abs=1e-5)
+    assert found.error_after_deg == pytest.approx(wanted.error_after_deg, rel=1e-3)
+    assert found.move.rotation_deg == wanted.move.rotation_deg
+    assert found.n_views == wanted.n_views == len(rotations)
+    assert np.isnan(found.unfamiliarity)
+    assert found.crops == ()
+
+
+def test_the_expected_error_is_that_of_its_definition(table):
+    """Written out: every view of every object counts by its affinity with the one at hand."""
+    p = softmax(soft_turns(np.random.default_rng(9), 1)[0, 5] / table.temperature)
+    power, alpha = AFFINITY["power"], AFFINITY["pseudo_observations"]
+    weights, errors = [], []
+    for rows in table.distributions.astype(np.float64):
+        for view in range(BINS):
+            weights.append(WIDTH * np.sqrt(p * rows[view]).sum() ** power)
+            of_view = []
+            for turn in range(BINS):
+                both = rows[view] * np.roll(rows[(view + turn) % BINS], -turn)
+                mean = np.angle(both @ np.exp(1j * np.radians(AZIMUTHS)), deg=True)
+                of_view.append(circular_distance_deg(mean, AZIMUTHS[view]))
+            errors.append(of_view)
+    weights, errors = np.array(weights), np.array(errors)
+    wanted = (weights @ errors + alpha * errors.mean(axis=0)) / (weights.sum() + alpha)
+    uncalibrated = p**table.temperature
+    found = table.recommend(uncalibrated / uncalibrated.sum()).error_after_deg
+    free = np.isfinite(found)
+    assert free.sum() > BINS / 2
+    assert found[free] == pytest.approx(wanted[free], rel=1e-3)
+
+
+@settings(max_examples=20, deadline=None)
+@given(power=st.floats(0.6, 1.6), seed=st.integers(0, 5))
+def test_how_sure_an_estimator_says_it_is_does_not_matter(power, seed):
+    """The same probabilities to any power: another temperature, the same table and answer."""
+    plain = DistributionTable.of_pairs(turns(seed))
+    sharp = DistributionTable.of_pairs(turns(seed, sharpness=power))
+    assert sharp.temperature == pytest.approx(power * plain.temperature, rel=2e-3)
+    assert sharp.distributions == pytest.approx(plain.distributions, abs=2e-3)
+
+
+def test_views_come_in_any_order_and_anywhere_closer_than_15_degrees():
+    given_turns = turns()
+    order = np.random.default_rng(0).permutation(BINS)
+    shuffled = {name: (a[order], p[order]) for name, (a, p) in given_turns.items()}
+    wanted, found = (DistributionTable.of_pairs(each) for each in (given_turns, shuffled))
+    assert found.temperature == pytest.approx(wanted.temperature)
+    assert found.distributions == pytest.approx(wanted.distributions, abs=1e-5)
+    with pytest.raises(UserError, match="30° apart"):
+        DistributionTable.of_pairs({n: (a[::2], p[::2]) for n, (a, p) in given_turns.items()})
+
+
+def test_what_does_not_fit_is_one_line(table):
+    p = turns()["o0"][1][0]
+    for probabilities, rotations, kind, message in (
+        (p[:12] / p[:12].sum(), [0.0], UserError, "12 probabilities; calibration objects have 24"),
+        (p[:3], [0.0], UserError, "8 classes or more"),
+        (2 * p, [0.0], UserError, "row 1: probabilities have the sum 2"),
+        ([p, -p], [0.0, 90.0], UserError, "row 2: a probability is below 0"),
+        (p, [0.0, 90.0], FrameError, "1 view and 2 rotations"),
+        ([p, p], [0.0], FrameError, "2 views and 1 rotation"),
+        ([["a"] * 24], [0.0], UserError, "no number"),
+    ):
+        with pytest.raises(kind, match=message):
+            table.recommend(probabilities, rotations)
+    other = {"x": (np.arange(36) * 10.0, np.full((36, 36), 1 / 36)), **turns()}
+    with pytest.raises(UserError, match=r"\[24, 36\] classes"):
+        DistributionTable.of_pairs(other)
+
+
+# Files and the command line
+
+
+def written(folder: Path, pairs, columns=BINS) -> Path:
+    rows = [
+        (name, azimuth, (azimuth + 1.0) % 360, *p[:columns])
+        for name, (azimuths, rows) in pairs.items()
+        for azimuth, p in zip(azimuths, rows, strict=True)
+    ]
+    names = ["object_id", "azimuth_deg", "estimate_deg", *(f"p{k}" for k in range(columns))]
+    table = pd.DataFrame(rows, columns=names)
+    table.to_csv(folder / "pairs.csv", index=False)
+    return folder / "pairs.csv"
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, turns())
+    (tmp_path / "pose.json").write_text(json.dumps(POSE))
+    rows = softmax(soft_turns(np.random.default_rng(7), 1)[0, [3, 9]])
+    pd.DataFrame(rows, columns=[f"p{k}" for k in range(BINS)]).to_csv("views.csv", index=False)
+    np.save("views.npy", rows)
+    return tmp_path
+
+
+def test_pairs_with_distributions_come_back_as_they_are(here):
+    found = read_pair_distributions("pairs.csv")
+    for (name, (azimuth, rows)), (own, wanted) in zip(found.items(), turns().items(), strict=True):
+        assert name == own
+        assert azimuth.tolist() == AZIMUTHS.tolist()
+        assert rows == pytest.approx(wanted[1], abs=1e-9)
+    assert np.array_equal(read_distributions("views.csv"), read_distributions("views.npy"))
+
+
+def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
+    out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    wanted = DistributionTable.of_pairs(read_pair_distributions("pairs.csv"))
+    told = f"distributions of {BINS} classes, temperature {wanted.temperature:.2f}"
+    assert out.splitlines()[-1] == told
+    printed = json.loads(run(capsys, "calibrate", "pairs.csv", "--output", "j.npz", "--json"))
+    assert printed["temperature"] == wanted.temperature
+    found = DistributionTable.load("t.npz")
+    assert found.object_ids == wanted.object_ids
+    assert found.temperature == wanted.temperature
+    assert np.array_equal(found.distributions, wanted.distributions)
+    of_estimates = pd.read_csv("pairs.csv").iloc[:, :3]
+    of_estimates.to_csv("plain.csv", index=False)
+    run(capsys, "calibrate", "plain.csv", "--output", "plain.npz")
+    same, plain = load_lookup("t.npz"), load_lookup("plain.npz")
+    assert np.array_equal(same.cost, plain.cost)
+    assert run(capsys, "recommend", "--estimate", "20", "--table", "t.npz") == run(
+        capsys, "recommend", "--estimate", "20", "--table", "plain.npz"
+    )
+    message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "plain.npz")
+    assert "plain.npz holds no distributions" in message
+
+
+@pytest.mark.parametrize("file", ["views.csv", "views.npy"])
+def test_the_command_answers_as_python_does(here, capsys, file):
+    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    options = ("--distribution", file, "--table", "t.npz", "--rotations", "0", "90")
+    limits = ("--max-travel", "120", "--camera-pose", "pose.json", "--axis", "0.5", "0", "0.1")
+    printed = json.loads(run(capsys, "recommend", *options, *limits, "--json"))
+    table = DistributionTable.load("t.npz")
+    answer = table.recommend(read_distributions(file), [0.0, 90.0], max_travel_deg=120.0)
+    assert printed["azimuth_deg"] == answer.azimuth_deg
+    same_move(printed, answer)
+    assert printed["unfamiliarity"] is None
+    assert printed["assumed_focal_px"] is None
+    target = moved_camera(np.array(POSE), [0.5, 0, 0.1], [0, 0, 1], answer.move.rotation_deg)
+    assert printed["target_camera_pose"] == pytest.approx(target)
+    told = run(capsys, "recommend", *options, "--allowed", "45,120")
+    only = table.recommend(read_distributions(file), [0.0, 90.0], allowed_deg=[45, 120])
+    assert f"azimuth {only.azimuth_deg:.1f}° about the object" in told
+    assert "(2 views)" in told
+    assert f"turn by {only.move.rotation_deg:+g}°" in told
+
+
+def test_what_a_user_gets_wrong_is_one_line(here, capsys):
+    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    both = ("--distribution", "views.csv", "--table", "t.npz")
+    for arguments, message in (
+        (("--distribution", "views.csv"), "--distribution and --table belong together"),
+        ((*both, "--estimate", "3"), "give one of them"),
+        ((*both, "--plot", "p.png"), "--plot does not go with --distribution"),
+        ((*both, "--elevation", "3"), "--elevation does not go with --distribution"),
+        (both, "2 views and 1 rotation"),
+        ((*both, "--rotations", "5", "90"), "the first is 5"),
+        (("--distribution", "no.csv", "--table", "t.npz"), "no.csv does not exist"),
+        (("--distribution", "no.npy", "--table", "t.npz"), "no.npy cannot be read"),
+        (("--distribution", "views.csv", "--table", "no.npz"), "no.npz does not exist"),
+        (("--distribution", "pose.json", "--table", "t.npz"), "pose.json"),
+        (("--distribution", "views.csv", "--table", "pairs.csv"), "pairs.csv"),
+    ):
+        assert message in fails(capsys, "recommend", *arguments)
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda t: t.drop(columns="p3"), "no column 'p3' among 23 of probabilities"),
+        (lambda t: t.assign(p3=2.0), "row 2: probabilities have the sum"),
+        (lambda t: t.assign(p3=["x", *t["p3"][1:]]), "row 2: a probability is below 0 or no n"),
+        (lambda t: t.assign(p3=[*t["p3"][:-1], -0.5]), "row 73: a probability is below 0"),
+        (lambda t: t[[*t.columns[:7]]], "8 classes or more"),
+    ],
+)
+def test_damaged_distributions_of_pairs_are_one_line(here, capsys, edit, message):
+    edit(pd.read_csv("pairs.csv")).to_csv("pairs.csv", index=False)
+    assert message in fails(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    assert not Path("t.npz").exists()
