@@ -125,6 +125,29 @@ def open_array(path: str | Path) -> NDArray[Any]:
         return stored
 
 
+def read_numbers(path: Path) -> NDArray[Any]:
+    """Return the numbers of a file that a user wrote: ``.npy``, ``.json``, or text.
+
+    Raises
+    ------
+    UserError
+        Where the file does not exist, or cannot be read.
+    """
+    try:
+        if path.suffix == ".npy":
+            return np.asarray(np.load(path, allow_pickle=False))
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".json":
+            return np.asarray(json.loads(text), dtype=np.float64)
+        return np.array([float(number) for number in text.replace(",", " ").split()])
+    except FileNotFoundError as error:
+        raise UserError(f"{path} does not exist") from error
+    # No list of what a reader may raise on arbitrary bytes is complete.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{path} cannot be read ({reason})") from error
+
+
 def read_arrays(path: str | Path, names: Iterable[str] = ()) -> dict[str, NDArray[Any]]:
     """Read a whole `.npz` written by `write_arrays`.
 

@@ -91,7 +91,7 @@ def test_the_expected_error_is_that_of_its_definition(table):
 
 
 @settings(max_examples=20, deadline=None)
-@given(power=st.floats(0.6, 1.6), seed=st.integers(0, 5))
+@given(power=st.floats(0.3, 6.0), seed=st.integers(0, 5))
 def test_how_sure_an_estimator_says_it_is_does_not_matter(power, seed):
     """The same probabilities to any power: another temperature, the same table and answer."""
     plain = DistributionTable.of_pairs(turns(seed))
@@ -116,17 +116,50 @@ def test_what_does_not_fit_is_one_line(table):
     for probabilities, rotations, kind, message in (
         (p[:12] / p[:12].sum(), [0.0], UserError, "12 probabilities; calibration objects have 24"),
         (p[:3], [0.0], UserError, "8 classes or more"),
-        (2 * p, [0.0], UserError, "row 1: probabilities have the sum 2"),
-        ([p, -p], [0.0, 90.0], UserError, "row 2: a probability is below 0"),
+        (2 * p, [0.0], UserError, "row 1: probabilities have the sum 2 "),
+        ([p, -p], [0.0, 90.0], UserError, "row 2, p0: a probability is below 0"),
         (p, [0.0, 90.0], FrameError, "1 view and 2 rotations"),
         ([p, p], [0.0], FrameError, "2 views and 1 rotation"),
-        ([["a"] * 24], [0.0], UserError, "no number"),
+        ([["a"] * 24], [0.0], UserError, "probabilities are numbers"),
+        (p + 0j, [0.0], UserError, "probabilities are numbers"),
+        ([p, p[:5]], [0.0, 90.0], UserError, "rows of different lengths"),
+        (100 * p, [0.0], UserError, "the sum 100 and not 1"),
+        (np.log(p), [0.0], UserError, "give probabilities, not their logarithms"),
     ):
         with pytest.raises(kind, match=message):
             table.recommend(probabilities, rotations)
+    for azimuths in (AZIMUTHS[:5], ["a"] * BINS, [*AZIMUTHS[1:], np.nan], AZIMUTHS[None]):
+        with pytest.raises(UserError, match="object 'x': azimuths"):
+            DistributionTable.of_pairs({"x": (azimuths, turns()["o0"][1])})
     other = {"x": (np.arange(36) * 10.0, np.full((36, 36), 1 / 36)), **turns()}
     with pytest.raises(UserError, match=r"\[24, 36\] classes"):
         DistributionTable.of_pairs(other)
+
+
+def test_zeros_exclude_no_pose(table):
+    """They count as the smallest other probability, or less."""
+    p = np.zeros(BINS)
+    p[3] = 1.0
+    found = table.recommend([p, np.roll(p, 12)], [0.0, 0.0])
+    assert np.isfinite(found.error_after_deg[np.isfinite(found.error_after_deg)]).all()
+    assert 0 < found.bayes_factor < 1e-3
+    assert found.warnings
+    many = table.recommend(np.tile(p, (300, 1)), [0.0] * 300)
+    assert np.isfinite(many.bayes_factor)
+    assert many.azimuth_deg == pytest.approx(3 * WIDTH, abs=1e-6)
+
+
+@pytest.mark.parametrize("period", [1, 2, 12])
+def test_where_no_direction_is_likelier_the_error_is_90(period):
+    """Uniform, or the same every 360 / period degrees: rounding gives no direction."""
+    classes = np.arange(BINS)
+    peaked = 1e-4 + (classes % (BINS // period or 1) == 0) if period > 1 else np.ones(BINS)
+    rows = np.stack([np.roll(peaked, k) for k in range(BINS)])
+    rows = rows / rows.sum(axis=1, keepdims=True)
+    flat = DistributionTable.of_pairs({"a": (AZIMUTHS, rows)})
+    answer = flat.recommend(rows[0])
+    assert answer.expected_error_deg == pytest.approx(90.0)
+    assert answer.move.expected_error_deg == pytest.approx(90.0)
 
 
 # Files and the command line
@@ -167,10 +200,12 @@ def test_pairs_with_distributions_come_back_as_they_are(here):
 def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     wanted = DistributionTable.of_pairs(read_pair_distributions("pairs.csv"))
-    told = f"distributions of {BINS} classes, temperature {wanted.temperature:.2f}"
-    assert out.splitlines()[-1] == told
+    told = f"distributions: {BINS} classes, temperature {wanted.temperature:.2f}; offset "
+    assert out.splitlines()[-1].startswith(told)
     printed = json.loads(run(capsys, "calibrate", "pairs.csv", "--output", "j.npz", "--json"))
-    assert printed["temperature"] == wanted.temperature
+    assert printed["distributions"]["temperature"] == wanted.temperature
+    assert abs(printed["distributions"]["offset_deg"]) < 10
+    assert printed["distributions"]["warning"] is None
     found = DistributionTable.load("t.npz")
     assert found.object_ids == wanted.object_ids
     assert found.temperature == wanted.temperature
@@ -184,7 +219,39 @@ def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
         capsys, "recommend", "--estimate", "20", "--table", "plain.npz"
     )
     message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "plain.npz")
-    assert "plain.npz holds no distributions" in message
+    assert "--table=plain.npz: no table of distributions" in message
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        (lambda p: p[:, ::-1], "careful    estimates fall where azimuths grow"),
+        (lambda p: np.roll(p, 6, axis=1), "careful    an offset of +"),
+    ],
+)
+def test_distributions_that_count_otherwise_than_azimuths_are_doubted(
+    here, capsys, changed, message
+):
+    """The estimates are right, so they raise no doubt."""
+    written(here, {name: (a, changed(p)) for name, (a, p) in turns().items()})
+    out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    assert out.count("careful") == 1
+    assert message in out.splitlines()[-1]
+
+
+def test_a_damaged_table_is_one_line(here, capsys):
+    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    stored = dict(np.load("t.npz"))
+    for name, value in (
+        ("temperature", np.array(0.0)),
+        ("temperature", np.array(np.nan)),
+        ("of_views", np.zeros((3, BINS, BINS), dtype=np.float32)),
+        ("of_views", stored["distribution.of_views"][:0]),
+        ("object_ids", stored["distribution.object_ids"][:2]),
+    ):
+        np.savez("d.npz", **(stored | {f"distribution.{name}": value}))
+        message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "d.npz")
+        assert "--table=d.npz: no table of distributions" in message
 
 
 @pytest.mark.parametrize("file", ["views.csv", "views.npy"])
@@ -211,6 +278,8 @@ def test_the_command_answers_as_python_does(here, capsys, file):
 def test_what_a_user_gets_wrong_is_one_line(here, capsys):
     run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     both = ("--distribution", "views.csv", "--table", "t.npz")
+    Path("bad.npy").write_bytes(b"PK\3\4 not a zip")
+    Path("empty.npy").touch()
     for arguments, message in (
         (("--distribution", "views.csv"), "--distribution and --table belong together"),
         ((*both, "--estimate", "3"), "give one of them"),
@@ -219,10 +288,16 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
         (both, "2 views and 1 rotation"),
         ((*both, "--rotations", "5", "90"), "the first is 5"),
         (("--distribution", "no.csv", "--table", "t.npz"), "no.csv does not exist"),
-        (("--distribution", "no.npy", "--table", "t.npz"), "no.npy cannot be read"),
+        (("--distribution", "no.npy", "--table", "t.npz"), "no.npy does not exist"),
         (("--distribution", "views.csv", "--table", "no.npz"), "no.npz does not exist"),
         (("--distribution", "pose.json", "--table", "t.npz"), "pose.json"),
-        (("--distribution", "views.csv", "--table", "pairs.csv"), "pairs.csv"),
+        (
+            ("--distribution", "views.csv", "--table", "pairs.csv"),
+            "--table=pairs.csv: no table of distributions; give the .npz file",
+        ),
+        (("--distribution", "bad.npy", "--table", "t.npz"), "bad.npy cannot be read"),
+        (("--distribution", "empty.npy", "--table", "t.npz"), "empty.npy cannot be read"),
+        (("--table", "t.npz"), "or --distribution and --table"),
     ):
         assert message in fails(capsys, "recommend", *arguments)
 
@@ -230,10 +305,17 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
-        (lambda t: t.drop(columns="p3"), "no column 'p3' among 23 of probabilities"),
+        (
+            lambda t: t.drop(columns="p3"),
+            "23 columns of probabilities are not p0 to p22: rename 'p23'",
+        ),
         (lambda t: t.assign(p3=2.0), "row 2: probabilities have the sum"),
-        (lambda t: t.assign(p3=["x", *t["p3"][1:]]), "row 2: a probability is below 0 or no n"),
-        (lambda t: t.assign(p3=[*t["p3"][:-1], -0.5]), "row 73: a probability is below 0"),
+        (lambda t: t.assign(p3=["x", *t["p3"][1:]]), "row 2, p3: a probability is below 0 or no"),
+        (lambda t: t.assign(p3=[*t["p3"][:-1], -0.5]), "row 73, p3: a probability is below 0"),
+        (lambda t: t.rename(columns={"p3": "P3"}), "rename 'P3'"),
+        (lambda t: t.rename(columns={"p3": "p_3"}), "rename 'p_3'"),
+        (lambda t: t.iloc[:, :3].assign(p1=0.5), "rename 'p1'"),
+        (lambda t: pd.concat([t, t[:1]]), "object 'o0' has 2 views at 0°"),
         (lambda t: t[[*t.columns[:7]]], "8 classes or more"),
     ],
 )

@@ -21,9 +21,10 @@ from nbv.bundles.next_view import (
     next_view,
 )
 from nbv.calibration.distributions import as_distributions
-from nbv.calibration.posteriors import LEAST_PROBABILITY, fit_temperature
+from nbv.calibration.posteriors import TEMPERATURES, fit_temperature
 from nbv.errors import UserError
-from nbv.files import need_distributions, read_arrays, readable
+from nbv.files import damaged, need_distributions, read_arrays, readable
+from nbv.labels import counted
 
 AFFINITY: Mapping[str, float] = {"power": 16.0, "pseudo_observations": 90.0}
 """What `config/` sets for the expected error given a distribution."""
@@ -80,19 +81,16 @@ class DistributionTable:
             Where views are farther apart, probabilities are no distributions, or objects have
             different numbers of classes.
         """
-        known = {
-            name: (np.asarray(azimuth, dtype=np.float64), as_distributions(rows, f"object {name}"))
-            for name, (azimuth, rows) in turns.items()
-        }
+        known = {name: _as_turn(name, *turn) for name, turn in turns.items()}
         widths = {rows.shape[1] for _, rows in known.values()}
         if len(widths) != 1:
             raise UserError(f"objects have {sorted(widths)} classes; give all the same number")
         temperature = fit_temperature(
-            _logs(np.concatenate([rows for _, rows in known.values()])),
+            np.log(np.concatenate([rows for _, rows in known.values()])),
             np.concatenate([azimuth for azimuth, _ in known.values()]),
         )
         turned = [
-            bin_apart(azimuth, distributions_of(_logs(rows), temperature))
+            bin_apart(azimuth, distributions_of(np.log(rows), temperature))
             for azimuth, rows in known.values()
         ]
         return cls(tuple(known), temperature, np.stack(turned))
@@ -129,14 +127,14 @@ class DistributionTable:
             Where probabilities are no distributions of this estimator, or the arguments do not fit
             each other.
         """
-        rows = as_distributions(np.atleast_2d(np.asarray(probabilities)), "the view")
+        rows = as_distributions(probabilities, "the views")
         if rows.shape[1] != (n_bins := self.distributions.shape[-1]):
             raise UserError(
                 f"{rows.shape[1]} probabilities; calibration objects have {n_bins}: give those of "
                 "the same estimator"
             )
         return next_view(
-            distributions_of(_logs(rows), self.temperature),
+            distributions_of(np.log(rows), self.temperature),
             as_rotation_list(rotations_deg, len(rows), "view"),
             self._calibrated,
             AFFINITY,
@@ -168,8 +166,23 @@ class DistributionTable:
             object_ids, temperature, rows = (stored[name] for name in _NAMES)
             n_bins = rows.shape[-1]
             need_distributions(path, rows, (len(object_ids), n_bins, n_bins))
+            least, most = TEMPERATURES
+            if not len(rows) or not (rows > 0).all() or not least <= float(temperature) <= most:
+                raise damaged(path, "its distributions or their temperature are out of range")
             return cls(tuple(map(str, object_ids)), float(temperature), rows)
 
 
-def _logs(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.log(np.maximum(rows, LEAST_PROBABILITY)))
+def _as_turn(
+    name: str, azimuth_deg: ArrayLike, probabilities: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    rows = as_distributions(probabilities, f"object {name!r}")
+    try:
+        azimuths = np.asarray(azimuth_deg, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise UserError(f"object {name!r}: azimuths are no numbers") from None
+    if azimuths.shape != (len(rows),) or not np.isfinite(azimuths).all():
+        raise UserError(
+            f"object {name!r}: azimuths of shape {azimuths.shape} for "
+            f"{counted(len(rows), 'view')}; give one number of degrees for each"
+        )
+    return azimuths, rows

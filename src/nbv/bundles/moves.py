@@ -8,15 +8,14 @@ azimuths.
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.errors import UserError
+from nbv.files import read_numbers
 
 Pose = NDArray[np.float64]
 
@@ -171,27 +170,10 @@ def read_rotations(path: str | Path) -> NDArray[np.float64]:
     path = Path(path)
     if path.suffix != ".npy":
         raise UserError(f"{path}: give rotations in degrees, or a .npy file")
-    return as_rotations(_loaded(path), str(path))
+    return as_rotations(read_numbers(path), str(path))
 
 
 def read_pose(path: str | Path) -> Pose:
     """Read a pose from ``.npy``, ``.json``, or text with 16 numbers; errors as of `as_pose`."""
     path = Path(path)
-    return as_pose(_loaded(path), str(path))
-
-
-def _loaded(path: Path) -> NDArray[Any]:
-    """Return the numbers of a file: ``.npy``, ``.json``, or text."""
-    try:
-        if path.suffix == ".npy":
-            return np.asarray(np.load(path, allow_pickle=False))
-        text = path.read_text(encoding="utf-8")
-        if path.suffix == ".json":
-            return np.asarray(json.loads(text), dtype=np.float64)
-        return np.array([float(number) for number in text.replace(",", " ").split()])
-    except FileNotFoundError as error:
-        raise UserError(f"{path} does not exist") from error
-    # No list of what a reader may raise on arbitrary bytes is complete.
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise UserError(f"{path} cannot be read ({reason})") from error
+    return as_pose(read_numbers(path), str(path))

@@ -36,6 +36,9 @@ LEAST_BAYES_FACTOR = 0.05
 N_KEPT = 6
 """Sequences of rotations whose look-alikes are kept: 20 MB each, of a bundle as large as `mug`."""
 
+_LARGEST_LOG = 700.0
+"""Below that of the largest number; very many views agree so well."""
+
 AfterRotations = Callable[[tuple[int, ...]], LookAlikes]
 """Calibration turns after rotations from the first view, in bins."""
 
@@ -189,7 +192,7 @@ def next_view(
     may = _reachable(n_bins, taken, allowed_deg, max_travel_deg)
     best, *others = _local_best(may, _between(error, may), width)
     error[~_is_near_bin(may, n_bins)] = np.inf
-    bayes_factor = math.exp(log_bayes_factor(distributions, rotations_deg))
+    bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
     return Recommendation(
         azimuth_deg=float(wrap_deg(mean_direction_deg(belief[None])[0] + last)),
         spread_deg=spread_deg(belief),

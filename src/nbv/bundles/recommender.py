@@ -148,7 +148,7 @@ class Recommender:
         """Return the pose that frames show, and the next view.
 
         A view from nearly the same place is no second view: what hides the pose there hides it
-        again. So the next view is `MIN_SEPARATION_DEG` or more from every view so far.
+        again. So the next view is 15° or more from every view so far.
 
         Parameters
         ----------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +11,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.calibration.estimates import COLUMNS
 from nbv.calibration.pairs import read_pair_rows, read_rows
+from nbv.calibration.posteriors import LEAST_PROBABILITY
 from nbv.errors import UserError
+from nbv.files import read_numbers
 
 FEWEST_CLASSES = 8
 
-LARGEST_EXCESS = 0.01
+SUM_TOLERANCE = 0.05
 """How far a row's sum may be from 1: rounded probabilities are normalised again."""
 
 
 def as_distributions(values: ArrayLike, name: str, first_row: int = 1) -> NDArray[np.float64]:
-    """Return rows (n, B) of probabilities, each with the sum 1.
+    """Return rows (n, B) of probabilities above 0, each with the sum 1.
+
+    A probability of 0 counts as the smallest other one of its row, or as `LEAST_PROBABILITY` where
+    that is less: no image excludes a pose.
 
     Parameters
     ----------
-    values : array-like (n, B)
+    values : array-like (n, B), or (B,)
     name : str
         What they are of, for messages.
     first_row : int
@@ -33,28 +39,37 @@ def as_distributions(values: ArrayLike, name: str, first_row: int = 1) -> NDArra
     ------
     UserError
         Where they have another shape, a value is no probability, or a sum is farther from 1 than
-        `LARGEST_EXCESS`.
+        `SUM_TOLERANCE`.
     """
     try:
-        rows = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise UserError(f"{name}: a probability is no number") from None
+        given = np.asarray(values)
+    except ValueError:
+        raise UserError(f"{name}: rows of different lengths") from None
+    if given.dtype.kind not in "iuf":
+        raise UserError(f"{name}: probabilities are numbers, not {given.dtype}")
+    rows = np.atleast_2d(given).astype(np.float64)
     if rows.ndim != 2 or not len(rows) or rows.shape[1] < FEWEST_CLASSES:
         raise UserError(
-            f"{name}: probabilities of shape {rows.shape}; give a row for each view, with "
+            f"{name}: probabilities of shape {given.shape}; give a row for each view, with "
             f"{FEWEST_CLASSES} classes or more"
         )
-    if not np.isfinite(rows).all() or (rows < 0).any():
-        place = int((~np.isfinite(rows) | (rows < 0)).any(axis=1).argmax())
-        raise UserError(f"{name}, row {place + first_row}: a probability is below 0 or no number")
+    is_wrong = ~np.isfinite(rows) | (rows < 0)
+    if is_wrong.any():
+        place, column = (int(index[0]) for index in np.nonzero(is_wrong))
+        raise UserError(
+            f"{name}, row {place + first_row}, p{column}: a probability is below 0 or no number; "
+            "give probabilities, not their logarithms"
+        )
     sums = rows.sum(axis=1)
-    if (far := np.abs(sums - 1.0) > LARGEST_EXCESS).any():
+    if (far := np.abs(sums - 1.0) > SUM_TOLERANCE).any():
         place = int(far.argmax())
         raise UserError(
-            f"{name}, row {place + first_row}: probabilities have the sum {sums[place]:g}; give "
-            "softmax outputs, whose sum is 1"
+            f"{name}, row {place + first_row}: probabilities have the sum {sums[place]:.3g} and "
+            "not 1; give softmax outputs, with more decimals where they are rounded"
         )
-    return np.asarray(rows / sums[:, None])
+    smallest = np.where(rows > 0, rows, np.inf).min(axis=1, keepdims=True)
+    rows = np.where(rows > 0, rows, np.minimum(smallest, LEAST_PROBABILITY))
+    return np.asarray(rows / rows.sum(axis=1, keepdims=True))
 
 
 def read_pair_distributions(
@@ -90,7 +105,7 @@ def read_pair_distributions(
 
 
 def read_distributions(path: str | Path) -> NDArray[np.float64]:
-    """Read distributions (n, B) of n views: CSV with columns ``p0, p1, …``, or a `.npy` array.
+    """Read distributions (n, B) of n views: CSV with columns ``p0, p1, …``, or a ``.npy`` array.
 
     Raises
     ------
@@ -99,20 +114,20 @@ def read_distributions(path: str | Path) -> NDArray[np.float64]:
     """
     path = Path(path)
     if path.suffix.lower() == ".npy":
-        try:
-            values = np.load(path, allow_pickle=False)
-        except (OSError, ValueError) as error:
-            raise UserError(f"{path} cannot be read ({' '.join(str(error).split())})") from error
-        return as_distributions(np.atleast_2d(values), str(path))
+        return as_distributions(read_numbers(path), str(path))
     return _rows(path, read_rows(path, ["p0"]))
 
 
 def _classes(path: Path, table: pd.DataFrame) -> list[str]:
     """Return the names of the columns of probabilities, in their order."""
-    found = [name for name in table.columns if name[:1] == "p" and name[1:].isdecimal()]
+    given = [str(name) for name in table.columns]
+    found = [name for name in given if re.fullmatch(r"\s*[pP][ _]?\d+\s*", name)]
     wanted = [f"p{number}" for number in range(len(found))]
-    if missing := [name for name in wanted if name not in found]:
-        raise UserError(f"{path}: no column {missing[0]!r} among {len(found)} of probabilities")
+    if strange := sorted(set(found) - set(wanted)):
+        raise UserError(
+            f"{path}: {len(found)} columns of probabilities are not p0 to p{len(found) - 1}: "
+            f"rename {strange[0]!r}"
+        )
     return wanted
 
 

@@ -134,6 +134,12 @@ def objects_of_pairs(
 
 def _object_turn(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float64]:
     azimuth_deg, estimate_deg = (rows[key].to_numpy(dtype=np.float64) for key in COLUMNS[1:])
+    values, counts = np.unique(wrap_deg(azimuth_deg), return_counts=True)
+    if counts.max() > 1:
+        raise UserError(
+            f"{path}: object {name!r} has {counts.max()} views at "
+            f"{values[counts.argmax()]:g}°; give one, and one elevation and category a file"
+        )
     if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
         raise UserError(
             f"{path}: the views of object {name!r} leave a gap of {gap:.0f}°; calibration needs a "

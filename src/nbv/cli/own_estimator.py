@@ -32,6 +32,7 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
     from nbv.bundles.manifest import is_manifest
     from nbv.calibration.distributions import read_pair_distributions
     from nbv.calibration.pairs import read_pairs
+    from nbv.recommendation.belief import mean_direction_deg
     from nbv.recommendation.criteria import CRITERIA
     from nbv.recommendation.density_selection import chosen_lookup
     from nbv.recommendation.lookup import save_lookup
@@ -53,21 +54,30 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
     lookup = chosen_lookup(estimates, criterion, DENSITY)
     save_lookup(output, lookup, given.arrays() if given else None)
     offset, number = offset_of(azimuth_deg, estimates), counted(len(estimates), "object")
+    about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)} | offset
+    if given is None:
+        if as_json:
+            say_json(about)
+            return
+        say_offset(str(source), number, offset)
+        say(f"{output}: {criterion} from {number}")
+        return
+    azimuths, rows = (np.concatenate(parts) for parts in zip(*turns.values(), strict=True))
+    of_means = offset_of(azimuths, mean_direction_deg(rows))
     if as_json:
-        about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)}
-        say_json(about | {"temperature": given.temperature if given else None} | offset)
+        about["distributions"] = {"temperature": given.temperature} | of_means
+        say_json(about)
         return
     say_offset(str(source), number, offset)
     say(f"{output}: {criterion} from {number}")
-    if given:
-        classes = given.distributions.shape[-1]
-        say(f"distributions of {classes} classes, temperature {given.temperature:.2f}")
+    classes = f"{rows.shape[1]} classes, temperature {given.temperature:.2f}"
+    say_offset("distributions", classes, of_means)
 
 
 def recommend_by_table(estimate: float | None, table: Path | None, *, as_json: bool) -> None:
     """Say the next view that a lookup table has for an estimate; see ``nbv recommend``."""
     if table is None or estimate is None:
-        raise UserError("--estimate and --table belong together")
+        raise UserError("--estimate and --table belong together; or --distribution and --table")
     if not math.isfinite(estimate):
         raise UserError(f"--estimate={estimate:g}: give an azimuth in degrees")
     from nbv.angles import nearest_bin, travel_deg
@@ -118,7 +128,15 @@ def recommend_by_distributions(
 
     if table is None:
         raise UserError("--distribution and --table belong together")
-    answer = DistributionTable.load(_existing(table)).recommend(
+    path = _existing(table)
+    try:
+        known = DistributionTable.load(path)
+    except UserError as error:
+        raise UserError(
+            f"--table={table}: no table of distributions; give the .npz file that nbv calibrate "
+            "made of pairs with columns p0, p1, …"
+        ) from error
+    answer = known.recommend(
         read_distributions(distribution),
         rotations if rotations is not None else [0.0],
         allowed_deg=allowed_rotations(allowed),

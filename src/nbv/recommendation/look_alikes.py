@@ -19,6 +19,9 @@ from nbv.recommendation.evidence import Table
 NEGLIGIBLE = 1e-10
 """Of the largest weight: what is left out is less than what single precision rounds."""
 
+FLAT = 1e-5
+"""Of distributions: below this resultant length the mean direction is rounding, and errs by 90°."""
+
 # Of all views: for more, their errors are read as they lie.
 _FEW = 0.15
 
@@ -59,16 +62,27 @@ def error_after_deg(so_far: Table, views: Table) -> Table:
     real = np.matmul(so_far * np.cos(angles).astype(np.float32), turned)
     imaginary = np.matmul(so_far * np.sin(angles).astype(np.float32), turned)
     error = np.abs(np.degrees(np.arctan2(imaginary, real))).astype(np.float32)
+    if any((_resultant_length(rows) < FLAT).any() for rows in (so_far, views)):
+        error[np.hypot(real, imaginary) < FLAT * np.matmul(so_far, turned)] = 90.0
     further = (np.arange(n_bins)[:, None] + np.arange(n_bins)) % n_bins
     return np.take_along_axis(error, further[None], axis=2)
 
 
 def error_of_deg(so_far: Table) -> Table:
     """Return the error of the mean direction of distributions `in_object_frame`, degrees."""
-    n_bins = so_far.shape[-1]
+    moment = _moment(so_far)
+    error = np.abs(np.degrees(np.arctan2(moment[..., 1], moment[..., 0]))).astype(np.float32)
+    return np.where(_resultant_length(so_far) < FLAT, np.float32(90.0), error)
+
+
+def _moment(distributions: Table) -> Table:
+    n_bins = distributions.shape[-1]
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
-    moment = so_far @ np.stack([np.cos(angles), np.sin(angles)], axis=1).astype(np.float32)
-    return np.abs(np.degrees(np.arctan2(moment[..., 1], moment[..., 0]))).astype(np.float32)
+    return distributions @ np.stack([np.cos(angles), np.sin(angles)], axis=1).astype(np.float32)
+
+
+def _resultant_length(distributions: Table) -> Table:
+    return np.asarray(np.linalg.norm(_moment(distributions), axis=-1))
 
 
 @dataclass(frozen=True)
