@@ -199,12 +199,12 @@ rule statistics:
             for kind in ("csv", "md")
             if bounded_units()
         },
-        trainings_csv=LAYOUT.confirmation("trainings", "csv"),
         **{
             f"{name}_{kind}": LAYOUT.confirmation(name, kind)
             for name in ("answers", "contrasts")
             for kind in ("png", "pdf", "svg")
         },
+        trainings_csv=LAYOUT.confirmation("trainings", "csv"),
     log:
         LAYOUT.log("statistics"),
     benchmark:
