@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from nbv.files import write_csv, write_text
+from nbv.labels import interval_text
 from nbv.reporting.templating import HTML, LATEX, MARKDOWN
 
 _LONGEST_LINE = 60
@@ -17,7 +18,10 @@ _PARAGRAPH = "p{18em}"
 
 @dataclass(frozen=True)
 class Cell:
-    """The text of a cell, set bold or not; `after` follows it, never bold."""
+    """The text of a cell; `after` follows it, never bold.
+
+    Bold means the same in every table: the best of the methods that a row or a column compares.
+    """
 
     text: str
     bold: bool = False
@@ -25,6 +29,14 @@ class Cell:
 
 
 Row = tuple[Cell, ...]
+
+DECIDED = "*: the interval excludes 0."
+"""The note of a table that has differences."""
+
+
+def difference_cell(value: float, low: float, high: float) -> Cell:
+    """Return a difference with its interval, and an asterisk where the interval excludes 0."""
+    return Cell(interval_text(value, low, high), after="*" if low > 0 or high < 0 else "")
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ def test_each_row_is_compared_with_the_first():
     assert table.cells["difference"].tolist() == pytest.approx(list(shifts))
     assert table.cells["value"].tolist() == pytest.approx(list(base.mean() + shifts))
     assert list(table.cells.columns[: space.shape[1]]) == list(space.columns)
-    assert [row[3].bold for row in table.rows] == [shift < 0 for shift in shifts]
+    assert [row[3].after for row in table.rows] == ["*" if shift else "" for shift in shifts]
     assert [cell.text for cell in table.rows[0]][:2] == ["nothing", "the paper's method"]
     assert table.rows[0][3].text == "–"
     # A line says what it changes: no two say the same.

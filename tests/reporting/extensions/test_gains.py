@@ -64,7 +64,7 @@ def test_gains_are_paired_differences_to_opposite_with_the_same_fusion_and_to_pr
     for cell in differences.to_dict("records"):
         of = mean[cell["category"]]
         assert cell["difference"] == pytest.approx(of[cell["method"]] - of[cell["versus"]])
-    assert all(cell.bold for row in table.rows for cell in row[-4:])
+    assert all(cell.after == "*" for row in table.rows for cell in row[-4:])
     assert texts(table)["Mug (run)"][:6] == [
         f"{mean['mug', name]:.2f}"
         for name in (

@@ -50,7 +50,7 @@ def test_cells_are_maes_and_paired_differences_to_the_opposite_view():
         assert cell["difference"] == pytest.approx(gap)
 
 
-def test_bold_only_where_the_interval_says_so():
+def test_the_lowest_is_bold_and_what_is_above_it_for_certain_is_marked():
     clear = {"opposite": 3.0, "proposed": 3.0, "selected": 0.0}
     close = {"opposite": 0.05, "proposed": 0.05, "selected": 0.0}
     table = leaderboard_table(
@@ -58,10 +58,13 @@ def test_bold_only_where_the_interval_says_so():
         METHODS,
         Resampler(0, 500),
     )
-    _, clearly, closely, _ = next(row for row in table.rows if row[0].text == "selected")
-    assert clearly.bold
-    assert not closely.bold
-    assert closely.text.endswith("*")
+    for column in (1, 2):
+        ranked = [row[column] for row in table.rows if "oracle" not in row[0].text]
+        lowest = min(ranked, key=lambda cell: float(cell.text))
+        assert [cell for cell in ranked if cell.bold] == [lowest]
+    marks = {row[0].text: [cell.after for cell in row[1:3]] for row in table.rows}
+    assert marks["selected"] == ["", ""]
+    assert marks["opposite"] == ["*", ""]
     best = table.cells.set_index(["category", "method"])["among_best"]
     assert not best["a", "opposite"]
     assert best["b", "opposite"]

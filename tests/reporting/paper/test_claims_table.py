@@ -34,7 +34,6 @@ def test_every_format_shows_every_claim(claims):
         assert all(text in shown for text in row)
     latex = table_latex(table)
     assert latex.isascii()
-    assert latex.count("\\textbf{") == len(CLAIMS)
     assert not any("nan" in text for text in shown)
 
 

@@ -8,8 +8,7 @@ from typing import Any
 import pandas as pd
 
 from nbv.labels import number
-from nbv.reporting.extensions.blocks import difference_cell
-from nbv.reporting.table import Cell, Table
+from nbv.reporting.table import DECIDED, Cell, Table, difference_cell
 from nbv.statistics.object_means import mae_difference, mae_interval, paired_objects
 from nbv.statistics.paired import Resampler
 
@@ -34,15 +33,14 @@ def ablation_table(
                 Cell(instance["varied"].replace("_", " ")),
                 Cell(_described(instance)),
                 Cell(number(value.value)),
-                difference_cell(less) if row else Cell("–"),
+                difference_cell(less.value, less.low, less.high) if row else Cell("–"),
             )
         )
     header = ("Varied", "Setting", "MAE", "Difference")
     notes = (
         "MAE in degrees. The first row is the paper's method with its density chosen by the "
         "cross-validated decision; each other row changes one thing.",
-        "Differences to the first row are paired by object, with 95 % intervals; bold where a "
-        "change is better and the interval excludes 0.",
+        f"Differences to the first row are paired by object, with 95 % intervals. {DECIDED}",
     )
     title = f"Ablation: {category}"
     return Table("ablation", title, title, pd.DataFrame(cells), header, tuple(printed), notes)

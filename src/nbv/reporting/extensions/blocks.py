@@ -14,9 +14,6 @@ import numpy as np
 import pandas as pd
 
 from nbv.files import existing, read_csv
-from nbv.labels import interval_text
-from nbv.reporting.table import Cell
-from nbv.statistics.metrics import Interval
 from nbv.statistics.object_means import mae_interval, paired_objects
 from nbv.statistics.paired import PairedErrors, Resampler
 
@@ -103,8 +100,3 @@ def block_cell(
         | {"run": run, "category": category, "method": method, "n_objects": sample.n_objects}
         | mae_interval(sample, method, resampler).columns("value", "ci")
     )
-
-
-def difference_cell(found: Interval) -> Cell:
-    """Return a difference as it is printed: bold where it is below 0 with its whole interval."""
-    return Cell(interval_text(found.value, found.low, found.high), bold=found.high < 0.0)

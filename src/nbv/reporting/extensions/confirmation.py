@@ -12,14 +12,14 @@ from matplotlib.lines import Line2D
 
 from nbv.labels import category_label, interval_text, number
 from nbv.reporting.style import AGAINST, FOR, INK, OPEN, RC, label_rows, new_figure
-from nbv.reporting.table import Cell, Part, Table
+from nbv.reporting.table import DECIDED, Cell, Part, Table, difference_cell
 from nbv.statistics.confirmation import ALL
 
 _INTERVALS = (
     "Intervals are 95 % and contain the chance of objects and of trainings (docs/method.md)."
 )
 _DIFFERENCE = "Difference of MAE (degrees), below 0 is better"
-_ROW_IN = 0.18
+_ROW_IN = 0.15
 _PANEL_IN = 0.75
 _BETTER, _UNDECIDED, _WORSE = "better", "undecided", "worse"
 # Colour and marker: told apart in grey and by those who see no colours.
@@ -121,10 +121,7 @@ def bounds_table(bounds: pd.DataFrame) -> Table:
                 Cell(str(row["n_views"])),
                 Cell(number(row["evenly_spaced_deg"], 2)),
                 Cell(number(row["best_of_others_deg"], 2)),
-                Cell(
-                    interval_text(row["difference_deg"], row["low"], row["high"]),
-                    bold=bool(row["low"] > 0 or row["high"] < 0),
-                ),
+                difference_cell(row["difference_deg"], row["low"], row["high"]),
                 Cell(number(row["best_of_own_deg"], 2)),
             )
             for _, row in part.iterrows()
@@ -139,7 +136,7 @@ def bounds_table(bounds: pd.DataFrame) -> Table:
         "other trainings. It knows the object, which no robot does.",
         "Picked by itself: the plan of least error under the training that scores it, which is too "
         "hopeful.",
-        "Bold where the interval excludes 0.",
+        DECIDED,
         _INTERVALS,
     )
     return Table("plan_bounds", title, title, bounds, header, tuple(parts), notes)
@@ -161,10 +158,7 @@ def contrasts_table(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Tabl
             (
                 Cell(_contrast(str(row["contrast"]))),
                 Cell(str(row["fusion"])),
-                Cell(
-                    interval_text(row["difference_deg"], row["low"], row["high"]),
-                    bold=bool(row["low"] > 0 or row["high"] < 0),
-                ),
+                difference_cell(row["difference_deg"], row["low"], row["high"]),
                 Cell(number(row["p_holm"], 3)),
             )
             for _, row in part.iterrows()
@@ -176,8 +170,7 @@ def contrasts_table(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Tabl
     title = "Differences between methods"
     header = ("Contrast", "Fusion", "Difference of MAE", "p")
     notes = (
-        "Difference of MAE in degrees, paired by object and training; bold where the interval "
-        "excludes 0.",
+        f"Difference of MAE in degrees, paired by object and training. {DECIDED}",
         _INTERVALS,
         "p: of the primary contrasts (docs/protocol.md) over all categories as they are; of all "
         "others adjusted by Holm's method within their data set and category.",

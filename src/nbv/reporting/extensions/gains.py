@@ -15,11 +15,10 @@ from nbv.reporting.extensions.blocks import (
     Blocks,
     Methods,
     block_cell,
-    difference_cell,
     method_with,
     shared_methods,
 )
-from nbv.reporting.table import Cell, Table
+from nbv.reporting.table import DECIDED, Cell, Table, difference_cell
 from nbv.statistics.object_means import mae_difference
 from nbv.statistics.paired import Resampler
 
@@ -94,7 +93,7 @@ def extension_gains_table(
             else:
                 found = mae_difference(sample, method, versus, resampler)
                 made |= {"versus": versus, **found.columns("difference")}
-                row.append(difference_cell(found))
+                row.append(difference_cell(found.value, found.low, found.high))
             cells.append(made)
         rows.append(tuple(row))
     header = ("Category", *(title for title, _, _ in shown))
@@ -126,8 +125,7 @@ def _notes(best: Mapping[str, str], header: tuple[str, ...]) -> tuple[str, ...]:
         "By fold": "By fold: in each fold and category the most cautious criterion and fusion "
         "whose error, cross-validated on the fold's few calibration objects, is not surely above "
         "the least.",
-        "Category": "Differences are paired by object, with 95 % intervals; bold where they are "
-        "below 0 and the interval excludes it.",
+        "Category": f"Differences are paired by object, with 95 % intervals. {DECIDED}",
         "Oracle": "Oracle: the best rotation for each image given the truth, with posterior "
         "fusion.",
     }

@@ -29,9 +29,8 @@ from nbv.statistics.paired import Resampler
 def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) -> Table:
     """Return the MAE of every method in every block, with mean ranks and a rank test.
 
-    Bold is the best of a column where the interval of its difference to every other method
-    excludes 0; otherwise all that cannot be told from the best are marked with an asterisk.
-    Oracles are bounds and are not ranked.
+    Bold is the lowest of a column. An asterisk marks what is above it with the whole interval of
+    the difference. Oracles are bounds and are not ranked.
     """
     shown = shared_methods(blocks, methods)
     ranked = [method for method in shown if methods[method]["policy"] != ORACLE]
@@ -46,9 +45,9 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
                 found = mae_difference(sample, method, versus, resampler)
                 made |= {"versus": versus, **found.columns("difference")}
             cells.append(made)
-            alone = best == [method]
-            mark = "*" if method in best and not alone else ""
-            texts[method].append(Cell(f"{number(made['value'])}{mark}", alone))
+            above = method in ranked and method not in best
+            lowest = method == best[0]
+            texts[method].append(Cell(number(made["value"]), lowest, "*" if above else ""))
     errors = np.array([[s.errors_deg[m].mean() for m in ranked] for s in blocks.values()])
     ranks = stats.rankdata(np.round(errors, 6), axis=1)  # 1: the lowest MAE of a block
     mean_rank = dict(zip(ranked, ranks.mean(axis=0), strict=True))
@@ -57,8 +56,8 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
     rows = [(*texts[m], Cell(number(mean_rank.get(m, np.nan)))) for m in order]
     notes = (
         "MAE in degrees over test images of all folds, at the reference elevation.",
-        "Bold: below every other method, the 95 % interval over objects excluding 0. "
-        "*: cannot be told from the lowest of its column. Oracles know the truth: a bound.",
+        "Bold: the lowest of its column. *: the 95 % interval over objects of the difference to it "
+        "excludes 0. Oracles know the truth: they are bounds and are not ranked.",
         *_rank_notes(methods, dict(zip(ranked, errors.T, strict=True)), ranks),
     )
     frame = pd.DataFrame(cells, columns=list(CELL_COLUMNS))

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from nbv.labels import category_label, method_label, number
-from nbv.reporting.extensions.blocks import difference_cell
-from nbv.reporting.table import Cell, Table
+from nbv.reporting.table import DECIDED, Cell, Table, difference_cell
 from nbv.statistics.object_means import mae_difference, mae_interval, paired_objects
 from nbv.statistics.paired import Resampler
 
@@ -38,15 +37,14 @@ def more_views_table(rows_by_category: Mapping[str, pd.DataFrame], resampler: Re
                 if n_views == 3 and method != "random" and "random@4" in sample.errors_deg:
                     less = mae_difference(sample, name, "random@4", resampler)
                     made |= less.columns("to_random_4")
-                    last = difference_cell(less)
+                    last = difference_cell(less.value, less.low, less.high)
                 cells.append(made)
                 row.append(Cell(number(found.value), after=f"[{travel[name]:.0f}°]"))
             printed.append((*row, last))
     header = ("Policy", *(f"{n} view{'s' if n > 1 else ''}" for n in views), "3 views − Random's 4")
     notes = (
         f"MAE in degrees [mean travel from view to view]; {_fusions(rows_by_category)}.",
-        "Last column: paired by object, 95 % interval; bold where three views of this policy are "
-        "better than four at random and the interval excludes 0.",
+        f"Last column: paired by object, 95 % interval. {DECIDED}",
         "Evenly spaced knows the number of views before the first view; its last one is shown.",
     )
     title = "Error and travel against the number of views"

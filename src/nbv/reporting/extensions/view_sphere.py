@@ -5,8 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from nbv.labels import category_label, method_label, number
-from nbv.reporting.extensions.blocks import difference_cell
-from nbv.reporting.table import Cell, Table
+from nbv.reporting.table import DECIDED, Cell, Table, difference_cell
 from nbv.statistics.object_means import mae_difference, mae_interval, paired_objects
 from nbv.statistics.paired import Resampler
 
@@ -29,7 +28,8 @@ def view_sphere_table(rows: pd.DataFrame, category: str, resampler: Resampler) -
         for criterion in criteria:
             circle, sphere = f"{criterion}_circle", f"{criterion}_sphere"
             row.append(Cell(f"{number(found[circle].value)} → {number(found[sphere].value)}"))
-            row.append(difference_cell(mae_difference(sample, sphere, circle, resampler)))
+            less = mae_difference(sample, sphere, circle, resampler)
+            row.append(difference_cell(less.value, less.low, less.high))
         printed.append(tuple(row))
     header = ["First elevation", "Opposite"]
     for criterion in criteria:
@@ -37,8 +37,7 @@ def view_sphere_table(rows: pd.DataFrame, category: str, resampler: Resampler) -
     notes = (
         "MAE in degrees of two views fused by posterior. Circle: the second view is at the first "
         "one's elevation; sphere: rotation and elevation are chosen jointly.",
-        "Differences are paired by object, with 95 % intervals; bold where the sphere is better "
-        "and the interval excludes 0.",
+        f"Differences are paired by object, with 95 % intervals. {DECIDED}",
     )
     title = f"Second views from anywhere on the view sphere: {category_label(category)}"
     frame = pd.DataFrame(cells)

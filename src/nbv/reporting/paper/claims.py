@@ -40,7 +40,7 @@ def _row(claim: Mapping[Hashable, Any]) -> Row:
         Cell(str(claim["section"])),
         Cell(claim["sentence"]),
         Cell(f"{claim['compared']}{note}"),
-        Cell(claim["verdict"], bold=True),
+        Cell(claim["verdict"]),
         Cell(claim["point_verdict"]),
         Cell(claim["summary"] or "–"),
         Cell(claim["published_verdict"]),
