@@ -7,7 +7,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from nbv.bundles.calibration import DENSITY
 from nbv.calibration.density import conditionals
+from nbv.cli import main
 from nbv.recommendation.lookup import load_lookup
 from projects import TINY, Project, copy_of_project
 
@@ -45,6 +47,29 @@ def test_methods_without_calibration_get_the_errors_of_the_run_itself(
     found = errors_of(project, category, method)
     wanted = errors_of(finished, category, method)
     pd.testing.assert_series_equal(found, wanted)
+
+
+def test_the_estimates_of_a_classifier_give_its_own_lookup_table(tmp_path, monkeypatch) -> None:
+    """A file of pairs and ``nbv calibrate``: the table of the workflow, bit for bit."""
+    project = copy_of_project(tmp_path)
+    own = [one for one in TINY if not one.startswith(("density.", "name="))]
+    own += [
+        f"density.{key}={str(DENSITY[key]).replace(' ', '')}"
+        for key in ("bandwidths_deg", "pseudo_observations", "n_parts")
+    ]
+    table = "results/classified/lookup/mug/el00/fold1/pose_ambiguity.npz"
+    project.run(
+        *("--cores", "2", table, "--notemp"),
+        overrides=(*own, "n_objects=25", "estimator=classifier", "name=classified"),
+    )
+    estimates = project.folder / "results/classified/estimates/mug/el00/fold1/calibration.csv"
+    rows = pd.read_csv(estimates, dtype=str)[["object_id", "azimuth_deg", "estimate_deg"]]
+    assert rows["object_id"].nunique() > 5  # as many as the parts of the cross-validation
+    shuffled = rows.groupby("object_id", sort=False).sample(frac=1.0, random_state=0)
+    shuffled[rows.columns[::-1]].to_csv(tmp_path / "pairs.csv", index=False)
+    monkeypatch.chdir(tmp_path)
+    assert main(["calibrate", "pairs.csv", "--output", "foreign.npz"]) == 0
+    assert Path("foreign.npz").read_bytes() == (project.folder / table).read_bytes()
 
 
 def test_all_objects_that_are_not_tested_calibrate(foreign) -> None:
