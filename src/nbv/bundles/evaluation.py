@@ -20,13 +20,12 @@ from nbv.calibration.offset import constant_offset_deg
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
-from nbv.recommendation.fusion import average
 from nbv.recommendation.look_alikes import LookAlikes
 
 SINGLE, RANDOM, FIXED = "single", "random", "best fixed"
 OPPOSITE, SPACED, RECOMMENDED = "opposite", "evenly spaced", "recommended"
 PAPER = "paper's table, averaged"
-"""The second view by the lookup table, both estimates averaged. All others fuse distributions."""
+"""Views by the lookup table, estimates averaged. All others fuse distributions."""
 
 LARGE_ERROR_DEG = 45.0
 
@@ -145,8 +144,13 @@ def choosers(
     }
 
 
-def paper_errors(seen: Seen, tables: PaperTables, elevation_deg: float) -> NDArray[np.float64]:
+def paper_errors(
+    seen: Seen, tables: PaperTables, elevation_deg: float, n_views: int
+) -> NDArray[np.float64]:
     """Return the signed error (n,) of the paper's method from every first frame, degrees.
+
+    The paper takes two views. Of more, the table says of every newest estimate where to go from
+    there, and all estimates are averaged as directions.
 
     Parameters
     ----------
@@ -154,15 +158,21 @@ def paper_errors(seen: Seen, tables: PaperTables, elevation_deg: float) -> NDArr
     tables : PaperTables
     elevation_deg : float
         NaN where it is not known.
+    n_views : int
     """
     estimates = mean_direction_deg(seen.distributions)
+    first = np.arange(len(estimates))
     turns = (seen.azimuth_deg - seen.azimuth_deg[:, None]) % 360.0
-    chosen = tables.recommend(estimates, elevation_deg)
-    apart = circular_distance_deg(turns, chosen[:, None])
-    np.fill_diagonal(apart, np.inf)
-    following = apart.argmin(axis=1)
-    rotation = turns[np.arange(len(turns)), following]
-    pose = average(estimates, estimates[following], rotation)
+    advised = tables.recommend(estimates, elevation_deg)
+    taken = first[:, None]
+    while taken.shape[1] < n_views:
+        newest = taken[:, -1]
+        chosen = turns[first, newest] + advised[newest]
+        apart = circular_distance_deg(turns, chosen[:, None])
+        np.put_along_axis(apart, taken, np.inf, axis=1)
+        taken = np.column_stack([taken, apart.argmin(axis=1)])
+    back = np.radians(estimates[taken] - np.take_along_axis(turns, taken, axis=1))
+    pose = np.degrees(np.arctan2(np.sin(back).sum(axis=1), np.cos(back).sum(axis=1)))
     return np.asarray(signed_difference_deg(pose, seen.azimuth_deg))
 
 
@@ -212,10 +222,9 @@ def evaluate(
         single = follow(seen, lambda beliefs, taken: np.zeros(len(beliefs)), 1)[:, 0]
         offset = constant_offset_deg(single)
         rows.append(_row(seen, SINGLE, 1, single, offset))
-        if 2 in n_views:
-            error = paper_errors(seen, bundle.paper, turn.elevation_deg)
-            rows.append(_row(seen, PAPER, 2, error, offset))
         for number in n_views:
+            error = paper_errors(seen, bundle.paper, turn.elevation_deg, number)
+            rows.append(_row(seen, PAPER, number, error, offset))
             rng = np.random.default_rng(seed)
             for name, choose in choosers(alike, seen, bundle.affinity, number, rng).items():
                 repeats = n_random if name == RANDOM else 1
