@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from nbv.bundles.evaluation import RECOMMENDED, SINGLE
-from nbv.labels import category_label, interval_text, number
-from nbv.reporting.table import Cell, Table
+from nbv.labels import category_label, number
+from nbv.reporting.table import DECIDED, Cell, Table, difference_cell
 from nbv.statistics.metrics import Interval
 from nbv.statistics.object_means import mae_difference, paired_objects
 from nbv.statistics.paired import Resampler
@@ -39,24 +39,23 @@ def ingredient_table(
     """
     cells, rows = [], []
     for category, without in rendered:
-        text = [f"{category_label(category)}, without {without.replace('_', ' ')}"]
-        if without == ALL:
-            text = [f"{category_label(category)}, with all"]
+        named = "with all" if without == ALL else f"without {without.replace('_', ' ')}"
+        row = [Cell(f"{category_label(category)}, {named}")]
         made: dict[str, float | str] = {"category": category, "without": without or "nothing"}
         for choice, n_views, label in _SHOWN:
             found = _found(rendered, category, without, choice, n_views, resampler)
             made |= found.columns(label.replace(" ", "_"))
-            text.append(
-                f"{number(found.value)}°"
+            row.append(
+                Cell(f"{number(found.value)}°")
                 if without == ALL
-                else interval_text(found.value, found.low, found.high)
+                else difference_cell(found.value, found.low, found.high)
             )
         for choice, n_views, label in _SHOWN if real else ():
             errors = _of_objects(real[category, without], choice, n_views)
             made[f"{label.replace(' ', '_')}_real"] = errors.mean()
-            text.append(f"{number(errors.mean())}°")
+            row.append(Cell(f"{number(errors.mean())}°"))
         cells.append(made)
-        rows.append(tuple(Cell(part) for part in text))
+        rows.append(tuple(row))
     return Table(
         "ingredients",
         "What is random in training",
@@ -67,7 +66,7 @@ def ingredient_table(
         (
             "Rendered: MAE on test objects of a view every 15°, with all that is random. Below the "
             "first line it is the difference to it, with a 95 % interval over objects; one "
-            "training each, whose chance the interval does not contain.",
+            f"training each, whose chance the interval does not contain. {DECIDED}",
             *(("Real: MAE on recordings with known azimuths.",) if real else ()),
         ),
     )

@@ -26,7 +26,7 @@ from nbv.recommendation.criteria.spreads import circular_variance, entropy
 from nbv.recommendation.lookup import load_lookup
 from nbv.reporting.cells import CELL_COLUMNS, method_cells, shared_resampler
 from nbv.reporting.settings import ReportSettings, common_elevation_deg, unit_label
-from nbv.reporting.table import Cell, Row, Table
+from nbv.reporting.table import DECIDED, Cell, Row, Table, difference_cell
 from nbv.statistics.object_means import FoldFile
 from nbv.statistics.paired import pair_methods
 
@@ -119,7 +119,7 @@ def density_comparison(runs: Mapping[str, DensityRun], settings: ReportSettings)
         "Opposite",
         "Recommended",
     )
-    notes = (*_NOTES, *_temperature_notes(runs, units))
+    notes = (*_NOTES, DECIDED, *_temperature_notes(runs, units))
     title = "How well densities know the azimuth"
     return Table(_NAME, title, title, frame, header, _rows(frame), notes, n_text_columns=3)
 
@@ -214,15 +214,20 @@ def _rows(cells: pd.DataFrame) -> tuple[Row, ...]:
     for (category, method), part in cells.groupby(["row_label", "method"], sort=False):
         run, _, density = str(method).rpartition(":")
         found = {cell["metric"]: cell for cell in part.to_dict("records")}
-        texts = [_with_interval(found.get(metric), metric, "value", "ci") for metric in METRICS]
-        gain = _with_interval(found[METRICS[0]], METRICS[0], "difference", "difference")
-        texts.insert(1, gain)
-        rows.append(tuple(map(Cell, (str(category), run, DENSITIES[density], *texts))))
+        texts = [str(category), run, DENSITIES[density]]
+        first, *others = (Cell(_with_interval(found.get(metric), metric)) for metric in METRICS)
+        rows.append((*map(Cell, texts), first, _gain(found[METRICS[0]]), *others))
     return tuple(rows)
 
 
-def _with_interval(cell: Mapping[Hashable, Any] | None, metric: str, value: str, ends: str) -> str:
-    if cell is None or not np.isfinite(cell[value]):
+def _gain(cell: Mapping[Hashable, Any]) -> Cell:
+    if not np.isfinite(cell["difference"]):
+        return Cell("–")
+    return difference_cell(cell["difference"], cell["difference_low"], cell["difference_high"])
+
+
+def _with_interval(cell: Mapping[Hashable, Any] | None, metric: str) -> str:
+    if cell is None or not np.isfinite(cell["value"]):
         return "–"
     decimals = 3 if metric == "circular_variance" else 2
-    return interval_text(cell[value], cell[f"{ends}_low"], cell[f"{ends}_high"], decimals)
+    return interval_text(cell["value"], cell["ci_low"], cell["ci_high"], decimals)

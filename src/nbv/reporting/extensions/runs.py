@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 
 from nbv.experiments.results import ESTIMATED_ROLES, Unit
-from nbv.labels import MINUS, category_label, interval_text, method_label, number
+from nbv.labels import MINUS, category_label, method_label, number
 from nbv.layout import unit_folder
 from nbv.reporting.cells import CELL_COLUMNS, method_cells, shared_resampler
 from nbv.reporting.settings import ReportSettings, common_elevation_deg, unit_label
-from nbv.reporting.table import Cell, Row, Table
+from nbv.reporting.table import DECIDED, Cell, Row, Table, difference_cell
 from nbv.statistics.paired import PairedErrors, pair_methods, pool
 
 _NOTE = (
@@ -133,16 +133,16 @@ def _table(
     by_label = frame.groupby("row_label", sort=False)
     rows = tuple(_row(str(label), part, runs) for label, part in by_label)
     header = ("MAE", *runs, *(f"{run} {MINUS} {runs[0]}" for run in runs[1:]))
-    return Table(name, title, title, frame, header, rows, (" ".join(notes),))
+    return Table(name, title, title, frame, header, rows, (" ".join((*notes, DECIDED)),))
 
 
 def _row(label: str, part: pd.DataFrame, runs: list[str]) -> Row:
     """Return a method's errors run by run, then the differences; a dash where there is none."""
     found = {cell["method"]: cell for cell in part.to_dict("records")}
-    values = [f"{number(found[run]['value'])}°" if run in found else "–" for run in runs]
-    differences = ["–"] * (len(runs) - 1)
+    values = [Cell(f"{number(found[run]['value'])}°" if run in found else "–") for run in runs]
+    differences = [Cell("–")] * (len(runs) - 1)
     for index, run in enumerate(runs[1:]):
         if run in found and np.isfinite(found[run]["difference"]):
             ends = found[run]["difference_low"], found[run]["difference_high"]
-            differences[index] = interval_text(found[run]["difference"], *ends)
-    return tuple(map(Cell, (label, *values, *differences)))
+            differences[index] = difference_cell(found[run]["difference"], *ends)
+    return (Cell(label), *values, *differences)

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from nbv.labels import MINUS, interval_text, method_label, number
+from nbv.labels import MINUS, method_label, number
 from nbv.paper.published import PUBLISHED, SIGMA_ROW, Note
 from nbv.reporting.settings import ReportSettings
-from nbv.reporting.table import Cell, Row
+from nbv.reporting.table import DECIDED, Cell, Row, difference_cell
 from nbv.statistics.paired import LOWER_IS_BETTER, UNIT_OF
 
 Body = tuple[list[str], list[Row]]
@@ -37,7 +37,7 @@ def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
         if differs:
             subject = part[part["method"] == settings.subject].iloc[0]
             ends = subject["difference_low"], subject["difference_high"]
-            row.append(Cell(interval_text(subject["difference"], *ends)))
+            row.append(difference_cell(subject["difference"], *ends))
         rows.append(tuple(row))
     titles = [method_label(method) for method in methods]
     return titles + ([_difference_title(settings)] if differs else []), rows
@@ -82,7 +82,7 @@ def comparison_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[
     if _shows_difference(cells, settings):
         yield (
             f"{_difference_title(settings)} is the paired difference with its 95 % interval over "
-            f"objects ({settings.n_resamples} resamples)."
+            f"objects ({settings.n_resamples} resamples). {DECIDED}"
         )
 
 
