@@ -30,7 +30,7 @@ class Cell:
 
 Row = tuple[Cell, ...]
 
-DECIDED = "*: the interval excludes 0."
+DECIDED = "*: the interval excludes 0, before rounding."
 """The note of a table that has differences."""
 
 
