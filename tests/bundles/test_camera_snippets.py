@@ -7,6 +7,7 @@ test finds what changes on our side, and not what changes on theirs.
 from __future__ import annotations
 
 import re
+import runpy
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -36,22 +37,25 @@ def frame() -> Frame:
     return nbv.example_frame(azimuth_deg=70.0, elevation_deg=20.0)
 
 
-def run(
-    snippet: str, monkeypatch, modules: dict[str, object], **given: object
-) -> dict[str, object]:
-    (code,) = (one for one in SNIPPETS if snippet in one)
-    for name, module in modules.items():
-        monkeypatch.setitem(sys.modules, name, module)
-    names = dict(given)
-    exec(compile(code, PAGE.name, "exec"), names)  # noqa: S102
-    return names
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """A function that runs a snippet after `given` names, and returns the names that it leaves."""
+
+    def of(snippet: str, modules, **given):
+        (code,) = (one for one in SNIPPETS if snippet in one)
+        for name, module in modules.items():
+            monkeypatch.setitem(sys.modules, name, module)
+        (tmp_path / "snippet.py").write_text(code, "utf-8")
+        return runpy.run_path(str(tmp_path / "snippet.py"), given)
+
+    return of
 
 
 def whole_millimetres(frame: Frame) -> np.ndarray:
     return np.round(frame.depth_m / MILLIMETRE).astype(np.uint16)
 
 
-def test_realsense(frame, monkeypatch) -> None:
+def test_realsense(frame, run) -> None:
     """Frames in units of the device, intrinsics of the depth stream."""
     depth_mm, camera = whole_millimetres(frame), frame.intrinsics
     realsense = ModuleType("pyrealsense2")
@@ -64,24 +68,24 @@ def test_realsense(frame, monkeypatch) -> None:
         start=lambda: SimpleNamespace(get_device=lambda: device),
         wait_for_frames=lambda: SimpleNamespace(get_depth_frame=lambda: depth),
     )
-    answer = run("pyrealsense2", monkeypatch, {"pyrealsense2": realsense})["answer"]
+    answer = run("pyrealsense2", {"pyrealsense2": realsense})["answer"]
     wanted = nbv.Recommender.load("mug").recommend(depth_mm, intrinsics=camera, far_m=0.9)
     assert answer.azimuth_deg == pytest.approx(wanted.azimuth_deg)
     assert answer.move == wanted.move
 
 
-def test_kinect(frame, monkeypatch) -> None:
+def test_kinect(frame, run) -> None:
     depth_mm = whole_millimetres(frame)
     freenect = ModuleType("freenect")
     freenect.DEPTH_MM = 5
     freenect.sync_get_depth = lambda **given: {5: (depth_mm, 0)}[given["format"]]
-    answer = run("freenect", monkeypatch, {"freenect": freenect})["answer"]
+    answer = run("freenect", {"freenect": freenect})["answer"]
     wanted = nbv.Recommender.load("mug").recommend(depth_mm, intrinsics=frame.intrinsics, far_m=0.9)
     assert answer.azimuth_deg == pytest.approx(wanted.azimuth_deg)
     assert answer.move == wanted.move
 
 
-def test_moveit(frame, monkeypatch) -> None:
+def test_moveit(frame, run) -> None:
     """The camera goes to a place about the object, and faces it; the second plan succeeds."""
     messages = ModuleType("geometry_msgs.msg")
     messages.Point = messages.Quaternion = SimpleNamespace
@@ -112,7 +116,7 @@ def test_moveit(frame, monkeypatch) -> None:
         **{module.__name__: module for module in (messages, planning)},
     }
     names = run(
-        *("moveit", monkeypatch, modules),
+        *("moveit", modules),
         buffer=buffer,
         stamp=None,
         depth_m=frame.depth_m,
