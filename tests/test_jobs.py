@@ -73,6 +73,20 @@ def test_a_mistake_is_one_line_everywhere(snakemake, tmp_path, capsys, error, li
     assert f"train mug/00] {line}" in printed
 
 
+def test_an_error_while_tidying_up_hides_no_full_disk(snakemake, capsys):
+    """As with a PDF that matplotlib cannot finish."""
+
+    def write() -> None:
+        try:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        finally:
+            raise AttributeError("'Stream' object has no attribute 'pos'")
+
+    with pytest.raises(SystemExit), job(snakemake):
+        write()
+    assert "error: out.csv: no space left on the disk" in capsys.readouterr().err
+
+
 def test_a_crash_keeps_its_traceback_in_the_log_alone(snakemake, capsys):
     with pytest.raises(SystemExit), job(snakemake):
         raise ZeroDivisionError("oh")

@@ -67,13 +67,11 @@ def job(snakemake: Any) -> Iterator[None]:
             checksums.write_checksum(file)
     except UserError as error:
         _fail(f"{error}", path)
-    except OSError as error:
-        if error.errno not in _FOR_THE_USER:
-            _fail_unexpectedly(error, path)
-        # An error from an open file names no file; only the job's own outputs are open.
-        where = error.filename or next(iter(snakemake.output), path)
-        _fail(f"{where}: {_FOR_THE_USER[error.errno]}", path)
     except Exception as error:
+        if (first := _first_for_the_user(error)) is not None:
+            # An error from an open file names no file; only the job's own outputs are open.
+            where = first.filename or next(iter(snakemake.output), path)
+            _fail(f"{where}: {_FOR_THE_USER[first.errno]}", path)
         if not _is_lack_of_memory(error):
             _fail_unexpectedly(error, path)
         reason = " ".join(str(error).split())
@@ -152,6 +150,18 @@ def _add_handler(handler: logging.Handler, label: str, before: str = "") -> None
     handler.setFormatter(logging.Formatter(line, "%H:%M:%S"))
     logging.getLogger().addHandler(handler)
     logging.getLogger().setLevel(logging.INFO)
+
+
+def _first_for_the_user(error: BaseException | None) -> OSError | None:
+    """Return the error of the file system that an error is, or that it came of.
+
+    A writer that tidies up on a full disk can fail once more, with an error of its own.
+    """
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _FOR_THE_USER:
+            return error
+        error = error.__cause__ or error.__context__
+    return None
 
 
 def _is_lack_of_memory(error: Exception) -> bool:
