@@ -24,8 +24,9 @@ log = logging.getLogger(__name__)
 ERASE_LINE = "\r\x1b[K"
 """Goes back to the start of a terminal's row and empties it."""
 _FINISHED, _FAILED, _STOPPED = "processor time", "error: ", "stopped"
+NO_SPACE = "no space left on the disk; free some and run the same command again"
 _FOR_THE_USER: dict[int | None, str] = {
-    errno.ENOSPC: "no space left on the disk; free some and run the same command again",
+    errno.ENOSPC: NO_SPACE,
     errno.EDQUOT: "the disk quota is used up; free some and run the same command again",
     errno.EROFS: "cannot be written, the file system is read-only",
     errno.EACCES: "permission denied",

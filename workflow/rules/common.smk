@@ -1,5 +1,7 @@
 # The configuration, and the functions of the rule files.
 
+import errno
+import os
 import re
 import sys
 import time
@@ -29,7 +31,7 @@ from nbv.estimation.warm_start import (
 )
 from nbv.experiments.results import ESTIMATED_ROLES
 from nbv.experiments.run_size import too_small
-from nbv.jobs import killed_jobs
+from nbv.jobs import NO_SPACE, killed_jobs
 from nbv.layout import Layout, fold_folder, unit_folder
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
@@ -397,6 +399,9 @@ def reasons(logs):
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     # A job that had no time to begin its log is known to Snakemake alone.
     told = "".join(Path(log).read_text(encoding="utf-8") for log in logs)
+    if not lines and os.strerror(errno.ENOSPC) in told:
+        # Snakemake's own files are on the disk, too.
+        lines = [f"error: {LAYOUT.root}: {NO_SPACE}"]
     unknown = re.findall(r"(\w+)\.py' died with <Signals.SIGKILL", told)
     killed = killed_jobs(LAYOUT.logs, STARTED) or unknown
     # A full disk ends logs in the middle, too.
