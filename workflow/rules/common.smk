@@ -405,7 +405,9 @@ def reasons(logs):
     unknown = re.findall(r"(\w+)\.py' died with <Signals.SIGKILL", told)
     killed = killed_jobs(LAYOUT.logs, STARTED) or unknown
     # A full disk ends logs in the middle, too.
-    ended_by_itself = "returned non-zero exit status" in told and "died with <Signals" not in told
+    ended_by_itself = (
+        "returned non-zero exit status" in told and "died with <Signals" not in told
+    )
     if not killed or ended_by_itself:
         return lines
     return [
