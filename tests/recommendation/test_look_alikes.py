@@ -39,12 +39,12 @@ def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Genera
     for turn in (3, 10):
         own = own * np.roll(distributions[1, (first + turn) % bins], -turn)
     own /= own.sum()
-    assert alike.seen[bins + first] == pytest.approx(own, rel=1e-4)
+    assert alike.seen[1, first] == pytest.approx(own, rel=1e-4)
     for turn in range(bins):
         other = distributions[1, (first + turn) % bins]
         pose = product(own, other, 15.0 * turn)
         wanted = circular_distance_deg(pose, 15.0 * first)
-        assert alike.errors_deg[bins + first, turn] == pytest.approx(wanted, abs=0.05)
+        assert alike.errors_deg[1, first, turn] == pytest.approx(wanted, abs=0.05)
 
 
 def test_a_turn_that_does_not_count_is_as_if_it_were_not_there(rng: np.random.Generator) -> None:
@@ -58,7 +58,6 @@ def test_a_turn_that_does_not_count_is_as_if_it_were_not_there(rng: np.random.Ge
 
 @pytest.mark.parametrize("sharpness", [1.0, 6.0])
 def test_one_belief_alone_and_among_others_has_the_same_errors(sharpness: float) -> None:
-    """Alone, views that are not alike are left out: of a sharp belief nearly all."""
     rng = np.random.default_rng(1)
     apart = np.arange(24) - np.arange(24)[:, None]
     logits = sharpness * np.cos(np.radians(15 * apart)) + rng.normal(0, 0.3, (5, 24, 24))

@@ -56,8 +56,8 @@ def best_fixed_deg(alike: LookAlikes, share: NDArray[np.float64]) -> float:
 
     It is `MIN_SEPARATION_DEG` or more, as all that are chosen.
     """
-    n_turns, n_bins, _ = alike.views.shape
-    of_turn = alike.errors_deg.reshape(n_turns, n_bins, n_bins).mean(axis=1)
+    n_bins = alike.views.shape[-1]
+    of_turn = alike.errors_deg.mean(axis=1)
     rotation_deg = np.arange(n_bins) * (360.0 / n_bins)
     error = np.where(travel_deg(rotation_deg) < MIN_SEPARATION_DEG, np.inf, share @ of_turn)
     return float(rotation_deg[error.argmin()])

@@ -16,14 +16,8 @@ from numpy.typing import NDArray
 
 from nbv.recommendation.evidence import Table
 
-NEGLIGIBLE = 1e-10
-"""Of the largest weight: what is left out is less than what single precision rounds."""
-
 FLAT = 1e-5
 """Of distributions: below this resultant length the mean direction is rounding, and errs by 90°."""
-
-# Of all views: for more, their errors are read as they lie.
-_FEW = 0.15
 
 
 def in_object_frame(distributions: Table) -> Table:
@@ -113,13 +107,13 @@ class LookAlikes:
 
     @cached_property
     def errors_deg(self) -> Table:
-        """`error_after_deg` of the turns, (S B, B)."""
-        return error_after_deg(self.so_far, self.views).reshape(-1, self.views.shape[-1])
+        """`error_after_deg` of the turns, (S, B, B)."""
+        return error_after_deg(self.so_far, self.views)
 
     @cached_property
     def error_now_deg(self) -> Table:
-        """`error_of_deg` of the turns, (S B)."""
-        return error_of_deg(self.so_far).ravel()
+        """`error_of_deg` of the turns, (S, B)."""
+        return error_of_deg(self.so_far)
 
     def expected_error_deg(
         self,
@@ -142,63 +136,47 @@ class LookAlikes:
         n_turns, n_bins, _ = self.views.shape
         of_turn = np.ones(n_turns) if share is None else np.asarray(share, dtype=np.float64)
         # The affinity of each belief with each view, whose roots are kept.
-        by_turn = self._roots @ np.sqrt(np.asarray(beliefs, dtype=np.float32)).T
-        by_turn **= power
-        by_turn *= (of_turn * (360.0 / n_bins)).astype(np.float32)[:, None, None]
-        weight = by_turn.reshape(n_turns * n_bins, -1).T
-        total = weight.sum(axis=1, dtype=np.float64) + pseudo_observations
+        weight = self._roots @ np.sqrt(np.asarray(beliefs, dtype=np.float32)).T
+        weight **= power
+        weight *= (of_turn * (360.0 / n_bins)).astype(np.float32)[:, None, None]
+        total = weight.sum(axis=(0, 1), dtype=np.float64) + pseudo_observations
         prior = pseudo_observations / (of_turn.sum() * n_bins)
-        now = _product(weight, self.error_now_deg[:, None])[:, 0] + prior * (
+        now = _weighted(weight, self.error_now_deg[:, :, None])[:, 0] + prior * (
             of_turn @ self._error_now_by_turn
         )
         after = _weighted(weight, self.errors_deg) + prior * (of_turn @ self._errors_by_turn)
-        return np.asarray(now / total), np.asarray(after / total[:, None])
+        return now / total, after / total[:, None]
 
     @property
     def seen(self) -> Table:
-        """The distributions in the frame of the first view, (S B, B)."""
+        """The distributions in the frame of the first view, (S, B, B)."""
         n_bins = self.views.shape[-1]
         index = (np.arange(n_bins) - np.arange(n_bins)[:, None]) % n_bins
-        seen = np.take_along_axis(self.so_far, index[None], axis=2)
-        return np.ascontiguousarray(seen.reshape(-1, n_bins))
+        return np.take_along_axis(self.so_far, index[None], axis=2)
 
     @cached_property
     def _roots(self) -> Table:
         """The square roots of `seen`, for `nbv.recommendation.criteria.expected_error.affinity`."""
-        return np.sqrt(self.seen).reshape(self.views.shape)
+        return np.sqrt(self.seen)
 
     @cached_property
     def _error_now_by_turn(self) -> NDArray[np.float64]:
-        n_turns, n_bins, _ = self.views.shape
-        by_turn = self.error_now_deg.reshape(n_turns, n_bins)
-        return np.asarray(by_turn.sum(axis=1, dtype=np.float64))
+        return np.asarray(self.error_now_deg.sum(axis=1, dtype=np.float64))
 
     @cached_property
     def _errors_by_turn(self) -> NDArray[np.float64]:
-        n_turns, n_bins, _ = self.views.shape
-        by_turn = self.errors_deg.reshape(n_turns, n_bins, n_bins)
-        return np.asarray(by_turn.sum(axis=1, dtype=np.float64))
+        return np.asarray(self.errors_deg.sum(axis=1, dtype=np.float64))
 
 
-def _weighted(weight: Table, errors_deg: Table) -> Table:
-    """Return the sums of errors (m, B) by weights (n, m), (n, B).
+def _weighted(weight: Table, errors_deg: Table) -> NDArray[np.float64]:
+    """Return the sums (n, m) of errors (S, B, m) by weights (S, B, n).
 
-    Where few weights of a row are above `NEGLIGIBLE`, the others are left out: reading the errors
-    takes longer than adding them up.
+    Those of a single belief turn by turn: the threads of a matrix library wait for each other where
+    other programs hold the cores, and take no part in small products. All at once took 16 ms then.
     """
-    if len(weight) == 1:
-        heavy = np.flatnonzero(weight[0] > NEGLIGIBLE * weight[0].max())
-        if len(heavy) < _FEW * weight.shape[1]:
-            return _product(weight[:, heavy], errors_deg[heavy])
-    return _product(weight, errors_deg)
-
-
-def _product(rows: Table, table: Table) -> Table:
-    """Return the product of matrices (n, k) and (k, m), of a single row on one thread.
-
-    The threads of a matrix library wait for each other where other programs hold the cores: a
-    single row then took 16 ms instead of 0.3.
-    """
-    if len(rows) == 1:
-        return np.asarray(np.einsum("k,km->m", rows[0], table)[None])
-    return rows @ table
+    n_turns, n_bins, n = weight.shape
+    if n == 1:
+        parts = np.matmul(weight.transpose(0, 2, 1), errors_deg)
+        return np.asarray(parts.sum(axis=0, dtype=np.float64))
+    rows, table = (each.reshape(n_turns * n_bins, -1) for each in (weight, errors_deg))
+    return np.asarray(rows.T @ table, dtype=np.float64)
