@@ -187,7 +187,13 @@ def test_one_core_gives_the_same_bytes_as_two(finished, fresh):
 def test_an_interrupted_run_continues_to_the_same_bytes(finished, fresh):
     command = fresh.command("--cores", "2")
     running = subprocess.Popen(
-        command, cwd=fresh.folder, env=fresh.environment, stderr=subprocess.PIPE, text=True
+        command,
+        cwd=fresh.folder,
+        env=fresh.environment,
+        stderr=subprocess.PIPE,
+        text=True,
+        # What a script starts in the background ignores Ctrl-C, and so would this.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 300
     while not list(fresh.results.glob("estimators/*/*/*/*.safetensors")):
