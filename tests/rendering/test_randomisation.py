@@ -7,12 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rendering_shapes import procedural
+from scipy import ndimage
 
 from nbv.rendering import open_renderer
 from nbv.rendering.camera import Camera, object_views
 from nbv.rendering.crop import crop_measured, sensor_camera
 from nbv.rendering.depth_codes import encode_depth
-from nbv.rendering.randomisation import Randomisation, add_table, lose, randomised_turn
+from nbv.rendering.randomisation import (
+    Randomisation,
+    add_table,
+    lose,
+    move_edge,
+    randomised_turn,
+)
 
 CAMERA = Camera(fov_deg=25.0, image_side=48)
 AZIMUTHS = np.arange(0.0, 360.0, 45.0)
@@ -28,6 +35,7 @@ NOTHING = Randomisation(
     inside=0,
     occluded=0,
     patches=0,
+    edge_px=0,
     shift_px=0,
 )
 
@@ -110,8 +118,26 @@ def test_a_loss_takes_pixels_away_and_changes_no_other(mesh, renderer, loss):
     assert lost > 0
 
 
+def test_an_edge_that_moves_leaves_the_middle_and_takes_depths_from_nearby(mesh, renderer):
+    whole = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+    rng, grown, shrunk = np.random.default_rng(0), 0, 0
+    for image in whole:
+        moved = image.copy()
+        move_edge(moved, 2.0, rng)
+        seen, new = image > 0, moved > 0
+        both = seen & new
+        assert np.array_equal(moved[both], image[both])
+        assert np.isin(moved[new], image[seen]).all()
+        # Outwards by five standard deviations at most, inwards by a pixel.
+        assert (ndimage.distance_transform_edt(~seen)[new & ~seen] < 11).all()
+        assert (ndimage.distance_transform_edt(seen)[seen & ~new] <= 1.5).all()
+        grown, shrunk = grown + (new & ~seen).sum(), shrunk + (seen & ~new).sum()
+    assert grown > 0
+    assert shrunk > 0
+
+
 def test_a_turn_depends_on_its_generator_alone(mesh, renderer):
-    draw = Randomisation(7.5, 5, 0.15, 3, 7, 0.6, 0.3, 0.1, 0.25, 0.15, 1, 1.5)
+    draw = Randomisation(7.5, 5, 0.15, 3, 7, 0.6, 0.3, 0.1, 0.25, 0.15, 1, 2, 1.5)
     one, again, other = (turn_of(mesh, renderer, draw, seed) for seed in (1, 1, 2))
     assert np.array_equal(one, again)
     assert not np.array_equal(one, other)

@@ -282,6 +282,7 @@ class Randomisation(Section):
     inside: Share = 0.0
     occluded: Share = 0.0
     patches: Annotated[Number, Field(ge=0, le=100)] = 0.0
+    edge_px: Annotated[Number, Field(ge=0, le=100)] = 0.0
     shift_px: Annotated[Number, Field(ge=0, le=100)] = 0.0
 
     @model_validator(mode="after")

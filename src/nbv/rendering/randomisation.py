@@ -1,8 +1,9 @@
 """What a real camera does that nobody knows beforehand: drawn anew for each turn and each view.
 
 Once for a turn: elevation, roll, the object's size and distance, and whether the sensor's noise is
-there at all. For each view: strips of the table that a mask takes along, thin parts and dark
-insides without depth, other patches without depth, an occluder, and a crop that is off its middle.
+there at all. For each view: strips of the table that a mask takes along, an edge that is not where
+it seems, thin parts and dark insides without depth, other patches without depth, an occluder, and a
+crop that is off its middle.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ HIGHEST_DEG = 85.0
 _MARGIN = 1.25
 # Of the table's depth from the object's, in diagonals: farther off a mask does not take it along.
 _TABLE_REACH = 0.7
+# Over how many pixels what moves an edge is smoothed.
+_EDGE_SMOOTHNESS = (1.0, 4.0)
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,8 @@ class Randomisation:
         inside, and with an occluder.
     patches : float
         Mean number of patches without depth in a view.
+    edge_px : float
+        Largest standard deviation of the place of an object's edge, in pixels of the crop.
     shift_px : float
         Standard deviation of the crop's middle.
     """
@@ -65,6 +70,7 @@ class Randomisation:
     inside: float
     occluded: float
     patches: float
+    edge_px: float
     shift_px: float
 
 
@@ -116,6 +122,8 @@ def randomised_turn(
     if sensor is not None and rng.random() < draw.measured:
         depth = sensor(depth, drawn, diagonal_m, rng)
     for image in depth:
+        if draw.edge_px > 0:
+            move_edge(image, draw.edge_px, rng)
         lose(image, draw, rng)
     return encode_depth(_cropped(depth, camera.image_side, draw.shift_px, rng), camera)
 
@@ -159,6 +167,25 @@ def add_table(
         patch = depth[view, top:end, left:right]
         is_table = (patch == 0) & (np.abs(table - camera.distance) < _TABLE_REACH)
         patch[is_table] = table[is_table]
+
+
+def move_edge(image: Depths, edge_px: float, rng: np.random.Generator) -> None:
+    """Move an object's edge outwards here and inwards there, as masks and depth cameras do.
+
+    What is added has the depth of the nearest pixel. How far the edge moves is a smooth random
+    field, whose standard deviation is drawn from 0 to `edge_px`; inwards by a pixel at most, or
+    handles would be lost, which is `lose`'s part.
+    """
+    seen = image > 0
+    if not seen.any():
+        return
+    field = ndimage.gaussian_filter(
+        rng.standard_normal(image.shape, dtype=np.float32), rng.uniform(*_EDGE_SMOOTHNESS)
+    )
+    field = np.maximum(field * (rng.uniform(0.0, edge_px) / field.std()), -1.0)
+    outside, nearest = ndimage.distance_transform_edt(~seen, return_indices=True)
+    distance = np.where(seen, 0.5 - ndimage.distance_transform_edt(seen), outside - 0.5)
+    image[:] = np.where(distance < field, image[tuple(nearest)], 0)
 
 
 def lose(image: Depths, draw: Randomisation, rng: np.random.Generator) -> None:
