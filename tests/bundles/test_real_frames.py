@@ -29,7 +29,7 @@ def errors():
 
 
 def test_no_frame_of_a_mug_is_refused_and_the_level_ones_are_right(errors):
-    """Bounds of the project's aims; nothing was trained or chosen on these frames."""
+    """Bounds of the project's aims; nothing was trained on these frames."""
     assert errors["1", SINGLE, 1] <= 12
     assert errors["1", RECOMMENDED, 2] <= 5
 
