@@ -111,7 +111,7 @@ onerror:
         PROGRESS.end()
     banner(
         "nbv: stopped",
-        *reasons(log),
+        *why_stopped(LAYOUT.logs, STARTED, log),
         "what was finished is kept; the same command goes on from there",
         f"logs: {LAYOUT.logs}/",
     )

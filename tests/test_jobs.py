@@ -14,7 +14,7 @@ import pytest
 
 from nbv.checksums import write_checksum
 from nbv.errors import UserError
-from nbv.jobs import is_verbose, job, killed_jobs
+from nbv.jobs import NO_SPACE, is_verbose, job, why_stopped
 
 
 @pytest.fixture
@@ -144,11 +144,10 @@ def test_a_log_that_cannot_be_written_is_named(snakemake, tmp_path, capsys):
     assert "mug.log: cannot be written" in capsys.readouterr().err
 
 
-def test_jobs_that_end_without_a_word_were_killed(snakemake, tmp_path):
-    logs, since = tmp_path / "logs", time.time() - 5
-
-    def ended(name, error=None):
-        snakemake.log[0] = str(logs / f"{name}.log")
+@pytest.fixture
+def ended(snakemake, tmp_path):
+    def run(name, error=None):
+        snakemake.log[0] = str(tmp_path / "results" / "logs" / f"{name}.log")
         try:
             with job(snakemake):
                 if error is not None:
@@ -156,16 +155,55 @@ def test_jobs_that_end_without_a_word_were_killed(snakemake, tmp_path):
         except (SystemExit, KeyboardInterrupt):
             pass
 
+    return run
+
+
+KILLED = "error: killed from outside: "
+
+
+def test_jobs_that_end_without_a_word_were_killed(ended, tmp_path):
+    logs, since = tmp_path / "results" / "logs", time.time() - 5
     ended("whole")
-    ended("failed", UserError("x"))
-    ended("crashed", ZeroDivisionError())
     ended("interrupted", KeyboardInterrupt())
-    assert killed_jobs(logs, since) == []
+    assert why_stopped(logs, since) == []
+    ended("crashed", ZeroDivisionError())
+    ended("failed", UserError("x"))
+    assert why_stopped(logs, since) == ["error: x"]
     (logs / "train").mkdir()
     (logs / "train/mug.log").write_text("[10:00:00 train mug] epoch 3\n")
     (logs / "train/old.log").write_text("[10:00:00 train old] epoch 3\n")
     os.utime(logs / "train/old.log", (since - 100, since - 100))
-    assert killed_jobs(logs, since) == ["train/mug"]
+    failed, killed, advice = why_stopped(logs, since)
+    assert (failed, killed) == ("error: x", f"{KILLED}train/mug")
+    assert "fewer --cores" in advice
+
+
+# What Snakemake logs of a script that ended by itself, that a signal ended, and of a full disk.
+FAILED = "Command 'python train.py' returned non-zero exit status 1."
+SIGNALLED = "Command 'python render.py' died with <Signals.SIGKILL: 9>."
+FULL = f"OSError: [Errno {errno.ENOSPC}] {os.strerror(errno.ENOSPC)}"
+
+
+@pytest.mark.parametrize(
+    ("told", "cut_off", "first"),
+    [
+        (SIGNALLED, False, f"{KILLED}render"),  # it had no time to begin its log
+        (SIGNALLED, True, f"{KILLED}cut"),
+        (f"{FAILED}\n{SIGNALLED}", True, f"{KILLED}cut"),
+        (FAILED, True, None),  # a full disk cut its log off
+        (FULL, False, f"error: {{results}}: {NO_SPACE}"),
+        ("", False, None),
+    ],
+)
+def test_the_log_of_snakemake_says_what_no_job_could(told, cut_off, first, tmp_path):
+    results = tmp_path / "results"
+    logs, of_snakemake = results / "logs", tmp_path / "snakemake.log"
+    logs.mkdir(parents=True)
+    of_snakemake.write_text(told)
+    if cut_off:
+        (logs / "cut.log").write_text("[10:00:00 cut] epo")
+    lines = why_stopped(logs, time.time() - 5, [of_snakemake])
+    assert lines[:1] == ([] if first is None else [first.format(results=results)])
 
 
 # A process called snakemake starts a shell, which starts a job that says how long it lives.

@@ -9,8 +9,9 @@ import contextlib
 import errno
 import logging
 import os
+import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,8 @@ log = logging.getLogger(__name__)
 ERASE_LINE = "\r\x1b[K"
 """Goes back to the start of a terminal's row and empties it."""
 _FINISHED, _FAILED, _STOPPED = "processor time", "error: ", "stopped"
+LAST_ERROR = "last_error.txt"
+"""In the folder of a run's logs: the line of the job that failed last."""
 NO_SPACE = "no space left on the disk; free some and run the same command again"
 _FOR_THE_USER: dict[int | None, str] = {
     errno.ENOSPC: NO_SPACE,
@@ -49,7 +52,7 @@ def job(snakemake: Any) -> Iterator[None]:
     snakemake : object
         What Snakemake gives a script. Rule and wildcards label each line, since several jobs run
         at a time. The traceback of an unexpected error goes to the log file alone. The error's one
-        line goes to ``logs/last_error.txt`` too, which the workflow prints when it stops.
+        line goes to ``logs/last_error.txt`` too, which `why_stopped` reads.
 
     Raises
     ------
@@ -100,19 +103,46 @@ def is_verbose(config: Mapping[str, Any]) -> bool:
     return verbose.lower() == "true"
 
 
-def killed_jobs(logs: str | Path, since: float) -> list[str]:
-    """Return the jobs whose logs end in the middle: they were killed without a word.
+def why_stopped(
+    logs: str | Path, since: float, snakemake_logs: Iterable[str | Path] = ()
+) -> list[str]:
+    """Return the lines that say why a run stopped; none where it was interrupted.
 
     Parameters
     ----------
     logs : path
-        The folder of a run's logs.
+        The folder of a run's logs, where a job that failed has left its error.
     since : float
         Seconds since 1970: older logs are of earlier runs.
+    snakemake_logs : iterable of path
+        Snakemake's own logs of this run. A job that had no time to begin its log is known to
+        Snakemake alone.
     """
+    last_error = Path(logs) / LAST_ERROR
+    lines = last_error.read_text(encoding="utf-8").splitlines() if last_error.exists() else []
+    told = "".join(Path(log).read_text(encoding="utf-8") for log in snakemake_logs)
+    if not lines and os.strerror(errno.ENOSPC) in told:
+        # Snakemake's own files are on the disk, too.
+        lines = [f"{_FAILED}{Path(logs).parent}: {NO_SPACE}"]
+    killed = _killed_jobs(Path(logs), since) or re.findall(
+        r"(\w+)\.py' died with <Signals.SIGKILL", told
+    )
+    # A full disk ends logs in the middle, too.
+    ended_by_itself = "returned non-zero exit status" in told and "died with <Signals" not in told
+    if not killed or ended_by_itself:
+        return lines
+    return [
+        *lines,
+        f"{_FAILED}killed from outside: {', '.join(killed)}",
+        "most often memory ran out: use fewer --cores, or smaller settings",
+    ]
+
+
+def _killed_jobs(logs: Path, since: float) -> list[str]:
+    """Return the jobs whose logs end in the middle: they were killed without a word."""
     return [
         path.relative_to(logs).with_suffix("").as_posix()
-        for path in sorted(Path(logs).rglob("*.log"))
+        for path in sorted(logs.rglob("*.log"))
         if path.stat().st_mtime >= since and not _has_end(path)
     ]
 
@@ -178,7 +208,7 @@ def _fail(message: str, log_file: Path) -> None:
     logs = next((folder for folder in log_file.parents if folder.name == "logs"), log_file.parent)
     # A full disk may not even take this line; the terminal has it already.
     with contextlib.suppress(OSError):
-        (logs / "last_error.txt").write_text(f"{_FAILED}{message}\n", encoding="utf-8")
+        (logs / LAST_ERROR).write_text(f"{_FAILED}{message}\n", encoding="utf-8")
     raise SystemExit(1)
 
 

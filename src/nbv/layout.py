@@ -182,11 +182,6 @@ class Layout:
         return f"{self.root}/logs"
 
     @property
-    def last_error(self) -> str:
-        """The line that the last failed job ended with."""
-        return f"{self.root}/logs/last_error.txt"
-
-    @property
     def configuration(self) -> str:
         """The resolved configuration."""
         return f"{self.root}/configuration.yaml"

@@ -1,6 +1,5 @@
 # The configuration, and the functions of the rule files.
 
-import errno
 import os
 import re
 import sys
@@ -31,7 +30,7 @@ from nbv.estimation.warm_start import (
 )
 from nbv.experiments.results import ESTIMATED_ROLES
 from nbv.experiments.run_size import too_small
-from nbv.jobs import NO_SPACE, killed_jobs
+from nbv.jobs import LAST_ERROR, why_stopped
 from nbv.layout import Layout, fold_folder, unit_folder
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
@@ -388,30 +387,6 @@ def forget_last_error():
     """Begin with no error; the first thing that a run writes."""
     try:
         Path(LAYOUT.logs).mkdir(parents=True, exist_ok=True)
-        Path(LAYOUT.last_error).unlink(missing_ok=True)
+        Path(LAYOUT.logs, LAST_ERROR).unlink(missing_ok=True)
     except OSError as error:
         stop(f"{LAYOUT.root} cannot be written: {error.strerror}")
-
-
-def reasons(logs):
-    """What the run stopped for, with the help of Snakemake's own logs."""
-    path = Path(LAYOUT.last_error)
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    # A job that had no time to begin its log is known to Snakemake alone.
-    told = "".join(Path(log).read_text(encoding="utf-8") for log in logs)
-    if not lines and os.strerror(errno.ENOSPC) in told:
-        # Snakemake's own files are on the disk, too.
-        lines = [f"error: {LAYOUT.root}: {NO_SPACE}"]
-    unknown = re.findall(r"(\w+)\.py' died with <Signals.SIGKILL", told)
-    killed = killed_jobs(LAYOUT.logs, STARTED) or unknown
-    # A full disk ends logs in the middle, too.
-    ended_by_itself = (
-        "returned non-zero exit status" in told and "died with <Signals" not in told
-    )
-    if not killed or ended_by_itself:
-        return lines
-    return [
-        *lines,
-        f"error: killed from outside: {', '.join(killed)}",
-        "most often memory ran out: use fewer --cores, or smaller settings",
-    ]
