@@ -61,7 +61,7 @@ def inputs(tree, evaluations, tmp_path_factory):
         write_table(build_table(name, evaluations, ReportSettings(n_resamples=50)), files)
     figures = {name: root / f"drawn_{name}.svg" for name in FIGURES}
     for name, path in figures.items():
-        drawn = new_figure(1, 1)
+        drawn = new_figure(3, 2)
         drawn.subplots().text(0, 0, f"drawn as {name}")
         save_figure(drawn, {"svg": path})
     claims = evaluate_claims(evaluations, np.random.default_rng(0), 100)
