@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -31,15 +32,48 @@ def one_thread():
     hw.use_one_thread()
 
 
-def test_one_thread_and_determinism_do_not_load_torchs_compiler():
-    """It takes two seconds of every job."""
+def test_a_training_on_one_thread_does_not_load_torchs_compiler():
+    """It takes a second or two of every job."""
     code = (
-        "import sys, torch; from nbv.estimation.hardware import use_one_thread; use_one_thread(); "
+        "import sys, torch; from clock_faces import CPU, SETTINGS, clock_faces; "
+        "from nbv.estimation.hardware import use_one_thread; use_one_thread(); "
+        "from nbv.estimation.training import train_network; "
+        "train_network(clock_faces(1), SETTINGS | {'epochs': 1}, CPU, 0); "
         "print(torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), "
-        "torch.is_deterministic_algorithms_warn_only_enabled(), 'torch._inductor' in sys.modules)"
+        "torch.is_deterministic_algorithms_warn_only_enabled(), "
+        "*(name in sys.modules for name in ('torch._inductor', 'torch._dynamo', 'triton')))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["1", "True", "True", "False"]
+    path = os.pathsep.join(sys.path)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"PYTHONPATH": path},
+    )
+    assert done.stdout.split() == ["1", "True", "True", "False", "False", "False"]
+
+
+def test_a_training_is_torchs_adamw_and_one_cycle_schedule_to_the_last_bit():
+    faces = clock_faces(2)
+    trained = train_network(faces, SETTINGS | {"epochs": 2, "weight_decay": 0.1}, CPU, 3)
+    torch.manual_seed(3)
+    network = build_network(SETTINGS, 16).train()
+    images = to_input(faces, CPU)
+    targets = torch.from_numpy(np.tile(direction_targets(SETTINGS, 72), (2, 1)))
+    size, rate = SETTINGS["batch_size"], SETTINGS["learning_rate"]
+    batches = len(images) // size
+    optimiser = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=0.1, fused=True)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, max_lr=rate, total_steps=2 * batches)
+    order = torch.Generator().manual_seed(3)
+    for _ in range(2):
+        for chosen in torch.randperm(len(images), generator=order)[: batches * size].split(size):
+            optimiser.zero_grad()
+            torch.nn.functional.mse_loss(network(images[chosen]), targets[chosen]).backward()
+            optimiser.step()
+            schedule.step()
+    expected = network.state_dict()
+    assert all(torch.equal(value, expected[name]) for name, value in trained.state_dict().items())
 
 
 def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():

@@ -93,6 +93,14 @@ def test_one_renderer_serves_several_sizes_and_objects(pyrender):
             assert 2.0 < image[image > 0].min() < 2.5
 
 
+def test_torchs_compiler_can_be_loaded_after_opengl(pyrender):
+    code = (
+        "from nbv.rendering import open_renderer; open_renderer('pyrender'); import torch._dynamo"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def run_without_egl(code, **environment):
     program = (
         "import os, sys\n"

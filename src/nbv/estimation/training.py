@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import time
 from collections.abc import Mapping, Sequence
@@ -112,7 +113,7 @@ def train_network(
     targets = torch.from_numpy(np.tile(of_one, (n_objects, 1))).to(hardware.device)
     n_images, batch_size, n_epochs = len(images), settings["batch_size"], settings["epochs"]
     batches = max(n_images // batch_size, 1)
-    optimiser = torch.optim.AdamW(
+    optimiser = _AdamW(
         network.parameters(),
         lr=settings["learning_rate"],
         weight_decay=settings["weight_decay"],
@@ -131,7 +132,7 @@ def train_network(
         running = torch.zeros((), device=hardware.device)
         for batch in range(batches):
             chosen = permutation[batch * batch_size : (batch + 1) * batch_size]
-            optimiser.zero_grad(set_to_none=True)
+            network.zero_grad(set_to_none=True)
             with hardware.autocast():
                 output = network(images[chosen])
             loss = kind.loss(output.float(), targets[chosen])
@@ -149,6 +150,16 @@ def train_network(
         _need_finite(network, running, epoch, settings)
         progress.report(epoch, n_images, float(running) / batches)
     return network.eval()
+
+
+class _AdamW(torch.optim.AdamW):
+    """AdamW without what torch wraps around these two methods for its compiler.
+
+    The wrappers import the compiler, which nothing here uses: a second of each training.
+    """
+
+    add_param_group = inspect.unwrap(torch.optim.Optimizer.add_param_group)
+    step = torch.no_grad()(inspect.unwrap(torch.optim.AdamW.step))
 
 
 def _set_weights(network: nn.Module, start: nn.Module) -> None:

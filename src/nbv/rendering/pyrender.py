@@ -12,8 +12,10 @@ It draws the same views as Embree. Three of pyrender's habits need care:
 
 from __future__ import annotations
 
+import contextlib
 import os
 from functools import cache
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,11 @@ _INSTALL = "install EGL (Debian: libegl1 libgl1 libgl1-mesa-dri) or take rendere
 @cache
 def _offscreen() -> Any:
     """Return the process's one OpenGL context: releasing a second would terminate the first."""
+    # Mesa and Triton, which torch's compiler loads, each bring an LLVM. Triton crashes the process
+    # if it comes second.
+    with contextlib.suppress(ImportError):
+        import_module("triton")
+
     import pyrender
 
     return pyrender.OffscreenRenderer(1, 1)
