@@ -36,7 +36,7 @@ def offset_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.fl
     if abs(offset) > LARGE_OFFSET_DEG:
         return (
             f"an offset of {offset:+.1f}° is another zero rather than an error: subtract it from "
-            "the estimates, or mend the azimuths, and calibrate again"
+            "the estimates, or add it to the azimuths, and calibrate again"
         )
     return ""
 
