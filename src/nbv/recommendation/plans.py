@@ -137,7 +137,7 @@ class Plans:
 def plans_of(evidence: Evidence, n_views: int, min_separation_deg: float) -> Plans:
     """Return the plans for n views.
 
-    Two views have every rotation for a plan and no caution, as `expected_error` has: the second
+    Two views have every rotation of ``min_separation_deg`` or more for a plan and no caution, as `expected_error` has: the second
     view brings so much that its mean error is known soon.
 
     Parameters
