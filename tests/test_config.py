@@ -455,6 +455,11 @@ def test_a_classifier_with_settings_out_of_range(override):
         load_config(CONFIG, ["estimator=classifier", f"estimator.{override}"])
 
 
+def test_the_opposite_view_is_a_whole_number_of_classes_away():
+    with pytest.raises(UserError, match="n_classes=45 is odd"):
+        load_config(CONFIG, ["estimator=classifier", "estimator.n_classes=45"])
+
+
 def test_a_regressor_has_no_setting_of_a_classifier():
     assert "n_classes" not in load_config(CONFIG)["estimator"]
     assert load_config(CONFIG, ["estimator=classifier"])["estimator"]["n_classes"] > 2

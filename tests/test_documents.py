@@ -24,10 +24,11 @@ DOCUMENTS = sorted(
 PAGES = [path for path in DOCUMENTS if path.name == "README.md" or "reference" not in path.parts]
 
 TERMS = (
-    *("warm start", "affinity", "choice", "plan", "shuffle"),
+    *("warm start", "affinity", "choice", "plan", "shuffle", "density", "embedded objects", "fold"),
     *("viewpoint", "pose", "view", "estimate", "rotation δ", "calibration pair", "conditional"),
     *("evidence", "belief", "criterion", "cost", "policy", "fusion", "method", "extension", "unit"),
     *("frame", "bundle", "calibration turn", "recording", "expected error", "unfamiliarity"),
+    *("spread", "single"),
 )
 
 # Each pattern with the word that takes its place. An underscore separates words, and so does a

@@ -112,8 +112,9 @@ def need_columns(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) 
 
 def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write named arrays as a compressed `.npz` (same bytes: numpy dates its members 1980)."""
-    with replacing(path) as temporary:
-        np.savez_compressed(temporary, allow_pickle=False, **arrays)
+    # An open file, because numpy adds a suffix to names in capitals.
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
 def open_array(path: str | Path) -> NDArray[Any]:
@@ -134,10 +135,10 @@ def read_numbers(path: Path) -> NDArray[Any]:
         Where the file does not exist, or cannot be read.
     """
     try:
-        if path.suffix == ".npy":
+        if path.suffix.lower() == ".npy":
             return np.asarray(np.load(path, allow_pickle=False))
         text = path.read_text(encoding="utf-8")
-        if path.suffix == ".json":
+        if path.suffix.lower() == ".json":
             return np.asarray(json.loads(text), dtype=np.float64)
         return np.array([float(number) for number in text.replace(",", " ").split()])
     except FileNotFoundError as error:

@@ -27,7 +27,7 @@ from nbv.bundles.bundle import (
     load_bundle,
     save_bundle,
 )
-from nbv.bundles.evaluation import best_fixed_deg
+from nbv.bundles.evaluation import best_fixed_deg, fixed_errors_deg
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.recommender import Recommender, bundle_path, turn_share
 from nbv.errors import UserError
@@ -49,9 +49,9 @@ def test_the_document_names_every_array_of_a_bundle():
 
 def test_the_best_fixed_rotation_of_the_shipped_bundle_is_as_documented():
     held = load_bundle(bundle_path("mug"))
-    alike = LookAlikes.of_views(held.distributions)
+    errors = fixed_errors_deg(LookAlikes.of_views(held.distributions), 2)
     found = {
-        elevation: best_fixed_deg(alike, turn_share(held, elevation))
+        elevation: best_fixed_deg(errors, turn_share(held, elevation))
         for elevation in (None, 0.0, 15.0, 30.0, 45.0, 60.0)
     }
     assert found.pop(None) == 177.0

@@ -316,6 +316,12 @@ def test_a_damaged_file_is_named_in_one_line(tmp_path, name):
     assert "\n" not in str(error.value)
 
 
+def test_a_suffix_may_be_in_capitals(tmp_path):
+    with (tmp_path / "A.NPY").open("wb") as file:
+        np.save(file, [90.0, 180.0])
+    assert read_rotations(tmp_path / "A.NPY").tolist() == [90.0, 180.0]
+
+
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(UserError, match=r"no\.npy does not exist"):
         read_pose(tmp_path / "no.npy")

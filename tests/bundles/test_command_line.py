@@ -555,6 +555,18 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
         ]
 
 
+def test_an_object_that_calibrated_the_bundle_is_named(manifest, capsys):
+    options = ("manifest.csv", "--bundle", "b.safetensors")
+    run(capsys, "calibrate", *options, "--output", "own.safetensors")
+    options = ("evaluate", "manifest.csv", "--views", "2", "--bundle")
+    assert "careful    cup: the bundle was calibrated with" in run(
+        capsys, *options, "own.safetensors"
+    )
+    printed = json.loads(run(capsys, *options, "own.safetensors", "--json"))
+    assert printed["calibrated_by"] == ["cup"]
+    assert json.loads(run(capsys, *options, "b.safetensors", "--json"))["calibrated_by"] == []
+
+
 def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
     np.save("turn/3.npy", np.zeros((ROWS, COLUMNS), np.float32))
     options = ("evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2")
@@ -645,6 +657,8 @@ def test_a_drawn_frame_is_told(here, capsys):
     told = run(capsys, "render", "--example", "--output", "x.npy")
     printed = json.loads(run(capsys, "render", "--example", "--output", "y.npy", "--json"))
     assert Path("x.npy").read_bytes() == Path("y.npy").read_bytes()
+    run(capsys, "render", "--example", "--output", "Z.NPY")
+    assert Path("Z.NPY").read_bytes() == Path("y.npy").read_bytes()
     n_pixels = np.count_nonzero(np.load("y.npy"))
     camera = {"fx": 585.0, "fy": 585.0, "cx": 319.5, "cy": 239.5, "width": 640, "height": 480}
     assert printed == {"file": "y.npy", "intrinsics": camera, "object_pixels": n_pixels}

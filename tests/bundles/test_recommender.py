@@ -708,6 +708,22 @@ def test_one_bad_frame_of_several_is_refused(recommender):
         recommender.recommend([FRAMES[0], np.zeros_like(FRAMES[0])], rotations_deg=[0.0, 90.0])
 
 
+def test_a_mask_may_be_any_array(recommender):
+    mask = FRAMES[0] > 0
+    wanted = recommender.recommend(FRAMES[0], mask=mask)
+    for given_ in (mask.tolist(), [mask.tolist()], np.where(mask, 1.0, np.nan), (mask,)):
+        same(recommender.recommend(FRAMES[0], mask=given_), wanted)
+    for given_ in ([1, 0, 1], 1, np.ones((1, 2, 3, 4))):
+        with pytest.raises(UserError):
+            recommender.recommend(FRAMES[0], mask=given_)
+
+
+def test_frames_of_several_sizes_are_arrays(recommender):
+    rows = FRAMES[0].tolist()
+    with pytest.raises(UserError, match="give a list of numpy arrays"):
+        recommender.recommend([rows, rows[1:]], rotations_deg=[0.0, 90.0])
+
+
 def test_masks_are_as_many_as_frames(recommender):
     mask = FRAMES[0] > 0
     with pytest.raises(UserError, match="2 frames and 1 mask:"):

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.angles import circular_distance_deg
@@ -18,14 +20,18 @@ from nbv.bundles.evaluation import (
     RECOMMENDED,
     SINGLE,
     SPACED,
+    at_random,
+    best_fixed_deg,
     evaluate,
     familiarity_of,
+    fixed_errors_deg,
 )
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.recommender import Recommender
 from nbv.bundles.turns import Turn
 from nbv.errors import UserError
 from nbv.recommendation.fusion import product
+from nbv.recommendation.look_alikes import LookAlikes
 
 COLUMNS = [
     *("object_id", "sequence", "choice", "n_views", "mae_deg", "median_deg", "above_45_percent"),
@@ -157,6 +163,47 @@ def test_the_best_fixed_rotation_is_that_of_the_calibration(bundle, elevation):
     turn = recording(1, elevation=elevation)
     row = rows_of(evaluate(bundle, [turn], n_views=(2,)), FIXED, 2)
     assert row["mae_deg"] == pytest.approx(wanted.mean(), rel=1e-4)
+
+
+@pytest.mark.parametrize("n_views", [2, 3, 4, 6])
+def test_the_best_fixed_step_keeps_views_apart_and_errs_least(bundle, n_views):
+    """Of views at equal steps on the calibration turns, multiplied one after the other."""
+    angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
+    errors = {}
+    for step in range(BINS):
+        places = [view * step * WIDTH % 360 for view in range(n_views)]
+        pairs = [(one - other) % 360 for one in places for other in places if one is not other]
+        if any(min(gap, 360 - gap) < 15 for gap in pairs):
+            continue
+        wanted = []
+        for own in np.log(bundle.distributions.astype(float)):
+            for first in range(BINS):
+                views = [np.roll(own[(first + k * step) % BINS], -k * step) for k in range(n_views)]
+                pose = np.degrees(np.angle(np.exp(sum(views) - sum(views).max()) @ angles))
+                wanted.append(abs(error(pose, first * WIDTH)))
+        errors[step] = np.mean(wanted)
+    found = fixed_errors_deg(LookAlikes.of_views(bundle.distributions), n_views).mean(axis=0)
+    assert np.flatnonzero(np.isfinite(found)).tolist() == list(errors)
+    assert found[list(errors)] == pytest.approx(list(errors.values()), rel=1e-3)
+    share = np.ones(len(bundle.distributions))
+    found = fixed_errors_deg(LookAlikes.of_views(bundle.distributions), n_views)
+    assert errors[round(best_fixed_deg(found, share) / WIDTH)] == pytest.approx(
+        min(errors.values()), rel=1e-3
+    )
+
+
+@given(seed=st.integers(0, 2**32), n_taken=st.integers(1, 6))
+def test_random_views_keep_away_from_all_so_far(seed, n_taken):
+    rng = np.random.default_rng(seed)
+    taken = rng.uniform(0, 360, (50, n_taken))
+    taken[:, 0] = 0.0
+    chosen = at_random(rng)(np.empty((50, 1)), taken)
+    assert circular_distance_deg(chosen[:, None], taken).min() >= 15.0
+
+
+def test_random_views_end_where_there_is_no_room():
+    taken = np.arange(0.0, 360.0, 20.0)[None]
+    assert np.isfinite(at_random(np.random.default_rng(0))(np.empty((1, 1)), taken)).all()
 
 
 @pytest.mark.parametrize("elevation", [np.nan, 20.0])
@@ -294,6 +341,11 @@ def test_all_frames_of_a_short_recording_are_one_answer(bundle):
     rows = found[~found["choice"].isin([SINGLE, PAPER])]
     assert len(rows) == 4
     assert rows["mae_deg"].to_numpy() == pytest.approx(rows["mae_deg"].iloc[0], rel=1e-6)
+
+
+def test_a_number_of_views_counts_once(bundle):
+    once = evaluate(bundle, [recording()], n_views=(3, 2))
+    assert evaluate(bundle, [recording()], n_views=(3, 2, 3, 2)).equals(once)
 
 
 def test_more_views_than_frames_are_one_line(bundle):

@@ -139,6 +139,7 @@ PRODUCTS = {
     "gain_product": {"policy": "information_gain", "fusion": "product"},
     "opposite_product": {"policy": "opposite", "fusion": "product"},
     "error_product": {"policy": "expected_error", "fusion": "product"},
+    "random_product": {"policy": "random", "fusion": "product"},
 }
 
 
@@ -182,6 +183,8 @@ def test_by_its_images_distributions_a_hidden_handle_is_sought_and_found():
         rows = np.repeat(np.arange(3), 360)
         np.testing.assert_allclose(frame["next_estimate_deg"], expected[rows, views])
     assert (frames["opposite_product"]["delta_deg"] == 180).all()
+    # The product is exact for whole classes.
+    assert set(frames["random_product"]["delta_deg"]) == set(range(10, 360, 10))
     assert circular_distance_deg(estimates.estimate_deg, np.arange(360)).ravel()[hidden].mean() > 20
     for name in ("gain_product", "error_product"):
         assert frames[name]["error_deg"][hidden].mean() < 5

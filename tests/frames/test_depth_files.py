@@ -113,8 +113,16 @@ def test_archives_give_the_array_called_depth_or_their_only_one(tmp_path):
     assert np.array_equal(read_depth(tmp_path / "a.npz"), METRES)
     assert np.array_equal(read_depth(tmp_path / "b.npz"), METRES)
     np.savez(tmp_path / "c.npz", colour=other, range=MILLIMETRES)
-    with pytest.raises(UserError, match="call the depth image 'depth'"):
+    with pytest.raises(UserError, match="call one of them 'depth'"):
         read_depth(tmp_path / "c.npz")
+
+
+def test_a_mask_is_the_array_called_mask(tmp_path):
+    np.savez(tmp_path / "a.npz", depth=MILLIMETRES, mask=INSIDE)
+    assert np.array_equal(read_mask(tmp_path / "a.npz"), INSIDE)
+    np.savez(tmp_path / "b.npz", depth=MILLIMETRES, scores=INSIDE)
+    with pytest.raises(UserError, match="holds depth, scores: call one of them 'mask'"):
+        read_mask(tmp_path / "b.npz")
 
 
 def test_a_channel_of_its_own_is_no_colour(tmp_path):
@@ -314,6 +322,13 @@ def test_what_is_transparent_is_not_in_the_mask(tmp_path):
     colours = np.full((*INSIDE.shape, 4), 200, dtype=np.uint8)
     colours[..., 3] = 255 * INSIDE
     assert np.array_equal(read_mask(image(tmp_path / "a.png", colours)), INSIDE)
+
+
+def test_a_transparent_colour_of_a_palette_is_not_in_the_mask(tmp_path):
+    palette = Image.fromarray(INSIDE.astype(np.uint8)).convert("P")
+    palette.putpalette([255, 255, 255, 200, 200, 200])
+    palette.save(tmp_path / "a.png", transparency=0)
+    assert np.array_equal(read_mask(tmp_path / "a.png"), INSIDE)
 
 
 def test_a_mask_has_rows_and_columns(tmp_path):

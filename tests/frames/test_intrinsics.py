@@ -117,6 +117,12 @@ def test_focal_lengths_are_above_0(bad):
             as_intrinsics(numbers)
 
 
+@pytest.mark.parametrize(("known", "missing"), [("cx", "cy"), ("cy", "cx")])
+def test_half_a_principal_point_is_none(known, missing):
+    with pytest.raises(UserError, match=f"{known} without {missing}"):
+        Intrinsics(FX, FY, **{known: 320.0})
+
+
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])
 def test_the_principal_point_is_finite(bad):
     with pytest.raises(UserError, match="cx="):

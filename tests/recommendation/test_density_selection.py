@@ -118,7 +118,10 @@ def test_an_error_that_is_not_a_number_is_never_the_least():
     estimate = hidden_range_estimates(6)
     estimate[2, 5] = np.nan
     grid = {"bandwidths_deg": [8.0, 16.0], "pseudo_observations": [10.0]}
+    methods = {"opposite": {"policy": "opposite", "fusion": "average"}}
     with np.errstate(invalid="ignore"), pytest.raises(UserError, match="is nan: the estimates"):
+        choose_densities(estimate, methods, SETTINGS | {"n_parts": 5} | grid)
+    with np.errstate(invalid="ignore"), pytest.raises(UserError, match="no finite number"):
         choose_density(estimate, **grid)
 
 

@@ -53,7 +53,7 @@ def test_it_is_the_mean_error_weighted_by_affinity_and_shrunk():
                 error = float(circular_distance_deg(pose, view * 360 / N_VIEWS)[0])
                 plain.append(error)
                 for index, row in enumerate(rows):
-                    weight = step * np.sum(np.sqrt(row * of_object[view])) ** 4
+                    weight = 360 / N_BINS * np.sum(np.sqrt(row * of_object[view])) ** 4
                     weighted[index] += weight * error
                     weights[index] += weight
         expected[:, delta] = (weighted + 5 * np.mean(plain)) / (weights + 5)
@@ -74,6 +74,15 @@ def test_errors_of_products_are_those_of_fusing_each_pair(n_views):
         pose = product(views, second, turn_deg)
         expected = circular_distance_deg(pose, np.arange(n_views) * (360.0 / n_views))
         np.testing.assert_allclose(found[delta], expected, atol=1e-3)
+
+
+def test_views_between_the_bins_do_not_count():
+    """So kept distributions, a bin apart, lead to the same choices as those of all views."""
+    views, rows = distributions(0), distributions(1).reshape(-1, N_BINS)[:5]
+    every, kept = evidence_of(views), evidence_of(views[:, :: N_VIEWS // N_BINS])
+    for criterion in ("expected_error", "fixed"):
+        costs = (cost_of(criterion, rows, evidence) for evidence in (every, kept))
+        np.testing.assert_allclose(next(costs), next(costs), rtol=1e-6)
 
 
 def test_without_trust_in_likeness_it_is_the_best_fixed_rotation():

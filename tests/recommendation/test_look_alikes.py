@@ -26,10 +26,8 @@ def test_after_one_view_it_is_the_criterion(rng: np.random.Generator) -> None:
     rows = turns(rng)[0].astype(np.float32)
     wanted = expected_error(Belief(rows, evidence), evidence, "product")
     alike = LookAlikes.of_views(distributions)
-    # Here pseudo-observations are views of one degree, there views of the evidence: of 15°.
-    _, found = alike.expected_error_deg(rows, power=5.0, pseudo_observations=15 * 30.0)
-    # Weights below a ten-thousandth are left out.
-    assert found == pytest.approx(wanted, abs=0.1)
+    _, found = alike.expected_error_deg(rows, power=5.0, pseudo_observations=30.0)
+    assert found == pytest.approx(wanted, rel=1e-4)
 
 
 def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Generator) -> None:

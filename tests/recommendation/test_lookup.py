@@ -45,6 +45,15 @@ def test_recommendations_are_read_at_the_nearest_bin():
         ]
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_an_estimate_that_is_no_number_has_no_rotation(bad):
+    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    for rotations in (table.recommend, table.least_cost):
+        for estimate in (bad, [0.0, bad]):
+            with pytest.raises(UserError, match="no finite number"):
+                rotations(estimate)
+
+
 @pytest.mark.parametrize("n_bins", [8, 72, 360])
 def test_a_view_from_the_same_place_is_not_recommended(rng, n_bins):
     """A table whose costs are least at hand, or a bin next to it, as those of one object may be."""

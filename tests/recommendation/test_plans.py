@@ -91,7 +91,7 @@ def test_caution_adds_standard_errors_over_objects():
     belief, spacings = first_views(1, evidence), spacing_bins(3, N_BINS, 0.0)
     views = evidence.distributions[:, :: N_VIEWS // N_BINS]
     errors = spaced_errors_deg(views, 3, spacings)
-    weights = 2 * affinity(belief.probabilities, views.reshape(-1, N_BINS)) ** 4
+    weights = 360 / N_BINS * affinity(belief.probabilities, views.reshape(-1, N_BINS)) ** 4
     plain, cautious = (excess_of_plans(belief, evidence, errors, c) for c in (0.0, 2.0))
     for row, place in np.ndindex(plain.shape):
         difference = errors[place] - errors[0]

@@ -61,6 +61,12 @@ def test_where_nothing_varies_it_is_the_rendered_image(mesh, renderer):
     assert np.array_equal(turn_of(mesh, renderer, NOTHING), wanted)
 
 
+def test_an_elevation_that_does_not_vary_may_be_any(mesh, renderer):
+    depth = renderer.render(mesh.vertices, mesh.faces, 88.0, AZIMUTHS, sensor_camera(CAMERA))
+    wanted = encode_depth(crop_measured(depth, CAMERA), CAMERA)
+    assert np.array_equal(turn_of(mesh, renderer, NOTHING, elevation=88.0), wanted)
+
+
 def test_a_camera_on_its_head_sees_the_image_on_its_head(mesh, renderer):
     upright = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
     turned = renderer.render(

@@ -177,6 +177,12 @@ def test_intervals_cover_where_folds_share_their_calibration_objects(n_shuffles)
     assert 0.91 <= inside / n <= 0.98
 
 
+def test_what_has_no_p_value_does_not_count_for_others():
+    found = holm({"a": 0.03, "b": float("nan"), "c": 0.01})
+    assert (found["a"], found["c"]) == (0.03, 0.02)
+    assert np.isnan(found["b"])
+
+
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
 def test_holm_rejects_what_the_step_down_rule_rejects(values):
     p_values = {str(place): value for place, value in enumerate(values)}

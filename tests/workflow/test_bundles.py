@@ -36,6 +36,37 @@ def made(tmp_path_factory) -> Project:
     return project
 
 
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (("camera.framing=axis",), "camera.framing=axis: a bundle's frames are centred"),
+        (("calibration=crossfit",), "calibration=crossfit: a bundle needs calibration=holdout"),
+        (("~sensor.diagonal_m.mug",), "sensor.diagonal_m.mug: a bundle needs"),
+    ],
+)
+def test_settings_that_make_no_bundle_are_one_line(fresh: Project, wrong, message) -> None:
+    overrides = (*CAMERA, *wrong)
+    done = fresh.run("-n", "--cores", "1", "bundles", overrides=overrides, fails=True)
+    assert f"nbv: error: {message}" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_bundle_needs_a_classifier(fresh: Project) -> None:
+    overrides = (*TINY, "categories=[mug]")
+    done = fresh.run("-n", "--cores", "1", "bundles", overrides=overrides, fails=True)
+    assert "nbv: error: estimator=regressor: a bundle needs estimator=classifier" in done.stderr
+
+
+def test_an_edit_of_the_renderer_renders_a_bundles_images_again(made: Project) -> None:
+    path = made.folder / "src/nbv/rendering/embree.py"
+    text = path.read_text()
+    assert made.would_run(*CAMERA[len(TINY) :], targets=("bundles",)) == {}
+    path.write_text(text + "\n\nEDITED = True\n")
+    jobs = made.would_run(*CAMERA[len(TINY) :], targets=("bundles",))
+    path.write_text(text)
+    assert jobs["render_bundle"] == 2
+
+
 def test_a_bundle_is_calibrated_by_objects_that_it_was_not_trained_on(made: Project) -> None:
     splits = pd.read_csv(made.results / "splits/mug.csv", dtype={"object_id": str})
     of_role = splits[splits["fold"] == 1].groupby("role")["object_id"].agg(set)

@@ -166,6 +166,14 @@ def test_a_comment_elsewhere_reruns_nothing(scratch):
     assert scratch.would_run() == {}
 
 
+def test_more_views_and_view_sphere_name_the_extension_that_they_need(scratch):
+    for missing in ("random", "opposite"):
+        overrides = (*TINY, f"~extensions.{missing}_posterior")
+        done = scratch.run("-n", "--cores", "1", "more_views", overrides=overrides, fails=True)
+        assert f"needs {{policy: {missing}, fusion: posterior}}" in done.stderr
+        assert "Traceback" not in done.stderr
+
+
 def test_touching_a_source_file_reruns_nothing(scratch):
     (scratch.folder / "src/nbv/statistics/metrics.py").touch()
     assert scratch.would_run() == {}

@@ -97,8 +97,6 @@ rule bundle:
         sensor=CONFIG["sensor"],
         affinity=CONFIG["affinity"],
         settings=bundle_settings,
-        device=CONFIG["estimator"]["device"],
-        precision=CONFIG["estimator"]["precision"],
     script:
         f"{SCRIPTS}/make_bundle.py"
 
@@ -144,7 +142,7 @@ use rule bundle as bundle_without with:
 rule ingredients:
     input:
         sources("tabulate_ingredients"),
-        frames=[FRAMES] if FRAMES else [],
+        frames=lambda wildcards: files_of_manifest(FRAMES) if FRAMES else [],
         bundles=[
             LAYOUT.bundle(category, "safetensors", without)
             for category in CATEGORIES

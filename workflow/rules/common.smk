@@ -170,12 +170,14 @@ wildcard_constraints:
 def sources(script, settings=CONFIG):
     """The files of nbv that a script depends on, as inputs: an edit reruns what uses them."""
     sensor = settings["sensor"]["name"]
+    drawn_by = [
+        RENDERERS[settings["renderer"]["name"]],
+        *([SENSORS[sensor]] if sensor in SENSORS else []),
+    ]
     chosen = {
         "prepare_meshes": [SOURCES[settings["dataset"]["source"]]],
-        "render_depth": [
-            RENDERERS[settings["renderer"]["name"]],
-            *([SENSORS[sensor]] if sensor in SENSORS else []),
-        ],
+        "render_depth": drawn_by,
+        "render_bundle": drawn_by,
     }
     path = SCRIPTS / f"{script}.py"
     files = provenance.source_files(path, chosen.get(script, []))
@@ -262,17 +264,49 @@ def stage_of(wildcards):
 
 def elevations_of_bundle(path, of_ingredient=True):
     """The path of every elevation of the wildcards' category, without their ingredient."""
-    return lambda wildcards: paths(
-        path,
-        [
-            (
-                wildcards.category,
-                elevation,
-                wildcards.get("ingredient") if of_ingredient else None,
-            )
-            for elevation in CONFIG["elevations_deg"][wildcards.category]
-        ],
-    )
+
+    def found(wildcards):
+        check_bundle(wildcards.category)
+        ingredient = wildcards.get("ingredient") if of_ingredient else None
+        elevations = CONFIG["elevations_deg"][wildcards.category]
+        places = [(wildcards.category, each, ingredient) for each in elevations]
+        return paths(path, places)
+
+    return found
+
+
+def files_of_manifest(path):
+    """A manifest, and the frames and masks that it names."""
+    from nbv.bundles.manifest import read_manifest  # only here: it is slow
+
+    try:
+        recordings = read_manifest(path)
+    except UserError as error:
+        stop(f"bundles.frames: {error}")
+    columns = [
+        one.frames[name]
+        for one in recordings
+        for name in ("path", "mask")
+        if name in one.frames
+    ]
+    return [path, *(file for column in columns for file in column if file)]
+
+
+def check_bundle(category):
+    """End with one line where settings make no bundle."""
+    if CONFIG["camera"]["framing"] != "silhouette":
+        stop(
+            f"camera.framing={CONFIG['camera']['framing']}: a bundle's frames are centred on what "
+            "is visible; give silhouette"
+        )
+    if CONFIG["calibration"] != "holdout":
+        stop(f"calibration={CONFIG['calibration']}: a bundle needs calibration=holdout")
+    if not CONFIG["gives_distributions"]:
+        stop("estimator=regressor: a bundle needs estimator=classifier")
+    if category not in CONFIG["sensor"]["diagonal_m"]:
+        stop(
+            f"sensor.diagonal_m.{category}: a bundle needs the object's diagonal, metres"
+        )
 
 
 def randomisation_of(wildcards):

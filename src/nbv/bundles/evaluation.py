@@ -29,6 +29,8 @@ PAPER = "paper's table, averaged"
 
 LARGE_ERROR_DEG = 45.0
 
+_MOST_DRAWS = 100
+
 
 @dataclass(frozen=True)
 class Seen:
@@ -51,16 +53,39 @@ class Seen:
     share: NDArray[np.float64]
 
 
-def best_fixed_deg(alike: LookAlikes, share: NDArray[np.float64]) -> float:
-    """Return the one rotation that is best on all calibration views, degrees.
+def fixed_errors_deg(alike: LookAlikes, n_views: int) -> NDArray[np.float64]:
+    """Return the mean error of each calibration turn with n views at equal steps, (S, B).
 
-    It is `MIN_SEPARATION_DEG` or more, as all that are chosen.
+    By the step, in bins; infinite where two of the views are nearer than `MIN_SEPARATION_DEG`, as
+    none are that are chosen. Evenly spaced views may always be taken.
     """
-    n_bins = alike.views.shape[-1]
-    of_turn = alike.errors_deg.mean(axis=1)
-    rotation_deg = np.arange(n_bins) * (360.0 / n_bins)
-    error = np.where(travel_deg(rotation_deg) < MIN_SEPARATION_DEG, np.inf, share @ of_turn)
-    return float(rotation_deg[error.argmin()])
+    n_turns, n_bins, _ = alike.views.shape
+    steps = np.arange(n_bins)
+    apart = travel_deg(np.arange(1, n_views)[:, None] * steps * (360.0 / n_bins)).min(axis=0)
+    may = (apart >= MIN_SEPARATION_DEG) | (steps == round(n_bins / n_views))
+    errors = np.full((n_turns, n_bins), np.inf)
+    if n_views == 2:
+        errors[:, may] = alike.errors_deg.mean(axis=1)[:, may]
+        return errors
+    for step in steps[may]:
+        turned_alike = alike
+        for view in range(1, n_views):
+            turned_alike = turned_alike.after(int(view * step) % n_bins)
+        errors[:, step] = turned_alike.error_now_deg.mean(axis=1)
+    return errors
+
+
+def best_fixed_deg(errors_deg: NDArray[np.float64], share: NDArray[np.float64]) -> float:
+    """Return the step, in degrees, that is best on all calibration views.
+
+    Parameters
+    ----------
+    errors_deg : ndarray (S, B)
+        From `fixed_errors_deg`.
+    share : ndarray (S,)
+        How much each calibration turn counts; above 0.
+    """
+    return float((share @ errors_deg).argmin() * (360.0 / errors_deg.shape[1]))
 
 
 Chooser = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
@@ -121,24 +146,47 @@ def recommended(alike: LookAlikes, seen: Seen, affinity: Mapping[str, float]) ->
     return choose
 
 
+def at_random(rng: np.random.Generator) -> Chooser:
+    """Return a uniformly random choice, `MIN_SEPARATION_DEG` or more from every view so far.
+
+    Where views are so many that `_MOST_DRAWS` draws find no such place, the last one counts.
+    """
+
+    def choose(beliefs: NDArray[np.float64], taken: NDArray[np.float64]) -> NDArray[np.float64]:
+        def draw(n: int) -> NDArray[np.float64]:
+            return rng.uniform(MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG, n)
+
+        chosen = draw(len(beliefs))
+        for _ in range(_MOST_DRAWS):
+            apart = circular_distance_deg(chosen[:, None], taken).min(axis=1)
+            is_near = apart < MIN_SEPARATION_DEG
+            if not is_near.any():
+                break
+            chosen[is_near] = draw(int(is_near.sum()))
+        return chosen
+
+    return choose
+
+
 def choosers(
     alike: LookAlikes,
     seen: Seen,
     affinity: Mapping[str, float],
     n_views: int,
+    fixed_deg: float,
     rng: np.random.Generator,
 ) -> dict[str, Chooser]:
-    """Return the ways to choose that are compared, by name, for `n_views` views in all."""
-    fixed = best_fixed_deg(alike, seen.share)
+    """Return the ways to choose that are compared, by name, for `n_views` views in all.
+
+    The best fixed step is `fixed_deg`.
+    """
 
     def at_steps(step_deg: float) -> Chooser:
         return lambda beliefs, taken: np.full(len(beliefs), taken.shape[1] * step_deg)
 
     return {
-        RANDOM: lambda beliefs, taken: rng.uniform(
-            MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG, len(beliefs)
-        ),
-        FIXED: at_steps(fixed),
+        RANDOM: at_random(rng),
+        FIXED: at_steps(fixed_deg),
         OPPOSITE if n_views == 2 else SPACED: at_steps(360.0 / n_views),
         RECOMMENDED: recommended(alike, seen, affinity),
     }
@@ -208,25 +256,29 @@ def evaluate(
     UserError
         Where a number of views is below 2, or above that of a recording's frames.
     """
-    if min(n_views) < 2:
-        raise UserError(f"{min(n_views)} views: a choice of views needs 2 or more")
+    numbers = list(dict.fromkeys(n_views))
+    if min(numbers) < 2:
+        raise UserError(f"{min(numbers)} views: a choice of views needs 2 or more")
     for turn in turns:
-        if len(turn.azimuth_deg) < max(n_views):
+        if len(turn.azimuth_deg) < max(numbers):
             raise UserError(
                 f"object {turn.object_id!r}, sequence {turn.sequence!r} has "
-                f"{counted(len(turn.azimuth_deg), 'frame')}, too few for {max(n_views)} views"
+                f"{counted(len(turn.azimuth_deg), 'frame')}, too few for {max(numbers)} views"
             )
     rows, alike = [], LookAlikes.of_views(bundle.distributions)
+    of_steps = {number: fixed_errors_deg(alike, number) for number in numbers}
     for turn in turns:
         seen = seen_by(bundle, turn)
         single = follow(seen, lambda beliefs, taken: np.zeros(len(beliefs)), 1)[:, 0]
         offset = constant_offset_deg(single)
         rows.append(_row(seen, SINGLE, 1, single, offset))
-        for number in n_views:
+        for number in numbers:
             error = paper_errors(seen, bundle.paper, turn.elevation_deg, number)
             rows.append(_row(seen, PAPER, number, error, offset))
+            fixed = best_fixed_deg(of_steps[number], seen.share)
             rng = np.random.default_rng(seed)
-            for name, choose in choosers(alike, seen, bundle.affinity, number, rng).items():
+            ways = choosers(alike, seen, bundle.affinity, number, fixed, rng)
+            for name, choose in ways.items():
                 repeats = n_random if name == RANDOM else 1
                 errors = [follow(seen, choose, number)[:, -1] for _ in range(repeats)]
                 rows.append(_row(seen, name, number, np.concatenate(errors), offset))

@@ -168,7 +168,7 @@ def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[
 def read_rotations(path: str | Path) -> NDArray[np.float64]:
     """Read rotations in degrees, or a mask of them, from ``.npy``; errors as of `as_rotations`."""
     path = Path(path)
-    if path.suffix != ".npy":
+    if path.suffix.lower() != ".npy":
         raise UserError(f"{path}: give rotations in degrees, or a .npy file")
     return as_rotations(read_numbers(path), str(path))
 

@@ -32,7 +32,7 @@ from nbv.frames.crop import (
     need_plausible_nearest,
     window_of,
 )
-from nbv.frames.depth_files import DepthImage, to_metres
+from nbv.frames.depth_files import DepthImage, is_in_mask, to_metres
 from nbv.frames.intrinsics import Intrinsics, as_intrinsics
 from nbv.frames.masks import object_mask
 from nbv.labels import counted
@@ -263,14 +263,12 @@ def _in_window(
 
     Without a mask that fits, or without depth in it, they are the whole frame's.
     """
-    given = None if mask is None else np.asarray(mask)
-    if given is not None and given.shape == depth_m.shape and depth_m.ndim == 2:
-        is_given = given if given.dtype == np.bool_ else given != 0
-        if is_given.any():
-            window, place = window_of(is_given)
-            part = to_metres(depth_m[place])
-            if part.any():
-                return part, is_given[place], window
+    given = None if mask is None else is_in_mask(mask)
+    if given is not None and given.shape == depth_m.shape and given.ndim == 2 and given.any():
+        window, place = window_of(given)
+        part = to_metres(depth_m[place])
+        if part.any():
+            return part, given[place], window
     return to_metres(depth_m), given, None
 
 
@@ -279,15 +277,22 @@ def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.gene
         return [depth_m]
     if isinstance(depth_m, list | tuple) and depth_m and isinstance(depth_m[0], np.ndarray):
         return [np.asarray(frame) for frame in depth_m]
-    values = np.asarray(depth_m)
+    try:
+        values = np.asarray(depth_m)
+    except ValueError as error:
+        raise UserError("frames of several sizes: give a list of numpy arrays") from error
     return list(values) if values.ndim == 3 and values.shape[2] > 4 else [values]
 
 
 def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[ArrayLike | None]:
     if mask is None:
         return [None] * n
-    is_one = isinstance(mask, np.ndarray) and (mask.ndim == 2 or mask.shape[2:] <= (4,))
-    masks: list[ArrayLike] = [np.asarray(mask)] if is_one else list(mask)  # type: ignore[arg-type]
+    masks: list[Any]
+    if isinstance(mask, list | tuple) and not (mask and np.ndim(mask[0]) == 1):
+        masks = list(mask)
+    else:
+        values = np.asarray(mask)
+        masks = list(values) if values.ndim == 3 and values.shape[2] > 4 else [values]
     if len(masks) != n:
         raise UserError(
             f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"

@@ -392,10 +392,12 @@ def evaluate(
     if output is not None:
         write_csv(output, found)
     familiar = familiarity_of(held, turns)
+    calibrated_by = sorted({turn.object_id for turn in turns} & set(held.object_ids))
     if json:
         say_json(
             {
                 "errors": found.to_dict("records"),
+                "calibrated_by": calibrated_by,
                 "familiarity": familiar.to_dict("records"),
                 "assumed_focal_px": held.focal_px if n_assumed else None,
             }
@@ -403,6 +405,11 @@ def evaluate(
         return
     if n_assumed:
         say_assumed_camera(held.focal_px, n_assumed)
+    if calibrated_by:
+        say(
+            f"careful    {', '.join(calibrated_by)}: the bundle was calibrated with this name; "
+            "errors on what calibrated it are too low, so evaluate other objects"
+        )
     say_evaluation(found, familiar)
 
 
@@ -462,8 +469,8 @@ def render(
 
     shape = example_mesh() if mesh is None else read_mesh(mesh, up, front)
     frame = draw_frame(shape, azimuth, elevation, distance, diagonal, noise=noise)
-    with replacing(output) as temporary:
-        np.save(temporary, frame.depth_m)
+    with replacing(output) as temporary, temporary.open("wb") as file:
+        np.save(file, frame.depth_m)
     camera, n_pixels = frame.intrinsics, int(frame.mask.sum())
     if json:
         about = {"file": str(output), "intrinsics": asdict(camera), "object_pixels": n_pixels}

@@ -195,6 +195,10 @@ class Estimator(Section):
             )
         if self.n_classes is not None and 360 % self.n_classes:
             raise UserError(f"estimator.n_classes={self.n_classes} is no divisor of 360")
+        if self.n_classes is not None and self.n_classes % 2:
+            raise UserError(
+                f"estimator.n_classes={self.n_classes} is odd: the opposite view needs a class"
+            )
         return self
 
 

@@ -125,7 +125,8 @@ def evaluate_factorial(
     more_views : mapping
         The configuration's ``more_views``.
     rng_of : callable
-        The generator of a choice, by name: random views are the same under every fusion.
+        The generator of a choice, by name: random views are the same under every fusion of
+        estimates.
     """
     known, tested = calibration.estimates.estimate_deg, test.estimates
     densities: dict[Pair, Choice] = {}

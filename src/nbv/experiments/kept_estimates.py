@@ -1,7 +1,7 @@
 """Held-out estimates of many trainings in one compact file, enough to redo the statistics.
 
 Estimates are kept as hundredths of a degree from the truth. Distributions are kept for every view
-that is a class apart, in the frame of the truth, as 255ths of the root of a probability. What is
+that is a class apart, in the frame of the truth, as whole tenths of -log p. What is
 read from estimates or from such a file is the same, so both give the same tables.
 """
 

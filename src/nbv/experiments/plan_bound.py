@@ -32,7 +32,8 @@ def plan_bounds(
     """Return each object's error under the plan that would have been best for each first view.
 
     Plans have equal steps and travel no farther than evenly spaced views; with two views they are
-    all rotations of ``min_separation_deg`` or more (`nbv.recommendation.plans.spacing_bins`). Views are fused by product.
+    all rotations of ``min_separation_deg`` or more (`nbv.recommendation.plans.spacing_bins`). Views
+    are fused by product.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
@@ -63,18 +63,19 @@ def read_depth(
     ...     nbv.read_depth(f"{folder}/depth.npy").round(3).tolist()
     [[0.7300000190734863, 0.0]]
     """
-    return to_metres(_read_array(Path(path)), depth_scale, str(path), unit_m)
+    return to_metres(_read_array(Path(path), "depth"), depth_scale, str(path), unit_m)
 
 
 def read_mask(path: str | Path) -> NDArray[np.bool_]:
     """Read a mask (rows, columns): true where the file is not 0; errors as of `read_depth`.
 
-    Of an image with a channel for opacity, pixels that are transparent are false as well.
+    Of several arrays in an ``.npz`` it is the one that is called ``mask``. Of an image with a
+    channel for opacity, pixels that are transparent are false as well.
     """
-    values = _read_array(Path(path))
+    values = _read_array(Path(path), "mask")
     if values.dtype.kind not in _NUMBERS:
         raise UserError(f"{path} holds {values.dtype}, no numbers")
-    mask = np.asarray(np.nan_to_num(values) != 0)
+    mask = is_in_mask(values)
     if mask.ndim == 3:
         has_opacity = mask.shape[2] in (2, 4)
         colours = mask[:, :, :-1] if has_opacity else mask
@@ -82,6 +83,14 @@ def read_mask(path: str | Path) -> NDArray[np.bool_]:
     if mask.ndim != 2:
         raise UserError(f"{path}: a mask has rows and columns, this has {mask.ndim} axes")
     return mask
+
+
+def is_in_mask(mask: ArrayLike) -> NDArray[np.bool_]:
+    """Return where a mask is not 0, and a number."""
+    values = np.asarray(mask)
+    if values.dtype.kind == "f":
+        return np.asarray((values != 0) & ~np.isnan(values))
+    return values if values.dtype == np.bool_ else np.asarray(values != 0)
 
 
 def to_metres(
@@ -113,14 +122,15 @@ def to_metres(
         return np.where(np.isfinite(metres) & (metres > 0), metres, np.float32(0))
 
 
-def _read_array(path: Path) -> NDArray[Any]:
+def _read_array(path: Path, name: str) -> NDArray[Any]:
+    """Return the numbers of a file; `name` is that of the array among several."""
     suffix = path.suffix.lower()
     if suffix not in ARRAYS + IMAGES:
         raise UserError(f"{path}: no known kind of file; give {', '.join(ARRAYS + IMAGES)}")
     try:
         if not path.is_file():
             raise UserError(f"{path} does not exist")
-        values = _read_image(path) if suffix in IMAGES else _read_numpy(path)
+        values = _read_image(path) if suffix in IMAGES else _read_numpy(path, name)
     except UserError:
         raise
     # No list of what a reader may raise on arbitrary bytes is complete.
@@ -132,17 +142,16 @@ def _read_array(path: Path) -> NDArray[Any]:
     return values
 
 
-def _read_numpy(path: Path) -> NDArray[Any]:
+def _read_numpy(path: Path, name: str) -> NDArray[Any]:
     stored = np.load(path, mmap_mode="r", allow_pickle=False)
     if isinstance(stored, np.ndarray):
         return np.asarray(stored)
     with stored:
         if not stored.files:
             raise UserError(f"{path} holds no array")
-        name = "depth" if "depth" in stored.files else stored.files[0]
-        if name != "depth" and len(stored.files) > 1:
-            raise UserError(f"{path} holds {', '.join(stored.files)}: call the depth image 'depth'")
-        return np.asarray(stored[name])
+        if name not in stored.files and len(stored.files) > 1:
+            raise UserError(f"{path} holds {', '.join(stored.files)}: call one of them {name!r}")
+        return np.asarray(stored[name if name in stored.files else stored.files[0]])
 
 
 def _read_image(path: Path) -> NDArray[Any]:
@@ -151,8 +160,9 @@ def _read_image(path: Path) -> NDArray[Any]:
     with Image.open(path) as image:
         if image.width * image.height > _MOST_PIXELS:
             raise UserError(f"{path}: {image.width} × {image.height} pixels are too many")
-        # The numbers of a palette image name colours.
-        values = np.asarray(image.convert("RGB") if image.mode == "P" else image)
+        # The numbers of a palette image name colours, one of which may be transparent.
+        colours = "RGBA" if "transparency" in image.info else "RGB"
+        values = np.asarray(image.convert(colours) if image.mode == "P" else image)
         if image.format == "PPM" and image.mode == "I":
             return _as_stored(values, path)
         return values

@@ -56,6 +56,9 @@ class Intrinsics:
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
                 raise UserError(f"intrinsics: {name}={value:g} is no number")
+        if (self.cx is None) != (self.cy is None):
+            known, missing = ("cy", "cx") if self.cx is None else ("cx", "cy")
+            raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
 
     def need_resolution(self, rows: int, columns: int) -> None:
         """Raise FrameError ``other-resolution`` where they are for images of another size."""

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from nbv.errors import UserError
-from nbv.frames.depth_files import DepthImage
+from nbv.frames.depth_files import DepthImage, is_in_mask
 from nbv.frames.errors import FrameError
 
 Mask = NDArray[np.bool_]
@@ -67,7 +67,7 @@ def object_mask(
             "empty-mask", "the frame has no depth at all: is the sensor covered, or too near?"
         )
     if mask is not None:
-        given = np.asarray(mask) != 0
+        given = is_in_mask(mask)
         if given.ndim == 3 and given.shape[2] == 1:
             given = given[:, :, 0]
         if given.ndim != 2:

@@ -56,14 +56,28 @@ class LookupTable:
         It is that of least cost which travels more than a bin. A view from the same place is no
         second view: the same image gives the same error again. The cost of a table of few objects
         may still be least there, because it takes views as independent.
+
+        Raises
+        ------
+        UserError
+            Where an estimate is no finite number.
         """
-        bins = nearest_bin(estimate_deg, len(self.cost))
-        return np.asarray(self._next_view_deg[bins])
+        return np.asarray(self._next_view_deg[self._bins(estimate_deg)])
 
     def least_cost(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
-        """Return the rotation of least cost for each estimate (Eq. 2), whatever it travels."""
-        bins = nearest_bin(estimate_deg, len(self.cost))
-        return np.asarray(self.recommended_delta_deg[bins])
+        """Return the rotation of least cost for each estimate (Eq. 2), whatever it travels.
+
+        Raises
+        ------
+        UserError
+            Where an estimate is no finite number.
+        """
+        return np.asarray(self.recommended_delta_deg[self._bins(estimate_deg)])
+
+    def _bins(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
+        if not np.isfinite(estimate_deg).all():
+            raise UserError("an estimate is no finite number of degrees")
+        return np.asarray(nearest_bin(estimate_deg, len(self.cost)), dtype=np.int64)
 
     @cached_property
     def _next_view_deg(self) -> NDArray[np.int64]:

@@ -137,8 +137,8 @@ class Plans:
 def plans_of(evidence: Evidence, n_views: int, min_separation_deg: float) -> Plans:
     """Return the plans for n views.
 
-    Two views have every rotation of ``min_separation_deg`` or more for a plan and no caution, as `expected_error` has: the second
-    view brings so much that its mean error is known soon.
+    Two views have every rotation of ``min_separation_deg`` or more for a plan and no caution, as
+    `expected_error` has: the second view brings so much that its mean error is known soon.
 
     Parameters
     ----------
@@ -201,14 +201,14 @@ def excess_of_plans(belief: Belief, evidence: Evidence, errors: Table, caution: 
     need_first_view(belief, evidence)
     n_bins, settings = evidence.n_bins, evidence.settings["affinity"]
     views = _views_a_bin_apart(evidence)
-    n_objects, step = len(views), evidence.n_views // n_bins
+    n_objects = len(views)
     excess = (errors - errors[0]).transpose(1, 2, 0)
     share = max(settings["pseudo_observations"], np.finfo(np.float32).tiny) / n_objects
     of_all = share * excess.mean(axis=1)
     found = []
     for start in range(0, len(belief.probabilities), BELIEFS_AT_ONCE):
         rows = belief.probabilities[start : start + BELIEFS_AT_ONCE]
-        weights = step * affinity(rows, views.reshape(-1, n_bins)) ** settings["power"]
+        weights = 360.0 / n_bins * affinity(rows, views.reshape(-1, n_bins)) ** settings["power"]
         of_view = weights.reshape(len(rows), n_objects, n_bins)
         sums = np.stack([of_view[:, o] @ excess[o] for o in range(n_objects)], axis=1) + of_all
         counts = of_view.sum(axis=2)[:, :, None] + share

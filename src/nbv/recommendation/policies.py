@@ -86,11 +86,14 @@ class TwoViews:
 
 
 def _random(turns: Turns, fusion: str) -> Rotations:
-    """Return a view other than the first, all equally likely."""
+    """Return a view other than the first, all equally likely; of distributions, whole classes."""
     if turns.rng is None:
         raise ValueError("policy 'random' needs a generator")
     shape = turns.estimate_deg.shape
-    return np.asarray(turns.rng.integers(1, shape[1], shape) * (360 // shape[1]))
+    n = shape[1]
+    if fusion in OF_DISTRIBUTIONS and turns.distributions is not None:
+        n = turns.distributions.shape[-1]
+    return np.asarray(turns.rng.integers(1, n, shape) * (360 // n))
 
 
 def _opposite(turns: Turns, fusion: str) -> Rotations:

@@ -111,7 +111,8 @@ def randomised_turn(
     """
     draw = randomisation
     lowest = max(elevation_deg - draw.elevation_deg, 0.0)
-    elevation = rng.uniform(lowest, min(elevation_deg + draw.elevation_deg, HIGHEST_DEG))
+    highest = min(elevation_deg + draw.elevation_deg, max(elevation_deg, HIGHEST_DEG))
+    elevation = rng.uniform(lowest, highest)
     scale = 1.0 + rng.uniform(-draw.size, draw.size)
     drawn = _drawn_camera(camera, draw, rng)
     vertices = np.asarray(mesh.vertices) * scale

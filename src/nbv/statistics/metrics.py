@@ -22,7 +22,7 @@ _MEDIAN_GRID = 1001
 
 @dataclass(frozen=True)
 class Interval:
-    """A figure with the ends of its 95 % percentile interval, all in the figure's unit."""
+    """A figure with the ends of its 95 % interval, all in the figure's unit."""
 
     value: float
     low: float

@@ -148,15 +148,17 @@ def predicted_by_others(tables: Sequence[Floats]) -> list[Interval]:
 def holm(p_values: Mapping[str, float]) -> dict[str, float]:
     """Return p-values adjusted for their number (Holm, 1979): each that is below 0.05 still counts.
 
-    The k-th least of n is multiplied by n - k + 1, and none is less than the one before it.
+    The k-th least of n is multiplied by n - k + 1, and none is less than the one before it. What
+    is NaN stays it and does not count.
     """
-    ordered = sorted(p_values, key=lambda name: p_values[name])
+    known = [name for name, p in p_values.items() if not np.isnan(p)]
+    ordered = sorted(known, key=lambda name: p_values[name])
     adjusted: dict[str, float] = {}
     highest = 0.0
     for place, name in enumerate(ordered):
         highest = max(highest, min((len(ordered) - place) * p_values[name], 1.0))
         adjusted[name] = highest
-    return {name: adjusted[name] for name in p_values}
+    return {name: adjusted.get(name, float("nan")) for name in p_values}
 
 
 def _spread(means: Floats) -> float:

@@ -104,6 +104,30 @@ def trained_under(name):
     return layout_of(name) if start is None else LAYOUT.below("transfer", name)
 
 
+def need_posterior(*policies):
+    """End with one line where no extension with the fusion posterior has one of the policies."""
+    methods = EXTENSIONS.values()
+    known = {one["policy"] for one in methods if one["fusion"] == "posterior"}
+    if absent := [policy for policy in policies if policy not in known]:
+        stop(
+            f"extensions: this target needs {{policy: {absent[0]}, fusion: posterior}}"
+        )
+
+
+def rows_of_more_views(wildcards):
+    need_posterior("random", "opposite")
+    return [LAYOUT.extension(*fold, "more_views") for fold in folds_of(REFERENCE_UNITS)]
+
+
+def rows_of_view_sphere(wildcards):
+    need_posterior("opposite")
+    return [
+        LAYOUT.view_sphere(category, fold)
+        for category in SPHERE_CATEGORIES
+        for fold in FOLDS
+    ]
+
+
 # The runs that this one is compared with.
 
 

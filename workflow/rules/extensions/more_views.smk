@@ -31,9 +31,7 @@ rule evaluate_more_views:
 rule more_views:
     input:
         sources("tabulate_more_views"),
-        rows=[
-            LAYOUT.extension(*fold, "more_views") for fold in folds_of(REFERENCE_UNITS)
-        ],
+        rows=rows_of_more_views,
     output:
         csv=LAYOUT.table("more_views", "csv"),
         md=LAYOUT.table("more_views", "md"),

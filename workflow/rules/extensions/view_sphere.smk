@@ -39,11 +39,7 @@ rule evaluate_view_sphere:
 rule view_sphere:
     input:
         sources("tabulate_view_sphere"),
-        rows=[
-            LAYOUT.view_sphere(category, fold)
-            for category in SPHERE_CATEGORIES
-            for fold in FOLDS
-        ],
+        rows=rows_of_view_sphere,
     output:
         csv=LAYOUT.table("view_sphere", "csv"),
         md=LAYOUT.table("view_sphere", "md"),

@@ -88,9 +88,11 @@ def _regression_on_distributions(belief: Belief, evidence: Evidence, fusion: str
     step = evidence.n_views // n_bins
     calibration = views[:, ::step].reshape(-1, n_bins)
     rows = belief.probabilities
+    # Pseudo-observations are views a degree apart, whatever the number of views.
     costs = [
         _shrunk(
-            step
+            360.0
+            / n_bins
             * affinity(rows[start : start + BELIEFS_AT_ONCE], calibration) ** settings["power"],
             errors,
             settings["pseudo_observations"],
