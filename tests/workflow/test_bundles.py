@@ -40,7 +40,10 @@ def made(tmp_path_factory) -> Project:
     ("wrong", "message"),
     [
         (("camera.framing=axis",), "camera.framing=axis: a bundle's frames are centred"),
-        (("calibration=crossfit",), "calibration=crossfit: a bundle needs calibration=holdout"),
+        (
+            ("calibration=crossfit", "crossfit_epochs=1"),
+            "calibration=crossfit: a bundle needs calibration=holdout",
+        ),
         (("~sensor.diagonal_m.mug",), "sensor.diagonal_m.mug: a bundle needs"),
     ],
 )

@@ -188,14 +188,19 @@ def sources(script, settings=CONFIG):
     ]
 
 
-def mesh_sources(wildcards):
-    """The modules that meshes depend on. What starts at meshes ends here without them."""
+def need_meshes():
+    """End with one line where the estimator is external."""
     if EXTERNAL:
         stop(
             "estimator=external has no meshes, images or trainings, and what was asked for needs "
             "them: ask for the report (no target), extensions or leaderboard, or choose another "
             "estimator"
         )
+
+
+def mesh_sources(wildcards):
+    """The modules that meshes depend on."""
+    need_meshes()
     return sources("prepare_meshes")
 
 
@@ -294,6 +299,7 @@ def files_of_manifest(path):
 
 def check_bundle(category):
     """End with one line where settings make no bundle."""
+    need_meshes()
     if CONFIG["camera"]["framing"] != "silhouette":
         stop(
             f"camera.framing={CONFIG['camera']['framing']}: a bundle's frames are centred on what "
