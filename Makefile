@@ -26,7 +26,7 @@ LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --genera
 	check lock audit licences docs clean
 
 reproduce: $(READY)
-	@echo "nbv: now the paper: usually 16 minutes on two cores with native bfloat16, an hour without"
+	@echo "nbv: now the paper: usually half an hour on two cores with native bfloat16, an hour without"
 	$(BIN)/snakemake --cores $(CORES)
 
 quick: $(READY)

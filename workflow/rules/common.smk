@@ -271,7 +271,7 @@ def elevations_of_bundle(path, of_ingredient=True):
     """The path of every elevation of the wildcards' category, without their ingredient."""
 
     def found(wildcards):
-        check_bundle(wildcards.category)
+        need_bundle_settings(wildcards.category)
         ingredient = wildcards.get("ingredient") if of_ingredient else None
         elevations = CONFIG["elevations_deg"][wildcards.category]
         places = [(wildcards.category, each, ingredient) for each in elevations]
@@ -297,7 +297,7 @@ def files_of_manifest(path):
     return [path, *(file for column in columns for file in column if file)]
 
 
-def check_bundle(category):
+def need_bundle_settings(category):
     """End with one line where settings make no bundle."""
     need_meshes()
     if CONFIG["camera"]["framing"] != "silhouette":

@@ -281,6 +281,11 @@ def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.gene
         values = np.asarray(depth_m)
     except ValueError as error:
         raise UserError("frames of several sizes: give a list of numpy arrays") from error
+    return _images_of(values)
+
+
+def _images_of(values: NDArray[Any]) -> list[NDArray[Any]]:
+    """Return the images of a stack (n, rows, columns), or the one image with up to 4 channels."""
     return list(values) if values.ndim == 3 and values.shape[2] > 4 else [values]
 
 
@@ -291,8 +296,7 @@ def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[
     if isinstance(mask, list | tuple) and not (mask and np.ndim(mask[0]) == 1):
         masks = list(mask)
     else:
-        values = np.asarray(mask)
-        masks = list(values) if values.ndim == 3 and values.shape[2] > 4 else [values]
+        masks = list(_images_of(np.asarray(mask)))
     if len(masks) != n:
         raise UserError(
             f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"

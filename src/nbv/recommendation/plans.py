@@ -17,7 +17,11 @@ from numpy.typing import NDArray
 
 from nbv.angles import circular_distance_deg
 from nbv.recommendation.belief import Belief, mean_direction_deg
-from nbv.recommendation.criteria.expected_error import BELIEFS_AT_ONCE, affinity, need_first_view
+from nbv.recommendation.criteria.expected_error import (
+    BELIEFS_AT_ONCE,
+    need_first_view,
+    view_weights,
+)
 from nbv.recommendation.evidence import Evidence, Table, evidence_of_distributions
 from nbv.recommendation.following import DistributionViews, follow
 from nbv.recommendation.fusion import Rotations
@@ -208,7 +212,7 @@ def excess_of_plans(belief: Belief, evidence: Evidence, errors: Table, caution: 
     found = []
     for start in range(0, len(belief.probabilities), BELIEFS_AT_ONCE):
         rows = belief.probabilities[start : start + BELIEFS_AT_ONCE]
-        weights = 360.0 / n_bins * affinity(rows, views.reshape(-1, n_bins)) ** settings["power"]
+        weights = view_weights(rows, views.reshape(-1, n_bins), settings["power"])
         of_view = weights.reshape(len(rows), n_objects, n_bins)
         sums = np.stack([of_view[:, o] @ excess[o] for o in range(n_objects)], axis=1) + of_all
         counts = of_view.sum(axis=2)[:, :, None] + share

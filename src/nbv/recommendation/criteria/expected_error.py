@@ -39,6 +39,15 @@ def affinity(one: Table, other: Table) -> Table:
     return np.asarray(np.sqrt(one) @ np.sqrt(other).T)
 
 
+def view_weights(beliefs: Table, views: Table, power: float) -> Table:
+    """Return how much each view (m, B) counts for each belief (n, B), (n, m).
+
+    It is the affinity to the power, times the degrees of a bin: pseudo-observations are views that
+    are a degree apart, and `views` are a bin apart.
+    """
+    return np.asarray(360.0 / views.shape[1] * affinity(beliefs, views) ** power)
+
+
 def need_first_view(belief: Belief, evidence: Evidence) -> None:
     """Raise ValueError unless the belief is of one view by the estimator of the evidence.
 
@@ -88,12 +97,9 @@ def _regression_on_distributions(belief: Belief, evidence: Evidence, fusion: str
     step = evidence.n_views // n_bins
     calibration = views[:, ::step].reshape(-1, n_bins)
     rows = belief.probabilities
-    # Pseudo-observations are views a degree apart, whatever the number of views.
     costs = [
         _shrunk(
-            360.0
-            / n_bins
-            * affinity(rows[start : start + BELIEFS_AT_ONCE], calibration) ** settings["power"],
+            view_weights(rows[start : start + BELIEFS_AT_ONCE], calibration, settings["power"]),
             errors,
             settings["pseudo_observations"],
         )
