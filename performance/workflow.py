@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +69,8 @@ def cost(results: Path, n_steps: int) -> Figure:
     """Return the run's processor time over that of the bare steps of its schedule.
 
     The schedule is that of ``estimator.warm_start=none``: `estimator.epochs` from random weights
-    for every estimator. A step is timed now, on this machine, where the run has to be made too.
+    for every estimator. A step is timed now, on this machine, where the run has to be made too, and
+    in as many processes at once as the run had jobs: they slow each other, bare or not.
     """
     runtime = _runtime(results)
     if runtime.empty:
@@ -78,9 +81,10 @@ def cost(results: Path, n_steps: int) -> Figure:
         steps = steps_from_random_weights(settings)
     except UserError as error:
         return Figure(COST, None, None, f"{error}")
-    step_s = _step_seconds(settings, n_steps)
-    cpu_s = float(runtime.iloc[-1]["cpu_s"])
-    detail = f"{cpu_s:,.0f} s against {steps:,} steps of {1e3 * step_s:.1f} ms, one thread"
+    total = runtime.iloc[-1]
+    cpu_s, at_once = float(total["cpu_s"]), int(total["side_by_side"])
+    step_s = _step_seconds(settings, n_steps, at_once)
+    detail = f"{cpu_s:,.0f} s against {steps:,} steps of {1e3 * step_s:.1f} ms, {at_once} at once"
     return Figure(COST, cpu_s / (steps * step_s), target, detail)
 
 
@@ -102,7 +106,14 @@ def steps_from_random_weights(settings: Mapping[str, Any]) -> int:
     return n_estimators * int(estimator["epochs"]) * batches
 
 
-def _step_seconds(settings: Mapping[str, Any], n_steps: int) -> float:
+def _step_seconds(settings: Mapping[str, Any], n_steps: int, at_once: int) -> float:
+    """Return the processor time of one bare step, of several processes that take them at once."""
+    with ProcessPoolExecutor(at_once, mp_context=get_context("spawn")) as processes:
+        each = processes.map(_own_step_seconds, [settings] * at_once, [n_steps] * at_once)
+        return float(np.mean(list(each)))
+
+
+def _own_step_seconds(settings: Mapping[str, Any], n_steps: int) -> float:
     """Return the processor time of one bare step: the median of five turns."""
     use_one_thread()
     estimator = settings["estimator"]

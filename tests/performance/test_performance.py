@@ -168,9 +168,9 @@ def test_the_steps_of_a_run_are_those_of_every_estimator():
 def test_the_cost_of_a_run_is_its_processor_time_in_bare_steps(tmp_path):
     settings = configuration()
     write_text(tmp_path / "configuration.yaml", yaml.safe_dump(settings))
-    row = {"rule": "all", "cpu_s": 1000.0}
+    row = {"rule": "all", "cpu_s": 1000.0, "side_by_side": 2}
     write_csv(tmp_path / "tables/runtime.csv", pd.DataFrame([row]))
     figure = cost(tmp_path, 2)
-    found = re.fullmatch(r"1,000 s against .* steps of (\d+\.\d) ms, one thread", figure.detail)
+    found = re.fullmatch(r"1,000 s against .* steps of (\d+\.\d) ms, 2 at once", figure.detail)
     expected = 1000.0 / (steps_from_random_weights(settings) * float(found[1]) / 1e3)
     assert figure.ratio == pytest.approx(expected, rel=0.05)

@@ -56,9 +56,9 @@ def fused(
 def log_bayes_factor(distributions: NDArray[np.floating], rotations_deg: Sequence[float]) -> float:
     """Return how much more probable views are of one pose than of unrelated poses.
 
-    The natural logarithm of B^(n - 1) sum_theta prod_i p_i(theta + rotation_i), which is 0 for one
-    view. Where distributions are calibrated and the rotations right, it is below log t with a
-    probability of t at the most (Markov's inequality).
+    The natural logarithm of B^(n - 1) sum_theta prod_i p_i(theta + rotation_i); 0 for one view.
+    Where distributions are calibrated and the rotations right, it is below log t with a probability
+    of t at the most (Markov's inequality).
 
     Parameters
     ----------
@@ -67,8 +67,10 @@ def log_bayes_factor(distributions: NDArray[np.floating], rotations_deg: Sequenc
     rotations_deg : sequence of float
         From the first view to each one.
     """
-    total = _log_product(distributions, rotations_deg)
     n, n_bins = distributions.shape
+    if n == 1:
+        return 0.0
+    total = _log_product(distributions, rotations_deg)
     most = float(total.max())
     evidence = float(np.exp(total - most).sum())
     return most + math.log(evidence) + float(n - 1) * math.log(n_bins)

@@ -81,10 +81,12 @@ class Window:
 
 def window_of(mask: Mask) -> tuple[Window, tuple[slice, slice]]:
     """Return the smallest window around a mask that is not empty, and its slices of the frame."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    top, left = int(rows[0]), int(columns[0])
-    window = Window(top, left, (mask.shape[0], mask.shape[1]))
-    return window, (slice(top, int(rows[-1]) + 1), slice(left, int(columns[-1]) + 1))
+    rows = np.flatnonzero(mask.any(axis=1))
+    of_rows = slice(int(rows[0]), int(rows[-1]) + 1)
+    columns = np.flatnonzero(mask[of_rows].any(axis=0))
+    of_columns = slice(int(columns[0]), int(columns[-1]) + 1)
+    window = Window(of_rows.start, of_columns.start, (mask.shape[0], mask.shape[1]))
+    return window, (of_rows, of_columns)
 
 
 def pixel_step(camera: Camera) -> float:

@@ -103,7 +103,9 @@ def object_mask(
 def _without_islands(inside: Mask) -> Mask:
     # Parts are looked for where there are any: most of a frame is not the object.
     place = ndimage.find_objects(inside.view(np.uint8))[0]
-    parts, _ = ndimage.label(inside[place], _EIGHT)
+    parts, n_parts = ndimage.label(inside[place], _EIGHT)
+    if n_parts == 1:
+        return inside
     sizes = np.bincount(parts.ravel())
     sizes[0] = 0
     largest = sizes.max()
