@@ -149,9 +149,13 @@ class Worker:
         return outcome, detail
 
     def environment(self) -> dict[str, str]:
-        """Return the environment in which Python loads the guard, and so do its children."""
+        """Return the environment in which Python loads the guard, and so do its children.
+
+        Nothing counts their coverage, which is written elsewhere.
+        """
+        inherited = {key: value for key, value in os.environ.items() if key[:9] != "COVERAGE_"}
         paths = [str(ROOT / "tests" / "fuzz" / "guard"), str(ROOT), os.environ.get("PYTHONPATH")]
-        return os.environ | {
+        return inherited | {
             "PYTHONPATH": os.pathsep.join(filter(None, paths)),
             "NBV_FUZZ_ALLOWED": str(self.folder.parent),
             "NBV_FUZZ_NOTES": str(self._notes),
