@@ -18,6 +18,9 @@ from typing import Literal
 START_S = 0.5
 """Seconds that any job takes, however small: Python starts and imports."""
 
+# Sums of the same times may differ in their last digit.
+_AT_ONCE_S = 1e-6
+
 # What a job weighs less for each one of its kind that ended after it, because other work on the
 # machine comes and goes. A half is left after three.
 _KEPT = 0.8
@@ -199,13 +202,17 @@ def _ends(
         while ready and len(running) < cores:
             *_, number = heapq.heappop(ready)
             heapq.heappush(running, (now + left[number], number))
-        now, number = heapq.heappop(running)
-        ends[number] = now
-        for follower in followers[number]:
-            waits_for[follower] -= 1
-            if not waits_for[follower]:
-                order = (-jobs[follower].priority, -left[follower], follower)
-                heapq.heappush(ready, order)
+        now = running[0][0]
+        # Jobs that end at once free their cores together: of what waited for them, the highest
+        # priority starts first.
+        while running and running[0][0] <= now + _AT_ONCE_S:
+            ends_at, number = heapq.heappop(running)
+            ends[number] = ends_at
+            for follower in followers[number]:
+                waits_for[follower] -= 1
+                if not waits_for[follower]:
+                    order = (-jobs[follower].priority, -left[follower], follower)
+                    heapq.heappush(ready, order)
     return ends
 
 
