@@ -153,7 +153,7 @@ class Worker:
 
         Nothing counts their coverage, which is written elsewhere.
         """
-        inherited = {key: value for key, value in os.environ.items() if key[:9] != "COVERAGE_"}
+        inherited = {k: v for k, v in os.environ.items() if not k.startswith("COVERAGE_")}
         paths = [str(ROOT / "tests" / "fuzz" / "guard"), str(ROOT), os.environ.get("PYTHONPATH")]
         return inherited | {
             "PYTHONPATH": os.pathsep.join(filter(None, paths)),
