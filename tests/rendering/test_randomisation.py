@@ -142,6 +142,31 @@ def test_an_edge_that_moves_leaves_the_middle_and_takes_depths_from_nearby(mesh,
     assert shrunk > 0
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_an_edge_moves_as_far_as_all_pairs_of_pixels_say(seed):
+    rng = np.random.default_rng(seed)
+    blob = ndimage.gaussian_filter(rng.standard_normal((23, 31)), 3.0) > rng.normal(0.05, 0.05)
+    blob[rng.integers(23), rng.integers(31)] = False
+    image = np.where(blob, 1 + rng.random(blob.shape), 0).astype(np.float32)
+    moved, largest = image.copy(), 3.0
+    move_edge(moved, largest, np.random.default_rng(seed))
+    # The same field, drawn in the same order.
+    again = np.random.default_rng(seed)
+    noise = again.standard_normal(image.shape, dtype=np.float32)
+    field = ndimage.gaussian_filter(noise, again.uniform(1.0, 4.0))
+    field = np.maximum(field * (again.uniform(0.0, largest) / field.std()), -1.0)
+    inside, outside = np.argwhere(blob), np.argwhere(~blob)
+    apart = np.sqrt(((inside[:, None] - outside) ** 2).sum(axis=2))
+    for pixel, to_edge in zip(inside, apart.min(axis=1), strict=True):
+        is_kept = 0.5 - to_edge < field[tuple(pixel)]
+        assert moved[tuple(pixel)] == (image[tuple(pixel)] if is_kept else 0)
+    for pixel, distances in zip(outside, apart.T, strict=True):
+        is_added = distances.min() - 0.5 < field[tuple(pixel)]
+        nearest = inside[distances == distances.min()]
+        wanted = image[tuple(nearest.T)] if is_added else [0]
+        assert moved[tuple(pixel)] in wanted
+
+
 def test_a_turn_depends_on_its_generator_alone(mesh, renderer):
     draw = Randomisation(7.5, 5, 0.15, 3, 7, 0.6, 0.3, 0.1, 0.25, 0.15, 1, 2, 1.5)
     one, again, other = (turn_of(mesh, renderer, draw, seed) for seed in (1, 1, 2))

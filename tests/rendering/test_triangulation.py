@@ -6,10 +6,19 @@ import math
 
 import numpy as np
 import pytest
+from scipy import ndimage
 from sensor_images import CAMERA, plane, plate
 
 from nbv.rendering.camera import Camera
-from nbv.rendering.noise.triangulation import displaced, incidence_rad, is_hidden, window_noise
+from nbv.rendering.noise.triangulation import (
+    displaced,
+    incidence_rad,
+    is_hidden,
+    same_surface,
+    window_noise,
+    window_share,
+    window_weights,
+)
 
 
 def test_noise_is_shared_by_neighbours_and_by_nobody_else():
@@ -59,6 +68,42 @@ def test_a_straight_edge_moves_as_far_as_measured():
     assert (outside > 0).mean() == pytest.approx(expected, abs=0.01)
     assert (inside == 0).mean() == pytest.approx(expected, abs=0.01)
     assert np.array_equal(moved[:, 20:44, 20:44], z[:, 20:44, 20:44])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_pixel_by_pixel_windows_and_displacements_are_the_same(seed):
+    """Both are defined for each pixel alone; the module takes all at once, near surfaces only."""
+    rng = np.random.default_rng(seed)
+    shape, focal, width = (3, 14, 17), 40.0, 3.4
+    seen = ndimage.gaussian_filter(rng.standard_normal(shape), (0, 2, 2)) > 0.05
+    z = np.where(seen, 1 + 0.02 * rng.integers(0, 20, shape), 0).astype(np.float32)
+    measured = np.where(rng.random(shape) < 0.8, z, 0).astype(np.float32)
+    moved = displaced(measured, z, np.full_like(z, 0.9), focal, np.random.default_rng(seed))
+    share = window_share(z, width, focal)
+    weights, again = window_weights(width), np.random.default_rng(seed)
+    shifts = []
+    for _ in range(2):
+        shift = np.float32(0.9) * again.standard_normal(shape, dtype=np.float32)
+        shifts.append(np.floor(shift + again.random(shape, dtype=np.float32)).astype(int))
+    reach = len(weights) // 2
+    for image, row, column in np.ndindex(shape):
+        here = z[image, row, column]
+        there = (
+            np.clip(row + shifts[0][image, row, column], 0, shape[1] - 1),
+            np.clip(column + shifts[1][image, row, column], 0, shape[2] - 1),
+        )
+        apart = math.hypot(there[0] - row, there[1] - column)
+        stays = same_surface(here, z[image][there], apart, focal)
+        wanted = measured[image, row, column] if stays else measured[image][there]
+        assert moved[image, row, column] == wanted
+        own = 0.0
+        for down, across in np.ndindex(len(weights), len(weights)):
+            at = row + down - reach, column + across - reach
+            if 0 <= at[0] < shape[1] and 0 <= at[1] < shape[2]:
+                apart = math.hypot(down - reach, across - reach)
+                is_same = same_surface(here, z[image][at], apart, focal)
+                own += weights[down] * weights[across] * bool(is_same)
+        assert share[image, row, column] == pytest.approx(own / weights.sum() ** 2, abs=1e-6)
 
 
 def test_a_step_casts_its_shadow_to_the_left():

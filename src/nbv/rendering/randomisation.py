@@ -32,6 +32,8 @@ _MARGIN = 1.25
 _TABLE_REACH = 0.7
 # Over how many pixels what moves an edge is smoothed.
 _EDGE_SMOOTHNESS = (1.0, 4.0)
+# Pixels; of an ellipse without depth.
+_PATCH_RADII = (0.7, 4.0)
 
 
 @dataclass(frozen=True)
@@ -183,10 +185,34 @@ def move_edge(image: Depths, edge_px: float, rng: np.random.Generator) -> None:
     field = ndimage.gaussian_filter(
         rng.standard_normal(image.shape, dtype=np.float32), rng.uniform(*_EDGE_SMOOTHNESS)
     )
-    field = np.maximum(field * (rng.uniform(0.0, edge_px) / field.std()), -1.0)
-    outside, nearest = ndimage.distance_transform_edt(~seen, return_indices=True)
-    distance = np.where(seen, 0.5 - ndimage.distance_transform_edt(seen), outside - 0.5)
-    image[:] = np.where(distance < field, image[tuple(nearest)], 0)
+    field *= rng.uniform(0.0, edge_px) / field.std()
+    # No edge moves farther out than this.
+    near = _bounds(seen, math.ceil(max(float(field.max()), 0.0) + 0.5))
+    image, seen, field = image[near], seen[near], np.maximum(field[near], -1.0)
+    row, column = np.nonzero(~seen & (field > 0.5))
+    nearest = ndimage.distance_transform_edt(~seen, return_distances=False, return_indices=True)
+    nearest = nearest[:, row, column]
+    is_added = np.hypot(*(nearest - (row, column))) - 0.5 < field[row, column]
+    image[row[is_added], column[is_added]] = image[tuple(nearest[:, is_added])]
+    image[seen & (0.5 - _depth_inside(seen) >= field)] = 0
+
+
+def _depth_inside(seen: NDArray[np.bool_]) -> Floats:
+    """Return how far each pixel is from one that is not seen: 1, √2, or 2 for all that is more.
+
+    What lies outside the image counts as seen.
+    """
+    padded = np.pad(seen, 1, constant_values=True)
+    above, level, below = padded[:-2], padded[1:-1], padded[2:]
+    sides = above[:, 1:-1] & below[:, 1:-1] & level[:, :-2] & level[:, 2:]
+    corners = above[:, :-2] & above[:, 2:] & below[:, :-2] & below[:, 2:]
+    return np.where(sides, np.where(corners, 2.0, math.sqrt(2.0)), 1.0)
+
+
+def _bounds(seen: NDArray[np.bool_], margin: int = 0) -> tuple[slice, ...]:
+    """Return the smallest window around what is seen, and a margin as far as the image goes."""
+    (box,) = ndimage.find_objects(seen.view(np.uint8))
+    return tuple(slice(max(side.start - margin, 0), side.stop + margin) for side in box)
 
 
 def lose(image: Depths, draw: Randomisation, rng: np.random.Generator) -> None:
@@ -195,17 +221,23 @@ def lose(image: Depths, draw: Randomisation, rng: np.random.Generator) -> None:
         _lose_thin_parts(image, rng)
     if rng.random() < draw.inside:
         _lose_inside(image, rng)
-    rows, columns = np.nonzero(image)
-    if not len(rows):
+    seen = np.flatnonzero(image)
+    if not len(seen):
         return
+    rows, columns = np.divmod(seen, image.shape[1])
     across, down = np.arange(image.shape[1]), np.arange(image.shape[0])[:, None]
+    reach = math.ceil(_PATCH_RADII[1])
     for _ in range(rng.poisson(draw.patches)):
-        middle = rng.integers(len(rows))
-        radii, turn = rng.uniform(0.7, 4.0, 2), rng.uniform(0.0, math.pi)
-        x, y = across - columns[middle], down - rows[middle]
+        middle = rng.integers(len(seen))
+        radii, turn = rng.uniform(*_PATCH_RADII, 2), rng.uniform(0.0, math.pi)
+        row, column = int(rows[middle]), int(columns[middle])
+        of_rows, of_columns = (
+            slice(max(place - reach, 0), place + reach + 1) for place in (row, column)
+        )
+        x, y = across[of_columns] - column, down[of_rows] - row
         along = x * math.cos(turn) + y * math.sin(turn)
         across_it = y * math.cos(turn) - x * math.sin(turn)
-        image[(along / radii[0]) ** 2 + (across_it / radii[1]) ** 2 < 1] = 0
+        image[of_rows, of_columns][(along / radii[0]) ** 2 + (across_it / radii[1]) ** 2 < 1] = 0
     if rng.random() < draw.occluded:
         turn, share = rng.uniform(0.0, 2 * math.pi), rng.uniform(0.02, 0.25)
         place = across * math.cos(turn) + down * math.sin(turn)
@@ -242,12 +274,16 @@ def _cropped(depth: Depths, side: int, shift_px: float, rng: np.random.Generator
     """Return images of a side with what is measured near the middle; what lies outside is cut."""
     cropped = np.zeros((len(depth), side, side), dtype=depth.dtype)
     for image, out in zip(depth, cropped, strict=True):
-        rows, columns = np.nonzero(image)
-        if not len(rows):
+        seen = image > 0
+        if not seen.any():
             continue
         shift = np.rint(rng.normal(0.0, shift_px, 2)).astype(int) if shift_px else (0, 0)
-        row = rows - rows.min() + (side - (rows.max() - rows.min() + 1)) // 2 + shift[0]
-        column = columns - columns.min() + (side - np.ptp(columns) - 1) // 2 + shift[1]
-        inside = (row >= 0) & (row < side) & (column >= 0) & (column < side)
-        out[row[inside], column[inside]] = image[rows[inside], columns[inside]]
+        measured = image[_bounds(seen)]
+        first = [(side - n) // 2 + int(by) for n, by in zip(measured.shape, shift, strict=True)]
+        kept = tuple(slice(max(-at, 0), max(side - at, 0)) for at in first)
+        part = measured[kept]
+        rows, columns = (
+            slice(max(at, 0), max(at, 0) + n) for at, n in zip(first, part.shape, strict=True)
+        )
+        out[rows, columns] = part
     return cropped

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import correlate1d
+from scipy import ndimage
 from scipy.special import ndtr
 
 Metres = NDArray[np.float32]
@@ -73,14 +73,18 @@ def window_share(z: Metres, width_px: float, focal_px: float) -> Metres:
     weights = window_weights(width_px)
     reach = len(weights) // 2
     padded = np.pad(z, [(0, 0), (reach, reach), (reach, reach)])
-    rows, columns = z.shape[-2:]
-    share = np.zeros_like(z)
+    # Where there is nothing, the window shows nothing.
+    seen, place = z > 0, np.flatnonzero(padded > 0)
+    own, of_own = z[seen], np.zeros(len(place), dtype=np.float32)
     for down, of_row in enumerate(weights):
         for across, of_column in enumerate(weights):
-            there = padded[:, down : down + rows, across : across + columns]
+            step = (down - reach) * padded.shape[-1] + across - reach
+            there = padded.ravel()[place + step]
             apart = math.hypot(down - reach, across - reach)
             weight = np.float32(of_row * of_column / weights.sum() ** 2)
-            share += weight * same_surface(z, there, apart, focal_px)
+            of_own += weight * same_surface(own, there, apart, focal_px)
+    share = np.zeros_like(z)
+    share[seen] = of_own
     return share
 
 
@@ -93,7 +97,7 @@ def window_noise(
     noise = rng.standard_normal(shape, dtype=np.float32)
     # Wrapped, so that the variance is 1 up to the edge of the image.
     for axis in (-2, -1):
-        noise = correlate1d(noise, weights, axis=axis, mode="wrap")
+        noise = ndimage.correlate1d(noise, weights, axis=axis, mode="wrap")
     return noise
 
 
@@ -156,16 +160,19 @@ def displaced(
     for _ in range(2):
         shift = sigma_px * rng.standard_normal(z.shape, dtype=np.float32)
         shift += rng.random(z.shape, dtype=np.float32)
-        shifts.append(np.floor(shift).astype(np.intp))
-    image, row, column = np.nonzero((shifts[0] != 0) | (shifts[1] != 0))
-    moved = image, row, column
-    source = (
-        image,
-        np.clip(row + shifts[0][moved], 0, z.shape[-2] - 1),
-        np.clip(column + shifts[1][moved], 0, z.shape[-1] - 1),
-    )
-    apart = np.hypot(source[1] - row, source[2] - column).astype(np.float32)
-    crosses = ~same_surface(z[moved], z[source], apart, focal_px)
+        shifts.append(np.floor(shift, out=shift).astype(np.int32))
+    # Far from the object, nothing takes the place of nothing.
+    farthest = max(int(np.abs(shift).max()) for shift in shifts)
+    is_near = ndimage.maximum_filter((z > 0).any(axis=0), 2 * farthest + 1)
+    moved = np.flatnonzero(((shifts[0] != 0) | (shifts[1] != 0)) & is_near)
+    rows, columns = z.shape[-2:]
+    above, column = np.divmod(moved, columns)
+    image, row = np.divmod(above, rows)
+    source_row = np.clip(row + shifts[0].ravel()[moved], 0, rows - 1)
+    source_column = np.clip(column + shifts[1].ravel()[moved], 0, columns - 1)
+    source = (image * rows + source_row) * columns + source_column
+    apart = np.hypot(source_row - row, source_column - column).astype(np.float32)
+    crosses = ~same_surface(z.ravel()[moved], z.ravel()[source], apart, focal_px)
     out = measured.copy()
-    out[image[crosses], row[crosses], column[crosses]] = measured[source][crosses]
+    out.ravel()[moved[crosses]] = measured.ravel()[source[crosses]]
     return out
