@@ -10,7 +10,7 @@ from nbv.recommendation.belief import Belief
 from nbv.recommendation.criteria.expected_error import expected_error
 from nbv.recommendation.evidence import evidence_of_distributions
 from nbv.recommendation.fusion import product
-from nbv.recommendation.look_alikes import LookAlikes
+from nbv.recommendation.look_alikes import LookAlikes, compared_step, error_after_deg
 
 SETTINGS = {"affinity": {"power": 5.0, "pseudo_observations": 30.0}}
 
@@ -43,6 +43,41 @@ def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Genera
         pose = product(own, other, 15.0 * turn)
         wanted = circular_distance_deg(pose, 15.0 * first)
         assert alike.errors_deg[1, first, turn] == pytest.approx(wanted, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("bins", "step"), [(24, 1), (60, 1), (72, 1), (90, 1), (120, 2), (180, 3), (360, 6), (210, 3)]
+)
+def test_finer_bins_are_compared_at_six_degrees_at_most(bins: int, step: int) -> None:
+    assert compared_step(bins) == step
+
+
+@pytest.mark.parametrize("step", [2, 3, 4])
+def test_errors_at_whole_steps_are_those_of_all_rotations(
+    rng: np.random.Generator, step: int
+) -> None:
+    alike = LookAlikes.of_views(turns(rng)).after(5)
+    wanted = error_after_deg(alike.so_far, alike.views)[:, :, ::step]
+    assert error_after_deg(alike.so_far, alike.views, step) == pytest.approx(wanted, abs=1e-3)
+
+
+def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.Generator) -> None:
+    """In bins of 3 degrees: affinities of pairs of bins, and errors linear between whole steps."""
+    distributions, beliefs = turns(rng, 2, 120), turns(rng, 1, 120)[0, :2]
+    alike = LookAlikes.of_views(distributions).after(7)
+    now, after = alike.expected_error_deg(beliefs, 5.0, 30.0)
+    views = np.concatenate(alike.seen)
+    errors = np.concatenate(error_after_deg(alike.so_far, alike.views))[:, ::2]
+    for belief, own_now, own in zip(beliefs, now, after, strict=True):
+        pairs = [np.sqrt(rows[..., ::2] + rows[..., 1::2]) for rows in (belief, views)]
+        weight = 3.0 * (pairs[1] @ pairs[0]) ** 5.0
+        total = weight.sum() + 30.0
+        wanted = (weight @ errors + 30.0 * errors.mean(axis=0)) / total
+        assert own[::2] == pytest.approx(wanted, rel=1e-4)
+        assert own[1::2] == pytest.approx((wanted + np.roll(wanted, -1)) / 2, rel=1e-4)
+        error_now = np.concatenate(alike.error_now_deg)
+        wanted_now = (weight @ error_now + 30.0 * error_now.mean()) / total
+        assert own_now == pytest.approx(wanted_now, rel=1e-4)
 
 
 def test_a_turn_that_does_not_count_is_as_if_it_were_not_there(rng: np.random.Generator) -> None:

@@ -20,7 +20,7 @@ from nbv.calibration.offset import constant_offset_deg
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
-from nbv.recommendation.look_alikes import LookAlikes
+from nbv.recommendation.look_alikes import LookAlikes, error_after_deg
 
 SINGLE, RANDOM, FIXED = "single", "random", "best fixed"
 OPPOSITE, SPACED, RECOMMENDED = "opposite", "evenly spaced", "recommended"
@@ -65,7 +65,7 @@ def fixed_errors_deg(alike: LookAlikes, n_views: int) -> NDArray[np.float64]:
     may = (apart >= MIN_SEPARATION_DEG) | (steps == round(n_bins / n_views))
     errors = np.full((n_turns, n_bins), np.inf)
     if n_views == 2:
-        errors[:, may] = alike.errors_deg.mean(axis=1)[:, may]
+        errors[:, may] = error_after_deg(alike.so_far, alike.views).mean(axis=1)[:, may]
         return errors
     for step in steps[may]:
         turned_alike = alike

@@ -16,6 +16,12 @@ from numpy.typing import NDArray
 
 from nbv.recommendation.evidence import Table
 
+COMPARED_DEG = 6.0
+"""Beliefs are compared, and errors found, at most so many degrees apart, if bins are finer.
+
+Half as much is read for a frame then as in bins of 3 degrees, and that is most of its time.
+"""
+
 FLAT = 1e-5
 """Of distributions: below this resultant length the mean direction is rounding, and errs by 90°."""
 
@@ -31,8 +37,14 @@ def in_object_frame(distributions: Table) -> Table:
     return np.take_along_axis(distributions, index[None], axis=2)
 
 
-def error_after_deg(so_far: Table, views: Table) -> Table:
-    """Return the error of the product with every further view, (S, B, B) float32, degrees.
+def compared_step(n_bins: int) -> int:
+    """Return how many bins of a full turn are one in comparisons: a divisor of all of them."""
+    most = max(int(COMPARED_DEG * n_bins / 360.0), 1)
+    return next(step for step in range(most, 0, -1) if n_bins % step == 0)
+
+
+def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
+    """Return the error of the product with further views, (S, B, B / step) float32, degrees.
 
     With c of the views so far and c' of a further one, both from `in_object_frame`, the mean
     direction of the product is that of ``sum_u c(u) c'(u) exp(i u)``: one product of matrices for
@@ -44,22 +56,31 @@ def error_after_deg(so_far: Table, views: Table) -> Table:
         Of the fused views, by the first one.
     views : ndarray (S, B, B)
         Of single views.
+    step : int
+        Further views are so many bins apart; a divisor of B.
 
     Returns
     -------
     ndarray
-        ``[s, k, d]``: of first view k with a further view at the rotation d, both in bins.
+        ``[s, k, d]``: of first view k with a further view at the rotation ``step d``, in bins.
     """
-    n_bins = views.shape[-1]
+    n_turns, n_bins, _ = views.shape
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
-    turned = views.transpose(0, 2, 1)
-    real = np.matmul(so_far * np.cos(angles).astype(np.float32), turned)
-    imaginary = np.matmul(so_far * np.sin(angles).astype(np.float32), turned)
+    # Views that are whole steps apart meet each other alone: [s, r, i] is view i step + r.
+    first, turned = (
+        rows.reshape(n_turns, n_bins // step, step, n_bins).transpose(0, 2, 1, 3)
+        for rows in (so_far, views)
+    )
+    turned = turned.transpose(0, 1, 3, 2)
+    real = np.matmul(first * np.cos(angles).astype(np.float32), turned)
+    imaginary = np.matmul(first * np.sin(angles).astype(np.float32), turned)
     error = np.abs(np.degrees(np.arctan2(imaginary, real))).astype(np.float32)
     if any((_resultant_length(rows) < FLAT).any() for rows in (so_far, views)):
-        error[np.hypot(real, imaginary) < FLAT * np.matmul(so_far, turned)] = 90.0
-    further = (np.arange(n_bins)[:, None] + np.arange(n_bins)) % n_bins
-    return np.take_along_axis(error, further[None], axis=2)
+        error[np.hypot(real, imaginary) < FLAT * np.matmul(first, turned)] = 90.0
+    n_steps = n_bins // step
+    further = (np.arange(n_steps)[:, None] + np.arange(n_steps)) % n_steps
+    error = np.take_along_axis(error, further[None, None], axis=3)
+    return np.asarray(error.transpose(0, 2, 1, 3).reshape(n_turns, n_bins, n_steps))
 
 
 def error_of_deg(so_far: Table) -> Table:
@@ -106,9 +127,13 @@ class LookAlikes:
         return LookAlikes(both / both.sum(axis=2, keepdims=True), self.views)
 
     @cached_property
+    def _step(self) -> int:
+        return compared_step(self.views.shape[-1])
+
+    @cached_property
     def errors_deg(self) -> Table:
-        """`error_after_deg` of the turns, (S, B, B)."""
-        return error_after_deg(self.so_far, self.views)
+        """`error_after_deg` of the turns, at rotations that are `compared_step` bins apart."""
+        return error_after_deg(self.so_far, self.views, self._step)
 
     @cached_property
     def error_now_deg(self) -> Table:
@@ -124,6 +149,8 @@ class LookAlikes:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the expected error now (n,), and after a view at every rotation (n, B), degrees.
 
+        Rotations between two whole steps (`compared_step`) have what lies between their errors.
+
         Parameters
         ----------
         beliefs : ndarray (n, B)
@@ -136,7 +163,8 @@ class LookAlikes:
         n_turns, n_bins, _ = self.views.shape
         of_turn = np.ones(n_turns) if share is None else np.asarray(share, dtype=np.float64)
         # The affinity of each belief with each view, whose roots are kept.
-        weight = self._roots @ np.sqrt(np.asarray(beliefs, dtype=np.float32)).T
+        compared = _joined(np.asarray(beliefs, dtype=np.float32), self._step)
+        weight = self._roots @ np.sqrt(compared).T
         weight **= power
         weight *= (of_turn * (360.0 / n_bins)).astype(np.float32)[:, None, None]
         total = weight.sum(axis=(0, 1), dtype=np.float64) + pseudo_observations
@@ -145,7 +173,7 @@ class LookAlikes:
             of_turn @ self._error_now_by_turn
         )
         after = _weighted(weight, self.errors_deg) + prior * (of_turn @ self._errors_by_turn)
-        return now / total, after / total[:, None]
+        return now / total, _between_steps(after / total[:, None], self._step)
 
     @property
     def seen(self) -> Table:
@@ -157,7 +185,7 @@ class LookAlikes:
     @cached_property
     def _roots(self) -> Table:
         """The square roots of `seen`, for `nbv.recommendation.criteria.expected_error.affinity`."""
-        return np.sqrt(self.seen)
+        return np.sqrt(_joined(self.seen, self._step))
 
     @cached_property
     def _error_now_by_turn(self) -> NDArray[np.float64]:
@@ -166,6 +194,18 @@ class LookAlikes:
     @cached_property
     def _errors_by_turn(self) -> NDArray[np.float64]:
         return np.asarray(self.errors_deg.sum(axis=1, dtype=np.float64))
+
+
+def _joined(rows: Table, step: int) -> Table:
+    """Return distributions (..., B) over bins that are as large as `step` of before."""
+    return np.asarray(rows.reshape(*rows.shape[:-1], -1, step).sum(axis=-1))
+
+
+def _between_steps(rows: NDArray[np.float64], step: int) -> NDArray[np.float64]:
+    """Return values (n, B) at every bin, of those (n, B / step) at whole steps of a full turn."""
+    part = np.arange(step) / step
+    between = rows[:, :, None] * (1 - part) + np.roll(rows, -1, axis=1)[:, :, None] * part
+    return np.asarray(between.reshape(len(rows), -1))
 
 
 def _weighted(weight: Table, errors_deg: Table) -> NDArray[np.float64]:
