@@ -294,7 +294,7 @@ def test_moves_keep_to_what_the_camera_may_do(recommender, seed, rotations, max_
 
 
 def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
-    """Three degrees a bin, and errors that have a minimum at nearly every third one."""
+    """Three degrees a bin, and errors, found at every second one, with many minima."""
     estimator = made_settings(120, hidden=40)
     rng = np.random.default_rng(0)
     rough = replace(
@@ -310,7 +310,7 @@ def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
     minima = (found.error_after_deg < np.roll(found.error_after_deg, 1)) & (
         found.error_after_deg < np.roll(found.error_after_deg, -1)
     )
-    assert minima.sum() > 20
+    assert minima.sum() > 15
     moves = [found.move, *found.alternatives]
     assert len(moves) == 1 + N_ALTERNATIVES
     rotations = np.array([move.rotation_deg for move in moves])
