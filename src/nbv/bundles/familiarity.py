@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,11 @@ class Familiarity:
     scales: NDArray[np.float32]
     threshold: float
 
+    @cached_property
+    def squares(self) -> NDArray[np.float32]:
+        """The squared lengths of the references, (m,)."""
+        return _squares(self.references)
+
 
 def crop_features(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Return what is seen in each square of crops (n, side, side): its share, its depth, (n, F)."""
@@ -80,7 +86,7 @@ def fit_familiarity(turns: Sequence[Turn]) -> Familiarity:
     places = (features - mean) @ basis
     kept = np.arange(0, len(places), max(1, -(-len(places) // MOST_REFERENCES)))
     references = places[kept].astype(np.float16).astype(np.float32)
-    apart = squared_distances(places, references)
+    apart = squared_distances(places, references, _squares(references))
     if len(set(names)) > 1:
         apart[names[:, None] == names[kept]] = np.inf
     distances = _to_neighbour(apart)
@@ -101,7 +107,7 @@ def unfamiliarity(
     to the third nearest reference (Sun et al., 2022).
     """
     places = ((crop_features(codes) - known.mean) @ known.basis).astype(np.float32)
-    distances = _to_neighbour(squared_distances(places, known.references))
+    distances = _to_neighbour(squared_distances(places, known.references, known.squares))
     sums = _in_scales(distances, energy(logits), known.scales)
     return np.maximum(sums, 0.0) / known.threshold
 
@@ -113,11 +119,18 @@ def energy(logits: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def squared_distances(
-    places: NDArray[np.float32], references: NDArray[np.float32]
+    places: NDArray[np.float32], references: NDArray[np.float32], squares: NDArray[np.float32]
 ) -> NDArray[np.float64]:
-    """Return the squared distance of each place (n, q) to each reference (m, q), (n, m)."""
-    squares = (places**2).sum(axis=1)[:, None] + (references**2).sum(axis=1)
-    return np.asarray(np.maximum(squares - 2 * places @ references.T, 0.0), dtype=np.float64)
+    """Return the squared distance of each place (n, q) to each reference (m, q), (n, m).
+
+    ``squares`` are the squared lengths of the references, (m,).
+    """
+    lengths = _squares(places)[:, None] + squares
+    return np.asarray(np.maximum(lengths - 2 * places @ references.T, 0.0), dtype=np.float64)
+
+
+def _squares(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.asarray((rows**2).sum(axis=1))
 
 
 def _to_neighbour(apart: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics
 from nbv.frames.masks import NEAREST_SHARE, Mask
 from nbv.rendering.camera import Camera
-from nbv.rendering.depth_codes import encode_depth
+from nbv.rendering.depth_codes import encode_depth, median_depth
 
 BEHIND_SURFACE = 0.15
 """How far an object's origin lies behind the median of what is visible of it, in diagonals."""
@@ -135,7 +135,7 @@ def crop_frame(
     _need_inside(top, bottom, left, right, window.frame_shape, intrinsics)
     middle = (left + right + 1) / 2, (top + bottom + 1) / 2
     turn, principal = _facing(intrinsics, *middle)
-    distance_m = float(np.median(depth_m[mask])) / turn[2, 2]
+    distance_m = float(median_depth(depth_m[mask])) / turn[2, 2]
     width_m = (right - left + 1) * distance_m / intrinsics.fx
     height_m = (bottom - top + 1) * distance_m / intrinsics.fy
     extent = math.hypot(width_m, height_m)

@@ -81,11 +81,11 @@ def object_mask(
             )
         if not given.any():
             raise FrameError("empty-mask", "the mask has no pixel")
-        if (share := float(inside[given].mean())) < LEAST_MEASURED:
+        inside &= given
+        if (share := np.count_nonzero(inside) / np.count_nonzero(given)) < LEAST_MEASURED:
             raise FrameError(
                 "little-depth", f"only {share:.0%} of the mask's pixels have a depth; need 30 %"
             )
-        inside &= given
     near = 0.0 if near_m is None else near_m
     far = np.inf if far_m is None else far_m
     if not 0 <= near < far:

@@ -40,7 +40,11 @@ def reference_depth(depth: Depths, camera: Camera) -> NDArray[np.float32]:
 def _reference(visible: Depths, camera: Camera) -> np.float32:
     if camera.framing != "silhouette" or not len(visible):
         return np.float32(camera.distance)
-    # numpy.median gives the same and takes six times as long for one image.
+    return median_depth(visible)
+
+
+def median_depth(visible: Depths) -> np.float32:
+    """Return the median of depths (n,): that of numpy.median, in a sixth of its time."""
     low, high = (len(visible) - 1) // 2, len(visible) // 2
     ordered = np.partition(visible, (low, high))
     return np.float32((ordered[low] + ordered[high]) / 2)
