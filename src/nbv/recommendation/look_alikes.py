@@ -149,7 +149,7 @@ class LookAlikes:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the expected error now (n,), and after a view at every rotation (n, B), degrees.
 
-        Rotations between two whole steps (`compared_step`) have what lies between their errors.
+        Between rotations that are whole steps (`compared_step`) it is linear.
 
         Parameters
         ----------

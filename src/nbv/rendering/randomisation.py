@@ -189,18 +189,19 @@ def move_edge(image: Depths, edge_px: float, rng: np.random.Generator) -> None:
     # No edge moves farther out than this.
     near = _bounds(seen, math.ceil(max(float(field.max()), 0.0) + 0.5))
     image, seen, field = image[near], seen[near], np.maximum(field[near], -1.0)
+    # The edge is half a pixel from the middles of the pixels along it.
     row, column = np.nonzero(~seen & (field > 0.5))
     nearest = ndimage.distance_transform_edt(~seen, return_distances=False, return_indices=True)
     nearest = nearest[:, row, column]
     is_added = np.hypot(*(nearest - (row, column))) - 0.5 < field[row, column]
     image[row[is_added], column[is_added]] = image[tuple(nearest[:, is_added])]
-    image[seen & (0.5 - _depth_inside(seen) >= field)] = 0
+    image[seen & (0.5 - _to_background_px(seen) >= field)] = 0
 
 
-def _depth_inside(seen: NDArray[np.bool_]) -> Floats:
+def _to_background_px(seen: NDArray[np.bool_]) -> Floats:
     """Return how far each pixel is from one that is not seen: 1, √2, or 2 for all that is more.
 
-    What lies outside the image counts as seen.
+    What lies outside the image counts as seen. At 2 no edge is moved inwards (`move_edge`).
     """
     padded = np.pad(seen, 1, constant_values=True)
     above, level, below = padded[:-2], padded[1:-1], padded[2:]
