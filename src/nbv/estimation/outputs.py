@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import softmax
 
 from nbv.angles import direction_deg
 
@@ -42,7 +41,7 @@ def class_targets(settings: Settings, n_views: int) -> Targets:
     centres = 2 * np.pi * np.arange(n_classes) / n_classes
     apart = centres - 2 * np.pi * np.arange(n_views)[:, None] / n_views
     narrowness = 1.0 / np.radians(settings["target_bandwidth_deg"]) ** 2
-    return np.asarray(softmax(narrowness * (np.cos(apart) - 1.0), axis=1), dtype=np.float32)
+    return np.asarray(_softmax(narrowness * (np.cos(apart) - 1.0), axis=1), dtype=np.float32)
 
 
 def decode_directions(outputs: Outputs) -> Outputs:
@@ -58,4 +57,11 @@ def decode_classes(outputs: Outputs) -> Outputs:
     n_classes = outputs.shape[-1]
     angles = 2 * np.pi * np.arange(n_classes) / n_classes
     unit = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return decode_directions(softmax(outputs, axis=-1) @ unit)
+    return decode_directions(_softmax(outputs, axis=-1) @ unit)
+
+
+def _softmax(logits: Outputs, axis: int) -> Outputs:
+    # Loading it takes a tenth of a second, for which no regressor's job should wait.
+    from scipy.special import softmax
+
+    return np.asarray(softmax(logits, axis=axis))
