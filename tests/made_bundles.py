@@ -10,7 +10,7 @@ import yaml
 from numpy.typing import NDArray
 
 from nbv.bundles.beliefs import distributions_of
-from nbv.bundles.bundle import Bundle, PaperTables
+from nbv.bundles.bundle import Bundle, PaperTables, as_kept
 from nbv.bundles.calibration import bin_apart
 from nbv.bundles.familiarity import fit_familiarity
 from nbv.bundles.turns import Turn
@@ -86,7 +86,7 @@ def soft_turns(
 def made_bundle(seed: int = 0, **changes) -> Bundle:
     rng = np.random.default_rng(seed)
     estimator = settings()
-    weights = random_weights(estimator, seed=seed)
+    weights = as_kept(random_weights(estimator, seed=seed))
     names = ("a", "b", "c")
     elevations = (0.0, 30.0)
     turns, rows = [], []

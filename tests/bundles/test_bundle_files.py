@@ -17,11 +17,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from made_bundles import made_bundle, random_codes
+from made_bundles import made_bundle, random_codes, random_weights, settings
 from nbv.bundles.bundle import (
     FORMAT,
     PROBABILITY_STEP,
     BundleError,
+    as_kept,
     as_steps,
     from_steps,
     load_bundle,
@@ -144,6 +145,30 @@ def test_weights_without_axes_keep_none(tmp_path):
     assert found["one"].shape == (1,)
 
 
+def test_matrices_take_two_bytes_and_keep_eleven_bits(tmp_path):
+    weights = random_weights(settings())
+    save_bundle(tmp_path / "a.safetensors", made_bundle(weights=weights))
+    found = load_bundle(tmp_path / "a.safetensors").weights
+    rounded = as_kept(weights)
+    for name, array in weights.items():
+        assert found[name].dtype == np.float32
+        assert np.array_equal(found[name], rounded[name]), name
+        # The smallest half numbers are 2^-24 apart.
+        within = np.maximum(np.abs(array) * 2**-11, 2**-25) if array.ndim > 1 else 0.0
+        assert (np.abs(found[name] - array) <= within).all(), name
+    with safetensors.safe_open(tmp_path / "a.safetensors", framework="numpy") as stored:
+        for name, array in weights.items():
+            assert stored.get_tensor(f"network.{name}").itemsize == (2 if array.ndim > 1 else 4)
+
+
+def test_a_file_of_format_1_has_all_weights_in_single_precision(bundle_file, tmp_path):
+    weights = random_weights(settings(), seed=1)
+    of_names = {f"network.{name}": array.copy("C") for name, array in weights.items()}
+    old = with_about(bundle_file, tmp_path / "old.safetensors", of_names, format=1)
+    found = load_bundle(old).weights
+    assert all(np.array_equal(found[name], array) for name, array in weights.items())
+
+
 def test_provenance_may_be_any_json(tmp_path):
     provenance = {"versions": {"numpy": "2.4"}, "epochs": {10: "ten", 2: "two"}, "ü": [1.5, None]}
     save_bundle(tmp_path / "a.safetensors", made_bundle(provenance=provenance))
@@ -207,11 +232,12 @@ def written(path, content: bytes):
     return path
 
 
-def with_about(bundle_file, path, **changes):
-    """The same arrays with other metadata, and with the digest of both."""
+def with_about(bundle_file, path, arrays_=None, **changes):
+    """The same arrays, or some others, with other metadata, and with the digest of both."""
     with safetensors.safe_open(bundle_file, framework="numpy") as stored:
         about = json.loads(stored.metadata()["nbv"])
-        arrays_ = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
+        held = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
+    arrays_ = held | (arrays_ or {})
     about.pop("sha256")
     about |= changes
     about = {name: value for name, value in about.items() if value is not None}

@@ -1,7 +1,7 @@
 """A bundle: a trained network with what its errors on held-out objects taught, in one file.
 
 The file is of the safetensors format: arrays, and metadata as JSON. It holds no code. Calibration
-distributions are kept as logs, one byte each, see `PROBABILITY_STEP`.
+distributions are kept as logs, one byte each, see `PROBABILITY_STEP`; weights as of `as_kept`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from nbv.errors import NamedError
 from nbv.files import replacing
 from nbv.rendering.camera import Camera
 
-FORMAT = 1
-"""Raised when an older program cannot read a newer file."""
+FORMAT = 2
+"""Raised when an older program cannot read a newer file. 2: weights in half precision."""
 
 PROBABILITY_STEP = 0.054
 """Between kept logs of probabilities, in nats: 256 of them reach down to 1e-6."""
@@ -67,7 +67,7 @@ class Bundle:
     ----------
     category : str
     weights : mapping of str to ndarray
-        The network's, by the names of `nbv.estimation.networks.build_network`.
+        The network's, by the names of `nbv.estimation.networks.build_network`, as of `as_kept`.
     estimator : mapping
         Its settings.
     camera : Camera
@@ -131,6 +131,19 @@ def from_steps(steps: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.asarray(kept / kept.sum(axis=-1, keepdims=True))
 
 
+def as_kept(weights: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:
+    """Return a network's weights, rounded as a bundle keeps them: all matrices in half precision.
+
+    What calibrates a bundle has to see the weights that a robot will have.
+    """
+    return {name: _kept(array).astype(np.float32) for name, array in weights.items()}
+
+
+def _kept(array: NDArray[np.float32]) -> NDArray[np.floating]:
+    # Offsets and normalisation take no space.
+    return array.astype(np.float16) if array.ndim > 1 else array
+
+
 def save_bundle(path: str | Path, bundle: Bundle) -> None:
     """Write a bundle."""
     about = {
@@ -148,7 +161,7 @@ def save_bundle(path: str | Path, bundle: Bundle) -> None:
         "provenance": dict(bundle.provenance),
     }
     arrays: dict[str, NDArray[Any]] = {
-        _NETWORK + name: array for name, array in bundle.weights.items()
+        _NETWORK + name: _kept(array) for name, array in bundle.weights.items()
     }
     arrays |= {
         "calibration.elevation_deg": bundle.elevation_deg.astype(np.float32),
@@ -250,7 +263,7 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
     return Bundle(
         category=about["category"],
         weights={
-            name.removeprefix(_NETWORK): array
+            name.removeprefix(_NETWORK): array.astype(np.float32)
             for name, array in arrays.items()
             if name.startswith(_NETWORK)
         },

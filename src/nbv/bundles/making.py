@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.bundles.beliefs import distributions_of
-from nbv.bundles.bundle import Bundle
+from nbv.bundles.bundle import Bundle, as_kept
 from nbv.bundles.calibration import bin_apart, paper_tables, temperature_of
 from nbv.bundles.familiarity import fit_familiarity
 from nbv.bundles.turns import Turn
@@ -40,7 +40,7 @@ def turns_of(
         The least and the largest diagonal of an object's box in an image, pixels, of 98 % of
         all images.
     """
-    network = network_of(weights_of(estimator), estimator.settings, estimator.image_side)
+    network = network_of(as_kept(weights_of(estimator)), estimator.settings, estimator.image_side)
     turns, extents = [], []
     for elevation, of_elevation in zip(elevations_deg, images, strict=True):
         for object_id, codes in zip(object_ids, of_elevation.of(object_ids), strict=True):
@@ -108,7 +108,7 @@ def make_bundle(
     low, high = (share * side * length_m for share, side in zip(_MARGINS, extent_px, strict=True))
     return Bundle(
         category=category,
-        weights=weights_of(estimator),
+        weights=as_kept(weights_of(estimator)),
         estimator=estimator.settings,
         camera=camera,
         diagonal_m=diagonal_m,
