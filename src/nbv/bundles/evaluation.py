@@ -168,15 +168,8 @@ def at_random(rng: np.random.Generator) -> Chooser:
     return choose
 
 
-def choosers(
-    alike: LookAlikes,
-    seen: Seen,
-    affinity: Mapping[str, float],
-    n_views: int,
-    fixed_deg: float,
-    rng: np.random.Generator,
-) -> dict[str, Chooser]:
-    """Return the ways to choose that are compared, by name, for `n_views` views in all.
+def rivals(n_views: int, fixed_deg: float, rng: np.random.Generator) -> dict[str, Chooser]:
+    """Return the ways to choose `n_views` views with which the recommended ones are compared.
 
     The best fixed step is `fixed_deg`.
     """
@@ -188,7 +181,6 @@ def choosers(
         RANDOM: at_random(rng),
         FIXED: at_steps(fixed_deg),
         OPPOSITE if n_views == 2 else SPACED: at_steps(360.0 / n_views),
-        RECOMMENDED: recommended(alike, seen, affinity),
     }
 
 
@@ -269,19 +261,21 @@ def evaluate(
     of_steps = {number: fixed_errors_deg(alike, number) for number in numbers}
     for turn in turns:
         seen = seen_by(bundle, turn)
-        single = follow(seen, lambda beliefs, taken: np.zeros(len(beliefs)), 1)[:, 0]
+        # However many views there are, the first ones are the same.
+        errors = follow(seen, recommended(alike, seen, bundle.affinity), max(numbers))
+        single = errors[:, 0]
         offset = constant_offset_deg(single)
         rows.append(_row(seen, SINGLE, 1, single, offset))
         for number in numbers:
-            error = paper_errors(seen, bundle.paper, turn.elevation_deg, number)
-            rows.append(_row(seen, PAPER, number, error, offset))
+            of_paper = paper_errors(seen, bundle.paper, turn.elevation_deg, number)
+            rows.append(_row(seen, PAPER, number, of_paper, offset))
             fixed = best_fixed_deg(of_steps[number], seen.share)
             rng = np.random.default_rng(seed)
-            ways = choosers(alike, seen, bundle.affinity, number, fixed, rng)
-            for name, choose in ways.items():
+            for name, choose in rivals(number, fixed, rng).items():
                 repeats = n_random if name == RANDOM else 1
-                errors = [follow(seen, choose, number)[:, -1] for _ in range(repeats)]
-                rows.append(_row(seen, name, number, np.concatenate(errors), offset))
+                last = [follow(seen, choose, number)[:, -1] for _ in range(repeats)]
+                rows.append(_row(seen, name, number, np.concatenate(last), offset))
+            rows.append(_row(seen, RECOMMENDED, number, errors[:, number - 1], offset))
     return pd.DataFrame(rows)
 
 
