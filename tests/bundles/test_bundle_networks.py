@@ -12,9 +12,11 @@ import torch
 from made_bundles import SIDE, made_bundle, random_codes, random_weights, settings
 from nbv.angles import circular_distance_deg
 from nbv.bundles.beliefs import distributions_of
-from nbv.bundles.bundle import load_bundle
+from nbv.bundles.bundle import as_kept, load_bundle
+from nbv.bundles.making import turns_of
 from nbv.bundles.networks import open_network
 from nbv.bundles.recommender import bundle_path
+from nbv.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.estimation.hardware import choose_hardware
 from nbv.estimation.inference import network_outputs
@@ -158,6 +160,19 @@ def test_torch_gives_the_outputs_of_the_trained_network(bundle, rng):
     wanted = network_outputs(estimator, codes, choose_hardware("cpu", "float32"))
     logits = open_network(bundle, "torch")(codes)
     assert logits == pytest.approx(wanted, abs=1e-5)
+
+
+def test_calibration_sees_the_weights_that_a_bundle_keeps(rng):
+    weights = random_weights(settings())
+    network = build_network(settings(), SIDE)
+    network.load_state_dict({n: torch.from_numpy(a) for n, a in weights.items()}, strict=False)
+    estimator = Estimator(network.eval(), settings(), SIDE, [])
+    images = DepthImages(("a",), random_codes(rng, 12)[None])
+    ((turn,), _, _) = turns_of(estimator, [images], [0.0], ["a"])
+    kept = open_network(made_bundle(weights=as_kept(weights)), "torch")(images.codes[0])
+    assert np.array_equal(turn.logits, kept)
+    full = network_outputs(estimator, images.codes[0], choose_hardware("cpu", "float32"))
+    assert not np.allclose(turn.logits, full, rtol=0, atol=1e-5)
 
 
 def test_the_background_is_0_and_the_reference_is_1(bundle):

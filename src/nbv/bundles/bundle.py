@@ -131,7 +131,7 @@ def from_steps(steps: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.asarray(kept / kept.sum(axis=-1, keepdims=True))
 
 
-def as_kept(weights: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:
+def as_kept(weights: Mapping[str, NDArray[np.floating]]) -> dict[str, NDArray[np.float32]]:
     """Return a network's weights, rounded as a bundle keeps them: all matrices in half precision.
 
     What calibrates a bundle has to see the weights that a robot will have.
@@ -139,7 +139,7 @@ def as_kept(weights: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.
     return {name: _kept(array).astype(np.float32) for name, array in weights.items()}
 
 
-def _kept(array: NDArray[np.float32]) -> NDArray[np.floating]:
+def _kept(array: NDArray[np.floating]) -> NDArray[np.floating]:
     # Offsets and normalisation take no space.
     return array.astype(np.float16) if array.ndim > 1 else array
 
@@ -262,11 +262,13 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
     low, high = about["extent_m"]
     return Bundle(
         category=about["category"],
-        weights={
-            name.removeprefix(_NETWORK): array.astype(np.float32)
-            for name, array in arrays.items()
-            if name.startswith(_NETWORK)
-        },
+        weights=as_kept(
+            {
+                name.removeprefix(_NETWORK): array
+                for name, array in arrays.items()
+                if name.startswith(_NETWORK)
+            }
+        ),
         estimator=about["estimator"],
         camera=Camera(**about["camera"]),
         diagonal_m=about["diagonal_m"],
