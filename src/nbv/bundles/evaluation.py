@@ -168,7 +168,7 @@ def at_random(rng: np.random.Generator) -> Chooser:
     return choose
 
 
-def rivals(n_views: int, fixed_deg: float, rng: np.random.Generator) -> dict[str, Chooser]:
+def baselines(n_views: int, fixed_deg: float, rng: np.random.Generator) -> dict[str, Chooser]:
     """Return the ways to choose `n_views` views with which the recommended ones are compared.
 
     The best fixed step is `fixed_deg`.
@@ -271,7 +271,7 @@ def evaluate(
             rows.append(_row(seen, PAPER, number, of_paper, offset))
             fixed = best_fixed_deg(of_steps[number], seen.share)
             rng = np.random.default_rng(seed)
-            for name, choose in rivals(number, fixed, rng).items():
+            for name, choose in baselines(number, fixed, rng).items():
                 repeats = n_random if name == RANDOM else 1
                 last = [follow(seen, choose, number)[:, -1] for _ in range(repeats)]
                 rows.append(_row(seen, name, number, np.concatenate(last), offset))
