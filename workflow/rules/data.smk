@@ -37,7 +37,7 @@ rule meshes:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=per_attempt(1000),
+        mem_mb=per_attempt(1500),
         runtime=per_attempt(30),
     params:
         dataset=lambda wildcards: dataset_of(wildcards.category),
