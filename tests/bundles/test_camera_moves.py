@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
@@ -17,11 +17,13 @@ from nbv.bundles.moves import (
     as_rotations,
     elevation_from_gravity,
     moved_camera,
+    need_object_on_axis,
     read_pose,
     read_rotations,
     rotation_about,
 )
 from nbv.errors import UserError
+from nbv.frames.errors import FrameError
 from nbv.rendering.camera import viewpoint_frames
 
 points = arrays(np.float64, (3,), elements=st.floats(-3, 3))
@@ -327,3 +329,57 @@ def test_a_missing_file_is_named(tmp_path):
         read_pose(tmp_path / "no.npy")
     with pytest.raises(UserError, match="cannot be read"):
         read_pose(tmp_path)
+
+
+# The object is where the axis is
+
+
+@given(
+    seed=seeds,
+    point=points,
+    direction=directions,
+    along=st.floats(-2, 2),
+    apart_m=st.floats(0, 1),
+    diagonal_m=st.floats(0.05, 0.5),
+)
+def test_an_object_farther_from_the_axis_than_its_diagonal_is_refused(
+    seed, point, direction, along, apart_m, diagonal_m
+):
+    assume(abs(apart_m - diagonal_m) > 1e-6)
+    pose, unit = random_pose(seed), direction / np.linalg.norm(direction)
+    aside = np.cross(unit, np.roll(unit, 1) + np.array([0.3, 0.0, 0.0]))
+    assume(np.linalg.norm(aside) > 1e-3)
+    place = point + along * unit + apart_m * aside / np.linalg.norm(aside)
+    seen = (np.linalg.inv(pose) @ [*place, 1.0])[:3]
+    if apart_m < diagonal_m:
+        need_object_on_axis(pose, point, direction, seen, diagonal_m)
+        return
+    with pytest.raises(FrameError, match=f"{apart_m:.3g} m from the axis") as error:
+        need_object_on_axis(pose, point, direction, seen, diagonal_m)
+    assert error.value.name == "axis"
+
+
+def link_frame(pose):
+    """The same camera's pose with x forward, y left, z up (ROS REP 103's camera_link)."""
+    turned = pose.copy()
+    turned[:3, :3] = pose[:3, :3] @ np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
+    return turned
+
+
+def in_millimetres(pose):
+    return np.block([[pose[:3, :3], 1000 * pose[:3, 3:]], [pose[3:]]])
+
+
+@pytest.mark.parametrize("mistake", [np.linalg.inv, link_frame, in_millimetres])
+@pytest.mark.parametrize(("elevation", "azimuth"), [(0.0, 10.0), (30.0, 130.0), (60.0, 250.0)])
+def test_usual_mistakes_of_a_camera_pose_are_refused(mistake, elevation, azimuth):
+    centre, seen, up = np.array([0.5, 0.2, 0.1]), (0.02, -0.01, 0.7), (0, 0, 1)
+    pose = camera_at(elevation, azimuth, 0.7, centre)
+    need_object_on_axis(pose, centre, up, seen, 0.17)
+    with pytest.raises(FrameError, match="optical frame"):
+        need_object_on_axis(mistake(pose), centre, up, seen, 0.17)
+
+
+def test_an_axis_without_a_direction_is_refused_with_an_object_too():
+    with pytest.raises(UserError, match="a direction that is not 0"):
+        need_object_on_axis(np.eye(4), (0, 0, 0), (0, 0, 0), (0, 0, 1), 0.17)

@@ -191,6 +191,26 @@ def test_the_target_pose_is_a_rotation_about_the_axis(here, capsys):
         assert printed["target_camera_pose"] == printed["move"]["target_camera_pose"]
 
 
+def test_an_axis_is_refused_that_is_not_where_the_object_is_seen(here, capsys):
+    camera = f"{FOCAL_PX},{FOCAL_PX},{COLUMNS / 2 - 0.5},{ROWS / 2 - 0.5}"
+    options = ("f0.npy", "--bundle", "b.safetensors", "--json")
+    known = run(capsys, "recommend", *options, "--intrinsics", camera)
+    seen = json.loads(known)["object_position_m"]
+    point = (np.array(POSE) @ [*seen, 1.0])[:3]
+    placed = (*options, "--camera-pose", "pose.json", "--axis")
+    diagonal_m = load_bundle("b.safetensors").diagonal_m
+    for share in (0.9, 1.1):
+        axis = ",".join(str(place) for place in point + np.array([0, share * diagonal_m, 5]))
+        # Without a principal point nobody knows in which direction the object is.
+        assert json.loads(run(capsys, "recommend", *placed, axis))["object_position_m"] is None
+        if share < 1:
+            printed = json.loads(run(capsys, "recommend", *placed, axis, "--intrinsics", camera))
+            assert printed["object_position_m"] == pytest.approx(seen)
+        else:
+            line = fails(capsys, "recommend", *placed, axis, "--intrinsics", camera)
+            assert line.startswith("nbv: error: axis: the object is seen at ")
+
+
 @pytest.mark.parametrize(
     ("gravity", "elevation"),
     [

@@ -134,6 +134,24 @@ def test_further_columns_are_ignored(folder):
     assert found.azimuth_deg.tolist() == list(AZIMUTHS)
 
 
+@pytest.mark.parametrize("column", ["Mask", " fx", "ELEVATION_DEG"])
+def test_a_known_column_that_is_written_otherwise_is_refused(folder, column):
+    message = refused(manifest(folder, table(**{column: ["", "", "", ""]})))
+    assert f"column {column!r}; call it {column.strip().lower()!r}" in message
+
+
+def test_a_file_occurs_once_in_a_sequence(folder):
+    message = refused(manifest(folder, table(file=["f0.npy", "f1.npy", "f2.npy", "f1.npy"])))
+    assert "row 5: file 'f1.npy' is in this sequence already" in message
+    rows = table(file=["f0.npy", "f1.npy", "f0.npy", "f1.npy"], sequence=[1, 1, 2, 2])
+    assert len(read_manifest(manifest(folder, rows))) == 2
+
+
+def test_commas_stand_between_columns(folder):
+    table().to_csv(folder / "manifest.csv", index=False, sep=";")
+    assert refused(folder / "manifest.csv").endswith("; commas stand between columns")
+
+
 @pytest.mark.parametrize("column", ["object_id", "sequence", "file", "azimuth_deg"])
 def test_a_missing_column_is_named(folder, column):
     message = refused(manifest(folder, table().drop(columns=column)))

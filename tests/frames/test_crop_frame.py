@@ -67,6 +67,22 @@ def test_a_frame_gives_the_codes_of_the_training_camera(elevation, azimuth, dist
     assert np.quantile(apart, 0.9) <= 2
 
 
+@given(
+    elevation=st.floats(0, 60),
+    azimuth=st.floats(0, 360),
+    distance=st.floats(4, 7),
+    across=st.floats(-0.5, 0.5),
+    up=st.floats(-0.2, 0.2),
+)
+@settings(max_examples=40, deadline=None)
+def test_the_object_is_where_it_was_drawn(elevation, azimuth, distance, across, up):
+    depth = frame(elevation, azimuth, distance, across=across, up=up) * DIAGONAL_M
+    camera = Intrinsics(575.0, 575.0, 159.5, 119.5)
+    drawn = DIAGONAL_M * np.array([across, -up, distance])
+    assert np.linalg.norm(cropped(depth, intrinsics=camera).centre_m - drawn) < 0.25 * DIAGONAL_M
+    assert cropped(depth).centre_m is None
+
+
 def seen_from(elevation, azimuth, distance, across, up):
     """Elevation, azimuth and distance of a camera that is directed at the object from there."""
     right, above, forward = (axes[0] for axes in viewpoint_frames(elevation, [azimuth]))

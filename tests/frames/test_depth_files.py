@@ -171,11 +171,12 @@ def test_what_is_given_is_not_changed():
 # What is refused
 
 
-def refused(name: str, path: Path):
+def refused(name: str, path: Path) -> str:
     with pytest.raises(FrameError, match=path.name) as error:
         read_depth(path)
     assert error.value.name == name
     assert str(error.value).startswith(f"{name}: ")
+    return str(error.value)
 
 
 @pytest.mark.parametrize("suffix", ["png", "tif", "pgm"])
@@ -190,9 +191,11 @@ def test_colour_images_are_refused(tmp_path, mode):
     refused("colour-image", tmp_path / "a.png")
 
 
-@pytest.mark.parametrize("shape", [(7,), (2, 3, 3), (2, 2, 2, 2)])
+@pytest.mark.parametrize("shape", [(7,), (2, 3, 3), (2, 6, 8), (2, 2, 2, 2)])
 def test_arrays_without_rows_and_columns_alone_are_refused(tmp_path, shape):
-    refused("colour-image", saved(tmp_path / "a.npy", np.ones(shape)))
+    message = refused("colour-image", saved(tmp_path / "a.npy", np.ones(shape)))
+    is_colour = shape == (2, 3, 3)
+    assert ("a colour image" if is_colour else f"an array of shape {shape}") in message
 
 
 @pytest.mark.parametrize(

@@ -63,15 +63,21 @@ def read_manifest(path: str | Path) -> list[Recording]:
     Raises
     ------
     UserError
-        Where a column or a file is missing, an azimuth is no number, or another cell holds what it
-        cannot hold; it names the row.
+        Where a column or a file is missing, a file occurs twice in a sequence, an azimuth is no
+        number, or another cell holds what it cannot hold; it names the row.
     """
     path = Path(path)
     table = read_rows(path, NEEDED)
+    for name in map(str, table):
+        if name != (known := name.strip().lower()) and known in OPTIONAL:
+            raise UserError(f"{path}: a column {name!r}; call it {known!r}")
     for name in {"azimuth_deg", *OPTIONAL} - {"mask"}:
         if name in table:
             table[name] = _numbers(path, table[name])
     table["path"] = _files(path, table["file"])
+    if (again := table.duplicated(["object_id", "sequence", "file"])).any():
+        place = int(again.to_numpy().argmax())
+        _refuse(path, place, f"file {table['file'][place]!r} is in this sequence already")
     if "mask" in table:
         table["mask"] = _files(path, table["mask"])
     intrinsics = list(_intrinsics(path, table))

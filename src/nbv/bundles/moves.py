@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.errors import UserError
 from nbv.files import read_numbers
+from nbv.frames.errors import FrameError
 
 Pose = NDArray[np.float64]
 
@@ -64,12 +65,7 @@ def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> 
     UserError
         Where the axis has no direction.
     """
-    origin = np.asarray(point, dtype=np.float64)
-    axis = np.asarray(direction, dtype=np.float64)
-    length = float(np.linalg.norm(axis))
-    if not (math.isfinite(length) and length > 1e-9 and np.isfinite(origin).all()):
-        raise UserError("axis: give a point and a direction that is not 0")
-    x, y, z = axis / length
+    origin, (x, y, z) = _as_axis(point, direction)
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     angle = math.radians(angle_deg)
     turn = np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
@@ -77,6 +73,18 @@ def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> 
     motion[:3, :3] = turn
     motion[:3, 3] = origin - turn @ origin
     return motion
+
+
+def _as_axis(
+    point: ArrayLike, direction: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a point (3,) and the direction (3,) of unit length."""
+    origin = np.asarray(point, dtype=np.float64)
+    axis = np.asarray(direction, dtype=np.float64)
+    length = float(np.linalg.norm(axis))
+    if not (math.isfinite(length) and length > 1e-9 and np.isfinite(origin).all()):
+        raise UserError("axis: give a point and a direction that is not 0")
+    return origin, axis / length
 
 
 def moved_camera(
@@ -107,6 +115,46 @@ def moved_camera(
     True
     """
     return rotation_about(point, direction, rotation_deg) @ as_pose(camera_pose)
+
+
+def need_object_on_axis(
+    camera_pose: ArrayLike,
+    point: ArrayLike,
+    direction: ArrayLike,
+    object_position_m: ArrayLike,
+    diagonal_m: float,
+) -> None:
+    """Refuse a camera pose and an axis that do not fit the frame: the object is elsewhere.
+
+    So a pose in another unit, of another frame or turned round moves no robot.
+
+    Parameters
+    ----------
+    camera_pose, point, direction
+        See `moved_camera`.
+    object_position_m : (3,)
+        Where the object is seen, in the camera's optical frame.
+    diagonal_m : float
+        Of the object's bounding box: the largest distance from the axis that is plausible.
+
+    Raises
+    ------
+    FrameError
+        ``axis``.
+    UserError
+        As of `moved_camera`.
+    """
+    origin, along = _as_axis(point, direction)
+    seen = (as_pose(camera_pose) @ np.append(np.asarray(object_position_m), 1.0))[:3]
+    apart_m = float(np.linalg.norm(np.cross(seen - origin, along)))
+    if apart_m > diagonal_m:
+        place = ", ".join(f"{coordinate:.3g}" for coordinate in seen)
+        raise FrameError(
+            "axis",
+            f"the object is seen at {place} in the base frame, {apart_m:.3g} m from the axis, and "
+            f"{diagonal_m:.2g} m at the most are plausible: is the camera pose that of the optical "
+            "frame (z forward) in the base frame, and are both in metres?",
+        )
 
 
 def elevation_from_gravity(gravity: ArrayLike) -> float:

@@ -101,6 +101,9 @@ class Recommendation:
         How many views the belief is fused of.
     crops : tuple of ndarray (side, side) uint8
         What the network saw of each frame; none where no frame was seen.
+    object_position_m : tuple of float, or None
+        About where the object's origin is in the last frame's optical frame (x right, y down, z
+        forward), metres. None where the intrinsics have no principal point, or no frame was seen.
 
     Examples
     --------
@@ -123,6 +126,7 @@ class Recommendation:
     warnings: tuple[str, ...]
     n_views: int
     crops: tuple[NDArray[np.uint8], ...] = ()
+    object_position_m: tuple[float, float, float] | None = None
 
     @property
     def is_unfamiliar(self) -> bool:

@@ -204,7 +204,11 @@ class Recommender:
             max_travel_deg=max_travel_deg,
         )
         doubts = (doubt for crop in crops for doubt in crop.doubts)
-        return replace(answer, warnings=(*dict.fromkeys(doubts), *answer.warnings))
+        return replace(
+            answer,
+            warnings=(*dict.fromkeys(doubts), *answer.warnings),
+            object_position_m=crops[-1].centre_m,
+        )
 
     def recommend_crops(
         self,

@@ -74,7 +74,8 @@ def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
         raise UserError(f"{path} cannot be read ({' '.join(str(error).split())})") from error
     for name in needed:
         if name not in table:
-            raise UserError(f"{path}: no column {name!r}; it needs {', '.join(needed)}")
+            hint = "; commas stand between columns" if table.shape[1] == 1 else ""
+            raise UserError(f"{path}: no column {name!r}; it needs {', '.join(needed)}{hint}")
     if table.empty:
         raise UserError(f"{path} has no rows")
     return table

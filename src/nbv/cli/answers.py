@@ -80,6 +80,7 @@ def recommendation_as_json(
         "bayes_factor": answer.bayes_factor,
         "warnings": list(answer.warnings),
         "assumed_focal_px": assumed_focal_px,
+        "object_position_m": answer.object_position_m,
         "belief": answer.belief.tolist(),
         "error_after_deg": [None if e == float("inf") else e for e in answer.error_after_deg],
     }

@@ -52,6 +52,9 @@ class Crop:
         The median depth of the object, metres.
     extent_m : float
         The diagonal of the object's bounding box in the image, metres.
+    centre_m : tuple of float, or None
+        About where the object's origin is in the camera's optical frame (x right, y down, z
+        forward), metres; None where the principal point is not known.
     doubts : tuple of str
         What may be wrong with the frame, a sentence each.
     """
@@ -59,6 +62,7 @@ class Crop:
     codes: NDArray[np.uint8]
     distance_m: float
     extent_m: float
+    centre_m: tuple[float, float, float] | None = None
     doubts: tuple[str, ...] = ()
 
 
@@ -154,7 +158,9 @@ def crop_frame(
     at = row.clip(0, rows - 1), column.clip(0, columns - 1)
     depth = np.where(inside & mask[at], depth_m[at] / (diagonal_m * ahead), 0.0)
     codes = encode_depth(depth[None].astype(np.float32), camera)[0]
-    return Crop(codes, distance_m, extent, intrinsics.doubts(*window.frame_shape))
+    right_m, down_m, ahead_m = (away_m * turn[2]).tolist()
+    centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
+    return Crop(codes, distance_m, extent, centre_m, intrinsics.doubts(*window.frame_shape))
 
 
 def _facing(

@@ -23,6 +23,7 @@ MILLIMETRE = 0.001
 ARRAYS, IMAGES = (".npy", ".npz"), (".png", ".tif", ".tiff", ".pgm")
 
 _MOST_PIXELS = 10**8
+_MOST_CHANNELS = 4
 _NUMBERS = "biuf"
 # Kind, columns, rows and the largest value that may occur; comments may stand between them.
 _PGM_HEADER = re.compile(rb"P[25]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)")
@@ -104,8 +105,11 @@ def to_metres(
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[:, :, 0]
     if values.ndim != 2:
-        what = "a colour image" if values.ndim == 3 else f"an array of {values.ndim} axes"
-        raise FrameError("colour-image", f"{name} is {what}; give the depth image")
+        is_colour = values.ndim == 3 and values.shape[2] <= _MOST_CHANNELS
+        what = "a colour image" if is_colour else f"an array of shape {values.shape}"
+        raise FrameError(
+            "colour-image", f"{name} is {what}; give one depth image, rows and columns alone"
+        )
     if depth_scale is not None and not 0 < depth_scale < math.inf:
         raise UserError(f"--depth-scale={depth_scale:g}: must be above 0 (metres per unit)")
     if np.issubdtype(values.dtype, np.floating):

@@ -64,7 +64,8 @@ def object_mask(
     inside = depth_m > 0
     if not inside.any():
         raise FrameError(
-            "empty-mask", "the frame has no depth at all: is the sensor covered, or too near?"
+            "empty-mask",
+            "the frame has no depth at all, no number above 0: is the sensor covered, or too near?",
         )
     if mask is not None:
         given = is_in_mask(mask)
