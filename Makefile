@@ -18,6 +18,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 AUDIT := $(VENV)/.audit-ready
 DOCS := $(VENV)/.docs-ready
+INSTALL_LOCKED := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes
 PYTEST := $(BIN)/pytest --numprocesses $(CORES) --dist worksteal
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
@@ -97,6 +98,7 @@ docs: $(DOCS)
 	@echo "the site: build/site/index.html"
 
 check: $(READY)
+	$(BIN)/python -m pip check
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -105,7 +107,7 @@ check: $(READY)
 	$(BIN)/snakemake --lint
 
 $(READY): requirements.lock requirements-torch.lock workflow/environment.post-deploy.sh pyproject.toml
-	@echo "nbv: first the environment: what is locked, into $(VENV); usually two minutes and 1.6 GB, once only"
+	@echo "nbv: first the environment: what is locked, into $(VENV); usually two minutes and 1.9 GB, once only"
 	@$(PYTHON) -c 'import sys; (3, 11) <= sys.version_info[:2] <= (3, 13) or sys.exit("nbv needs Python 3.11 to 3.13, this is " + sys.version.split()[0] + ": make PYTHON=python3.12 ...")'
 	$(PYTHON) -m venv --clear $(VENV)
 	PATH="$(CURDIR)/$(BIN):$$PATH" bash workflow/environment.post-deploy.sh
@@ -113,13 +115,12 @@ $(READY): requirements.lock requirements-torch.lock workflow/environment.post-de
 	@echo "nbv: the environment is ready"
 
 $(AUDIT): $(READY) requirements-audit.lock requirements-slurm.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes \
+	$(INSTALL_LOCKED) \
 		--requirement requirements-audit.lock --requirement requirements-slurm.lock
 	touch $@
 
 $(DOCS): $(READY) requirements-docs.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes \
-		--requirement requirements-docs.lock
+	$(INSTALL_LOCKED) --requirement requirements-docs.lock
 	touch $@
 
 clean:
