@@ -97,6 +97,23 @@ def test_calibration_distributions_are_those_of_the_network(made: Project) -> No
     assert bundle.distributions[place] == pytest.approx(found, rel=0.06, abs=1e-6)
 
 
+def test_a_bundle_is_tested_on_a_view_every_15_degrees(made: Project) -> None:
+    recommender = Recommender.load(made.results / "bundles/mug.safetensors", "torch")
+    found = pd.read_csv(made.results / "bundles/mug.csv", dtype={"sequence": str})
+    single = found[found["choice"] == "single"].set_index(["sequence", "object_id"])["mae_deg"]
+    azimuth_deg = np.arange(24) * 15.0
+    for elevation in ("00", "30"):
+        images = np.load(made.results / f"bundles/depth/mug/el{elevation}.npy", mmap_mode="r")
+        names = json.loads(
+            (made.results / f"bundles/depth/mug/el{elevation}_objects.json").read_text()
+        )
+        for object_id, mae_deg in single[str(int(elevation))].items():
+            beliefs = recommender.distributions(np.asarray(images[names.index(object_id), ::15]))
+            poses = np.degrees(np.angle(beliefs @ np.exp(1j * np.radians(azimuth_deg)))) % 360
+            apart = np.abs(poses - azimuth_deg)
+            assert np.minimum(apart, 360 - apart).mean() == pytest.approx(mae_deg, abs=1e-3)
+
+
 def test_the_same_settings_give_the_same_bytes(made: Project, tmp_path) -> None:
     again = copy_of_project(tmp_path)
     again.run("--cores", "1", "bundles", overrides=CAMERA)
