@@ -17,7 +17,7 @@ from nbv.config import read_configuration
 from nbv.reporting.runtime import load_measured
 
 REFERENCE = Path(__file__).parents[1] / "docs/reference/paper"
-OF_UNIT = ("estimate", "lookup", "evaluate_baselines", "evaluate_recommended")
+OF_UNIT = ("lookup", "evaluate_baselines", "evaluate_recommended")
 OF_CATEGORIES = ("table", "figure")
 
 

@@ -101,7 +101,6 @@ def test_another_bandwidth_reruns_lookups_and_what_follows(finished):
 def test_another_training_length_reruns_training_and_what_follows(finished):
     assert finished.would_run("estimator.epochs=2") == {
         "train": 4,
-        "estimate": 4,
         "lookup": 4,
         "evaluate_baselines": 4,
         "evaluate_recommended": 4,
@@ -152,7 +151,7 @@ def test_an_edit_of_a_criterion_leaves_training_alone(scratch):
     jobs = scratch.would_run()
     assert jobs["lookup"] == 4
     assert jobs["evaluate_recommended"] == 4
-    assert not {"meshes", "render", "train", "estimate"} & set(jobs)
+    assert not {"meshes", "render", "train"} & set(jobs)
 
 
 def test_the_explorer_is_made_on_request_of_what_a_finished_run_has(finished):
@@ -247,7 +246,7 @@ def test_a_finished_job_and_not_a_clock_makes_snakemake_schedule_again(scratch):
 
 def test_extensions_are_made_and_leave_the_paper_alone(scratch):
     targets = ("extensions",)
-    assert not {"meshes", "render", "train", "estimate"} & set(scratch.would_run(targets=targets))
+    assert not {"meshes", "render", "train"} & set(scratch.would_run(targets=targets))
     before = scratch.outcome()
     tall = tuple(each for each in TINY if not each.startswith("elevations_deg"))
     scratch.run("--cores", "2", *targets, overrides=(*tall, "elevations_deg.mug=[0,30]"))

@@ -236,6 +236,17 @@ def posteriors_of_fold(layout=LAYOUT):
     }
 
 
+def estimates_of_fold(layout=LAYOUT):
+    """The files of a fold's estimates by name, and those of distributions."""
+    estimates = {role: layout.estimates(*FOLD, role) for role in ESTIMATED_ROLES}
+    return posteriors_of_fold(layout) | estimates
+
+
+def estimates_of_training(layout=LAYOUT):
+    """The files of estimates that a training makes: all, or none if others train for them."""
+    return {} if CROSSFIT or EXTERNAL else estimates_of_fold(layout)
+
+
 # What a training starts from.
 
 
@@ -368,7 +379,9 @@ def counted_jobs():
         "train_part": [
             f"{fold_folder(*fold)}/{part}" for fold in folds_of(UNITS) for part in PARTS
         ],
-        "estimate": [fold_folder(*fold) for fold in folds_of(UNITS)],
+        "estimate": [
+            fold_folder(*fold) for fold in folds_of(UNITS) if CROSSFIT or EXTERNAL
+        ],
         "lookup": [
             f"{fold_folder(*fold)}/{criterion}"
             for fold in folds_of(UNITS)

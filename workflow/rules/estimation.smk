@@ -38,6 +38,7 @@ use rule pretrain as pretrain_part with:
         LAYOUT.benchmark("pretrain_part/fold{fold}/{part}")
 
 
+# It estimates, too, what its estimator has not seen: a job of its own would load torch once more.
 rule train:
     input:
         sources("train_estimator"),
@@ -46,7 +47,8 @@ rule train:
         objects=rules.render.output.objects,
         start=training_start,
     output:
-        LAYOUT.estimator(*FOLD),
+        **estimates_of_training(),
+        estimator=LAYOUT.estimator(*FOLD),
     log:
         LAYOUT.log(f"train/{fold_folder(*FOLD)}"),
     benchmark:
@@ -68,7 +70,7 @@ rule train:
 # One estimator for each part: it trains on all other parts, and its part calibrates it.
 use rule train as train_part with:
     output:
-        LAYOUT.part_estimator(*FOLD, "{part}"),
+        estimator=LAYOUT.part_estimator(*FOLD, "{part}"),
     log:
         LAYOUT.log(f"train_part/{fold_folder(*FOLD)}/{{part}}"),
     benchmark:
@@ -83,8 +85,7 @@ if EXTERNAL:
             splits=rules.splits.output[0],
             pairs=CONFIG["estimator"]["pairs"],
         output:
-            calibration=LAYOUT.estimates(*FOLD, "calibration"),
-            test=LAYOUT.estimates(*FOLD, "test"),
+            **estimates_of_fold(),
         log:
             LAYOUT.log(f"estimate/{fold_folder(*FOLD)}"),
         benchmark:
@@ -99,18 +100,19 @@ if EXTERNAL:
 
 else:
 
+    ruleorder: train > estimate
+
+    # Where calibration is cross-fitted, several estimators answer for a fold.
     rule estimate:
         input:
             sources("estimate_views"),
             splits=rules.splits.output[0],
             depth=rules.render.output.depth,
             objects=rules.render.output.objects,
-            estimator=rules.train.output[0],
+            estimator=rules.train.output.estimator,
             of_parts=[LAYOUT.part_estimator(*FOLD, part) for part in PARTS],
         output:
-            **posteriors_of_fold(),
-            calibration=LAYOUT.estimates(*FOLD, "calibration"),
-            test=LAYOUT.estimates(*FOLD, "test"),
+            **estimates_of_fold(),
         log:
             LAYOUT.log(f"estimate/{fold_folder(*FOLD)}"),
         benchmark:

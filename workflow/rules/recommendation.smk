@@ -5,7 +5,7 @@ rule lookup:
     input:
         sources("build_lookup"),
         splits=rules.splits.output[0],
-        calibration=rules.estimate.output.calibration,
+        calibration=LAYOUT.estimates(*FOLD, "calibration"),
     output:
         LAYOUT.lookup(*FOLD, "{criterion}"),
     log:
@@ -27,7 +27,7 @@ rule evaluate_baselines:
     input:
         sources("evaluate_baselines"),
         splits=rules.splits.output[0],
-        test=rules.estimate.output.test,
+        test=LAYOUT.estimates(*FOLD, "test"),
     output:
         [LAYOUT.evaluation(*FOLD, method) for method in BASELINE_METHODS],
     log:
@@ -50,7 +50,7 @@ rule evaluate_recommended:
     input:
         sources("evaluate_recommended"),
         splits=rules.splits.output[0],
-        test=rules.estimate.output.test,
+        test=LAYOUT.estimates(*FOLD, "test"),
         lookup=lambda wildcards: LAYOUT.lookup(
             wildcards.category,
             wildcards.elevation,

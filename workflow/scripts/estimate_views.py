@@ -3,13 +3,11 @@
 from nbv.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.estimates import write_estimates
-    from nbv.calibration.posteriors import write_posteriors
     from nbv.calibration.splits import read_splits
     from nbv.depth_images import open_depth
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.weights import load_estimator
-    from nbv.experiments.held_out import estimate_fold
+    from nbv.experiments.held_out import estimate_fold, write_fold
 
     params, given, output = snakemake.params, snakemake.input, snakemake.output
     use_one_thread()
@@ -23,7 +21,4 @@ with job(snakemake):
         hardware,
         distributions=bool(output.get("test_posteriors")),
     )
-    for role, (estimates, posteriors) in found.items():
-        write_estimates(output[role], estimates)
-        if posteriors is not None:
-            write_posteriors(output[f"{role}_posteriors"], posteriors)
+    write_fold(output, found)

@@ -1,4 +1,8 @@
-"""Train the estimator of one category, elevation and fold, or of the parts but one of a fold."""
+"""Train the estimator of one category, elevation and fold, or of the parts but one of a fold.
+
+A fold's own estimator then estimates the calibration and the test objects, where files for that
+are asked for.
+"""
 
 from nbv.jobs import job
 
@@ -7,20 +11,22 @@ with job(snakemake):
     from nbv.depth_images import open_depth
     from nbv.estimation.hardware import choose_hardware, use_one_thread
     from nbv.estimation.training import train_estimator
-    from nbv.estimation.weights import read_start, save_estimator
+    from nbv.estimation.weights import load_estimator, read_start, save_estimator
+    from nbv.experiments.held_out import estimate_fold, write_fold
     from nbv.seeds import seed_for
 
-    params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
+    params, wildcards = snakemake.params, snakemake.wildcards
+    given, output = snakemake.input, snakemake.output
     use_one_thread()
     splits, images = read_splits(given.splits), open_depth(given.depth, given.objects)
     need_objects(splits, images.object_ids)
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
-    part = wildcards.get("part")
+    fold, part = int(wildcards.fold), wildcards.get("part")
     roles = training_roles(splits, without=None if part is None else int(part))
-    object_ids = objects_with_role(splits, int(wildcards.fold), *roles)
-    output = snakemake.output[0]
+    object_ids = objects_with_role(splits, fold, *roles)
     starts = [
-        read_start(path, wildcards.category, object_ids, output, hardware) for path in given.start
+        read_start(path, wildcards.category, object_ids, output.estimator, hardware)
+        for path in given.start
     ]
     estimator = train_estimator(
         images,
@@ -30,4 +36,12 @@ with job(snakemake):
         seed_for(params.seed, "train", *wildcards),
         start=starts[0] if starts else None,
     )
-    save_estimator(output, estimator, hardware)
+    save_estimator(output.estimator, estimator, hardware)
+    if output.get("test"):
+        # What is estimated with is what the file holds.
+        saved = load_estimator(output.estimator, hardware)
+        distributions = bool(output.get("test_posteriors"))
+        found = estimate_fold(
+            images, splits, fold, saved, [], hardware, distributions=distributions
+        )
+        write_fold(output, found)

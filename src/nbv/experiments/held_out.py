@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from nbv.calibration.estimates import Estimates
-from nbv.calibration.posteriors import Posteriors, fit_temperature, posteriors_of
+from nbv.calibration.estimates import Estimates, write_estimates
+from nbv.calibration.posteriors import (
+    Posteriors,
+    fit_temperature,
+    posteriors_of,
+    write_posteriors,
+)
 from nbv.calibration.splits import calibration_roles, need_objects, objects_with_role
 from nbv.depth_images import DepthImages
 from nbv.estimation.hardware import Hardware
 from nbv.estimation.inference import decode, outputs_of_parts
 from nbv.estimation.weights import Estimator
+
+FoldEstimates = dict[str, tuple[Estimates, Posteriors | None]]
+"""For ``calibration`` and ``test``; without posteriors where outputs are no logits."""
 
 
 def estimate_fold(
@@ -25,7 +33,7 @@ def estimate_fold(
     hardware: Hardware,
     *,
     distributions: bool,
-) -> dict[str, tuple[Estimates, Posteriors | None]]:
+) -> FoldEstimates:
     """Estimate every view of a fold's calibration and test objects.
 
     Parameters
@@ -46,8 +54,7 @@ def estimate_fold(
 
     Returns
     -------
-    dict of str to tuple
-        For ``calibration`` and ``test``; without posteriors where outputs are no logits.
+    FoldEstimates
 
     Raises
     ------
@@ -72,3 +79,19 @@ def estimate_fold(
             posteriors = posteriors_of(object_ids, output, temperature)
         found[role] = Estimates(tuple(object_ids), decode(tested, output, temperature)), posteriors
     return found
+
+
+def write_fold(paths: Mapping[str, str], found: FoldEstimates) -> None:
+    """Write what `estimate_fold` returned.
+
+    Parameters
+    ----------
+    paths : mapping
+        The files of ``calibration`` and ``test``, and where there are posteriors those of
+        ``calibration_posteriors`` and ``test_posteriors``.
+    found : FoldEstimates
+    """
+    for role, (estimates, posteriors) in found.items():
+        write_estimates(paths[role], estimates)
+        if posteriors is not None:
+            write_posteriors(paths[f"{role}_posteriors"], posteriors)

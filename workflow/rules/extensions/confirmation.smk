@@ -57,7 +57,8 @@ use rule train as replicate_train with:
         objects=rules.render.output.objects,
         start=replicate_start,
     output:
-        OF_REPLICATE.estimator(*FOLD),
+        **estimates_of_training(OF_REPLICATE),
+        estimator=OF_REPLICATE.estimator(*FOLD),
     log:
         LAYOUT.log(f"replicate_train/{REPLICATE}/{fold_folder(*FOLD)}"),
     benchmark:
@@ -66,7 +67,7 @@ use rule train as replicate_train with:
 
 use rule replicate_train as replicate_train_part with:
     output:
-        OF_REPLICATE.part_estimator(*FOLD, "{part}"),
+        estimator=OF_REPLICATE.part_estimator(*FOLD, "{part}"),
     log:
         LAYOUT.log(f"replicate_train_part/{REPLICATE}/{fold_folder(*FOLD)}/{{part}}"),
     benchmark:
@@ -75,18 +76,19 @@ use rule replicate_train as replicate_train_part with:
         )
 
 
+ruleorder: replicate_train > replicate_estimate
+
+
 use rule estimate as replicate_estimate with:
     input:
         sources("estimate_views"),
         splits=shuffled_splits,
         depth=rules.render.output.depth,
         objects=rules.render.output.objects,
-        estimator=rules.replicate_train.output[0],
+        estimator=rules.replicate_train.output.estimator,
         of_parts=[OF_REPLICATE.part_estimator(*FOLD, part) for part in PARTS],
     output:
-        **posteriors_of_fold(OF_REPLICATE),
-        calibration=OF_REPLICATE.estimates(*FOLD, "calibration"),
-        test=OF_REPLICATE.estimates(*FOLD, "test"),
+        **estimates_of_fold(OF_REPLICATE),
     log:
         LAYOUT.log(f"replicate_estimate/{REPLICATE}/{fold_folder(*FOLD)}"),
     benchmark:

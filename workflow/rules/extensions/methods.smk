@@ -10,10 +10,8 @@ EXTENSION_LOOKUPS = [
 rule evaluate_extensions:
     input:
         sources("evaluate_extensions"),
-        **posteriors_of_fold(),
+        **estimates_of_fold(),
         splits=rules.splits.output[0],
-        calibration=rules.estimate.output.calibration,
-        test=rules.estimate.output.test,
         methods=[LAYOUT.evaluation(*FOLD, name) for name in METHODS],
     output:
         evaluations=[LAYOUT.evaluation(*FOLD, name) for name in EXTENSIONS],

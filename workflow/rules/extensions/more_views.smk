@@ -4,10 +4,8 @@
 rule evaluate_more_views:
     input:
         sources("evaluate_more_views"),
-        **posteriors_of_fold(),
+        **estimates_of_fold(),
         splits=rules.splits.output[0],
-        calibration=rules.estimate.output.calibration,
-        test=rules.estimate.output.test,
         choices=rules.evaluate_extensions.output.choices,
     output:
         LAYOUT.extension(*FOLD, "more_views"),

@@ -56,7 +56,7 @@ use rule train as transfer_train with:
         # Another estimator has seen the run's own condition.
         start=[],
     output:
-        OF_TRAINED.estimator(*FOLD),
+        estimator=OF_TRAINED.estimator(*FOLD),
     log:
         LAYOUT.log(f"transfer/train/{{trained}}/{fold_folder(*FOLD)}"),
     benchmark:
