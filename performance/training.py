@@ -16,7 +16,7 @@ from nbv.estimation.networks import build_network
 from nbv.estimation.training import train_network
 from performance.figures import Figure, Target
 from performance.settings import configuration
-from performance.timing import Work, take_turns
+from performance.timing import Turns, Work, take_turns
 
 TARGET = Target(0.90)
 N_VIEWS, SIDE = 360, 64
@@ -26,8 +26,26 @@ def run(quick: bool) -> list[Figure]:
     use_one_thread()
     settings = {**configuration()["estimator"], "epochs": 1 if quick else 2}
     hardware = choose_hardware("cpu", settings["precision"])
-    # More than processors' caches hold: images must come from memory, as they do in the paper run.
     n_objects = 3 if quick else 20
+    turns = bare_and_own(settings, hardware, n_objects, 1 if quick else 8)
+    n_images = n_objects * N_VIEWS
+    steps = n_images // settings["batch_size"] * settings["epochs"]
+    bare, own = (steps * settings["batch_size"] / turns.typical(column) for column in (0, 1))
+    detail = (
+        f"{own:,.0f} against {bare:,.0f} images/s ({hardware}, one thread); "
+        f"{settings['epochs']} epochs of {n_images:,} images in batches of {settings['batch_size']}"
+    )
+    return [Figure("training: own loop / bare steps", turns.ratio(0, 1), TARGET, detail)]
+
+
+def bare_and_own(
+    settings: Mapping[str, Any], hardware: Hardware, n_objects: int, n_rounds: int
+) -> Turns:
+    """Return the times of as many bare steps as a training takes, and of the training.
+
+    20 objects are more than processors' caches hold: images must come from memory, as they do in
+    the paper's run.
+    """
     n_images = n_objects * N_VIEWS
     codes = random_codes(n_images, SIDE).reshape(n_objects, N_VIEWS, SIDE, SIDE)
     steps = n_images // settings["batch_size"] * settings["epochs"]
@@ -37,13 +55,7 @@ def run(quick: bool) -> list[Figure]:
     ]
     bare_steps(settings, hardware, SIDE, 3)()
     train_network(codes[:3], {**settings, "epochs": 1}, hardware, seed=0)
-    turns = take_turns(works, 1 if quick else 8, warm_up=False)
-    bare, own = (steps * settings["batch_size"] / turns.typical(column) for column in (0, 1))
-    detail = (
-        f"{own:,.0f} against {bare:,.0f} images/s ({hardware}, one thread); "
-        f"{settings['epochs']} epochs of {n_images:,} images in batches of {settings['batch_size']}"
-    )
-    return [Figure("training: own loop / bare steps", turns.ratio(0, 1), TARGET, detail)]
+    return take_turns(works, n_rounds, warm_up=False)
 
 
 def random_codes(n_images: int, side: int) -> NDArray[np.uint8]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import re
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -16,12 +16,13 @@ from nbv.config import read_configuration
 from nbv.config.memory import training_objects
 from nbv.errors import UserError
 from nbv.estimation.hardware import choose_hardware, use_one_thread
+from nbv.estimation.training import STEPS_TAKEN
 from nbv.files import read_csv
 from nbv.layout import Layout
 from nbv.reporting.runtime import efficiency
 from performance.figures import Figure, Target
 from performance.settings import ROOT
-from performance.training import N_VIEWS, bare_steps
+from performance.training import N_VIEWS, bare_and_own
 
 BUSY, BUSY_TARGET = "workflow: processor time / (cores × wall)", Target(0.90)
 COST = "workflow: processor time / bare steps"
@@ -36,7 +37,7 @@ COST_TARGETS = {
 
 def run(quick: bool) -> list[Figure]:
     results = ROOT / "results" / "paper"
-    return [utilisation(results), cost(results, 20 if quick else 200)]
+    return [utilisation(results), cost(results, *((3, 1) if quick else (20, 5)))]
 
 
 def utilisation(results: Path) -> Figure:
@@ -65,12 +66,20 @@ def utilisation(results: Path) -> Figure:
     return Figure(BUSY, None, BUSY_TARGET, f"at least {share:.2f}: {detail}")
 
 
-def cost(results: Path, n_steps: int) -> Figure:
+def cost(results: Path, n_objects: int, n_rounds: int) -> Figure:
     """Return the run's processor time over that of the bare steps of its schedule.
 
     The schedule is that of ``estimator.warm_start=none``: `estimator.epochs` from random weights
-    for every estimator. A step is timed now, on this machine, where the run has to be made too, and
-    in as many processes at once as the run had jobs: they slow each other, bare or not.
+    for every estimator. A bare step's time is that of the run's own steps, times bare over own.
+    Only this quotient is measured now, in pairs and in as many processes at once as the run had
+    jobs: a machine's speed changes more between the run and now than this ratio may.
+
+    Parameters
+    ----------
+    results : Path
+        Of the run.
+    n_objects, n_rounds : int
+        Of the trainings that are paired with bare steps, in each process.
     """
     runtime = _runtime(results)
     if runtime.empty:
@@ -79,12 +88,17 @@ def cost(results: Path, n_steps: int) -> Figure:
         settings = read_configuration(results, ("categories", "elevations_deg", "n_objects"))
         target = COST_TARGETS[settings["estimator"].get("warm_start", "none")]
         steps = steps_from_random_weights(settings)
+        own_s = _own_step_s(Path(Layout(str(results)).logs))
     except UserError as error:
         return Figure(COST, None, None, f"{error}")
     total = runtime.iloc[-1]
     cpu_s, at_once = float(total["cpu_s"]), int(total["side_by_side"])
-    step_s = _step_seconds(settings, n_steps, at_once)
-    detail = f"{cpu_s:,.0f} s against {steps:,} steps of {1e3 * step_s:.1f} ms, {at_once} at once"
+    share = _bare_over_own(settings["estimator"], n_objects, n_rounds, at_once)
+    step_s = share * own_s
+    detail = (
+        f"{cpu_s:,.0f} s against {steps:,} steps of {1e3 * step_s:.2f} ms; the run's took "
+        f"{1e3 * own_s:.2f} ms, and bare ones {share:.3f} of it, {at_once} at once"
+    )
     return Figure(COST, cpu_s / (steps * step_s), target, detail)
 
 
@@ -106,26 +120,31 @@ def steps_from_random_weights(settings: Mapping[str, Any]) -> int:
     return n_estimators * int(estimator["epochs"]) * batches
 
 
-def _step_seconds(settings: Mapping[str, Any], n_steps: int, at_once: int) -> float:
-    """Return the processor time of one bare step, of several processes that take them at once."""
+def _own_step_s(logs: Path) -> float:
+    """Return the processor time of a training step of a run, by what its trainings logged."""
+    pattern = re.escape(STEPS_TAKEN).replace("%d", r"(\d+)").replace(r"%\.2f", r"([\d.]+)")
+    texts = (path.read_text(encoding="utf-8") for path in sorted(logs.glob("train/**/*.log")))
+    told = [found.groups() for text in texts if (found := re.search(pattern, text))]
+    if not told:
+        raise UserError(f"not measured: the trainings in {logs} tell no processor time")
+    steps, seconds = np.array(told, dtype=float).sum(axis=0)
+    return float(seconds / steps)
+
+
+def _bare_over_own(
+    estimator: Mapping[str, Any], n_objects: int, n_rounds: int, at_once: int
+) -> float:
+    """Return the time of a bare step over that of an own one, in several processes at once."""
     with ProcessPoolExecutor(at_once, mp_context=get_context("spawn")) as processes:
-        each = processes.map(_own_step_seconds, [settings] * at_once, [n_steps] * at_once)
+        given = (estimator, n_objects, n_rounds)
+        each = processes.map(_pairs, *([argument] * at_once for argument in given))
         return float(np.mean(list(each)))
 
 
-def _own_step_seconds(settings: Mapping[str, Any], n_steps: int) -> float:
-    """Return the processor time of one bare step: the median of five turns."""
+def _pairs(estimator: Mapping[str, Any], n_objects: int, n_rounds: int) -> float:
     use_one_thread()
-    estimator = settings["estimator"]
     hardware = choose_hardware("cpu", estimator["precision"])
-    work = bare_steps(estimator, hardware, settings["camera"]["image_side"], n_steps)
-    work()
-    turns = []
-    for _ in range(5):
-        started = time.process_time()
-        work()
-        turns.append((time.process_time() - started) / n_steps)
-    return float(np.median(turns))
+    return bare_and_own({**estimator, "epochs": 1}, hardware, n_objects, n_rounds).ratio(0, 1)
 
 
 def _runtime(results: Path) -> pd.DataFrame:

@@ -16,6 +16,7 @@ from performance.solids import object_with_faces
 from performance.timing import Turns, growth_exponent, median_ratio, take_turns
 from performance.workflow import cost, steps_from_random_weights, utilisation
 
+from nbv.estimation.training import STEPS_TAKEN
 from nbv.files import write_csv, write_text
 from nbv.reporting.runtime import load_jobs, summarise_jobs
 
@@ -162,7 +163,7 @@ def test_the_steps_of_a_run_are_those_of_every_estimator():
     """Five folds of ten units, 80 of 125 objects each, seen 360 times in eleven epochs."""
     settings = configuration()
     assert steps_from_random_weights(settings) == 5 * 10 * 11 * (80 * 360 // 64)
-    assert cost(Path("nowhere"), 1).detail.startswith("not run")
+    assert cost(Path("nowhere"), 1, 1).detail.startswith("not run")
 
 
 def test_the_cost_of_a_run_is_its_processor_time_in_bare_steps(tmp_path):
@@ -170,7 +171,20 @@ def test_the_cost_of_a_run_is_its_processor_time_in_bare_steps(tmp_path):
     write_text(tmp_path / "configuration.yaml", yaml.safe_dump(settings))
     row = {"rule": "all", "cpu_s": 1000.0, "side_by_side": 2}
     write_csv(tmp_path / "tables/runtime.csv", pd.DataFrame([row]))
-    figure = cost(tmp_path, 2)
-    found = re.fullmatch(r"1,000 s against .* steps of (\d+\.\d) ms, 2 at once", figure.detail)
-    expected = 1000.0 / (steps_from_random_weights(settings) * float(found[1]) / 1e3)
-    assert figure.ratio == pytest.approx(expected, rel=0.05)
+    figure = cost(tmp_path, 1, 1)
+    assert (figure.ratio, figure.reached) == (None, None)
+    assert figure.detail.startswith("not measured: the trainings in ")
+    for fold, seconds in ((1, 4.0), (2, 2.0)):
+        log = tmp_path / f"logs/train/mug/el00/fold{fold}.log"
+        write_text(log, f"[10:00:00 train] {STEPS_TAKEN % (100, seconds)}\n[10:00:01 train] end\n")
+    figure = cost(tmp_path, 1, 1)
+    found = re.fullmatch(
+        r"1,000 s against .* steps of ([\d.]+) ms; the run's took 30.00 ms, and bare ones "
+        r"([\d.]+) of it, 2 at once",
+        figure.detail,
+    )
+    bare_ms, share = map(float, found.groups())
+    assert bare_ms == pytest.approx(30.0 * share, rel=0.001)
+    assert 0.2 < share < 2.0
+    expected = 1000.0 / (steps_from_random_weights(settings) * 0.030 * share)
+    assert figure.ratio == pytest.approx(expected, rel=0.001)

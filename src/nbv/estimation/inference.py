@@ -63,7 +63,7 @@ def network_outputs(
     estimator: Estimator,
     codes: NDArray[np.uint8],
     hardware: Hardware,
-    batch_size: int = 1024,
+    batch_size: int = 256,
 ) -> Outputs:
     """Return the network's outputs for images.
 

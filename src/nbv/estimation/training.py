@@ -24,6 +24,7 @@ from nbv.estimation.weights import Estimator, Start
 log = logging.getLogger(__name__)
 
 PROGRESS_SECONDS = 5.0
+STEPS_TAKEN = "%d steps took %.2f s of processor time"
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,7 @@ def train_network(
     log.info("training on %d images of %d objects (%s)", n_images, n_objects, hardware)
     progress = Progress(n_epochs, n_images, time.perf_counter())
     reported = progress.started
+    computing = time.process_time()
     network.train()
     for epoch in range(n_epochs):
         permutation = torch.randperm(n_images, generator=order).to(hardware.device)
@@ -134,7 +136,8 @@ def train_network(
             chosen = permutation[batch * batch_size : (batch + 1) * batch_size]
             network.zero_grad(set_to_none=True)
             with hardware.autocast():
-                output = network(images[chosen])
+                # Takes half the time of images[chosen], and gives the same.
+                output = network(images.index_select(0, chosen))
             loss = kind.loss(output.float(), targets[chosen])
             loss.backward()  # type: ignore[no-untyped-call]
             optimiser.step()
@@ -149,6 +152,8 @@ def train_network(
                 reported = now
         _need_finite(network, running, epoch, settings)
         progress.report(epoch, n_images, float(running) / batches)
+    # The benchmark compares a run with bare steps by this line.
+    log.info(STEPS_TAKEN, n_epochs * batches, time.process_time() - computing)
     return network.eval()
 
 
