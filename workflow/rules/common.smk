@@ -243,7 +243,7 @@ def estimates_of_fold(layout=LAYOUT):
 
 
 def estimates_of_training(layout=LAYOUT):
-    """The files of estimates that a training makes: all, or none if others train for them."""
+    """The estimates that a training makes: a fold's, or none where `estimate` makes them."""
     return {} if CROSSFIT or EXTERNAL else estimates_of_fold(layout)
 
 
