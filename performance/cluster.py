@@ -112,7 +112,8 @@ def costs(
     first, then = estimator["epochs"], estimator["next_elevation"]["epochs"]
     n_lowest = len(known.elevations)
     epoch_s = one["train"] * known.units / (n_lowest * first + (known.units - n_lowest) * then)
-    others_s = sum(one[rule] for rule in OF_UNIT)
+    # Until a training's job estimated, too, estimates had a job of their own.
+    others_s = sum(one[rule] for rule in OF_UNIT) + one.get("estimate", 0.0)
     return Costs(
         start_s=start_s,
         category_s=one["meshes"] + one["splits"],

@@ -27,7 +27,7 @@ def run(quick: bool) -> list[Figure]:
     settings = {**configuration()["estimator"], "epochs": 1 if quick else 2}
     hardware = choose_hardware("cpu", settings["precision"])
     n_objects = 3 if quick else 20
-    turns = bare_and_own(settings, hardware, n_objects, 1 if quick else 8)
+    turns = bare_and_own(settings, hardware, SIDE, n_objects, 1 if quick else 8)
     n_images = n_objects * N_VIEWS
     steps = n_images // settings["batch_size"] * settings["epochs"]
     bare, own = (steps * settings["batch_size"] / turns.typical(column) for column in (0, 1))
@@ -39,7 +39,7 @@ def run(quick: bool) -> list[Figure]:
 
 
 def bare_and_own(
-    settings: Mapping[str, Any], hardware: Hardware, n_objects: int, n_rounds: int
+    settings: Mapping[str, Any], hardware: Hardware, side: int, n_objects: int, n_rounds: int
 ) -> Turns:
     """Return the times of as many bare steps as a training takes, and of the training.
 
@@ -47,13 +47,13 @@ def bare_and_own(
     the paper's run.
     """
     n_images = n_objects * N_VIEWS
-    codes = random_codes(n_images, SIDE).reshape(n_objects, N_VIEWS, SIDE, SIDE)
+    codes = random_codes(n_images, side).reshape(n_objects, N_VIEWS, side, side)
     steps = n_images // settings["batch_size"] * settings["epochs"]
     works = [
-        bare_steps(settings, hardware, SIDE, steps),
+        bare_steps(settings, hardware, side, steps),
         lambda: train_network(codes, settings, hardware, seed=0),
     ]
-    bare_steps(settings, hardware, SIDE, 3)()
+    bare_steps(settings, hardware, side, 3)()
     train_network(codes[:3], {**settings, "epochs": 1}, hardware, seed=0)
     return take_turns(works, n_rounds, warm_up=False)
 

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from nbv.config.memory import INFERENCE_BATCH
 from nbv.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.estimation.hardware import Hardware
@@ -63,7 +64,7 @@ def network_outputs(
     estimator: Estimator,
     codes: NDArray[np.uint8],
     hardware: Hardware,
-    batch_size: int = 256,
+    batch_size: int = INFERENCE_BATCH,
 ) -> Outputs:
     """Return the network's outputs for images.
 
