@@ -10,6 +10,8 @@ import subprocess
 
 import pytest
 
+from projects import TINY
+
 KINDS = {
     "meshes": "meshes/mug.npz",
     "splits": "splits/mug.csv",
@@ -37,7 +39,6 @@ READ_FOR = {
     "splits": "lookup/mug/el00/fold1/pose_ambiguity.npz",
     "depth": "estimates/mug/el00/fold1/test.csv",
     "objects": "estimates/mug/el00/fold1/test.csv",
-    "estimator": "estimates/mug/el00/fold1/test.csv",
     "calibration": "lookup/mug/el00/fold1/pose_ambiguity.npz",
     "test": "evaluation/mug/el00/fold1/proposed.csv",
     "lookup": "evaluation/mug/el00/fold1/proposed.csv",
@@ -105,6 +106,28 @@ def test_a_job_notices_what_it_reads(scratch, kind):
     assert f"error: results/tiny/{KINDS[kind]} changed after it was written" in printed
     assert "Traceback" not in printed
     assert not (scratch.results / KINDS[kind]).exists()
+
+
+@pytest.mark.slow
+def test_a_training_notices_what_it_starts_from(scratch):
+    damage(scratch.results / KINDS["estimator"], flip)
+    chain = (*TINY, "elevations_deg.mug=[0,60]", "estimator.warm_start=elevations")
+    target = "results/tiny/estimators/mug/el60/fold1/estimator.safetensors"
+    printed = scratch.run(target, "--cores", "2", overrides=chain, fails=True).stderr
+    assert f"error: results/tiny/{KINDS['estimator']} changed after it was written" in printed
+    assert "Traceback" not in printed
+    assert not (scratch.results / KINDS["estimator"]).exists()
+
+
+@pytest.mark.slow
+def test_a_damaged_estimator_is_trained_again_with_its_lost_estimates(scratch):
+    before = scratch.outcome()
+    whole = (scratch.results / KINDS["estimator"]).read_bytes()
+    damage(scratch.results / KINDS["estimator"], flip)
+    (scratch.results / KINDS["test"]).unlink()
+    scratch.run(f"results/tiny/{KINDS['test']}", "--cores", "2")
+    assert (scratch.results / KINDS["estimator"]).read_bytes() == whole
+    assert scratch.outcome() == before
 
 
 @pytest.mark.slow
