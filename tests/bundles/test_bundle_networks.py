@@ -159,7 +159,7 @@ def test_torch_gives_the_outputs_of_the_trained_network(bundle, rng):
     codes = random_codes(rng, 50)
     wanted = network_outputs(estimator, codes, choose_hardware("cpu", "float32"))
     logits = open_network(bundle, "torch")(codes)
-    assert logits == pytest.approx(wanted, abs=1e-5)
+    assert logits == pytest.approx(wanted, abs=1e-4)
 
 
 def test_calibration_sees_the_weights_that_a_bundle_keeps(rng):

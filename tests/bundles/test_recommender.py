@@ -156,8 +156,9 @@ def test_another_frame_as_the_last_turns_the_answer(recommender, seed, bins):
     codes = codes_of(seed, 2)
     one = recommender.recommend_crops(codes, [0.0, bins * WIDTH])
     other = recommender.recommend_crops(codes[::-1], [0.0, -bins * WIDTH])
-    assert circular_distance_deg(one.azimuth_deg, other.azimuth_deg + bins * WIDTH) < 1e-6
-    assert one.belief == pytest.approx(np.roll(other.belief, bins), rel=1e-6, abs=1e-12)
+    # Single precision: what an image's logits are depends a little on its place among others.
+    assert circular_distance_deg(one.azimuth_deg, other.azimuth_deg + bins * WIDTH) < 1e-2
+    assert one.belief == pytest.approx(np.roll(other.belief, bins), rel=1e-4, abs=1e-12)
     turned_back = np.roll(other.error_after_deg, -bins)
     assert one.error_after_deg == pytest.approx(turned_back, rel=1e-3)
 
@@ -227,9 +228,8 @@ def test_expected_errors_are_those_of_objects_that_look_alike(recommender, bins,
     now, after = brute_force(bundle, recommender.distributions(codes), bins, share)
     free = np.isfinite(found.error_after_deg)
     assert free.sum() == BINS - len(bins)
-    # Views that count for less than a ten-thousandth are left out.
-    assert found.expected_error_deg == pytest.approx(now, rel=2e-3)
-    assert found.error_after_deg[free] == pytest.approx(after[free], rel=2e-3)
+    assert found.expected_error_deg == pytest.approx(now, rel=1e-4)
+    assert found.error_after_deg[free] == pytest.approx(after[free], rel=1e-4)
 
 
 def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from nbv.angles import circular_distance_deg
 from nbv.recommendation.belief import Belief
 from nbv.recommendation.criteria.expected_error import expected_error
 from nbv.recommendation.evidence import evidence_of_distributions
 from nbv.recommendation.fusion import product
-from nbv.recommendation.look_alikes import LookAlikes, compared_step, error_after_deg
+from nbv.recommendation.look_alikes import LookAlikes, compared_step, error_after_deg, first_views
 
 SETTINGS = {"affinity": {"power": 5.0, "pseudo_observations": 30.0}}
 
@@ -52,13 +54,55 @@ def test_finer_bins_are_compared_at_six_degrees_at_most(bins: int, step: int) ->
     assert compared_step(bins) == step
 
 
+@given(
+    n_turns=st.integers(1, 200),
+    n_bins=st.sampled_from([7, 24, 90, 120]),
+    most=st.integers(1, 30_000),
+)
+def test_first_views_are_evenly_apart_and_everywhere(n_turns: int, n_bins: int, most: int) -> None:
+    first = first_views(n_turns, n_bins, most)
+    of_turn = first.shape[1]
+    apart = np.diff(first, axis=1, append=first[:, :1] + n_bins)
+    assert np.all(apart == n_bins / of_turn)
+    assert first.size <= max(most, n_turns)
+    # No divisor of a full turn would have more.
+    finer = [n for n in range(of_turn + 1, n_bins + 1) if n_bins % n == 0]
+    assert all(n_turns * n > most for n in finer)
+    for place in range(n_bins):
+        if n_turns * of_turn >= n_bins:
+            assert place in first
+
+
+def test_without_a_limit_every_view_is_a_first_one() -> None:
+    assert np.array_equal(first_views(3, 24), np.tile(np.arange(24), (3, 1)))
+
+
+def test_fewer_first_views_are_the_same_views(rng: np.random.Generator) -> None:
+    """Their errors, distributions and weights are those of the same views among all."""
+    distributions, belief = turns(rng), turns(rng)[0, :2]
+    everything = LookAlikes.of_views(distributions).after(5)
+    fewer = LookAlikes.of_views(distributions, most=40).after(5)
+    assert fewer.first.tolist() == [[k + 2 * n for n in range(12)] for k in (0, 1, 0)]
+    rows = np.arange(3)[:, None], fewer.first
+    assert np.array_equal(fewer.seen, everything.seen[rows])
+    assert fewer.errors_deg == pytest.approx(everything.errors_deg[rows], abs=1e-3)
+    now, after = fewer.expected_error_deg(belief, 5.0, 30.0)
+    for own, own_now, own_after in zip(belief, now, after, strict=True):
+        weight = 30.0 * (np.sqrt(fewer.seen) @ np.sqrt(own)) ** 5.0
+        weight += 30.0 / weight.size
+        share = weight / weight.sum()
+        assert own_now == pytest.approx((share * everything.error_now_deg[rows]).sum(), rel=1e-4)
+        wanted = np.tensordot(share, everything.errors_deg[rows])
+        assert own_after == pytest.approx(wanted, rel=1e-4)
+
+
 @pytest.mark.parametrize("step", [2, 3, 4])
 def test_errors_at_whole_steps_are_those_of_all_rotations(
     rng: np.random.Generator, step: int
 ) -> None:
     alike = LookAlikes.of_views(turns(rng)).after(5)
     wanted = error_after_deg(alike.so_far, alike.views)[:, :, ::step]
-    assert error_after_deg(alike.so_far, alike.views, step) == pytest.approx(wanted, abs=1e-3)
+    assert error_after_deg(alike.so_far, alike.views, step=step) == pytest.approx(wanted, abs=1e-3)
 
 
 def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.Generator) -> None:

@@ -20,7 +20,7 @@ from nbv.calibration.offset import constant_offset_deg
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
-from nbv.recommendation.look_alikes import LookAlikes, error_after_deg
+from nbv.recommendation.look_alikes import MOST_COMPARED, LookAlikes, error_after_deg
 
 SINGLE, RANDOM, FIXED = "single", "random", "best fixed"
 OPPOSITE, SPACED, RECOMMENDED = "opposite", "evenly spaced", "recommended"
@@ -257,12 +257,13 @@ def evaluate(
                 f"object {turn.object_id!r}, sequence {turn.sequence!r} has "
                 f"{counted(len(turn.azimuth_deg), 'frame')}, too few for {max(numbers)} views"
             )
-    rows, alike = [], LookAlikes.of_views(bundle.distributions)
-    of_steps = {number: fixed_errors_deg(alike, number) for number in numbers}
+    rows, of_all = [], LookAlikes.of_views(bundle.distributions)
+    of_steps = {number: fixed_errors_deg(of_all, number) for number in numbers}
+    compared = LookAlikes.of_views(bundle.distributions, MOST_COMPARED)
     for turn in turns:
         seen = seen_by(bundle, turn)
         # However many views there are, the first ones are the same.
-        errors = follow(seen, recommended(alike, seen, bundle.affinity), max(numbers))
+        errors = follow(seen, recommended(compared, seen, bundle.affinity), max(numbers))
         single = errors[:, 0]
         offset = constant_offset_deg(single)
         rows.append(_row(seen, SINGLE, 1, single, offset))

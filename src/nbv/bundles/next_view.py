@@ -13,8 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.angles import (
     circular_distance_deg,
     nearest_bin,
-    signed_difference_deg,
-    travel_deg,
     wrap_deg,
 )
 from nbv.bundles.beliefs import fused, log_bayes_factor, spread_deg, turned
@@ -23,7 +21,7 @@ from nbv.errors import UserError
 from nbv.frames.errors import FrameError
 from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
-from nbv.recommendation.look_alikes import LookAlikes
+from nbv.recommendation.look_alikes import MOST_COMPARED, LookAlikes
 
 MIN_SEPARATION_DEG = 15.0
 """From every view so far: an estimator errs alike from nearly the same place."""
@@ -143,7 +141,7 @@ def after_rotations(distributions: NDArray[np.float32]) -> AfterRotations:
     @lru_cache(maxsize=N_KEPT)
     def after(bins: tuple[int, ...]) -> LookAlikes:
         if not bins:
-            return LookAlikes.of_views(distributions)
+            return LookAlikes.of_views(distributions, MOST_COMPARED)
         return after(bins[:-1]).after(bins[-1])
 
     return after
@@ -191,11 +189,18 @@ def next_view(
     (now,), (after,) = alike.expected_error_deg(belief[None], **affinity, share=share)
     # From the frame of the first view to that of the last one.
     last = rotations_deg[-1]
-    error = np.roll(after, -round(last / width))
+    error = after[(np.arange(n_bins) + round(last / width)) % n_bins]
     taken = np.asarray(rotations_deg) - last
-    may = _reachable(n_bins, taken, allowed_deg, max_travel_deg)
-    best, *others = _local_best(may, _between(error, may), width)
-    error[~_is_near_bin(may, n_bins)] = np.inf
+    if allowed_deg is None:
+        rotation_deg = _signed(np.arange(n_bins, dtype=np.float64) * width)
+        is_near = _is_reachable(rotation_deg, taken, max_travel_deg)
+        best, *others = _local_best(rotation_deg[is_near], error[is_near], width)
+    else:
+        rotation_deg = _allowed(allowed_deg)
+        rotation_deg = rotation_deg[_is_reachable(rotation_deg, taken, max_travel_deg)]
+        best, *others = _local_best(rotation_deg, _between(error, rotation_deg), width)
+        is_near = np.isin(np.arange(n_bins), nearest_bin(rotation_deg, n_bins))
+    error[~is_near] = np.inf
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
     return Recommendation(
         azimuth_deg=float(wrap_deg(mean_direction_deg(belief[None])[0] + last)),
@@ -250,44 +255,38 @@ def as_rotation_list(
     return rotations
 
 
-def _reachable(
-    n_bins: int, taken: NDArray[np.float64], allowed_deg: ArrayLike | None, max_travel_deg: float
-) -> NDArray[np.float64]:
-    """Return the rotations (m,) that the camera may take, in (-180, 180], by size in [0, 360).
-
-    They are all bins, or those of `allowed_deg`, less what travels too far or is too near to a view
-    that was `taken`.
-    """
-    if allowed_deg is None:
-        rotation_deg = np.arange(n_bins) * (360.0 / n_bins)
-    else:
-        given = as_rotations(allowed_deg)
-        rotation_deg = given[np.unique(wrap_deg(given), return_index=True)[1]]
+def _allowed(allowed_deg: ArrayLike) -> NDArray[np.float64]:
+    """Return allowed rotations (m,) once each, in (-180, 180], by size in [0, 360)."""
+    given = as_rotations(allowed_deg)
+    rotation_deg = given[np.unique(wrap_deg(given), return_index=True)[1]]
     # A rotation that is in the range already keeps its bits.
     is_within = (rotation_deg > -180.0) & (rotation_deg <= 180.0)
-    rotation_deg = np.where(is_within, rotation_deg, -signed_difference_deg(0.0, rotation_deg))
+    return np.where(is_within, rotation_deg, _signed(wrap_deg(rotation_deg)))
+
+
+def _signed(rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return rotations in [0, 360) in (-180, 180]."""
+    return np.where(rotation_deg > 180.0, rotation_deg - 360.0, rotation_deg)
+
+
+def _is_reachable(
+    rotation_deg: NDArray[np.float64], taken: NDArray[np.float64], max_travel_deg: float
+) -> NDArray[np.bool_]:
+    """Return which rotations (m,) are neither too far nor too near to a view that was `taken`."""
     apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
-    is_free = (apart >= MIN_SEPARATION_DEG) & (travel_deg(rotation_deg) <= max_travel_deg)
-    may: NDArray[np.float64] = rotation_deg[is_free]
-    if not may.size:
+    is_free = (apart >= MIN_SEPARATION_DEG) & (np.abs(rotation_deg) <= max_travel_deg)
+    if not is_free.any():
         raise UserError(
             "no rotation is allowed: widen --allowed or --max-travel; a view is "
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
         )
-    return may
+    return np.asarray(is_free)
 
 
 def _between(error: NDArray[np.float64], rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the errors (m,) at rotations, of those of the bins (B,); linear between bins."""
     bins = np.arange(len(error)) * (360.0 / len(error))
     return np.asarray(np.interp(rotation_deg, bins, error, period=360.0))
-
-
-def _is_near_bin(rotation_deg: NDArray[np.float64], n_bins: int) -> NDArray[np.bool_]:
-    """Return whether each bin is the nearest one of a rotation, (B,)."""
-    near = np.zeros(n_bins, dtype=bool)
-    near[nearest_bin(rotation_deg, n_bins)] = True
-    return near
 
 
 def _local_best(
@@ -297,10 +296,11 @@ def _local_best(
 
     Rotations are sorted by their place in [0, 360).
     """
-    is_near = circular_distance_deg(np.roll(rotation_deg, -1), rotation_deg) <= width + 1e-9
-    is_better = np.roll(error, -1) < error
-    is_worse = np.roll(error, -1) > error
-    beaten = (is_near & is_better) | np.roll(is_near & is_worse, 1)
+    following = np.arange(1, len(error) + 1) % len(error)
+    is_near = wrap_deg(rotation_deg[following] - rotation_deg) <= width + 1e-9
+    rise = error[following] - error
+    beaten = is_near & (rise < 0)
+    beaten[following] |= is_near & (rise > 0)
     places = np.flatnonzero(~beaten)
     travel = np.abs(rotation_deg)
     order = places[np.lexsort((wrap_deg(rotation_deg[places]), travel[places], error[places]))]

@@ -9,20 +9,18 @@ from numpy.typing import NDArray
 
 from nbv.bundles.bundle import Bundle
 from nbv.errors import UserError
+from nbv.estimation.folding import folded_convolutions
 
 if TYPE_CHECKING:
     from onnx import ModelProto
 
 OPSET, IR_VERSION = 17, 8
-# torch.nn.BatchNorm2d's default.
-_EPSILON = 1e-5
 
 
 def onnx_model(bundle: Bundle) -> ModelProto:
     """Return the network from ``codes`` (n, 1, side, side) float32 to ``logits``.
 
-    Codes are divided by 128, as `nbv.estimation.images.to_input` does. Batch normalisation is
-    folded into the convolutions.
+    Convolutions are as of `nbv.estimation.folding.folded_convolutions`.
 
     Raises
     ------
@@ -43,7 +41,8 @@ def onnx_model(bundle: Bundle) -> ModelProto:
 
     weights, side = bundle.weights, bundle.camera.image_side
     here = "codes"
-    for layer, (kernel, bias) in enumerate(_convolutions(bundle)):
+    convolutions = folded_convolutions(weights, len(bundle.estimator["channels"]))
+    for layer, (kernel, bias) in enumerate(convolutions):
         names = constant(f"kernel{layer}", kernel), constant(f"bias{layer}", bias)
         reach = kernel.shape[-1] // 2
         nodes.append(
@@ -71,16 +70,3 @@ def onnx_model(bundle: Bundle) -> ModelProto:
     )
     opset = [helper.make_opsetid("", OPSET)]
     return helper.make_model(graph, opset_imports=opset, ir_version=IR_VERSION, producer_name="nbv")
-
-
-def _convolutions(bundle: Bundle) -> list[tuple[NDArray[np.float32], NDArray[np.float32]]]:
-    """Return kernel and bias of every convolution, with the normalisation that follows it."""
-    weights = bundle.weights
-    found = [(weights["0.0.weight"] / np.float32(128), weights["0.0.bias"])]
-    for layer in range(1, len(bundle.estimator["channels"])):
-        kernel = weights[f"0.{3 * layer - 1}.weight"]
-        norm = f"0.{3 * layer}."
-        scale = weights[norm + "weight"] / np.sqrt(weights[norm + "running_var"] + _EPSILON)
-        offset = weights[norm + "bias"] - scale * weights[norm + "running_mean"]
-        found.append((kernel * scale[:, None, None, None], offset))
-    return [(np.asarray(k, np.float32), np.asarray(b, np.float32)) for k, b in found]

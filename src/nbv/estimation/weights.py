@@ -15,11 +15,12 @@ import safetensors.torch
 import torch
 from numpy.typing import NDArray
 from torch import nn
+from torch.nn.functional import conv2d, linear
 
 from nbv.checksums import sha256_of
 from nbv.errors import UserError
-from nbv.estimation.hardware import Hardware, choose_hardware, use_one_thread
-from nbv.estimation.images import to_input
+from nbv.estimation.folding import folded_convolutions
+from nbv.estimation.hardware import Hardware, use_one_thread
 from nbv.estimation.networks import build_network
 from nbv.estimation.warm_start import with_category
 from nbv.files import damaged, readable, replacing
@@ -160,7 +161,8 @@ def network_of(
 ) -> Callable[[NDArray[np.uint8]], NDArray[np.float32]]:
     """Return the network of some weights, from codes (n, side, side) to outputs (n, k).
 
-    It computes on one core of the processor, in single precision.
+    It computes on one core of the processor, in single precision, without the calls of modules and
+    with `nbv.estimation.folding.folded_convolutions`: a single image takes a third less time so.
 
     Raises
     ------
@@ -168,19 +170,32 @@ def network_of(
         Where the weights do not fit the settings.
     """
     use_one_thread()
-    hardware = choose_hardware("cpu", "float32")
-    network = build_network(settings, image_side).eval()
+    tensors = {name: torch.from_numpy(np.array(array)) for name, array in weights.items()}
     try:
-        tensors = {name: torch.from_numpy(np.array(array)) for name, array in weights.items()}
         # Without the number of batches that normalisation has seen, which training alone needs.
-        missing, unknown = network.load_state_dict(tensors, strict=False)
+        missing, unknown = build_network(settings, image_side).load_state_dict(
+            tensors, strict=False
+        )
         if unknown or any(not name.endswith("num_batches_tracked") for name in missing):
             raise RuntimeError("names")
     except (RuntimeError, TypeError) as error:
         raise UserError("the weights do not fit the network's settings") from error
+    convolutions = [
+        (
+            torch.from_numpy(kernel).contiguous(memory_format=torch.channels_last),
+            torch.from_numpy(bias),
+        )
+        for kernel, bias in folded_convolutions(weights, len(settings["channels"]))
+    ]
+    hidden, last = ((tensors[f"{at}.weight"], tensors[f"{at}.bias"]) for at in (2, 4))
 
     def run(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
         with torch.inference_mode():
-            return np.asarray(network(to_input(codes, hardware)).numpy())
+            values = torch.from_numpy(codes[:, None].astype(np.float32))
+            for kernel, bias in convolutions:
+                reach = kernel.shape[-1] // 2
+                values = conv2d(values, kernel, bias, stride=2, padding=reach).relu_()
+            values = linear(values.flatten(1), *hidden).relu_()
+            return np.asarray(linear(values, *last).numpy())
 
     return run

@@ -150,17 +150,27 @@ def crop_frame(
     grid *= pixel_step(camera) * diagonal_m / away_m
     # Rays of a camera that is directed at the object, in the frame of the one that is not.
     across, down, ahead = (
-        grid * turn[0, axis] + grid[:, None] * turn[1, axis] + turn[2, axis] for axis in range(3)
+        (grid * turn[0, axis] + turn[2, axis]) + (grid * turn[1, axis])[:, None]
+        for axis in range(3)
     )
-    column = np.floor(principal[0] + intrinsics.fx * across / ahead).astype(int) - window.left
-    row = np.floor(principal[1] + intrinsics.fy * down / ahead).astype(int) - window.top
-    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns) & (ahead > 0)
-    at = row.clip(0, rows - 1), column.clip(0, columns - 1)
-    depth = np.where(inside & mask[at], depth_m[at] / (diagonal_m * ahead), 0.0)
+    # What lies outside the window has no depth, as its border here.
+    measured = np.zeros((rows + 2, columns + 2), dtype=np.float32)
+    np.copyto(measured[1:-1, 1:-1], depth_m, where=mask)
+    column = principal[0] - window.left + intrinsics.fx * across / ahead
+    row = principal[1] - window.top + intrinsics.fy * down / ahead
+    depth = measured[_places(row, rows), _places(column, columns)] / (diagonal_m * ahead)
     codes = encode_depth(depth[None].astype(np.float32), camera)[0]
     right_m, down_m, ahead_m = (away_m * turn[2]).tolist()
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
     return Crop(codes, distance_m, extent, centre_m, intrinsics.doubts(*window.frame_shape))
+
+
+def _places(position: NDArray[np.float64], length: int) -> NDArray[np.intp]:
+    """Return the pixels of positions along an axis, from 1 to length; 0 or length + 1 outside."""
+    place = np.floor(position)
+    np.maximum(place, -1, out=place)
+    np.minimum(place, length, out=place)
+    return place.astype(np.intp) + 1
 
 
 def _facing(
@@ -176,10 +186,16 @@ def _facing(
     # In files, whole numbers are the middles of pixels.
     principal = intrinsics.cx + 0.5, intrinsics.cy + 0.5
     x, y = (column - principal[0]) / intrinsics.fx, (row - principal[1]) / intrinsics.fy
-    ray = np.array([x, y, 1.0]) / math.sqrt(x**2 + y**2 + 1.0)
-    across = np.array([[0.0, 0.0, ray[0]], [0.0, 0.0, ray[1]], [-ray[0], -ray[1], 0.0]])
-    turn = np.eye(3) + across + across @ across / (1.0 + ray[2])
-    return turn.T, principal
+    ahead = 1.0 / math.sqrt(x**2 + y**2 + 1.0)
+    right, down = x * ahead, y * ahead
+    # Rodrigues' formula for the shortest rotation from (0, 0, 1) to (right, down, ahead).
+    share = 1.0 / (1.0 + ahead)
+    turn = [
+        [1.0 - right**2 * share, -right * down * share, -right],
+        [-right * down * share, 1.0 - down**2 * share, -down],
+        [right, down, ahead],
+    ]
+    return np.array(turn), principal
 
 
 def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:

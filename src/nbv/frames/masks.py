@@ -91,7 +91,8 @@ def object_mask(
     far = np.inf if far_m is None else far_m
     if not 0 <= near < far:
         raise UserError(f"--near={near:g} and --far={far:g}: 0 ≤ near < far (metres)")
-    inside &= (depth_m >= near) & (depth_m <= far)
+    if near_m is not None or far_m is not None:
+        inside &= (depth_m >= near) & (depth_m <= far)
     if mask is None and far_m is None and inside.any():
         inside &= depth_m < np.quantile(depth_m[inside], NEAREST_SHARE) + reach_m
     if np.count_nonzero(inside) < _LEAST_PIXELS:

@@ -22,6 +22,12 @@ COMPARED_DEG = 6.0
 Half as much is read for a frame then as in bins of 3 degrees, and that is most of its time.
 """
 
+MOST_COMPARED = 8000
+"""First views at most that a belief is compared with: those of neighbouring places are alike.
+
+What all 15,000 views of 125 turns need is larger than a processor core's cache.
+"""
+
 FLAT = 1e-5
 """Of distributions: below this resultant length the mean direction is rounding, and errs by 90°."""
 
@@ -43,8 +49,27 @@ def compared_step(n_bins: int) -> int:
     return next(step for step in range(most, 0, -1) if n_bins % step == 0)
 
 
-def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
-    """Return the error of the product with further views, (S, B, B / step) float32, degrees.
+def first_views(n_turns: int, n_bins: int, most: int | None = None) -> NDArray[np.intp]:
+    """Return which views of each turn are first ones, (n_turns, K), in bins.
+
+    Those of a turn are evenly apart. Those of the next turn are one bin further, so that all turns
+    together have them everywhere.
+
+    Parameters
+    ----------
+    n_turns, n_bins : int
+    most : int, optional
+        Of all turns together, but at least one of each; without it every view is one.
+    """
+    of_turn = n_bins if most is None else max(most // n_turns, 1)
+    apart = next(n for n in range(1, n_bins + 1) if n_bins % n == 0 and n_bins // n <= of_turn)
+    return np.arange(n_turns)[:, None] % apart + np.arange(0, n_bins, apart)
+
+
+def error_after_deg(
+    so_far: Table, views: Table, first: NDArray[np.intp] | None = None, step: int = 1
+) -> Table:
+    """Return the error of the product with further views, (S, K, B / step) float32, degrees.
 
     With c of the views so far and c' of a further one, both from `in_object_frame`, the mean
     direction of the product is that of ``sum_u c(u) c'(u) exp(i u)``: one product of matrices for
@@ -52,10 +77,12 @@ def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
 
     Parameters
     ----------
-    so_far : ndarray (S, B, B)
+    so_far : ndarray (S, K, B)
         Of the fused views, by the first one.
     views : ndarray (S, B, B)
         Of single views.
+    first : ndarray (S, K), optional
+        The first views, in bins; all of them without it.
     step : int
         Further views are so many bins apart; a divisor of B.
 
@@ -65,22 +92,21 @@ def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
         ``[s, k, d]``: of first view k with a further view at the rotation ``step d``, in bins.
     """
     n_turns, n_bins, _ = views.shape
+    if first is None:
+        first = first_views(n_turns, n_bins)
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
-    # Views that are whole steps apart meet each other alone: [s, r, i] is view i step + r.
-    first, turned = (
-        rows.reshape(n_turns, n_bins // step, step, n_bins).transpose(0, 2, 1, 3)
-        for rows in (so_far, views)
-    )
-    turned = turned.transpose(0, 1, 3, 2)
-    real = np.matmul(first * np.cos(angles).astype(np.float32), turned)
-    imaginary = np.matmul(first * np.sin(angles).astype(np.float32), turned)
+    turned = views.transpose(0, 2, 1)
+    further = (first[:, :, None] + np.arange(0, n_bins, step)) % n_bins
+
+    def of_pairs(rows: Table) -> Table:
+        return np.take_along_axis(np.matmul(rows, turned), further, axis=2)
+
+    real = of_pairs(so_far * np.cos(angles).astype(np.float32))
+    imaginary = of_pairs(so_far * np.sin(angles).astype(np.float32))
     error = np.abs(np.degrees(np.arctan2(imaginary, real))).astype(np.float32)
     if any((_resultant_length(rows) < FLAT).any() for rows in (so_far, views)):
-        error[np.hypot(real, imaginary) < FLAT * np.matmul(first, turned)] = 90.0
-    n_steps = n_bins // step
-    further = (np.arange(n_steps)[:, None] + np.arange(n_steps)) % n_steps
-    error = np.take_along_axis(error, further[None, None], axis=3)
-    return np.asarray(error.transpose(0, 2, 1, 3).reshape(n_turns, n_bins, n_steps))
+        error[np.hypot(real, imaginary) < FLAT * of_pairs(so_far)] = 90.0
+    return error
 
 
 def error_of_deg(so_far: Table) -> Table:
@@ -106,38 +132,46 @@ class LookAlikes:
 
     Attributes
     ----------
-    so_far : ndarray (S, B, B) float32
+    so_far : ndarray (S, K, B) float32
         Distributions of the fused views `in_object_frame`, by the first view; rows sum to 1.
     views : ndarray (S, B, B) float32
         The same of single views.
+    first : ndarray (S, K)
+        The first views, in bins; see `first_views`.
     """
 
     so_far: Table
     views: Table
+    first: NDArray[np.intp]
 
     @staticmethod
-    def of_views(distributions: Table) -> LookAlikes:
-        """Return the turns after one view, of distributions (S, B, B) of views a bin apart."""
+    def of_views(distributions: Table, most: int | None = None) -> LookAlikes:
+        """Return the turns after one view, of distributions (S, B, B) of views a bin apart.
+
+        ``most`` first views of all turns together, as in `first_views`.
+        """
         views = in_object_frame(np.asarray(distributions, dtype=np.float32))
-        return LookAlikes(views, views)
+        first = first_views(views.shape[0], views.shape[1], most)
+        return LookAlikes(np.take_along_axis(views, first[:, :, None], axis=1), views, first)
 
     def after(self, rotation_bins: int) -> LookAlikes:
         """Return the turns after one more view, at a rotation from the first one."""
-        both = self.so_far * np.roll(self.views, -rotation_bins, axis=1)
-        return LookAlikes(both / both.sum(axis=2, keepdims=True), self.views)
+        second = (self.first + rotation_bins) % self.views.shape[-1]
+        both = self.so_far * np.take_along_axis(self.views, second[:, :, None], axis=1)
+        return LookAlikes(both / both.sum(axis=2, keepdims=True), self.views, self.first)
 
     @cached_property
     def _step(self) -> int:
         return compared_step(self.views.shape[-1])
 
-    @cached_property
+    @property
     def errors_deg(self) -> Table:
         """`error_after_deg` of the turns, at rotations that are `compared_step` bins apart."""
-        return error_after_deg(self.so_far, self.views, self._step)
+        return self._errors[:, :, :-1]
 
-    @cached_property
+    @property
     def error_now_deg(self) -> Table:
-        """`error_of_deg` of the turns, (S, B)."""
+        """`error_of_deg` of the turns, (S, K)."""
         return error_of_deg(self.so_far)
 
     def expected_error_deg(
@@ -160,27 +194,25 @@ class LookAlikes:
         share : ndarray (S,), optional
             How much each turn counts; 1 without it.
         """
-        n_turns, n_bins, _ = self.views.shape
+        n_turns, n_first = self.first.shape
         of_turn = np.ones(n_turns) if share is None else np.asarray(share, dtype=np.float64)
         # The affinity of each belief with each view, whose roots are kept.
         compared = _joined(np.asarray(beliefs, dtype=np.float32), self._step)
         weight = self._roots @ np.sqrt(compared).T
         weight **= power
-        weight *= (of_turn * (360.0 / n_bins)).astype(np.float32)[:, None, None]
+        weight *= (of_turn * (360.0 / n_first)).astype(np.float32)[:, None, None]
         total = weight.sum(axis=(0, 1), dtype=np.float64) + pseudo_observations
-        prior = pseudo_observations / (of_turn.sum() * n_bins)
-        now = _weighted(weight, self.error_now_deg[:, :, None])[:, 0] + prior * (
-            of_turn @ self._error_now_by_turn
-        )
-        after = _weighted(weight, self.errors_deg) + prior * (of_turn @ self._errors_by_turn)
-        return now / total, _between_steps(after / total[:, None], self._step)
+        prior = pseudo_observations / (of_turn.sum() * n_first)
+        errors = _weighted(weight, self._errors) + prior * (of_turn @ self._errors_by_turn)
+        errors /= total[:, None]
+        return errors[:, -1], _between_steps(errors[:, :-1], self._step)
 
     @property
     def seen(self) -> Table:
-        """The distributions in the frame of the first view, (S, B, B)."""
+        """The distributions in the frame of the first view, (S, K, B)."""
         n_bins = self.views.shape[-1]
-        index = (np.arange(n_bins) - np.arange(n_bins)[:, None]) % n_bins
-        return np.take_along_axis(self.so_far, index[None], axis=2)
+        index = (np.arange(n_bins) - self.first[:, :, None]) % n_bins
+        return np.take_along_axis(self.so_far, index, axis=2)
 
     @cached_property
     def _roots(self) -> Table:
@@ -188,12 +220,14 @@ class LookAlikes:
         return np.sqrt(_joined(self.seen, self._step))
 
     @cached_property
-    def _error_now_by_turn(self) -> NDArray[np.float64]:
-        return np.asarray(self.error_now_deg.sum(axis=1, dtype=np.float64))
+    def _errors(self) -> Table:
+        """The errors after each rotation and, last, the error now: (S, K, m + 1)."""
+        after = error_after_deg(self.so_far, self.views, self.first, self._step)
+        return np.concatenate([after, self.error_now_deg[:, :, None]], axis=2)
 
     @cached_property
     def _errors_by_turn(self) -> NDArray[np.float64]:
-        return np.asarray(self.errors_deg.sum(axis=1, dtype=np.float64))
+        return np.asarray(self._errors.sum(axis=1, dtype=np.float64))
 
 
 def _joined(rows: Table, step: int) -> Table:
@@ -203,20 +237,23 @@ def _joined(rows: Table, step: int) -> Table:
 
 def _between_steps(rows: NDArray[np.float64], step: int) -> NDArray[np.float64]:
     """Return values (n, B) at every bin, of those (n, B / step) at whole steps of a full turn."""
+    if step == 1:
+        return rows
     part = np.arange(step) / step
-    between = rows[:, :, None] * (1 - part) + np.roll(rows, -1, axis=1)[:, :, None] * part
+    around = np.concatenate([rows, rows[:, :1]], axis=1)[:, :, None]
+    between = around[:, :-1] * (1 - part) + around[:, 1:] * part
     return np.asarray(between.reshape(len(rows), -1))
 
 
 def _weighted(weight: Table, errors_deg: Table) -> NDArray[np.float64]:
-    """Return the sums (n, m) of errors (S, B, m) by weights (S, B, n).
+    """Return the sums (n, m) of errors (S, K, m) by weights (S, K, n).
 
     Those of a single belief turn by turn: the threads of a matrix library wait for each other where
     other programs hold the cores, and take no part in small products. All at once took 16 ms then.
     """
-    n_turns, n_bins, n = weight.shape
+    n = weight.shape[2]
     if n == 1:
         parts = np.matmul(weight.transpose(0, 2, 1), errors_deg)
         return np.asarray(parts.sum(axis=0, dtype=np.float64))
-    rows, table = (each.reshape(n_turns * n_bins, -1) for each in (weight, errors_deg))
+    rows, table = (each.reshape(-1, each.shape[2]) for each in (weight, errors_deg))
     return np.asarray(rows.T @ table, dtype=np.float64)
