@@ -52,6 +52,14 @@ def test_a_log_gets_the_last_line_alone_when_a_run_is_short():
     assert lines_of(stream) == ["[00:00:00 nbv] 100 % done in 0 s, 3 of 3 jobs"]
 
 
+def test_jobs_that_nobody_timed_are_said_to_be_guessed():
+    planned = three_jobs() | {4: Planned(Job("bundle"), "bundle")}
+    said = "4 jobs to do, about 2 min by the reference run's times (1 job guessed)"
+    assert progress_of(planned)[0].first_estimate() == said
+    unknown = {number: Planned(Job("bundle"), "bundle") for number in (1, 2)}
+    assert progress_of(unknown)[0].first_estimate() == "2 jobs to do"
+
+
 def test_a_log_gets_a_line_at_each_interval_and_a_terminal_one_that_is_written_over(monkeypatch):
     monkeypatch.setattr(run, "LOG_S", 0.2)
     monkeypatch.setattr(run, "TERMINAL_S", 0.2)

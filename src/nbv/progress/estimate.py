@@ -89,11 +89,14 @@ class Estimate:
     basis : str
         What most of the time left goes by: times of ``this run``, of the ``reference`` run, or a
         ``guess``: a job of which neither is known is taken to be like the median of the others.
+    n_guessed: int
+        Jobs that are left and of which neither is known.
     """
 
     done: float
     left_s: float
     basis: Basis
+    n_guessed: int = 0
 
 
 def estimate(jobs: Mapping[int, Job], seen: Seen, cores: int) -> Estimate:
@@ -128,6 +131,7 @@ def estimate(jobs: Mapping[int, Job], seen: Seen, cores: int) -> Estimate:
         done=done_s / (done_s + sum(left.values())) if left else 1.0,
         left_s=max(ends.values(), default=0.0),
         basis=max(work_s, key=work_s.__getitem__),
+        n_guessed=sum(expected[number][1] == "guess" for number in ends),
     )
 
 

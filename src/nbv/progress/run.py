@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from nbv.labels import duration
+from nbv.labels import counted, duration
 from nbv.progress.estimate import Estimate, Job, Seen, estimate
 from nbv.progress.line import Line, how_far, time_left
 
@@ -93,7 +93,9 @@ class RunProgress(logging.Handler):
             "this run": f"{usual}times of those",
             "guess": "",
         }[self._estimate.basis]
-        return f"{n_left:,} {'job' if n_left == 1 else 'jobs'} to do{there}{usual}"
+        guessed = self._estimate.n_guessed if usual else 0
+        unknown = f" ({counted(guessed, 'job')} guessed)" if guessed else ""
+        return f"{n_left:,} {'job' if n_left == 1 else 'jobs'} to do{there}{usual}{unknown}"
 
     def emit(self, record: logging.LogRecord) -> None:
         """Take note of a job that starts, ends or fails."""

@@ -23,9 +23,9 @@ Half as much is read for a frame then as in bins of 3 degrees, and that is most 
 """
 
 MOST_COMPARED = 8000
-"""First views at most that a belief is compared with: those of neighbouring places are alike.
+"""First views at most that a belief is compared with: neighbours are alike.
 
-What all 15,000 views of 125 turns need is larger than a processor core's cache.
+The tables of all 15,000 views of 125 turns are much larger than the cache of a processor's core.
 """
 
 FLAT = 1e-5
