@@ -162,7 +162,7 @@ def network_of(
     """Return the network of some weights, from codes (n, side, side) to outputs (n, k).
 
     It computes on one core of the processor, in single precision, without the calls of modules and
-    with `nbv.estimation.folding.folded_convolutions`: a single image takes a third less time so.
+    with `nbv.estimation.folding.folded_convolutions`: a single image takes a quarter less time so.
 
     Raises
     ------
