@@ -57,7 +57,7 @@ rule train_bundle:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=per_attempt(8000),
+        mem_mb=per_attempt(9000),
         runtime=per_attempt(120),
     params:
         fold=BUNDLE_FOLD,

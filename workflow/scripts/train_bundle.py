@@ -6,29 +6,29 @@ with job(snakemake):
     import numpy as np
 
     from nbv.calibration.splits import need_objects, objects_with_role, read_splits
-    from nbv.depth_images import DepthImages, open_depth
+    from nbv.depth_images import open_depth
     from nbv.estimation.hardware import choose_hardware, use_one_thread
-    from nbv.estimation.training import train_estimator
-    from nbv.estimation.weights import save_estimator
+    from nbv.estimation.training import train_network
+    from nbv.estimation.weights import Estimator, save_estimator
     from nbv.seeds import seed_for
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     use_one_thread()
     splits = read_splits(given.splits)
     object_ids = objects_with_role(splits, params.fold, "train")
-    names: list[str] = []
-    codes = []
-    for place, paths in enumerate(zip(given.depth, given.objects, strict=True)):
-        images = open_depth(*paths)
+    opened = [open_depth(*paths) for paths in zip(given.depth, given.objects, strict=True)]
+    # A gigabyte and more: one copy, filled elevation by elevation.
+    codes = np.empty((len(opened), len(object_ids), *opened[0].codes.shape[1:]), dtype=np.uint8)
+    for of_elevation, images in zip(codes, opened, strict=True):
         need_objects(splits, images.object_ids)
-        names += [f"{object_id}/{place}" for object_id in object_ids]
-        codes.append(images.of(object_ids))
+        of_elevation[:] = images.of(object_ids)
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
-    estimator = train_estimator(
-        DepthImages(tuple(names), np.concatenate(codes)),
-        names,
+    network = train_network(
+        codes.reshape(-1, *codes.shape[2:]),
         params.estimator,
         hardware,
         seed_for(params.seed, "bundle", wildcards.category),
     )
+    names = [f"{name}/{place}" for place in range(len(opened)) for name in object_ids]
+    estimator = Estimator(network, params.estimator, codes.shape[-1], names)
     save_estimator(snakemake.output[0], estimator, hardware)
