@@ -203,12 +203,23 @@ def test_a_bundle_is_calibrated_again(bundle):
     limit = max(np.quantile(scores, 0.95), LEAST_LIMIT)
     assert found.familiarity.threshold == pytest.approx(limit * known.threshold)
     assert np.array_equal(found.familiarity.references, known.references)
-    wanted = paper_tables(np.array([10.0, 0.0, 40.0]), found.distributions[:3], ONE_DENSITY)
-    assert found.paper.elevation_deg.tolist() == [0.0, 10.0, 40.0]
+    # Each turn counts for the nearest table; without an elevation, for the lowest.
+    of_table = np.array([0.0, 0.0, 30.0, *bundle.elevation_deg])
+    wanted = paper_tables(of_table, found.distributions, ONE_DENSITY)
+    assert found.paper.elevation_deg.tolist() == bundle.paper.elevation_deg.tolist() == [0.0, 30.0]
     assert np.array_equal(found.paper.rotation_deg, wanted.rotation_deg)
     assert found.weights is bundle.weights
     assert found.provenance == {**bundle.provenance, "calibrated_by": "recording.csv"}
     assert "calibrated_by" not in bundle.provenance
+
+
+def test_a_paper_table_without_new_turns_stays(bundle):
+    marked = replace(bundle.paper, rotation_deg=np.full((2, 360), 77, np.int16))
+    known = replace(bundle, paper=marked)
+    found = recalibrated(known, [turn("x", elevation=31.0)], "recording.csv", ONE_DENSITY)
+    assert (found.paper.rotation_deg[0] == 77).all()
+    assert (found.paper.rotation_deg[1] != 77).any()
+    assert (known.paper.rotation_deg == 77).all()
 
 
 def test_without_elevations_all_turns_count_alike(bundle):

@@ -48,13 +48,13 @@ class PaperTables:
     elevation_deg: NDArray[np.float32]
     rotation_deg: NDArray[np.int16]
 
-    def recommend(self, estimate_deg: ArrayLike, elevation_deg: float) -> NDArray[np.float64]:
-        """Return the rotations for estimates, of the table of the nearest elevation.
+    def table_of(self, elevation_deg: float) -> int:
+        """Return which table is nearest to an elevation: the lowest where it is not known (NaN)."""
+        return int(np.nan_to_num(np.abs(self.elevation_deg - elevation_deg)).argmin())
 
-        Of an elevation that is not known (NaN), the lowest table answers.
-        """
-        apart = np.abs(self.elevation_deg - elevation_deg)
-        table = self.rotation_deg[int(np.nan_to_num(apart).argmin())]
+    def recommend(self, estimate_deg: ArrayLike, elevation_deg: float) -> NDArray[np.float64]:
+        """Return the rotations for estimates, of the table of `table_of` an elevation."""
+        table = self.rotation_deg[self.table_of(elevation_deg)]
         rotations = table[nearest_bin(estimate_deg, len(table))]
         return np.asarray(rotations, dtype=np.float64)
 

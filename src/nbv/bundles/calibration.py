@@ -87,14 +87,21 @@ def paper_tables(
     density : mapping
         See `nbv.recommendation.density_selection.choose_densities`.
     """
-    n_bins = distributions.shape[-1]
-    azimuth_deg = np.arange(n_bins) * (360.0 / n_bins)
-    estimates = np.stack([full_turn(azimuth_deg, mean_direction_deg(d)) for d in distributions])
     of_turn = np.rint(elevation_deg)
     levels = np.unique(of_turn)
-    tables = [chosen_lookup(estimates[of_turn == level], PAPER, density) for level in levels]
-    rotations = np.stack([table.recommended_delta_deg for table in tables])
-    return PaperTables(levels.astype(np.float32), rotations.astype(np.int16))
+    rotations = [_paper_rotations(distributions[of_turn == level], density) for level in levels]
+    return PaperTables(levels.astype(np.float32), np.stack(rotations))
+
+
+def _paper_rotations(
+    distributions: NDArray[np.floating], density: Mapping[str, Any]
+) -> NDArray[np.int16]:
+    """Return what the paper's lookup table of some turns (S, B, B) recommends, (360,)."""
+    n_bins = distributions.shape[-1]
+    azimuth_deg = np.arange(n_bins) * (360.0 / n_bins)
+    estimates = [full_turn(azimuth_deg, mean_direction_deg(turn)) for turn in distributions]
+    table = chosen_lookup(np.stack(estimates), PAPER, density)
+    return table.recommended_delta_deg.astype(np.int16)
 
 
 def recalibrated(
@@ -102,10 +109,11 @@ def recalibrated(
 ) -> Bundle:
     """Return a bundle with the same network, calibrated by other turns, such as those of a camera.
 
-    Temperature, the paper's tables, the familiar range and, where it is known, the focal length of
-    frames without intrinsics are those of the turns. The bundle's own
-    calibration turns stay, and count as much as `PRIOR_TURNS` of the others together: a turn or
-    two say too little alone. A turn of unknown elevation counts for all.
+    Temperature, the familiar range and, where it is known, the focal length of frames without
+    intrinsics are those of the turns. The bundle's own calibration turns stay, and count as much as
+    `PRIOR_TURNS` of the others together: a turn or two say too little alone. A turn of unknown
+    elevation counts for all. The paper's table of an elevation is made again where one of the turns
+    is nearest to it, of those and the bundle's, each of which counts once.
 
     Parameters
     ----------
@@ -123,7 +131,13 @@ def recalibrated(
     prior = bundle.distributions ** np.float32(bundle.temperature / temperature)
     prior /= prior.sum(axis=-1, keepdims=True)
     prior_weight = bundle.turn_weight * (PRIOR_TURNS / bundle.turn_weight.sum())
-    elevation_deg = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
+    of_turns = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
+    elevation_deg = np.concatenate([of_turns, bundle.elevation_deg])
+    distributions = np.concatenate([rows, prior])
+    of_table = np.array([bundle.paper.table_of(elevation) for elevation in elevation_deg])
+    rotations = bundle.paper.rotation_deg.copy()
+    for table in np.unique(of_table[: len(turns)]):
+        rotations[table] = _paper_rotations(distributions[of_table == table], density)
     known = bundle.familiarity
     scores = [unfamiliarity(known, turn.codes, turn.logits) for turn in turns]
     focal_px = [turn.focal_px for turn in turns if np.isfinite(turn.focal_px)]
@@ -133,10 +147,10 @@ def recalibrated(
         focal_px=float(np.median(focal_px)) if focal_px else bundle.focal_px,
         temperature=temperature,
         object_ids=(*(turn.object_id for turn in turns), *bundle.object_ids),
-        elevation_deg=np.concatenate([elevation_deg, bundle.elevation_deg]),
+        elevation_deg=elevation_deg,
         turn_weight=np.concatenate([np.ones(len(turns)), prior_weight]).astype(np.float32),
-        distributions=np.concatenate([rows, prior]),
+        distributions=distributions,
         familiarity=replace(known, threshold=limit * known.threshold),
-        paper=paper_tables(np.nan_to_num(elevation_deg), rows, density),
+        paper=replace(bundle.paper, rotation_deg=rotations),
         provenance=dict(bundle.provenance) | {"calibrated_by": origin},
     )
