@@ -126,7 +126,7 @@ def test_moveit(frame, run) -> None:
     buffer.lookup_transform.assert_called_once_with("base_link", "camera_depth_optical_frame", None)
     assert done == ["path"]
     assert names["camera_pose"] == pytest.approx(POSE)
-    point, moves = names["point"], (names["answer"].move, *names["answer"].alternatives)
+    point, moves = names["point"], names["answer"].moves
     # The example's mug stands in the middle of the image, at the distance that it was drawn.
     ahead = np.linalg.inv(POSE) @ [*point, 1.0]
     assert ahead[:2] == pytest.approx([0, 0], abs=0.02)

@@ -101,7 +101,7 @@ def same_answer(printed: dict, answer) -> None:
 
 
 def same_move(printed: dict, answer) -> None:
-    moves = [answer.move, *answer.alternatives]
+    moves = answer.moves
     for one, move in zip([printed["move"], *printed["alternatives"]], moves, strict=True):
         assert one["rotation_deg"] == move.rotation_deg
         assert one["travel_deg"] == move.travel_deg
@@ -255,6 +255,24 @@ def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
     )
     assert "(2 views)" in two
     assert "camera" not in two.splitlines()[0]
+
+
+def test_frames_all_round_have_a_pose_and_no_next_view(manifest, capsys):
+    frames = [f"turn/{place}.npy" for place in range(BINS)]
+    rotations = ("--rotations", *(f"{place * WIDTH:g}" for place in range(BINS)))
+    where = ("--camera-pose", "pose.json", "--axis", "0", "0", "0")
+    command = ("recommend", *frames, *rotations, "--bundle", "b.safetensors", *where)
+    _, pose, next_view, *others = run(capsys, *command).splitlines()
+    assert "(24 views)" in pose
+    assert next_view.startswith("next view  none: ")
+    assert not any(line.startswith(("or ", "target")) for line in others)
+    printed = json.loads(run(capsys, *command, "--json"))
+    assert printed["move"] is printed["target_camera_pose"] is None
+    assert printed["alternatives"] == []
+    answer = Recommender.load("b.safetensors").recommend(
+        [frame(place) for place in range(BINS)], rotations_deg=np.arange(BINS) * WIDTH
+    )
+    assert printed["azimuth_deg"] == pytest.approx(answer.azimuth_deg)
 
 
 @pytest.mark.parametrize(("limit", "is_told"), [(1e-6, True), (1e6, False)])

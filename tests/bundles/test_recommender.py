@@ -254,7 +254,7 @@ def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):
 
 
 def check_moves(found):
-    moves = [found.move, *found.alternatives]
+    moves = found.moves
     assert len(moves) <= 1 + N_ALTERNATIVES
     errors = [move.expected_error_deg for move in moves]
     assert errors == sorted(errors)
@@ -284,6 +284,9 @@ def test_moves_keep_to_what_the_camera_may_do(recommender, seed, rotations, max_
     codes = codes_of(seed, len(rotations))
     apart = circular_distance_deg(HERE[:, None], np.array(rotations) - rotations[-1]).min(axis=1)
     wanted = (apart >= MIN_SEPARATION_DEG) & (travel_deg(HERE) <= max_travel)
+    if not (apart >= MIN_SEPARATION_DEG).any():
+        assert recommender.recommend_crops(codes, rotations, max_travel_deg=max_travel).moves == ()
+        return
     if not wanted.any():
         with pytest.raises(UserError, match="no rotation is allowed"):
             recommender.recommend_crops(codes, rotations, max_travel_deg=max_travel)
@@ -311,7 +314,7 @@ def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
         found.error_after_deg < np.roll(found.error_after_deg, -1)
     )
     assert minima.sum() > 15
-    moves = [found.move, *found.alternatives]
+    moves = found.moves
     assert len(moves) == 1 + N_ALTERNATIVES
     rotations = np.array([move.rotation_deg for move in moves])
     apart = circular_distance_deg(rotations[:, None], rotations)
@@ -379,12 +382,12 @@ def test_allowed_rotations_are_ranked(recommender):
     codes = codes_of(2, 1)
     allowed = np.arange(-180.0, 180.0, 2.5)
     found = recommender.recommend_crops(codes, allowed_deg=allowed)
-    moves = [found.move, *found.alternatives]
+    moves = found.moves
     assert all(move.rotation_deg in {*allowed, 180.0} for move in moves)
     free = recommender.recommend_crops(codes)
     assert found.move.expected_error_deg <= free.move.expected_error_deg
     few = recommender.recommend_crops(codes, allowed_deg=[40.25, -75.5, 131.0])
-    moves = [few.move, *few.alternatives]
+    moves = few.moves
     assert {move.rotation_deg for move in moves} == {40.25, -75.5, 131.0}
     errors = [move.expected_error_deg for move in moves]
     assert errors == sorted(errors)
@@ -400,7 +403,7 @@ def test_booleans_are_a_mask_over_the_circle(recommender, seed, mask):
         return
     found = recommender.recommend_crops(codes, allowed_deg=np.array(mask))
     wanted = recommender.recommend_crops(codes, allowed_deg=allowed)
-    assert [found.move, *found.alternatives] == [wanted.move, *wanted.alternatives]
+    assert found.moves == wanted.moves
     assert np.array_equal(found.error_after_deg, wanted.error_after_deg)
 
 
@@ -423,10 +426,25 @@ def test_where_nothing_is_allowed_is_one_line(recommender):
     ):
         with pytest.raises(UserError, match="widen --allowed or --max-travel"):
             recommender.recommend_crops(codes, **options)
-    # Frames all round leave nothing.
+
+
+@pytest.mark.parametrize("options", [{}, {"allowed_deg": [90.0]}, {"max_travel_deg": 10.0}])
+def test_frames_all_round_have_a_pose_and_no_next_view(recommender, options):
     everywhere = np.arange(BINS) * WIDTH
-    with pytest.raises(UserError, match="no rotation is allowed"):
-        recommender.recommend_crops(codes_of(0, BINS), everywhere)
+    codes = codes_of(0, BINS)
+    found = recommender.recommend_crops(codes, everywhere, **options)
+    assert found.move is None
+    assert found.moves == found.alternatives == ()
+    assert np.isinf(found.error_after_deg).all()
+    # The pose is that of the same frames in another order, with room for a next view.
+    half = recommender.recommend_crops(codes[:12], everywhere[:12])
+    assert half.move is not None
+    assert half.moves == (half.move, *half.alternatives)
+    assert found.n_views == BINS
+    logs = np.log(recommender.distributions(codes))
+    product = np.exp(sum(np.roll(row, -place) for place, row in enumerate(logs)))
+    back = np.roll(product / product.sum(), BINS - 1)
+    assert found.belief == pytest.approx(back, abs=1e-6)
 
 
 @pytest.mark.parametrize("allowed", [[], [np.nan], [30.0, np.inf]])

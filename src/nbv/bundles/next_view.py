@@ -78,8 +78,9 @@ class Recommendation:
         Circular standard deviation of the belief.
     expected_error_deg : float
         Of `azimuth_deg`: what objects that looked alike erred in calibration.
-    move : Move
-        The best next view.
+    move : Move, or None
+        The best next view; None where the views so far are all round, so that each further one
+        would be nearer than 15° to one of them.
     alternatives : tuple of Move
         Other views, each the best of its neighbourhood, best first.
     belief : ndarray (B,)
@@ -108,14 +109,14 @@ class Recommendation:
     >>> import nbv
     >>> frame = nbv.example_frame(azimuth_deg=250.0)
     >>> answer = nbv.Recommender.load("mug").recommend(frame.depth_m, intrinsics=frame.intrinsics)
-    >>> abs(answer.azimuth_deg - 250.0) < 20, answer.move.expected_error_deg < 20
+    >>> abs(answer.azimuth_deg - 250.0) < 20, answer.moves[0].expected_error_deg < 20
     (True, True)
     """
 
     azimuth_deg: float
     spread_deg: float
     expected_error_deg: float
-    move: Move
+    move: Move | None
     alternatives: tuple[Move, ...]
     belief: NDArray[np.float64]
     error_after_deg: NDArray[np.float64]
@@ -125,6 +126,11 @@ class Recommendation:
     n_views: int
     crops: tuple[NDArray[np.uint8], ...] = ()
     object_position_m: tuple[float, float, float] | None = None
+
+    @property
+    def moves(self) -> tuple[Move, ...]:
+        """`move` and `alternatives`, best first; empty where there is no further view."""
+        return () if self.move is None else (self.move, *self.alternatives)
 
     @property
     def is_unfamiliar(self) -> bool:
@@ -180,7 +186,7 @@ def next_view(
     Raises
     ------
     UserError
-        Where no rotation is allowed.
+        Where there is a further view, but none that is allowed.
     """
     belief = fused(distributions, rotations_deg)
     n_bins = len(belief)
@@ -191,23 +197,25 @@ def next_view(
     last = rotations_deg[-1]
     error = after[(np.arange(n_bins) + round(last / width)) % n_bins]
     taken = np.asarray(rotations_deg) - last
-    if allowed_deg is None:
-        rotation_deg = _signed(np.arange(n_bins, dtype=np.float64) * width)
-        is_near = _is_reachable(rotation_deg, taken, max_travel_deg)
-        best, *others = _local_best(rotation_deg[is_near], error[is_near], width)
-    else:
-        rotation_deg = _allowed(allowed_deg)
-        rotation_deg = rotation_deg[_is_reachable(rotation_deg, taken, max_travel_deg)]
-        best, *others = _local_best(rotation_deg, _between(error, rotation_deg), width)
-        is_near = np.isin(np.arange(n_bins), nearest_bin(rotation_deg, n_bins))
-    error[~is_near] = np.inf
+    bins_deg = _signed(np.arange(n_bins, dtype=np.float64) * width)
+    rotation_deg = bins_deg if allowed_deg is None else _allowed(allowed_deg)
+    expected = error if allowed_deg is None else _between(error, rotation_deg)
+    is_allowed = _is_free(rotation_deg, taken) & (np.abs(rotation_deg) <= max_travel_deg)
+    if not is_allowed.any() and _is_free(bins_deg, taken).any():
+        raise UserError(
+            "no rotation is allowed: widen --allowed or --max-travel; a view is "
+            f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
+        )
+    rotation_deg = rotation_deg[is_allowed]
+    moves = _local_best(rotation_deg, expected[is_allowed], width)
+    error[~np.isin(np.arange(n_bins), nearest_bin(rotation_deg, n_bins))] = np.inf
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
     return Recommendation(
         azimuth_deg=float(wrap_deg(mean_direction_deg(belief[None])[0] + last)),
         spread_deg=spread_deg(belief),
         expected_error_deg=float(now),
-        move=best,
-        alternatives=tuple(others),
+        move=moves[0] if moves else None,
+        alternatives=tuple(moves[1:]),
         belief=turned(belief, -last),
         error_after_deg=error,
         unfamiliarity=math.nan,
@@ -269,18 +277,10 @@ def _signed(rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(rotation_deg > 180.0, rotation_deg - 360.0, rotation_deg)
 
 
-def _is_reachable(
-    rotation_deg: NDArray[np.float64], taken: NDArray[np.float64], max_travel_deg: float
-) -> NDArray[np.bool_]:
-    """Return which rotations (m,) are neither too far nor too near to a view that was `taken`."""
+def _is_free(rotation_deg: NDArray[np.float64], taken: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which rotations (m,) are not too near to a view that was `taken`."""
     apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
-    is_free = (apart >= MIN_SEPARATION_DEG) & (np.abs(rotation_deg) <= max_travel_deg)
-    if not is_free.any():
-        raise UserError(
-            "no rotation is allowed: widen --allowed or --max-travel; a view is "
-            f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
-        )
-    return np.asarray(is_free)
+    return np.asarray(apart >= MIN_SEPARATION_DEG)
 
 
 def _between(error: NDArray[np.float64], rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:

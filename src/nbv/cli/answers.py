@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from nbv.labels import counted
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from nbv.bundles.next_view import Move, Recommendation
+    from nbv.bundles.next_view import Recommendation
 
 
 Place = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
@@ -43,8 +44,7 @@ def target_poses(answer: Recommendation, place: Place | None) -> list[NDArray[np
 
     if place is None:
         return None
-    moves = (answer.move, *answer.alternatives)
-    return [moved_camera(*place, move.rotation_deg) for move in moves]
+    return [moved_camera(*place, move.rotation_deg) for move in answer.moves]
 
 
 def recommendation_as_json(
@@ -62,20 +62,13 @@ def recommendation_as_json(
     targets : sequence of ndarray (4, 4), optional
         The camera's pose after the move and after each alternative.
     """
-
-    def move(one: Move) -> dict[str, Any]:
-        return {
-            "rotation_deg": one.rotation_deg,
-            "travel_deg": one.travel_deg,
-            "expected_error_deg": one.expected_error_deg,
-        }
-
+    moves: list[dict[str, Any]] = [asdict(move) for move in answer.moves]
     about: dict[str, Any] = {
         "azimuth_deg": answer.azimuth_deg,
         "spread_deg": answer.spread_deg,
         "expected_error_deg": answer.expected_error_deg,
-        "move": move(answer.move),
-        "alternatives": [move(one) for one in answer.alternatives],
+        "move": moves[0] if moves else None,
+        "alternatives": moves[1:],
         "unfamiliarity": None if math.isnan(answer.unfamiliarity) else answer.unfamiliarity,
         "bayes_factor": answer.bayes_factor,
         "warnings": list(answer.warnings),
@@ -85,9 +78,9 @@ def recommendation_as_json(
         "error_after_deg": [None if e == float("inf") else e for e in answer.error_after_deg],
     }
     if targets is not None:
-        for one, target in zip([about["move"], *about["alternatives"]], targets, strict=True):
-            one["target_camera_pose"] = target.tolist()
-        about["target_camera_pose"] = targets[0].tolist()
+        for move, target in zip(moves, targets, strict=True):
+            move["target_camera_pose"] = target.tolist()
+        about["target_camera_pose"] = moves[0]["target_camera_pose"] if moves else None
     return about
 
 
@@ -100,11 +93,13 @@ def say_recommendation(
         f"expected error {answer.expected_error_deg:.1f}°, spread {answer.spread_deg:.1f}° "
         f"({counted(answer.n_views, 'view')})"
     )
-    move = answer.move
-    say(
-        f"next view  turn by {move.rotation_deg:+g}° (travel {move.travel_deg:g}°): "
-        f"expected error {move.expected_error_deg:.1f}°"
-    )
+    if (move := answer.move) is None:
+        say("next view  none: every place is less than 15° from a view so far")
+    else:
+        say(
+            f"next view  turn by {move.rotation_deg:+g}° (travel {move.travel_deg:g}°): "
+            f"expected error {move.expected_error_deg:.1f}°"
+        )
     if answer.alternatives:
         others = (
             f"{m.rotation_deg:+g}° ({m.expected_error_deg:.1f}°)" for m in answer.alternatives
@@ -112,7 +107,7 @@ def say_recommendation(
         say(f"or         {', '.join(others)}")
     for warning in answer.warnings:
         say(f"careful    {warning}")
-    if targets is not None:
+    if targets:
         say("target camera pose in the base frame")
         for row in targets[0]:
             say("  " + " ".join(f"{value:9.5f}" for value in row))
