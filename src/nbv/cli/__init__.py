@@ -163,7 +163,7 @@ def recommend(
     table
         The lookup table that nbv calibrate made of that estimator.
     plot
-        Draw crop, belief and expected errors into this file.
+        Draw crop, belief, expected errors and the move into this file.
     json
         Print JSON.
     """
