@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Self
 
 
 class UserError(Exception):
@@ -16,6 +17,10 @@ class UserError(Exception):
         shown = (c if c.isprintable() else ascii(c)[1:-1] for c in message)
         super().__init__("".join(shown))
 
+    def about(self, what: str) -> Self:
+        """Return the same mistake with a message that says first what it is about."""
+        return type(self)(f"{what}: {self}")
+
 
 class NamedError(UserError):
     """A mistake that has a name, for programs.
@@ -24,11 +29,18 @@ class NamedError(UserError):
     ----------
     name : str
         Stable, such as ``empty-mask``; the message starts with it.
+    message : str
+        What follows the name.
     """
 
     def __init__(self, name: str, message: str) -> None:
         super().__init__(f"{name}: {message}")
         self.name = name
+        self.message = message
+
+    def about(self, what: str) -> Self:
+        """Return the same mistake; after its name, the message says first what it is about."""
+        return type(self)(self.name, f"{what}: {self.message}")
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:

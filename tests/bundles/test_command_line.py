@@ -460,6 +460,8 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
         "category": "mug",
         "n_objects": 1,
         "assumed_focal_px": FOCAL_PX,
+        "n_frames_without_camera": 24,
+        "left_out": [],
     }
     assert f"{recording.pop('offset_deg'):+.1f}°" in head
     assert f"careful    {recording.pop('warning')}" == warning
@@ -474,10 +476,13 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
 def test_a_turn_with_a_gap_does_not_calibrate(manifest, capsys):
     rows = pd.read_csv(manifest).iloc[3:]
     rows.to_csv("gap.csv", index=False)
-    message = fails(
-        capsys, "calibrate", "gap.csv", "--bundle", "b.safetensors", "--output", "x.safetensors"
-    )
-    assert "60° apart" in message
+    options = ("--bundle", "b.safetensors", "--output", "x.safetensors")
+    assert main(["calibrate", "gap.csv", *options]) == 2
+    out, err = capsys.readouterr()
+    assert err.startswith("nbv: error: object 'cup', sequence '1': views are 60° apart")
+    assert err.count("\n") == 1
+    # What was found before stays: the offset tells which frames there are.
+    assert "cup, sequence 1: 21 frames" in out
     assert not Path("x.safetensors").exists()
 
 
@@ -610,15 +615,24 @@ def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
     options = ("evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2")
     assert main([*options, "--json"]) == 0
     out, err = capsys.readouterr()
-    assert len(json.loads(out)["errors"]) == 6
-    assert "3.npy is left out: empty-mask" in err
-    assert "3.npy is left out: empty-mask" in run(capsys, *options)
+    printed = json.loads(out)
+    assert len(printed["errors"]) == 6
+    (left_out,) = printed["left_out"]
+    assert left_out["file"].endswith("turn/3.npy")
+    assert left_out["reason"] == "empty-mask"
+    assert f"3.npy is left out: empty-mask: {left_out['message']}" in err
+    told = run(capsys, *options)
+    assert "3.npy is left out: empty-mask" in told
+    # The frame that is left out needs no camera.
+    assert printed["n_frames_without_camera"] == 23
+    assert "not given for 23 frames" in told
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["no.csv"], "no.csv does not exist"),
+        (["masks.csv"], "turn/2.npy: the mask has 3 × 4 pixels and the frame"),
         (["pairs.csv"], "no column 'sequence'"),
         (["manifest.csv", "--views", "1"], "needs 2 or more"),
         (["manifest.csv", "--views", "40"], "24 frames, too few for 40 views"),
@@ -630,6 +644,10 @@ def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
     ],
 )
 def test_what_cannot_be_evaluated_is_one_line(manifest, pairs, capsys, arguments, message):
+    rows = pd.read_csv("manifest.csv").assign(mask="")
+    rows.loc[2, "mask"] = "small.npy"
+    rows.to_csv("masks.csv", index=False)
+    np.save("small.npy", np.ones((4, 3)))
     code = main(["evaluate", *arguments, "--bundle", "b.safetensors"])
     out, err = capsys.readouterr()
     assert code == 2

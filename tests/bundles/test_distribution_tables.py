@@ -107,7 +107,7 @@ def test_views_come_in_any_order_and_anywhere_closer_than_15_degrees():
     wanted, found = (DistributionTable.of_pairs(each) for each in (given_turns, shuffled))
     assert found.temperature == pytest.approx(wanted.temperature)
     assert found.distributions == pytest.approx(wanted.distributions, abs=1e-5)
-    with pytest.raises(UserError, match="30° apart"):
+    with pytest.raises(UserError, match=r"^object '.*': views are 30° apart"):
         DistributionTable.of_pairs({n: (a[::2], p[::2]) for n, (a, p) in given_turns.items()})
 
 

@@ -721,8 +721,8 @@ def test_what_is_nearest_may_be_nearer_than_the_middle_of_the_object(recommender
         recommender.recommend(0.3 * depth, intrinsics=[60.0])
 
 
-def test_one_bad_frame_of_several_is_refused(recommender):
-    with pytest.raises(FrameError, match="empty-mask"):
+def test_one_bad_frame_of_several_is_refused_by_its_number(recommender):
+    with pytest.raises(FrameError, match=r"^empty-mask: frame 2 of 2: "):
         recommender.recommend([FRAMES[0], np.zeros_like(FRAMES[0])], rotations_deg=[0.0, 90.0])
 
 

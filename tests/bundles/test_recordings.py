@@ -52,7 +52,7 @@ def refused(path: Path) -> str:
 
 
 def told(lines: list[str]):
-    return lines.append
+    return lambda path, error: lines.append(f"{path} is left out: {error}")
 
 
 # Manifests

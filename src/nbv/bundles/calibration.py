@@ -104,6 +104,13 @@ def _paper_rotations(
     return table.recommended_delta_deg.astype(np.int16)
 
 
+def _bins_of(turn: Turn, temperature: float) -> NDArray[np.float32]:
+    try:
+        return bin_apart(turn.azimuth_deg, distributions_of(turn.logits, temperature))
+    except UserError as error:
+        raise error.about(f"object {turn.object_id!r}, sequence {turn.sequence!r}") from error
+
+
 def recalibrated(
     bundle: Bundle, turns: Sequence[Turn], origin: str, density: Mapping[str, Any] = DENSITY
 ) -> Bundle:
@@ -125,9 +132,7 @@ def recalibrated(
         See `paper_tables`.
     """
     temperature = temperature_of(turns)
-    rows = np.stack(
-        [bin_apart(t.azimuth_deg, distributions_of(t.logits, temperature)) for t in turns]
-    )
+    rows = np.stack([_bins_of(turn, temperature) for turn in turns])
     prior = bundle.distributions ** np.float32(bundle.temperature / temperature)
     prior /= prior.sum(axis=-1, keepdims=True)
     prior_weight = bundle.turn_weight * (PRIOR_TURNS / bundle.turn_weight.sum())

@@ -89,10 +89,12 @@ class DistributionTable:
             np.log(np.concatenate([rows for _, rows in known.values()])),
             np.concatenate([azimuth for azimuth, _ in known.values()]),
         )
-        turned = [
-            bin_apart(azimuth, distributions_of(np.log(rows), temperature))
-            for azimuth, rows in known.values()
-        ]
+        turned = []
+        for name, (azimuth, rows) in known.items():
+            try:
+                turned.append(bin_apart(azimuth, distributions_of(np.log(rows), temperature)))
+            except UserError as error:
+                raise error.about(f"object {name!r}") from error
         return cls(tuple(known), temperature, np.stack(turned))
 
     @cached_property

@@ -150,7 +150,7 @@ def see(
     recording: Recording,
     intrinsics: str | None,
     depth_scale: float | None,
-    tell: Callable[[str], None],
+    tell: Callable[[str, FrameError], None],
     near_m: float | None = None,
     far_m: float | None = None,
 ) -> Turn:
@@ -165,7 +165,7 @@ def see(
     depth_scale : float or None
         See `nbv.frames.depth_files.read_depth`.
     tell : callable
-        Takes a line of text.
+        Takes the file of a frame that is refused, and why.
     near_m, far_m : float, optional
         The object lies between them in every frame, metres.
 
@@ -180,17 +180,17 @@ def see(
     ):
         mask, camera = row.get("mask"), camera_of(intrinsics, row["path"])
         known = own or camera.intrinsics
+        object_mask = read_mask(mask) if isinstance(mask, str) else None
         try:
+            depth_m = read_depth(row["path"], depth_scale, camera.unit_m)
             crop = recommender.crop(
-                read_depth(row["path"], depth_scale, camera.unit_m),
-                mask=read_mask(mask) if isinstance(mask, str) else None,
-                intrinsics=known,
-                near_m=near_m,
-                far_m=far_m,
+                depth_m, mask=object_mask, intrinsics=known, near_m=near_m, far_m=far_m
             )
         except FrameError as error:
-            tell(f"{row['path']} is left out: {error}")
+            tell(row["path"], error)
             continue
+        except UserError as error:
+            raise error if row["path"] in str(error) else error.about(row["path"]) from error
         codes.append(crop.codes)
         kept.append(place)
         focal_px.append(known.fx if known else float("nan"))

@@ -191,10 +191,15 @@ class Recommender:
         masks = _as_masks(mask, len(frames))
         cameras = _as_cameras(intrinsics, len(frames))
         rotations_deg = as_rotation_list(rotations_deg, len(frames))
-        crops = [
-            self.crop(frame, mask=own, intrinsics=camera, near_m=near_m, far_m=far_m)
-            for frame, own, camera in zip(frames, masks, cameras, strict=True)
-        ]
+        crops: list[Crop] = []
+        for frame, own, camera in zip(frames, masks, cameras, strict=True):
+            try:
+                crop = self.crop(frame, mask=own, intrinsics=camera, near_m=near_m, far_m=far_m)
+            except UserError as error:
+                if len(frames) == 1:
+                    raise
+                raise error.about(f"frame {len(crops) + 1} of {len(frames)}") from error
+            crops.append(crop)
         codes = np.stack([crop.codes for crop in crops])
         answer = self.recommend_crops(
             codes,

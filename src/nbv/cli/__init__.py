@@ -9,7 +9,7 @@ import math
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from nbv.bundles.recommender import Recommender
     from nbv.bundles.turns import Turn
     from nbv.cli.answers import Place
+    from nbv.frames.errors import FrameError
 
 USER_ERROR = 2
 
@@ -309,18 +310,23 @@ def calibrate(
     from nbv.bundles.calibration import recalibrated
     from nbv.recommendation.belief import mean_direction_deg
 
-    recommender, turns, n_assumed = _seen_turns(
-        bundle, source, intrinsics, depth_scale, near, far, as_json=json
-    )
-    held = recommender.bundle
-    calibrated = recalibrated(held, turns, str(source))
+    seen = _seen_frames(bundle, source, intrinsics, depth_scale, near, far, as_json=json)
+    held, turns = seen.recommender.bundle, seen.turns
     recordings: list[dict[str, Any]] = []
     for turn in turns:
         estimate_deg = mean_direction_deg(distributions_of(turn.logits, held.temperature))
         about = {"object_id": turn.object_id, "sequence": turn.sequence}
         counts = {"n_frames": len(estimate_deg)}
         recordings.append(about | counts | offset_of(turn.azimuth_deg, estimate_deg))
-    save_bundle(output, calibrated)
+    if not json:
+        # Before the tables are made, which takes up to a minute.
+        if seen.n_assumed:
+            say_assumed_camera(held.focal_px, seen.n_assumed)
+        for one in recordings:
+            name = f"{one['object_id']}, sequence {one['sequence']}"
+            say_offset(name, counted(one["n_frames"], "frame"), one)
+        sys.stdout.flush()
+    save_bundle(output, recalibrated(held, turns, str(source)))
     if json:
         say_json(
             {
@@ -328,15 +334,10 @@ def calibrate(
                 "category": held.category,
                 "n_objects": len({turn.object_id for turn in turns}),
                 "recordings": recordings,
-                "assumed_focal_px": held.focal_px if n_assumed else None,
+                **seen.as_json(),
             }
         )
         return
-    if n_assumed:
-        say_assumed_camera(held.focal_px, n_assumed)
-    for one in recordings:
-        name = f"{one['object_id']}, sequence {one['sequence']}"
-        say_offset(name, counted(one["n_frames"], "frame"), one)
     calibrate_it = "recording calibrates it" if len(turns) == 1 else "recordings calibrate it"
     say(f"{output}: {held.category}, {len(turns)} {calibrate_it}")
 
@@ -386,10 +387,8 @@ def evaluate(
     from nbv.bundles.evaluation import familiarity_of
     from nbv.files import write_csv
 
-    recommender, turns, n_assumed = _seen_turns(
-        bundle, manifest, intrinsics, depth_scale, near, far, as_json=json
-    )
-    held = recommender.bundle
+    seen = _seen_frames(bundle, manifest, intrinsics, depth_scale, near, far, as_json=json)
+    held, turns = seen.recommender.bundle, seen.turns
     found = evaluate_(held, turns, views or [2, 3, 4, 5])
     if output is not None:
         write_csv(output, found)
@@ -401,12 +400,12 @@ def evaluate(
                 "errors": found.to_dict("records"),
                 "calibrated_by": calibrated_by,
                 "familiarity": familiar.to_dict("records"),
-                "assumed_focal_px": held.focal_px if n_assumed else None,
+                **seen.as_json(),
             }
         )
         return
-    if n_assumed:
-        say_assumed_camera(held.focal_px, n_assumed)
+    if seen.n_assumed:
+        say_assumed_camera(held.focal_px, seen.n_assumed)
     if calibrated_by:
         say(
             f"careful    {', '.join(calibrated_by)}: the bundle was calibrated with this name; "
@@ -557,7 +556,28 @@ def _tensor(value: Any) -> dict[str, Any]:
     return {"name": value.name, "shape": [side.dim_param or side.dim_value for side in sides]}
 
 
-def _seen_turns(
+@dataclass(frozen=True)
+class SeenFrames:
+    """What a bundle makes of recordings; the focal length of `n_assumed` frames is assumed."""
+
+    recommender: Recommender
+    turns: list[Turn]
+    n_assumed: int
+    left_out: dict[str, FrameError]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return for JSON whose camera is assumed, and which frames are left out."""
+        return {
+            "assumed_focal_px": self.recommender.bundle.focal_px if self.n_assumed else None,
+            "n_frames_without_camera": self.n_assumed,
+            "left_out": [
+                {"file": path, "reason": error.name, "message": error.message}
+                for path, error in self.left_out.items()
+            ],
+        }
+
+
+def _seen_frames(
     bundle: str,
     manifest: Path,
     intrinsics: str | None,
@@ -566,16 +586,26 @@ def _seen_turns(
     far: float | None,
     *,
     as_json: bool,
-) -> tuple[Recommender, list[Turn], int]:
-    """Return what a bundle makes of recordings, and of how many frames the camera is assumed."""
+) -> SeenFrames:
+    """Return what a bundle makes of the frames of a manifest, and tell which are left out."""
     from nbv.bundles.manifest import read_manifest, see
     from nbv.bundles.recommender import Recommender
 
-    tell = (lambda line: print(line, file=sys.stderr)) if as_json else say  # noqa: T201
+    left_out: dict[str, FrameError] = {}
+
+    def tell(path: str, error: FrameError) -> None:
+        left_out[path] = error
+        line = f"{path} is left out: {error}"
+        print(line, file=sys.stderr) if as_json else say(line)  # noqa: T201
+
     recommender, recordings = Recommender.load(bundle), read_manifest(manifest)
     turns = [see(recommender, one, intrinsics, depth_scale, tell, near, far) for one in recordings]
-    cameras = [camera for one in recordings for camera in one.intrinsics]
-    return recommender, turns, cameras.count(None) if intrinsics is None else 0
+    n_assumed = sum(
+        camera is None and intrinsics is None and path not in left_out
+        for one in recordings
+        for path, camera in zip(one.frames["path"], one.intrinsics, strict=True)
+    )
+    return SeenFrames(recommender, turns, n_assumed, left_out)
 
 
 def _known_place(camera_pose: Path | None, axis: list[float] | None) -> Place | None:
