@@ -1,0 +1,86 @@
+"""What docs/bundles.md says of several trainings is what the kept errors of each object say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nbv.bundles.evaluation import FIXED, OPPOSITE, PAPER, RANDOM, RECOMMENDED, SINGLE, SPACED
+from nbv.statistics.trainings import crossed_mean
+
+ROOT = Path(__file__).parents[2]
+SEEDS = ["seed_0", "seed_1", "seed_2", "seed_3"]
+OBJECTS = ("generated", "shapenet")
+
+
+@pytest.fixture(scope="module")
+def errors() -> pd.DataFrame:
+    table = pd.read_csv(ROOT / "docs/reference/bundles/trainings.csv")
+    return table.set_index(["objects", "choice", "n_views", "object_id"]).sort_index()[SEEDS]
+
+
+@pytest.fixture(scope="module")
+def page() -> list[list[str]]:
+    """The cells of all rows of the page's tables."""
+    lines = (ROOT / "docs/bundles.md").read_text(encoding="utf-8").splitlines()
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if "|" in line]
+
+
+def shown(errors: pd.DataFrame) -> str:
+    """A mean over objects and trainings as the page has it, with its 95 % interval."""
+    found = crossed_mean(errors.to_numpy().T).interval()
+    one, low, high = (f"{value:.1f}" for value in (found.value, found.low, found.high))
+    star = " *" if found.high < 0 or found.low > 0 else ""
+    return f"{one} ({low} to {high}){star}".replace("-0.0", "0.0").replace("-", "−")
+
+
+@pytest.mark.parametrize(
+    ("line", "choice", "n_views", "less"),
+    [
+        ("two views, recommended", RECOMMENDED, 2, None),
+        ("… less random", RECOMMENDED, 2, RANDOM),
+        ("… less best fixed", RECOMMENDED, 2, FIXED),
+        ("… less opposite", RECOMMENDED, 2, OPPOSITE),
+        ("… less the paper's method", RECOMMENDED, 2, PAPER),
+        ("three views, recommended", RECOMMENDED, 3, None),
+        ("… less evenly spaced", RECOMMENDED, 3, SPACED),
+        ("one view", SINGLE, 1, None),
+    ],
+)
+def test_means_and_differences_have_intervals_over_objects_and_trainings(
+    errors, page, line, choice, n_views, less
+):
+    (cells,) = (row[1:] for row in page if row[0] == line and len(row) == 3 and "(" in row[1])
+    for objects, cell in zip(OBJECTS, cells, strict=True):
+        own = errors.loc[objects, choice, n_views]
+        wanted = shown(own if less is None else own - errors.loc[objects, less, n_views])
+        assert cell.removesuffix(" *") == wanted.removesuffix(" *")
+        if less is not None:
+            assert cell == wanted
+
+
+@pytest.mark.parametrize("recording", ["nearly level", "from above"])
+def test_the_real_mug_has_a_column_for_each_training(errors, page, recording):
+    start = next(i for i, row in enumerate(page) if row[0] == f"{recording}: one view")
+    names = [RANDOM, FIXED, OPPOSITE, RECOMMENDED]
+    rows = page[start : start + 5]
+    assert [row[0].removeprefix("two views, ") for row in rows[1:]] == names
+    for choice, n_views, row in zip([SINGLE, *names], [1, 2, 2, 2, 2], rows, strict=True):
+        (found,) = errors.loc[f"real, {recording}", choice, n_views].to_numpy()
+        assert row[1:] == [f"{error:.1f}" for error in found]
+
+
+def test_the_shipped_bundle_is_the_first_of_the_trainings(errors, page):
+    """The lines of the page's first table of errors."""
+    names = {"generated mugs": "generated", "mugs of ShapeNet": "shapenet"}
+    names |= {f"real mug, {r}": f"real, {r}" for r in ("nearly level", "from above")}
+    columns = [(SINGLE, 1), *((c, 2) for c in (RANDOM, FIXED, OPPOSITE, RECOMMENDED, PAPER))]
+    for line, objects in names.items():
+        (cells,) = (row[1:] for row in page if row[0] == line and len(row) == 8)
+        means = [
+            errors.loc[objects, c, n]["seed_0"].mean() for c, n in [*columns, (RECOMMENDED, 3)]
+        ]
+        assert np.array(cells, float) == pytest.approx(np.array(means), abs=0.0501)
