@@ -788,6 +788,42 @@ def test_a_reader_that_has_seen_enough_is_no_error(here, command):
     program.stderr.close()
 
 
+def program(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The program, run by a shell: `nbv` in the command."""
+    nbv = f"{sys.executable} -c 'from nbv.cli import run; run()'"
+    return subprocess.run(
+        ["sh", "-c", command.replace("nbv", nbv)],
+        capture_output=True,
+        text=True,
+        env=os.environ | environment,
+    )
+
+
+def test_characters_that_an_encoding_lacks_are_escaped(here):
+    for name, options in (("text", ""), ("json", "--json")):
+        command = f"nbv recommend f0.npy --bundle b.safetensors {options}"
+        plain, escaped = (
+            program(command, PYTHONIOENCODING=encoding) for encoding in ("utf-8", "ascii")
+        )
+        assert (escaped.returncode, escaped.stderr) == (0, ""), name
+        if options:
+            assert json.loads(escaped.stdout) == json.loads(plain.stdout)
+        else:
+            assert escaped.stdout == plain.stdout.replace("°", r"\xb0")
+
+
+def test_a_closed_stream_is_no_traceback(here):
+    done = program("nbv inspect b.safetensors >&-")
+    assert done.returncode == 2
+    assert done.stderr == "nbv: error: standard output is closed: give it a file, or /dev/null\n"
+    done = program("nbv inspect b.safetensors 2>&-")
+    assert done.returncode == 0
+    assert done.stdout == program("nbv inspect b.safetensors").stdout
+    # Where there is no place for a mistake's line, output is none.
+    done = program("nbv inspect no-such 2>&-")
+    assert (done.returncode, done.stdout) == (2, "")
+
+
 def test_paths_are_checked_before_a_network_runs(here, capsys, monkeypatch):
     monkeypatch.setattr(Recommender, "load", lambda *_: pytest.fail("too late"))
     frames = ("recommend", "f0.npy")

@@ -5,6 +5,7 @@ Commands import what they use when they run, so that ``nbv --help`` stays quick.
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import sys
@@ -90,10 +91,23 @@ def _refused(message: str) -> int:
 
 def run() -> NoReturn:
     """Run the command of the command line, and exit."""
+    _open_streams()
     # Before numpy is imported, which reads them once.
     for name in THREADS:
         os.environ.setdefault(name, "1")
     sys.exit(main())
+
+
+def _open_streams() -> None:
+    """Make the program's streams ready for every character, or exit where nothing can be said."""
+    if sys.stderr is None:
+        # Else the next file that is opened takes its number, and the messages of libraries.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+        sys.stderr = open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    if sys.stdout is None:
+        sys.exit(_refused("standard output is closed: give it a file, or /dev/null"))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 @app.command

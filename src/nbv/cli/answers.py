@@ -28,8 +28,8 @@ def say(line: str) -> None:
 
 
 def say_json(value: Any) -> None:
-    """Print JSON, indented."""
-    say(json.dumps(value, indent=2, ensure_ascii=False))
+    """Print JSON, indented, in characters that every encoding has."""
+    say(json.dumps(value, indent=2))
 
 
 def say_assumed_camera(focal_px: float, n_frames: int | None = None) -> None:
