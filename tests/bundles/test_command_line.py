@@ -84,8 +84,12 @@ def fails(capsys, *arguments: str) -> str:
     """The one line of a command that fails."""
     code = main([str(argument) for argument in arguments])
     out, err = capsys.readouterr()
-    assert (code, out) == (2, "")
+    assert code == 2
     assert err.startswith("nbv: error: ")
+    if "--json" in arguments:
+        assert json.loads(out)["error"]["message"] == err.removeprefix("nbv: error: ").strip()
+    else:
+        assert out == ""
     assert err.endswith("\n")
     assert err.count("\n") == 1
     return err.strip()
@@ -861,6 +865,30 @@ def test_help_imports_nothing_heavy():
         "sys.exit(code or ' '.join(heavy & set(sys.modules)) or 0)\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True, capture_output=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        (("recommend", "f0.npy", "--far", "0.1", "--bundle", "b.safetensors"), "empty-mask"),
+        (("inspect", "no-such"), "no-bundle"),
+        (("recommend", "no.npy"), None),
+        (("recommend", "--near", "x"), None),
+        (("export", "b.safetensors", "--onnx", "locked/x.onnx"), None),
+    ],
+)
+def test_a_mistake_is_json_where_json_is_wanted(here, capsys, monkeypatch, arguments, name):
+    def locked(*_, **__):
+        raise PermissionError(13, "Permission denied", "locked")
+
+    monkeypatch.setattr(Path, "mkdir", locked)
+    line = fails(capsys, *arguments)
+    assert main([*arguments, "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert err.strip() == line
+    assert json.loads(out) == {
+        "error": {"name": name, "message": line.removeprefix("nbv: error: ")}
+    }
 
 
 # Without the packages of the experiment

@@ -31,6 +31,7 @@ from nbv.cli.answers import (
 )
 from nbv.cli.arguments import (
     SHIPPED,
+    Json,
     Numbers,
     Rotations,
     WholeNumbers,
@@ -39,7 +40,7 @@ from nbv.cli.arguments import (
     need_writable,
 )
 from nbv.cli.own_estimator import calibrate_table, recommend_by_distributions, recommend_by_table
-from nbv.errors import UserError
+from nbv.errors import NamedError, UserError
 from nbv.labels import counted
 
 if TYPE_CHECKING:
@@ -75,13 +76,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # Whoever read the output has seen enough. The interpreter flushes once more at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except OSError as error:
-        # Of a file to write: readers name the file themselves.
-        where = f"{error.filename}: " if error.filename else ""
-        return _refused(f"{where}{error.strerror}")
-    except (UserError, CycloptsError) as error:
-        return _refused(" ".join(str(error).split()))
+    except (UserError, CycloptsError, OSError) as error:
+        message = _message(error)
+        # An error of standard output itself names no file.
+        can_print = not isinstance(error, OSError) or error.filename is not None
+        if "--json" in given and can_print:
+            name = error.name if isinstance(error, NamedError) else None
+            say_json({"error": {"name": name, "message": message}})
+        return _refused(message)
     return 0
+
+
+def _message(error: Exception) -> str:
+    if not isinstance(error, OSError):
+        return " ".join(str(error).split())
+    # Of a file to write: readers name the file themselves.
+    return f"{error.filename}: {error.strerror}" if error.filename else f"{error.strerror}"
 
 
 def _refused(message: str) -> int:
@@ -130,7 +140,7 @@ def recommend(
     distribution: Path | None = None,
     table: Path | None = None,
     plot: Path | None = None,
-    json: bool = False,
+    json: Json = False,
 ) -> None:
     """Say where the camera stands about the object, and where it should look next.
 
@@ -271,7 +281,7 @@ def calibrate(
     depth_scale: float | None = None,
     near: float | None = None,
     far: float | None = None,
-    json: bool = False,
+    json: Json = False,
 ) -> None:
     """Learn from known azimuths what an estimator's errors are.
 
@@ -368,7 +378,7 @@ def evaluate(
     near: float | None = None,
     far: float | None = None,
     output: Path | None = None,
-    json: bool = False,
+    json: Json = False,
 ) -> None:
     """Measure errors on frames with known azimuths, for every way to choose views.
 
@@ -442,7 +452,7 @@ def render(
     up: str = "+z",
     front: str = "+x",
     noise: bool = True,
-    json: bool = False,
+    json: Json = False,
 ) -> None:
     """Write the depth frame that a depth camera would take of a mesh.
 
@@ -498,7 +508,7 @@ def render(
 
 
 @app.command
-def inspect(bundle: str = SHIPPED, /, *, json: bool = False) -> None:
+def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
     """Show what a bundle holds and where it comes from.
 
     Parameters
@@ -536,7 +546,7 @@ def inspect(bundle: str = SHIPPED, /, *, json: bool = False) -> None:
 
 
 @app.command
-def export(bundle: str = SHIPPED, /, *, onnx: Path, json: bool = False) -> None:
+def export(bundle: str = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
     """Write a bundle's network as ONNX: from crops to logits.
 
     Parameters

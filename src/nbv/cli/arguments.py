@@ -38,6 +38,8 @@ Rotations = Annotated[
     list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FILE")
 ]
 
+Json = Annotated[bool, Parameter(negative=())]
+
 SHIPPED = "mug"
 """The bundle that is taken where none is named."""
 
