@@ -97,11 +97,34 @@ def test_only_the_direction_of_the_axis_matters(point, direction, angle, scale):
         ([0, 0, 0], [np.nan, 0, 1]),
         ([np.nan, 0, 0], [0, 0, 1]),
         ([np.inf, 0, 0], [0, 0, 1]),
+        ([1e300, 0, 0], [0, 0, 1]),
+        ([0, 0], [0, 0, 1]),
+        ([0, 0, 0], [0, 0, 1, 0]),
+        ([[0, 0, 0]], [0, 0, 1]),
+        ("origin", [0, 0, 1]),
+        ([0, 0, 0], ["up", "up", "up"]),
+        ([0, 0, 0], None),
+        ([0, 0, 0], [0, 0, 1j]),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_an_axis_has_a_point_and_a_direction(point, direction):
     with pytest.raises(UserError, match="axis"):
         rotation_about(point, direction, 10.0)
+
+
+@pytest.mark.parametrize("angle", [np.nan, np.inf, "left", None, [10, 20], 1j])
+def test_a_rotation_is_one_finite_number(angle):
+    with pytest.raises(UserError, match=r"rotation: .*give one finite number of degrees"):
+        moved_camera(np.eye(4), [0, 0, 0], [0, 0, 1], angle)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_direction_may_be_of_any_length():
+    wanted = rotation_about([1, 2, 3], [1, 2, 2], 40.0)
+    for length in (1e-8, 1e200, 1e300):
+        found = rotation_about([1, 2, 3], np.array([1, 2, 2]) * length, 40.0)
+        assert found == pytest.approx(wanted)
 
 
 # The camera
@@ -206,9 +229,11 @@ def bad_poses():
         "all scaled": millimetres,
         "zeros": np.zeros((4, 4)),
         "ones": np.ones(16),
+        "huge": 1e300 * pose,
     }
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", bad_poses())
 def test_what_is_no_rotation_with_a_translation_is_refused(name):
     with pytest.raises(UserError, match="transposed or scaled"):
@@ -223,10 +248,20 @@ def test_a_pose_of_another_size_is_refused(values):
         as_pose(values)
 
 
-@pytest.mark.parametrize("values", ["pose", {"a": 1}, [[1, 2], [3]], [None, "x"]])
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "values", ["pose", {"a": 1}, [[1, 2], [3]], [None, "x"], np.eye(4, dtype=complex)]
+)
 def test_what_is_no_numbers_is_refused(values):
     with pytest.raises(UserError, match="camera pose"):
         as_pose(values)
+
+
+def test_a_pose_is_within_reach():
+    pose = random_pose(1)
+    pose[1, 3] = 1e300
+    with pytest.raises(UserError, match=r"camera pose: a place 1e\+300 m away; give metres"):
+        as_pose(pose)
 
 
 def test_rounded_numbers_are_a_pose():

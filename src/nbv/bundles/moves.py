@@ -21,6 +21,29 @@ from nbv.frames.errors import FrameError
 Pose = NDArray[np.float64]
 
 _ROTATION_TOLERANCE = 1e-3
+_FARTHEST_M = 1e6
+
+
+def _as_numbers(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.float64]:
+    try:
+        given = np.asarray(values)
+        if not np.iscomplexobj(given):
+            return given.astype(np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise UserError(f"{name}: no numbers; give {what_to_give}")
+
+
+def _as_vector(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.float64]:
+    vector = _as_numbers(values, name, what_to_give)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise UserError(f"{name}: give {what_to_give}")
+    return vector
+
+
+def _need_metres(place: NDArray[np.float64], name: str) -> None:
+    if (np.abs(place) > _FARTHEST_M).any():
+        raise UserError(f"{name}: a place {np.abs(place).max():g} m away; give metres")
 
 
 def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
@@ -31,22 +54,21 @@ def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
     UserError
         Where it is no rotation with a translation.
     """
-    try:
-        numbers = np.asarray(values, dtype=np.float64).ravel()
-    except (TypeError, ValueError):
-        raise UserError(f"{name}: no numbers; give the 16 of a 4 × 4 matrix") from None
+    numbers = _as_numbers(values, name, "the 16 of a 4 × 4 matrix").ravel()
     if numbers.size != 16:
         raise UserError(f"{name}: {numbers.size} numbers; give the 16 of a 4 × 4 matrix")
     pose = numbers.reshape(4, 4)
     turn = pose[:3, :3]
     is_rotation = (
         np.isfinite(pose).all()
+        and (np.abs(turn) < 2).all()  # else the product may overflow
         and np.allclose(turn @ turn.T, np.eye(3), atol=_ROTATION_TOLERANCE)
         and np.linalg.det(turn) > 0
         and np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9)
     )
     if not is_rotation:
         raise UserError(f"{name}: no rotation with a translation; is it transposed or scaled?")
+    _need_metres(pose[:3, 3], name)
     return pose
 
 
@@ -63,11 +85,14 @@ def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> 
     Raises
     ------
     UserError
-        Where the axis has no direction.
+        Where the axis has no direction, or the angle is no finite number.
     """
     origin, (x, y, z) = _as_axis(point, direction)
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    angle = math.radians(angle_deg)
+    degrees = _as_numbers(angle_deg, "rotation", "one finite number of degrees")
+    if degrees.size != 1 or not np.isfinite(degrees).all():
+        raise UserError(f"rotation: {angle_deg}; give one finite number of degrees")
+    angle = math.radians(degrees.item())
     turn = np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
     motion = np.eye(4)
     motion[:3, :3] = turn
@@ -79,12 +104,16 @@ def _as_axis(
     point: ArrayLike, direction: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return a point (3,) and the direction (3,) of unit length."""
-    origin = np.asarray(point, dtype=np.float64)
-    axis = np.asarray(direction, dtype=np.float64)
-    length = float(np.linalg.norm(axis))
-    if not (math.isfinite(length) and length > 1e-9 and np.isfinite(origin).all()):
+    three = "three finite numbers: x,y,z"
+    origin = _as_vector(point, "axis: the point", three)
+    _need_metres(origin, "axis: the point")
+    axis = _as_vector(direction, "axis: the direction", three)
+    largest = float(np.abs(axis).max())
+    if largest <= 1e-9:
         raise UserError("axis: give a point and a direction that is not 0")
-    return origin, axis / length
+    # Squares of very large numbers overflow.
+    axis /= largest
+    return origin, axis / np.linalg.norm(axis)
 
 
 def moved_camera(
@@ -104,7 +133,8 @@ def moved_camera(
     Raises
     ------
     UserError
-        Where the pose is no rotation with a translation, or the axis has no direction.
+        Where the pose is no rotation with a translation, the axis has no direction, or the
+        rotation is no finite number.
 
     Examples
     --------
@@ -173,9 +203,7 @@ def elevation_from_gravity(gravity: ArrayLike) -> float:
     UserError
         Where it is not three finite numbers, or has no length.
     """
-    down = np.asarray(gravity, dtype=np.float64)
-    if down.shape != (3,) or not np.isfinite(down).all():
-        raise UserError("gravity: give three finite numbers, the direction down: x,y,z")
+    down = _as_vector(gravity, "gravity", "three finite numbers, the direction down: x,y,z")
     if not down.any():
         raise UserError("gravity: 0,0,0 is no direction")
     right, below, forward = (down / np.abs(down).max()).tolist()
