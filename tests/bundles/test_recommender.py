@@ -125,6 +125,24 @@ def test_frames_are_counted_in_the_crops(recommender):
     assert np.array_equal(np.stack(found.crops), codes)
 
 
+@pytest.mark.parametrize("together", [list, np.ma.stack])
+def test_what_a_masked_array_masks_counts_as_nothing(recommender, together):
+    """Neither were its depths measured, nor does it show the object where it masks."""
+    top = np.zeros(FRAMES[0].shape, dtype=bool)
+    top[: ROWS // 2] = True
+    rotations = [0.0, 60.0]
+    wanted = recommender.recommend(
+        [np.where(top, 0, one) for one in FRAMES[:2]], rotations_deg=rotations
+    )
+    depths = together([np.ma.array(one, mask=top) for one in FRAMES[:2]])
+    masks = together([np.ma.array(one > 0, mask=top) for one in FRAMES[:2]])
+    for found in (
+        recommender.recommend(depths, rotations_deg=rotations),
+        recommender.recommend(FRAMES[:2], mask=masks, rotations_deg=rotations),
+    ):
+        assert np.array_equal(found.crops, wanted.crops)
+
+
 # Which frame is called the first
 
 

@@ -117,7 +117,7 @@ class Recommender:
     ) -> Crop:
         """Return what the network sees of a frame; parameters and errors as of `recommend`."""
         bundle = self.bundle
-        depth, given, window = _in_window(np.asarray(depth_m), mask)
+        depth, given, window = _in_window(np.asanyarray(depth_m), mask)
         camera = bundle.focal_px if intrinsics is None else intrinsics
         known = as_intrinsics([camera] if isinstance(camera, float) else camera)
         reach_m = REACH * bundle.diagonal_m
@@ -285,9 +285,9 @@ def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.gene
     if isinstance(depth_m, np.ndarray) and depth_m.ndim == 2:
         return [depth_m]
     if isinstance(depth_m, list | tuple) and depth_m and isinstance(depth_m[0], np.ndarray):
-        return [np.asarray(frame) for frame in depth_m]
+        return [np.asanyarray(frame) for frame in depth_m]
     try:
-        values = np.asarray(depth_m)
+        values = np.asanyarray(depth_m)
     except ValueError as error:
         raise UserError("frames of several sizes: give a list of numpy arrays") from error
     return _images_of(values)
@@ -305,7 +305,7 @@ def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[
     if isinstance(mask, list | tuple) and not (mask and np.ndim(mask[0]) == 1):
         masks = list(mask)
     else:
-        masks = list(_images_of(np.asarray(mask)))
+        masks = list(_images_of(np.asanyarray(mask)))
     if len(masks) != n:
         raise UserError(
             f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"

@@ -6,7 +6,6 @@ multiples of a scale, 0 where nothing was measured (ROS REP 118: 32FC1 and 16UC1
 
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,8 @@ MILLIMETRE = 0.001
 ARRAYS, IMAGES = (".npy", ".npz"), (".png", ".tif", ".tiff", ".pgm")
 
 _MOST_PIXELS = 10**8
+# Metres per unit: numbers from 0 to 1 may reach as far as a sensor does.
+_LARGEST_SCALE = 10.0
 _MOST_CHANNELS = 4
 _NUMBERS = "biuf"
 # Kind, columns, rows and the largest value that may occur; comments may stand between them.
@@ -87,8 +88,8 @@ def read_mask(path: str | Path) -> NDArray[np.bool_]:
 
 
 def is_in_mask(mask: ArrayLike) -> NDArray[np.bool_]:
-    """Return where a mask is not 0, and a number."""
-    values = np.asarray(mask)
+    """Return where a mask is not 0, a number, and not masked itself."""
+    values = np.asarray(np.ma.filled(mask, 0))
     if values.dtype.kind == "f":
         return np.asarray((values != 0) & ~np.isnan(values))
     return values if values.dtype == np.bool_ else np.asarray(values != 0)
@@ -100,8 +101,11 @@ def to_metres(
     name: str = "depth",
     unit_m: float = MILLIMETRE,
 ) -> DepthImage:
-    """Return a depth image in metres, 0 where nothing was measured; see `read_depth`."""
-    values = np.asarray(values)
+    """Return a depth image in metres, 0 where nothing was measured; see `read_depth`.
+
+    Of a masked array, what is masked was not measured.
+    """
+    values = np.asarray(np.ma.filled(values, 0))
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[:, :, 0]
     if values.ndim != 2:
@@ -110,8 +114,11 @@ def to_metres(
         raise FrameError(
             "colour-image", f"{name} is {what}; give one depth image, rows and columns alone"
         )
-    if depth_scale is not None and not 0 < depth_scale < math.inf:
-        raise UserError(f"--depth-scale={depth_scale:g}: must be above 0 (metres per unit)")
+    if depth_scale is not None and not 0 < depth_scale <= _LARGEST_SCALE:
+        raise UserError(
+            f"--depth-scale={depth_scale:g}: give metres per unit, above 0 and at most "
+            f"{_LARGEST_SCALE:g}; of millimetres 0.001"
+        )
     if np.issubdtype(values.dtype, np.floating):
         scale = 1.0 if depth_scale is None else depth_scale
     elif np.issubdtype(values.dtype, np.integer):
