@@ -137,7 +137,8 @@ def read_numbers(path: Path) -> NDArray[Any]:
     try:
         if path.suffix.lower() == ".npy":
             return np.asarray(np.load(path, allow_pickle=False))
-        text = path.read_text(encoding="utf-8")
+        # Some programs begin a text with a byte order mark.
+        text = path.read_text(encoding="utf-8-sig")
         if path.suffix.lower() == ".json":
             return np.asarray(json.loads(text), dtype=np.float64)
         return np.array([float(number) for number in text.replace(",", " ").split()])

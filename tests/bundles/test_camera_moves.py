@@ -312,6 +312,9 @@ def test_every_form_of_file_gives_the_pose(tmp_path_factory, seed):
     (folder / "flat.json").write_text(json.dumps(pose.ravel().tolist()))
     np.savetxt(folder / "a.txt", pose, fmt="%.17g")
     np.savetxt(folder / "a.csv", pose, fmt="%.17g", delimiter=",")
+    for name in ("a.txt", "a.json"):
+        marked = (folder / name).with_stem("mark")
+        marked.write_text((folder / name).read_text(), encoding="utf-8-sig")
     for path in folder.iterdir():
         assert np.array_equal(read_pose(path), pose), path.name
 

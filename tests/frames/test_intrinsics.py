@@ -68,8 +68,9 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 def test_every_camera_file_gives_the_same_camera(tmp_path, name):
     text, wanted = FILES[name]
-    (tmp_path / name).write_text(text)
-    assert camera_of(str(tmp_path / name)).intrinsics == wanted
+    for encoding in ("utf-8", "utf-8-sig"):
+        (tmp_path / name).write_text(text, encoding=encoding)
+        assert camera_of(str(tmp_path / name)).intrinsics == wanted
 
 
 @given(f=pixels)
@@ -85,6 +86,7 @@ def test_numbers_a_matrix_and_a_text_say_the_same(fx, fy, cx, cy):
     assert as_intrinsics((fx, fy, cx, cy)) == wanted
     assert as_intrinsics(matrix) == as_intrinsics(matrix.ravel().tolist()) == wanted
     assert camera_of(f"{fx!r}, {fy!r},{cx!r} ,{cy!r}").intrinsics == wanted
+    assert camera_of(f"{fx!r} {fy!r}  {cx!r} {cy!r}").intrinsics == wanted
     assert camera_of(",".join(map(repr, matrix.ravel().tolist()))).intrinsics == wanted
     assert as_intrinsics(wanted) is wanted
 
@@ -208,9 +210,17 @@ BAD_FILES = {
 @pytest.mark.parametrize("name", BAD_FILES)
 def test_a_file_without_a_camera_is_one_line(tmp_path, name):
     (tmp_path / name).write_text(BAD_FILES[name])
-    with pytest.raises(UserError) as error:
+    with pytest.raises(UserError, match=name) as error:
         camera_of(str(tmp_path / name))
     assert "\n" not in str(error.value)
+
+
+def test_a_camera_that_is_not_calibrated_is_said_to_be_so(tmp_path):
+    (tmp_path / "info.yaml").write_text(f"width: 640\nheight: 480\nk: {[0.0] * 9}\n")
+    with pytest.raises(UserError, match=r"info\.yaml: .* the camera is not calibrated"):
+        camera_of(str(tmp_path / "info.yaml"))
+    with pytest.raises(UserError, match="the camera is not calibrated"):
+        as_intrinsics(np.zeros((3, 3)))
 
 
 def test_bytes_that_are_no_text_are_one_line(tmp_path):

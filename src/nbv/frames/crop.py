@@ -211,10 +211,13 @@ def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) ->
     Raises
     ------
     UserError
-        Where the object would lie beyond all plausible distances, or might lie anywhere.
+        Where one is negative or no number, and where the object would lie beyond all plausible
+        distances, or might lie anywhere.
     """
     limits = (("--near", near_m, FARTHEST), ("--far", far_m, _NO_LIMIT))
     for name, limit_m, most in limits:
+        if limit_m is not None and not limit_m >= 0:
+            raise UserError(f"{name}={limit_m:g}: give metres, 0 or more")
         if limit_m is not None and most * diagonal_m < limit_m < math.inf:
             raise UserError(
                 f"{name}={limit_m:g}: give metres; the object is {NEAREST * diagonal_m:.2g} to "

@@ -111,6 +111,11 @@ def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
         return Intrinsics(numbers[0], numbers[0])
     if len(numbers) == 4:
         return Intrinsics(numbers[0], numbers[1], numbers[2], numbers[3])
+    if len(numbers) == 9 and not any(numbers):
+        raise UserError(
+            "intrinsics: all 9 numbers of the matrix are 0: the camera is not calibrated (a ROS "
+            "driver says so); calibrate it, or give fx,fy,cx,cy"
+        )
     if len(numbers) == 9:
         if not np.allclose([numbers[3], *numbers[6:]], [0, 0, 0, 1]):
             raise UserError(
@@ -158,7 +163,7 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     """
     if text is None:
         return DepthCamera()
-    parts = text.split(",")
+    parts = text.replace(",", " ").split()
     try:
         return DepthCamera(as_intrinsics([float(part) for part in parts]))
     except ValueError:
@@ -207,7 +212,7 @@ def _of_image(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[str
 
 
 def _read_mapping(path: Path) -> Mapping[str, Any]:
-    text = path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8-sig")
     if path.suffix.lower() == ".json":
         values = json.loads(text)
     else:
@@ -233,7 +238,10 @@ def _of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
         if absent:
             raise UserError(f"{path} holds no {absent[0]}, and no cam_K, K or camera_matrix")
         matrix = [values[name] for name in ("fx", "fy", "cx", "cy")]
-    found = as_intrinsics(matrix)
+    try:
+        found = as_intrinsics(matrix)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
     width, height = (int(side) if isinstance(side, int | float) else None for side in size)
     intrinsics = Intrinsics(found.fx, found.fy, found.cx, found.cy, width, height)
     return DepthCamera(intrinsics, _unit_m(values.get("depth_scale"), path))
