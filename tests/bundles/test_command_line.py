@@ -314,6 +314,8 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         (["f0.npy", "--plot", "m.npy/x.png"], "--plot=m.npy/x.png: m.npy is a file and no folder"),
         (["f0.npy", "--plot", "."], "--plot=.: give a name"),
         (["f0.npy", "--near", "2", "--far", "1"], "near < far"),
+        (["f0.npy", "--near", "-1"], "--near=-1: give metres, 0 or more"),
+        (["f0.npy", "--near", "nan"], "--near=nan: give metres, 0 or more"),
         (["f0.npy", "--depth-scale", "0.001"], "depths 1000 times as large would fit"),
         (["f0.npy", "--depth-scale", "-1"], "--depth-scale=-1"),
         (["f0.npy", "--mask", "m.npy", "m.npy"], "1 frame and 2 masks"),
@@ -404,6 +406,14 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
         assert printed["cost"] == pytest.approx(float(cost))
         told = run(capsys, "recommend", *options)
         assert told.startswith(f"turn the camera by {rotation:+d}°, travel {abs(rotation)}°")
+
+
+def test_pairs_may_begin_with_a_byte_order_mark(pairs, capsys):
+    text = pairs.read_text()
+    run(capsys, "calibrate", "pairs.csv", "--output", "plain.npz")
+    pairs.write_text(text, encoding="utf-8-sig")
+    run(capsys, "calibrate", "pairs.csv", "--output", "marked.npz")
+    assert Path("marked.npz").read_bytes() == Path("plain.npz").read_bytes()
 
 
 def test_a_table_is_made_of_pairs_alone(pairs, capsys):
@@ -727,10 +737,33 @@ def test_a_drawn_frame_is_told(here, capsys):
     assert "first Kinect: 640 x 480 pixels, a focal length of 585 px" in text
 
 
+def test_a_frame_may_be_drawn_as_a_png_of_another_sensor(here, capsys):
+    options = ("--example", "--sensor", "stereo")
+    for name in ("x.png", "x.npy"):
+        printed = json.loads(run(capsys, "render", *options, "--output", name, "--json"))
+        assert printed["intrinsics"]["fx"] == 424.0
+    assert np.abs(read_depth("x.png") - read_depth("x.npy")).max() < 0.00051
+    run(capsys, "render", *options, "--output", "other.npy", "--seed", "1")
+    assert not np.array_equal(read_depth("other.npy"), read_depth("x.npy"))
+
+
+def test_an_axis_of_a_mesh_file_may_begin_with_a_hyphen(here, capsys):
+    faces = "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
+    Path("wedge.obj").write_text(f"v 0 0 0\nv 4 0 0\nv 0 1 0\nv 0 0 1\n{faces}")
+    frames = []
+    for front in (("--front", "-z"), ("--front=-z",), ("--front", "+z")):
+        run(capsys, "render", "wedge.obj", "--up", "+y", *front, "--output", "x.npy")
+        frames.append(np.load("x.npy"))
+    assert np.array_equal(frames[0], frames[1])
+    assert not np.array_equal(frames[0], frames[2])
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (("--output", "x.png"), "--output=x.png: give a name that ends in .npy"),
+        (("--output", "x.jpg"), "--output=x.jpg: give a name that ends in .npy or .png"),
+        (("--output", "x.npy", "--front", "-z"), "--up and --front are of a mesh file"),
+        (("--output", "x.npy", "--sensor", "lidar"), "sensor=lidar: choose from"),
         (("--output", "x.npy", "--azimuth", "nan"), "an azimuth of nan"),
         (("--output", "x.npy", "--distance", "800"), "a distance of 800 m"),
         (("--output", "x.npy", "--diagonal", "170"), "a distance of 0.8 m from an object of 170 m"),

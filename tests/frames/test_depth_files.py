@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from PIL import Image
 
 from nbv.errors import UserError
-from nbv.frames.depth_files import read_depth, read_mask, to_metres
+from nbv.frames.depth_files import read_depth, read_mask, to_metres, write_depth
 from nbv.frames.errors import FrameError
 
 MILLIMETRES = np.array([[0, 1, 400], [1234, 10000, 65535]], dtype=np.uint16)
@@ -68,6 +68,12 @@ def test_whole_numbers_are_millimetres(tmp_path, dtype):
     assert np.array_equal(found, METRES)
 
 
+@pytest.mark.parametrize("scale", [0.0, -0.001, float("nan"), float("inf"), 1000.0])
+def test_a_depth_scale_is_metres_per_unit(scale):
+    with pytest.raises(UserError, match=f"--depth-scale={scale:g}: give metres per unit"):
+        to_metres(MILLIMETRES, depth_scale=scale)
+
+
 def test_negative_whole_numbers_are_no_measurement():
     found = to_metres(np.array([[-5, 5]], dtype=np.int16))
     assert found == pytest.approx(np.array([[0.0, 0.005]]), rel=1e-6)
@@ -104,6 +110,16 @@ def test_pgm_may_be_text(tmp_path):
 def test_every_number_of_a_pgm_comes_back(tmp_path_factory, values, largest):
     path = pgm(tmp_path_factory.mktemp("pgm") / "a.pgm", values, largest)
     assert np.array_equal(np.rint(read_depth(path, depth_scale=1.0)), values)
+
+
+def test_what_is_written_is_read_again(tmp_path):
+    metres = np.array([[0.0, 0.7504], [2.0, 65.535]], dtype=np.float32)
+    for name, off in (("a.png", 0.0005), ("A.PNG", 0.0005), ("a.npy", 0.0), ("A.NPY", 0.0)):
+        write_depth(tmp_path / name, metres)
+        assert np.abs(read_depth(tmp_path / name) - metres).max() <= off + 1e-6
+    with pytest.raises(UserError, match=r"b\.png: 65\.6 m are too far for a PNG"):
+        write_depth(tmp_path / "b.png", metres + np.float32(0.1))
+    assert not (tmp_path / "b.png").exists()
 
 
 def test_archives_give_the_array_called_depth_or_their_only_one(tmp_path):

@@ -23,7 +23,7 @@ def drawn(azimuth=30.0, distance=0.9, **more):
 
 def test_without_noise_the_points_lie_on_the_object():
     """In the object's frame all lie within its sphere, and some near its surface's extremes."""
-    frame = drawn(noise=False)
+    frame = drawn(sensor="none")
     rows, columns = np.nonzero(frame.mask)
     z = frame.depth_m[rows, columns]
     camera = frame.intrinsics
@@ -36,7 +36,7 @@ def test_without_noise_the_points_lie_on_the_object():
 
 def test_noise_moves_depths_by_millimetres_and_depends_on_the_seed():
     true, one, again, other = (
-        drawn(noise=False),
+        drawn(sensor="none"),
         drawn(seed=1),
         drawn(seed=1),
         drawn(seed=2),
@@ -47,6 +47,34 @@ def test_noise_moves_depths_by_millimetres_and_depends_on_the_seed():
     assert 0.0005 < np.abs(one.depth_m - true.depth_m)[both].mean() < 0.006
 
 
+def test_a_stereo_camera_has_its_own_image_and_noise():
+    true, kinect, stereo = (drawn(sensor=name) for name in ("none", "kinect", "stereo"))
+    assert true.intrinsics == kinect.intrinsics
+    assert (stereo.intrinsics.fx, stereo.intrinsics.cx, stereo.intrinsics.width) == (
+        424,
+        423.5,
+        848,
+    )
+    assert stereo.depth_m.shape == (HEIGHT, 848)
+    steps = [np.unique(frame.depth_m).size for frame in (stereo, true)]
+    assert steps[0] < steps[1]
+    apart = np.median(stereo.depth_m[stereo.mask]) - np.median(true.depth_m[true.mask])
+    assert abs(apart) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"sensor": "stero"}, "sensor=stero: did you mean 'stereo'"),
+        ({"seed": -1}, "seed=-1: must be 0 or more"),
+        ({"distance": 0.31}, "a distance of 0.31 m: kinect measures nothing nearer than 0.33 m"),
+    ],
+)
+def test_what_no_camera_can_take_is_refused(more, message):
+    with pytest.raises(UserError, match=message):
+        drawn(**more)
+
+
 def test_size_and_distance_in_proportion_give_the_same_crop():
     """The noise would tell them apart."""
     vertices, faces = shape()
@@ -54,7 +82,7 @@ def test_size_and_distance_in_proportion_give_the_same_crop():
     crops = []
     for factor in (1.0, 2.0):
         size = factor * DIAGONAL_M
-        frame = draw_frame(mesh, 70.0, 5.0, factor * 0.9, size, noise=False)
+        frame = draw_frame(mesh, 70.0, 5.0, factor * 0.9, size, sensor="none")
         crop = crop_frame(frame.depth_m, frame.mask, frame.intrinsics, Camera(), size)
         crops.append(crop.codes)
     assert np.array_equal(*crops)
@@ -106,7 +134,7 @@ def test_a_frame_without_the_object_is_refused():
     vertices = np.array([[0, 0, -0.5], [1e-6, 0, -0.5], [0, 1e-6, 0.5]], dtype=np.float32)
     needle = Mesh(vertices, np.array([[0, 1, 2]], dtype=np.int32))
     with pytest.raises(UserError, match="no pixel of the object"):
-        draw_frame(needle, 20.0, 0.0, 3.9, DIAGONAL_M, noise=False)
+        draw_frame(needle, 20.0, 0.0, 3.9, DIAGONAL_M, sensor="none")
 
 
 @pytest.mark.parametrize("diagonal", [0.0, -1.0, float("nan"), float("inf")])

@@ -31,6 +31,7 @@ from nbv.cli.answers import (
 )
 from nbv.cli.arguments import (
     SHIPPED,
+    FileAxis,
     Json,
     Numbers,
     Rotations,
@@ -52,12 +53,13 @@ if TYPE_CHECKING:
 USER_ERROR = 2
 
 ANY_TRAVEL_DEG = 180.0
+UP, FRONT = "+z", "+x"
 
 app = App(
     name="nbv",
     help="Where should the camera look next? Poses and next views from depth frames.",
     version=__version__,
-    help_format="plaintext",
+    help_format="markdown",
     result_action="return_value",
 )
 
@@ -449,22 +451,25 @@ def render(
     elevation: float = 15.0,
     distance: float = 0.8,
     diagonal: float = 0.17,
-    up: str = "+z",
-    front: str = "+x",
-    noise: bool = True,
+    up: FileAxis = UP,
+    front: FileAxis = FRONT,
+    sensor: str = "kinect",
+    seed: int = 0,
     json: Json = False,
 ) -> None:
     """Write the depth frame that a depth camera would take of a mesh.
 
-    The camera is the first Kinect: 640 x 480 pixels, a focal length of 585 px. It is directed at
-    the object.
+    The camera is the first Kinect: 640 x 480 pixels, a focal length of 585 px. With --sensor stereo
+    it is a RealSense D435: 848 x 480 pixels, 424 px. It is directed at the object.
+
+    Example: nbv render mug.obj --up +y --front -z --output frame.npy
 
     Parameters
     ----------
     mesh
         A mesh file: .obj, .ply, .off, .stl or .glb.
     output
-        The .npy file to write, in metres.
+        The file to write: .npy in metres, or .png in millimetres (16 bits).
     example
         A generated mug instead of a mesh file.
     azimuth
@@ -476,26 +481,27 @@ def render(
     diagonal
         Of the object's bounding box, metres.
     up
-        The axis of the file that points up.
+        The axis of the mesh file that points up: +x, -x, +y, -y, +z or -z.
     front
-        The axis of the file that points to the front.
-    noise
-        Whether the sensor's noise is there.
+        The axis of the mesh file that points to the front.
+    sensor
+        kinect, stereo, or none: the true depth in the Kinect's image.
+    seed
+        Of the sensor's noise: another one gives other noise.
     json
         Print JSON.
     """
     if (mesh is None) != example:
         raise UserError("give a mesh file, or --example")
-    need_writable("--output", output, [".npy"])
-    import numpy as np
-
-    from nbv.files import replacing
+    if example and (up, front) != (UP, FRONT):
+        raise UserError("--up and --front are of a mesh file; leave them out with --example")
+    need_writable("--output", output, [".npy", ".png"])
+    from nbv.frames.depth_files import write_depth
     from nbv.frames.drawn import draw_frame, example_mesh, read_mesh
 
     shape = example_mesh() if mesh is None else read_mesh(mesh, up, front)
-    frame = draw_frame(shape, azimuth, elevation, distance, diagonal, noise=noise)
-    with replacing(output) as temporary, temporary.open("wb") as file:
-        np.save(file, frame.depth_m)
+    frame = draw_frame(shape, azimuth, elevation, distance, diagonal, seed, sensor=sensor)
+    write_depth(output, frame.depth_m)
     camera, n_pixels = frame.intrinsics, int(frame.mask.sum())
     if json:
         about = {"file": str(output), "intrinsics": asdict(camera), "object_pixels": n_pixels}

@@ -33,6 +33,8 @@ def _list_parameter(converter: Callable[..., Any], metavar: str) -> Parameter:
 
 
 Numbers = Annotated[list[float] | None, _list_parameter(as_numbers, "NUMBER...")]
+# -z is an axis here, and no option.
+FileAxis = Annotated[str, Parameter(allow_leading_hyphen=True)]
 WholeNumbers = Annotated[list[int] | None, _list_parameter(as_numbers, "NUMBER...")]
 Rotations = Annotated[
     list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FILE")

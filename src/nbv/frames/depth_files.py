@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.errors import UserError
+from nbv.files import replacing
 from nbv.frames.errors import FrameError
 
 DepthImage = NDArray[np.float32]
@@ -66,6 +67,28 @@ def read_depth(
     [[0.7300000190734863, 0.0]]
     """
     return to_metres(_read_array(Path(path), "depth"), depth_scale, str(path), unit_m)
+
+
+def write_depth(path: Path, depth_m: DepthImage) -> None:
+    """Write a depth image: ``.png`` of 16 bits in millimetres, or ``.npy`` in metres.
+
+    Raises
+    ------
+    UserError
+        Where a depth is beyond what 16 bits can hold.
+    """
+    if path.suffix.lower() != ".png":
+        # An open file, because numpy adds a suffix to names in capitals.
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            np.save(file, depth_m)
+        return
+    from PIL import Image
+
+    millimetres = np.rint(depth_m / MILLIMETRE)
+    if millimetres.max() > np.iinfo(np.uint16).max:
+        raise UserError(f"{path}: {depth_m.max():.3g} m are too far for a PNG; write a .npy file")
+    with replacing(path) as temporary:
+        Image.fromarray(millimetres.astype(np.uint16)).save(temporary)
 
 
 def read_mask(path: str | Path) -> NDArray[np.bool_]:

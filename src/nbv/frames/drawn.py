@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.errors import UserError
+from nbv.errors import UserError, nearest
 from nbv.frames.crop import FARTHEST, NEAREST
 from nbv.frames.depth_files import DepthImage
 from nbv.frames.intrinsics import Intrinsics
@@ -18,12 +18,31 @@ from nbv.meshes.reader import MeshReader
 from nbv.meshes.store import Mesh, as_mesh
 from nbv.rendering import open_renderer
 from nbv.rendering.camera import Camera
+from nbv.rendering.noise import Sensor
 from nbv.rendering.noise.kinect import Kinect
+from nbv.rendering.noise.stereo import Stereo
 
 WIDTH, HEIGHT = 640, 480
 
-# Of the depth camera that is drawn: the first Kinect (Nguyen et al. 2012; Konolige and Mihelich).
+# The first Kinect (Nguyen et al. 2012; Konolige and Mihelich), and a RealSense D435
+# (Grunnet-Jepsen et al. 2019; Keselman et al. 2017).
 _KINECT = Kinect(focal_px=585.0, baseline_m=0.075, window_px=9.0)
+_STEREO = Stereo(focal_px=424.0, baseline_m=0.05, disparity_noise_px=0.08, window_px=7.0)
+
+
+@dataclass(frozen=True)
+class _DepthCamera:
+    measure: Sensor | None
+    focal_px: float
+    width: int
+
+
+CAMERAS = {
+    "kinect": _DepthCamera(_KINECT, _KINECT.focal_px, WIDTH),
+    "stereo": _DepthCamera(_STEREO, _STEREO.focal_px, 848),
+    "none": _DepthCamera(None, _KINECT.focal_px, WIDTH),
+}
+"""What `draw_frame` can be taken with, by name; all have `HEIGHT` rows."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +51,9 @@ class Frame:
 
     Attributes
     ----------
-    depth_m : (480, 640) float32
+    depth_m : (480, columns) float32
         Metres; 0 where nothing was measured.
-    mask : (480, 640) bool
+    mask : (480, columns) bool
         The pixels of the object where depth was measured.
     intrinsics : Intrinsics
     azimuth_deg, elevation_deg : float
@@ -56,9 +75,9 @@ def draw_frame(
     diagonal_m: float,
     seed: int = 0,
     *,
-    noise: bool = True,
+    sensor: str = "kinect",
 ) -> Frame:
-    """Return what a first-generation Kinect measures of an object in front of it.
+    """Return what a depth camera measures of an object in front of it.
 
     Parameters
     ----------
@@ -71,29 +90,40 @@ def draw_frame(
         Of the object's bounding box.
     seed : int
         Of the noise.
-    noise : bool
-        False keeps the true depth.
+    sensor : str
+        A name in `CAMERAS`. ``none`` is the Kinect's camera with the true depth.
 
     Raises
     ------
     UserError
-        Where an angle is none, or the object would be nearer or farther than is plausible.
+        Where an angle is none, the object would be nearer or farther than is plausible or than the
+        sensor measures, the sensor is unknown, or the seed is negative.
     """
     _need_view(azimuth_deg, elevation_deg, distance_m, diagonal_m)
-    focal_px = _KINECT.focal_px
-    fov_deg = math.degrees(2 * math.atan(WIDTH / 2 / focal_px))
-    camera = Camera(distance_m / diagonal_m, fov_deg, WIDTH, framing="axis")
+    if sensor not in CAMERAS:
+        raise UserError(f"sensor={sensor}: {nearest(sensor, CAMERAS)}")
+    if seed < 0:
+        raise UserError(f"seed={seed}: must be 0 or more")
+    taken_by = CAMERAS[sensor]
+    focal_px, width = taken_by.focal_px, taken_by.width
+    fov_deg = math.degrees(2 * math.atan(width / 2 / focal_px))
+    camera = Camera(distance_m / diagonal_m, fov_deg, width, framing="axis")
     depth = open_renderer("embree").render(
         mesh.vertices, mesh.faces, elevation_deg, [azimuth_deg], camera
     )
-    if noise:
-        depth = _KINECT(depth, camera, diagonal_m, np.random.default_rng(seed))
-    above = (WIDTH - HEIGHT) // 2
+    if taken_by.measure is not None:
+        if distance_m < (nearest_m := taken_by.measure.nearest_m):
+            raise UserError(
+                f"a distance of {distance_m:g} m: {sensor} measures nothing nearer than "
+                f"{nearest_m:.2g} m"
+            )
+        depth = taken_by.measure(depth, camera, diagonal_m, np.random.default_rng(seed))
+    above = (width - HEIGHT) // 2
     depth_m = (depth[0, above : above + HEIGHT] * np.float32(diagonal_m)).astype(np.float32)
     if not depth_m.any():
         raise UserError("no pixel of the object is seen in this frame: bring the camera nearer")
     intrinsics = Intrinsics(
-        focal_px, focal_px, WIDTH / 2 - 0.5, HEIGHT / 2 - 0.5, width=WIDTH, height=HEIGHT
+        focal_px, focal_px, width / 2 - 0.5, HEIGHT / 2 - 0.5, width=width, height=HEIGHT
     )
     return Frame(depth_m, depth_m > 0, intrinsics, azimuth_deg, elevation_deg)
 
