@@ -92,7 +92,8 @@ def one_line_or_an_answer(capsys, *arguments: object) -> bool:
         answer = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in the answer"))
         assert 0 <= answer["azimuth_deg"] < 360
         return True
-    assert (code, out) == (2, "")
+    assert code == 2
+    assert err.strip() == f"nbv: error: {json.loads(out)['error']['message']}"
     assert err.startswith("nbv: error: ")
     assert err.count("\n") == 1
     return False

@@ -59,7 +59,7 @@ app = App(
     name="nbv",
     help="Where should the camera look next? Poses and next views from depth frames.",
     version=__version__,
-    help_format="markdown",
+    help_format="plaintext",
     result_action="return_value",
 )
 
