@@ -30,6 +30,7 @@ _MODULES = {
     "Move": "nbv.bundles.next_view",
     "DistributionTable": "nbv.bundles.distribution_tables",
     "moved_camera": "nbv.bundles.moves",
+    "check_axis": "nbv.bundles.moves",
     "BundleError": "nbv.bundles.bundle",
     "FrameError": "nbv.frames.errors",
     "Intrinsics": "nbv.frames.intrinsics",

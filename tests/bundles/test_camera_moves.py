@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 from nbv.bundles.moves import (
     as_pose,
     as_rotations,
+    check_axis,
     elevation_from_gravity,
     moved_camera,
-    need_object_on_axis,
     read_pose,
     read_rotations,
     rotation_about,
@@ -373,28 +373,53 @@ def test_a_missing_file_is_named(tmp_path):
 
 
 @given(
-    seed=seeds,
-    point=points,
-    direction=directions,
     along=st.floats(-2, 2),
     apart_m=st.floats(0, 1),
+    aside_deg=st.floats(0, 360),
     diagonal_m=st.floats(0.05, 0.5),
+    elevation=st.floats(-25, 75),
+    azimuth=st.floats(0, 360),
 )
 def test_an_object_farther_from_the_axis_than_its_diagonal_is_refused(
-    seed, point, direction, along, apart_m, diagonal_m
+    along, apart_m, aside_deg, diagonal_m, elevation, azimuth
 ):
     assume(abs(apart_m - diagonal_m) > 1e-6)
-    pose, unit = random_pose(seed), direction / np.linalg.norm(direction)
-    aside = np.cross(unit, np.roll(unit, 1) + np.array([0.3, 0.0, 0.0]))
-    assume(np.linalg.norm(aside) > 1e-3)
-    place = point + along * unit + apart_m * aside / np.linalg.norm(aside)
+    point, aside = np.array([0.5, 0.2, 0.1]), np.radians(aside_deg)
+    pose = camera_at(elevation, azimuth, 0.7, point)
+    place = point + np.array([apart_m * np.cos(aside), apart_m * np.sin(aside), along])
     seen = (np.linalg.inv(pose) @ [*place, 1.0])[:3]
+    # The axis may have any length.
+    check_axis(pose, point, (0, 0, 3))
+    check_axis(pose, point, (0, 0, 3), object_position_m=seen)
     if apart_m < diagonal_m:
-        need_object_on_axis(pose, point, direction, seen, diagonal_m)
+        check_axis(pose, point, (0, 0, 3), seen, diagonal_m)
         return
     with pytest.raises(FrameError, match=f"{apart_m:.3g} m from the axis") as error:
-        need_object_on_axis(pose, point, direction, seen, diagonal_m)
+        check_axis(pose, point, (0, 0, 3), seen, diagonal_m)
     assert error.value.name == "axis"
+
+
+@given(
+    roll=st.floats(-180, 180), elevation=st.floats(-89, 89), azimuth=st.floats(0, 360), seed=seeds
+)
+def test_an_axis_that_does_not_point_up_in_the_image_is_refused(roll, elevation, azimuth, seed):
+    edges = (abs(abs(roll) - 45), abs(elevation + 30), abs(elevation - 80))
+    assume(min(edges) > 1e-6)
+    pose = camera_at(elevation, azimuth, 0.7, np.zeros(3))
+    turn = np.radians(roll)
+    # About the optical axis, z.
+    pose[:3, :2] = pose[:3, :2] @ [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    # In any base frame.
+    base = random_pose(seed)
+    point, up = base[:3, 3], base[:3, :3] @ [0, 0, 1]
+    if abs(roll) < 45 and -30 < elevation < 80:
+        check_axis(base @ pose, point, up)
+        return
+    with pytest.raises(FrameError, match="upright") as error:
+        check_axis(base @ pose, point, up)
+    assert error.value.name == "axis"
+    what = f"elevation of {elevation:.0f}°" if not -30 < elevation < 80 else f"{abs(roll):.0f}°"
+    assert what in str(error.value).replace("-0°", "0°")
 
 
 def link_frame(pose):
@@ -413,11 +438,25 @@ def in_millimetres(pose):
 def test_usual_mistakes_of_a_camera_pose_are_refused(mistake, elevation, azimuth):
     centre, seen, up = np.array([0.5, 0.2, 0.1]), (0.02, -0.01, 0.7), (0, 0, 1)
     pose = camera_at(elevation, azimuth, 0.7, centre)
-    need_object_on_axis(pose, centre, up, seen, 0.17)
+    check_axis(pose, centre, up, seen, 0.17)
     with pytest.raises(FrameError, match="optical frame"):
-        need_object_on_axis(mistake(pose), centre, up, seen, 0.17)
+        check_axis(mistake(pose), centre, up, seen, 0.17)
+
+
+@pytest.mark.parametrize("direction", [(0, 0, -1), (1, 0, 0), (0, -1, 0)])
+def test_an_axis_that_lies_or_points_down_is_refused(direction):
+    centre = np.array([0.5, 0.2, 0.1])
+    with pytest.raises(FrameError, match="does the direction point up"):
+        check_axis(camera_at(30.0, 130.0, 0.7, centre), centre, direction)
+
+
+@pytest.mark.parametrize(("elevation", "azimuth"), [(0.0, 10.0), (30.0, 130.0), (60.0, 250.0)])
+def test_a_pose_of_another_frame_is_refused_without_a_position_too(elevation, azimuth):
+    centre = np.array([0.5, 0.2, 0.1])
+    with pytest.raises(FrameError, match="optical frame"):
+        check_axis(link_frame(camera_at(elevation, azimuth, 0.7, centre)), centre, (0, 0, 1))
 
 
 def test_an_axis_without_a_direction_is_refused_with_an_object_too():
     with pytest.raises(UserError, match="a direction that is not 0"):
-        need_object_on_axis(np.eye(4), (0, 0, 0), (0, 0, 0), (0, 0, 1), 0.17)
+        check_axis(np.eye(4), (0, 0, 0), (0, 0, 0), (0, 0, 1), 0.17)

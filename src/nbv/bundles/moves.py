@@ -23,6 +23,10 @@ Pose = NDArray[np.float64]
 _ROTATION_TOLERANCE = 1e-3
 _FARTHEST_M = 1e6
 
+MOST_ROLL_DEG = 45.0
+LEAST_ELEVATION_DEG, MOST_ELEVATION_DEG = -30.0, 80.0
+"""Far beyond what a bundle is trained for, so that only mistakes are outside."""
+
 
 def _as_numbers(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.float64]:
     try:
@@ -147,25 +151,28 @@ def moved_camera(
     return rotation_about(point, direction, rotation_deg) @ as_pose(camera_pose)
 
 
-def need_object_on_axis(
+def check_axis(
     camera_pose: ArrayLike,
     point: ArrayLike,
     direction: ArrayLike,
-    object_position_m: ArrayLike,
-    diagonal_m: float,
+    object_position_m: ArrayLike | None = None,
+    diagonal_m: float | None = None,
 ) -> None:
-    """Refuse a camera pose and an axis that do not fit the frame: the object is elsewhere.
+    """Refuse a camera pose and an axis that do not fit the frame, before a robot moves.
 
-    So a pose in another unit, of another frame or turned round moves no robot.
+    Such as a pose in another unit, of another frame, inverted or turned round. The network knows
+    upright objects. So in the image the axis points up, within `MOST_ROLL_DEG`, and the camera is
+    at an elevation of `LEAST_ELEVATION_DEG` to `MOST_ELEVATION_DEG`.
 
     Parameters
     ----------
     camera_pose, point, direction
         See `moved_camera`.
-    object_position_m : (3,)
-        Where the object is seen, in the camera's optical frame.
-    diagonal_m : float
-        Of the object's bounding box: the largest distance from the axis that is plausible.
+    object_position_m : (3,), optional
+        Where the object is seen (`nbv.Recommendation.object_position_m`); it lies on the axis.
+    diagonal_m : float, optional
+        The largest distance from the axis that is plausible, metres: the diagonal of the object's
+        bounding box. Without it, or without a position, the distance is not checked.
 
     Raises
     ------
@@ -173,7 +180,44 @@ def need_object_on_axis(
         ``axis``.
     UserError
         As of `moved_camera`.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> ahead = np.array([[0, 0, 1, -1], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    >>> nbv.check_axis(ahead, point=(0, 0, 0), direction=(0, 0, 1))
+    >>> try:
+    ...     nbv.check_axis(ahead, point=(0, 0, 0), direction=(0, 0, -1))
+    ... except nbv.FrameError as error:
+    ...     error.name
+    'axis'
     """
+    if object_position_m is not None and diagonal_m is not None:
+        _need_object_on_axis(camera_pose, point, direction, object_position_m, diagonal_m)
+    _, along = _as_axis(point, direction)
+    right, below, forward = (as_pose(camera_pose)[:3, :3].T @ along).tolist()
+    elevation_deg = math.degrees(math.asin(min(max(-forward, -1.0), 1.0)))
+    roll_deg = math.degrees(math.atan2(right, -below))
+    if not LEAST_ELEVATION_DEG <= elevation_deg <= MOST_ELEVATION_DEG:
+        seen = f"the camera is at an elevation of {elevation_deg:.0f}° about this axis"
+    elif abs(roll_deg) > MOST_ROLL_DEG:
+        seen = f"the axis is {abs(roll_deg):.0f}° away from up in the image"
+    else:
+        return
+    raise FrameError(
+        "axis",
+        f"{seen}, and the object stands upright: does the direction point up, and is the camera "
+        "pose that of the optical frame (z forward, y down) in the base frame?",
+    )
+
+
+def _need_object_on_axis(
+    camera_pose: ArrayLike,
+    point: ArrayLike,
+    direction: ArrayLike,
+    object_position_m: ArrayLike,
+    diagonal_m: float,
+) -> None:
     origin, along = _as_axis(point, direction)
     seen = (as_pose(camera_pose) @ np.append(np.asarray(object_position_m), 1.0))[:3]
     apart_m = float(np.linalg.norm(np.cross(seen - origin, along)))

@@ -232,7 +232,7 @@ def recommend(
     if gravity is not None and elevation is not None:
         raise UserError("--gravity gives the elevation; leave --gravity or --elevation out")
     place = _known_place(camera_pose, axis)
-    from nbv.bundles.moves import elevation_from_gravity, need_object_on_axis
+    from nbv.bundles.moves import check_axis, elevation_from_gravity
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask
     from nbv.frames.intrinsics import camera_of
@@ -255,8 +255,8 @@ def recommend(
         allowed_deg=allowed_rotations(allowed),
         max_travel_deg=max_travel,
     )
-    if place is not None and answer.object_position_m is not None:
-        need_object_on_axis(*place, answer.object_position_m, recommender.bundle.diagonal_m)
+    if place is not None:
+        check_axis(*place, answer.object_position_m, recommender.bundle.diagonal_m)
     targets = target_poses(answer, place)
     if plot is not None:
         from nbv.reporting.recommendation import draw_recommendation

@@ -124,6 +124,7 @@ def recommend_by_distributions(
 ) -> None:
     """Say the pose and the next view that distributions show; see ``nbv recommend``."""
     from nbv.bundles.distribution_tables import DistributionTable
+    from nbv.bundles.moves import check_axis
     from nbv.calibration.distributions import read_distributions
 
     if table is None:
@@ -142,6 +143,8 @@ def recommend_by_distributions(
         allowed_deg=allowed_rotations(allowed),
         max_travel_deg=max_travel,
     )
+    if place is not None:
+        check_axis(*place)
     targets = target_poses(answer, place)
     if as_json:
         say_json(recommendation_as_json(answer, None, targets))
