@@ -55,7 +55,7 @@ def test_it_answers_as_a_bundle_does_of_frames(bundle, rotations):
     recommender = Recommender(same)
     codes = random_codes(np.random.default_rng(5), len(rotations))
     wanted = recommender.recommend_crops(codes, rotations, max_travel_deg=150.0)
-    table = DistributionTable(same.object_ids, same.temperature, same.distributions)
+    table = DistributionTable(same.object_ids, same.temperature, same.distributions, BINS)
     of_network = softmax(recommender.network(codes).astype(np.float64))
     found = table.recommend(of_network, rotations, max_travel_deg=150.0)
     for name in ("azimuth_deg", "spread_deg", "expected_error_deg", "belief", "bayes_factor"):
@@ -69,25 +69,60 @@ def test_it_answers_as_a_bundle_does_of_frames(bundle, rotations):
 
 def test_the_expected_error_is_that_of_its_definition(table):
     """Written out: every view of every object counts by its affinity with the one at hand."""
-    p = softmax(soft_turns(np.random.default_rng(9), 1)[0, 5] / table.temperature)
+    given = softmax(soft_turns(np.random.default_rng(9), 1)[0, 5] / table.temperature)
+    n_bins = table.distributions.shape[-1]
+    width = 360 / n_bins
+    azimuths = np.arange(n_bins) * width
+    p = np.interp(azimuths, AZIMUTHS, given, period=360) * BINS / n_bins
     power, alpha = AFFINITY["power"], AFFINITY["pseudo_observations"]
     weights, errors = [], []
     for rows in table.distributions.astype(np.float64):
-        for view in range(BINS):
-            weights.append(WIDTH * np.sqrt(p * rows[view]).sum() ** power)
-            of_view = []
-            for turn in range(BINS):
-                both = rows[view] * np.roll(rows[(view + turn) % BINS], -turn)
-                mean = np.angle(both @ np.exp(1j * np.radians(AZIMUTHS)), deg=True)
-                of_view.append(circular_distance_deg(mean, AZIMUTHS[view]))
-            errors.append(of_view)
+        for view in range(n_bins):
+            weights.append(width * np.sqrt(p * rows[view]).sum() ** power)
+            turned = rows[(view + np.arange(n_bins)) % n_bins]
+            back = (np.arange(n_bins) + np.arange(n_bins)[:, None]) % n_bins
+            both = rows[view] * np.take_along_axis(turned, back, axis=1)
+            mean = np.angle(both @ np.exp(1j * np.radians(azimuths)), deg=True)
+            errors.append(circular_distance_deg(mean, azimuths[view]))
     weights, errors = np.array(weights), np.array(errors)
     wanted = (weights @ errors + alpha * errors.mean(axis=0)) / (weights.sum() + alpha)
-    uncalibrated = p**table.temperature
+    uncalibrated = given**table.temperature
     found = table.recommend(uncalibrated / uncalibrated.sum()).error_after_deg
     free = np.isfinite(found)
-    assert free.sum() > BINS / 2
+    assert free.sum() > n_bins / 2
     assert found[free] == pytest.approx(wanted[free], rel=1e-3)
+
+
+@pytest.mark.parametrize("n_classes", [8, 12, 24, 36])
+def test_between_two_classes_an_estimator_errs_by_up_to_half_a_class(n_classes):
+    """Every view has the nearest class for certain, so errors are uniform up to half a class."""
+    width = 360 / n_classes
+    azimuths = np.arange(0.0, 360.0)
+    nearest = np.floor(azimuths / width + 0.5).astype(int) % n_classes
+    rows = np.eye(n_classes)[nearest] * 0.97 + 0.03 / n_classes
+    table = DistributionTable.of_pairs({"a": (azimuths, rows), "b": (azimuths, rows)})
+    n_bins = table.distributions.shape[-1]
+    assert 360 / n_bins <= 6
+    assert n_bins % n_classes == 0
+    answer = table.recommend(rows[0])
+    assert circular_distance_deg(answer.azimuth_deg, 0.0) < 1e-6
+    assert answer.expected_error_deg == pytest.approx(width / 4, rel=0.15)
+    # Two views of which one is between two classes are better, and none is without error.
+    assert 0.02 * width < answer.moves[0].expected_error_deg < width / 4
+    more = DistributionTable.of_pairs(
+        {"a": (azimuths, np.eye(120)[nearest * 0 + 3] * 0.5 + 0.5 / 120)}
+    )
+    assert more.distributions.shape[-1] == more.n_classes == 120
+
+
+def test_a_temperature_at_its_limit_is_told(here, capsys):
+    right = 0.1 * np.eye(BINS) + 0.9 / BINS
+    certain = {"a": (AZIMUTHS, right), "b": (AZIMUTHS, right)}
+    assert "the temperature 0.05 is at its limit" in DistributionTable.of_pairs(certain).warning
+    assert DistributionTable.of_pairs(turns()).warning == ""
+    written(here, certain)
+    out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    assert out.splitlines()[-1].startswith("careful    the temperature 0.05 is at its limit")
 
 
 @settings(max_examples=20, deadline=None)
@@ -248,6 +283,8 @@ def test_a_damaged_table_is_one_line(here, capsys):
         ("of_views", np.zeros((3, BINS, BINS), dtype=np.float32)),
         ("of_views", stored["distribution.of_views"][:0]),
         ("object_ids", stored["distribution.object_ids"][:2]),
+        ("n_classes", np.array(40)),
+        ("n_classes", np.array([24, 24])),
     ):
         np.savez("d.npz", **(stored | {f"distribution.{name}": value}))
         message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "d.npz")

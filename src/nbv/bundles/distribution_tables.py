@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,8 +21,8 @@ from nbv.bundles.next_view import (
     as_rotation_list,
     next_view,
 )
-from nbv.calibration.distributions import as_distributions
-from nbv.calibration.posteriors import TEMPERATURES, fit_temperature
+from nbv.calibration.distributions import FEWEST_CLASSES, as_distributions
+from nbv.calibration.posteriors import TEMPERATURES, fit_temperature, on_degrees
 from nbv.errors import UserError
 from nbv.files import damaged, need_distributions, read_arrays, readable
 from nbv.labels import counted
@@ -29,8 +30,11 @@ from nbv.labels import counted
 AFFINITY: Mapping[str, float] = {"power": 16.0, "pseudo_observations": 90.0}
 """What `config/` sets for the expected error given a distribution."""
 
+WIDEST_BIN_DEG = 6.0
+"""Of a table: an estimator errs by up to half a class between its classes."""
+
 _PREFIX = "distribution."
-_NAMES = tuple(_PREFIX + name for name in ("object_ids", "temperature", "of_views"))
+_NAMES = tuple(_PREFIX + name for name in ("object_ids", "temperature", "n_classes", "of_views"))
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,9 @@ class DistributionTable:
         p^(1/T) is calibrated; above 1 the estimator was too sure of itself.
     distributions : ndarray (S, B, B) float32
         Calibrated p(azimuth | image) of views a bin apart.
+    n_classes : int
+        Of the estimator; B is the least multiple of it whose bins are at most `WIDEST_BIN_DEG`. So
+        views between two classes count with the error that they have.
 
     Examples
     --------
@@ -64,6 +71,7 @@ class DistributionTable:
     object_ids: tuple[str, ...]
     temperature: float
     distributions: NDArray[np.float32]
+    n_classes: int
 
     @classmethod
     def of_pairs(cls, turns: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> DistributionTable:
@@ -82,20 +90,31 @@ class DistributionTable:
             different numbers of classes.
         """
         known = {name: _as_turn(name, *turn) for name, turn in turns.items()}
-        widths = {rows.shape[1] for _, rows in known.values()}
-        if len(widths) != 1:
+        n_classes, *others = widths = {rows.shape[1] for _, rows in known.values()}
+        if others:
             raise UserError(f"objects have {sorted(widths)} classes; give all the same number")
         temperature = fit_temperature(
             np.log(np.concatenate([rows for _, rows in known.values()])),
             np.concatenate([azimuth for azimuth, _ in known.values()]),
         )
-        turned = []
+        turned, n_bins = [], _n_bins(n_classes)
         for name, (azimuth, rows) in known.items():
             try:
-                turned.append(bin_apart(azimuth, distributions_of(np.log(rows), temperature)))
+                turned.append(bin_apart(azimuth, _in_bins(rows, temperature, n_bins)))
             except UserError as error:
                 raise error.about(f"object {name!r}") from error
-        return cls(tuple(known), temperature, np.stack(turned))
+        return cls(tuple(known), temperature, np.stack(turned), n_classes)
+
+    @property
+    def warning(self) -> str:
+        """What may be wrong with the calibration objects; empty where nothing is."""
+        least, most = TEMPERATURES
+        if 1.1 * least < self.temperature < most / 1.1:
+            return ""
+        return (
+            f"the temperature {self.temperature:.2g} is at its limit: the likeliest class is "
+            "always right, or never; calibrate with objects that the estimator was not trained on"
+        )
 
     @cached_property
     def _calibrated(self) -> AfterRotations:
@@ -130,13 +149,13 @@ class DistributionTable:
             each other.
         """
         rows = as_distributions(probabilities, "the views")
-        if rows.shape[1] != (n_bins := self.distributions.shape[-1]):
+        if rows.shape[1] != self.n_classes:
             raise UserError(
-                f"{rows.shape[1]} probabilities; calibration objects have {n_bins}: give those of "
-                "the same estimator"
+                f"{rows.shape[1]} probabilities; calibration objects have {self.n_classes}: give "
+                "those of the same estimator"
             )
         return next_view(
-            distributions_of(np.log(rows), self.temperature),
+            _in_bins(rows, self.temperature, self.distributions.shape[-1]),
             as_rotation_list(rotations_deg, len(rows), "view"),
             self._calibrated,
             AFFINITY,
@@ -146,7 +165,8 @@ class DistributionTable:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return what a file keeps of the table, by name; see `load`."""
-        kept = np.asarray(self.object_ids), np.asarray(self.temperature), self.distributions
+        numbers = np.asarray(self.temperature), np.asarray(self.n_classes)
+        kept = np.asarray(self.object_ids), *numbers, self.distributions
         return dict(zip(_NAMES, kept, strict=True))
 
     @classmethod
@@ -165,13 +185,25 @@ class DistributionTable:
                 "columns p0, p1, …"
             )
         with readable(path):
-            object_ids, temperature, rows = (stored[name] for name in _NAMES)
+            object_ids, temperature, n_classes, rows = (stored[name] for name in _NAMES)
             n_bins = rows.shape[-1]
             need_distributions(path, rows, (len(object_ids), n_bins, n_bins))
             least, most = TEMPERATURES
             if not len(rows) or not (rows > 0).all() or not least <= float(temperature) <= most:
                 raise damaged(path, "its distributions or their temperature are out of range")
-            return cls(tuple(map(str, object_ids)), float(temperature), rows)
+            if n_classes.shape or n_classes < FEWEST_CLASSES or _n_bins(int(n_classes)) != n_bins:
+                raise damaged(path, "its number of classes does not fit its distributions")
+            return cls(tuple(map(str, object_ids)), float(temperature), rows, int(n_classes))
+
+
+def _n_bins(n_classes: int) -> int:
+    return n_classes * math.ceil(360.0 / (n_classes * WIDEST_BIN_DEG))
+
+
+def _in_bins(rows: NDArray[np.float64], temperature: float, n_bins: int) -> NDArray[np.float64]:
+    """Return calibrated distributions (n, B), linear between the centres of classes (n, k)."""
+    calibrated = distributions_of(np.log(rows), temperature)
+    return calibrated if n_bins == rows.shape[1] else on_degrees(calibrated, n_bins)
 
 
 def _as_turn(

@@ -64,6 +64,7 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
         return
     azimuths, rows = (np.concatenate(parts) for parts in zip(*turns.values(), strict=True))
     of_means = offset_of(azimuths, mean_direction_deg(rows))
+    of_means["warning"] = of_means["warning"] or given.warning or None
     if as_json:
         about["distributions"] = {"temperature": given.temperature} | of_means
         say_json(about)
