@@ -581,6 +581,9 @@ def test_near_and_far_hold_for_every_frame_of_a_recording(manifest, capsys, comm
         (lambda azimuth, estimate: estimate + 180, "another zero"),
         (lambda azimuth, estimate: -estimate, "estimates fall where azimuths grow"),
         (lambda azimuth, estimate: 70 - estimate, "estimates fall where azimuths grow"),
+        (lambda azimuth, estimate: np.radians(estimate), "estimates are radians"),
+        (lambda azimuth, estimate: 7.0 * azimuth, "estimates do not follow azimuths"),
+        (lambda azimuth, estimate: 0.0 * azimuth + 80.0, "estimates do not follow azimuths"),
     ],
 )
 def test_pairs_in_another_frame_are_told(pairs, capsys, change, warning):
@@ -616,9 +619,12 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
     text = run(
         *(capsys, "evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2", "3")
     )
-    camera, head, numbers, *lines = text.splitlines()
+    camera, head, careful, numbers, *lines = text.splitlines()
     assert camera == ASSUMED
     assert head.startswith("cup, sequence 1: 24 frames; offset ")
+    # The network of this bundle is random.
+    assert careful == f"careful    {familiar['warning'][0]}"
+    assert "estimates do not follow azimuths" in careful
     assert numbers.split()[-3:] == ["1", "2", "3"]
     assert len(lines) == wanted["choice"].nunique()
     for line in lines:

@@ -383,5 +383,26 @@ def test_unfamiliar_and_wrong_frames_are_counted(bundle):
     (row,) = familiarity_of(changed, [replace(turn, codes=codes)]).to_dict("records")
     assert row == {
         **{"object_id": "cup", "sequence": "1", "n_frames": 24},
-        **{"n_unfamiliar": 8, "n_wrong": 6, "n_wrong_unfamiliar": 2},
+        **{"n_unfamiliar": 8, "n_wrong": 6, "n_wrong_unfamiliar": 2, "warning": ""},
     }
+
+
+ALL_ROUND = np.arange(BINS) * WIDTH
+
+
+@pytest.mark.parametrize(
+    ("azimuths_deg", "warning"),
+    [
+        (ALL_ROUND, ""),
+        (ALL_ROUND + 130.0, ""),
+        (360.0 - ALL_ROUND, "estimates fall where azimuths grow"),
+        (np.radians(ALL_ROUND), "azimuths are radians"),
+        (np.roll(ALL_ROUND, 12)[np.argsort(np.sin(7 * np.arange(BINS)))], "do not follow azimuths"),
+    ],
+)
+def test_azimuths_that_estimates_do_not_follow_are_told(bundle, azimuths_deg, warning):
+    """A constant offset is no such thing: it is shown apart."""
+    turn = recording(logits=sure(ALL_ROUND, np.zeros(BINS)))
+    (row,) = familiarity_of(bundle, [replace(turn, azimuth_deg=azimuths_deg)]).to_dict("records")
+    assert warning in row["warning"]
+    assert bool(warning) == bool(row["warning"])

@@ -16,7 +16,7 @@ from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.next_view import MIN_SEPARATION_DEG
 from nbv.bundles.recommender import turn_share
 from nbv.bundles.turns import Turn
-from nbv.calibration.offset import constant_offset_deg
+from nbv.calibration.offset import constant_offset_deg, frame_warning
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
@@ -286,8 +286,9 @@ def familiarity_of(bundle: Bundle, turns: Sequence[Turn]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``object_id, sequence, n_frames, n_unfamiliar, n_wrong, n_wrong_unfamiliar`` for each
-        recording; wrong is an error above 45 degrees.
+        ``object_id, sequence, n_frames, n_unfamiliar, n_wrong, n_wrong_unfamiliar, warning`` for
+        each recording; wrong is an error above 45 degrees, and the warning says why estimates do
+        not follow azimuths, or is empty.
     """
     known, rows = bundle.familiarity, []
     for turn in turns:
@@ -303,6 +304,7 @@ def familiarity_of(bundle: Bundle, turns: Sequence[Turn]) -> pd.DataFrame:
                 "n_unfamiliar": int(is_strange.sum()),
                 "n_wrong": int(is_wrong.sum()),
                 "n_wrong_unfamiliar": int((is_wrong & is_strange).sum()),
+                "warning": frame_warning(turn.azimuth_deg, estimates),
             }
         )
     return pd.DataFrame(rows)

@@ -11,6 +11,7 @@ LARGE_OFFSET_DEG = 15.0
 """More than estimators err by on the whole: another zero is likelier."""
 
 _LEAST_AGREEMENT = 0.5
+"""Length of the mean of unit vectors; that of uniformly random differences is near 0."""
 
 
 def constant_offset_deg(error_deg: ArrayLike) -> float:
@@ -20,18 +21,39 @@ def constant_offset_deg(error_deg: ArrayLike) -> float:
     return float(signed_difference_deg(mean, 0.0))
 
 
+def frame_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]) -> str:
+    """Return why estimates (n,) do not follow azimuths: radians, another sense, or others' views.
+
+    Nothing where estimates follow azimuths, whatever constant offset lies between them.
+    """
+    estimates_agree = _agreement(estimate_deg - azimuth_deg)
+    if _agreement(estimate_deg + azimuth_deg) > max(_LEAST_AGREEMENT, estimates_agree):
+        return (
+            "estimates fall where azimuths grow: both count counter-clockwise seen from above; "
+            "turn the sign of one of them"
+        )
+    if estimates_agree > _LEAST_AGREEMENT:
+        return ""
+    for name, in_degrees in (
+        ("estimates", np.degrees(estimate_deg) - azimuth_deg),
+        ("azimuths", estimate_deg - np.degrees(azimuth_deg)),
+    ):
+        if _agreement(in_degrees) > _LEAST_AGREEMENT:
+            return f"{name} are radians: multiply them by 180/π"
+    return (
+        "estimates do not follow azimuths: are they of the same views, in the same order, and does "
+        "the object have a front that can be seen?"
+    )
+
+
 def offset_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]) -> str:
     """Return what is wrong with the frame of calibration pairs (n,); nothing where all is well.
 
     A lookup table made of pairs whose estimates count from another zero, or the other way round,
     recommends rotations for poses that the object does not have.
     """
-    mirrored = _agreement(estimate_deg + azimuth_deg)
-    if mirrored > max(_LEAST_AGREEMENT, _agreement(estimate_deg - azimuth_deg)):
-        return (
-            "estimates fall where azimuths grow: both count counter-clockwise seen from above; "
-            "turn the sign of one of them"
-        )
+    if warning := frame_warning(azimuth_deg, estimate_deg):
+        return warning
     offset = constant_offset_deg(estimate_deg - azimuth_deg)
     if abs(offset) > LARGE_OFFSET_DEG:
         return (

@@ -139,8 +139,8 @@ def _object_turn(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float6
     if counts.max() > 1:
         raise UserError(
             f"{path}: object {name!r} has {counts.max()} views at "
-            f"{values[counts.argmax()]:g}°; give one; other elevations and "
-            "categories belong into files of their own, or into columns that tell them apart"
+            f"{values[counts.argmax()]:g}°; give one, and other elevations and categories in "
+            "files of their own; only estimator=external tells them apart by columns"
         )
     if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
         raise UserError(

@@ -153,6 +153,8 @@ def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
             f"offset {rows['offset_deg'].iloc[0]:+.1f}°; {about['n_unfamiliar']} unfamiliar, "
             f"{about['n_wrong']} wrong by more than 45°, {about['n_wrong_unfamiliar']} both"
         )
+        if about["warning"]:
+            say(f"careful    {about['warning']}")
         numbers = sorted(rows["n_views"].unique())
         say(f"  {'MAE (without offset), degrees':<30}" + "".join(f"{n:>15}" for n in numbers))
         for choice in dict.fromkeys(rows["choice"]):

@@ -31,7 +31,7 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
     from nbv.bundles.distribution_tables import DistributionTable
     from nbv.bundles.manifest import is_manifest
     from nbv.calibration.distributions import read_pair_distributions
-    from nbv.calibration.pairs import read_pairs
+    from nbv.calibration.pairs import read_pair_rows, read_pairs
     from nbv.recommendation.belief import mean_direction_deg
     from nbv.recommendation.criteria import CRITERIA
     from nbv.recommendation.density_selection import chosen_lookup
@@ -48,12 +48,13 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
             f"{source} is a manifest of frames, which need --bundle, for instance --bundle "
             f"{SHIPPED}, and an --output that ends in .safetensors"
         ) from error
-    azimuth_deg = np.broadcast_to(np.arange(estimates.shape[1], dtype=np.float64), estimates.shape)
     turns = read_pair_distributions(source)
     given = DistributionTable.of_pairs(turns) if turns else None
     lookup = chosen_lookup(estimates, criterion, DENSITY)
     save_lookup(output, lookup, given.arrays() if given else None)
-    offset, number = offset_of(azimuth_deg, estimates), counted(len(estimates), "object")
+    pairs = read_pair_rows(source)
+    offset = offset_of(pairs["azimuth_deg"].to_numpy(), pairs["estimate_deg"].to_numpy())
+    number = counted(len(estimates), "object")
     about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)} | offset
     if given is None:
         if as_json:
