@@ -502,6 +502,18 @@ def test_of_one_frame_the_rotation_may_be_a_number(recommender, rotations):
     same(recommender.recommend_crops(codes, rotations), recommender.recommend_crops(codes))
 
 
+@pytest.mark.parametrize(
+    ("elevation", "is_told"),
+    [(None, False), (-7.0, False), (15.0, False), (37.0, False), (-20.0, True), (70.0, True)],
+)
+def test_an_elevation_unlike_all_that_were_calibrated_is_told(recommender, elevation, is_told):
+    """The bundle's are 0 and 30 degrees."""
+    found = recommender.recommend_crops(codes_of(0, 1), elevation_deg=elevation)
+    assert any("is unlike those that were calibrated, 0 to 30°" in w for w in found.warnings) == (
+        is_told
+    )
+
+
 def test_an_elevation_is_a_number(recommender):
     with pytest.raises(UserError, match="elevation of nan"):
         recommender.recommend_crops(codes_of(0, 1), elevation_deg=float("nan"))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.bundles.beliefs import distributions_of, elevation_share
+from nbv.bundles.beliefs import ELEVATION_BANDWIDTH_DEG, distributions_of, elevation_share
 from nbv.bundles.bundle import Bundle, BundleError, load_bundle
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.networks import Network, open_network
@@ -245,7 +245,11 @@ class Recommender:
         return replace(
             answer,
             unfamiliarity=unfamiliar,
-            warnings=(*_unfamiliar(unfamiliar), *answer.warnings),
+            warnings=(
+                *_unfamiliar(unfamiliar),
+                *_other_elevation(self.bundle, elevation_deg),
+                *answer.warnings,
+            ),
             crops=tuple(codes),
         )
 
@@ -262,6 +266,19 @@ def _unfamiliar(unfamiliar: float) -> tuple[str, ...]:
     return (
         f"a frame is like nothing that was calibrated ({unfamiliar:.1f} times the limit): "
         "check mask, units and category",
+    )
+
+
+def _other_elevation(bundle: Bundle, elevation_deg: float | None) -> tuple[str, ...]:
+    known = bundle.elevation_deg[np.isfinite(bundle.elevation_deg)]
+    if elevation_deg is None or not len(known):
+        return ()
+    least, most = float(known.min()), float(known.max())
+    if least - ELEVATION_BANDWIDTH_DEG <= elevation_deg <= most + ELEVATION_BANDWIDTH_DEG:
+        return ()
+    return (
+        f"an elevation of {elevation_deg:g}° is unlike those that were calibrated, "
+        f"{least:g} to {most:g}°: expected errors may be too low",
     )
 
 
