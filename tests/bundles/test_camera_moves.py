@@ -202,6 +202,16 @@ def test_the_direction_down_in_the_camera_tells_its_elevation(elevation, azimuth
     assert elevation_from_gravity(length * down) == pytest.approx(elevation, abs=1e-6)
 
 
+@pytest.mark.parametrize("down", [(0, -9.81, 0), (0, -1, 1), (3, -1, 1), (0, -0.2, -1)])
+def test_gravity_does_not_point_up_in_the_image(down):
+    with pytest.raises(UserError, match="points up, and y is down in the optical frame"):
+        elevation_from_gravity(down)
+
+
+def test_a_camera_may_be_directed_straight_down():
+    assert elevation_from_gravity((0, -0.01, 1)) == pytest.approx(90, abs=1)
+
+
 # Poses
 
 

@@ -27,6 +27,10 @@ MOST_ROLL_DEG = 45.0
 LEAST_ELEVATION_DEG, MOST_ELEVATION_DEG = -30.0, 80.0
 """Far beyond what a bundle is trained for, so that only mistakes are outside."""
 
+UPSIDE_DOWN = 0.1
+"""Share of the direction down that may point up in the image: of a camera that is directed straight
+down it is little, and its sign is chance."""
+
 
 def _as_numbers(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.float64]:
     try:
@@ -245,12 +249,19 @@ def elevation_from_gravity(gravity: ArrayLike) -> float:
     Raises
     ------
     UserError
-        Where it is not three finite numbers, or has no length.
+        Where it is not three finite numbers, has no length, or points up in the image: the camera
+        then hangs upside down, or the signs are wrong.
     """
     down = _as_vector(gravity, "gravity", "three finite numbers, the direction down: x,y,z")
     if not down.any():
         raise UserError("gravity: 0,0,0 is no direction")
     right, below, forward = (down / np.abs(down).max()).tolist()
+    if below < -UPSIDE_DOWN * math.hypot(right, below, forward):
+        raise UserError(
+            f"gravity: y={down[1]:g} points up, and y is down in the optical frame; an "
+            "accelerometer reports the direction up: reverse the sign of all three numbers; of a "
+            "camera that hangs upside down, turn the frame by 180° and reverse x and y"
+        )
     return math.degrees(math.atan2(forward, math.hypot(right, below)))
 
 
