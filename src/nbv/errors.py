@@ -11,6 +11,15 @@ class UserError(Exception):
     """A mistake in the input: one line that names the file, key or value, and what to do.
 
     What cannot be printed, such as the line break in a file's name, is shown by its escape.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> try:
+    ...     nbv.Intrinsics(0.0, 585.0)
+    ... except nbv.UserError as error:
+    ...     print(error)
+    intrinsics: fx=0 must be above 0 (pixels)
     """
 
     def __init__(self, message: str) -> None:
@@ -18,7 +27,14 @@ class UserError(Exception):
         super().__init__("".join(shown))
 
     def about(self, what: str) -> Self:
-        """Return the same mistake with a message that says first what it is about."""
+        """Return the same mistake with a message that says first what it is about.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> print(nbv.UserError("no pixel").about("frame 2 of 3"))
+        frame 2 of 3: no pixel
+        """
         return type(self)(f"{what}: {self}")
 
 
@@ -39,7 +55,14 @@ class NamedError(UserError):
         self.message = message
 
     def about(self, what: str) -> Self:
-        """Return the same mistake; after its name, the message says first what it is about."""
+        """Return the same mistake; after its name, the message says first what it is about.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> print(nbv.FrameError("empty-mask", "no pixel").about("frame 2 of 3"))
+        empty-mask: frame 2 of 3: no pixel
+        """
         return type(self)(self.name, f"{what}: {self.message}")
 
 

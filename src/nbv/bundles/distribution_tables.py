@@ -88,6 +88,16 @@ class DistributionTable:
         UserError
             Where views are farther apart, probabilities are no distributions, or objects have
             different numbers of classes.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> azimuths = np.arange(24) * 15.0
+        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
+        >>> rows /= rows.sum(axis=1, keepdims=True)
+        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
+        >>> table.object_ids, table.n_classes
+        (('mug-17',), 24)
         """
         known = {name: _as_turn(name, *turn) for name, turn in turns.items()}
         n_classes, *others = widths = {rows.shape[1] for _, rows in known.values()}
@@ -107,7 +117,18 @@ class DistributionTable:
 
     @property
     def warning(self) -> str:
-        """What may be wrong with the calibration objects; empty where nothing is."""
+        """What may be wrong with the calibration objects; empty where nothing is.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> azimuths = np.arange(24) * 15.0
+        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
+        >>> rows /= rows.sum(axis=1, keepdims=True)
+        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
+        >>> table.warning.split(":")[0]  # this estimator is always right
+        'the temperature 0.05 is at its limit'
+        """
         least, most = TEMPERATURES
         if 1.1 * least < self.temperature < most / 1.1:
             return ""
@@ -147,6 +168,17 @@ class DistributionTable:
         UserError
             Where probabilities are no distributions of this estimator, or the arguments do not fit
             each other.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> azimuths = np.arange(24) * 15.0
+        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
+        >>> rows /= rows.sum(axis=1, keepdims=True)
+        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
+        >>> answer = table.recommend([rows[3], rows[9]], rotations_deg=[0, 90])
+        >>> round(answer.azimuth_deg), answer.n_views  # of the last view
+        (135, 2)
         """
         rows = as_distributions(probabilities, "the views")
         if rows.shape[1] != self.n_classes:
@@ -164,7 +196,18 @@ class DistributionTable:
         )
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return what a file keeps of the table, by name; see `load`."""
+        """Return what a file keeps of the table, by name; see `load`.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> azimuths = np.arange(24) * 15.0
+        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
+        >>> rows /= rows.sum(axis=1, keepdims=True)
+        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
+        >>> sorted(table.arrays())[-1]
+        'distribution.temperature'
+        """
         numbers = np.asarray(self.temperature), np.asarray(self.n_classes)
         kept = np.asarray(self.object_ids), *numbers, self.distributions
         return dict(zip(_NAMES, kept, strict=True))
@@ -177,6 +220,19 @@ class DistributionTable:
         ------
         UserError
             Where the file cannot be read, or has no such table.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> azimuths = np.arange(24) * 15.0
+        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
+        >>> rows /= rows.sum(axis=1, keepdims=True)
+        >>> import tempfile
+        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     np.savez(f"{folder}/table.npz", **table.arrays())
+        ...     nbv.DistributionTable.load(f"{folder}/table.npz").object_ids
+        ('mug-17',)
         """
         stored = read_arrays(path)
         if any(name not in stored for name in _NAMES):

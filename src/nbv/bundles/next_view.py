@@ -129,12 +129,27 @@ class Recommendation:
 
     @property
     def moves(self) -> tuple[Move, ...]:
-        """`move` and `alternatives`, best first; empty where there is no further view."""
+        """`move` and `alternatives`, best first; empty where there is no further view.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> answer = nbv.Recommender.load("mug").recommend(nbv.example_frame().depth_m)
+        >>> answer.moves[0] == answer.move, len(answer.moves) == 1 + len(answer.alternatives)
+        (True, True)
+        """
         return () if self.move is None else (self.move, *self.alternatives)
 
     @property
     def is_unfamiliar(self) -> bool:
-        """Whether a frame is like nothing that was calibrated."""
+        """Whether a frame is like nothing that was calibrated.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> nbv.Recommender.load("mug").recommend(nbv.example_frame().depth_m).is_unfamiliar
+        False
+        """
         return self.unfamiliarity > 1.0
 
 

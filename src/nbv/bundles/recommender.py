@@ -99,6 +99,12 @@ class Recommender:
         ------
         UserError
             Where there is no such bundle, or it is damaged.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> nbv.Recommender.load("mug").bundle.category
+        'mug'
         """
         return cls(load_bundle(bundle_path(name)), backend)
 
@@ -115,7 +121,16 @@ class Recommender:
         near_m: float | None = None,
         far_m: float | None = None,
     ) -> Crop:
-        """Return what the network sees of a frame; parameters and errors as of `recommend`."""
+        """Return what the network sees of a frame; parameters and errors as of `recommend`.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> frame, recommender = nbv.example_frame(), nbv.Recommender.load("mug")
+        >>> crop = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics)
+        >>> crop.codes.shape, crop.codes.dtype.name
+        ((64, 64), 'uint8')
+        """
         bundle = self.bundle
         depth, given, window = _in_window(np.asanyarray(depth_m), mask)
         camera = bundle.focal_px if intrinsics is None else intrinsics
@@ -129,7 +144,17 @@ class Recommender:
         return crop_frame(depth, inside, known, bundle.camera, *sizes, window)
 
     def distributions(self, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Return p(azimuth | image) (n, B) of crops (n, side, side)."""
+        """Return p(azimuth | image) (n, B) of crops (n, side, side).
+
+        Examples
+        --------
+        >>> import nbv
+        >>> frame, recommender = nbv.example_frame(), nbv.Recommender.load("mug")
+        >>> codes = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics).codes
+        >>> (p,) = recommender.distributions(codes[None])
+        >>> len(p), round(float(p.sum()), 6)
+        (120, 1.0)
+        """
         return distributions_of(self.network(codes), self.bundle.temperature)
 
     def recommend(
@@ -224,7 +249,17 @@ class Recommender:
         allowed_deg: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
     ) -> Recommendation:
-        """Return what `recommend` does, of crops (n, side, side) uint8."""
+        """Return what `recommend` does, of crops (n, side, side) uint8.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> frame, recommender = nbv.example_frame(), nbv.Recommender.load("mug")
+        >>> crop = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics)
+        >>> of_crop = recommender.recommend_crops(crop.codes[None])
+        >>> of_crop.move == recommender.recommend(frame.depth_m, intrinsics=frame.intrinsics).move
+        True
+        """
         rotations_deg = as_rotation_list(rotations_deg, len(codes))
         if elevation_deg is not None and not -90 <= elevation_deg <= 90:
             raise UserError(

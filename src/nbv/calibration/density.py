@@ -25,6 +25,14 @@ class Conditionals:
         V[estimate, viewpoint] = p(viewpoint | estimate), Eq. 5 of the paper.
     estimate : ndarray (B, B)
         L[viewpoint, estimate] = p(estimate | viewpoint).
+
+    Examples
+    --------
+    >>> import nbv
+    >>> choice = {"bandwidth_deg": 5, "pseudo_observations": 1}
+    >>> pair = nbv.conditionals([0.0, 90.0], [0.0, 100.0], **choice)
+    >>> int(pair.viewpoint[90].argmax())  # what was estimated as 90° was at 100°
+    100
     """
 
     viewpoint: Matrix
@@ -32,7 +40,16 @@ class Conditionals:
 
     @property
     def n_bins(self) -> int:
-        """B, the number of bins round the circle."""
+        """B, the number of bins round the circle.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> choice = {"bandwidth_deg": 5, "pseudo_observations": 1}
+        >>> pair = nbv.conditionals([0.0, 90.0], [0.0, 100.0], **choice)
+        >>> pair.n_bins
+        360
+        """
         return len(self.viewpoint)
 
 

@@ -61,7 +61,19 @@ class Intrinsics:
             raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
 
     def need_resolution(self, rows: int, columns: int) -> None:
-        """Raise FrameError ``other-resolution`` where they are for images of another size."""
+        """Raise FrameError ``other-resolution`` where they are for images of another size.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> camera = nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5, width=640, height=480)
+        >>> camera.need_resolution(rows=480, columns=640)
+        >>> try:
+        ...     camera.need_resolution(rows=240, columns=320)
+        ... except nbv.FrameError as error:
+        ...     error.name
+        'other-resolution'
+        """
         known = self.width is not None and self.height is not None
         if known and (self.height, self.width) != (rows, columns):
             raise FrameError(
@@ -79,7 +91,17 @@ class Intrinsics:
                 )
 
     def doubts(self, rows: int, columns: int) -> tuple[str, ...]:
-        """Return a sentence where they may be for another image than one of this size, or none."""
+        """Return a sentence where they may be for another image than one of this size, or none.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> camera = nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5)
+        >>> camera.doubts(rows=480, columns=640)
+        ()
+        >>> len(camera.doubts(rows=400, columns=400))
+        1
+        """
         off = [
             value is not None and abs(value - (size - 1) / 2) > OFF_CENTRE * size
             for value, size in ((self.cx, columns), (self.cy, rows))
