@@ -26,6 +26,7 @@ from nbv.bundles.moves import elevation_from_gravity, moved_camera
 from nbv.bundles.recommender import Recommender
 from nbv.calibration.pairs import read_pairs
 from nbv.cli import main
+from nbv.cli.arguments import as_paragraphs
 from nbv.frames.depth_files import read_depth
 from nbv.recommendation.density_selection import chosen_lookup
 from nbv.recommendation.lookup import load_lookup, save_lookup
@@ -706,6 +707,10 @@ def test_inspect_shows_what_a_bundle_holds(here, bundle, capsys):
     assert about["calibration_turns"] == 6
     assert about["elevations_deg"] == [0.0, 30.0]
     assert about["temperature"] == bundle.temperature
+    assert about["network"] == dict(bundle.estimator)
+    assert about["affinity"] == dict(bundle.affinity)
+    assert about["familiar_within"] == bundle.familiarity.threshold
+    assert about["extent_m"] == list(bundle.extent_m)
     assert {key: about[key] for key in bundle.provenance} == bundle.provenance
     lines = run(capsys, "inspect", "b.safetensors").splitlines()
     # Names within names have a dot, and a line each.
@@ -904,8 +909,35 @@ def test_help_and_version_succeed(capsys):
     text = run(capsys, "--help")
     for command in ("recommend", "calibrate", "evaluate", "inspect", "export"):
         assert command in text
-        assert "Usage: nbv" in run(capsys, command, "--help")
+        told = run(capsys, command, "--help")
+        assert "Usage: nbv" in told
+        assert f"Example: nbv {command} " in told
     assert run(capsys, "--version").strip() == __import__("nbv").__version__
+
+
+def test_each_paragraph_of_the_help_is_one_line_before_it_is_wrapped():
+    def command(name: str, limit: int = 3) -> None:
+        """Do one thing.
+
+        It is a long story, which takes
+        two lines.
+
+        Parameters
+        ----------
+        name
+            Of the thing,
+            which is known,
+            or not.
+        limit
+            Of names.
+        """
+
+    assert as_paragraphs(command) is command
+    assert command.__doc__.splitlines() == [
+        *("Do one thing.", "", "It is a long story, which takes two lines.", ""),
+        *("Parameters", "----------"),
+        *("name", "    Of the thing, which is known, or not.", "limit", "    Of names."),
+    ]
 
 
 def test_unknown_commands_and_options_are_one_line(here, capsys):
@@ -960,6 +992,7 @@ class Absent(PathFinder):
 
 sys.meta_path[sys.meta_path.index(PathFinder)] = Absent
 from nbv.cli import main
+from nbv.cli.arguments import as_paragraphs
 sys.exit(main(sys.argv[2:]))
 """
 EXPERIMENT = ("torch", "pyrender", "hydra", "omegaconf", "pydantic", "psutil", "grimp")

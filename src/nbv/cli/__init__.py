@@ -37,6 +37,7 @@ from nbv.cli.arguments import (
     Rotations,
     WholeNumbers,
     allowed_rotations,
+    as_paragraphs,
     joined_numbers,
     need_writable,
 )
@@ -57,7 +58,10 @@ UP, FRONT = "+z", "+x"
 
 app = App(
     name="nbv",
-    help="Where should the camera look next? Poses and next views from depth frames.",
+    help=(
+        "Where should the camera look next? Poses and next views from depth frames.\n\n"
+        "A mistake in the input is one line, and exit code 2."
+    ),
     version=__version__,
     help_format="plaintext",
     result_action="return_value",
@@ -123,6 +127,7 @@ def _open_streams() -> None:
 
 
 @app.command
+@as_paragraphs
 def recommend(
     *frames: Annotated[Path, Parameter(name="FRAME", negative=())],
     bundle: str = SHIPPED,
@@ -146,12 +151,18 @@ def recommend(
 ) -> None:
     """Say where the camera stands about the object, and where it should look next.
 
-    Rotations are degrees about the object's upright axis, counter-clockwise seen from above.
+    Rotations are degrees about the object's upright axis, counter-clockwise
+    seen from above.
+
+    Example: nbv recommend frame.png --intrinsics 585,585,319.5,239.5
+
+    Example: nbv recommend a.npy b.npy --rotations 0 90 --plot answer.png
 
     Parameters
     ----------
     frames
-        Depth frames of one object: .npy or .npz in metres, or 16-bit images.
+        Depth frames of one object: .npy or .npz, or images of 16 bits. Numbers with a decimal point
+        are metres, whole numbers millimetres; see --depth-scale.
     bundle
         A bundle that comes with nbv, or a file.
     rotations
@@ -179,9 +190,12 @@ def recommend(
     max_travel
         Degrees that the camera may travel.
     camera_pose
-        A file with the camera's pose in the base frame, 4 x 4: the target pose is then given too.
+        The camera's pose at the last frame, and then the target pose is given too: that of the
+        optical frame (x right, y down, z forward) in the base frame, metres; the 16 numbers of a
+        4 x 4 matrix, row by row, in a .txt, .npy or .json file.
     axis
-        The object's upright axis in the base frame: a point, or a point and a direction.
+        The object's upright axis in the base frame: a point, metres, or a point and a direction,
+        which is 0 0 1 without it.
     estimate
         Instead of frames: the azimuth that your own estimator gave, degrees.
     distribution
@@ -190,7 +204,7 @@ def recommend(
     table
         The lookup table that nbv calibrate made of that estimator.
     plot
-        Draw crop, belief, expected errors and the move into this file.
+        Draw crop, belief, expected errors and the move into this file: .png, .pdf or .svg.
     json
         Print JSON.
     """
@@ -272,6 +286,7 @@ def recommend(
 
 
 @app.command
+@as_paragraphs
 def calibrate(
     source: Annotated[Path, Parameter(name="PAIRS_OR_MANIFEST")],
     /,
@@ -287,10 +302,15 @@ def calibrate(
 ) -> None:
     """Learn from known azimuths what an estimator's errors are.
 
-    From pairs (object_id, azimuth_deg, estimate_deg) of any estimator it makes a lookup table for
-    nbv recommend --estimate; with columns p0, p1, ..., the probabilities of the azimuths 360 k / B,
-    also what nbv recommend --distribution needs. From a manifest of frames (object_id, sequence,
-    file, azimuth_deg) and a bundle it makes the bundle for your camera.
+    From pairs (object_id, azimuth_deg, estimate_deg) of any estimator it makes
+    a lookup table for nbv recommend --estimate; with columns p0, p1, ..., the
+    probabilities of the azimuths 360 k / B, also what nbv recommend
+    --distribution needs. From a manifest of frames (object_id, sequence, file,
+    azimuth_deg) and a bundle it makes the bundle for your camera.
+
+    Example: nbv calibrate pairs.csv --output table.npz
+
+    Example: nbv calibrate manifest.csv --bundle mug --output my.safetensors
 
     Parameters
     ----------
@@ -369,6 +389,7 @@ def calibrate(
 
 
 @app.command
+@as_paragraphs
 def evaluate(
     manifest: Annotated[Path, Parameter(name="MANIFEST")],
     /,
@@ -383,6 +404,8 @@ def evaluate(
     json: Json = False,
 ) -> None:
     """Measure errors on frames with known azimuths, for every way to choose views.
+
+    Example: nbv evaluate manifest.csv --views 2 3
 
     Parameters
     ----------
@@ -441,6 +464,7 @@ def evaluate(
 
 
 @app.command
+@as_paragraphs
 def render(
     mesh: Annotated[Path | None, Parameter(name="MESH")] = None,
     /,
@@ -459,8 +483,9 @@ def render(
 ) -> None:
     """Write the depth frame that a depth camera would take of a mesh.
 
-    The camera is the first Kinect: 640 x 480 pixels, a focal length of 585 px. With --sensor stereo
-    it is a RealSense D435: 848 x 480 pixels, 424 px. It is directed at the object.
+    The camera is the first Kinect: 640 x 480 pixels, a focal length of 585 px.
+    With --sensor stereo it is a RealSense D435: 848 x 480 pixels, 424 px. It is
+    directed at the object.
 
     Example: nbv render mug.obj --up +y --front -z --output frame.npy
 
@@ -514,8 +539,11 @@ def render(
 
 
 @app.command
+@as_paragraphs
 def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
     """Show what a bundle holds and where it comes from.
+
+    Example: nbv inspect mug
 
     Parameters
     ----------
@@ -534,10 +562,14 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
         "bytes": path.stat().st_size,
         "category": held.category,
         "diagonal_m": held.diagonal_m,
+        "extent_m": list(held.extent_m),
         "focal_px": held.focal_px,
         "crop": f"{held.camera.image_side} pixels, {held.camera.fov_deg:g}°",
         "classes": held.n_bins,
+        "network": dict(held.estimator),
         "temperature": round(held.temperature, 3),
+        "affinity": dict(held.affinity),
+        "familiar_within": held.familiarity.threshold,
         "calibration_objects": len(set(held.object_ids)),
         "calibration_turns": len(held.object_ids),
         "elevations_deg": sorted(
@@ -552,8 +584,11 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
 
 
 @app.command
+@as_paragraphs
 def export(bundle: str = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
     """Write a bundle's network as ONNX: from crops to logits.
+
+    Example: nbv export mug --onnx mug.onnx
 
     Parameters
     ----------

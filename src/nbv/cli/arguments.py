@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from cyclopts import Parameter, Token
 
 from nbv.errors import UserError
+
+Command = TypeVar("Command", bound=Callable[..., None])
 
 
 def as_numbers(kind: Any, tokens: Sequence[Token]) -> list[Any]:
@@ -44,6 +47,24 @@ Json = Annotated[bool, Parameter(negative=())]
 
 SHIPPED = "mug"
 """The bundle that is taken where none is named."""
+
+
+def as_paragraphs(command: Command) -> Command:
+    """Return a command whose help has a line for each paragraph; what prints it wraps it.
+
+    The help in plain text breaks lines where the docstring does, and then again.
+    """
+    joined: list[str] = []
+    head, _, parameters = inspect.cleandoc(command.__doc__ or "").partition("\nParameters\n")
+    for line in parameters.splitlines():
+        if line.startswith(" ") and joined[-1].startswith(" "):
+            joined[-1] += f" {line.strip()}"
+        else:
+            joined.append(line)
+    paragraphs = (" ".join(paragraph.split()) for paragraph in head.split("\n\n"))
+    command.__doc__ = "\n".join(["\n\n".join(paragraphs), "", "Parameters", *joined])
+    return command
+
 
 OF_NUMBERS = ("--rotations", "--allowed", "--axis", "--gravity", "--views", "--intrinsics")
 
