@@ -420,10 +420,10 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
         assert -180 < rotation <= 180
         assert printed["travel_deg"] == abs(rotation)
         assert printed["criterion"] == criterion
-        cost = table.cost[round(estimate) % 360, rotation % 360]
+        cost = table.cost[round(estimate) % 360, int(rotation) % 360]
         assert printed["cost"] == pytest.approx(float(cost))
         told = run(capsys, "recommend", *options)
-        assert told.startswith(f"turn the camera by {rotation:+d}°, travel {abs(rotation)}°")
+        assert told.startswith(f"turn the camera by {rotation:+g}°, travel {abs(rotation):g}°")
 
 
 def test_pairs_may_begin_with_a_byte_order_mark(pairs, capsys):
@@ -1034,16 +1034,14 @@ def test_without_any_way_to_compute_a_network_it_says_what_to_install(here):
     "more",
     [
         ("f0.npy",),
-        ("--allowed", "90"),
         ("--axis", "0", "0", "0"),
         ("--plot", "x.png"),
         ("--intrinsics", "500"),
         ("--far", "1"),
         ("--elevation", "10"),
         ("--gravity", "0", "1", "0"),
-        ("--max-travel", "90"),
         ("--bundle", "b.safetensors"),
-        ("--allowed", "mask.npy"),
+        ("--rotations", "0"),
     ],
 )
 def test_what_an_estimate_cannot_use_is_refused(pairs, capsys, more):
@@ -1052,6 +1050,38 @@ def test_what_an_estimate_cannot_use_is_refused(pairs, capsys, more):
     options = ("recommend", "--estimate", "90", "--table", "table.npz")
     message = fails(capsys, *options, *more)
     assert f"{'FRAME' if more == ('f0.npy',) else more[0]} does not go with --estimate" in message
+
+
+@pytest.mark.parametrize(
+    ("criterion", "unit"), [("pose_ambiguity", " nats"), ("expected_error", " degrees")]
+)
+def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, criterion, unit):
+    main(["calibrate", "pairs.csv", "--output", "t.npz", "--criterion", criterion])
+    capsys.readouterr()
+    options = ("recommend", "--estimate", "90", "--table", "t.npz")
+    cost = load_lookup("t.npz").cost[90].astype(float)
+    turns = np.arange(360)
+    travel = np.minimum(turns, 360 - turns)
+    for limits, may in (
+        ((), travel > 1),
+        (("--max-travel", "100"), (travel > 1) & (travel <= 100)),
+        (("--allowed", "-100", "20", "70", "0"), np.isin(turns, [260, 20, 70])),
+        (("--allowed", "-100", "20", "--max-travel", "40"), turns == 20),
+    ):
+        printed = json.loads(run(capsys, *options, *limits, "--json"))
+        moves = [printed, *printed["alternatives"]]
+        assert printed["cost"] == pytest.approx(cost[may].min())
+        assert printed["cost_unit"] == unit.strip()
+        found = [int(move["rotation_deg"]) % 360 for move in moves]
+        assert may[found].all()
+        assert [move["cost"] for move in moves] == pytest.approx(cost[found].tolist())
+        assert cost[found].tolist() == sorted(cost[found])
+        assert len(moves) == may.sum() if may.sum() < 5 else len(moves) > 1
+        told = run(capsys, *options, *limits).splitlines()
+        assert told[0].endswith(f"({criterion} {printed['cost']:.3f}{unit})")
+        assert told[1:] == [] if len(moves) == 1 else told[1].startswith("or ")
+    for limits in (("--allowed", "0", "1", "-1"), ("--max-travel", "1")):
+        assert "no rotation is allowed" in fails(capsys, *options, *limits)
 
 
 @pytest.mark.parametrize("name", ["pairs.csv", "f0.npy", "b.safetensors"])

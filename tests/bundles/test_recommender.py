@@ -24,8 +24,8 @@ from made_bundles import settings as made_settings
 from nbv.angles import circular_distance_deg, travel_deg
 from nbv.bundles.beliefs import distributions_of, elevation_share, spread_deg
 from nbv.bundles.familiarity import fit_familiarity, unfamiliarity
-from nbv.bundles.next_view import MIN_SEPARATION_DEG, N_ALTERNATIVES
 from nbv.bundles.recommender import Recommender
+from nbv.bundles.rotations import MIN_SEPARATION_DEG, N_ALTERNATIVES
 from nbv.bundles.turns import Turn
 from nbv.errors import UserError
 from nbv.frames.crop import crop_frame

@@ -13,8 +13,8 @@ from nbv.angles import circular_distance_deg, signed_difference_deg, travel_deg
 from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import unfamiliarity
-from nbv.bundles.next_view import MIN_SEPARATION_DEG
 from nbv.bundles.recommender import turn_share
+from nbv.bundles.rotations import MIN_SEPARATION_DEG
 from nbv.bundles.turns import Turn
 from nbv.calibration.offset import constant_offset_deg, frame_warning
 from nbv.errors import UserError

@@ -16,17 +16,18 @@ from nbv.angles import (
     wrap_deg,
 )
 from nbv.bundles.beliefs import fused, log_bayes_factor, spread_deg, turned
-from nbv.bundles.moves import as_rotations
+from nbv.bundles.rotations import (
+    MIN_SEPARATION_DEG,
+    as_allowed,
+    at_rotations,
+    best_rotations,
+    signed_deg,
+)
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
 from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.look_alikes import MOST_COMPARED, LookAlikes
-
-MIN_SEPARATION_DEG = 15.0
-"""From every view so far: an estimator errs alike from nearly the same place."""
-
-N_ALTERNATIVES = 5
 
 LEAST_BAYES_FACTOR = 0.05
 """Below it views contradict each other. Of right ones, one in 20 at the most is below."""
@@ -212,9 +213,9 @@ def next_view(
     last = rotations_deg[-1]
     error = after[(np.arange(n_bins) + round(last / width)) % n_bins]
     taken = np.asarray(rotations_deg) - last
-    bins_deg = _signed(np.arange(n_bins, dtype=np.float64) * width)
-    rotation_deg = bins_deg if allowed_deg is None else _allowed(allowed_deg)
-    expected = error if allowed_deg is None else _between(error, rotation_deg)
+    bins_deg = signed_deg(np.arange(n_bins, dtype=np.float64) * width)
+    rotation_deg = bins_deg if allowed_deg is None else as_allowed(allowed_deg)
+    expected = error if allowed_deg is None else at_rotations(error, rotation_deg)
     is_allowed = _is_free(rotation_deg, taken) & (np.abs(rotation_deg) <= max_travel_deg)
     if not is_allowed.any() and _is_free(bins_deg, taken).any():
         raise UserError(
@@ -222,7 +223,10 @@ def next_view(
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
         )
     rotation_deg = rotation_deg[is_allowed]
-    moves = _local_best(rotation_deg, expected[is_allowed], width)
+    moves = [
+        Move(rotation, abs(rotation), error_deg)
+        for rotation, error_deg in best_rotations(rotation_deg, expected[is_allowed], width)
+    ]
     error[~np.isin(np.arange(n_bins), nearest_bin(rotation_deg, n_bins))] = np.inf
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
     return Recommendation(
@@ -278,52 +282,7 @@ def as_rotation_list(
     return rotations
 
 
-def _allowed(allowed_deg: ArrayLike) -> NDArray[np.float64]:
-    """Return allowed rotations (m,) once each, in (-180, 180], by size in [0, 360)."""
-    given = as_rotations(allowed_deg)
-    rotation_deg = given[np.unique(wrap_deg(given), return_index=True)[1]]
-    # A rotation that is in the range already keeps its bits.
-    is_within = (rotation_deg > -180.0) & (rotation_deg <= 180.0)
-    return np.where(is_within, rotation_deg, _signed(wrap_deg(rotation_deg)))
-
-
-def _signed(rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return rotations in [0, 360) in (-180, 180]."""
-    return np.where(rotation_deg > 180.0, rotation_deg - 360.0, rotation_deg)
-
-
 def _is_free(rotation_deg: NDArray[np.float64], taken: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which rotations (m,) are not too near to a view that was `taken`."""
     apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
     return np.asarray(apart >= MIN_SEPARATION_DEG)
-
-
-def _between(error: NDArray[np.float64], rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the errors (m,) at rotations, of those of the bins (B,); linear between bins."""
-    bins = np.arange(len(error)) * (360.0 / len(error))
-    return np.asarray(np.interp(rotation_deg, bins, error, period=360.0))
-
-
-def _local_best(
-    rotation_deg: NDArray[np.float64], error: NDArray[np.float64], width: float
-) -> list[Move]:
-    """Return the moves that are better than their neighbours within a bin's width, best first.
-
-    Rotations are sorted by their place in [0, 360).
-    """
-    following = np.arange(1, len(error) + 1) % len(error)
-    is_near = wrap_deg(rotation_deg[following] - rotation_deg) <= width + 1e-9
-    rise = error[following] - error
-    beaten = is_near & (rise < 0)
-    beaten[following] |= is_near & (rise > 0)
-    places = np.flatnonzero(~beaten)
-    travel = np.abs(rotation_deg)
-    order = places[np.lexsort((wrap_deg(rotation_deg[places]), travel[places], error[places]))]
-    found: list[Move] = []
-    for rotation, expected in zip(rotation_deg[order].tolist(), error[order].tolist(), strict=True):
-        apart = (abs(rotation - one.rotation_deg) for one in found)
-        if all(min(angle, 360.0 - angle) >= MIN_SEPARATION_DEG for angle in apart):
-            found.append(Move(rotation, abs(rotation), expected))
-        if len(found) > N_ALTERNATIVES:
-            break
-    return found

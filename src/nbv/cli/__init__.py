@@ -216,20 +216,14 @@ def recommend(
         of_frames |= {"--plot": plot, "--mask": mask, "--near": near, "--far": far}
         of_frames |= {"--intrinsics": intrinsics, "--depth-scale": depth_scale}
         of_frames |= {"--elevation": elevation, "--gravity": gravity}
-        of_views = {
-            "--allowed": allowed,
-            "--axis": axis,
-            "--camera-pose": camera_pose,
-            "--max-travel": None if max_travel == ANY_TRAVEL_DEG else max_travel,
-            "--rotations": rotations,
-        }
+        of_views = {"--axis": axis, "--camera-pose": camera_pose, "--rotations": rotations}
         if distribution is None:
             of_frames |= of_views
         if ignored := [name for name, value in of_frames.items() if value is not None]:
             own = "--estimate" if distribution is None else "--distribution"
             raise UserError(f"{ignored[0]} does not go with {own} and --table; leave it out")
         if distribution is None:
-            recommend_by_table(estimate, table, as_json=json)
+            recommend_by_table(estimate, table, allowed, max_travel, as_json=json)
             return
         if estimate is not None:
             raise UserError("--estimate and --distribution: give one of them")

@@ -20,7 +20,10 @@ from nbv.errors import UserError, nearest
 from nbv.labels import counted
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from nbv.cli.answers import Place
+    from nbv.recommendation.lookup import LookupTable
 
 
 def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool) -> None:
@@ -76,13 +79,20 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
     say_offset("distributions", classes, of_means)
 
 
-def recommend_by_table(estimate: float | None, table: Path | None, *, as_json: bool) -> None:
-    """Say the next view that a lookup table has for an estimate; see ``nbv recommend``."""
+def recommend_by_table(
+    estimate: float | None,
+    table: Path | None,
+    allowed: list[float] | Path | None,
+    max_travel: float,
+    *,
+    as_json: bool,
+) -> None:
+    """Say the next views that a lookup table has for an estimate; see ``nbv recommend``."""
     if table is None or estimate is None:
         raise UserError("--estimate and --table belong together; or --distribution and --table")
     if not math.isfinite(estimate):
         raise UserError(f"--estimate={estimate:g}: give an azimuth in degrees")
-    from nbv.angles import nearest_bin, travel_deg
+    from nbv.recommendation.criteria import cost_unit
     from nbv.recommendation.lookup import load_lookup
 
     path = _existing(table)
@@ -92,26 +102,68 @@ def recommend_by_table(estimate: float | None, table: Path | None, *, as_json: b
         raise UserError(
             f"--table={table}: no lookup table; give the .npz file that nbv calibrate wrote"
         ) from error
-    rotation = int(lookup.recommend(estimate))
-    cost = float(
-        lookup.cost[
-            nearest_bin(estimate, len(lookup.cost)), nearest_bin(rotation, len(lookup.cost))
-        ]
-    )
-    about = {
-        "estimate_deg": estimate,
-        "rotation_deg": rotation if rotation <= 180 else rotation - 360,
-        "travel_deg": float(travel_deg(rotation)),
-        "criterion": lookup.criterion,
-        "cost": cost,
-    }
+    unit = cost_unit(lookup.criterion, {"spread": lookup.spread})
+    moves = [
+        {"rotation_deg": rotation, "travel_deg": abs(rotation), "cost": cost}
+        for rotation, cost in _ranked(lookup, estimate, allowed_rotations(allowed), max_travel)
+    ]
     if as_json:
-        say_json(about)
+        about = {"criterion": lookup.criterion, "cost_unit": unit}
+        say_json({"estimate_deg": estimate} | moves[0] | about | {"alternatives": moves[1:]})
         return
+    unit = "" if unit == "1" else f" {unit}"
+    best, *others = moves
     say(
-        f"turn the camera by {about['rotation_deg']:+d}°, travel {about['travel_deg']:g}° "
-        f"({lookup.criterion} {cost:.3f})"
+        f"turn the camera by {best['rotation_deg']:+g}°, travel {best['travel_deg']:g}° "
+        f"({lookup.criterion} {best['cost']:.3f}{unit})"
     )
+    if others:
+        told = (f"{move['rotation_deg']:+g}° ({move['cost']:.3f})" for move in others)
+        say(f"or {', '.join(told)}")
+
+
+def _ranked(
+    lookup: LookupTable, estimate_deg: float, allowed_deg: ArrayLike | None, max_travel_deg: float
+) -> list[tuple[float, float]]:
+    """Return rotations and their costs, best first: without limits, the table's own is the first.
+
+    As in `LookupTable.recommend`, a rotation travels more than a bin.
+    """
+    import numpy as np
+
+    from nbv.angles import circular_distance_deg, nearest_bin
+    from nbv.bundles.rotations import (
+        MIN_SEPARATION_DEG,
+        as_allowed,
+        at_rotations,
+        best_rotations,
+        signed_deg,
+    )
+
+    n_bins = len(lookup.cost)
+    width = 360.0 / n_bins
+    of_bins = lookup.cost[nearest_bin(estimate_deg, n_bins)]
+    bins_deg = signed_deg(np.arange(n_bins, dtype=np.float64) * width)
+    rotation_deg = bins_deg if allowed_deg is None else as_allowed(allowed_deg)
+    cost = at_rotations(of_bins, rotation_deg)
+    travel = np.abs(rotation_deg)
+    is_allowed = (travel > width) & (travel <= max_travel_deg)
+    if not is_allowed.any():
+        raise UserError(
+            "no rotation is allowed: widen --allowed or --max-travel; a turn is more than "
+            f"{width:g}°"
+        )
+    ranked = best_rotations(rotation_deg[is_allowed], cost[is_allowed], width)
+    if allowed_deg is not None or max_travel_deg < bins_deg.max():
+        return ranked
+    # What the table was made with, such as a cost of travel, counts for its own rotation.
+    own = float(signed_deg(np.asarray(lookup.recommend(estimate_deg), dtype=np.float64)))
+    own_cost = float(of_bins[nearest_bin(own, n_bins)])
+    is_apart = (
+        circular_distance_deg(rotation, own) >= MIN_SEPARATION_DEG for rotation, _ in ranked
+    )
+    others = [one for one, apart in zip(ranked, is_apart, strict=True) if apart]
+    return [(own, own_cost), *others]
 
 
 def recommend_by_distributions(

@@ -1,0 +1,78 @@
+"""Rotations that a camera may take, and the best of them by their cost."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.angles import wrap_deg
+from nbv.bundles.moves import as_rotations
+
+MIN_SEPARATION_DEG = 15.0
+"""From every view so far: an estimator errs alike from nearly the same place."""
+
+N_ALTERNATIVES = 5
+
+
+def signed_deg(rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return rotations in [0, 360) in (-180, 180]."""
+    return np.where(rotation_deg > 180.0, rotation_deg - 360.0, rotation_deg)
+
+
+def as_allowed(allowed_deg: ArrayLike) -> NDArray[np.float64]:
+    """Return allowed rotations (m,) once each, in (-180, 180], by their place in [0, 360).
+
+    Errors as of `nbv.bundles.moves.as_rotations`.
+    """
+    given = as_rotations(allowed_deg)
+    rotation_deg = given[np.unique(wrap_deg(given), return_index=True)[1]]
+    # A rotation that is in the range already keeps its bits.
+    is_within = (rotation_deg > -180.0) & (rotation_deg <= 180.0)
+    return np.where(is_within, rotation_deg, signed_deg(wrap_deg(rotation_deg)))
+
+
+def at_rotations(
+    cost: NDArray[np.floating], rotation_deg: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return costs (m,) at rotations, of those of the bins (B,); linear between bins."""
+    bins = np.arange(len(cost)) * (360.0 / len(cost))
+    return np.asarray(np.interp(rotation_deg, bins, cost, period=360.0))
+
+
+def best_rotations(
+    rotation_deg: NDArray[np.float64], cost: NDArray[np.floating], width: float
+) -> list[tuple[float, float]]:
+    """Return rotations of less cost than their neighbours within a bin's width, best first.
+
+    Parameters
+    ----------
+    rotation_deg : ndarray (m,)
+        In (-180, 180], by their place in [0, 360).
+    cost : ndarray (m,)
+    width : float
+        Of a bin, degrees.
+
+    Returns
+    -------
+    list of (rotation, cost)
+        Of equal costs the one of less travel first; all are `MIN_SEPARATION_DEG` or more apart, and
+        there are at most `N_ALTERNATIVES` after the first.
+    """
+    following = np.arange(1, len(cost) + 1) % len(cost)
+    is_near = wrap_deg(rotation_deg[following] - rotation_deg) <= width + 1e-9
+    rise = cost[following] - cost
+    beaten = is_near & (rise < 0)
+    beaten[following] |= is_near & (rise > 0)
+    places = np.flatnonzero(~beaten)
+    travel = np.abs(rotation_deg)
+    order = places[np.lexsort((wrap_deg(rotation_deg[places]), travel[places], cost[places]))]
+    found: list[tuple[float, float]] = []
+    for rotation, of_rotation in zip(
+        rotation_deg[order].tolist(), cost[order].tolist(), strict=True
+    ):
+        apart = (abs(rotation - other) for other, _ in found)
+        if all(min(angle, 360.0 - angle) >= MIN_SEPARATION_DEG for angle in apart):
+            found.append((rotation, of_rotation))
+        if len(found) > N_ALTERNATIVES:
+            break
+    return found
