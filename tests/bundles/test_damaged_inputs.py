@@ -114,7 +114,7 @@ def test_damaged_files_are_one_line_or_an_answer(here, capsys, name, option):
     rng = np.random.default_rng(list(name.encode()))
     used = [damaged_name] if option is None else ["frame.npy", option, damaged_name]
     if option == "--camera-pose":
-        used += ["--axis", "0", "0", "0"]
+        used += ["--axis", "0", "0", "0", "0", "-1", "0"]
     Path(damaged_name).write_bytes(content)
     assert one_line_or_an_answer(capsys, *used)
     for _ in range(40):
