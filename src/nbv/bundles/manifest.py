@@ -183,14 +183,17 @@ def see(
         object_mask = read_mask(mask) if isinstance(mask, str) else None
         try:
             depth_m = read_depth(row["path"], depth_scale, camera.unit_m)
-            crop = recommender.crop(
-                depth_m, mask=object_mask, intrinsics=known, near_m=near_m, far_m=far_m
-            )
+            try:
+                crop = recommender.crop(
+                    depth_m, mask=object_mask, intrinsics=known, near_m=near_m, far_m=far_m
+                )
+            except FrameError:
+                raise
+            except UserError as error:
+                raise error.about(row["path"]) from error
         except FrameError as error:
             tell(row["path"], error)
             continue
-        except UserError as error:
-            raise error if row["path"] in str(error) else error.about(row["path"]) from error
         codes.append(crop.codes)
         kept.append(place)
         focal_px.append(known.fx if known else float("nan"))

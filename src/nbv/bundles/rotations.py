@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.angles import wrap_deg
+from nbv.angles import circular_distance_deg, nearest_bin, wrap_deg
 from nbv.bundles.moves import as_rotations
+from nbv.errors import UserError
+from nbv.recommendation.lookup import LookupTable
 
 MIN_SEPARATION_DEG = 15.0
 """From every view so far: an estimator errs alike from nearly the same place."""
@@ -76,3 +78,48 @@ def best_rotations(
         if len(found) > N_ALTERNATIVES:
             break
     return found
+
+
+def ranked_rotations(
+    lookup: LookupTable,
+    estimate_deg: float,
+    allowed_deg: ArrayLike | None = None,
+    max_travel_deg: float = 180.0,
+) -> list[tuple[float, float]]:
+    """Return the rotations of a lookup table for an estimate and their costs, best first.
+
+    As in `LookupTable.recommend`, a rotation travels more than a bin. Without limits the table's
+    own is the first: what it was made with, such as a cost of travel, counts for it.
+
+    Parameters
+    ----------
+    lookup : LookupTable
+    estimate_deg : float
+    allowed_deg, max_travel_deg
+        See `nbv.Recommender.recommend`.
+
+    Raises
+    ------
+    UserError
+        Where no rotation is allowed.
+    """
+    n_bins = len(lookup.cost)
+    width = 360.0 / n_bins
+    of_bins = lookup.cost[nearest_bin(estimate_deg, n_bins)]
+    bins_deg = signed_deg(np.arange(n_bins, dtype=np.float64) * width)
+    rotation_deg = bins_deg if allowed_deg is None else as_allowed(allowed_deg)
+    travel = np.abs(rotation_deg)
+    is_allowed = (travel > width) & (travel <= max_travel_deg)
+    if not is_allowed.any():
+        raise UserError(
+            "no rotation is allowed: widen --allowed or --max-travel; a turn is more than "
+            f"{width:g}°"
+        )
+    rotation_deg = rotation_deg[is_allowed]
+    ranked = best_rotations(rotation_deg, at_rotations(of_bins, rotation_deg), width)
+    if allowed_deg is not None or max_travel_deg < bins_deg.max():
+        return ranked
+    own = float(signed_deg(np.asarray(lookup.recommend(estimate_deg), dtype=np.float64)))
+    own_cost = float(of_bins[nearest_bin(own, n_bins)])
+    others = [one for one in ranked if circular_distance_deg(one[0], own) >= MIN_SEPARATION_DEG]
+    return [(own, own_cost), *others]

@@ -20,10 +20,7 @@ from nbv.errors import UserError, nearest
 from nbv.labels import counted
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from nbv.cli.answers import Place
-    from nbv.recommendation.lookup import LookupTable
 
 
 def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool) -> None:
@@ -92,6 +89,7 @@ def recommend_by_table(
         raise UserError("--estimate and --table belong together; or --distribution and --table")
     if not math.isfinite(estimate):
         raise UserError(f"--estimate={estimate:g}: give an azimuth in degrees")
+    from nbv.bundles.rotations import ranked_rotations
     from nbv.recommendation.criteria import cost_unit
     from nbv.recommendation.lookup import load_lookup
 
@@ -105,7 +103,9 @@ def recommend_by_table(
     unit = cost_unit(lookup.criterion, {"spread": lookup.spread})
     moves = [
         {"rotation_deg": rotation, "travel_deg": abs(rotation), "cost": cost}
-        for rotation, cost in _ranked(lookup, estimate, allowed_rotations(allowed), max_travel)
+        for rotation, cost in ranked_rotations(
+            lookup, estimate, allowed_rotations(allowed), max_travel
+        )
     ]
     if as_json:
         about = {"criterion": lookup.criterion, "cost_unit": unit}
@@ -120,50 +120,6 @@ def recommend_by_table(
     if others:
         told = (f"{move['rotation_deg']:+g}° ({move['cost']:.3f})" for move in others)
         say(f"or {', '.join(told)}")
-
-
-def _ranked(
-    lookup: LookupTable, estimate_deg: float, allowed_deg: ArrayLike | None, max_travel_deg: float
-) -> list[tuple[float, float]]:
-    """Return rotations and their costs, best first: without limits, the table's own is the first.
-
-    As in `LookupTable.recommend`, a rotation travels more than a bin.
-    """
-    import numpy as np
-
-    from nbv.angles import circular_distance_deg, nearest_bin
-    from nbv.bundles.rotations import (
-        MIN_SEPARATION_DEG,
-        as_allowed,
-        at_rotations,
-        best_rotations,
-        signed_deg,
-    )
-
-    n_bins = len(lookup.cost)
-    width = 360.0 / n_bins
-    of_bins = lookup.cost[nearest_bin(estimate_deg, n_bins)]
-    bins_deg = signed_deg(np.arange(n_bins, dtype=np.float64) * width)
-    rotation_deg = bins_deg if allowed_deg is None else as_allowed(allowed_deg)
-    cost = at_rotations(of_bins, rotation_deg)
-    travel = np.abs(rotation_deg)
-    is_allowed = (travel > width) & (travel <= max_travel_deg)
-    if not is_allowed.any():
-        raise UserError(
-            "no rotation is allowed: widen --allowed or --max-travel; a turn is more than "
-            f"{width:g}°"
-        )
-    ranked = best_rotations(rotation_deg[is_allowed], cost[is_allowed], width)
-    if allowed_deg is not None or max_travel_deg < bins_deg.max():
-        return ranked
-    # What the table was made with, such as a cost of travel, counts for its own rotation.
-    own = float(signed_deg(np.asarray(lookup.recommend(estimate_deg), dtype=np.float64)))
-    own_cost = float(of_bins[nearest_bin(own, n_bins)])
-    is_apart = (
-        circular_distance_deg(rotation, own) >= MIN_SEPARATION_DEG for rotation, _ in ranked
-    )
-    others = [one for one, apart in zip(ranked, is_apart, strict=True) if apart]
-    return [(own, own_cost), *others]
 
 
 def recommend_by_distributions(
