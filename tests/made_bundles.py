@@ -105,6 +105,7 @@ def made_bundle(seed: int = 0, **changes) -> Bundle:
         "diagonal_m": DIAGONAL_M,
         "extent_m": (0.4 * DIAGONAL_M, 1.6 * DIAGONAL_M),
         "focal_px": FOCAL_PX,
+        "mirror_plane_deg": None,
         "temperature": 1.25,
         "object_ids": tuple(turn.object_id for turn in turns),
         "elevation_deg": np.array([turn.elevation_deg for turn in turns], dtype=np.float32),

@@ -173,6 +173,17 @@ def test_a_file_of_format_1_is_rounded_once(bundle_file, tmp_path):
     assert all(np.array_equal(again[name], array) for name, array in found.weights.items())
 
 
+def test_a_mirror_plane_comes_back_and_older_files_have_none(tmp_path):
+    for plane_deg in (None, 0.0, 82.5):
+        path = tmp_path / "new.safetensors"
+        save_bundle(path, made_bundle(mirror_plane_deg=plane_deg))
+        assert load_bundle(path).mirror_plane_deg == plane_deg
+    old = with_about(path, tmp_path / "old.safetensors", mirror_plane_deg=None, format=2)
+    assert load_bundle(old).mirror_plane_deg is None
+    cut = with_about(path, tmp_path / "cut.safetensors", mirror_plane_deg=None)
+    assert "mirror_plane_deg" in refused(cut)
+
+
 def test_provenance_may_be_any_json(tmp_path):
     provenance = {"versions": {"numpy": "2.4"}, "epochs": {10: "ten", 2: "two"}, "ü": [1.5, None]}
     save_bundle(tmp_path / "a.safetensors", made_bundle(provenance=provenance))
@@ -237,14 +248,17 @@ def written(path, content: bytes):
 
 
 def with_about(bundle_file, path, arrays_=None, **changes):
-    """The same arrays, or some others, with other metadata, and with the digest of both."""
+    """The same arrays, or some others, with other metadata, and with the digest of both.
+
+    What is to be None is left out.
+    """
     with safetensors.safe_open(bundle_file, framework="numpy") as stored:
         about = json.loads(stored.metadata()["nbv"])
         held = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
     arrays_ = held | (arrays_ or {})
     about.pop("sha256")
     about |= changes
-    about = {name: value for name, value in about.items() if value is not None}
+    about = {name: value for name, value in about.items() if changes.get(name, 0) is not None}
     digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
     for name, array in sorted(arrays_.items()):
         digest.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
@@ -320,6 +334,11 @@ def test_a_bundle_without_its_digest_is_refused(bundle_file, tmp_path):
         {"temperature": float("nan")},
         {"temperature": float("inf")},
         {"familiar_within": 0.0},
+        {"mirror_plane_deg": 180.0},
+        {"mirror_plane_deg": -7.5},
+        {"mirror_plane_deg": 91.0},
+        {"mirror_plane_deg": float("nan")},
+        {"mirror_plane_deg": "none"},
         {"object_ids": []},
         {"object_ids": ["a"]},
         {"estimator": {}},

@@ -4,11 +4,13 @@ from nbv.jobs import job
 
 with job(snakemake):
     import json
+    import logging
     from pathlib import Path
 
     from nbv.bundles.bundle import save_bundle
     from nbv.bundles.evaluation import evaluate
-    from nbv.bundles.making import make_bundle, turns_of
+    from nbv.bundles.making import kept_network, make_bundle, turns_of
+    from nbv.bundles.mirror import find_mirror_plane, mirror_averaged
     from nbv.bundles.turns import every
     from nbv.calibration.splits import objects_with_role, read_splits
     from nbv.depth_images import open_depth
@@ -22,24 +24,29 @@ with job(snakemake):
     hardware = choose_hardware("cpu", "float32")
     estimator = load_estimator(given.estimator, hardware)
     splits = read_splits(given.splits)
-    of_role = {
-        role: turns_of(
-            estimator,
-            [open_depth(*paths) for paths in zip(depth, objects, strict=True)],
-            params.elevations,
-            objects_with_role(splits, params.fold, role),
+    images, test_images = (
+        [open_depth(*paths) for paths in zip(depth, objects, strict=True)]
+        for depth, objects in (
+            (given.depth, given.objects),
+            (given.test_depth, given.test_objects),
         )
-        for role, depth, objects in (
-            ("calibration", given.depth, given.objects),
-            ("test", given.test_depth, given.test_objects),
-        )
-    }
-    turns, *extent_px = of_role["calibration"]
+    )
+    calibration, test = (
+        objects_with_role(splits, params.fold, role) for role in ("calibration", "test")
+    )
+    network = kept_network(estimator)
+    plain, *_ = turns_of(network, images, params.elevations, calibration)
+    plane_deg = find_mirror_plane(network, plain)
+    where = "none" if plane_deg is None else f"at an azimuth of {plane_deg:g}°"
+    logging.getLogger("nbv").info("mirror plane of the objects: %s", where)
+    network = mirror_averaged(network, plane_deg)
+    turns, *extent_px = turns_of(network, images, params.elevations, calibration)
     bundle = make_bundle(
         wildcards.category,
         estimator,
         turns,
         tuple(extent_px),
+        mirror_plane_deg=plane_deg,
         camera=Camera(**params.camera),
         sensor=params.sensor,
         affinity=params.affinity,
@@ -47,6 +54,7 @@ with job(snakemake):
         | {"settings": params.settings},
     )
     save_bundle(snakemake.output.bundle, bundle)
+    tested, *_ = turns_of(network, test_images, params.elevations, test)
     # As on a turntable: a view every 15 degrees.
-    found = evaluate(bundle, [every(turn, 15) for turn in of_role["test"][0]], n_views=(2, 3))
-    write_csv(snakemake.output.evaluation, found)
+    errors = evaluate(bundle, [every(turn, 15) for turn in tested], n_views=(2, 3))
+    write_csv(snakemake.output.evaluation, errors)

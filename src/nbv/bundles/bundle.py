@@ -25,8 +25,11 @@ from nbv.errors import NamedError
 from nbv.files import replacing
 from nbv.rendering.camera import Camera
 
-FORMAT = 2
-"""Raised when an older program cannot read a newer file. 2: weights in half precision."""
+FORMAT = 3
+"""Raised when an older program cannot read a newer file.
+
+2: weights in half precision. 3: a mirror plane.
+"""
 
 PROBABILITY_STEP = 0.054
 """Between kept logs of probabilities, in nats: 256 of them reach down to 1e-6."""
@@ -78,6 +81,9 @@ class Bundle:
         Between which the diagonal of an object's box in the image is plausible, metres.
     focal_px : float
         Of the sensor that training simulated: what is assumed where a camera is not known.
+    mirror_plane_deg : float or None
+        The azimuth of the plane about which objects are symmetric, degrees in [0, 180); see
+        `nbv.bundles.mirror`. None where there is none, as in files of format 1 and 2.
     temperature : float
         What logits are divided by.
     object_ids : tuple of str
@@ -103,6 +109,7 @@ class Bundle:
     diagonal_m: float
     extent_m: tuple[float, float]
     focal_px: float
+    mirror_plane_deg: float | None
     temperature: float
     object_ids: tuple[str, ...]
     elevation_deg: NDArray[np.float32]
@@ -154,6 +161,7 @@ def save_bundle(path: str | Path, bundle: Bundle) -> None:
         "diagonal_m": bundle.diagonal_m,
         "extent_m": list(bundle.extent_m),
         "focal_px": bundle.focal_px,
+        "mirror_plane_deg": bundle.mirror_plane_deg,
         "temperature": bundle.temperature,
         "object_ids": list(bundle.object_ids),
         "affinity": dict(bundle.affinity),
@@ -274,6 +282,7 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
         diagonal_m=about["diagonal_m"],
         extent_m=(low, high),
         focal_px=about["focal_px"],
+        mirror_plane_deg=about["mirror_plane_deg"] if about["format"] > 2 else None,
         temperature=about["temperature"],
         object_ids=tuple(about["object_ids"]),
         elevation_deg=arrays["calibration.elevation_deg"],
@@ -305,6 +314,9 @@ def _need_sound(bundle: Bundle) -> None:
         raise ValueError("the paper's tables are no tables")
     if bundle.estimator["n_classes"] != n_bins or 360 % n_bins:
         raise ValueError(f"{n_bins} bins for {bundle.estimator['n_classes']} classes")
+    plane = bundle.mirror_plane_deg
+    if plane is not None and not (0 <= plane < 180 and (2 * plane * n_bins / 360).is_integer()):
+        raise ValueError(f"a mirror plane at {plane}°")
     numbers = [bundle.diagonal_m, bundle.focal_px, bundle.temperature, bundle.familiarity.threshold]
     if not all(math.isfinite(number) and number > 0 for number in numbers):
         raise ValueError("a size, focal length, temperature or threshold is not above 0")

@@ -12,6 +12,7 @@ from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.bundle import Bundle, as_kept
 from nbv.bundles.calibration import bin_apart, paper_tables, temperature_of
 from nbv.bundles.familiarity import fit_familiarity
+from nbv.bundles.mirror import Network
 from nbv.bundles.turns import Turn
 from nbv.depth_images import DepthImages
 from nbv.estimation.weights import Estimator, network_of, weights_of
@@ -25,8 +26,14 @@ DEFAULT_FOCAL_PX = 600.0
 _MARGINS = (0.6, 1.5)
 
 
+def kept_network(estimator: Estimator) -> Network:
+    """Return the network of an estimator with the weights that a bundle keeps."""
+    weights = as_kept(weights_of(estimator))
+    return network_of(weights, estimator.settings, estimator.image_side)
+
+
 def turns_of(
-    estimator: Estimator,
+    network: Network,
     images: Sequence[DepthImages],
     elevations_deg: Sequence[float],
     object_ids: Sequence[str],
@@ -40,7 +47,6 @@ def turns_of(
         The least and the largest diagonal of an object's box in an image, pixels, of 98 % of
         all images.
     """
-    network = network_of(as_kept(weights_of(estimator)), estimator.settings, estimator.image_side)
     turns, extents = [], []
     for elevation, of_elevation in zip(elevations_deg, images, strict=True):
         for object_id, codes in zip(object_ids, of_elevation.of(object_ids), strict=True):
@@ -72,6 +78,7 @@ def make_bundle(
     turns: Sequence[Turn],
     extent_px: tuple[float, float],
     *,
+    mirror_plane_deg: float | None,
     camera: Camera,
     sensor: Mapping[str, Any],
     affinity: Mapping[str, float],
@@ -85,9 +92,12 @@ def make_bundle(
     estimator : Estimator
         A classifier, trained on ``<object id>/<elevation>``.
     turns : sequence of Turn
-        Of calibration objects, which the estimator has not seen.
+        Of calibration objects, which the estimator has not seen, by the network that is averaged
+        over mirror images where there is a plane.
     extent_px : (float, float)
         From `turns_of`.
+    mirror_plane_deg : float or None
+        From `nbv.bundles.mirror.find_mirror_plane`.
     camera : Camera
         That of the training.
     sensor : mapping
@@ -114,6 +124,7 @@ def make_bundle(
         diagonal_m=diagonal_m,
         extent_m=(low, high),
         focal_px=float(sensor["parameters"].get("focal_px", DEFAULT_FOCAL_PX)),
+        mirror_plane_deg=mirror_plane_deg,
         temperature=temperature,
         object_ids=tuple(turn.object_id for turn in turns),
         elevation_deg=elevation_deg,

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nbv.bundles.bundle import Bundle
+from nbv.bundles.mirror import Network, mirror_averaged
 from nbv.errors import UserError, nearest
-
-Codes = NDArray[np.uint8]
-Outputs = NDArray[np.float32]
-
-Network = Callable[[Codes], Outputs]
-"""From codes (n, side, side) to logits (n, B)."""
 
 BACKENDS = ("onnx", "torch")
 
 
 def open_network(bundle: Bundle, backend: str | None = None) -> Network:
     """Return a bundle's network, on one core of the processor.
+
+    It is that of `nbv.bundles.mirror.mirror_averaged` where the bundle has a mirror plane.
 
     Parameters
     ----------
@@ -55,7 +51,7 @@ def _onnx_network(bundle: Bundle) -> Network:
         onnx_model(bundle).SerializeToString(), options, providers=["CPUExecutionProvider"]
     )
 
-    def network(codes: Codes) -> Outputs:
+    def network(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
         (logits,) = session.run(["logits"], {"codes": codes[:, None].astype(np.float32)})
         return np.asarray(logits)
 
@@ -70,4 +66,5 @@ def _torch_network(bundle: Bundle) -> Network:
             f"a network needs the packages of nbv[onnx], or torch ({error}); install one of them"
         ) from error
 
-    return network_of(bundle.weights, bundle.estimator, bundle.camera.image_side)
+    network = network_of(bundle.weights, bundle.estimator, bundle.camera.image_side)
+    return mirror_averaged(network, bundle.mirror_plane_deg)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nbv.bundles.bundle import Bundle
+from nbv.bundles.mirror import mirrored_classes
 from nbv.errors import UserError
 from nbv.estimation.folding import folded_convolutions
 
@@ -20,7 +22,8 @@ OPSET, IR_VERSION = 17, 8
 def onnx_model(bundle: Bundle) -> ModelProto:
     """Return the network from ``codes`` (n, 1, side, side) float32 to ``logits``.
 
-    Convolutions are as of `nbv.estimation.folding.folded_convolutions`.
+    Convolutions are as of `nbv.estimation.folding.folded_convolutions`. Where the bundle has a
+    mirror plane, the logits are those of `nbv.bundles.mirror.mirror_averaged`.
 
     Raises
     ------
@@ -35,37 +38,55 @@ def onnx_model(bundle: Bundle) -> ModelProto:
     nodes: list[Any] = []
     constants: list[Any] = []
 
-    def constant(name: str, value: NDArray[np.float32]) -> str:
-        constants.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
+    def constant(name: str, value: NDArray[Any]) -> str:
+        constants.append(numpy_helper.from_array(np.asarray(value, order="C"), name))
         return name
 
-    weights, side = bundle.weights, bundle.camera.image_side
+    def whole(name: str, *values: int) -> str:
+        return constant(name, np.array(values, dtype=np.int64))
+
+    def node(kind: str, inputs: Sequence[str], output: str, **attributes: Any) -> str:
+        nodes.append(helper.make_node(kind, inputs, [output], **attributes))
+        return output
+
+    weights, side, plane = bundle.weights, bundle.camera.image_side, bundle.mirror_plane_deg
+    n_classes = weights["4.bias"].size
     here = "codes"
+    if plane is not None:
+        # Backwards from the last column to the first.
+        last_to_first = (whole("last", -1), whole("end", -side - 1), whole("axis", 3))
+        mirrored = node("Slice", [here, *last_to_first, whole("step", -1)], "mirrored")
+        here = node("Concat", [here, mirrored], "images", axis=0)
     convolutions = folded_convolutions(weights, len(bundle.estimator["channels"]))
     for layer, (kernel, bias) in enumerate(convolutions):
         names = constant(f"kernel{layer}", kernel), constant(f"bias{layer}", bias)
         reach = kernel.shape[-1] // 2
-        nodes.append(
-            helper.make_node(
-                "Conv", [here, *names], [f"conv{layer}"], strides=[2, 2], pads=[reach] * 4
-            )
-        )
-        nodes.append(helper.make_node("Relu", [f"conv{layer}"], [f"map{layer}"]))
-        here = f"map{layer}"
-    nodes.append(helper.make_node("Flatten", [here], ["flat"]))
-    for place, (given, made) in {"2": ("flat", "wide"), "4": ("hidden", "logits")}.items():
+        here = node("Conv", [here, *names], f"conv{layer}", strides=[2, 2], pads=[reach] * 4)
+        here = node("Relu", [here], f"map{layer}")
+    here = node("Flatten", [here], "flat")
+
+    def linear(place: str, output: str) -> str:
         names = (
             constant(f"weight{place}", weights[f"{place}.weight"]),
             constant(f"offset{place}", weights[f"{place}.bias"]),
         )
-        nodes.append(helper.make_node("Gemm", [given, *names], [made], transB=1))
-        if place == "2":
-            nodes.append(helper.make_node("Relu", ["wide"], ["hidden"]))
+        return node("Gemm", [here, *names], output, transB=1)
+
+    here = node("Relu", [linear("2", "wide")], "hidden")
+    here = linear("4", "logits" if plane is None else "outputs")
+    if plane is not None:
+        both = node("Reshape", [here, whole("pairs", 2, -1, n_classes)], "both")
+        own, other = (
+            node("Gather", [both, constant(f"place_{name}", np.array(place))], name, axis=0)
+            for place, name in enumerate(("own", "other"))
+        )
+        backwards = whole("classes", *mirrored_classes(n_classes, plane).tolist())
+        node("Mean", [own, node("Gather", [other, backwards], "turned", axis=1)], "logits")
     graph = helper.make_graph(
         nodes,
         f"nbv {bundle.category}",
         [helper.make_tensor_value_info("codes", TensorProto.FLOAT, ["n", 1, side, side])],
-        [helper.make_tensor_value_info("logits", TensorProto.FLOAT, ["n", weights["4.bias"].size])],
+        [helper.make_tensor_value_info("logits", TensorProto.FLOAT, ["n", n_classes])],
         constants,
     )
     opset = [helper.make_opsetid("", OPSET)]

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.bundles.beliefs import ELEVATION_BANDWIDTH_DEG, distributions_of, elevation_share
 from nbv.bundles.bundle import Bundle, BundleError, load_bundle
 from nbv.bundles.familiarity import unfamiliarity
-from nbv.bundles.networks import Network, open_network
+from nbv.bundles.mirror import Network
+from nbv.bundles.networks import open_network
 from nbv.bundles.next_view import (
     AfterRotations,
     Recommendation,

@@ -144,6 +144,14 @@ def estimate_likelihood(distributions: NDArray[np.floating]) -> Floats:
     return np.asarray(sums / sums.sum(axis=1, keepdims=True))
 
 
+def mean_log_likelihood(
+    logits: NDArray[np.floating], azimuth_deg: ArrayLike, temperature: float
+) -> float:
+    """Return the mean log density of softmax(logits / temperature) at azimuths, nats per degree."""
+    tempered = _log_softmax(logits / temperature)
+    return float(log_likelihood(tempered, azimuth_deg).mean())
+
+
 def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:
     """Return the T of softmax(logits / T) under which the true azimuths are likeliest.
 
@@ -159,8 +167,7 @@ def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:
     from scipy.optimize import minimize_scalar
 
     def loss(log_temperature: float) -> float:
-        tempered = _log_softmax(logits / np.exp(log_temperature))
-        return -float(log_likelihood(tempered, azimuth_deg).mean())
+        return -mean_log_likelihood(logits, azimuth_deg, float(np.exp(log_temperature)))
 
     bounds = tuple(np.log(TEMPERATURES))
     return float(np.exp(minimize_scalar(loss, bounds=bounds, method="bounded").x))

@@ -561,6 +561,7 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
         "crop": f"{held.camera.image_side} pixels, {held.camera.fov_deg:g}°",
         "classes": held.n_bins,
         "network": dict(held.estimator),
+        "mirror_plane_deg": held.mirror_plane_deg,
         "temperature": round(held.temperature, 3),
         "affinity": dict(held.affinity),
         "familiar_within": held.familiarity.threshold,
