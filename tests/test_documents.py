@@ -27,7 +27,15 @@ TERMS = (
     *("warm start", "affinity", "choice", "plan", "shuffle", "density", "embedded objects", "fold"),
     *("viewpoint", "pose", "view", "estimate", "rotation δ", "calibration pair", "conditional"),
     *("evidence", "belief", "criterion", "cost", "policy", "fusion", "method", "extension", "unit"),
-    *("frame", "bundle", "calibration turn", "recording", "expected error", "unfamiliarity"),
+    *(
+        "frame",
+        "bundle",
+        "mirror plane",
+        "calibration turn",
+        "recording",
+        "expected error",
+        "unfamiliarity",
+    ),
     *("spread", "single"),
 )
 

@@ -16,10 +16,14 @@ SEEDS = ["seed_0", "seed_1", "seed_2", "seed_3"]
 OBJECTS = ("generated", "shapenet")
 
 
+def read(name: str) -> pd.DataFrame:
+    table = pd.read_csv(ROOT / "docs/reference/bundles" / name)
+    return table.set_index(["objects", "choice", "n_views", "object_id"]).sort_index()[SEEDS]
+
+
 @pytest.fixture(scope="module")
 def errors() -> pd.DataFrame:
-    table = pd.read_csv(ROOT / "docs/reference/bundles/trainings.csv")
-    return table.set_index(["objects", "choice", "n_views", "object_id"]).sort_index()[SEEDS]
+    return read("trainings.csv")
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +64,26 @@ def test_means_and_differences_have_intervals_over_objects_and_trainings(
         assert cell.removesuffix(" *") == wanted.removesuffix(" *")
         if less is not None:
             assert cell == wanted
+
+
+@pytest.mark.parametrize(
+    ("line", "choice", "n_views"),
+    [
+        ("in one view", SINGLE, 1),
+        ("in two views, recommended", RECOMMENDED, 2),
+        ("in two views, opposite", OPPOSITE, 2),
+        ("in two views, random", RANDOM, 2),
+    ],
+)
+def test_what_mirror_images_bring_is_the_difference_of_the_kept_errors(
+    errors, page, line, choice, n_views
+):
+    before = read("without_mirror_images.csv")
+    (cells,) = (row[1:] for row in page if row[0] == line)
+    for objects, cell in zip(OBJECTS, cells, strict=True):
+        own, other = (table.loc[objects, choice, n_views] for table in (errors, before))
+        assert own.index.equals(other.index)
+        assert cell == shown(own - other)
 
 
 @pytest.mark.parametrize("recording", ["nearly level", "from above"])

@@ -53,11 +53,13 @@ def test_the_commands_print_what_the_page_shows(printed):
 
 
 def test_the_text_follows_the_answer():
-    """The second frame is where the first answer sends the camera, 180° on from 75°."""
+    """The second frame is where the first answer sends the camera from 75°."""
     (first, *_) = re.findall(r"turn by ([+-]\d+)°", "\n".join(ANSWERS))
+    there = 75 + int(first)
     assert f"--rotations 0 {int(first)}" in COMMANDS[-1]
-    assert f"--azimuth {(75 + int(first)) % 360} " in COMMANDS[-2]
-    assert f"75 + {int(first)} = {75 + int(first)}°" in TEXT
+    assert f"--azimuth {there % 360} " in COMMANDS[-2]
+    words = " ".join(TEXT.replace("−", "-").split())
+    assert f"75 {first[0]} {first[1:]} = {there}°, which is {there % 360}°" in words
 
 
 def test_the_picture_is_the_one_that_the_command_draws(printed, folder):
