@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 
 import numpy as np
 import pytest
@@ -13,13 +14,16 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from nbv.bundles.moves import (
+    ROLL_LIMIT_DEG,
     as_pose,
     as_rotations,
     check_axis,
+    down_of_axis,
     elevation_from_gravity,
     moved_camera,
     read_pose,
     read_rotations,
+    roll_warnings,
     rotation_about,
 )
 from nbv.errors import UserError
@@ -210,6 +214,39 @@ def test_gravity_does_not_point_up_in_the_image(down):
 
 def test_a_camera_may_be_directed_straight_down():
     assert elevation_from_gravity((0, -0.01, 1)) == pytest.approx(90, abs=1)
+
+
+@given(
+    elevation=st.floats(-80, 79),
+    azimuth=st.floats(0, 360),
+    roll=st.floats(-44, 44),
+    length=st.floats(1e-200, 1e200),
+)
+def test_a_camera_that_is_rolled_is_told_to_which_side_the_object_leans(
+    elevation, azimuth, roll, length
+):
+    camera = camera_at(elevation, azimuth, 0.6, np.zeros(3))
+    cos, sin = np.cos(np.radians(roll)), np.sin(np.radians(roll))
+    # Turned clockwise about its line of sight: objects lean to the left.
+    rolled = camera.copy()
+    rolled[:3, :3] = camera[:3, :3] @ [[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]
+    for down in (
+        length * (rolled[:3, :3].T @ [0.0, 0.0, -1.0]),
+        down_of_axis(rolled, (0.1, 0, 0), (0, 0, 2.0)),
+    ):
+        said = roll_warnings(down)
+        if abs(abs(roll) - ROLL_LIMIT_DEG) < 1e-6:
+            continue
+        assert len(said) == (abs(roll) > ROLL_LIMIT_DEG)
+        for line in said:
+            leans, side = re.findall(r"leans (\d+)° to the (\w+)", line)[0]
+            assert abs(int(leans) - abs(roll)) < 0.51
+            assert side == ("left" if roll > 0 else "right")
+
+
+def test_of_a_camera_that_is_directed_straight_down_no_roll_is_told():
+    assert roll_warnings((0.1, 0.0, 1.0)) == ()
+    assert len(roll_warnings((1.0, 0.0, 1.0))) == 1
 
 
 # Poses

@@ -217,22 +217,26 @@ def test_an_axis_is_refused_that_is_not_where_the_object_is_seen(here, capsys):
 
 
 @pytest.mark.parametrize(
-    ("gravity", "elevation"),
+    ("gravity", "elevation", "leans"),
     [
-        (("0", "9.81", "0"), 0.0),
-        (("0,1,1",), 45.0),
-        (("-3", "0", "-3"), -45.0),
-        (("1", "1.41421356", "1"), 30.0),
-        (("0", "0", "1e-300"), 90.0),
+        (("0", "9.81", "0"), 0.0, None),
+        (("0,1,1",), 45.0, None),
+        (("-3", "0", "-3"), -45.0, "90° to the right"),
+        (("1", "1.41421356", "1"), 30.0, "35° to the left"),
+        (("0", "0", "1e-300"), 90.0, None),
     ],
 )
-def test_the_direction_down_gives_the_elevation(here, capsys, gravity, elevation):
+def test_the_direction_down_gives_the_elevation_and_the_roll(
+    here, capsys, gravity, elevation, leans
+):
     assert elevation_from_gravity(",".join(gravity).split(",")) == pytest.approx(elevation)
     options = ("recommend", "f0.npy", "--bundle", "b.safetensors", "--json")
     printed = json.loads(run(capsys, *options, "--gravity", *gravity))
     same_answer(
         printed, Recommender.load("b.safetensors").recommend(frame(0), elevation_deg=elevation)
     )
+    of_roll = [line for line in printed["warnings"] if "leans" in line]
+    assert [leans in line for line in of_roll] == ([] if leans is None else [True])
 
 
 def test_a_recommendation_is_told_in_a_few_lines(here, capsys):

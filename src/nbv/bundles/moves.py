@@ -23,6 +23,9 @@ Pose = NDArray[np.float64]
 _ROTATION_TOLERANCE = 1e-3
 _FARTHEST_M = 1e6
 
+ROLL_LIMIT_DEG = 10.0
+"""Of a camera about its line of sight: beyond it, errors are more than half as large again."""
+
 MOST_ROLL_DEG = 45.0
 LEAST_ELEVATION_DEG, MOST_ELEVATION_DEG = -30.0, 80.0
 """Far beyond what a bundle is trained for, so that only mistakes are outside."""
@@ -198,10 +201,7 @@ def check_axis(
     """
     if object_position_m is not None and diagonal_m is not None:
         _need_object_on_axis(camera_pose, point, direction, object_position_m, diagonal_m)
-    _, along = _as_axis(point, direction)
-    right, below, forward = (as_pose(camera_pose)[:3, :3].T @ along).tolist()
-    elevation_deg = math.degrees(math.asin(min(max(-forward, -1.0), 1.0)))
-    roll_deg = math.degrees(math.atan2(right, -below))
+    elevation_deg, roll_deg = _elevation_and_roll(down_of_axis(camera_pose, point, direction))
     if not LEAST_ELEVATION_DEG <= elevation_deg <= MOST_ELEVATION_DEG:
         seen = f"the camera is at an elevation of {elevation_deg:.0f}° about this axis"
     elif abs(roll_deg) > MOST_ROLL_DEG:
@@ -235,6 +235,45 @@ def _need_object_on_axis(
         )
 
 
+def down_of_axis(
+    camera_pose: ArrayLike, point: ArrayLike, direction: ArrayLike
+) -> NDArray[np.float64]:
+    """Return the direction down (3,) along an axis, in the camera's frame; see `moved_camera`."""
+    _, along = _as_axis(point, direction)
+    return np.asarray(-(as_pose(camera_pose)[:3, :3].T @ along))
+
+
+def _elevation_and_roll(down: NDArray[np.float64]) -> tuple[float, float]:
+    right, below, forward = (down / np.abs(down).max()).tolist()
+    elevation_deg = math.degrees(math.atan2(forward, math.hypot(right, below)))
+    return elevation_deg, math.degrees(math.atan2(right, below))
+
+
+def roll_warnings(down: ArrayLike) -> tuple[str, ...]:
+    """Return a sentence where a camera is rolled about its line of sight beyond `ROLL_LIMIT_DEG`.
+
+    Parameters
+    ----------
+    down : (3,)
+        The direction down in the camera's optical frame. Above `MOST_ELEVATION_DEG` it says nothing.
+    """
+    elevation_deg, roll_deg = _elevation_and_roll(_as_down(down))
+    if abs(roll_deg) <= ROLL_LIMIT_DEG or elevation_deg > MOST_ELEVATION_DEG:
+        return ()
+    side = "left" if roll_deg > 0 else "right"
+    return (
+        f"the camera is rolled: in the image the object leans {abs(roll_deg):.0f}° to the {side}, "
+        f"and above {ROLL_LIMIT_DEG:g}° errors grow; hold the camera level, or turn the frame",
+    )
+
+
+def _as_down(gravity: ArrayLike) -> NDArray[np.float64]:
+    down = _as_vector(gravity, "gravity", "three finite numbers, the direction down: x,y,z")
+    if not down.any():
+        raise UserError("gravity: 0,0,0 is no direction")
+    return down
+
+
 def elevation_from_gravity(gravity: ArrayLike) -> float:
     """Return the elevation, degrees, of a camera that is directed at the object.
 
@@ -252,17 +291,14 @@ def elevation_from_gravity(gravity: ArrayLike) -> float:
         Where it is not three finite numbers, has no length, or points up in the image: the camera
         then hangs upside down, or the signs are wrong.
     """
-    down = _as_vector(gravity, "gravity", "three finite numbers, the direction down: x,y,z")
-    if not down.any():
-        raise UserError("gravity: 0,0,0 is no direction")
-    right, below, forward = (down / np.abs(down).max()).tolist()
-    if below < -UPSIDE_DOWN * math.hypot(right, below, forward):
+    down = _as_down(gravity)
+    if down[1] < -UPSIDE_DOWN * math.hypot(*down.tolist()):
         raise UserError(
             f"gravity: y={down[1]:g} points up, and y is down in the optical frame; an "
             "accelerometer reports the direction up: reverse the sign of all three numbers; of a "
             "camera that hangs upside down, turn the frame by 180° and reverse x and y"
         )
-    return math.degrees(math.atan2(forward, math.hypot(right, below)))
+    return _elevation_and_roll(down)[0]
 
 
 def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ import math
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -240,7 +240,12 @@ def recommend(
     if gravity is not None and elevation is not None:
         raise UserError("--gravity gives the elevation; leave --gravity or --elevation out")
     place = _known_place(camera_pose, axis)
-    from nbv.bundles.moves import check_axis, elevation_from_gravity
+    from nbv.bundles.moves import (
+        check_axis,
+        down_of_axis,
+        elevation_from_gravity,
+        roll_warnings,
+    )
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask
     from nbv.frames.intrinsics import camera_of
@@ -265,6 +270,9 @@ def recommend(
     )
     if place is not None:
         check_axis(*place, answer.object_position_m, recommender.bundle.diagonal_m)
+    down = gravity if place is None else down_of_axis(*place)
+    if down is not None:
+        answer = replace(answer, warnings=(*answer.warnings, *roll_warnings(down)))
     targets = target_poses(answer, place)
     if plot is not None:
         from nbv.reporting.recommendation import draw_recommendation
