@@ -255,10 +255,11 @@ def roll_warnings(down: ArrayLike) -> tuple[str, ...]:
     Parameters
     ----------
     down : (3,)
-        The direction down in the camera's optical frame. Above `MOST_ELEVATION_DEG` it says nothing.
+        The direction down in the camera's optical frame. Of a camera that is directed nearly
+        straight down or up, beyond `MOST_ELEVATION_DEG`, it says nothing.
     """
     elevation_deg, roll_deg = _elevation_and_roll(_as_down(down))
-    if abs(roll_deg) <= ROLL_LIMIT_DEG or elevation_deg > MOST_ELEVATION_DEG:
+    if abs(roll_deg) <= ROLL_LIMIT_DEG or abs(elevation_deg) > MOST_ELEVATION_DEG:
         return ()
     side = "left" if roll_deg > 0 else "right"
     return (
