@@ -15,7 +15,7 @@ from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import FAMILIAR_SHARE, unfamiliarity
 from nbv.bundles.turns import Turn
 from nbv.calibration.pairs import WIDEST_GAP_DEG, full_turn, widest_gap_deg
-from nbv.calibration.posteriors import fit_temperature
+from nbv.calibration.posteriors import LEAST_PROBABILITY, fit_temperature
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.density_selection import chosen_lookup
@@ -25,6 +25,9 @@ LEAST_LIMIT = 0.5
 
 PRIOR_TURNS = 3.0
 """So many turns of a camera count as much as all turns that a bundle was made with."""
+
+# Of each of these turns, to fit the temperature by: neighbouring views say the same.
+_MOST_VIEWS = 24
 
 PAPER = "pose_ambiguity"
 
@@ -111,16 +114,41 @@ def _bins_of(turn: Turn, temperature: float) -> NDArray[np.float32]:
         raise error.about(f"object {turn.object_id!r}, sequence {turn.sequence!r}") from error
 
 
+def _temperature_with_own(
+    bundle: Bundle, turns: Sequence[Turn], prior_weight: NDArray[np.floating]
+) -> float:
+    """Return the likeliest temperature of turns and of a bundle's own, which count as given (S,).
+
+    Each of the turns counts 1, however many views it has.
+    """
+    views = slice(None, None, max(1, bundle.n_bins // _MOST_VIEWS))
+    # At the bundle's temperature; the logits but for a constant of each view.
+    own = bundle.temperature * np.log(np.maximum(bundle.distributions[:, views], LEAST_PROBABILITY))
+    bins_deg = (np.arange(bundle.n_bins) * (360.0 / bundle.n_bins))[views]
+    logits = [*(turn.logits for turn in turns), *own]
+    azimuth_deg = [*(turn.azimuth_deg for turn in turns), *(bins_deg for _ in own)]
+    counts = [*(1.0 for _ in turns), *prior_weight.tolist()]
+    weight = [
+        np.full(len(angles), count / len(angles))
+        for angles, count in zip(azimuth_deg, counts, strict=True)
+    ]
+    return fit_temperature(
+        np.concatenate(logits).astype(np.float64),
+        np.concatenate(azimuth_deg),
+        np.concatenate(weight),
+    )
+
+
 def recalibrated(
     bundle: Bundle, turns: Sequence[Turn], origin: str, density: Mapping[str, Any] = DENSITY
 ) -> Bundle:
     """Return a bundle with the same network, calibrated by other turns, such as those of a camera.
 
-    Temperature, the familiar range and, where it is known, the focal length of frames without
-    intrinsics are those of the turns. The bundle's own calibration turns stay, and count as much as
-    `PRIOR_TURNS` of the others together: a turn or two say too little alone. A turn of unknown
-    elevation counts for all. The paper's table of an elevation is made again where one of the turns
-    is nearest to it, of those and the bundle's, each of which counts once.
+    The familiar range and, where it is known, the focal length of frames without intrinsics are
+    those of the turns. The bundle's own calibration turns stay, and count as much as `PRIOR_TURNS`
+    of the others together, for the temperature too: a turn or two say too little alone. A turn of
+    unknown elevation counts for all. The paper's table of an elevation is made again where one of
+    the turns is nearest to it, of those and the bundle's, each of which counts once.
 
     Parameters
     ----------
@@ -131,11 +159,11 @@ def recalibrated(
     density : mapping
         See `paper_tables`.
     """
-    temperature = temperature_of(turns)
+    prior_weight = bundle.turn_weight * (PRIOR_TURNS / bundle.turn_weight.sum())
+    temperature = _temperature_with_own(bundle, turns, prior_weight)
     rows = np.stack([_bins_of(turn, temperature) for turn in turns])
     prior = bundle.distributions ** np.float32(bundle.temperature / temperature)
     prior /= prior.sum(axis=-1, keepdims=True)
-    prior_weight = bundle.turn_weight * (PRIOR_TURNS / bundle.turn_weight.sum())
     of_turns = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
     elevation_deg = np.concatenate([of_turns, bundle.elevation_deg])
     distributions = np.concatenate([rows, prior])

@@ -145,14 +145,20 @@ def estimate_likelihood(distributions: NDArray[np.floating]) -> Floats:
 
 
 def mean_log_likelihood(
-    logits: NDArray[np.floating], azimuth_deg: ArrayLike, temperature: float
+    logits: NDArray[np.floating],
+    azimuth_deg: ArrayLike,
+    temperature: float,
+    weight: Floats | None = None,
 ) -> float:
-    """Return the mean log density of softmax(logits / temperature) at azimuths, nats per degree."""
-    tempered = _log_softmax(logits / temperature)
-    return float(log_likelihood(tempered, azimuth_deg).mean())
+    """Return the mean log density of softmax(logits / temperature) at azimuths, nats per degree.
+
+    Parameters and ``weight`` as of `fit_temperature`.
+    """
+    values = log_likelihood(_log_softmax(logits / temperature), azimuth_deg)
+    return float(values.mean() if weight is None else np.average(values, weights=weight))
 
 
-def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:
+def fit_temperature(logits: Floats, azimuth_deg: ArrayLike, weight: Floats | None = None) -> float:
     """Return the T of softmax(logits / T) under which the true azimuths are likeliest.
 
     It lies within `TEMPERATURES`; above 1 the network was too sure of itself.
@@ -163,11 +169,13 @@ def fit_temperature(logits: Floats, azimuth_deg: ArrayLike) -> float:
         Of images that the network was not trained on.
     azimuth_deg : array-like, broadcasting to (...)
         The truth.
+    weight : ndarray (...), optional
+        How much each image counts.
     """
     from scipy.optimize import minimize_scalar
 
     def loss(log_temperature: float) -> float:
-        return -mean_log_likelihood(logits, azimuth_deg, float(np.exp(log_temperature)))
+        return -mean_log_likelihood(logits, azimuth_deg, float(np.exp(log_temperature)), weight)
 
     bounds = tuple(np.log(TEMPERATURES))
     return float(np.exp(minimize_scalar(loss, bounds=bounds, method="bounded").x))
