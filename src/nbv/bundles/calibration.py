@@ -13,7 +13,7 @@ from nbv.angles import signed_difference_deg
 from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import FAMILIAR_SHARE, unfamiliarity
-from nbv.bundles.turns import Turn
+from nbv.bundles.turns import ENOUGH_VIEWS, Turn
 from nbv.calibration.pairs import WIDEST_GAP_DEG, full_turn, widest_gap_deg
 from nbv.calibration.posteriors import LEAST_PROBABILITY, fit_temperature
 from nbv.errors import UserError
@@ -25,9 +25,6 @@ LEAST_LIMIT = 0.5
 
 PRIOR_TURNS = 3.0
 """So many turns of a camera count as much as all turns that a bundle was made with."""
-
-# Of each of these turns, to fit the temperature by: neighbouring views say the same.
-_MOST_VIEWS = 24
 
 PAPER = "pose_ambiguity"
 
@@ -121,7 +118,7 @@ def _temperature_with_own(
 
     Each of the turns counts 1, however many views it has.
     """
-    views = slice(None, None, max(1, bundle.n_bins // _MOST_VIEWS))
+    views = slice(None, None, max(1, bundle.n_bins // ENOUGH_VIEWS))
     # At the bundle's temperature; the logits but for a constant of each view.
     own = bundle.temperature * np.log(np.maximum(bundle.distributions[:, views], LEAST_PROBABILITY))
     bins_deg = (np.arange(bundle.n_bins) * (360.0 / bundle.n_bins))[views]

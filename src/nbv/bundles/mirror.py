@@ -12,14 +12,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.bundles.turns import Turn, every
+from nbv.bundles.turns import ENOUGH_VIEWS, Turn, every
 from nbv.calibration.posteriors import fit_temperature, mean_log_likelihood
 
 Network = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
 """From codes (n, side, side) to logits (n, B)."""
-
-# Of each turn, to find the plane by: neighbouring views say the same.
-_MOST_VIEWS = 24
 
 
 def mirrored_classes(n_classes: int, plane_deg: float) -> NDArray[np.intp]:
@@ -67,7 +64,7 @@ def find_mirror_plane(network: Network, turns: Sequence[Turn]) -> float | None:
         Degrees in [0, 180), half a class apart; None where the network itself is better than its
         average with any mirror image. Both are compared at their best temperatures.
     """
-    some = [every(turn, -(-len(turn.azimuth_deg) // _MOST_VIEWS)) for turn in turns]
+    some = [every(turn, -(-len(turn.azimuth_deg) // ENOUGH_VIEWS)) for turn in turns]
     azimuth_deg = np.concatenate([turn.azimuth_deg for turn in some])
     own = np.concatenate([turn.logits for turn in some]).astype(np.float64)
     mirrored = np.concatenate([network(turn.codes[:, :, ::-1]) for turn in some])

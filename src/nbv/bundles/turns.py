@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+ENOUGH_VIEWS = 24
+"""Of a turn, to fit one number by: neighbouring views say the same."""
+
 
 @dataclass(frozen=True)
 class Turn:
