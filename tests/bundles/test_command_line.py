@@ -18,7 +18,7 @@ from made_bundles import BINS, COLUMNS, FOCAL_PX, ROWS, WIDTH, frame
 
 pytest.importorskip("cyclopts")
 
-from nbv.bundles.bundle import load_bundle, save_bundle
+from nbv.bundles.bundle import FORMAT, load_bundle, save_bundle
 from nbv.bundles.calibration import DENSITY, recalibrated
 from nbv.bundles.evaluation import evaluate, familiarity_of
 from nbv.bundles.manifest import read_manifest, see
@@ -705,6 +705,7 @@ def test_inspect_shows_what_a_bundle_holds(here, bundle, capsys):
     about = json.loads(run(capsys, "inspect", "b.safetensors", "--json"))
     assert about["file"] == "b.safetensors"
     assert about["bytes"] == (here / "b.safetensors").stat().st_size
+    assert about["format"] == FORMAT
     assert about["category"] == "mug"
     assert about["classes"] == BINS
     assert about["calibration_objects"] == 3
@@ -1038,7 +1039,6 @@ def test_without_any_way_to_compute_a_network_it_says_what_to_install(here):
     "more",
     [
         ("f0.npy",),
-        ("--axis", "0", "0", "0"),
         ("--plot", "x.png"),
         ("--intrinsics", "500"),
         ("--far", "1"),
@@ -1054,6 +1054,42 @@ def test_what_an_estimate_cannot_use_is_refused(pairs, capsys, more):
     options = ("recommend", "--estimate", "90", "--table", "table.npz")
     message = fails(capsys, *options, *more)
     assert f"{'FRAME' if more == ('f0.npy',) else more[0]} does not go with --estimate" in message
+
+
+def test_an_estimate_has_target_poses_where_camera_and_axis_are_known(pairs, capsys):
+    run(capsys, "calibrate", "pairs.csv", "--output", "table.npz")
+    options = ("recommend", "--estimate", "90", "--table", "table.npz")
+    bare = json.loads(run(capsys, *options, "--json"))
+    placed = (*options, "--camera-pose", "pose.json", "--axis", "0.1,-0.2,0.3")
+    printed = json.loads(run(capsys, *placed, "--json"))
+    moves = [printed, *printed["alternatives"]]
+    assert len(moves) > 1
+    for move in moves:
+        wanted = moved_camera(POSE, (0.1, -0.2, 0.3), (0, 0, 1), move["rotation_deg"])
+        assert np.array(move.pop("target_camera_pose")) == pytest.approx(wanted)
+    assert printed == bare
+    told = run(capsys, *placed).splitlines()
+    assert told[:-5] == run(capsys, *options).splitlines()
+    wanted = moved_camera(POSE, (0.1, -0.2, 0.3), (0, 0, 1), printed["rotation_deg"])
+    rows = [[float(value) for value in line.split()] for line in told[-4:]]
+    assert np.array(rows) == pytest.approx(wanted, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--camera-pose", "pose.json"), "--camera-pose and --axis belong together"),
+        (("--axis", "0,0,0"), "--camera-pose and --axis belong together"),
+        (
+            ("--camera-pose", "pose.json", "--axis", "0,0,0,0,0,-1"),
+            "does the direction point up",
+        ),
+    ],
+)
+def test_an_estimate_needs_a_camera_pose_and_an_axis_that_fit(pairs, capsys, more, message):
+    run(capsys, "calibrate", "pairs.csv", "--output", "table.npz")
+    options = ("recommend", "--estimate", "90", "--table", "table.npz")
+    assert message in fails(capsys, *options, *more)
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,9 @@ def test_jobs_that_nobody_timed_are_said_to_be_guessed():
     planned = three_jobs() | {4: Planned(Job("bundle"), "bundle")}
     said = "4 jobs to do, about 2 min by the reference run's times (1 job guessed)"
     assert progress_of(planned)[0].first_estimate() == said
+    # As of `make bundles`: two short jobs that were timed, and long ones that were not.
+    planned |= {number: Planned(Job("bundle"), "bundle") for number in (5, 6, 7)}
+    assert progress_of(planned)[0].first_estimate() == "7 jobs to do"
     unknown = {number: Planned(Job("bundle"), "bundle") for number in (1, 2)}
     assert progress_of(unknown)[0].first_estimate() == "2 jobs to do"
 

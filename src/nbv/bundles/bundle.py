@@ -253,6 +253,12 @@ def load_bundle(path: str | Path) -> Bundle:
     return bundle
 
 
+def format_of(path: Path) -> int:
+    """Return the format of a sound bundle's file."""
+    about, _ = _read(path)
+    return int(about["format"])
+
+
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     with safetensors.safe_open(path, framework="numpy") as stored:
         metadata = stored.metadata() or {}

@@ -190,7 +190,7 @@ def recommend(
     max_travel
         Degrees that the camera may travel.
     camera_pose
-        The camera's pose at the last frame, and then the target pose is given too: that of the
+        The camera's pose at the last view, and then the target pose is given too: that of the
         optical frame (x right, y down, z forward) in the base frame, metres; the 16 numbers of a
         4 x 4 matrix, row by row, in a .txt, .npy or .json file.
     axis
@@ -216,18 +216,17 @@ def recommend(
         of_frames |= {"--plot": plot, "--mask": mask, "--near": near, "--far": far}
         of_frames |= {"--intrinsics": intrinsics, "--depth-scale": depth_scale}
         of_frames |= {"--elevation": elevation, "--gravity": gravity}
-        of_views = {"--axis": axis, "--camera-pose": camera_pose, "--rotations": rotations}
         if distribution is None:
-            of_frames |= of_views
+            of_frames["--rotations"] = rotations
         if ignored := [name for name, value in of_frames.items() if value is not None]:
             own = "--estimate" if distribution is None else "--distribution"
             raise UserError(f"{ignored[0]} does not go with {own} and --table; leave it out")
+        place = _known_place(camera_pose, axis)
         if distribution is None:
-            recommend_by_table(estimate, table, allowed, max_travel, as_json=json)
+            recommend_by_table(estimate, table, allowed, max_travel, place, as_json=json)
             return
         if estimate is not None:
             raise UserError("--estimate and --distribution: give one of them")
-        place = _known_place(camera_pose, axis)
         recommend_by_distributions(
             distribution, table, rotations, allowed, max_travel, place, as_json=json
         )
@@ -273,7 +272,7 @@ def recommend(
     down = gravity if place is None else down_of_axis(*place)
     if down is not None:
         answer = replace(answer, warnings=(*answer.warnings, *roll_warnings(down)))
-    targets = target_poses(answer, place)
+    targets = target_poses((move.rotation_deg for move in answer.moves), place)
     if plot is not None:
         from nbv.reporting.recommendation import draw_recommendation
 
@@ -554,7 +553,7 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
     json
         Print JSON.
     """
-    from nbv.bundles.bundle import load_bundle
+    from nbv.bundles.bundle import format_of, load_bundle
     from nbv.bundles.recommender import bundle_path
 
     path = bundle_path(bundle)
@@ -562,6 +561,7 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
     about: dict[str, Any] = {
         "file": str(path),
         "bytes": path.stat().st_size,
+        "format": format_of(path),
         "category": held.category,
         "diagonal_m": held.diagonal_m,
         "extent_m": list(held.extent_m),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -38,13 +38,36 @@ def say_assumed_camera(focal_px: float, n_frames: int | None = None) -> None:
     say(f"camera     not given{of_frames}: a focal length of {focal_px:g} px is assumed")
 
 
-def target_poses(answer: Recommendation, place: Place | None) -> list[NDArray[np.float64]] | None:
-    """Return the camera's poses (4, 4) after the move and each alternative, where it is known."""
+def target_poses(
+    rotations_deg: Iterable[float], place: Place | None
+) -> list[NDArray[np.float64]] | None:
+    """Return the camera's poses (4, 4) after each of several rotations, where its own is known."""
     from nbv.bundles.moves import moved_camera
 
     if place is None:
         return None
-    return [moved_camera(*place, move.rotation_deg) for move in answer.moves]
+    return [moved_camera(*place, rotation_deg) for rotation_deg in rotations_deg]
+
+
+def with_targets(
+    moves: Sequence[Mapping[str, Any]], targets: Sequence[NDArray[np.float64]] | None
+) -> list[dict[str, Any]]:
+    """Return moves for JSON, each with the camera's pose after it where that is known."""
+    if targets is None:
+        return [dict(move) for move in moves]
+    return [
+        {**move, "target_camera_pose": target.tolist()}
+        for move, target in zip(moves, targets, strict=True)
+    ]
+
+
+def say_target(targets: Sequence[NDArray[np.float64]] | None) -> None:
+    """Print the camera's pose after the best move, where it is known and there is a move."""
+    if not targets:
+        return
+    say("target camera pose in the base frame")
+    for row in targets[0]:
+        say("  " + " ".join(f"{value:9.5f}" for value in row))
 
 
 def recommendation_as_json(
@@ -62,7 +85,7 @@ def recommendation_as_json(
     targets : sequence of ndarray (4, 4), optional
         The camera's pose after the move and after each alternative.
     """
-    moves: list[dict[str, Any]] = [asdict(move) for move in answer.moves]
+    moves = with_targets([asdict(move) for move in answer.moves], targets)
     about: dict[str, Any] = {
         "azimuth_deg": answer.azimuth_deg,
         "spread_deg": answer.spread_deg,
@@ -78,8 +101,6 @@ def recommendation_as_json(
         "error_after_deg": [None if e == float("inf") else e for e in answer.error_after_deg],
     }
     if targets is not None:
-        for move, target in zip(moves, targets, strict=True):
-            move["target_camera_pose"] = target.tolist()
         about["target_camera_pose"] = moves[0]["target_camera_pose"] if moves else None
     return about
 
@@ -107,10 +128,7 @@ def say_recommendation(
         say(f"or         {', '.join(others)}")
     for warning in answer.warnings:
         say(f"careful    {warning}")
-    if targets:
-        say("target camera pose in the base frame")
-        for row in targets[0]:
-            say("  " + " ".join(f"{value:9.5f}" for value in row))
+    say_target(targets)
 
 
 def offset_of(

@@ -13,7 +13,9 @@ from nbv.cli.answers import (
     say_json,
     say_offset,
     say_recommendation,
+    say_target,
     target_poses,
+    with_targets,
 )
 from nbv.cli.arguments import SHIPPED, allowed_rotations
 from nbv.errors import UserError, nearest
@@ -81,6 +83,7 @@ def recommend_by_table(
     table: Path | None,
     allowed: list[float] | Path | None,
     max_travel: float,
+    place: Place | None,
     *,
     as_json: bool,
 ) -> None:
@@ -89,6 +92,7 @@ def recommend_by_table(
         raise UserError("--estimate and --table belong together; or --distribution and --table")
     if not math.isfinite(estimate):
         raise UserError(f"--estimate={estimate:g}: give an azimuth in degrees")
+    from nbv.bundles.moves import check_axis
     from nbv.bundles.rotations import ranked_rotations
     from nbv.recommendation.criteria import cost_unit
     from nbv.recommendation.lookup import load_lookup
@@ -100,13 +104,17 @@ def recommend_by_table(
         raise UserError(
             f"--table={table}: no lookup table; give the .npz file that nbv calibrate wrote"
         ) from error
+    if place is not None:
+        check_axis(*place)
     unit = cost_unit(lookup.criterion, {"spread": lookup.spread})
-    moves = [
+    found = [
         {"rotation_deg": rotation, "travel_deg": abs(rotation), "cost": cost}
         for rotation, cost in ranked_rotations(
             lookup, estimate, allowed_rotations(allowed), max_travel
         )
     ]
+    targets = target_poses((move["rotation_deg"] for move in found), place)
+    moves = with_targets(found, targets)
     if as_json:
         about = {"criterion": lookup.criterion, "cost_unit": unit}
         say_json({"estimate_deg": estimate} | moves[0] | about | {"alternatives": moves[1:]})
@@ -120,6 +128,7 @@ def recommend_by_table(
     if others:
         told = (f"{move['rotation_deg']:+g}° ({move['cost']:.3f})" for move in others)
         say(f"or {', '.join(told)}")
+    say_target(targets)
 
 
 def recommend_by_distributions(
@@ -155,7 +164,7 @@ def recommend_by_distributions(
     )
     if place is not None:
         check_axis(*place)
-    targets = target_poses(answer, place)
+    targets = target_poses((move.rotation_deg for move in answer.moves), place)
     if as_json:
         say_json(recommendation_as_json(answer, None, targets))
         return

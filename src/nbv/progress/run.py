@@ -87,15 +87,15 @@ class RunProgress(logging.Handler):
         """Say how much there is to do, before anything runs."""
         n_left = len(self._planned) - len(self._finished)
         there = f" ({len(self._finished):,} already there)" if self._finished else ""
-        usual = f", about {time_left(self._estimate)} by the "
-        usual = {
-            "reference": f"{usual}reference run's times",
-            "this run": f"{usual}times of those",
-            "guess": "",
-        }[self._estimate.basis]
-        guessed = self._estimate.n_guessed if usual else 0
+        to_do = f"{n_left:,} {'job' if n_left == 1 else 'jobs'} to do{there}"
+        guessed = self._estimate.n_guessed
+        # A median of few jobs says nothing of the many others, which may be the long ones.
+        if self._estimate.basis == "guess" or 2 * guessed > n_left:
+            return to_do
+        source = {"reference": "reference run's times", "this run": "times of those"}
         unknown = f" ({counted(guessed, 'job')} guessed)" if guessed else ""
-        return f"{n_left:,} {'job' if n_left == 1 else 'jobs'} to do{there}{usual}{unknown}"
+        usual = f"about {time_left(self._estimate)} by the {source[self._estimate.basis]}"
+        return f"{to_do}, {usual}{unknown}"
 
     def emit(self, record: logging.LogRecord) -> None:
         """Take note of a job that starts, ends or fails."""
