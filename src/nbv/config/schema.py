@@ -109,6 +109,7 @@ class Dataset(Section):
     front: Axis = "+x"
     turn_deg: dict[Name, Angle] = {}
     centre: Literal["box", "origin"] = "box"
+    handle_reach: Annotated[Number, Field(ge=0, le=0.5), "in widths of a mug's body"] = 0.0
     exclude: list[Text] = []
     exclude_file: DataPath | None = None
 

@@ -26,7 +26,9 @@ CATEGORIES: dict[str, Callable[[np.random.Generator], trimesh.Trimesh]] = {
 }
 
 
-def generate(category: str, seed: int, index: int) -> trimesh.Trimesh:
+def generate(
+    category: str, seed: int, index: int, *, handle_reach: float = 0.0
+) -> trimesh.Trimesh:
     """Return object number `index` of a category.
 
     Parameters
@@ -37,6 +39,9 @@ def generate(category: str, seed: int, index: int) -> trimesh.Trimesh:
         Seed of the whole data set, >= 0.
     index : int
         Number of the object, >= 0. An object does not depend on other objects or their order.
+    handle_reach : float
+        Least reach of a mug's handle, in widths of the body, 0 to 0.5
+        (`nbv.meshes.procedural.mug.handle_reach`). Other categories do not heed it.
 
     Returns
     -------
@@ -56,4 +61,6 @@ def generate(category: str, seed: int, index: int) -> trimesh.Trimesh:
         raise UserError(message)
     # crc32, not hash(): Python's hash of a string differs between processes.
     rng = np.random.default_rng([seed, zlib.crc32(category.encode()), index])
+    if category == "mug":
+        return mug.mug(rng, handle_reach)
     return CATEGORIES[category](rng)

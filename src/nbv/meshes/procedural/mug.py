@@ -14,8 +14,28 @@ _AROUND = 96
 _REACHES = ((0.08, 0.15), (0.16, 0.3), (0.3, 0.52))
 
 
-def mug(rng: np.random.Generator) -> trimesh.Trimesh:
-    """Return a mug of height 1 on z = 0, its handle towards -y."""
+def mug(rng: np.random.Generator, least_reach: float = 0.0) -> trimesh.Trimesh:
+    """Return a mug of height 1 on z = 0, its handle towards -y.
+
+    Mugs are drawn until the handle's reach is at least `least_reach`. Where the first draw is one,
+    the mug is that of `least_reach` 0.
+    """
+    while handle_reach(drawn := _any_mug(rng)) < least_reach:
+        pass
+    return drawn
+
+
+def handle_reach(mesh: trimesh.Trimesh) -> float:
+    """Return what the handle adds to the body's width, in widths of the body.
+
+    It is the difference of the two horizontal sides of the mug's box, over the shorter one, along
+    x. A handle that the body swallows has 0.
+    """
+    across, along, _ = np.ptp(mesh.vertices, axis=0)
+    return float(along / across - 1.0)
+
+
+def _any_mug(rng: np.random.Generator) -> trimesh.Trimesh:
     outer = _body_curve(rng)
     wall = rng.uniform(0.025, 0.06)
     handle = _handle(rng, outer, wall)

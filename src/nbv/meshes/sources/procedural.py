@@ -50,8 +50,9 @@ class ProceduralSource:
         number = object_id.removeprefix(f"{category}-")
         if not number.isdecimal():
             raise UserError(f"dataset=procedural: {object_id} is not an id like {category}-0000")
-        mesh = generate(category, self.seed, int(number))
-        check_mesh(mesh, f"dataset=procedural: {object_id}")
         settings = self._settings
+        reach = settings["handle_reach"]
+        mesh = generate(category, self.seed, int(number), handle_reach=reach)
+        check_mesh(mesh, f"dataset=procedural: {object_id}")
         turn_deg = settings["turn_deg"].get(category, 0.0)
         return normalise(mesh, settings["up"], settings["front"], turn_deg, settings["centre"])
