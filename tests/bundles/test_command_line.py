@@ -22,7 +22,7 @@ from nbv.bundles.bundle import FORMAT, load_bundle, save_bundle
 from nbv.bundles.calibration import DENSITY, recalibrated
 from nbv.bundles.evaluation import evaluate, familiarity_of
 from nbv.bundles.manifest import read_manifest, see
-from nbv.bundles.moves import elevation_from_gravity, moved_camera
+from nbv.bundles.moves import check_axis, elevation_from_gravity, moved_camera
 from nbv.bundles.recommender import Recommender
 from nbv.calibration.pairs import read_pairs
 from nbv.cli import main
@@ -237,6 +237,9 @@ def test_the_direction_down_gives_the_elevation_and_the_roll(
     )
     of_roll = [line for line in printed["warnings"] if "leans" in line]
     assert [leans in line for line in of_roll] == ([] if leans is None else [True])
+    down = [float(number) for number in ",".join(gravity).split(",")]
+    answer = Recommender.load("b.safetensors").recommend(frame(0), gravity=down)
+    assert list(answer.warnings) == printed["warnings"]
 
 
 def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
@@ -360,7 +363,7 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         (["f0.npy", "--gravity", "0,nan,1"], "gravity: give three finite numbers"),
         (["f0.npy", "--gravity", "0,0,inf"], "gravity: give three finite numbers"),
         (["f0.npy", "--gravity", "0,0,0"], "gravity: 0,0,0 is no direction"),
-        (["f0.npy", "--gravity", "0,1,0", "--elevation", "0"], "leave --gravity or --elevation"),
+        (["f0.npy", "--gravity", "0,1,0", "--elevation", "0"], "leave gravity or elevation out"),
         (["f0.npy", "--nearest", "2"], "--nearest"),
     ],
 )
@@ -1073,6 +1076,23 @@ def test_an_estimate_has_target_poses_where_camera_and_axis_are_known(pairs, cap
     wanted = moved_camera(POSE, (0.1, -0.2, 0.3), (0, 0, 1), printed["rotation_deg"])
     rows = [[float(value) for value in line.split()] for line in told[-4:]]
     assert np.array(rows) == pytest.approx(wanted, abs=1e-5)
+
+
+def test_a_rolled_camera_is_told_whatever_the_recommendation_is_of(pairs, capsys):
+    run(capsys, "calibrate", "pairs.csv", "--output", "table.npz")
+    # An axis that leans by 30 degrees in the image of the camera of POSE.
+    axis = f"0,0,0,0,{-np.sin(np.radians(30))},{np.cos(np.radians(30))}"
+    placed = ("--camera-pose", "pose.json", "--axis", axis)
+    (wanted,) = check_axis(POSE, (0, 0, 0), (0, -np.sin(np.radians(30)), np.cos(np.radians(30))))
+    assert "leans 30° to the right" in wanted
+    for options in (
+        ("--estimate", "90", "--table", "table.npz"),
+        ("f0.npy", "--bundle", "b.safetensors"),
+        ("f0.npy", "--bundle", "b.safetensors", "--gravity", "0,1,0"),
+    ):
+        printed = json.loads(run(capsys, "recommend", *options, *placed, "--json"))
+        assert printed["warnings"].count(wanted) == 1
+        assert f"careful    {wanted}" in run(capsys, "recommend", *options, *placed).splitlines()
 
 
 @pytest.mark.parametrize(

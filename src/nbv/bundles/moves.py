@@ -164,7 +164,7 @@ def check_axis(
     direction: ArrayLike,
     object_position_m: ArrayLike | None = None,
     diagonal_m: float | None = None,
-) -> None:
+) -> tuple[str, ...]:
     """Refuse a camera pose and an axis that do not fit the frame, before a robot moves.
 
     Such as a pose in another unit, of another frame, inverted or turned round. The network knows
@@ -181,6 +181,11 @@ def check_axis(
         The largest distance from the axis that is plausible, metres: the diagonal of the object's
         bounding box. Without it, or without a position, the distance is not checked.
 
+    Returns
+    -------
+    tuple of str
+        What to heed: a camera that is rolled by more than `ROLL_LIMIT_DEG`.
+
     Raises
     ------
     FrameError
@@ -193,6 +198,7 @@ def check_axis(
     >>> import numpy as np, nbv
     >>> ahead = np.array([[0, 0, 1, -1], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
     >>> nbv.check_axis(ahead, point=(0, 0, 0), direction=(0, 0, 1))
+    ()
     >>> try:
     ...     nbv.check_axis(ahead, point=(0, 0, 0), direction=(0, 0, -1))
     ... except nbv.FrameError as error:
@@ -201,13 +207,14 @@ def check_axis(
     """
     if object_position_m is not None and diagonal_m is not None:
         _need_object_on_axis(camera_pose, point, direction, object_position_m, diagonal_m)
-    elevation_deg, roll_deg = _elevation_and_roll(down_of_axis(camera_pose, point, direction))
+    down = down_of_axis(camera_pose, point, direction)
+    elevation_deg, roll_deg = _elevation_and_roll(down)
     if not LEAST_ELEVATION_DEG <= elevation_deg <= MOST_ELEVATION_DEG:
         seen = f"the camera is at an elevation of {elevation_deg:.0f}° about this axis"
     elif abs(roll_deg) > MOST_ROLL_DEG:
         seen = f"the axis is {abs(roll_deg):.0f}° away from up in the image"
     else:
-        return
+        return roll_warnings(down)
     raise FrameError(
         "axis",
         f"{seen}, and the object stands upright: does the direction point up, and is the camera "

@@ -16,6 +16,7 @@ from nbv.bundles.beliefs import ELEVATION_BANDWIDTH_DEG, distributions_of, eleva
 from nbv.bundles.bundle import Bundle, BundleError, load_bundle
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.mirror import Network
+from nbv.bundles.moves import elevation_from_gravity, roll_warnings
 from nbv.bundles.networks import open_network
 from nbv.bundles.next_view import (
     AfterRotations,
@@ -168,6 +169,7 @@ class Recommender:
         near_m: float | None = None,
         far_m: float | None = None,
         elevation_deg: float | None = None,
+        gravity: ArrayLike | None = None,
         allowed_deg: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
     ) -> Recommendation:
@@ -193,6 +195,10 @@ class Recommender:
             Metres.
         elevation_deg : float, optional
             Of the camera above the object's base plane, where it is known.
+        gravity : (3,), optional
+            The direction down in the optical frame of the last frame's camera, of any length. It
+            gives the elevation, and a warning where the camera is rolled. An accelerometer reports
+            the opposite direction.
         allowed_deg : array-like, optional
             Rotations from the last frame's place that the camera may take; all without it. An
             array of n booleans is a mask over the circle: entry k is the rotation 360 k / n.
@@ -213,6 +219,11 @@ class Recommender:
         >>> 0 <= answer.azimuth_deg < 360
         True
         """
+        if gravity is not None and elevation_deg is not None:
+            raise UserError("gravity gives the elevation; leave gravity or elevation out")
+        rolled: tuple[str, ...] = ()
+        if gravity is not None:
+            elevation_deg, rolled = elevation_from_gravity(gravity), roll_warnings(gravity)
         frames = _as_frames(depth_m)
         masks = _as_masks(mask, len(frames))
         cameras = _as_cameras(intrinsics, len(frames))
@@ -237,7 +248,7 @@ class Recommender:
         doubts = (doubt for crop in crops for doubt in crop.doubts)
         return replace(
             answer,
-            warnings=(*dict.fromkeys(doubts), *answer.warnings),
+            warnings=(*dict.fromkeys(doubts), *answer.warnings, *rolled),
             object_position_m=crops[-1].centre_m,
         )
 

@@ -236,21 +236,12 @@ def recommend(
         raise UserError(f"give a depth frame, or --estimate or --distribution with --table{hint}")
     if plot is not None:
         need_writable("--plot", plot, FIGURES)
-    if gravity is not None and elevation is not None:
-        raise UserError("--gravity gives the elevation; leave --gravity or --elevation out")
     place = _known_place(camera_pose, axis)
-    from nbv.bundles.moves import (
-        check_axis,
-        down_of_axis,
-        elevation_from_gravity,
-        roll_warnings,
-    )
+    from nbv.bundles.moves import check_axis
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask
     from nbv.frames.intrinsics import camera_of
 
-    if gravity is not None:
-        elevation = elevation_from_gravity(gravity)
     recommender = Recommender.load(bundle)
     cameras = [camera_of(intrinsics, path) for path in frames]
     answer = recommender.recommend(
@@ -264,14 +255,14 @@ def recommend(
         near_m=near,
         far_m=far,
         elevation_deg=elevation,
+        gravity=gravity,
         allowed_deg=allowed_rotations(allowed),
         max_travel_deg=max_travel,
     )
     if place is not None:
-        check_axis(*place, answer.object_position_m, recommender.bundle.diagonal_m)
-    down = gravity if place is None else down_of_axis(*place)
-    if down is not None:
-        answer = replace(answer, warnings=(*answer.warnings, *roll_warnings(down)))
+        diagonal_m = recommender.bundle.diagonal_m
+        rolled = check_axis(*place, answer.object_position_m, diagonal_m)
+        answer = replace(answer, warnings=tuple(dict.fromkeys((*answer.warnings, *rolled))))
     targets = target_poses((move.rotation_deg for move in answer.moves), place)
     if plot is not None:
         from nbv.reporting.recommendation import draw_recommendation

@@ -61,6 +61,12 @@ def with_targets(
     ]
 
 
+def say_warnings(warnings: Iterable[str]) -> None:
+    """Print what to heed, a line each."""
+    for warning in warnings:
+        say(f"careful    {warning}")
+
+
 def say_target(targets: Sequence[NDArray[np.float64]] | None) -> None:
     """Print the camera's pose after the best move, where it is known and there is a move."""
     if not targets:
@@ -126,8 +132,7 @@ def say_recommendation(
             f"{m.rotation_deg:+g}° ({m.expected_error_deg:.1f}°)" for m in answer.alternatives
         )
         say(f"or         {', '.join(others)}")
-    for warning in answer.warnings:
-        say(f"careful    {warning}")
+    say_warnings(answer.warnings)
     say_target(targets)
 
 

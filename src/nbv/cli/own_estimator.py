@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from nbv.cli.answers import (
     say_offset,
     say_recommendation,
     say_target,
+    say_warnings,
     target_poses,
     with_targets,
 )
@@ -104,8 +106,7 @@ def recommend_by_table(
         raise UserError(
             f"--table={table}: no lookup table; give the .npz file that nbv calibrate wrote"
         ) from error
-    if place is not None:
-        check_axis(*place)
+    warnings = () if place is None else check_axis(*place)
     unit = cost_unit(lookup.criterion, {"spread": lookup.spread})
     found = [
         {"rotation_deg": rotation, "travel_deg": abs(rotation), "cost": cost}
@@ -116,7 +117,7 @@ def recommend_by_table(
     targets = target_poses((move["rotation_deg"] for move in found), place)
     moves = with_targets(found, targets)
     if as_json:
-        about = {"criterion": lookup.criterion, "cost_unit": unit}
+        about = {"criterion": lookup.criterion, "cost_unit": unit, "warnings": list(warnings)}
         say_json({"estimate_deg": estimate} | moves[0] | about | {"alternatives": moves[1:]})
         return
     unit = "" if unit == "1" else f" {unit}"
@@ -128,6 +129,7 @@ def recommend_by_table(
     if others:
         told = (f"{move['rotation_deg']:+g}° ({move['cost']:.3f})" for move in others)
         say(f"or {', '.join(told)}")
+    say_warnings(warnings)
     say_target(targets)
 
 
@@ -163,7 +165,7 @@ def recommend_by_distributions(
         max_travel_deg=max_travel,
     )
     if place is not None:
-        check_axis(*place)
+        answer = replace(answer, warnings=(*answer.warnings, *check_axis(*place)))
     targets = target_poses((move.rotation_deg for move in answer.moves), place)
     if as_json:
         say_json(recommendation_as_json(answer, None, targets))
