@@ -212,6 +212,7 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
         ),
         ("dataset.categories.mug=/etc", "dataset.categories.mug: '/etc' is not below dataset.root"),
         ("dataset.up=up", "dataset.up=up: an axis such as +y, a vector such as 0,0,1, or auto"),
+        ("dataset.handle_reach=0.6", "dataset.handle_reach=0.6 is out of range: 0 to 0.5"),
         ("dataset.layout=v3", "dataset.layout=v3 is unknown: choose from: auto, sem, v1, v2"),
         # What Hydra cannot read, or reads as something else.
         ("categories=[a{b}c]", "override 'categories=[a{b}c]' cannot be read: "),

@@ -32,6 +32,14 @@ def test_an_object_depends_on_seed_and_number():
     assert np.isclose(np.linalg.norm(np.ptp(one.vertices, axis=0)), 1.0)
 
 
+def test_the_setting_of_handles_reaches_the_generator():
+    plain, far = (source_of("procedural", handle_reach=reach) for reach in (0, 0.5))
+    width, length, _ = np.ptp(far.load("mug", "mug-0000").vertices, axis=0)
+    assert length / width >= 1.5
+    width, length, _ = np.ptp(plain.load("mug", "mug-0000").vertices, axis=0)
+    assert length / width < 1.5
+
+
 def test_the_handle_is_at_270_degrees():
     vertices = np.asarray(source_of("procedural").load("mug", "mug-0000").vertices)
     radius = np.linalg.norm(vertices[:, :2], axis=1)

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from nbv.errors import UserError
 from nbv.meshes.procedural import CATEGORIES, generate
+from nbv.meshes.procedural.mug import handle_reach
 
 N_OBJECTS = 12
 each_category = pytest.mark.parametrize("category", CATEGORIES)
@@ -237,6 +238,27 @@ def test_the_handle_is_at_azimuth_270():
         tip = handle.vertices[np.argmin(handle.vertices[:, 1])]
         assert -tip[1] > outer_radius(body, tip[2]) + 0.05
         assert handle.vertices[:, 1].max() < 0
+
+
+def test_a_handle_may_have_to_stand_out_and_mugs_that_do_stay_as_they_are():
+    least = 0.25
+    reaches, replaced = [], 0
+    for index in range(40):
+        plain = generate("mug", 0, index)
+        mesh = generate("mug", 0, index, handle_reach=least)
+        body, handle = body_and_handle(mesh)
+        width = 2 * np.hypot(body.vertices[:, 0], body.vertices[:, 1]).max()
+        reaches.append((-handle.vertices[:, 1].min() - width / 2) / width)
+        is_same = digest(mesh) == digest(plain)
+        assert is_same == (handle_reach(plain) >= least)
+        replaced += not is_same
+    assert min(reaches) > least - 0.01
+    assert 0 < replaced < 40
+
+
+def test_only_mugs_have_handles_that_have_to_stand_out():
+    for category in set(CATEGORIES) - {"mug"}:
+        assert digest(generate(category, 0, 0, handle_reach=0.5)) == digest(objects(category)[0])
 
 
 def test_the_handle_is_hidden_over_a_real_range_about_azimuth_90():

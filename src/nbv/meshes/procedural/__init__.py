@@ -26,9 +26,7 @@ CATEGORIES: dict[str, Callable[[np.random.Generator], trimesh.Trimesh]] = {
 }
 
 
-def generate(
-    category: str, seed: int, index: int, *, handle_reach: float = 0.0
-) -> trimesh.Trimesh:
+def generate(category: str, seed: int, index: int, *, handle_reach: float = 0.0) -> trimesh.Trimesh:
     """Return object number `index` of a category.
 
     Parameters
