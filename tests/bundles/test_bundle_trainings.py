@@ -9,6 +9,8 @@ import pandas as pd
 import pytest
 
 from nbv.bundles.evaluation import FIXED, OPPOSITE, PAPER, RANDOM, RECOMMENDED, SINGLE, SPACED
+from nbv.meshes.procedural import generate
+from nbv.meshes.procedural.mug import handle_reach
 from nbv.statistics.trainings import crossed_mean
 
 ROOT = Path(__file__).parents[2]
@@ -75,15 +77,42 @@ def test_means_and_differences_have_intervals_over_objects_and_trainings(
         ("in two views, random", RANDOM, 2),
     ],
 )
-def test_what_mirror_images_bring_is_the_difference_of_the_kept_errors(
-    errors, page, line, choice, n_views
-):
-    before = read("without_mirror_images.csv")
-    (cells,) = (row[1:] for row in page if row[0] == line)
+def test_what_mirror_images_bring_is_the_difference_of_the_kept_errors(page, line, choice, n_views):
+    tables = read("any_reach.csv"), read("without_mirror_images.csv")
+    (cells,) = (row[1:] for row in page if row[0] == line and len(row) == 3)
     for objects, cell in zip(OBJECTS, cells, strict=True):
-        own, other = (table.loc[objects, choice, n_views] for table in (errors, before))
+        own, other = (table.loc[objects, choice, n_views] for table in tables)
         assert own.index.equals(other.index)
         assert cell == shown(own - other)
+
+
+@pytest.mark.parametrize(
+    ("line", "choice", "n_views"),
+    [
+        ("in one view", SINGLE, 1),
+        ("in two views, recommended", RECOMMENDED, 2),
+        ("in two views, opposite", OPPOSITE, 2),
+        ("in two views, random", RANDOM, 2),
+        ("in three views, recommended", RECOMMENDED, 3),
+    ],
+)
+def test_what_handles_that_stand_out_bring_is_the_difference_of_the_kept_errors(
+    errors, page, line, choice, n_views
+):
+    """On the same images: of ShapeNet's mugs, and of generated mugs of any reach."""
+    before = read("any_reach.csv")
+    (cells,) = (row[1:] for row in page if row[0] == line and len(row) == 4)
+    own = errors.loc["shapenet", choice, n_views]
+    assert cells[0] == shown(own - before.loc["shapenet", choice, n_views])
+    own = errors.loc["generated, any reach", choice, n_views]
+    change = own - before.loc["generated", choice, n_views]
+    stands_out = np.array(
+        [
+            handle_reach(generate("mug", 0, int(name.removeprefix("mug-")))) >= 0.2
+            for name in own.index
+        ]
+    )
+    assert cells[1:] == [shown(change[stands_out]), shown(change[~stands_out])]
 
 
 @pytest.mark.parametrize("recording", ["nearly level", "from above"])

@@ -59,7 +59,8 @@ def test_the_text_follows_the_answer():
     assert f"--rotations 0 {int(first)}" in COMMANDS[-1]
     assert f"--azimuth {there % 360} " in COMMANDS[-2]
     words = " ".join(TEXT.replace("−", "-").split())
-    assert f"75 {first[0]} {first[1:]} = {there}°, which is {there % 360}°" in words
+    same = "" if 0 <= there < 360 else f", which is {there % 360}°"
+    assert f"75 {first[0]} {first[1:]} = {there}°{same}" in words
 
 
 def test_the_picture_is_the_one_that_the_command_draws(printed, folder):

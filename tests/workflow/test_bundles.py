@@ -11,6 +11,7 @@ from safetensors import safe_open
 
 from nbv.bundles.bundle import load_bundle
 from nbv.bundles.recommender import Recommender
+from nbv.meshes.store import load_meshes
 from projects import TINY, Project, copy_of_project
 
 pytestmark = pytest.mark.slow
@@ -26,6 +27,7 @@ CAMERA = (
     "randomisation.size=0.1",
     "randomisation.elevation_deg=5",
     "randomisation.patches=1",
+    "dataset.handle_reach=0.3",
 )
 
 
@@ -68,6 +70,14 @@ def test_an_edit_of_the_renderer_renders_a_bundles_images_again(made: Project) -
     jobs = made.would_run(*CAMERA[len(TINY) :], targets=("bundles",))
     path.write_text(text)
     assert jobs["render_bundle"] == 2
+
+
+def test_its_mugs_have_handles_that_stand_out(made: Project) -> None:
+    sides = [
+        np.ptp(m.vertices, axis=0) for m in load_meshes(made.results / "meshes/mug.npz").values()
+    ]
+    assert len(sides) > 3
+    assert all(along / across >= 1.3 for across, along, _ in sides)
 
 
 def test_a_bundle_is_calibrated_by_objects_that_it_was_not_trained_on(made: Project) -> None:
