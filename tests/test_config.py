@@ -299,6 +299,15 @@ def test_a_kept_reference_has_the_settings_of_today():
 
 
 @pytest.mark.parametrize(
+    ("dataset", "reach"),
+    [(["dataset=procedural"], 0.2), (["dataset=folder", "dataset.root=/tmp"], 0.0)],
+)
+def test_only_generated_mugs_have_a_least_reach(dataset, reach):
+    settings = load_config(CONFIG, ["experiment=bundles", "estimator=classifier", *dataset])
+    assert settings["dataset"]["handle_reach"] == reach
+
+
+@pytest.mark.parametrize(
     ("key", "default"),
     [
         ("calibration", "holdout"),

@@ -24,7 +24,7 @@ _ROTATION_TOLERANCE = 1e-3
 _FARTHEST_M = 1e6
 
 ROLL_LIMIT_DEG = 10.0
-"""Of a camera about its line of sight: beyond it, errors are more than half as large again."""
+"""Of a camera about its line of sight: at it, two opposite views err by half as much again."""
 
 MOST_ROLL_DEG = 45.0
 LEAST_ELEVATION_DEG, MOST_ELEVATION_DEG = -30.0, 80.0
@@ -271,7 +271,7 @@ def roll_warnings(down: ArrayLike) -> tuple[str, ...]:
     side = "left" if roll_deg > 0 else "right"
     return (
         f"the camera is rolled: in the image the object leans {abs(roll_deg):.0f}° to the {side}, "
-        f"and above {ROLL_LIMIT_DEG:g}° errors grow; hold the camera level, or turn the frame",
+        f"and above {ROLL_LIMIT_DEG:g}° errors may grow; hold the camera level, or turn the frame",
     )
 
 

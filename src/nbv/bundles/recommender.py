@@ -196,9 +196,9 @@ class Recommender:
         elevation_deg : float, optional
             Of the camera above the object's base plane, where it is known.
         gravity : (3,), optional
-            The direction down in the optical frame of the last frame's camera, of any length. It
-            gives the elevation, and a warning where the camera is rolled. An accelerometer reports
-            the opposite direction.
+            Instead of `elevation_deg`: the direction down in the optical frame of the last frame's
+            camera, of any length. It gives the elevation, and a warning where the camera is rolled.
+            An accelerometer reports the opposite direction.
         allowed_deg : array-like, optional
             Rotations from the last frame's place that the camera may take; all without it. An
             array of n booleans is a mask over the circle: entry k is the rotation 360 k / n.
@@ -209,7 +209,7 @@ class Recommender:
         nbv.frames.errors.FrameError
             Where a frame cannot be used; it says why.
         UserError
-            Where the arguments do not fit each other.
+            Where the arguments do not fit each other, or gravity points up in the image.
 
         Examples
         --------
@@ -220,7 +220,7 @@ class Recommender:
         True
         """
         if gravity is not None and elevation_deg is not None:
-            raise UserError("gravity gives the elevation; leave gravity or elevation out")
+            raise UserError("gravity gives the elevation: give it or an elevation, not both")
         rolled: tuple[str, ...] = ()
         if gravity is not None:
             elevation_deg, rolled = elevation_from_gravity(gravity), roll_warnings(gravity)

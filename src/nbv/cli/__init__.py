@@ -237,11 +237,14 @@ def recommend(
     if plot is not None:
         need_writable("--plot", plot, FIGURES)
     place = _known_place(camera_pose, axis)
-    from nbv.bundles.moves import check_axis
+    from nbv.bundles.moves import check_axis, elevation_from_gravity
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask
     from nbv.frames.intrinsics import camera_of
 
+    if place is not None and gravity is not None and elevation is None:
+        # The axis tells of a roll too, and is the one that the target pose needs.
+        elevation, gravity = elevation_from_gravity(gravity), None
     recommender = Recommender.load(bundle)
     cameras = [camera_of(intrinsics, path) for path in frames]
     answer = recommender.recommend(
@@ -262,7 +265,7 @@ def recommend(
     if place is not None:
         diagonal_m = recommender.bundle.diagonal_m
         rolled = check_axis(*place, answer.object_position_m, diagonal_m)
-        answer = replace(answer, warnings=tuple(dict.fromkeys((*answer.warnings, *rolled))))
+        answer = replace(answer, warnings=(*answer.warnings, *rolled))
     targets = target_poses((move.rotation_deg for move in answer.moves), place)
     if plot is not None:
         from nbv.reporting.recommendation import draw_recommendation

@@ -113,6 +113,13 @@ class Dataset(Section):
     exclude: list[Text] = []
     exclude_file: DataPath | None = None
 
+    @model_validator(mode="after")
+    def _of_generated_mugs_alone(self) -> Self:
+        # An experiment sets it whatever its data set: what a run says of itself must be true.
+        if self.source != "procedural":
+            self.handle_reach = 0.0
+        return self
+
 
 class Renderer(Section):
     """Which renderer draws depth; see `nbv.rendering`."""

@@ -245,7 +245,7 @@ def test_a_handle_may_have_to_stand_out_and_mugs_that_do_stay_as_they_are():
     reaches, replaced = [], 0
     for index in range(40):
         plain = generate("mug", 0, index)
-        mesh = generate("mug", 0, index, handle_reach=least)
+        mesh = generate("mug", 0, index, least_reach=least)
         body, handle = body_and_handle(mesh)
         width = 2 * np.hypot(body.vertices[:, 0], body.vertices[:, 1]).max()
         reaches.append((-handle.vertices[:, 1].min() - width / 2) / width)
@@ -256,9 +256,15 @@ def test_a_handle_may_have_to_stand_out_and_mugs_that_do_stay_as_they_are():
     assert 0 < replaced < 40
 
 
+@pytest.mark.parametrize("least", [-0.1, 0.6, np.nan])
+def test_a_reach_that_few_mugs_have_is_refused(least):
+    with pytest.raises(UserError, match="least reach"):
+        generate("mug", 0, 0, least_reach=least)
+
+
 def test_only_mugs_have_handles_that_have_to_stand_out():
     for category in set(CATEGORIES) - {"mug"}:
-        assert digest(generate(category, 0, 0, handle_reach=0.5)) == digest(objects(category)[0])
+        assert digest(generate(category, 0, 0, least_reach=0.5)) == digest(objects(category)[0])
 
 
 def test_the_handle_is_hidden_over_a_real_range_about_azimuth_90():

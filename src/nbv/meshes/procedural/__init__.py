@@ -1,7 +1,8 @@
 """Generated objects of five categories: the data set without a download.
 
-An object is a pure function of (seed, category, index). Its frame is the object frame: z up,
-front +x, turning axis x = y = 0, a mug's handle at azimuth 270 degrees. Its scale is arbitrary.
+An object is a pure function of (seed, category, index); a mug's handle may have a least reach. Its
+frame is the object frame: z up, front +x, turning axis x = y = 0, a mug's handle at azimuth 270
+degrees. Its scale is arbitrary.
 """
 
 from __future__ import annotations
@@ -25,8 +26,11 @@ CATEGORIES: dict[str, Callable[[np.random.Generator], trimesh.Trimesh]] = {
     "toilet": toilet.toilet,
 }
 
+MOST_LEAST_REACH = 0.5
+"""About every eighth mug has it; of more, too many would be drawn for one."""
 
-def generate(category: str, seed: int, index: int, *, handle_reach: float = 0.0) -> trimesh.Trimesh:
+
+def generate(category: str, seed: int, index: int, *, least_reach: float = 0.0) -> trimesh.Trimesh:
     """Return object number `index` of a category.
 
     Parameters
@@ -37,7 +41,7 @@ def generate(category: str, seed: int, index: int, *, handle_reach: float = 0.0)
         Seed of the whole data set, >= 0.
     index : int
         Number of the object, >= 0. An object does not depend on other objects or their order.
-    handle_reach : float
+    least_reach : float
         Least reach of a mug's handle, in widths of the body, 0 to 0.5
         (`nbv.meshes.procedural.mug.handle_reach`). Other categories do not heed it.
 
@@ -49,7 +53,7 @@ def generate(category: str, seed: int, index: int, *, handle_reach: float = 0.0)
     Raises
     ------
     UserError
-        If the category is unknown, or seed or index is negative.
+        If the category is unknown, seed or index is negative, or the least reach is out of range.
     """
     if category not in CATEGORIES:
         message = f"no procedural category {category!r}: {nearest(category, CATEGORIES)}"
@@ -57,8 +61,10 @@ def generate(category: str, seed: int, index: int, *, handle_reach: float = 0.0)
     if seed < 0 or index < 0:
         message = f"procedural {category}: seed {seed} and index {index} must not be negative"
         raise UserError(message)
+    if not 0 <= least_reach <= MOST_LEAST_REACH:
+        raise UserError(f"a least reach of {least_reach:g}: 0 to {MOST_LEAST_REACH:g} expected")
     # crc32, not hash(): Python's hash of a string differs between processes.
     rng = np.random.default_rng([seed, zlib.crc32(category.encode()), index])
     if category == "mug":
-        return mug.mug(rng, handle_reach)
+        return mug.mug(rng, least_reach)
     return CATEGORIES[category](rng)

@@ -11,14 +11,14 @@ from nbv.meshes.procedural.solids import Points, fillet, revolve, superellipse, 
 # So many that the facets of the body do not reveal the viewpoint.
 _AROUND = 96
 # Distance of a handle's centre line from the wall, in heights of the mug: small, usual, large.
-_REACHES = ((0.08, 0.15), (0.16, 0.3), (0.3, 0.52))
+_DISTANCES = ((0.08, 0.15), (0.16, 0.3), (0.3, 0.52))
 
 
 def mug(rng: np.random.Generator, least_reach: float = 0.0) -> trimesh.Trimesh:
     """Return a mug of height 1 on z = 0, its handle towards -y.
 
-    Mugs are drawn until the handle's reach is at least `least_reach`. Where the first draw is one,
-    the mug is that of `least_reach` 0.
+    Mugs are drawn until the handle's reach is at least `least_reach`. A mug whose first draw has
+    it is the same as with 0.
     """
     while handle_reach(drawn := _any_mug(rng)) < least_reach:
         pass
@@ -83,14 +83,14 @@ def _cup(outer: Points, wall: float, floor: float) -> trimesh.Trimesh:
 def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Trimesh:
     """Return the handle, its ends buried in the wall; a hook has its lower end free."""
     # From a finger ring to a tankard's: only this sets the range of azimuths that the body hides.
-    low, high = _REACHES[rng.choice(3, p=[0.15, 0.45, 0.4])]
-    reach = rng.uniform(low, high)
-    span = float(np.clip(rng.uniform(1.2, 2.6) * reach + rng.uniform(0.0, 0.2), 0.24, 0.76))
+    low, high = _DISTANCES[rng.choice(3, p=[0.15, 0.45, 0.4])]
+    distance = rng.uniform(low, high)
+    span = float(np.clip(rng.uniform(1.2, 2.6) * distance + rng.uniform(0.0, 0.2), 0.24, 0.76))
     top = rng.uniform(max(0.12 + span, 0.6), 0.94)
     heights = np.array([top, top - span])
     radii = np.interp(heights, outer[:, 1], outer[:, 0])
     style = str(rng.choice(["round", "square", "d", "ear"], p=[0.3, 0.25, 0.2, 0.25]))
-    side = _handle_curve(rng, style, reach, span)
+    side = _handle_curve(rng, style, distance, span)
     ends = radii - 0.5 * wall
     # Straight between the two ends of the wall, plus the handle's distance from it.
     t = np.linspace(0.0, 1.0, len(side))[:, None]
@@ -99,7 +99,7 @@ def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Tri
     up = top + side[:, 1:] - side[:1, 1:]
     path = np.concatenate([np.zeros_like(t), -out, up], axis=1)
     half_width = np.exp(rng.uniform(np.log(0.015), np.log(0.13)))
-    half_thick = min(np.exp(rng.uniform(np.log(0.013), np.log(0.055))), 0.35 * reach)
+    half_thick = min(np.exp(rng.uniform(np.log(0.013), np.log(0.055))), 0.35 * distance)
     outline = superellipse(half_width, half_thick, rng.uniform(2.0, 5.0), n=20)
     swell = 1.0 + rng.uniform(0.0, 0.5) * np.abs(2.0 * t[:, 0] - 1.0) ** 3
     hook = style in ("round", "ear") and rng.random() < 0.12
@@ -107,21 +107,21 @@ def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Tri
     return sweep(path[:kept], outline, (1.0, 0.0, 0.0), scale=swell[:kept])
 
 
-def _handle_curve(rng: np.random.Generator, style: str, reach: float, span: float) -> Points:
+def _handle_curve(rng: np.random.Generator, style: str, distance: float, span: float) -> Points:
     """Return the handle's centre line as (m, 2) of (distance from the wall, height)."""
     if style == "round":
         angle = np.linspace(0.5 * np.pi, -0.5 * np.pi, 25)
-        return np.stack([reach * np.cos(angle), span / 2 * np.sin(angle)], axis=-1)
+        return np.stack([distance * np.cos(angle), span / 2 * np.sin(angle)], axis=-1)
     if style == "ear":
         angle = np.linspace(0.5 * np.pi, -0.5 * np.pi, 25)
         droop = 1.0 + rng.uniform(0.2, 0.45) * np.sin(angle)
-        out = reach * np.cos(angle) ** rng.uniform(0.6, 1.0) * droop / droop.max()
+        out = distance * np.cos(angle) ** rng.uniform(0.6, 1.0) * droop / droop.max()
         return np.stack([out, span / 2 * np.sin(angle)], axis=-1)
     lean = rng.uniform(0.0, 0.12) if style == "square" else rng.uniform(0.15, 0.3)
     corners = [
         [0, 0, span / 2],
-        [reach, 0, span * (0.5 - lean / 2)],
-        [reach, 0, -span * (0.5 - lean)],
+        [distance, 0, span * (0.5 - lean / 2)],
+        [distance, 0, -span * (0.5 - lean)],
         [0, 0, -span / 2],
     ]
     radius = rng.uniform(0.04, 0.1) if style == "square" else 0.3

@@ -44,7 +44,7 @@ class ProceduralSource:
         return f"the generator of {category} meshes"
 
     def load(self, category: str, object_id: str) -> trimesh.Trimesh:
-        """Make one object; it depends only on the seed, the category and its number."""
+        """Make one object of the seed, the category, its number and the least reach of handles."""
         from nbv.meshes.procedural import generate
 
         number = object_id.removeprefix(f"{category}-")
@@ -52,7 +52,7 @@ class ProceduralSource:
             raise UserError(f"dataset=procedural: {object_id} is not an id like {category}-0000")
         settings = self._settings
         reach = settings["handle_reach"]
-        mesh = generate(category, self.seed, int(number), handle_reach=reach)
+        mesh = generate(category, self.seed, int(number), least_reach=reach)
         check_mesh(mesh, f"dataset=procedural: {object_id}")
         turn_deg = settings["turn_deg"].get(category, 0.0)
         return normalise(mesh, settings["up"], settings["front"], turn_deg, settings["centre"])
