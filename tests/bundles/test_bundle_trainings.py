@@ -16,6 +16,12 @@ from nbv.statistics.trainings import crossed_mean
 ROOT = Path(__file__).parents[2]
 SEEDS = ["seed_0", "seed_1", "seed_2", "seed_3"]
 OBJECTS = ("generated", "shapenet")
+LINES = [
+    ("in one view", SINGLE, 1),
+    ("in two views, recommended", RECOMMENDED, 2),
+    ("in two views, opposite", OPPOSITE, 2),
+    ("in two views, random", RANDOM, 2),
+]
 
 
 def read(name: str) -> pd.DataFrame:
@@ -68,15 +74,7 @@ def test_means_and_differences_have_intervals_over_objects_and_trainings(
             assert cell == wanted
 
 
-@pytest.mark.parametrize(
-    ("line", "choice", "n_views"),
-    [
-        ("in one view", SINGLE, 1),
-        ("in two views, recommended", RECOMMENDED, 2),
-        ("in two views, opposite", OPPOSITE, 2),
-        ("in two views, random", RANDOM, 2),
-    ],
-)
+@pytest.mark.parametrize(("line", "choice", "n_views"), LINES)
 def test_what_mirror_images_bring_is_the_difference_of_the_kept_errors(page, line, choice, n_views):
     tables = read("any_reach.csv"), read("without_mirror_images.csv")
     (cells,) = (row[1:] for row in page if row[0] == line and len(row) == 3)
@@ -87,14 +85,7 @@ def test_what_mirror_images_bring_is_the_difference_of_the_kept_errors(page, lin
 
 
 @pytest.mark.parametrize(
-    ("line", "choice", "n_views"),
-    [
-        ("in one view", SINGLE, 1),
-        ("in two views, recommended", RECOMMENDED, 2),
-        ("in two views, opposite", OPPOSITE, 2),
-        ("in two views, random", RANDOM, 2),
-        ("in three views, recommended", RECOMMENDED, 3),
-    ],
+    ("line", "choice", "n_views"), [*LINES, ("in three views, recommended", RECOMMENDED, 3)]
 )
 def test_what_handles_that_stand_out_bring_is_the_difference_of_the_kept_errors(
     errors, page, line, choice, n_views
