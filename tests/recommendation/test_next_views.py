@@ -58,15 +58,19 @@ def test_no_costs_lead_farther_than_even_spacing(monkeypatch, n_views, apart_deg
 def test_walks_are_as_short_as_views_one_way_round_can_be(taken, n_more, apart_deg):
     n_bins, bin_deg = 24, 15.0
     found = shortest_walk_deg(np.array([taken]) * 15, n_bins, n_more, apart_deg)[0]
+    place_deg = np.arange(n_bins) * bin_deg
+    apart = circular_distance_deg(place_deg[:, None], place_deg) >= apart_deg
+    # Every set of further places, as steps from the start.
+    steps = np.array(list(itertools.combinations(range(1, n_bins), n_more)), dtype=int)
+    length_deg = steps.max(axis=1, initial=0) * bin_deg
     for start in range(n_bins):
         best = np.inf
-        for way, steps in itertools.product(
-            (1, -1), itertools.combinations(range(1, n_bins), n_more)
-        ):
-            new = [(start + way * step) % n_bins for step in steps]
-            pairs = [*itertools.product(new, taken), *itertools.combinations([start, *new], 2)]
-            if all(circular_distance_deg(a * 15, b * 15) >= apart_deg for a, b in pairs):
-                best = min(best, max(steps, default=0) * bin_deg)
+        for way in (1, -1):
+            new = (start + way * steps) % n_bins
+            may = apart[new[:, :, None], taken].all(axis=(1, 2)) & apart[start, new].all(axis=1)
+            for one, other in itertools.combinations(new.T, 2):
+                may &= apart[one, other]
+            best = min(best, length_deg[may].min(initial=np.inf))
         assert found[start] == best
 
 
