@@ -30,6 +30,7 @@ TERMS = (
     *(
         "frame",
         "bundle",
+        "reach",
         "mirror plane",
         "calibration turn",
         "recording",
