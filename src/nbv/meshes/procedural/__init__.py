@@ -27,7 +27,7 @@ CATEGORIES: dict[str, Callable[[np.random.Generator], trimesh.Trimesh]] = {
 }
 
 MOST_LEAST_REACH = 0.5
-"""About every eighth mug has it; of more, too many would be drawn for one."""
+"""About every eighth mug has a reach of 0.5. Above it, finding one would take many draws."""
 
 
 def generate(category: str, seed: int, index: int, *, least_reach: float = 0.0) -> trimesh.Trimesh:
