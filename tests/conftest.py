@@ -81,7 +81,7 @@ def bundle() -> Bundle:
 
 @pytest.fixture(scope="session")
 def recommender(bundle: Bundle) -> Recommender:
-    return Recommender(bundle, "torch")
+    return Recommender(bundle, "numpy")
 
 
 @pytest.fixture(scope="session")

@@ -262,7 +262,7 @@ def test_without_elevations_all_turns_count_alike(bundle):
     found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY)
     found = replace(found, elevation_deg=np.full(len(found.elevation_deg), np.nan, np.float32))
     codes = np.random.default_rng(0).integers(0, 256, (1, 32, 32)).astype(np.uint8)
-    recommender = Recommender(found, "torch")
+    recommender = Recommender(found, "numpy")
     one, other = (recommender.recommend_crops(codes, elevation_deg=e) for e in (None, 20.0))
     assert one.move == other.move
 

@@ -33,7 +33,7 @@ def never(path, error):
 
 @pytest.fixture(scope="module")
 def errors():
-    recommender = Recommender.load("mug", "torch")
+    recommender = Recommender.load("mug", "numpy")
     recordings = read_manifest(FRAMES / "manifest.csv")
     turns = [see(recommender, one, None, None, never) for one in recordings]
     found = evaluate(recommender.bundle, turns, n_views=(2, 3))

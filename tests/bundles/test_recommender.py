@@ -47,7 +47,7 @@ def codes_of(seed: int, n: int) -> np.ndarray:
 
 def telling(bundle, sureness: float = 8.0) -> Recommender:
     """A recommender whose network reads the azimuth's class off the first pixel of a crop."""
-    made = Recommender(bundle, "torch")
+    made = Recommender(bundle, "numpy")
 
     def network(codes):
         classes = codes[:, 0, 0].astype(int)
@@ -261,8 +261,8 @@ def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):
             turn_weight=bundle.turn_weight[of_it],
             object_ids=tuple(bundle.object_ids[place] for place in of_it),
         )
-        wanted = Recommender(only, "torch").recommend_crops(codes)
-        found = Recommender(bundle, "torch").recommend_crops(codes, elevation_deg=elevation)
+        wanted = Recommender(only, "numpy").recommend_crops(codes)
+        found = Recommender(bundle, "numpy").recommend_crops(codes, elevation_deg=elevation)
         assert found.error_after_deg == pytest.approx(wanted.error_after_deg, rel=1e-4)
         assert found.expected_error_deg == pytest.approx(wanted.expected_error_deg, rel=1e-4)
         assert found.belief == pytest.approx(wanted.belief)
@@ -327,7 +327,7 @@ def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
         turn_weight=np.ones(2, np.float32),
         object_ids=("a", "b"),
     )
-    found = Recommender(rough, "torch").recommend_crops(codes_of(0, 2), [0.0, 60.0])
+    found = Recommender(rough, "numpy").recommend_crops(codes_of(0, 2), [0.0, 60.0])
     minima = (found.error_after_deg < np.roll(found.error_after_deg, 1)) & (
         found.error_after_deg < np.roll(found.error_after_deg, -1)
     )
@@ -567,7 +567,7 @@ def test_what_no_calibration_image_resembles_is_less_familiar(bundle, recommende
         codes = random_codes(np.random.default_rng(ord(name)), BINS)
         logits = recommender.network(codes)
         turns.append(Turn(name, "1", 0.0, azimuth_deg, logits, codes))
-    made = Recommender(replace(bundle, familiarity=fit_familiarity(turns)), "torch")
+    made = Recommender(replace(bundle, familiarity=fit_familiarity(turns)), "numpy")
     strange = np.full((1, 32, 32), 255, dtype=np.uint8)
     known, other = (made.recommend_crops(codes) for codes in (codes_of(12, 1), strange))
     assert not known.is_unfamiliar
@@ -631,7 +631,7 @@ def test_frames_are_not_changed(recommender):
 
 def test_the_same_frame_gives_the_same_answer(bundle, recommender):
     same(recommender.recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
-    same(Recommender(bundle, "torch").recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
+    same(Recommender(bundle, "numpy").recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
 
 
 def test_a_mask_takes_the_object_from_its_surroundings(recommender):
@@ -666,10 +666,10 @@ def test_only_the_part_of_a_frame_around_the_mask_is_looked_at(recommender, seed
 
 def test_a_repeated_sequence_of_rotations_has_the_same_answer(bundle):
     """What calibration turns make of rotations is kept: no answer depends on those before it."""
-    kept = Recommender(bundle, "torch")
+    kept = Recommender(bundle, "numpy")
     for rotations in ([0.0], [0.0, 60.0], [0.0, 90.0], [0.0, 60.0, 120.0], [0.0], [0.0, 60.0]):
         codes = codes_of(len(rotations), len(rotations))
-        fresh = Recommender(bundle, "torch").recommend_crops(codes, rotations)
+        fresh = Recommender(bundle, "numpy").recommend_crops(codes, rotations)
         found = kept.recommend_crops(codes, rotations)
         assert np.array_equal(found.error_after_deg, fresh.error_after_deg)
         same(found, fresh)
@@ -829,7 +829,7 @@ def test_the_unit_and_the_size_of_the_object_go_together(bundle, recommender):
         diagonal_m=2 * DIAGONAL_M,
         extent_m=(2 * bundle.extent_m[0], 2 * bundle.extent_m[1]),
     )
-    same(Recommender(large, "torch").recommend(2 * FRAMES[0]), recommender.recommend(FRAMES[0]))
+    same(Recommender(large, "numpy").recommend(2 * FRAMES[0]), recommender.recommend(FRAMES[0]))
 
 
 def test_both_backends_give_the_same_answer(bundle, recommender):

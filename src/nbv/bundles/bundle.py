@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.angles import nearest_bin
 from nbv.bundles.familiarity import Familiarity
 from nbv.errors import NamedError
+from nbv.estimation.folding import network_shapes
 from nbv.files import replacing
 from nbv.rendering.camera import Camera
 
@@ -308,6 +309,9 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
 
 
 def _need_sound(bundle: Bundle) -> None:
+    shapes = {name: array.shape for name, array in bundle.weights.items()}
+    if shapes != network_shapes(bundle.estimator, bundle.camera.image_side):
+        raise ValueError("the weights do not fit the network's settings")
     n_turns, n_bins = len(bundle.object_ids), bundle.n_bins
     if bundle.distributions.shape != (n_turns, n_bins, n_bins) or not n_turns:
         raise ValueError(f"calibration of {bundle.distributions.shape} for {n_turns} turns")

@@ -13,9 +13,10 @@ from nbv.bundles.bundle import Bundle, as_kept
 from nbv.bundles.calibration import bin_apart, paper_tables, temperature_of
 from nbv.bundles.familiarity import fit_familiarity
 from nbv.bundles.mirror import Network
+from nbv.bundles.numpy_network import numpy_network
 from nbv.bundles.turns import Turn
 from nbv.depth_images import DepthImages
-from nbv.estimation.weights import Estimator, network_of, weights_of
+from nbv.estimation.weights import Estimator, weights_of
 from nbv.frames.crop import pixel_step
 from nbv.rendering.camera import Camera
 
@@ -28,8 +29,7 @@ _MARGINS = (0.6, 1.5)
 
 def kept_network(estimator: Estimator) -> Network:
     """Return the network of an estimator with the weights that a bundle keeps."""
-    weights = as_kept(weights_of(estimator))
-    return network_of(weights, estimator.settings, estimator.image_side)
+    return numpy_network(as_kept(weights_of(estimator)), estimator.settings)
 
 
 def turns_of(

@@ -1,4 +1,4 @@
-"""A bundle's network at work: with onnxruntime where it is installed, else with torch."""
+"""A bundle's network at work: with onnxruntime where it is installed, else with numpy."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from nbv.bundles.bundle import Bundle
 from nbv.bundles.mirror import Network, mirror_averaged
+from nbv.bundles.numpy_network import numpy_network
 from nbv.errors import UserError, nearest
 
-BACKENDS = ("onnx", "torch")
+BACKENDS = ("onnx", "numpy")
 
 
 def open_network(bundle: Bundle, backend: str | None = None) -> Network:
@@ -22,8 +23,8 @@ def open_network(bundle: Bundle, backend: str | None = None) -> Network:
     Parameters
     ----------
     bundle : Bundle
-    backend : {"onnx", "torch"}, optional
-        None: ``onnx`` where both of its packages are installed, else ``torch``.
+    backend : {"onnx", "numpy"}, optional
+        None: ``onnx`` where both of its packages are installed, else ``numpy``.
 
     Raises
     ------
@@ -32,10 +33,13 @@ def open_network(bundle: Bundle, backend: str | None = None) -> Network:
     """
     if backend is None:
         has_onnx = all(find_spec(name) is not None for name in ("onnx", "onnxruntime"))
-        backend = "onnx" if has_onnx else "torch"
+        backend = "onnx" if has_onnx else "numpy"
     if backend not in BACKENDS:
         raise UserError(f"backend {backend!r}: {nearest(backend, BACKENDS)}")
-    return _onnx_network(bundle) if backend == "onnx" else _torch_network(bundle)
+    if backend == "onnx":
+        return _onnx_network(bundle)
+    network = numpy_network(bundle.weights, bundle.estimator)
+    return mirror_averaged(network, bundle.mirror_plane_deg)
 
 
 def _onnx_network(bundle: Bundle) -> Network:
@@ -56,15 +60,3 @@ def _onnx_network(bundle: Bundle) -> Network:
         return np.asarray(logits)
 
     return network
-
-
-def _torch_network(bundle: Bundle) -> Network:
-    try:
-        from nbv.estimation.weights import network_of
-    except ImportError as error:
-        raise UserError(
-            f"a network needs the packages of nbv[onnx], or torch ({error}); install one of them"
-        ) from error
-
-    network = network_of(bundle.weights, bundle.estimator, bundle.camera.image_side)
-    return mirror_averaged(network, bundle.mirror_plane_deg)

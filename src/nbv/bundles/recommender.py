@@ -78,7 +78,7 @@ class Recommender:
     Parameters
     ----------
     bundle : Bundle
-    backend : {"onnx", "torch"}, optional
+    backend : {"onnx", "numpy"}, optional
         See `nbv.bundles.networks.open_network`.
 
     Examples

@@ -1,8 +1,10 @@
-"""A trained network's convolutions, with what is done to their inputs and outputs in them."""
+"""A trained network's weights: their shapes, and convolutions with what is done around them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,3 +38,30 @@ def folded_convolutions(
         offset = weights[norm + "bias"] - scale * weights[norm + "running_mean"]
         found.append((kernel * scale[:, None, None, None], offset))
     return [(np.asarray(k, np.float32), np.asarray(b, np.float32)) for k, b in found]
+
+
+def network_shapes(settings: Mapping[str, Any], image_side: int) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of a classifier's weights (`nbv.estimation.networks`), by their names.
+
+    Parameters
+    ----------
+    settings : mapping
+        ``channels``, ``hidden`` and ``n_classes``.
+    image_side : int
+        Pixels.
+    """
+    channels, hidden, n_classes = (settings[key] for key in ("channels", "hidden", "n_classes"))
+    shapes: dict[str, tuple[int, ...]] = {
+        "0.0.weight": (channels[0], 1, 5, 5),
+        "0.0.bias": (channels[0],),
+    }
+    for layer, (before, after) in enumerate(pairwise(channels), start=1):
+        shapes[f"0.{3 * layer - 1}.weight"] = (after, before, 3, 3)
+        for name in ("weight", "bias", "running_mean", "running_var"):
+            shapes[f"0.{3 * layer}.{name}"] = (after,)
+    side = image_side
+    for _ in channels:
+        side = (side + 1) // 2
+    shapes["2.weight"] = (hidden, channels[-1] * side**2)
+    shapes["4.weight"] = (n_classes, hidden)
+    return shapes | {"2.bias": (hidden,), "4.bias": (n_classes,)}

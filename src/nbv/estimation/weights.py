@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,11 @@ from typing import Any
 import numpy as np
 import safetensors
 import safetensors.torch
-import torch
 from numpy.typing import NDArray
 from torch import nn
-from torch.nn.functional import conv2d, linear
 
 from nbv.checksums import sha256_of
-from nbv.errors import UserError
-from nbv.estimation.folding import folded_convolutions
-from nbv.estimation.hardware import Hardware, use_one_thread
+from nbv.estimation.hardware import Hardware
 from nbv.estimation.networks import build_network
 from nbv.estimation.warm_start import with_category
 from nbv.files import damaged, readable, replacing
@@ -154,48 +150,3 @@ def weights_of(estimator: Estimator) -> dict[str, NDArray[np.float32]]:
         for name, tensor in estimator.network.state_dict().items()
         if tensor.is_floating_point()
     }
-
-
-def network_of(
-    weights: Mapping[str, NDArray[np.float32]], settings: Mapping[str, Any], image_side: int
-) -> Callable[[NDArray[np.uint8]], NDArray[np.float32]]:
-    """Return the network of some weights, from codes (n, side, side) to outputs (n, k).
-
-    It computes on one core of the processor, in single precision, without the calls of modules and
-    with `nbv.estimation.folding.folded_convolutions`: a single image takes a quarter less time so.
-
-    Raises
-    ------
-    UserError
-        Where the weights do not fit the settings.
-    """
-    use_one_thread()
-    tensors = {name: torch.from_numpy(np.array(array)) for name, array in weights.items()}
-    try:
-        # Without the number of batches that normalisation has seen, which training alone needs.
-        missing, unknown = build_network(settings, image_side).load_state_dict(
-            tensors, strict=False
-        )
-        if unknown or any(not name.endswith("num_batches_tracked") for name in missing):
-            raise RuntimeError("names")
-    except (RuntimeError, TypeError) as error:
-        raise UserError("the weights do not fit the network's settings") from error
-    convolutions = [
-        (
-            torch.from_numpy(kernel).contiguous(memory_format=torch.channels_last),
-            torch.from_numpy(bias),
-        )
-        for kernel, bias in folded_convolutions(weights, len(settings["channels"]))
-    ]
-    hidden, last = ((tensors[f"{at}.weight"], tensors[f"{at}.bias"]) for at in (2, 4))
-
-    def run(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
-        with torch.inference_mode():
-            values = torch.from_numpy(codes[:, None].astype(np.float32))
-            for kernel, bias in convolutions:
-                reach = kernel.shape[-1] // 2
-                values = conv2d(values, kernel, bias, stride=2, padding=reach).relu_()
-            values = linear(values.flatten(1), *hidden).relu_()
-            return np.asarray(linear(values, *last).numpy())
-
-    return run
