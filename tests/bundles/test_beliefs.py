@@ -12,14 +12,15 @@ from hypothesis.extra.numpy import arrays
 from scipy.special import softmax
 from scipy.stats import circstd
 
+from nbv.angles import circular_distance_deg
 from nbv.bundles.beliefs import (
     ELEVATION_BANDWIDTH_DEG,
     LEAST_PROBABILITY,
+    direction_and_spread_deg,
     distributions_of,
     elevation_share,
     fused,
     log_bayes_factor,
-    spread_deg,
     turned,
 )
 from nbv.calibration.posteriors import on_degrees, posteriors_of
@@ -197,6 +198,18 @@ def test_views_and_rotations_are_as_many():
 
 
 # Spread
+
+
+def spread_deg(belief: np.ndarray) -> float:
+    return direction_and_spread_deg(belief)[1]
+
+
+@given(seed=st.integers(0, 10**6))
+def test_the_direction_is_the_mean_direction(seed):
+    row = beliefs(seed, 1)
+    found, _ = direction_and_spread_deg(row[0])
+    assert -180 < found <= 180
+    assert circular_distance_deg(found, mean_direction_deg(row)[0]) < 1e-9
 
 
 @given(counts=arrays(np.int64, (BINS,), elements=st.integers(0, 20)))

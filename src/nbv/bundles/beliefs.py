@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,8 +31,7 @@ def turned(rows: NDArray[np.floating], turn_deg: ArrayLike) -> NDArray[np.float6
     n_bins = rows.shape[-1]
     place = np.asarray(turn_deg, dtype=np.float64) * (n_bins / 360.0)
     if not place.any():  # a single frame, mostly
-        shape = np.broadcast_shapes(rows.shape, (*place.shape, n_bins))
-        return np.array(np.broadcast_to(rows, shape), dtype=np.float64)
+        return np.asarray(rows + place[..., None])
     below = np.floor(place)
     part = (place - below)[..., None]
     index = (np.arange(n_bins) + below.astype(np.intp)[..., None]) % n_bins
@@ -82,11 +83,20 @@ def _log_product(
     return np.asarray(np.log(turned(distributions, rotations_deg)).sum(axis=0))
 
 
-def spread_deg(belief: NDArray[np.floating]) -> float:
-    """Return the circular standard deviation of a belief (B,), degrees: sqrt(-2 log R)."""
-    angles = 2 * np.pi * np.arange(len(belief)) / len(belief)
-    length = abs(complex(belief @ np.cos(angles), belief @ np.sin(angles)))
-    return math.degrees(math.sqrt(max(-2.0 * math.log(max(length, 1e-12)), 0.0)))
+def direction_and_spread_deg(belief: NDArray[np.floating]) -> tuple[float, float]:
+    """Return a belief's (B,) mean direction and circular standard deviation, degrees.
+
+    The direction is in (-180, 180]. The standard deviation is sqrt(-2 log R), where R is the
+    resultant length.
+    """
+    moment = complex(belief @ _unit_vectors(len(belief)))
+    spread = math.sqrt(max(-2.0 * math.log(max(abs(moment), 1e-12)), 0.0))
+    return math.degrees(cmath.phase(moment)), math.degrees(spread)
+
+
+@cache
+def _unit_vectors(n_bins: int) -> NDArray[np.complex128]:
+    return np.asarray(np.exp(2j * np.pi * np.arange(n_bins) / n_bins))
 
 
 def elevation_share(known_deg: NDArray[np.floating], elevation_deg: float) -> NDArray[np.float64]:
@@ -95,7 +105,7 @@ def elevation_share(known_deg: NDArray[np.floating], elevation_deg: float) -> ND
     A normal kernel of `ELEVATION_BANDWIDTH_DEG`, in which the nearest turn counts 1. A turn of
     unknown elevation (NaN) counts 1 too, and so do all turns for frames of unknown elevation.
     """
-    if np.isnan(known_deg).all() or np.isnan(elevation_deg):
+    if math.isnan(elevation_deg) or np.isnan(known_deg).all():
         return np.ones(len(known_deg))
     apart = ((known_deg - elevation_deg) / ELEVATION_BANDWIDTH_DEG) ** 2
     share = np.exp(-0.5 * (apart - np.nanmin(apart)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,14 +58,22 @@ def crop_features(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
     n, side = codes.shape[:2]
     across = min(CELLS, side)
     step = side // across
-    # Sums over squares, as products with a matrix of 0 and 1: exact for these whole numbers.
-    pixel = np.arange(side)
-    in_cell = (pixel[:, None] // step == np.arange(across)).astype(np.float32)
+    in_cell = _cells(side, across)
     seen, depth = (in_cell.T @ image.astype(np.float32) @ in_cell for image in (codes > 0, codes))
     depth -= np.float32(ZERO_CODE) * seen
     depth /= np.maximum(seen, 1)
     share = np.float32(ZERO_CODE / step**2) * seen
     return np.concatenate([share.reshape(n, -1), depth.reshape(n, -1)], axis=1)
+
+
+@cache
+def _cells(side: int, across: int) -> NDArray[np.float32]:
+    """Return a matrix of 0 and 1, products with which are sums over squares.
+
+    They are exact for the whole numbers of crops.
+    """
+    is_in_cell = np.arange(side)[:, None] // (side // across) == np.arange(across)
+    return np.asarray(is_in_cell, dtype=np.float32)
 
 
 def fit_familiarity(turns: Sequence[Turn]) -> Familiarity:
@@ -122,22 +130,22 @@ def energy(logits: NDArray[np.floating]) -> NDArray[np.float64]:
 
 def squared_distances(
     places: NDArray[np.float32], references: NDArray[np.float32], squares: NDArray[np.float32]
-) -> NDArray[np.float64]:
+) -> NDArray[np.float32]:
     """Return the squared distance of each place (n, q) to each reference (m, q), (n, m).
 
     ``squares`` are the squared lengths of the references, (m,).
     """
     lengths = _squares(places)[:, None] + squares
-    return np.asarray(np.maximum(lengths - 2 * places @ references.T, 0.0), dtype=np.float64)
+    return np.asarray(np.maximum(lengths - 2 * places @ references.T, 0.0), dtype=np.float32)
 
 
 def _squares(rows: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray((rows**2).sum(axis=1))
 
 
-def _to_neighbour(apart: NDArray[np.float64]) -> NDArray[np.float64]:
+def _to_neighbour(apart: NDArray[np.float32]) -> NDArray[np.float64]:
     number = min(NEIGHBOUR, apart.shape[1]) - 1
-    return np.asarray(np.sqrt(np.partition(apart, number, axis=1)[:, number]))
+    return np.sqrt(np.partition(apart, number, axis=1)[:, number].astype(np.float64))
 
 
 def _in_scales(

@@ -15,7 +15,7 @@ from nbv.angles import (
     nearest_bin,
     wrap_deg,
 )
-from nbv.bundles.beliefs import fused, log_bayes_factor, spread_deg, turned
+from nbv.bundles.beliefs import direction_and_spread_deg, fused, log_bayes_factor, turned
 from nbv.bundles.rotations import (
     MIN_SEPARATION_DEG,
     as_allowed,
@@ -26,7 +26,6 @@ from nbv.bundles.rotations import (
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
 from nbv.labels import counted
-from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.look_alikes import MOST_COMPARED, LookAlikes
 
 LEAST_BAYES_FACTOR = 0.05
@@ -227,16 +226,19 @@ def next_view(
         Move(rotation, abs(rotation), error_deg)
         for rotation, error_deg in best_rotations(rotation_deg, expected[is_allowed], width)
     ]
-    error[~np.isin(np.arange(n_bins), nearest_bin(rotation_deg, n_bins))] = np.inf
+    error_after_deg = np.full(n_bins, np.inf)
+    nearest = nearest_bin(rotation_deg, n_bins)
+    error_after_deg[nearest] = error[nearest]
+    direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
     return Recommendation(
-        azimuth_deg=float(wrap_deg(mean_direction_deg(belief[None])[0] + last)),
-        spread_deg=spread_deg(belief),
+        azimuth_deg=float(wrap_deg(direction_deg + last)),
+        spread_deg=spread_deg,
         expected_error_deg=float(now),
         move=moves[0] if moves else None,
         alternatives=tuple(moves[1:]),
         belief=turned(belief, -last),
-        error_after_deg=error,
+        error_after_deg=error_after_deg,
         unfamiliarity=math.nan,
         bayes_factor=bayes_factor,
         warnings=_contradictions(bayes_factor),
@@ -265,11 +267,11 @@ def as_rotation_list(
         ``rotations``: where there are not n numbers, or the first is not 0.
     """
     try:
-        given = np.atleast_1d(np.asarray(rotations_deg, dtype=np.float64))
+        given = np.asarray(rotations_deg, dtype=np.float64)
     except (TypeError, ValueError):
         raise FrameError("rotations", f"{rotations_deg!r} are no numbers of degrees") from None
-    rotations = [float(rotation) for rotation in given.ravel()]
-    if given.shape != (n,):
+    rotations: list[float] = given.reshape(-1).tolist()
+    if given.ndim > 1 or len(rotations) != n:
         raise FrameError(
             "rotations",
             f"{counted(n, noun)} and {counted(len(rotations), 'rotation')}; give one for each "

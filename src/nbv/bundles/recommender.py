@@ -26,17 +26,10 @@ from nbv.bundles.next_view import (
     next_view,
 )
 from nbv.errors import UserError, nearest
-from nbv.frames.crop import (
-    Crop,
-    Window,
-    crop_frame,
-    need_metres,
-    need_plausible_nearest,
-    window_of,
-)
+from nbv.frames.crop import Crop, crop_frame, need_metres, need_plausible_nearest
 from nbv.frames.depth_files import DepthImage, is_in_mask, to_metres
 from nbv.frames.intrinsics import Intrinsics, as_intrinsics
-from nbv.frames.masks import object_mask
+from nbv.frames.masks import Window, object_mask, window_of
 from nbv.labels import counted
 
 IntrinsicsLike = Intrinsics | ArrayLike | None
@@ -237,7 +230,7 @@ class Recommender:
                     raise
                 raise error.about(f"frame {len(crops) + 1} of {len(frames)}") from error
             crops.append(crop)
-        codes = np.stack([crop.codes for crop in crops])
+        codes = np.array([crop.codes for crop in crops])
         answer = self.recommend_crops(
             codes,
             rotations_deg,

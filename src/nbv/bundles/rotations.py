@@ -61,13 +61,13 @@ def best_rotations(
         there are at most `N_ALTERNATIVES` after the first.
     """
     following = np.arange(1, len(cost) + 1) % len(cost)
-    is_near = wrap_deg(rotation_deg[following] - rotation_deg) <= width + 1e-9
+    is_near = (rotation_deg[following] - rotation_deg) % 360.0 <= width + 1e-9
     rise = cost[following] - cost
     beaten = is_near & (rise < 0)
     beaten[following] |= is_near & (rise > 0)
     places = np.flatnonzero(~beaten)
     travel = np.abs(rotation_deg)
-    order = places[np.lexsort((wrap_deg(rotation_deg[places]), travel[places], cost[places]))]
+    order = places[np.lexsort((rotation_deg[places] % 360.0, travel[places], cost[places]))]
     found: list[tuple[float, float]] = []
     for rotation, of_rotation in zip(
         rotation_deg[order].tolist(), cost[order].tolist(), strict=True

@@ -19,7 +19,7 @@ from nbv.errors import UserError
 from nbv.frames.depth_files import DepthImage
 from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics
-from nbv.frames.masks import NEAREST_SHARE, Mask
+from nbv.frames.masks import NEAREST_SHARE, Mask, Window, window_of
 from nbv.rendering.camera import Camera
 from nbv.rendering.depth_codes import encode_depth, median_depth
 
@@ -64,33 +64,6 @@ class Crop:
     extent_m: float
     centre_m: tuple[float, float, float] | None = None
     doubts: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Window:
-    """A part of a frame.
-
-    Attributes
-    ----------
-    top, left : int
-        Of its first pixel in the frame.
-    frame_shape : (int, int)
-        Rows and columns of the whole frame.
-    """
-
-    top: int
-    left: int
-    frame_shape: tuple[int, int]
-
-
-def window_of(mask: Mask) -> tuple[Window, tuple[slice, slice]]:
-    """Return the smallest window around a mask that is not empty, and its slices of the frame."""
-    rows = np.flatnonzero(mask.any(axis=1))
-    of_rows = slice(int(rows[0]), int(rows[-1]) + 1)
-    columns = np.flatnonzero(mask[of_rows].any(axis=0))
-    of_columns = slice(int(columns[0]), int(columns[-1]) + 1)
-    window = Window(of_rows.start, of_columns.start, (mask.shape[0], mask.shape[1]))
-    return window, (of_rows, of_columns)
 
 
 def pixel_step(camera: Camera) -> float:
@@ -148,17 +121,23 @@ def crop_frame(
     away_m = distance_m + BEHIND_SURFACE * diagonal_m
     grid = np.arange(camera.image_side) + 0.5 - camera.image_side / 2
     grid *= pixel_step(camera) * diagonal_m / away_m
-    # Rays of a camera that is directed at the object, in the frame of the one that is not.
-    across, down, ahead = (
-        (grid * turn[0, axis] + turn[2, axis]) + (grid * turn[1, axis])[:, None]
-        for axis in range(3)
+    # Rays of a camera that is directed at the object, in the frame of the one that is not, and from
+    # there to its pixels: homogeneous coordinates in the window with a border of one pixel.
+    to_pixels = np.array(
+        [
+            [intrinsics.fx, 0.0, principal[0] - window.left + 1.0],
+            [0.0, intrinsics.fy, principal[1] - window.top + 1.0],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    across, below, ahead = (
+        (grid * x + z) + (grid * y)[:, None] for x, y, z in (to_pixels @ turn.T).tolist()
     )
     # What lies outside the window has no depth, as its border here.
     measured = np.zeros((rows + 2, columns + 2), dtype=np.float32)
     np.copyto(measured[1:-1, 1:-1], depth_m, where=mask)
-    column = principal[0] - window.left + intrinsics.fx * across / ahead
-    row = principal[1] - window.top + intrinsics.fy * down / ahead
-    depth = measured[_places(row, rows), _places(column, columns)] / (diagonal_m * ahead)
+    places = _places(below / ahead, rows) * (columns + 2) + _places(across / ahead, columns)
+    depth = measured.take(places) / (diagonal_m * ahead)
     codes = encode_depth(depth[None].astype(np.float32), camera)[0]
     right_m, down_m, ahead_m = (away_m * turn[2]).tolist()
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
@@ -166,11 +145,9 @@ def crop_frame(
 
 
 def _places(position: NDArray[np.float64], length: int) -> NDArray[np.intp]:
-    """Return the pixels of positions along an axis, from 1 to length; 0 or length + 1 outside."""
-    place = np.floor(position)
-    np.maximum(place, -1, out=place)
-    np.minimum(place, length, out=place)
-    return place.astype(np.intp) + 1
+    """Return the pixels of positions along an axis with a border, 0 and length + 1, at its ends."""
+    np.maximum(position, 0.0, out=position)
+    return np.minimum(position, length + 1.0, out=position).astype(np.intp)
 
 
 def _facing(

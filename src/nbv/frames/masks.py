@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
@@ -26,6 +28,33 @@ NEAREST_SHARE = 0.02
 
 _LEAST_PIXELS = 30
 _EIGHT = np.ones((3, 3), dtype=bool)
+
+
+@dataclass(frozen=True)
+class Window:
+    """A part of a frame.
+
+    Attributes
+    ----------
+    top, left : int
+        Of its first pixel in the frame.
+    frame_shape : (int, int)
+        Rows and columns of the whole frame.
+    """
+
+    top: int
+    left: int
+    frame_shape: tuple[int, int]
+
+
+def window_of(mask: Mask) -> tuple[Window, tuple[slice, slice]]:
+    """Return the smallest window around a mask that is not empty, and its slices of the frame."""
+    rows = np.flatnonzero(mask.any(axis=1))
+    of_rows = slice(int(rows[0]), int(rows[-1]) + 1)
+    columns = np.flatnonzero(mask[of_rows].any(axis=0))
+    of_columns = slice(int(columns[0]), int(columns[-1]) + 1)
+    window = Window(of_rows.start, of_columns.start, (mask.shape[0], mask.shape[1]))
+    return window, (of_rows, of_columns)
 
 
 def object_mask(
@@ -104,7 +133,7 @@ def object_mask(
 
 def _without_islands(inside: Mask) -> Mask:
     # Parts are looked for where there are any: most of a frame is not the object.
-    place = ndimage.find_objects(inside.view(np.uint8))[0]
+    _, place = window_of(inside)
     parts, n_parts = ndimage.label(inside[place], _EIGHT)
     if n_parts == 1:
         return inside

@@ -237,12 +237,10 @@ def _joined(rows: Table, step: int) -> Table:
 
 def _between_steps(rows: NDArray[np.float64], step: int) -> NDArray[np.float64]:
     """Return values (n, B) at every bin, of those (n, B / step) at whole steps of a full turn."""
-    if step == 1:
-        return rows
     part = np.arange(step) / step
-    around = np.concatenate([rows, rows[:, :1]], axis=1)[:, :, None]
-    between = around[:, :-1] * (1 - part) + around[:, 1:] * part
-    return np.asarray(between.reshape(len(rows), -1))
+    following = np.concatenate([rows[:, 1:], rows[:, :1]], axis=1)
+    between = rows[:, :, None] * (1 - part) + following[:, :, None] * part
+    return between.reshape(len(rows), -1)
 
 
 def _weighted(weight: Table, errors_deg: Table) -> NDArray[np.float64]:
