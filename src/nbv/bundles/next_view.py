@@ -21,7 +21,7 @@ from nbv.bundles.rotations import (
     as_allowed,
     at_rotations,
     best_rotations,
-    signed_deg,
+    bins_deg,
 )
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
@@ -212,11 +212,14 @@ def next_view(
     last = rotations_deg[-1]
     error = after[(np.arange(n_bins) + round(last / width)) % n_bins]
     taken = np.asarray(rotations_deg) - last
-    bins_deg = signed_deg(np.arange(n_bins, dtype=np.float64) * width)
-    rotation_deg = bins_deg if allowed_deg is None else as_allowed(allowed_deg)
-    expected = error if allowed_deg is None else at_rotations(error, rotation_deg)
+    of_all = bins_deg(n_bins)
+    if allowed_deg is None:
+        rotation_deg, expected, places = of_all, error, np.arange(n_bins)
+    else:
+        rotation_deg = as_allowed(allowed_deg)
+        expected, places = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
     is_allowed = _is_free(rotation_deg, taken) & (np.abs(rotation_deg) <= max_travel_deg)
-    if not is_allowed.any() and _is_free(bins_deg, taken).any():
+    if not is_allowed.any() and _is_free(of_all, taken).any():
         raise UserError(
             "no rotation is allowed: widen --allowed or --max-travel; a view is "
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
@@ -227,8 +230,7 @@ def next_view(
         for rotation, error_deg in best_rotations(rotation_deg, expected[is_allowed], width)
     ]
     error_after_deg = np.full(n_bins, np.inf)
-    nearest = nearest_bin(rotation_deg, n_bins)
-    error_after_deg[nearest] = error[nearest]
+    error_after_deg[places[is_allowed]] = error[places[is_allowed]]
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
     return Recommendation(

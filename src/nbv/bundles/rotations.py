@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,6 +21,12 @@ N_ALTERNATIVES = 5
 def signed_deg(rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return rotations in [0, 360) in (-180, 180]."""
     return np.where(rotation_deg > 180.0, rotation_deg - 360.0, rotation_deg)
+
+
+@cache
+def bins_deg(n_bins: int) -> NDArray[np.float64]:
+    """Return the rotations of all bins of a full turn, in (-180, 180]."""
+    return signed_deg(np.arange(n_bins, dtype=np.float64) * (360.0 / n_bins))
 
 
 def as_allowed(allowed_deg: ArrayLike) -> NDArray[np.float64]:
@@ -106,8 +114,8 @@ def ranked_rotations(
     n_bins = len(lookup.cost)
     width = 360.0 / n_bins
     of_bins = lookup.cost[nearest_bin(estimate_deg, n_bins)]
-    bins_deg = signed_deg(np.arange(n_bins, dtype=np.float64) * width)
-    rotation_deg = bins_deg if allowed_deg is None else as_allowed(allowed_deg)
+    of_all = bins_deg(n_bins)
+    rotation_deg = of_all if allowed_deg is None else as_allowed(allowed_deg)
     travel = np.abs(rotation_deg)
     is_allowed = (travel > width) & (travel <= max_travel_deg)
     if not is_allowed.any():
@@ -117,7 +125,7 @@ def ranked_rotations(
         )
     rotation_deg = rotation_deg[is_allowed]
     ranked = best_rotations(rotation_deg, at_rotations(of_bins, rotation_deg), width)
-    if allowed_deg is not None or max_travel_deg < bins_deg.max():
+    if allowed_deg is not None or max_travel_deg < of_all.max():
         return ranked
     own = float(signed_deg(np.asarray(lookup.recommend(estimate_deg), dtype=np.float64)))
     own_cost = float(of_bins[nearest_bin(own, n_bins)])

@@ -9,7 +9,7 @@ its restriction to one first view.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -237,10 +237,17 @@ def _joined(rows: Table, step: int) -> Table:
 
 def _between_steps(rows: NDArray[np.float64], step: int) -> NDArray[np.float64]:
     """Return values (n, B) at every bin, of those (n, B / step) at whole steps of a full turn."""
+    return np.asarray(rows @ _interpolation(rows.shape[1], step))
+
+
+@cache
+def _interpolation(n_steps: int, step: int) -> NDArray[np.float64]:
+    """Return the matrix (n_steps, n_steps * step) of linear interpolation around a full turn."""
     part = np.arange(step) / step
-    following = np.concatenate([rows[:, 1:], rows[:, :1]], axis=1)
-    between = rows[:, :, None] * (1 - part) + following[:, :, None] * part
-    return between.reshape(len(rows), -1)
+    # Of each value, what lies after it and what lies before it.
+    after, before = np.eye(n_steps), np.roll(np.eye(n_steps), -1, axis=1)
+    between = after[:, :, None] * (1 - part) + before[:, :, None] * part
+    return between.reshape(n_steps, -1)
 
 
 def _weighted(weight: Table, errors_deg: Table) -> NDArray[np.float64]:
