@@ -106,6 +106,25 @@ def test_what_handles_that_stand_out_bring_is_the_difference_of_the_kept_errors(
     assert cells[1:] == [shown(change[stands_out]), shown(change[~stands_out])]
 
 
+def test_mugs_of_shapenet_are_told_apart_by_where_their_handles_are(errors, page):
+    table = pd.read_csv(ROOT / "docs/reference/bundles/shapenet_handles.csv")
+    away = table.set_index("object_id")["handle_deg"].abs()
+    lines = {
+        "within 3° of where the file has it": away <= 3,
+        "3 to 14° away from there": away.between(3, 14, inclusive="right"),
+        "not the only part that stands out": away.isna(),
+    }
+    assert sum(lines.values()).eq(1).all()
+    for line, chosen in lines.items():
+        (cells,) = (row[1:] for row in page if row[0] == line)
+        assert cells[0] == str(chosen.sum())
+        for cell, place in zip(
+            cells[1:], [(SINGLE, 1), (RECOMMENDED, 2), (RECOMMENDED, 3)], strict=True
+        ):
+            own = errors.loc[("shapenet", *place)]
+            assert cell == shown(own[chosen.reindex(own.index)]).removesuffix(" *")
+
+
 @pytest.mark.parametrize("recording", ["nearly level", "from above"])
 def test_the_real_mug_has_a_column_for_each_training(errors, page, recording):
     start = next(i for i, row in enumerate(page) if row[0] == f"{recording}: one view")
