@@ -32,7 +32,7 @@ LEAST_BAYES_FACTOR = 0.05
 """Below it views contradict each other. Of right ones, one in 20 at the most is below."""
 
 N_KEPT = 6
-"""Sequences of rotations whose look-alikes are kept: 4 MB each, of a bundle as large as `mug`."""
+"""Sequences of rotations whose look-alikes are kept: 7 MB each, of a bundle as large as `mug`."""
 
 _LARGEST_LOG = 700.0
 """Below that of the largest number; very many views agree so well."""
