@@ -208,7 +208,7 @@ def spread_deg(belief: np.ndarray) -> float:
 def test_the_direction_is_the_mean_direction(seed):
     row = beliefs(seed, 1)
     found, _ = direction_and_spread_deg(row[0])
-    assert -180 < found <= 180
+    assert -180 <= found <= 180
     assert circular_distance_deg(found, mean_direction_deg(row)[0]) < 1e-9
 
 

@@ -245,6 +245,22 @@ def test_the_background_is_0_and_the_reference_is_1(bundle, backend):
         assert found == pytest.approx(wanted, abs=1e-4)
 
 
+def test_weights_that_do_not_fit_are_one_line(bundle):
+    for backend in BACKENDS:
+        for name, shape in (("2.weight", (40, 9)), ("4.bias", (1,)), ("9.weight", (2, 2))):
+            weights = {**bundle.weights, name: np.ones(shape, dtype=np.float32)}
+            with pytest.raises(UserError, match="do not fit"):
+                open_network(replace(bundle, weights=weights), backend)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_crops_of_another_shape_are_one_line(bundle, backend):
+    network = network_with(backend, bundle)
+    for shape in ((1, SIDE + 1, SIDE + 1), (1, SIDE, SIDE - 1), (SIDE, SIDE), (1, 1, SIDE, SIDE)):
+        with pytest.raises(UserError, match=rf"give \(n, {SIDE}, {SIDE}\)"):
+            network(np.zeros(shape, dtype=np.uint8))
+
+
 def test_an_unknown_backend_is_one_line(bundle):
     with pytest.raises(UserError, match="did you mean 'onnx'"):
         open_network(bundle, "onyx")

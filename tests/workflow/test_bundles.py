@@ -10,7 +10,11 @@ import pytest
 from safetensors import safe_open
 
 from nbv.bundles.bundle import load_bundle
+from nbv.bundles.evaluation import evaluate
+from nbv.bundles.manifest import read_manifest, see
 from nbv.bundles.recommender import Recommender
+from nbv.frames.depth_files import write_depth
+from nbv.frames.drawn import example_frame
 from nbv.meshes.store import load_meshes
 from projects import TINY, Project, copy_of_project
 
@@ -103,12 +107,12 @@ def test_calibration_distributions_are_those_of_the_network(made: Project) -> No
     names = json.loads((made.results / "bundles/depth/mug/el30_objects.json").read_text())
     place = int(np.flatnonzero(bundle.elevation_deg == 30.0)[0])
     codes = images[names.index(bundle.object_ids[place]), ::15]
-    found = Recommender(bundle, "torch").distributions(np.asarray(codes))
+    found = Recommender(bundle, "numpy").distributions(np.asarray(codes))
     assert bundle.distributions[place] == pytest.approx(found, rel=0.06, abs=1e-6)
 
 
 def test_a_bundle_is_tested_on_a_view_every_15_degrees(made: Project) -> None:
-    recommender = Recommender.load(made.results / "bundles/mug.safetensors", "torch")
+    recommender = Recommender.load(made.results / "bundles/mug.safetensors", "numpy")
     found = pd.read_csv(made.results / "bundles/mug.csv", dtype={"sequence": str})
     single = found[found["choice"] == "single"].set_index(["sequence", "object_id"])["mae_deg"]
     azimuth_deg = np.arange(24) * 15.0
@@ -132,14 +136,28 @@ def test_the_same_settings_give_the_same_bytes(made: Project, tmp_path) -> None:
 
 
 def test_ingredients_are_left_out_of_training_and_not_of_the_test(made: Project) -> None:
+    frames = made.folder / "frames"
+    frames.mkdir()
+    rows = []
+    for azimuth_deg in range(0, 360, 45):
+        write_depth(frames / f"{azimuth_deg}.npy", example_frame(azimuth_deg).depth_m)
+        rows.append({"file": f"{azimuth_deg}.npy", "azimuth_deg": azimuth_deg})
+    manifest = frames / "manifest.csv"
+    pd.DataFrame(rows).assign(object_id="mug", sequence="1").to_csv(manifest, index=False)
     left_out = (
         *CAMERA,
         "++bundles.ingredients.size.size=0",
         "++bundles.ingredients.lost.patches=0",
+        f"bundles.frames={manifest}",
     )
     made.run("--cores", "2", "ingredients", overrides=left_out)
     table = pd.read_csv(made.results / "tables/ingredients.csv")
     assert table["without"].tolist() == ["nothing", "size", "lost"]
+    bundle = Recommender.load(made.results / "bundles/mug.safetensors", "numpy")
+    (recording,) = read_manifest(manifest)
+    seen = see(bundle, recording, None, None, lambda path, error: None)
+    single = evaluate(bundle.bundle, [seen]).set_index("choice")["mae_deg"]["single"]
+    assert table["one_view_real"][0] == pytest.approx(single, abs=1e-3)
     for without, mae in zip(
         ("", "without_size/", "without_lost/"), table["two_views"], strict=True
     ):

@@ -28,7 +28,7 @@ with job(snakemake):
     if given.frames:
         recordings = read_manifest(given.frames[0])
         for key, path in zip(keys, given.bundles, strict=True):
-            recommender = Recommender(load_bundle(path), "torch")
+            recommender = Recommender(load_bundle(path), "numpy")
             turns = [see(recommender, one, None, None, left_out) for one in recordings]
             real[key] = evaluate(recommender.bundle, turns, n_views=(2,))
     rng = rng_for(params.seed, "ingredients")

@@ -30,7 +30,7 @@ def turned(rows: NDArray[np.floating], turn_deg: ArrayLike) -> NDArray[np.float6
     """
     n_bins = rows.shape[-1]
     place = np.asarray(turn_deg, dtype=np.float64) * (n_bins / 360.0)
-    if not place.any():  # a single frame, mostly
+    if not place.any():  # a single frame, mostly; the zeros give the sum its shape
         return np.asarray(rows + place[..., None])
     below = np.floor(place)
     part = (place - below)[..., None]
@@ -86,7 +86,7 @@ def _log_product(
 def direction_and_spread_deg(belief: NDArray[np.floating]) -> tuple[float, float]:
     """Return a belief's (B,) mean direction and circular standard deviation, degrees.
 
-    The direction is in (-180, 180]. The standard deviation is sqrt(-2 log R), where R is the
+    The direction is in [-180, 180]. The standard deviation is sqrt(-2 log R), where R is the
     resultant length.
     """
     moment = complex(belief @ _unit_vectors(len(belief)))

@@ -308,9 +308,14 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
     )
 
 
-def _need_sound(bundle: Bundle) -> None:
+def weights_fit(bundle: Bundle) -> bool:
+    """Return whether the weights are those of a network with the bundle's settings."""
     shapes = {name: array.shape for name, array in bundle.weights.items()}
-    if shapes != network_shapes(bundle.estimator, bundle.camera.image_side):
+    return shapes == network_shapes(bundle.estimator, bundle.camera.image_side)
+
+
+def _need_sound(bundle: Bundle) -> None:
+    if not weights_fit(bundle):
         raise ValueError("the weights do not fit the network's settings")
     n_turns, n_bins = len(bundle.object_ids), bundle.n_bins
     if bundle.distributions.shape != (n_turns, n_bins, n_bins) or not n_turns:

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.bundles.bundle import Bundle
+from nbv.bundles.bundle import Bundle, weights_fit
 from nbv.bundles.mirror import Network, mirror_averaged
 from nbv.bundles.numpy_network import numpy_network
 from nbv.errors import UserError, nearest
@@ -29,15 +29,28 @@ def open_network(bundle: Bundle, backend: str | None = None) -> Network:
     Raises
     ------
     UserError
-        For another backend, or where its packages are missing.
+        For another backend, where its packages are missing, or where the weights do not fit the
+        estimator's settings; by the network, where crops have another shape.
     """
     if backend is None:
         has_onnx = all(find_spec(name) is not None for name in ("onnx", "onnxruntime"))
         backend = "onnx" if has_onnx else "numpy"
     if backend not in BACKENDS:
         raise UserError(f"backend {backend!r}: {nearest(backend, BACKENDS)}")
-    if backend == "onnx":
-        return _onnx_network(bundle)
+    if not weights_fit(bundle):
+        raise UserError("the weights do not fit the network's settings")
+    network = _onnx_network(bundle) if backend == "onnx" else _numpy_network(bundle)
+    side = bundle.camera.image_side
+
+    def of_crops(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
+        if codes.ndim != 3 or codes.shape[1:] != (side, side):
+            raise UserError(f"crops of shape {codes.shape}: give (n, {side}, {side})")
+        return network(codes)
+
+    return of_crops
+
+
+def _numpy_network(bundle: Bundle) -> Network:
     network = numpy_network(bundle.weights, bundle.estimator)
     return mirror_averaged(network, bundle.mirror_plane_deg)
 

@@ -26,7 +26,9 @@ def signed_deg(rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
 @cache
 def bins_deg(n_bins: int) -> NDArray[np.float64]:
     """Return the rotations of all bins of a full turn, in (-180, 180]."""
-    return signed_deg(np.arange(n_bins, dtype=np.float64) * (360.0 / n_bins))
+    rotation_deg = signed_deg(np.arange(n_bins, dtype=np.float64) * (360.0 / n_bins))
+    rotation_deg.flags.writeable = False
+    return rotation_deg
 
 
 def as_allowed(allowed_deg: ArrayLike) -> NDArray[np.float64]:

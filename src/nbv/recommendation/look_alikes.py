@@ -19,7 +19,7 @@ from nbv.recommendation.evidence import Table
 COMPARED_DEG = 6.0
 """Beliefs are compared, and errors found, at most so many degrees apart, if bins are finer.
 
-Half as much is read for a frame then as in bins of 3 degrees, and that is most of its time.
+Half as much is read for a frame then as in bins of 3 degrees.
 """
 
 MOST_COMPARED = 8000
@@ -244,9 +244,9 @@ def _between_steps(rows: NDArray[np.float64], step: int) -> NDArray[np.float64]:
 def _interpolation(n_steps: int, step: int) -> NDArray[np.float64]:
     """Return the matrix (n_steps, n_steps * step) of linear interpolation around a full turn."""
     part = np.arange(step) / step
-    # Of each value, what lies after it and what lies before it.
-    after, before = np.eye(n_steps), np.roll(np.eye(n_steps), -1, axis=1)
-    between = after[:, :, None] * (1 - part) + before[:, :, None] * part
+    own, previous = np.eye(n_steps), np.roll(np.eye(n_steps), -1, axis=1)
+    # A value counts in its own step, and in the previous one, which ends at it.
+    between = own[:, :, None] * (1 - part) + previous[:, :, None] * part
     return between.reshape(n_steps, -1)
 
 
