@@ -145,7 +145,10 @@ def crop_frame(
 
 
 def _places(position: NDArray[np.float64], length: int) -> NDArray[np.intp]:
-    """Return the pixels of positions along an axis with a border, 0 and length + 1, at its ends."""
+    """Return the pixels of positions along an axis whose border is 0 and length + 1.
+
+    The positions are changed.
+    """
     np.maximum(position, 0.0, out=position)
     return np.minimum(position, length + 1.0, out=position).astype(np.intp)
 
