@@ -213,6 +213,7 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
         ("dataset.categories.mug=/etc", "dataset.categories.mug: '/etc' is not below dataset.root"),
         ("dataset.up=up", "dataset.up=up: an axis such as +y, a vector such as 0,0,1, or auto"),
         ("dataset.handle_reach=0.6", "dataset.handle_reach=0.6 is out of range: 0 to 0.5"),
+        ("dataset.square_share=1.5", "dataset.square_share=1.5 is out of range: 0 to 1"),
         ("dataset.layout=v3", "dataset.layout=v3 is unknown: choose from: auto, sem, v1, v2"),
         # What Hydra cannot read, or reads as something else.
         ("categories=[a{b}c]", "override 'categories=[a{b}c]' cannot be read: "),
@@ -299,12 +300,16 @@ def test_a_kept_reference_has_the_settings_of_today():
 
 
 @pytest.mark.parametrize(
-    ("dataset", "reach"),
-    [(["dataset=procedural"], 0.2), (["dataset=folder", "dataset.root=/tmp"], 0.0)],
+    ("dataset", "reach", "share"),
+    [(["dataset=procedural"], 0.2, 0.3), (["dataset=folder", "dataset.root=/tmp"], 0.0, 0.0)],
 )
-def test_only_generated_mugs_have_a_least_reach(dataset, reach):
-    settings = load_config(CONFIG, ["experiment=bundles", "estimator=classifier", *dataset])
+def test_only_generated_mugs_have_settings_of_mugs(dataset, reach, share):
+    settings = load_config(
+        CONFIG,
+        ["experiment=bundles", "estimator=classifier", *dataset, "dataset.square_share=0.3"],
+    )
     assert settings["dataset"]["handle_reach"] == reach
+    assert settings["dataset"]["square_share"] == share
 
 
 @pytest.mark.parametrize(

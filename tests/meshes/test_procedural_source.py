@@ -40,6 +40,15 @@ def test_the_setting_of_handles_reaches_the_generator():
     assert length / width < 1.5
 
 
+def test_the_share_of_square_mugs_reaches_the_generator():
+    plain, square = (source_of("procedural", square_share=share) for share in (0, 1))
+    # Away from the handle, towards a corner.
+    to_corner = [
+        each.load("mug", "mug-0000").vertices[:, :2].sum(axis=1).max() for each in (plain, square)
+    ]
+    assert to_corner[1] > 1.05 * to_corner[0]
+
+
 def test_the_handle_is_at_270_degrees():
     vertices = np.asarray(source_of("procedural").load("mug", "mug-0000").vertices)
     radius = np.linalg.norm(vertices[:, :2], axis=1)

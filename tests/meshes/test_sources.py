@@ -19,7 +19,7 @@ def test_every_source_has_its_configuration_and_opens():
     for name in SOURCES:
         settings = settings_of(name, root="anywhere")
         # What only generated objects have.
-        own = set() if name == "procedural" else {"handle_reach"}
+        own = set() if name == "procedural" else {"handle_reach", "square_share"}
         assert set(settings) == fields - own
         assert open_source(settings, seed=3).name == settings["source"] == name
         assert open_source(settings, seed=3).seed == 3

@@ -32,6 +32,7 @@ CAMERA = (
     "randomisation.elevation_deg=5",
     "randomisation.patches=1",
     "dataset.handle_reach=0.3",
+    "dataset.square_share=0.3",
 )
 
 

@@ -86,7 +86,7 @@ def dataset_of(category):
     for key in ("categories", "turn_deg"):
         settings[key] = {k: v for k, v in settings[key].items() if k == category}
     if category != "mug":
-        settings["handle_reach"] = 0.0
+        settings["handle_reach"] = settings["square_share"] = 0.0
     return settings | {"exclude": [], "exclude_file": None}
 
 

@@ -110,6 +110,7 @@ class Dataset(Section):
     turn_deg: dict[Name, Angle] = {}
     centre: Literal["box", "origin"] = "box"
     handle_reach: Annotated[Number, Field(ge=0, le=0.5), "in widths of a mug's body"] = 0.0
+    square_share: Annotated[Number, Field(ge=0, le=1), "share of mugs"] = 0.0
     exclude: list[Text] = []
     exclude_file: DataPath | None = None
 
@@ -117,7 +118,7 @@ class Dataset(Section):
     def _of_generated_mugs_alone(self) -> Self:
         # An experiment sets it whatever its data set: what a run says of itself must be true.
         if self.source != "procedural":
-            self.handle_reach = 0.0
+            self.handle_reach = self.square_share = 0.0
         return self
 
 

@@ -262,9 +262,40 @@ def test_a_reach_that_few_mugs_have_is_refused(least):
         generate("mug", 0, 0, least_reach=least)
 
 
-def test_only_mugs_have_handles_that_have_to_stand_out():
+def test_settings_of_mugs_leave_other_objects_as_they_are():
     for category in set(CATEGORIES) - {"mug"}:
-        assert digest(generate(category, 0, 0, least_reach=0.5)) == digest(objects(category)[0])
+        same = generate(category, 0, 0, least_reach=0.5, square_share=1.0)
+        assert digest(same) == digest(objects(category)[0])
+
+
+def test_a_share_of_mugs_is_square_and_the_others_stay_as_they_are():
+    corners = []
+    for index in range(60):
+        plain = generate("mug", 0, index, least_reach=0.2)
+        mesh = generate("mug", 0, index, least_reach=0.2, square_share=0.5)
+        if digest(mesh) == digest(plain):
+            continue
+        body, handle = body_and_handle(mesh)
+        round_body, same_handle = body_and_handle(plain)
+        assert np.array_equal(handle.vertices, same_handle.vertices)
+        assert np.allclose(body.bounds, round_body.bounds, atol=1e-12)
+        assert handle_reach(mesh) == pytest.approx(handle_reach(plain), abs=1e-12)
+        across = np.abs(body.vertices[:, :2]) / body.bounds[1, 0]
+        corner = np.hypot(*across.T).max()
+        exponent = 1 / (0.5 - np.log2(corner))
+        on_widest = np.isclose((across**exponent).sum(axis=1), 1.0, atol=1e-9)
+        # Once around, at the directions of the round body.
+        assert np.count_nonzero(on_widest) % 96 == 0 < np.count_nonzero(on_widest)
+        corners.append(corner)
+    assert 15 <= len(corners) <= 45
+    assert 1.1 <= min(corners) < 1.15
+    assert 1.31 < max(corners) <= 1.36
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, np.nan])
+def test_a_share_that_is_none_is_refused(share):
+    with pytest.raises(UserError, match="share of square mugs"):
+        generate("mug", 0, 0, square_share=share)
 
 
 def test_the_handle_is_hidden_over_a_real_range_about_azimuth_90():

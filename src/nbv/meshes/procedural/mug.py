@@ -1,4 +1,4 @@
-"""Mugs: a hollow body of revolution, and a handle at azimuth 270 degrees."""
+"""Mugs: a hollow body, round or with four sides, and a handle at azimuth 270 degrees."""
 
 from __future__ import annotations
 
@@ -12,15 +12,24 @@ from nbv.meshes.procedural.solids import Points, fillet, revolve, superellipse, 
 _AROUND = 96
 # Distance of a handle's centre line from the wall, in heights of the mug: small, usual, large.
 _DISTANCES = ((0.08, 0.15), (0.16, 0.3), (0.3, 0.52))
+# Half a diagonal of a square body, in half widths: from hardly square to hardly rounded.
+_CORNERS = (1.1, 1.36)
 
 
-def mug(rng: np.random.Generator, least_reach: float = 0.0) -> trimesh.Trimesh:
+def mug(
+    rng: np.random.Generator, least_reach: float = 0.0, square_share: float = 0.0
+) -> trimesh.Trimesh:
     """Return a mug of height 1 on z = 0, its handle towards -y.
 
     Mugs are drawn until the handle's reach is at least `least_reach`. A mug whose first draw has
-    it is the same as with 0.
+    it is the same as with 0. A share of mugs, `square_share`, has a square body, the handle on one
+    of its sides; the others are the same as with 0.
     """
-    while handle_reach(drawn := _any_mug(rng)) < least_reach:
+    # A stream of its own: it takes nothing from that of the round mugs.
+    (of_section,) = rng.spawn(1)
+    is_square = of_section.random() < square_share
+    corner = float(of_section.uniform(*_CORNERS)) if is_square else 1.0
+    while handle_reach(drawn := _any_mug(rng, corner)) < least_reach:
         pass
     return drawn
 
@@ -35,11 +44,12 @@ def handle_reach(mesh: trimesh.Trimesh) -> float:
     return float(along / across - 1.0)
 
 
-def _any_mug(rng: np.random.Generator) -> trimesh.Trimesh:
+def _any_mug(rng: np.random.Generator, corner: float) -> trimesh.Trimesh:
     outer = _body_curve(rng)
     wall = rng.uniform(0.025, 0.06)
     handle = _handle(rng, outer, wall)
-    return join([_cup(outer, wall, floor=rng.uniform(0.04, 0.09)), handle])
+    cup = _cup(outer, wall, floor=rng.uniform(0.04, 0.09))
+    return join([cup if corner == 1.0 else _squared(cup, corner), handle])
 
 
 def _body_curve(rng: np.random.Generator) -> Points:
@@ -78,6 +88,20 @@ def _cup(outer: Points, wall: float, floor: float) -> trimesh.Trimesh:
     inside = outer[outer[:, 1] > floor][::-1] - (wall, 0.0)
     bottom = [[0.97 * inside[-1, 0], floor]]
     return revolve(np.concatenate([outer, rim, inside, bottom]), n=_AROUND)
+
+
+def _squared(body: trimesh.Trimesh, corner: float) -> trimesh.Trimesh:
+    """Return a body of revolution whose circles are superellipses of the same width.
+
+    `corner` is half their diagonal in half widths, from 1 (circles) to less than sqrt(2).
+    """
+    exponent = 1.0 / (0.5 - np.log2(corner))
+    x, y, _ = body.vertices.T
+    radius = np.hypot(x, y)
+    along = np.abs([x, y]) / np.where(radius > 0.0, radius, 1.0)
+    outwards = np.where(radius > 0.0, (along**exponent).sum(axis=0), 1.0) ** (-1.0 / exponent)
+    vertices = body.vertices * np.stack([outwards, outwards, np.ones_like(x)], axis=-1)
+    return trimesh.Trimesh(vertices, body.faces, process=False)
 
 
 def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Trimesh:

@@ -44,15 +44,20 @@ class ProceduralSource:
         return f"the generator of {category} meshes"
 
     def load(self, category: str, object_id: str) -> trimesh.Trimesh:
-        """Make one object of the seed, the category, its number and the least reach of handles."""
+        """Make one object of the seed, the category, its number and the settings of mugs."""
         from nbv.meshes.procedural import generate
 
         number = object_id.removeprefix(f"{category}-")
         if not number.isdecimal():
             raise UserError(f"dataset=procedural: {object_id} is not an id like {category}-0000")
         settings = self._settings
-        reach = settings["handle_reach"]
-        mesh = generate(category, self.seed, int(number), least_reach=reach)
+        mesh = generate(
+            category,
+            self.seed,
+            int(number),
+            least_reach=settings["handle_reach"],
+            square_share=settings["square_share"],
+        )
         check_mesh(mesh, f"dataset=procedural: {object_id}")
         turn_deg = settings["turn_deg"].get(category, 0.0)
         return normalise(mesh, settings["up"], settings["front"], turn_deg, settings["centre"])
