@@ -32,7 +32,7 @@ LEAST_BAYES_FACTOR = 0.05
 """Below it views contradict each other. Of right ones, one in 20 at the most is below."""
 
 N_KEPT = 6
-"""Sequences of rotations whose look-alikes are kept: 7 MB each, of a bundle as large as `mug`."""
+"""Sequences of rotations of which what was found is kept. Look-alikes have 7 MB each, of `mug`."""
 
 _LARGEST_LOG = 700.0
 """Below that of the largest number; very many views agree so well."""
@@ -211,15 +211,16 @@ def next_view(
     # From the frame of the first view to that of the last one.
     last = rotations_deg[-1]
     error = after[(np.arange(n_bins) + round(last / width)) % n_bins]
-    taken = np.asarray(rotations_deg) - last
-    of_all = bins_deg(n_bins)
+    taken = tuple(rotation - last for rotation in rotations_deg)
     if allowed_deg is None:
-        rotation_deg, expected, places = of_all, error, np.arange(n_bins)
+        rotation_deg, expected, places = bins_deg(n_bins), error, np.arange(n_bins)
+        is_free = _free_bins(n_bins, taken)
     else:
         rotation_deg = as_allowed(allowed_deg)
         expected, places = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
-    is_allowed = _is_free(rotation_deg, taken) & (np.abs(rotation_deg) <= max_travel_deg)
-    if not is_allowed.any() and _is_free(of_all, taken).any():
+        is_free = _is_free(rotation_deg, taken)
+    is_allowed = is_free & (np.abs(rotation_deg) <= max_travel_deg)
+    if not is_allowed.any() and _free_bins(n_bins, taken).any():
         raise UserError(
             "no rotation is allowed: widen --allowed or --max-travel; a view is "
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
@@ -286,7 +287,14 @@ def as_rotation_list(
     return rotations
 
 
-def _is_free(rotation_deg: NDArray[np.float64], taken: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _is_free(rotation_deg: NDArray[np.float64], taken: tuple[float, ...]) -> NDArray[np.bool_]:
     """Return which rotations (m,) are not too near to a view that was `taken`."""
     apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
     return np.asarray(apart >= MIN_SEPARATION_DEG)
+
+
+@lru_cache(maxsize=N_KEPT)
+def _free_bins(n_bins: int, taken: tuple[float, ...]) -> NDArray[np.bool_]:
+    is_free = _is_free(bins_deg(n_bins), taken)
+    is_free.flags.writeable = False
+    return is_free

@@ -230,19 +230,16 @@ class Recommender:
                     raise
                 raise error.about(f"frame {len(crops) + 1} of {len(frames)}") from error
             crops.append(crop)
-        codes = np.array([crop.codes for crop in crops])
-        answer = self.recommend_crops(
-            codes,
-            rotations_deg,
-            elevation_deg=elevation_deg,
-            allowed_deg=allowed_deg,
-            max_travel_deg=max_travel_deg,
-        )
         doubts = (doubt for crop in crops for doubt in crop.doubts)
-        return replace(
-            answer,
-            warnings=(*dict.fromkeys(doubts), *answer.warnings, *rolled),
-            object_position_m=crops[-1].centre_m,
+        return self._of_crops(
+            np.array([crop.codes for crop in crops]),
+            rotations_deg,
+            elevation_deg,
+            allowed_deg,
+            max_travel_deg,
+            crops[-1].centre_m,
+            (*dict.fromkeys(doubts),),
+            rolled,
         )
 
     def recommend_crops(
@@ -266,14 +263,26 @@ class Recommender:
         True
         """
         rotations_deg = as_rotation_list(rotations_deg, len(codes))
+        return self._of_crops(codes, rotations_deg, elevation_deg, allowed_deg, max_travel_deg)
+
+    def _of_crops(
+        self,
+        codes: NDArray[np.uint8],
+        rotations_deg: list[float],
+        elevation_deg: float | None,
+        allowed_deg: ArrayLike | None,
+        max_travel_deg: float,
+        object_position_m: tuple[float, float, float] | None = None,
+        doubts: tuple[str, ...] = (),
+        rolled: tuple[str, ...] = (),
+    ) -> Recommendation:
         if elevation_deg is not None and not -90 <= elevation_deg <= 90:
             raise UserError(
                 f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
             )
         logits = self.network(codes)
-        distributions = distributions_of(logits, self.bundle.temperature)
         answer = next_view(
-            distributions,
+            distributions_of(logits, self.bundle.temperature),
             rotations_deg,
             self._calibrated,
             self.bundle.affinity,
@@ -286,11 +295,14 @@ class Recommender:
             answer,
             unfamiliarity=unfamiliar,
             warnings=(
+                *doubts,
                 *_unfamiliar(unfamiliar),
                 *_other_elevation(self.bundle, elevation_deg),
                 *answer.warnings,
+                *rolled,
             ),
             crops=tuple(codes),
+            object_position_m=object_position_m,
         )
 
 
@@ -330,7 +342,7 @@ def _in_window(
     Without a mask that fits, or without depth in it, they are the whole frame's.
     """
     given = None if mask is None else is_in_mask(mask)
-    if given is not None and given.shape == depth_m.shape and given.ndim == 2 and given.any():
+    if given is not None and given.shape == depth_m.shape and given.ndim == 2:
         window, place = window_of(given)
         part = to_metres(depth_m[place])
         if part.any():

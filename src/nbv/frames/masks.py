@@ -48,13 +48,17 @@ class Window:
 
 
 def window_of(mask: Mask) -> tuple[Window, tuple[slice, slice]]:
-    """Return the smallest window around a mask that is not empty, and its slices of the frame."""
-    rows = np.flatnonzero(mask.any(axis=1))
-    of_rows = slice(int(rows[0]), int(rows[-1]) + 1)
-    columns = np.flatnonzero(mask[of_rows].any(axis=0))
-    of_columns = slice(int(columns[0]), int(columns[-1]) + 1)
+    """Return the smallest window around a mask, and its slices of the frame; empty ones of none."""
+    of_rows = _span(mask.any(axis=1))
+    of_columns = _span(mask[of_rows].any(axis=0))
     window = Window(of_rows.start, of_columns.start, (mask.shape[0], mask.shape[1]))
     return window, (of_rows, of_columns)
+
+
+def _span(inside: np.bool_ | Mask) -> slice:
+    """Return the slice from the first to the last that is inside (n,)."""
+    places = np.flatnonzero(inside)
+    return slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 0)
 
 
 def object_mask(
@@ -134,8 +138,9 @@ def object_mask(
 def _without_islands(inside: Mask) -> Mask:
     # Parts are looked for where there are any: most of a frame is not the object.
     _, place = window_of(inside)
-    parts, n_parts = ndimage.label(inside[place], _EIGHT)
-    if n_parts == 1:
+    # In the numbers of an index, so that they need not be converted to such below.
+    parts = np.empty(inside[place].shape, dtype=np.int64)
+    if ndimage.label(inside[place], _EIGHT, output=parts) == 1:
         return inside
     sizes = np.bincount(parts.ravel())
     sizes[0] = 0
