@@ -18,7 +18,7 @@ from made_bundles import made_bundle
 from nbv.bundles.bundle import Bundle, save_bundle
 from nbv.bundles.recommender import Recommender
 from nbv.experiments.results import load_evaluations
-from projects import Project, copy_of_project
+from projects import Project, copy_of_project, finished_project
 
 # Machines are noisy, and a first example may import a library: no test is timed.
 hypothesis.settings.register_profile("untimed", deadline=None)
@@ -54,9 +54,7 @@ def rng():
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Project:
     """A project after a whole tiny run on two cores. Not to be changed: see `scratch`."""
-    project = copy_of_project(tmp_path_factory.mktemp("finished"))
-    project.run("--cores", "2")
-    return project
+    return finished_project(tmp_path_factory, "finished")
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import shutil
@@ -9,6 +10,8 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[1]
 PARTS = ("Snakefile", "config", "workflow", "profiles", "src")
@@ -96,3 +99,30 @@ def copy_of_project(folder: Path) -> Project:
         else:
             shutil.copy2(source, folder / part)
     return Project(folder)
+
+
+def finished_project(
+    factory: pytest.TempPathFactory, name: str, *targets: str, overrides: tuple[str, ...] = TINY
+) -> Project:
+    """Return an own copy of a project after a run on two cores.
+
+    One of the processes that share the tests runs it. The others wait: it takes both cores.
+    """
+    own = factory.mktemp(name)
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        project = copy_of_project(own)
+        project.run("--cores", "2", *targets, overrides=overrides)
+        return project
+    # The folders of all processes are in one, which is of this run of the tests alone.
+    of_all = factory.getbasetemp().parent
+    with (of_all / f"{name}.lock").open("w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        if not (of_all / name).exists():
+            # What is left where another process failed to make it.
+            shutil.rmtree(of_all / f"{name}.partial", ignore_errors=True)
+            (of_all / f"{name}.partial").mkdir()
+            project = copy_of_project(of_all / f"{name}.partial")
+            project.run("--cores", "2", *targets, overrides=overrides)
+            project.folder.rename(of_all / name)
+    shutil.copytree(of_all / name, own, symlinks=True, dirs_exist_ok=True)
+    return Project(own)

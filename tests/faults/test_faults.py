@@ -73,7 +73,7 @@ def test_kills_at_any_moment_change_no_byte(fresh):
     while n_killed < KILLS:
         running = start(fresh, *TARGETS, overrides=SMALL)
         try:
-            _, printed = running.communicate(timeout=rng.uniform(0.1, 0.6) * whole_s)
+            _, printed = running.communicate(timeout=rng.uniform(0.1, 0.4) * whole_s)
         except subprocess.TimeoutExpired:
             kill = next(kinds)
             kill(running, rng)

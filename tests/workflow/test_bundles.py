@@ -16,7 +16,7 @@ from nbv.bundles.recommender import Recommender
 from nbv.frames.depth_files import write_depth
 from nbv.frames.drawn import example_frame
 from nbv.meshes.store import load_meshes
-from projects import TINY, Project, copy_of_project
+from projects import TINY, Project, copy_of_project, finished_project
 
 pytestmark = pytest.mark.slow
 
@@ -38,9 +38,7 @@ CAMERA = (
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Project:
-    project = copy_of_project(tmp_path_factory.mktemp("bundles"))
-    project.run("--cores", "2", "bundles", overrides=CAMERA)
-    return project
+    return finished_project(tmp_path_factory, "bundles", "bundles", overrides=CAMERA)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from safetensors import safe_open
 
-from projects import TINY, Project, copy_of_project
+from projects import TINY, Project, finished_project
 
 pytestmark = pytest.mark.slow
 
@@ -30,9 +30,7 @@ TRAININGS = {(0, 0): "", (1, 0): "confirmation/shuffle1/replicate0/"}
 
 @pytest.fixture(scope="module")
 def confirmed(tmp_path_factory) -> Project:
-    project = copy_of_project(tmp_path_factory.mktemp("confirmed"))
-    project.run("--cores", "2", "confirm", overrides=SMALL)
-    return project
+    return finished_project(tmp_path_factory, "confirmed", "confirm", overrides=SMALL)
 
 
 def splits_of(project: Project, shuffle: int, category: str) -> pd.DataFrame:

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from safetensors import safe_open
 
-from projects import TINY, Project, copy_of_project
+from projects import TINY, Project, finished_project
 
 pytestmark = pytest.mark.slow
 
@@ -25,9 +25,7 @@ MORE = overrides(0, 15, 60)
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory) -> Project:
     """The estimators of two categories; mugs are seen from three elevations."""
-    project = copy_of_project(tmp_path_factory.mktemp("warm"))
-    project.run("--cores", "2", "estimators", overrides=(*TINY, *MORE))
-    return project
+    return finished_project(tmp_path_factory, "warm", "estimators", overrides=(*TINY, *MORE))
 
 
 def history(path: Path) -> dict:
