@@ -83,6 +83,13 @@ def test_its_mugs_have_handles_that_stand_out(made: Project) -> None:
     assert all(along / across >= 1.3 for across, along, _ in sides)
 
 
+def test_some_of_its_mugs_are_square(made: Project) -> None:
+    meshes = load_meshes(made.results / "meshes/mug.npz").values()
+    # From the axis towards a corner that is away from the handle: of a circle sqrt(2).
+    to_corner = [m.vertices[:, :2].sum(axis=1).max() / m.vertices[:, 0].max() for m in meshes]
+    assert 0 < sum(each > 1.5 for each in to_corner) < len(to_corner)
+
+
 def test_a_bundle_is_calibrated_by_objects_that_it_was_not_trained_on(made: Project) -> None:
     splits = pd.read_csv(made.results / "splits/mug.csv", dtype={"object_id": str})
     of_role = splits[splits["fold"] == 1].groupby("role")["object_id"].agg(set)

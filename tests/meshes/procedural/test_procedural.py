@@ -287,6 +287,9 @@ def test_a_share_of_mugs_is_square_and_the_others_stay_as_they_are():
         # Once around, at the directions of the round body.
         assert np.count_nonzero(on_widest) % 96 == 0 < np.count_nonzero(on_widest)
         corners.append(corner)
+        assert body.is_watertight
+        assert body.is_winding_consistent
+        assert 0 < body.volume < 0.5 * body.convex_hull.volume
     assert 15 <= len(corners) <= 45
     assert 1.1 <= min(corners) < 1.15
     assert 1.31 < max(corners) <= 1.36

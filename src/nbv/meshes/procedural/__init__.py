@@ -47,7 +47,7 @@ def generate(
         Least reach of a mug's handle, in widths of the body, 0 to 0.5
         (`nbv.meshes.procedural.mug.handle_reach`). Other categories do not heed it.
     square_share : float
-        Of mugs, those with a square body, 0 to 1. Other categories do not heed it.
+        The probability that a mug has a square body, 0 to 1. Other categories do not heed it.
 
     Returns
     -------

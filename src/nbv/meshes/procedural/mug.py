@@ -22,8 +22,8 @@ def mug(
     """Return a mug of height 1 on z = 0, its handle towards -y.
 
     Mugs are drawn until the handle's reach is at least `least_reach`. A mug whose first draw has
-    it is the same as with 0. A share of mugs, `square_share`, has a square body, the handle on one
-    of its sides; the others are the same as with 0.
+    it is the same as with 0. With the probability `square_share` it has a square body, the handle
+    on one of its sides; otherwise it is the same as with 0.
     """
     # A stream of its own: it takes nothing from that of the round mugs.
     (of_section,) = rng.spawn(1)
