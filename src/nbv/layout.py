@@ -141,27 +141,24 @@ class Layout:
         """Return the paper's claims and their verdicts as ``csv`` or ``md``."""
         return f"{self.root}/claims.{kind}"
 
-    def bundle(self, category: str, kind: str, without: str | None = None) -> str:
-        """Return a category's bundle (``safetensors``), or its errors on test objects (``csv``)."""
-        return f"{self._bundles(without)}/{category}.{kind}"
+    def bundle(self, category: str, kind: str, variant: str = "") -> str:
+        """Return a category's bundle (``safetensors``), or its errors on test objects (``csv``).
 
-    def bundle_depth(self, category: str, elevation: int | str, without: str | None = None) -> str:
+        ``variant`` is what `bundle_variant` returns.
+        """
+        return f"{self.root}/bundles{variant}/{category}.{kind}"
+
+    def bundle_depth(self, category: str, elevation: int | str, without: str = "") -> str:
         """Return the randomised depth images that a bundle learns from."""
-        return f"{self._bundles(without)}/depth/{unit_folder(category, elevation)}.npy"
+        return f"{self.root}/bundles{without}/depth/{unit_folder(category, elevation)}.npy"
 
-    def bundle_objects(
-        self, category: str, elevation: int | str, without: str | None = None
-    ) -> str:
+    def bundle_objects(self, category: str, elevation: int | str, without: str = "") -> str:
         """Return the ids of the objects in `bundle_depth`, in their order."""
-        return f"{self._bundles(without)}/depth/{unit_folder(category, elevation)}_objects.json"
+        return f"{self.root}/bundles{without}/depth/{unit_folder(category, elevation)}_objects.json"
 
-    def bundle_estimator(self, category: str, without: str | None = None) -> str:
+    def bundle_estimator(self, category: str, variant: str = "") -> str:
         """Return the network of a bundle, trained over all elevations."""
-        return f"{self._bundles(without)}/estimators/{category}.safetensors"
-
-    def _bundles(self, without: str | None) -> str:
-        """Return the folder of bundles, or of those that an ingredient is left out of."""
-        return f"{self.root}/bundles" + (f"/without_{without}" if without else "")
+        return f"{self.root}/bundles{variant}/estimators/{category}.safetensors"
 
     def log(self, job: str) -> str:
         """Return a job's log."""
@@ -225,6 +222,15 @@ def unit_folder(category: str, elevation: int | str) -> str:
 def fold_folder(category: str, elevation: int | str, fold: int | str) -> str:
     """Return ``<category>/el<EE>/fold<k>``."""
     return f"{unit_folder(category, elevation)}/fold{fold}"
+
+
+def bundle_variant(without: str = "", replicate: int = 0) -> str:
+    """Return the folder below ``bundles`` of a training without an ingredient, or of a replicate.
+
+    Replicate 0 with all ingredients is the bundle itself, whose folder is ``bundles``.
+    """
+    named = f"/without_{without}" if without else ""
+    return f"{named}/replicate{replicate}" if replicate else named
 
 
 def files_by_run(

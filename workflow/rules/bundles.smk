@@ -1,19 +1,32 @@
 # What a robot needs of a category, in one file. Its network sees all elevations, as a camera would.
 
-
 BUNDLE_FOLD = 1
 # Neither the paper's images nor its estimators: those know their elevation.
 BUNDLE_UNIT = ("{category}", "{elevation}")
-
-
 # What is left out of the randomisation, one after the other, to see what it brings.
 INGREDIENTS = CONFIG["bundles"]["ingredients"]
-WITHOUT = "{ingredient}"
+REPLICATES = CONFIG["bundles"]["replicates"]
 FRAMES = CONFIG["bundles"]["frames"]
+# By their folders: what each training is without, and its replicate.
+VARIANTS = {
+    bundle_variant(without, replicate): (without, replicate)
+    for without in ("", *INGREDIENTS)
+    for replicate in {0, *REPLICATES}
+}
+# Replicates learn from the same images.
+RENDERED = [folder for folder, (_, replicate) in VARIANTS.items() if replicate == 0]
+# What the ingredients' table compares.
+COMPARED = [
+    (category, without, replicate)
+    for category in CATEGORIES
+    for without in ("", *INGREDIENTS)
+    for replicate in REPLICATES
+]
 
 
+# In brackets: where nothing is left out, the only name is empty.
 wildcard_constraints:
-    ingredient="|".join(map(re.escape, INGREDIENTS)) or "none",
+    variant="(" + "|".join(map(re.escape, VARIANTS)) + ")",
 
 
 rule render_bundle:
@@ -21,12 +34,14 @@ rule render_bundle:
         sources("render_bundle"),
         meshes=rules.meshes.output[0],
     output:
-        depth=LAYOUT.bundle_depth(*BUNDLE_UNIT),
-        objects=LAYOUT.bundle_objects(*BUNDLE_UNIT),
+        depth=LAYOUT.bundle_depth(*BUNDLE_UNIT, "{variant}"),
+        objects=LAYOUT.bundle_objects(*BUNDLE_UNIT, "{variant}"),
     log:
-        LAYOUT.log("render_bundle/{category}/el{elevation}"),
+        LAYOUT.log("render_bundle{variant}/{category}/el{elevation}"),
     benchmark:
-        LAYOUT.benchmark("render_bundle/{category}/el{elevation}")
+        LAYOUT.benchmark("render_bundle{variant}/{category}/el{elevation}")
+    wildcard_constraints:
+        variant="(" + "|".join(map(re.escape, RENDERED)) + ")",
     conda:
         ENVIRONMENT
     resources:
@@ -49,11 +64,11 @@ rule train_bundle:
         depth=elevations_of_bundle(LAYOUT.bundle_depth),
         objects=elevations_of_bundle(LAYOUT.bundle_objects),
     output:
-        LAYOUT.bundle_estimator("{category}"),
+        LAYOUT.bundle_estimator("{category}", "{variant}"),
     log:
-        LAYOUT.log("train_bundle/{category}"),
+        LAYOUT.log("train_bundle{variant}/{category}"),
     benchmark:
-        LAYOUT.benchmark("train_bundle/{category}")
+        LAYOUT.benchmark("train_bundle{variant}/{category}")
     conda:
         ENVIRONMENT
     resources:
@@ -63,6 +78,7 @@ rule train_bundle:
         fold=BUNDLE_FOLD,
         estimator=STAGE_SETTINGS["training"],
         seed=CONFIG["seed"],
+        replicate=lambda wildcards: VARIANTS[wildcards.variant][1],
     script:
         f"{SCRIPTS}/train_bundle.py"
 
@@ -79,12 +95,12 @@ rule bundle:
         estimator=rules.train_bundle.output[0],
         provenance=LAYOUT.provenance,
     output:
-        bundle=LAYOUT.bundle("{category}", "safetensors"),
-        evaluation=LAYOUT.bundle("{category}", "csv"),
+        bundle=LAYOUT.bundle("{category}", "safetensors", "{variant}"),
+        evaluation=LAYOUT.bundle("{category}", "csv", "{variant}"),
     log:
-        LAYOUT.log("bundle/{category}"),
+        LAYOUT.log("bundle{variant}/{category}"),
     benchmark:
-        LAYOUT.benchmark("bundle/{category}")
+        LAYOUT.benchmark("bundle{variant}/{category}")
     conda:
         ENVIRONMENT
     resources:
@@ -101,57 +117,17 @@ rule bundle:
         f"{SCRIPTS}/make_bundle.py"
 
 
-use rule render_bundle as render_without with:
-    output:
-        depth=LAYOUT.bundle_depth(*BUNDLE_UNIT, WITHOUT),
-        objects=LAYOUT.bundle_objects(*BUNDLE_UNIT, WITHOUT),
-    log:
-        LAYOUT.log("render_without/{ingredient}/{category}/el{elevation}"),
-    benchmark:
-        LAYOUT.benchmark("render_without/{ingredient}/{category}/el{elevation}")
-
-
-use rule train_bundle as train_without with:
-    output:
-        LAYOUT.bundle_estimator("{category}", WITHOUT),
-    log:
-        LAYOUT.log("train_without/{ingredient}/{category}"),
-    benchmark:
-        LAYOUT.benchmark("train_without/{ingredient}/{category}")
-
-
-use rule bundle as bundle_without with:
-    input:
-        sources("make_bundle"),
-        splits=rules.splits.output[0],
-        depth=elevations_of_bundle(LAYOUT.bundle_depth),
-        objects=elevations_of_bundle(LAYOUT.bundle_objects),
-        test_depth=elevations_of_bundle(LAYOUT.bundle_depth, of_ingredient=False),
-        test_objects=elevations_of_bundle(LAYOUT.bundle_objects, of_ingredient=False),
-        estimator=rules.train_without.output[0],
-        provenance=LAYOUT.provenance,
-    output:
-        bundle=LAYOUT.bundle("{category}", "safetensors", WITHOUT),
-        evaluation=LAYOUT.bundle("{category}", "csv", WITHOUT),
-    log:
-        LAYOUT.log("bundle_without/{ingredient}/{category}"),
-    benchmark:
-        LAYOUT.benchmark("bundle_without/{ingredient}/{category}")
-
-
 rule ingredients:
     input:
         sources("tabulate_ingredients"),
         frames=lambda wildcards: files_of_manifest(FRAMES) if FRAMES else [],
         bundles=[
-            LAYOUT.bundle(category, "safetensors", without)
-            for category in CATEGORIES
-            for without in (None, *INGREDIENTS)
+            LAYOUT.bundle(category, "safetensors", bundle_variant(*variant))
+            for category, *variant in COMPARED
         ],
         evaluations=[
-            LAYOUT.bundle(category, "csv", without)
-            for category in CATEGORIES
-            for without in (None, *INGREDIENTS)
+            LAYOUT.bundle(category, "csv", bundle_variant(*variant))
+            for category, *variant in COMPARED
         ],
     output:
         csv=LAYOUT.table("ingredients", "csv"),
@@ -166,13 +142,7 @@ rule ingredients:
         mem_mb=per_attempt(4000),
         runtime=per_attempt(60),
     params:
-        bundles=[
-            (category, without)
-            for category in CATEGORIES
-            for without in ("", *INGREDIENTS)
-        ],
-        n_resamples=CONFIG["n_resamples"],
-        seed=CONFIG["seed"],
+        compared=COMPARED,
         caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_ingredients.py"

@@ -31,7 +31,7 @@ from nbv.estimation.warm_start import (
 from nbv.experiments.results import ESTIMATED_ROLES
 from nbv.experiments.run_size import too_small
 from nbv.jobs import LAST_ERROR, why_stopped
-from nbv.layout import Layout, fold_folder, unit_folder
+from nbv.layout import Layout, bundle_variant, fold_folder, unit_folder
 from nbv.meshes.sources import SOURCES, open_source, select_objects
 from nbv.meshes.store import stored_ids
 from nbv.processes import hold_lock
@@ -285,9 +285,11 @@ def elevations_of_bundle(path, of_ingredient=True):
 
     def found(wildcards):
         need_bundle_settings(wildcards.category)
-        ingredient = wildcards.get("ingredient") if of_ingredient else None
+        without = VARIANTS[wildcards.variant][0] if of_ingredient else ""
         elevations = CONFIG["elevations_deg"][wildcards.category]
-        places = [(wildcards.category, each, ingredient) for each in elevations]
+        places = [
+            (wildcards.category, each, bundle_variant(without)) for each in elevations
+        ]
         return paths(path, places)
 
     return found
@@ -329,13 +331,19 @@ def need_bundle_settings(category):
 
 
 def randomisation_of(wildcards):
-    return CONFIG["randomisation"] | INGREDIENTS.get(wildcards.get("ingredient"), {})
+    without, _ = VARIANTS[wildcards.variant]
+    return CONFIG["randomisation"] | INGREDIENTS.get(without, {})
 
 
 def bundle_settings(wildcards):
     """What a bundle says of its training."""
     said = {key: CONFIG[key] for key in ("dataset", "sensor", "seed")}
-    return said | {"randomisation": randomisation_of(wildcards)}
+    _, replicate = VARIANTS[wildcards.variant]
+    return (
+        said
+        | {"randomisation": randomisation_of(wildcards)}
+        | ({"replicate": replicate} if replicate else {})
+    )
 
 
 # What tables and figures are about, and the files that they need.

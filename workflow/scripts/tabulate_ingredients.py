@@ -5,6 +5,8 @@ from nbv.jobs import job
 with job(snakemake):
     import logging
 
+    import pandas as pd
+
     from nbv.bundles.bundle import load_bundle
     from nbv.bundles.evaluation import evaluate
     from nbv.bundles.manifest import read_manifest, see
@@ -13,8 +15,6 @@ with job(snakemake):
     from nbv.frames.errors import FrameError
     from nbv.reporting.ingredients import ingredient_table
     from nbv.reporting.table import write_table
-    from nbv.seeds import rng_for
-    from nbv.statistics.paired import Resampler
 
     params, given = snakemake.params, snakemake.input
     log = logging.getLogger("nbv")
@@ -22,15 +22,16 @@ with job(snakemake):
     def left_out(path: str, error: FrameError) -> None:
         log.info("%s is left out: %s", path, error)
 
-    keys = [tuple(key) for key in params.bundles]
-    rendered = {key: read_csv(path) for key, path in zip(keys, given.evaluations, strict=True)}
-    real = {}
+    keys = [(category, without) for category, without, _ in params.compared]
+    rendered: dict[tuple[str, str], list[pd.DataFrame]] = {}
+    for key, path in zip(keys, given.evaluations, strict=True):
+        rendered.setdefault(key, []).append(read_csv(path))
+    real: dict[tuple[str, str], list[pd.DataFrame]] = {}
     if given.frames:
         recordings = read_manifest(given.frames[0])
         for key, path in zip(keys, given.bundles, strict=True):
             recommender = Recommender(load_bundle(path), "numpy")
             turns = [see(recommender, one, None, None, left_out) for one in recordings]
-            real[key] = evaluate(recommender.bundle, turns, n_views=(2,))
-    rng = rng_for(params.seed, "ingredients")
-    table = ingredient_table(rendered, real, Resampler.seeded(rng, params.n_resamples))
-    write_table(table, dict(snakemake.output.items()), snakemake.params.caution)
+            real.setdefault(key, []).append(evaluate(recommender.bundle, turns, n_views=(2,)))
+    table = ingredient_table(rendered, real)
+    write_table(table, dict(snakemake.output.items()), params.caution)

@@ -23,11 +23,13 @@ with job(snakemake):
         need_objects(splits, images.object_ids)
         of_elevation[:] = images.of(object_ids)
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
+    # Replicate 0 is the bundle itself.
+    own = [params.replicate] if params.replicate else []
     network = train_network(
         codes.reshape(-1, *codes.shape[2:]),
         params.estimator,
         hardware,
-        seed_for(params.seed, "bundle", wildcards.category),
+        seed_for(params.seed, "bundle", wildcards.category, *own),
     )
     names = [f"{name}/{place}" for place in range(len(opened)) for name in object_ids]
     estimator = Estimator(network, params.estimator, codes.shape[-1], names)

@@ -313,6 +313,7 @@ class Bundles(Section):
     """What bundles are compared without, and on which frames; see workflow/rules/bundles.smk."""
 
     ingredients: dict[Name, dict[Name, Number | None]] = {}
+    replicates: Annotated[list[Replicate], Field(min_length=1), Distinct] = [0]
     frames: str | None = None
 
     @model_validator(mode="after")

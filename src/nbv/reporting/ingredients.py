@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from nbv.bundles.evaluation import RECOMMENDED, SINGLE
-from nbv.labels import category_label, number
+from nbv.labels import category_label, counted, number
 from nbv.reporting.table import DECIDED, Cell, Table, difference_cell
-from nbv.statistics.metrics import Interval
-from nbv.statistics.object_means import mae_difference, paired_objects
-from nbv.statistics.paired import Resampler
+from nbv.statistics.trainings import crossed_mean
 
 ALL = ""
 """In the place of what is left out: nothing."""
@@ -20,22 +19,20 @@ ALL = ""
 _SHOWN = ((SINGLE, 1, "one view"), (RECOMMENDED, 2, "two views"))
 
 Key = tuple[str, str]
-"""Category, and what the training is without."""
+"""Category, and what the trainings are without."""
+Replicates = Sequence[pd.DataFrame]
+"""What `nbv.bundles.evaluation.evaluate` returns of each training, of equally many for each key."""
 
 
-def ingredient_table(
-    rendered: Mapping[Key, pd.DataFrame], real: Mapping[Key, pd.DataFrame], resampler: Resampler
-) -> Table:
-    """Return the errors of bundles that lack an ingredient, less those of the one with all.
+def ingredient_table(rendered: Mapping[Key, Replicates], real: Mapping[Key, Replicates]) -> Table:
+    """Return the errors of bundles that lack an ingredient, less those of the ones with all.
 
     Parameters
     ----------
-    rendered : mapping of (str, str) to DataFrame
-        By category and what is left out, `ALL` first: `nbv.bundles.evaluation.evaluate` on test
-        objects, with all that is random.
+    rendered : mapping of (str, str) to sequence of DataFrame
+        By category and what is left out, `ALL` first: on test objects, with all that is random.
     real : mapping
         The same on recordings of a real camera, or empty.
-    resampler : Resampler
     """
     cells, rows = [], []
     for category, without in rendered:
@@ -43,19 +40,29 @@ def ingredient_table(
         row = [Cell(f"{category_label(category)}, {named}")]
         made: dict[str, float | str] = {"category": category, "without": without or "nothing"}
         for choice, n_views, label in _SHOWN:
-            found = _found(rendered, category, without, choice, n_views, resampler)
-            made |= found.columns(label.replace(" ", "_"))
-            row.append(
-                Cell(f"{number(found.value)}°")
-                if without == ALL
-                else difference_cell(found.value, found.low, found.high)
-            )
+            errors = _of_objects(rendered[category, without], choice, n_views)
+            key = label.replace(" ", "_")
+            if without == ALL:
+                value = float(errors.mean())
+                made |= {key: value, f"{key}_low": np.nan, f"{key}_high": np.nan}
+                row.append(Cell(f"{number(value)}°"))
+            else:
+                with_all = _of_objects(rendered[category, ALL], choice, n_views)
+                found = crossed_mean(errors - with_all).interval()
+                made |= found.columns(key)
+                row.append(difference_cell(found.value, found.low, found.high))
         for choice, n_views, label in _SHOWN if real else ():
-            errors = _of_objects(real[category, without], choice, n_views)
-            made[f"{label.replace(' ', '_')}_real"] = errors.mean()
-            row.append(Cell(f"{number(errors.mean())}°"))
+            of_training = _of_objects(real[category, without], choice, n_views).mean(axis=1)
+            key = f"{label.replace(' ', '_')}_real"
+            made |= {
+                key: float(of_training.mean()),
+                f"{key}_least": float(of_training.min()),
+                f"{key}_greatest": float(of_training.max()),
+            }
+            row.append(Cell(_spread(of_training)))
         cells.append(made)
         rows.append(tuple(row))
+    n_trainings = len(next(iter(rendered.values())))
     return Table(
         "ingredients",
         "What is random in training",
@@ -65,40 +72,41 @@ def ingredient_table(
         tuple(rows),
         (
             "Rendered: MAE on test objects of a view every 15°, with all that is random. Below the "
-            "first line it is the difference to it, with a 95 % interval over objects; one "
-            f"training each, whose chance the interval does not contain. {DECIDED}",
-            *(("Real: MAE on recordings with known azimuths.",) if real else ()),
+            f"first line it is the difference to it, with a 95 % interval {_over(n_trainings)}. "
+            f"{DECIDED}",
+            *((_real_note(n_trainings),) if real else ()),
         ),
     )
+
+
+def _over(n_trainings: int) -> str:
+    if n_trainings == 1:
+        return "over objects; one training each, whose chance the interval does not contain"
+    return f"over objects and {n_trainings} trainings"
+
+
+def _real_note(n_trainings: int) -> str:
+    note = "Real: MAE on recordings with known azimuths"
+    if n_trainings == 1:
+        return f"{note}."
+    return f"{note}, the mean over {counted(n_trainings, 'training')}, and the least and greatest."
 
 
 def _titles(what: str) -> Iterator[str]:
     return (f"{label}, {what}" for _, _, label in _SHOWN)
 
 
-def _of_objects(found: pd.DataFrame, choice: str, n_views: int) -> pd.Series[float]:
-    """Return the mean error of each object over its recordings."""
-    rows = found[(found["choice"] == choice) & (found["n_views"] == n_views)]
-    return rows.groupby("object_id")["mae_deg"].mean()
+def _spread(of_training: NDArray[np.float64]) -> str:
+    mean = f"{number(of_training.mean())}°"
+    if len(of_training) == 1:
+        return mean
+    return f"{mean} ({number(of_training.min())} to {number(of_training.max())})"
 
 
-def _found(
-    rendered: Mapping[Key, pd.DataFrame],
-    category: str,
-    without: str,
-    choice: str,
-    n_views: int,
-    resampler: Resampler,
-) -> Interval:
-    errors = {
-        name: _of_objects(rendered[category, name], choice, n_views) for name in {ALL, without}
-    }
-    if without == ALL:
-        return Interval(float(errors[ALL].mean()), np.nan, np.nan)
-    means = pd.concat(
-        [
-            rows.rename("error_deg").reset_index().assign(method=name, fold=1)
-            for name, rows in errors.items()
-        ]
-    )
-    return mae_difference(paired_objects(means, category), without, ALL, resampler)
+def _of_objects(trainings: Replicates, choice: str, n_views: int) -> NDArray[np.float64]:
+    """Return the mean error of each object over its recordings, (n_trainings, n_objects)."""
+    of_training = []
+    for found in trainings:
+        rows = found[(found["choice"] == choice) & (found["n_views"] == n_views)]
+        of_training.append(rows.groupby("object_id")["mae_deg"].mean())
+    return pd.concat(of_training, axis=1).to_numpy(dtype=np.float64).T
