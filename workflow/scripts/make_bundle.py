@@ -11,7 +11,6 @@ with job(snakemake):
     from nbv.bundles.evaluation import evaluate
     from nbv.bundles.making import kept_network, make_bundle, turns_of
     from nbv.bundles.mirror import find_mirror_plane, mirror_averaged
-    from nbv.bundles.turns import every
     from nbv.calibration.splits import objects_with_role, read_splits
     from nbv.depth_images import open_depth
     from nbv.estimation.hardware import choose_hardware, use_one_thread
@@ -35,7 +34,9 @@ with job(snakemake):
         objects_with_role(splits, params.fold, role) for role in ("calibration", "test")
     )
     network = kept_network(estimator)
-    plain, *_ = turns_of(network, images, params.elevations, calibration)
+    # A view every 15 degrees, as on a turntable.
+    of_turntable = 15
+    plain, *_ = turns_of(network, images, params.elevations, calibration, of_turntable)
     plane_deg = find_mirror_plane(network, plain)
     where = "none" if plane_deg is None else f"at an azimuth of {plane_deg:g}°"
     logging.getLogger("nbv").info("mirror plane of the objects: %s", where)
@@ -54,7 +55,5 @@ with job(snakemake):
         | {"settings": params.settings},
     )
     save_bundle(snakemake.output.bundle, bundle)
-    tested, *_ = turns_of(network, test_images, params.elevations, test)
-    # As on a turntable: a view every 15 degrees.
-    errors = evaluate(bundle, [every(turn, 15) for turn in tested], n_views=(2, 3))
-    write_csv(snakemake.output.evaluation, errors)
+    tested, *_ = turns_of(network, test_images, params.elevations, test, of_turntable)
+    write_csv(snakemake.output.evaluation, evaluate(bundle, tested, n_views=(2, 3)))

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.bundles.turns import ENOUGH_VIEWS, Turn, every
+from nbv.bundles.turns import Turn
 from nbv.calibration.posteriors import fit_temperature, mean_log_likelihood
 
 Network = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
@@ -56,7 +56,8 @@ def find_mirror_plane(network: Network, turns: Sequence[Turn]) -> float | None:
     ----------
     network : callable
     turns : sequence of Turn
-        Of calibration objects, which the network has not seen, with its own logits.
+        Of calibration objects, which the network has not seen, with its own logits. A view every
+        15 degrees is enough: neighbouring views say the same.
 
     Returns
     -------
@@ -64,10 +65,9 @@ def find_mirror_plane(network: Network, turns: Sequence[Turn]) -> float | None:
         Degrees in [0, 180), half a class apart; None where the network itself is better than its
         average with any mirror image. Both are compared at their best temperatures.
     """
-    some = [every(turn, -(-len(turn.azimuth_deg) // ENOUGH_VIEWS)) for turn in turns]
-    azimuth_deg = np.concatenate([turn.azimuth_deg for turn in some])
-    own = np.concatenate([turn.logits for turn in some]).astype(np.float64)
-    mirrored = np.concatenate([network(turn.codes[:, :, ::-1]) for turn in some])
+    azimuth_deg = np.concatenate([turn.azimuth_deg for turn in turns])
+    own = np.concatenate([turn.logits for turn in turns]).astype(np.float64)
+    mirrored = np.concatenate([network(turn.codes[:, :, ::-1]) for turn in turns])
     n_classes = own.shape[1]
     planes = np.arange(n_classes) * (180.0 / n_classes)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,13 +35,3 @@ class Turn:
     logits: NDArray[np.float32]
     codes: NDArray[np.uint8]
     focal_px: float = float("nan")
-
-
-def every(turn: Turn, step: int) -> Turn:
-    """Return every `step`-th view of a turn."""
-    return replace(
-        turn,
-        azimuth_deg=turn.azimuth_deg[::step],
-        logits=turn.logits[::step],
-        codes=turn.codes[::step],
-    )
