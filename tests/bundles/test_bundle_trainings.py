@@ -195,3 +195,37 @@ def test_the_shipped_bundle_is_the_first_of_the_trainings(errors, page):
             errors.loc[objects, c, n]["seed_0"].mean() for c, n in [*columns, (RECOMMENDED, 3)]
         ]
         assert np.array(cells, float) == pytest.approx(np.array(means), abs=0.0501)
+
+
+INGREDIENTS = {
+    "edges that move": "edge",
+    "lost parts and patches": "lost_depth",
+    "sensor's noise": "noise",
+    "crop off its middle": "shift",
+    "occluder": "occlusion",
+}
+
+
+def test_what_ingredients_bring_is_the_difference_of_the_kept_errors(page):
+    """On rendered mugs a difference; on the real one the mean, and the least and the greatest."""
+    table = pd.read_csv(ROOT / "docs/reference/bundles/ingredients_by_object.csv")
+    keys = ["objects", "choice", "n_views", "without", "object_id"]
+    errors = table.set_index(keys).sort_index()
+    lines = {INGREDIENTS.get(row[0], row[0]): row[1:] for row in page if len(row) == 7}
+    named = {name: row for name, row in lines.items() if name in errors.index.levels[3]}
+    assert set(named) == set(table["without"])
+    views = [(SINGLE, 1), (RECOMMENDED, 2)]
+    for name, cells in named.items():
+        for cell, (choice, n_views) in zip(cells[:2], views, strict=True):
+            own, all_of_it = (
+                errors.loc["generated", choice, n_views, one] for one in (name, "nothing")
+            )
+            if name == "nothing":
+                assert cell == f"{own.to_numpy().mean():.1f}"
+            else:
+                assert cell.removeprefix("+") == shown(own - all_of_it)
+                assert cell.startswith("+")
+        for place, recording in enumerate(("level", "from above")):
+            for cell, (choice, n_views) in zip(cells[2 + 2 * place :], views, strict=False):
+                own = errors.loc["real", choice, n_views, name, recording]
+                assert cell == f"{own.mean():.1f} ({own.min():.1f} to {own.max():.1f})"
