@@ -41,12 +41,22 @@ def median_ratio(numerators: ArrayLike, denominators: ArrayLike) -> float:
     return float(np.median(np.divide(numerators, denominators)))
 
 
-def take_turns(works: Sequence[Work], n_rounds: int, warm_up: bool = True) -> Turns:
-    """Time works in turn: A B A B ...; unless `warm_up` is false, each is called once before."""
+def take_turns(
+    works: Sequence[Work], n_rounds: int, warm_up: bool = True, in_a_row: int = 1
+) -> Turns:
+    """Time works in turn: A B A B ...; unless `warm_up` is false, each is called once before.
+
+    Works of a millisecond push each other out of the processor's cache. With `in_a_row` a round has
+    so many calls of each, one after the other, and their median counts.
+    """
     if warm_up:
         for work in works:
             work()
-    return Turns(np.array([[seconds(work) for work in works] for _ in range(n_rounds)]))
+    rounds = [
+        [np.median([seconds(work) for _ in range(in_a_row)]) for work in works]
+        for _ in range(n_rounds)
+    ]
+    return Turns(np.array(rounds))
 
 
 def growth_exponent(sizes: Sequence[float], turns: Turns) -> float:

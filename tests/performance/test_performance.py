@@ -63,6 +63,9 @@ def test_works_take_turns():
     assert "".join(calls) == "ab" * 4
     assert turns.rounds.shape == (3, 2)
     assert (turns.rounds > 0).all()
+    calls.clear()
+    take_turns([lambda: calls.append("a"), lambda: calls.append("b")], 2, False, in_a_row=3)
+    assert "".join(calls) == "aaabbb" * 2
 
 
 def test_time_is_measured_in_seconds():

@@ -210,7 +210,7 @@ def next_view(
     (now,), (after,) = alike.expected_error_deg(belief[None], **affinity, share=share)
     # From the frame of the first view to that of the last one.
     last = rotations_deg[-1]
-    error = after[(np.arange(n_bins) + round(last / width)) % n_bins]
+    error = np.roll(after, -round(last / width)) if last else after
     taken = tuple(rotation - last for rotation in rotations_deg)
     if allowed_deg is None:
         rotation_deg, expected, places = bins_deg(n_bins), error, np.arange(n_bins)

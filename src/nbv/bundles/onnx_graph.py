@@ -75,13 +75,10 @@ def onnx_model(bundle: Bundle) -> ModelProto:
     here = node("Relu", [linear("2", "wide")], "hidden")
     here = linear("4", "logits" if plane is None else "outputs")
     if plane is not None:
-        both = node("Reshape", [here, whole("pairs", 2, -1, n_classes)], "both")
-        own, other = (
-            node("Gather", [both, constant(f"place_{name}", np.array(place))], name, axis=0)
-            for place, name in enumerate(("own", "other"))
-        )
+        # As many of either.
+        nodes.append(helper.make_node("Split", [here], ["own", "other"], axis=0))
         backwards = whole("classes", *mirrored_classes(n_classes, plane).tolist())
-        node("Mean", [own, node("Gather", [other, backwards], "turned", axis=1)], "logits")
+        node("Mean", ["own", node("Gather", ["other", backwards], "turned", axis=1)], "logits")
     graph = helper.make_graph(
         nodes,
         f"nbv {bundle.category}",

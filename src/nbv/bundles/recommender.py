@@ -322,8 +322,10 @@ def _unfamiliar(unfamiliar: float) -> tuple[str, ...]:
 
 
 def _other_elevation(bundle: Bundle, elevation_deg: float | None) -> tuple[str, ...]:
+    if elevation_deg is None:
+        return ()
     known = bundle.elevation_deg[np.isfinite(bundle.elevation_deg)]
-    if elevation_deg is None or not len(known):
+    if not len(known):
         return ()
     least, most = float(known.min()), float(known.max())
     if least - ELEVATION_BANDWIDTH_DEG <= elevation_deg <= most + ELEVATION_BANDWIDTH_DEG:

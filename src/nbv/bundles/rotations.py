@@ -75,15 +75,11 @@ def best_rotations(
     rise = cost[following] - cost
     beaten = is_near & (rise < 0)
     beaten[following] |= is_near & (rise > 0)
-    places = np.flatnonzero(~beaten)
-    travel = np.abs(rotation_deg)
-    order = places[np.lexsort((rotation_deg[places] % 360.0, travel[places], cost[places]))]
+    left = zip(cost[~beaten].tolist(), rotation_deg[~beaten].tolist(), strict=True)
     found: list[tuple[float, float]] = []
-    for rotation, of_rotation in zip(
-        rotation_deg[order].tolist(), cost[order].tolist(), strict=True
-    ):
+    for of_rotation, rotation in sorted(left, key=lambda one: (one[0], abs(one[1]), one[1] % 360)):
         apart = (abs(rotation - other) for other, _ in found)
-        if all(min(angle, 360.0 - angle) >= MIN_SEPARATION_DEG for angle in apart):
+        if all(MIN_SEPARATION_DEG <= angle <= 360.0 - MIN_SEPARATION_DEG for angle in apart):
             found.append((rotation, of_rotation))
         if len(found) > N_ALTERNATIVES:
             break

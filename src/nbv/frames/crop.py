@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,8 +120,7 @@ def crop_frame(
     _need_plausible(distance_m, extent, diagonal_m, extent_m)
     # A pixel covers the same length on the object's middle as in training.
     away_m = distance_m + BEHIND_SURFACE * diagonal_m
-    grid = np.arange(camera.image_side) + 0.5 - camera.image_side / 2
-    grid *= pixel_step(camera) * diagonal_m / away_m
+    grid = _middles(camera.image_side) * (pixel_step(camera) * diagonal_m / away_m)
     # Rays of a camera that is directed at the object, in the frame of the one that is not, and from
     # there to its pixels: homogeneous coordinates in the window with a border of one pixel.
     to_pixels = np.array(
@@ -142,6 +142,12 @@ def crop_frame(
     right_m, down_m, ahead_m = (away_m * turn[2]).tolist()
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
     return Crop(codes, distance_m, extent, centre_m, intrinsics.doubts(*window.frame_shape))
+
+
+@cache
+def _middles(side: int) -> NDArray[np.float64]:
+    """Return the middles of a crop's pixels, from the middle of the crop, pixels."""
+    return np.arange(side, dtype=np.float64) + 0.5 - side / 2
 
 
 def _places(position: NDArray[np.float64], length: int) -> NDArray[np.intp]:
@@ -262,6 +268,8 @@ def _need_inside(
     top: int, bottom: int, left: int, right: int, shape: tuple[int, ...], intrinsics: Intrinsics
 ) -> None:
     rows, columns = shape
+    if top > 0 and left > 0 and bottom < rows - 1 and right < columns - 1:
+        return
     view = math.degrees(2 * math.atan(max(columns / intrinsics.fx, rows / intrinsics.fy) / 2))
     sides = {"top": top == 0, "bottom": bottom == rows - 1}
     sides |= {"left": left == 0, "right": right == columns - 1}

@@ -132,15 +132,19 @@ def object_mask(
         raise FrameError(
             "empty-mask", f"{np.count_nonzero(inside)} pixels of the object have a depth; need 30"
         )
-    return _without_islands(inside)
+    if mask is not None:
+        return _without_islands(inside)
+    # Most of a frame is not the object.
+    _, place = window_of(inside)
+    found = np.zeros_like(inside)
+    found[place] = _without_islands(inside[place])
+    return found
 
 
 def _without_islands(inside: Mask) -> Mask:
-    # Parts are looked for where there are any: most of a frame is not the object.
-    _, place = window_of(inside)
     # In the numbers of an index, so that they need not be converted to such below.
-    parts = np.empty(inside[place].shape, dtype=np.int64)
-    if ndimage.label(inside[place], _EIGHT, output=parts) == 1:
+    parts = np.empty(inside.shape, dtype=np.int64)
+    if ndimage.label(inside, _EIGHT, output=parts) == 1:
         return inside
     sizes = np.bincount(parts.ravel())
     sizes[0] = 0
@@ -151,9 +155,7 @@ def _without_islands(inside: Mask) -> Mask:
             "two-objects",
             f"two separate parts of {first} and {second} pixels: mask one of them",
         )
-    kept = np.zeros_like(inside)
-    kept[place] = (sizes >= max(ISLAND * largest, 1))[parts]
-    return kept
+    return np.asarray((sizes >= max(ISLAND * largest, 1))[parts])
 
 
 def _size(shape: tuple[int, ...]) -> str:
