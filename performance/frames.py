@@ -63,7 +63,7 @@ def _in_memory(bundle: Bundle, frame: Frame, n_rounds: int) -> list[Figure]:
             frame.depth_m, mask=frame.mask, intrinsics=frame.intrinsics
         )
 
-    # A robot has one frame after the other, and no forward pass with torch in between.
+    # In turn, they push each other out of the processor's cache.
     turns = {
         backend: take_turns([answer(backend), forward], n_rounds, in_a_row=IN_A_ROW)
         for backend in FRAME_MS

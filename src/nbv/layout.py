@@ -148,13 +148,13 @@ class Layout:
         """
         return f"{self.root}/bundles{variant}/{category}.{kind}"
 
-    def bundle_depth(self, category: str, elevation: int | str, without: str = "") -> str:
+    def bundle_depth(self, category: str, elevation: int | str, variant: str = "") -> str:
         """Return the randomised depth images that a bundle learns from."""
-        return f"{self.root}/bundles{without}/depth/{unit_folder(category, elevation)}.npy"
+        return f"{self.root}/bundles{variant}/depth/{unit_folder(category, elevation)}.npy"
 
-    def bundle_objects(self, category: str, elevation: int | str, without: str = "") -> str:
+    def bundle_objects(self, category: str, elevation: int | str, variant: str = "") -> str:
         """Return the ids of the objects in `bundle_depth`, in their order."""
-        return f"{self.root}/bundles{without}/depth/{unit_folder(category, elevation)}_objects.json"
+        return f"{self.root}/bundles{variant}/depth/{unit_folder(category, elevation)}_objects.json"
 
     def bundle_estimator(self, category: str, variant: str = "") -> str:
         """Return the network of a bundle, trained over all elevations."""

@@ -232,6 +232,19 @@ def test_calibration_sees_the_weights_that_a_bundle_keeps(rng):
     assert not np.allclose(turn.logits, full, rtol=0, atol=1e-5)
 
 
+@pytest.mark.parametrize("step", [1, 5, 7])
+def test_a_step_leaves_views_out_of_a_turn_and_nothing_else(bundle, rng, step):
+    images = DepthImages(("a", "b"), random_codes(rng, 70).reshape(2, 35, SIDE, SIDE))
+    network = network_with("numpy", bundle)
+    whole, *_ = turns_of(network, [images], [30.0], ["b", "a"])
+    some, *_ = turns_of(network, [images], [30.0], ["b", "a"], step)
+    for all_of_it, part in zip(whole, some, strict=True):
+        assert part.object_id == all_of_it.object_id
+        assert np.array_equal(part.azimuth_deg, all_of_it.azimuth_deg[::step])
+        assert np.array_equal(part.codes, all_of_it.codes[::step])
+        assert part.logits == pytest.approx(all_of_it.logits[::step], abs=1e-4)
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_the_background_is_0_and_the_reference_is_1(bundle, backend):
     """An image of one code is a constant input: 0, 1 and 255 / 128."""

@@ -224,8 +224,9 @@ def test_what_ingredients_bring_is_the_difference_of_the_kept_errors(page):
             own, with_all = (
                 errors.loc["generated", choice, n_views, one] for one in (name, "nothing")
             )
-            wanted = f"{own.to_numpy().mean():.1f}"
-            assert cell == (wanted if name == "nothing" else f"+{shown(own - with_all)}")
+            change = shown(own - with_all)
+            signed = change if change.startswith(("−", "0.0")) else f"+{change}"
+            assert cell == (f"{own.to_numpy().mean():.1f}" if name == "nothing" else signed)
         recordings = [(place, *view) for place in ("level", "from above") for view in views]
         for cell, (place, choice, n_views) in zip(real[name], recordings, strict=True):
             own = errors.loc["real", choice, n_views, name, place]

@@ -68,6 +68,13 @@ def test_works_take_turns():
     assert "".join(calls) == "aaabbb" * 2
 
 
+def test_of_calls_in_a_row_the_median_counts(monkeypatch):
+    times = iter([1.0, 9.0, 2.0, 5.0, 5.0, 50.0])
+    monkeypatch.setattr("performance.timing.seconds", lambda work: next(times))
+    turns = take_turns([lambda: None, lambda: None], 1, False, in_a_row=3)
+    assert turns.rounds.tolist() == [[2.0, 5.0]]
+
+
 def test_time_is_measured_in_seconds():
     turns = take_turns([lambda: time.sleep(0.02), lambda: time.sleep(0.01)], 2, warm_up=False)
     assert (turns.rounds.min(axis=0) >= [0.02, 0.01]).all()

@@ -34,7 +34,7 @@ with job(snakemake):
         objects_with_role(splits, params.fold, role) for role in ("calibration", "test")
     )
     network = kept_network(estimator)
-    # A view every 15 degrees, as on a turntable.
+    # Of 360 views one every 15 degrees, as on a turntable.
     of_turntable = 15
     plain, *_ = turns_of(network, images, params.elevations, calibration, of_turntable)
     plane_deg = find_mirror_plane(network, plain)

@@ -13,12 +13,15 @@ from nbv.angles import signed_difference_deg
 from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import FAMILIAR_SHARE, unfamiliarity
-from nbv.bundles.turns import ENOUGH_VIEWS, Turn
+from nbv.bundles.turns import Turn
 from nbv.calibration.pairs import WIDEST_GAP_DEG, full_turn, widest_gap_deg
 from nbv.calibration.posteriors import LEAST_PROBABILITY, fit_temperature
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.density_selection import chosen_lookup
+
+ENOUGH_VIEWS = 24
+"""Of a turn, to fit one number by: neighbouring views say the same."""
 
 LEAST_LIMIT = 0.5
 """Of unfamiliarity, where a camera's own frames are all very familiar."""

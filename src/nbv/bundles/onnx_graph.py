@@ -75,7 +75,7 @@ def onnx_model(bundle: Bundle) -> ModelProto:
     here = node("Relu", [linear("2", "wide")], "hidden")
     here = linear("4", "logits" if plane is None else "outputs")
     if plane is not None:
-        # As many of either.
+        # The first half are of the images, the second half of their mirror images.
         nodes.append(helper.make_node("Split", [here], ["own", "other"], axis=0))
         backwards = whole("classes", *mirrored_classes(n_classes, plane).tolist())
         node("Mean", ["own", node("Gather", ["other", backwards], "turned", axis=1)], "logits")

@@ -61,6 +61,7 @@ def best_rotations(
     rotation_deg : ndarray (m,)
         In (-180, 180], by their place in [0, 360).
     cost : ndarray (m,)
+        No NaN.
     width : float
         Of a bin, degrees.
 

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-ENOUGH_VIEWS = 24
-"""Of a turn, to fit one number by: neighbouring views say the same."""
-
 
 @dataclass(frozen=True)
 class Turn:

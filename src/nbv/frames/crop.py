@@ -147,7 +147,9 @@ def crop_frame(
 @cache
 def _middles(side: int) -> NDArray[np.float64]:
     """Return the middles of a crop's pixels, from the middle of the crop, pixels."""
-    return np.arange(side, dtype=np.float64) + 0.5 - side / 2
+    middles = np.arange(side, dtype=np.float64) + 0.5 - side / 2
+    middles.flags.writeable = False
+    return middles
 
 
 def _places(position: NDArray[np.float64], length: int) -> NDArray[np.intp]:

@@ -134,7 +134,7 @@ def object_mask(
         )
     if mask is not None:
         return _without_islands(inside)
-    # Most of a frame is not the object.
+    # Most of a frame is not the object. (Where there is a mask, the caller has cut out its window.)
     _, place = window_of(inside)
     found = np.zeros_like(inside)
     found[place] = _without_islands(inside[place])

@@ -82,14 +82,14 @@ def ingredient_table(rendered: Mapping[Key, Replicates], real: Mapping[Key, Repl
 def _over(n_trainings: int) -> str:
     if n_trainings == 1:
         return "over objects; one training each, whose chance the interval does not contain"
-    return f"over objects and {n_trainings} trainings"
+    return f"over objects and {counted(n_trainings, 'training')} of the same images"
 
 
 def _real_note(n_trainings: int) -> str:
     note = "Real: MAE on recordings with known azimuths"
     if n_trainings == 1:
         return f"{note}."
-    return f"{note}, the mean over {counted(n_trainings, 'training')}, and the least and greatest."
+    return f"{note}, the mean over the trainings, and the least and greatest."
 
 
 def _titles(what: str) -> Iterator[str]:
