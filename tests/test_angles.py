@@ -32,6 +32,8 @@ def test_wrapping_is_the_remainder_bit_for_bit(angle, turns):
     remainder = np.mod(angles_deg, 360.0)
     expected = np.where(remainder >= 360.0, 0.0, remainder)
     assert angles.wrap_deg(angles_deg).tobytes() == expected.tobytes()
+    one_by_one = np.stack([angles.wrap_deg(float(each)) for each in angles_deg])
+    assert one_by_one.tobytes() == expected.tobytes()
 
 
 @pytest.mark.parametrize("angle", [-1e-17, 360.0, 720.0, -360.0])

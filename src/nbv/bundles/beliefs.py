@@ -28,10 +28,10 @@ def turned(rows: NDArray[np.floating], turn_deg: ArrayLike) -> NDArray[np.float6
 
     Exact for whole bins; linear in between. ``turn_deg`` is one for all, or one for each row.
     """
+    if isinstance(turn_deg, float) and turn_deg == 0.0:  # a single frame, mostly
+        return np.asarray(rows, dtype=np.float64)
     n_bins = rows.shape[-1]
     place = np.asarray(turn_deg, dtype=np.float64) * (n_bins / 360.0)
-    if not place.any():  # a single frame, mostly; the zeros give the sum its shape
-        return np.asarray(rows + place[..., None])
     below = np.floor(place)
     part = (place - below)[..., None]
     index = (np.arange(n_bins) + below.astype(np.intp)[..., None]) % n_bins
@@ -49,6 +49,8 @@ def fused(
 
     ``rotations_deg`` are those from the first view to each one.
     """
+    if len(distributions) == 1:
+        return np.asarray(turned(distributions[0], rotations_deg[0]), dtype=np.float64)
     total = _log_product(distributions, rotations_deg)
     product = np.exp(total - total.max())
     return np.asarray(product / product.sum())

@@ -59,11 +59,14 @@ def crop_features(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
     across = min(CELLS, side)
     step = side // across
     in_cell = _cells(side, across)
-    seen, depth = (in_cell.T @ image.astype(np.float32) @ in_cell for image in (codes > 0, codes))
+    images = np.empty((n, 2, side, side), dtype=np.float32)
+    images[:, 0], images[:, 1] = codes > 0, codes
+    features: NDArray[np.float32] = np.matmul(np.matmul(in_cell.T, images), in_cell)
+    seen, depth = features[:, 0], features[:, 1]
     depth -= np.float32(ZERO_CODE) * seen
     depth /= np.maximum(seen, 1)
-    share = np.float32(ZERO_CODE / step**2) * seen
-    return np.concatenate([share.reshape(n, -1), depth.reshape(n, -1)], axis=1)
+    seen *= np.float32(ZERO_CODE / step**2)
+    return features.reshape(n, -1)
 
 
 @cache
@@ -116,7 +119,7 @@ def unfamiliarity(
     negative log of the sum of exponentials of the logits (Liu et al., 2020); the distance is that
     to the third nearest reference (Sun et al., 2022).
     """
-    places = ((crop_features(codes) - known.mean) @ known.basis).astype(np.float32)
+    places = np.matmul(crop_features(codes) - known.mean, known.basis)
     distances = _to_neighbour(squared_distances(places, known.references, known.squares))
     sums = _in_scales(distances, energy(logits), known.scales)
     return np.maximum(sums, 0.0) / known.threshold
@@ -151,5 +154,5 @@ def _to_neighbour(apart: NDArray[np.float32]) -> NDArray[np.float64]:
 def _in_scales(
     distances: NDArray[np.float64], energies: NDArray[np.float64], scales: NDArray[np.float32]
 ) -> NDArray[np.float64]:
-    (near, spread), (low, width) = scales.astype(np.float64)
+    (near, spread), (low, width) = scales.tolist()
     return np.asarray((distances - near) / spread + (energies - low) / width)

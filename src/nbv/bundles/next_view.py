@@ -213,11 +213,9 @@ def next_view(
     error = np.roll(after, -round(last / width)) if last else after
     taken = tuple(rotation - last for rotation in rotations_deg)
     if allowed_deg is None:
-        rotation_deg, expected, places = bins_deg(n_bins), error, np.arange(n_bins)
-        is_free = _free_bins(n_bins, taken)
+        rotation_deg, is_free = bins_deg(n_bins), _free_bins(n_bins, taken)
     else:
         rotation_deg = as_allowed(allowed_deg)
-        expected, places = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
         is_free = _is_free(rotation_deg, taken)
     is_allowed = is_free & (np.abs(rotation_deg) <= max_travel_deg)
     if not is_allowed.any() and _free_bins(n_bins, taken).any():
@@ -226,12 +224,16 @@ def next_view(
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
         )
     rotation_deg = rotation_deg[is_allowed]
+    if allowed_deg is None:
+        expected, error_after_deg = error[is_allowed], np.where(is_allowed, error, np.inf)
+    else:
+        expected, places = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
+        error_after_deg = np.full(n_bins, np.inf)
+        error_after_deg[places] = error[places]
     moves = [
         Move(rotation, abs(rotation), error_deg)
-        for rotation, error_deg in best_rotations(rotation_deg, expected[is_allowed], width)
+        for rotation, error_deg in best_rotations(rotation_deg, expected, width)
     ]
-    error_after_deg = np.full(n_bins, np.inf)
-    error_after_deg[places[is_allowed]] = error[places[is_allowed]]
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
     return Recommendation(

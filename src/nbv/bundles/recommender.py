@@ -308,8 +308,10 @@ class Recommender:
 
 def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float64]:
     """Return how much each calibration turn (S,) counts for frames of an elevation, or of any."""
-    known = float("nan") if elevation_deg is None else elevation_deg
-    return bundle.turn_weight * elevation_share(bundle.elevation_deg, known)
+    weight = np.asarray(bundle.turn_weight, dtype=np.float64)
+    if elevation_deg is None:
+        return weight
+    return weight * elevation_share(bundle.elevation_deg, elevation_deg)
 
 
 def _unfamiliar(unfamiliar: float) -> tuple[str, ...]:

@@ -71,12 +71,14 @@ def best_rotations(
         Of equal costs the one of less travel first; all are `MIN_SEPARATION_DEG` or more apart, and
         there are at most `N_ALTERNATIVES` after the first.
     """
-    following = np.arange(1, len(cost) + 1) % len(cost)
-    is_near = (rotation_deg[following] - rotation_deg) % 360.0 <= width + 1e-9
-    rise = cost[following] - cost
-    beaten = is_near & (rise < 0)
-    beaten[following] |= is_near & (rise > 0)
-    left = zip(cost[~beaten].tolist(), rotation_deg[~beaten].tolist(), strict=True)
+    gap = np.concatenate([rotation_deg[1:], rotation_deg[:1]]) - rotation_deg
+    rise = np.concatenate([cost[1:], cost[:1]]) - cost
+    is_near = gap % 360.0 <= width + 1e-9
+    beaten, beats = is_near & (rise < 0), is_near & (rise > 0)
+    beaten[1:] |= beats[:-1]
+    beaten[:1] |= beats[-1:]
+    places = np.flatnonzero(~beaten)
+    left = zip(cost[places].tolist(), rotation_deg[places].tolist(), strict=True)
     found: list[tuple[float, float]] = []
     for of_rotation, rotation in sorted(left, key=lambda one: (one[0], abs(one[1]), one[1] % 360)):
         apart = (abs(rotation - other) for other, _ in found)

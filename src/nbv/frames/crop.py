@@ -33,6 +33,8 @@ CROPPED_DEG = 25.0
 NEAREST, FARTHEST = 1.5, 20.0
 """Distances that are plausible, in diagonals."""
 
+_Axis = tuple[float, float, float]
+
 # Diagonals: a limit of depth beyond it is none.
 _NO_LIMIT = 100.0
 
@@ -112,8 +114,9 @@ def crop_frame(
     left, right = window.left + seen.left, window.left + of_columns.stop - 1
     _need_inside(top, bottom, left, right, window.frame_shape, intrinsics)
     middle = (left + right + 1) / 2, (top + bottom + 1) / 2
-    turn, principal = _facing(intrinsics, *middle)
-    distance_m = float(median_depth(depth_m[mask])) / turn[2, 2]
+    axes, principal = _facing(intrinsics, *middle)
+    towards = axes[2]
+    distance_m = float(median_depth(depth_m[mask])) / towards[2]
     width_m = (right - left + 1) * distance_m / intrinsics.fx
     height_m = (bottom - top + 1) * distance_m / intrinsics.fy
     extent = math.hypot(width_m, height_m)
@@ -121,17 +124,13 @@ def crop_frame(
     # A pixel covers the same length on the object's middle as in training.
     away_m = distance_m + BEHIND_SURFACE * diagonal_m
     grid = _middles(camera.image_side) * (pixel_step(camera) * diagonal_m / away_m)
-    # Rays of a camera that is directed at the object, in the frame of the one that is not, and from
-    # there to its pixels: homogeneous coordinates in the window with a border of one pixel.
-    to_pixels = np.array(
-        [
-            [intrinsics.fx, 0.0, principal[0] - window.left + 1.0],
-            [0.0, intrinsics.fy, principal[1] - window.top + 1.0],
-            [0.0, 0.0, 1.0],
-        ]
-    )
+    # Rays of a camera that is directed at the object are sums of its axes. These become pixels of
+    # the window with a border of one pixel, in homogeneous coordinates.
+    column, row = principal[0] - window.left + 1.0, principal[1] - window.top + 1.0
+    pixels = ((intrinsics.fx * x + column * z, intrinsics.fy * y + row * z, z) for x, y, z in axes)
     across, below, ahead = (
-        (grid * x + z) + (grid * y)[:, None] for x, y, z in (to_pixels @ turn.T).tolist()
+        (grid * right + onward) + (grid * down)[:, None]
+        for right, down, onward in zip(*pixels, strict=True)
     )
     # What lies outside the window has no depth, as its border here.
     measured = np.zeros((rows + 2, columns + 2), dtype=np.float32)
@@ -139,7 +138,7 @@ def crop_frame(
     places = _places(below / ahead, rows) * (columns + 2) + _places(across / ahead, columns)
     depth = measured.take(places) / (diagonal_m * ahead)
     codes = encode_depth(depth[None].astype(np.float32), camera)[0]
-    right_m, down_m, ahead_m = (away_m * turn[2]).tolist()
+    right_m, down_m, ahead_m = (away_m * part for part in towards)
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
     return Crop(codes, distance_m, extent, centre_m, intrinsics.doubts(*window.frame_shape))
 
@@ -163,14 +162,14 @@ def _places(position: NDArray[np.float64], length: int) -> NDArray[np.intp]:
 
 def _facing(
     intrinsics: Intrinsics, column: float, row: float
-) -> tuple[NDArray[np.float64], tuple[float, float]]:
-    """Return the axes (3, 3) of a camera directed at a place of the image, and the principal point.
+) -> tuple[tuple[_Axis, _Axis, _Axis], tuple[float, float]]:
+    """Return the axes of a camera directed at a place of the image, and the principal point.
 
-    The axes are rows, in the camera's own frame. It is turned by the shortest rotation. Where the
-    principal point is not known, the camera is taken to be directed there.
+    The axes are right, down and ahead, in the camera's own frame. It is turned by the shortest
+    rotation. Where the principal point is not known, the camera is taken to be directed there.
     """
     if intrinsics.cx is None or intrinsics.cy is None:
-        return np.eye(3), (column, row)
+        return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (column, row)
     # In files, whole numbers are the middles of pixels.
     principal = intrinsics.cx + 0.5, intrinsics.cy + 0.5
     x, y = (column - principal[0]) / intrinsics.fx, (row - principal[1]) / intrinsics.fy
@@ -178,12 +177,12 @@ def _facing(
     right, down = x * ahead, y * ahead
     # Rodrigues' formula for the shortest rotation from (0, 0, 1) to (right, down, ahead).
     share = 1.0 / (1.0 + ahead)
-    turn = [
-        [1.0 - right**2 * share, -right * down * share, -right],
-        [-right * down * share, 1.0 - down**2 * share, -down],
-        [right, down, ahead],
-    ]
-    return np.array(turn), principal
+    axes = (
+        (1.0 - right**2 * share, -right * down * share, -right),
+        (-right * down * share, 1.0 - down**2 * share, -down),
+        (right, down, ahead),
+    )
+    return axes, principal
 
 
 def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:

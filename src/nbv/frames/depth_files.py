@@ -152,7 +152,9 @@ def to_metres(
         raise UserError(f"{name} holds {values.dtype}, no numbers")
     # What overflows is as far away as what is infinite: nothing was measured.
     with np.errstate(invalid="ignore", over="ignore"):
-        metres = values.astype(np.float32) * np.float32(scale)
+        metres = values.astype(np.float32)
+        if scale != 1.0:
+            metres *= np.float32(scale)
         return np.where(np.isfinite(metres) & (metres > 0), metres, np.float32(0))
 
 

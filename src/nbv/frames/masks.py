@@ -95,7 +95,7 @@ def object_mask(
         Where mask and frame have different sizes, or the limits are no range.
     """
     inside = depth_m > 0
-    if not inside.any():
+    if not np.count_nonzero(inside):
         raise FrameError(
             "empty-mask",
             "the frame has no depth at all, no number above 0: is the sensor covered, or too near?",
@@ -113,10 +113,10 @@ def object_mask(
             raise UserError(
                 f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}"
             )
-        if not given.any():
+        if not (n_given := np.count_nonzero(given)):
             raise FrameError("empty-mask", "the mask has no pixel")
         inside &= given
-        if (share := np.count_nonzero(inside) / np.count_nonzero(given)) < LEAST_MEASURED:
+        if (share := np.count_nonzero(inside) / n_given) < LEAST_MEASURED:
             raise FrameError(
                 "little-depth", f"only {share:.0%} of the mask's pixels have a depth; need 30 %"
             )
@@ -146,16 +146,15 @@ def _without_islands(inside: Mask) -> Mask:
     parts = np.empty(inside.shape, dtype=np.int64)
     if ndimage.label(inside, _EIGHT, output=parts) == 1:
         return inside
-    sizes = np.bincount(parts.ravel())
-    sizes[0] = 0
-    largest = sizes.max()
-    if np.count_nonzero(sizes >= SECOND_OBJECT * largest) > 1:
-        first, second = np.sort(sizes)[:-3:-1]
+    # In Python: mostly a few numbers, for which numpy takes longer.
+    _, *sizes = np.bincount(parts.ravel()).tolist()
+    second, largest = sorted(sizes)[-2:]
+    if second >= SECOND_OBJECT * largest:
         raise FrameError(
             "two-objects",
-            f"two separate parts of {first} and {second} pixels: mask one of them",
+            f"two separate parts of {largest} and {second} pixels: mask one of them",
         )
-    return np.asarray((sizes >= max(ISLAND * largest, 1))[parts])
+    return np.asarray(np.array([False, *(size >= ISLAND * largest for size in sizes)])[parts])
 
 
 def _size(shape: tuple[int, ...]) -> str:

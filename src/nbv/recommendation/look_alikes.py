@@ -167,7 +167,7 @@ class LookAlikes:
     @property
     def errors_deg(self) -> Table:
         """`error_after_deg` of the turns, at rotations that are `compared_step` bins apart."""
-        return self._errors[:, :, :-1]
+        return self._errors[:, :, :-2]
 
     @property
     def error_now_deg(self) -> Table:
@@ -200,11 +200,11 @@ class LookAlikes:
         compared = _joined(np.asarray(beliefs, dtype=np.float32), self._step)
         weight = self._roots @ np.sqrt(compared).T
         weight **= power
-        weight *= (of_turn * (360.0 / n_first)).astype(np.float32)[:, None, None]
-        total = weight.sum(axis=(0, 1), dtype=np.float64) + pseudo_observations
+        # A first view stands for the degrees that it is apart from the next one.
+        of_view = of_turn * (360.0 / n_first)
         prior = pseudo_observations / (of_turn.sum() * n_first)
-        errors = _weighted(weight, self._errors) + prior * (of_turn @ self._errors_by_turn)
-        errors /= total[:, None]
+        sums = _weighted(weight, of_view, self._errors) + prior * (of_turn @ self._errors_by_turn)
+        errors = sums[:, :-1] / sums[:, -1:]
         return errors[:, -1], _between_steps(errors[:, :-1], self._step)
 
     @property
@@ -221,9 +221,10 @@ class LookAlikes:
 
     @cached_property
     def _errors(self) -> Table:
-        """The errors after each rotation and, last, the error now: (S, K, m + 1)."""
+        """The errors after each rotation, the error now, and 1 to count views: (S, K, m + 2)."""
         after = error_after_deg(self.so_far, self.views, self.first, self._step)
-        return np.concatenate([after, self.error_now_deg[:, :, None]], axis=2)
+        now = self.error_now_deg[:, :, None]
+        return np.concatenate([after, now, np.ones_like(now)], axis=2)
 
     @cached_property
     def _errors_by_turn(self) -> NDArray[np.float64]:
@@ -250,8 +251,10 @@ def _interpolation(n_steps: int, step: int) -> NDArray[np.float64]:
     return between.reshape(n_steps, -1)
 
 
-def _weighted(weight: Table, errors_deg: Table) -> NDArray[np.float64]:
-    """Return the sums (n, m) of errors (S, K, m) by weights (S, K, n).
+def _weighted(
+    weight: Table, of_view: NDArray[np.float64], errors_deg: Table
+) -> NDArray[np.float64]:
+    """Return the sums (n, m) of errors (S, K, m) by weights (S, K, n) and those of a turn (S,).
 
     Those of a single belief turn by turn: the threads of a matrix library wait for each other where
     other programs hold the cores, and take no part in small products. All at once took 16 ms then.
@@ -259,6 +262,7 @@ def _weighted(weight: Table, errors_deg: Table) -> NDArray[np.float64]:
     n = weight.shape[2]
     if n == 1:
         parts = np.matmul(weight.transpose(0, 2, 1), errors_deg)
-        return np.asarray(parts.sum(axis=0, dtype=np.float64))
+        return np.asarray((of_view @ parts[:, 0])[None])
+    weight *= of_view.astype(np.float32)[:, None, None]
     rows, table = (each.reshape(-1, each.shape[2]) for each in (weight, errors_deg))
     return np.asarray(rows.T @ table, dtype=np.float64)
