@@ -77,12 +77,12 @@ def best_rotations(
     beaten, beats = is_near & (rise < 0), is_near & (rise > 0)
     beaten[1:] |= beats[:-1]
     beaten[:1] |= beats[-1:]
-    places = np.flatnonzero(~beaten)
+    (places,) = (~beaten).nonzero()
     left = zip(cost[places].tolist(), rotation_deg[places].tolist(), strict=True)
+    least, most = MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG
     found: list[tuple[float, float]] = []
     for of_rotation, rotation in sorted(left, key=lambda one: (one[0], abs(one[1]), one[1] % 360)):
-        apart = (abs(rotation - other) for other, _ in found)
-        if all(MIN_SEPARATION_DEG <= angle <= 360.0 - MIN_SEPARATION_DEG for angle in apart):
+        if all(least <= abs(rotation - other) <= most for other, _ in found):
             found.append((rotation, of_rotation))
         if len(found) > N_ALTERNATIVES:
             break

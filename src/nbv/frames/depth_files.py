@@ -142,9 +142,9 @@ def to_metres(
             f"--depth-scale={depth_scale:g}: give metres per unit, above 0 and at most "
             f"{_LARGEST_SCALE:g}; of millimetres 0.001"
         )
-    if np.issubdtype(values.dtype, np.floating):
+    if values.dtype.kind == "f":
         scale = 1.0 if depth_scale is None else depth_scale
-    elif np.issubdtype(values.dtype, np.integer):
+    elif values.dtype.kind in "iu":
         if values.dtype.itemsize == 1:
             raise FrameError("few-levels", f"{name} has 8 bits a pixel, and depth needs 16")
         scale = unit_m if depth_scale is None else depth_scale

@@ -46,7 +46,8 @@ def _reference(visible: Depths, camera: Camera) -> np.float32:
 def median_depth(visible: Depths) -> np.float32:
     """Return the median of depths (n,): that of numpy.median, in a sixth of its time."""
     low, high = (len(visible) - 1) // 2, len(visible) // 2
-    ordered = np.partition(visible, (low, high))
+    ordered = visible.copy()
+    ordered.partition((low, high))
     return np.float32((ordered[low] + ordered[high]) / 2)
 
 
