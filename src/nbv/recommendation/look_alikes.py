@@ -22,10 +22,11 @@ COMPARED_DEG = 6.0
 Half as much is read for a frame then as in bins of 3 degrees.
 """
 
-MOST_COMPARED = 8000
+MOST_COMPARED = 4000
 """First views at most that a belief is compared with: neighbours are alike.
 
 The tables of all 15,000 views of 125 turns are much larger than the cache of a processor's core.
+How many are enough: docs/reference/bundles/README.md.
 """
 
 FLAT = 1e-5
