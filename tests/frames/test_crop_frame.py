@@ -308,6 +308,13 @@ def refused(name: str, *arguments, **options) -> str:
 WIDE, NARROW = Intrinsics(150.0, 150.0), Intrinsics(200.0, 200.0)
 
 
+def test_a_mask_without_a_pixel_is_called_empty():
+    nothing = np.zeros((60, 80), dtype=bool)
+    with pytest.raises(FrameError, match="no pixel") as error:
+        crop_frame(np.ones((60, 80), np.float32), nothing, WIDE, TRAINING, DIAGONAL_M)
+    assert error.value.name == "empty-mask"
+
+
 @pytest.mark.parametrize(
     ("row", "column", "border"),
     [(19, 40, "top"), (40, 40, "bottom"), (30, 19, "left"), (30, 60, "right")],

@@ -104,12 +104,15 @@ def crop_frame(
     Raises
     ------
     FrameError
-        ``mask-at-border``, ``other-resolution``, ``implausible-distance`` or ``implausible-size``.
+        ``empty-mask``, ``mask-at-border``, ``other-resolution``, ``implausible-distance`` or
+        ``implausible-size``.
     """
     rows, columns = depth_m.shape
     window = window or Window(0, 0, (rows, columns))
     intrinsics.need_resolution(*window.frame_shape)
     seen, (of_rows, of_columns) = window_of(mask)
+    if not of_rows.stop:
+        raise FrameError("empty-mask", "the mask has no pixel")
     top, bottom = window.top + seen.top, window.top + of_rows.stop - 1
     left, right = window.left + seen.left, window.left + of_columns.stop - 1
     _need_inside(top, bottom, left, right, window.frame_shape, intrinsics)
