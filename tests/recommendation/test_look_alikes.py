@@ -12,7 +12,13 @@ from nbv.recommendation.belief import Belief
 from nbv.recommendation.criteria.expected_error import expected_error
 from nbv.recommendation.evidence import evidence_of_distributions
 from nbv.recommendation.fusion import product
-from nbv.recommendation.look_alikes import LookAlikes, compared_step, error_after_deg, first_views
+from nbv.recommendation.look_alikes import (
+    LookAlikes,
+    compared_step,
+    error_after_deg,
+    first_views,
+    near_first_views,
+)
 
 SETTINGS = {"affinity": {"power": 5.0, "pseudo_observations": 30.0}}
 
@@ -40,11 +46,12 @@ def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Genera
         own = own * np.roll(distributions[1, (first + turn) % bins], -turn)
     own /= own.sum()
     assert alike.seen[1, first] == pytest.approx(own, rel=1e-4)
+    errors = error_after_deg(alike.so_far, alike.views)
     for turn in range(bins):
         other = distributions[1, (first + turn) % bins]
         pose = product(own, other, 15.0 * turn)
         wanted = circular_distance_deg(pose, 15.0 * first)
-        assert alike.errors_deg[1, first, turn] == pytest.approx(wanted, abs=0.05)
+        assert errors[1, first, turn] == pytest.approx(wanted, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -77,22 +84,46 @@ def test_without_a_limit_every_view_is_a_first_one() -> None:
     assert np.array_equal(first_views(3, 24), np.tile(np.arange(24), (3, 1)))
 
 
+@pytest.mark.parametrize(("n_bins", "most"), [(24, 500), (24, 40), (24, 12), (15, 15), (30, 3)])
+def test_errors_near_first_views_are_those_within_half_the_way(
+    rng: np.random.Generator, n_bins: int, most: int
+) -> None:
+    first = first_views(3, n_bins, most)
+    apart = n_bins // first.shape[1]
+    errors = rng.uniform(0, 180, (3, n_bins, 2)).astype(np.float32)
+    found = near_first_views(errors, first)
+    for turn, places in enumerate(first):
+        for row, place in enumerate(places):
+            # Half a bin at a time, so that a bin that two share is counted once by each.
+            ways = (2 * place + np.arange(-apart + 0.5, apart)) / 2
+            near = errors[turn, np.round(ways).astype(int) % n_bins]
+            assert found[turn, row] == pytest.approx(near.mean(axis=0), rel=1e-4)
+
+
+def test_all_errors_count_wherever_a_belief_is_compared(rng: np.random.Generator) -> None:
+    errors = rng.uniform(0, 180, (3, 24, 5)).astype(np.float32)
+    for most in (9, 12, 24, 36, 72):
+        found = near_first_views(errors, first_views(3, 24, most))
+        assert found.mean(axis=1) == pytest.approx(errors.mean(axis=1), rel=1e-5)
+
+
 def test_fewer_first_views_are_the_same_views(rng: np.random.Generator) -> None:
-    """Their errors, distributions and weights are those of the same views among all."""
+    """Their distributions and weights are those of the same views among all."""
     distributions, belief = turns(rng), turns(rng)[0, :2]
     everything = LookAlikes.of_views(distributions).after(5)
     fewer = LookAlikes.of_views(distributions, most=40).after(5)
     assert fewer.first.tolist() == [[k + 2 * n for n in range(12)] for k in (0, 1, 0)]
     rows = np.arange(3)[:, None], fewer.first
     assert np.array_equal(fewer.seen, everything.seen[rows])
-    assert fewer.errors_deg == pytest.approx(everything.errors_deg[rows], abs=1e-3)
+    errors = near_first_views(error_after_deg(fewer.so_far, fewer.views), fewer.first)
+    errors_now = near_first_views(fewer.error_now_deg[:, :, None], fewer.first)[:, :, 0]
     now, after = fewer.expected_error_deg(belief, 5.0, 30.0)
     for own, own_now, own_after in zip(belief, now, after, strict=True):
         weight = 30.0 * (np.sqrt(fewer.seen) @ np.sqrt(own)) ** 5.0
         weight += 30.0 / weight.size
         share = weight / weight.sum()
-        assert own_now == pytest.approx((share * everything.error_now_deg[rows]).sum(), rel=1e-4)
-        wanted = np.tensordot(share, everything.errors_deg[rows])
+        assert own_now == pytest.approx((share * errors_now).sum(), rel=1e-4)
+        wanted = np.tensordot(share, errors)
         assert own_after == pytest.approx(wanted, rel=1e-4)
 
 

@@ -26,7 +26,8 @@ def distributions_of(logits: NDArray[np.floating], temperature: float) -> NDArra
 def turned(rows: NDArray[np.floating], turn_deg: ArrayLike) -> NDArray[np.float64]:
     """Return p(theta + turn) as a function of theta, (..., B), of distributions (..., B).
 
-    Exact for whole bins; linear in between. ``turn_deg`` is one for all, or one for each row.
+    Exact for whole bins; linear in between. ``turn_deg`` is one for all, or one for each row. For
+    the number 0.0 the result may be the argument itself.
     """
     if isinstance(turn_deg, float) and turn_deg == 0.0:  # a single frame, mostly
         return np.asarray(rows, dtype=np.float64)
@@ -47,10 +48,11 @@ def fused(
 ) -> NDArray[np.float64]:
     """Return the product (B,) of the distributions (n, B) of views, in the frame of the first view.
 
-    ``rotations_deg`` are those from the first view to each one.
+    Of one view it is the view's own distribution, which must sum to 1. ``rotations_deg`` are those
+    from the first view to each one.
     """
     if len(distributions) == 1:
-        return np.asarray(turned(distributions[0], rotations_deg[0]), dtype=np.float64)
+        return turned(distributions[0], rotations_deg[0])
     total = _log_product(distributions, rotations_deg)
     product = np.exp(total - total.max())
     return np.asarray(product / product.sum())

@@ -67,10 +67,8 @@ def first_views(n_turns: int, n_bins: int, most: int | None = None) -> NDArray[n
     return np.arange(n_turns)[:, None] % apart + np.arange(0, n_bins, apart)
 
 
-def error_after_deg(
-    so_far: Table, views: Table, first: NDArray[np.intp] | None = None, step: int = 1
-) -> Table:
-    """Return the error of the product with further views, (S, K, B / step) float32, degrees.
+def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
+    """Return the error of the product with further views, (S, B, B / step) float32, degrees.
 
     With c of the views so far and c' of a further one, both from `in_object_frame`, the mean
     direction of the product is that of ``sum_u c(u) c'(u) exp(i u)``: one product of matrices for
@@ -78,12 +76,10 @@ def error_after_deg(
 
     Parameters
     ----------
-    so_far : ndarray (S, K, B)
+    so_far : ndarray (S, B, B)
         Of the fused views, by the first one.
     views : ndarray (S, B, B)
         Of single views.
-    first : ndarray (S, K), optional
-        The first views, in bins; all of them without it.
     step : int
         Further views are so many bins apart; a divisor of B.
 
@@ -92,15 +88,13 @@ def error_after_deg(
     ndarray
         ``[s, k, d]``: of first view k with a further view at the rotation ``step d``, in bins.
     """
-    n_turns, n_bins, _ = views.shape
-    if first is None:
-        first = first_views(n_turns, n_bins)
+    n_bins = views.shape[1]
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
     turned = views.transpose(0, 2, 1)
-    further = (first[:, :, None] + np.arange(0, n_bins, step)) % n_bins
+    further = (np.arange(n_bins)[:, None] + np.arange(0, n_bins, step)) % n_bins
 
     def of_pairs(rows: Table) -> Table:
-        return np.take_along_axis(np.matmul(rows, turned), further, axis=2)
+        return np.take_along_axis(np.matmul(rows, turned), further[None], axis=2)
 
     real = of_pairs(so_far * np.cos(angles).astype(np.float32))
     imaginary = of_pairs(so_far * np.sin(angles).astype(np.float32))
@@ -108,6 +102,28 @@ def error_after_deg(
     if any((_resultant_length(rows) < FLAT).any() for rows in (so_far, views)):
         error[np.hypot(real, imaginary) < FLAT * of_pairs(so_far)] = 90.0
     return error
+
+
+def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
+    """Return the mean errors (S, K, m) of all first views near each of some.
+
+    The further views are half as far away as the next of `first`; those that are as near to two of
+    them count half for each.
+
+    Parameters
+    ----------
+    errors_deg : ndarray (S, B, m)
+        By the first view.
+    first : ndarray (S, K)
+        In bins, B / K apart.
+    """
+    n_turns, n_bins, _ = errors_deg.shape
+    apart = n_bins // first.shape[1]
+    near = np.arange(-(apart // 2), apart // 2 + 1)
+    share = np.minimum(1.0, (apart + 1) / 2 - np.abs(near)).astype(np.float32) / np.float32(apart)
+    places = (first[:, :, None] + near) % n_bins
+    rows = errors_deg[np.arange(n_turns)[:, None, None], places]
+    return np.asarray(np.einsum("skum,u->skm", rows, share))
 
 
 def error_of_deg(so_far: Table) -> Table:
@@ -133,12 +149,13 @@ class LookAlikes:
 
     Attributes
     ----------
-    so_far : ndarray (S, K, B) float32
+    so_far : ndarray (S, B, B) float32
         Distributions of the fused views `in_object_frame`, by the first view; rows sum to 1.
     views : ndarray (S, B, B) float32
         The same of single views.
     first : ndarray (S, K)
-        The first views, in bins; see `first_views`.
+        The first views that a belief is compared with, in bins; see `first_views`. For each one
+        the errors count of all first views that are near it (`near_first_views`).
     """
 
     so_far: Table
@@ -149,16 +166,14 @@ class LookAlikes:
     def of_views(distributions: Table, most: int | None = None) -> LookAlikes:
         """Return the turns after one view, of distributions (S, B, B) of views a bin apart.
 
-        ``most`` first views of all turns together, as in `first_views`.
+        ``most`` of all first views together are compared, as in `first_views`.
         """
         views = in_object_frame(np.asarray(distributions, dtype=np.float32))
-        first = first_views(views.shape[0], views.shape[1], most)
-        return LookAlikes(np.take_along_axis(views, first[:, :, None], axis=1), views, first)
+        return LookAlikes(views, views, first_views(views.shape[0], views.shape[1], most))
 
     def after(self, rotation_bins: int) -> LookAlikes:
         """Return the turns after one more view, at a rotation from the first one."""
-        second = (self.first + rotation_bins) % self.views.shape[-1]
-        both = self.so_far * np.take_along_axis(self.views, second[:, :, None], axis=1)
+        both = self.so_far * np.roll(self.views, -rotation_bins, axis=1)
         return LookAlikes(both / both.sum(axis=2, keepdims=True), self.views, self.first)
 
     @cached_property
@@ -166,13 +181,8 @@ class LookAlikes:
         return compared_step(self.views.shape[-1])
 
     @property
-    def errors_deg(self) -> Table:
-        """`error_after_deg` of the turns, at rotations that are `compared_step` bins apart."""
-        return self._errors[:, :, :-2]
-
-    @property
     def error_now_deg(self) -> Table:
-        """`error_of_deg` of the turns, (S, K)."""
+        """`error_of_deg` of the turns, (S, B)."""
         return error_of_deg(self.so_far)
 
     def expected_error_deg(
@@ -210,10 +220,11 @@ class LookAlikes:
 
     @property
     def seen(self) -> Table:
-        """The distributions in the frame of the first view, (S, K, B)."""
-        n_bins = self.views.shape[-1]
-        index = (np.arange(n_bins) - self.first[:, :, None]) % n_bins
-        return np.take_along_axis(self.so_far, index, axis=2)
+        """The distributions of `first` in the frames of these views, (S, K, B)."""
+        n_turns, n_bins, _ = self.so_far.shape
+        places = (np.arange(n_bins) - self.first[:, :, None]) % n_bins
+        turns = np.arange(n_turns)[:, None, None]
+        return np.asarray(self.so_far[turns, self.first[:, :, None], places])
 
     @cached_property
     def _roots(self) -> Table:
@@ -222,10 +233,14 @@ class LookAlikes:
 
     @cached_property
     def _errors(self) -> Table:
-        """The errors after each rotation, the error now, and 1 to count views: (S, K, m + 2)."""
-        after = error_after_deg(self.so_far, self.views, self.first, self._step)
-        now = self.error_now_deg[:, :, None]
-        return np.concatenate([after, now, np.ones_like(now)], axis=2)
+        """The errors after each rotation, the error now, and 1: (S, K, m + 2).
+
+        The weighted sum of the last is the total weight.
+        """
+        after = error_after_deg(self.so_far, self.views, self._step)
+        errors = np.concatenate([after, self.error_now_deg[:, :, None]], axis=2)
+        of_first = near_first_views(errors, self.first)
+        return np.concatenate([of_first, np.ones_like(of_first[:, :, :1])], axis=2)
 
     @cached_property
     def _errors_by_turn(self) -> NDArray[np.float64]:
@@ -264,6 +279,6 @@ def _weighted(
     if n == 1:
         parts = np.matmul(weight.transpose(0, 2, 1), errors_deg)
         return np.asarray((of_view @ parts[:, 0])[None])
-    weight *= of_view.astype(np.float32)[:, None, None]
-    rows, table = (each.reshape(-1, each.shape[2]) for each in (weight, errors_deg))
+    of_turns = weight * of_view.astype(np.float32)[:, None, None]
+    rows, table = (each.reshape(-1, each.shape[2]) for each in (of_turns, errors_deg))
     return np.asarray(rows.T @ table, dtype=np.float64)
