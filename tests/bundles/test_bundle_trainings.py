@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import sem, t
 
 from nbv.bundles.evaluation import FIXED, OPPOSITE, PAPER, RANDOM, RECOMMENDED, SINGLE, SPACED
 from nbv.meshes.procedural import generate
@@ -147,6 +148,31 @@ def test_fewer_compared_beliefs_change_what_the_kept_errors_say(errors):
             for one in (RECOMMENDED, OF_8000)
         )
         assert f"{now}° instead of {then}° ({place})" in " ".join(text.split())
+
+
+def test_calibration_mugs_left_out_say_what_fewer_compared_beliefs_cost():
+    errors = pd.read_csv(ROOT / "docs/reference/bundles/compared_beliefs.csv")
+    text = (ROOT / "docs/reference/bundles/README.md").read_text("utf-8")
+    tables = {
+        name: rows.set_index(["seed", "object_id"]) for name, rows in errors.groupby("compared")
+    }
+    before = tables["every second"]
+    for name, own in tables.items():
+        cells = []
+        for column in ("two_views", "two_views_15", "three_views_15"):
+            change = own[column] - before[column]
+            half = t.ppf(0.975, len(change) - 1) * sem(change)
+            values = (change.mean(), change.mean() - half, change.mean() + half)
+            one, low, high = (f"{value:.2f}".replace("-0.00", "0.00") for value in values)
+            star = " *" if abs(change.mean()) > half else ""
+            cell = f"{one} ({low} to {high}){star}".replace("-", "−")
+            cells.append(f"{before[column].mean():.2f}" if own is before else cell)
+        expected = own["one_view_expected"].mean(), own["two_views_expected"].mean()
+        cells.append(f"{expected[0]:.1f} and {expected[1]:.2f}")
+        assert f"| {name} | {' | '.join(cells)} |" in text
+    now = tables["every fourth, with neighbours"].mean(numeric_only=True)
+    assert now["one_view"] == pytest.approx(now["one_view_expected"], abs=0.05)
+    assert now["two_views_expected"] / now["two_views"] == pytest.approx(0.85, abs=0.005)
 
 
 @pytest.fixture(scope="module")

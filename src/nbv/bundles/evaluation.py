@@ -257,13 +257,12 @@ def evaluate(
                 f"object {turn.object_id!r}, sequence {turn.sequence!r} has "
                 f"{counted(len(turn.azimuth_deg), 'frame')}, too few for {max(numbers)} views"
             )
-    rows, of_all = [], LookAlikes.of_views(bundle.distributions)
-    of_steps = {number: fixed_errors_deg(of_all, number) for number in numbers}
-    compared = LookAlikes.of_views(bundle.distributions, MOST_COMPARED)
+    rows, alike = [], LookAlikes.of_views(bundle.distributions, MOST_COMPARED)
+    of_steps = {number: fixed_errors_deg(alike, number) for number in numbers}
     for turn in turns:
         seen = seen_by(bundle, turn)
         # However many views there are, the first ones are the same.
-        errors = follow(seen, recommended(compared, seen, bundle.affinity), max(numbers))
+        errors = follow(seen, recommended(alike, seen, bundle.affinity), max(numbers))
         single = errors[:, 0]
         offset = constant_offset_deg(single)
         rows.append(_row(seen, SINGLE, 1, single, offset))

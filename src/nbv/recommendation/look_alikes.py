@@ -107,8 +107,8 @@ def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
 def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
     """Return the mean errors (S, K, m) of all first views near each of some.
 
-    The further views are half as far away as the next of `first`; those that are as near to two of
-    them count half for each.
+    Near are those up to half way to the next of `first`. One that is half way counts half for each
+    of the two.
 
     Parameters
     ----------
@@ -154,8 +154,8 @@ class LookAlikes:
     views : ndarray (S, B, B) float32
         The same of single views.
     first : ndarray (S, K)
-        The first views that a belief is compared with, in bins; see `first_views`. For each one
-        the errors count of all first views that are near it (`near_first_views`).
+        The first views that a belief is compared with, in bins; see `first_views`. With each one,
+        the errors of all first views near it count (`near_first_views`).
     """
 
     so_far: Table
