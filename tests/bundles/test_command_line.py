@@ -612,6 +612,16 @@ def test_pairs_in_another_frame_are_told(pairs, capsys, change, warning):
 # Evaluate
 
 
+def test_several_recordings_show_how_many_are_evaluated(manifest, capsys):
+    one = pd.read_csv(manifest)
+    pd.concat([one, one.assign(sequence="2")]).to_csv(manifest, index=False)
+    command = ["evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2", "--json"]
+    assert main(command) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["errors"]
+    assert err == "evaluated 1 of 2 recordings\nevaluated 2 of 2 recordings\n"
+
+
 def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
     wanted = evaluate(load_bundle("b.safetensors"), turns_of(manifest), [2, 3])
     out = run(

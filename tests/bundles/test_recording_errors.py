@@ -302,7 +302,9 @@ def test_the_order_of_frames_does_not_matter(bundle, rng):
 def test_recordings_do_not_matter_to_one_another(bundle):
     turns = [recording(1, name="a"), recording(2, name="b"), recording(3, name="a")]
     turns[2] = replace(turns[2], sequence="2")
-    together = evaluate(bundle, turns, n_views=(2,))
+    done: list[int] = []
+    together = evaluate(bundle, turns, n_views=(2,), tell=done.append)
+    assert done == [1, 2, 3]
     assert list(dict.fromkeys(zip(together["object_id"], together["sequence"], strict=True))) == [
         *(("a", "1"), ("b", "1"), ("a", "2"))
     ]

@@ -13,6 +13,7 @@ from nbv.angles import circular_distance_deg, signed_difference_deg, travel_deg
 from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import unfamiliarity
+from nbv.bundles.next_view import AfterRotations, after_rotations
 from nbv.bundles.recommender import turn_share
 from nbv.bundles.rotations import MIN_SEPARATION_DEG
 from nbv.bundles.turns import Turn
@@ -20,7 +21,7 @@ from nbv.calibration.offset import constant_offset_deg, frame_warning
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
-from nbv.recommendation.look_alikes import MOST_COMPARED, LookAlikes, error_after_deg
+from nbv.recommendation.look_alikes import LookAlikes, error_after_deg
 
 SINGLE, RANDOM, FIXED = "single", "random", "best fixed"
 OPPOSITE, SPACED, RECOMMENDED = "opposite", "evenly spaced", "recommended"
@@ -123,23 +124,20 @@ def follow(seen: Seen, choose: Chooser, n_views: int) -> NDArray[np.float64]:
     return np.stack(errors, axis=1)
 
 
-def recommended(alike: LookAlikes, seen: Seen, affinity: Mapping[str, float]) -> Chooser:
+def recommended(calibrated: AfterRotations, seen: Seen, affinity: Mapping[str, float]) -> Chooser:
     """Return the choice of least expected error, given the look-alikes after the same rotations."""
-    n_bins = alike.views.shape[-1]
+    n_bins = seen.distributions.shape[-1]
     here = np.arange(n_bins) * (360.0 / n_bins)
 
     def choose(beliefs: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
         bins = np.rint(rotations * (n_bins / 360.0)).astype(int) % n_bins
         different, of_row = np.unique(bins, axis=0, return_inverse=True)
         error = np.empty(beliefs.shape)
-        for place, so_far in enumerate(different):
-            turned_alike = alike
-            for rotation in so_far[1:]:
-                turned_alike = turned_alike.after(int(rotation))
+        # In their order, what the rotations of two neighbours have in common is found once.
+        for place, so_far in enumerate(different.tolist()):
             rows = of_row.ravel() == place
-            error[rows] = turned_alike.expected_error_deg(
-                beliefs[rows], **affinity, share=seen.share
-            )[1]
+            alike = calibrated(tuple(so_far[1:]))
+            error[rows] = alike.expected_error_deg(beliefs[rows], **affinity, share=seen.share)[1]
         near = circular_distance_deg(here[:, None], rotations[:, None, :]).min(axis=2)
         return np.asarray(here[np.where(near < MIN_SEPARATION_DEG, np.inf, error).argmin(axis=1)])
 
@@ -233,8 +231,11 @@ def evaluate(
     n_views: Sequence[int] = (2, 3, 4, 5),
     n_random: int = 10,
     seed: int = 0,
+    tell: Callable[[int], None] = lambda n_done: None,
 ) -> pd.DataFrame:
     """Return the errors of every way to choose views, for each recording.
+
+    `tell` is called after each recording, with how many are done.
 
     Returns
     -------
@@ -257,12 +258,12 @@ def evaluate(
                 f"object {turn.object_id!r}, sequence {turn.sequence!r} has "
                 f"{counted(len(turn.azimuth_deg), 'frame')}, too few for {max(numbers)} views"
             )
-    rows, alike = [], LookAlikes.of_views(bundle.distributions, MOST_COMPARED)
-    of_steps = {number: fixed_errors_deg(alike, number) for number in numbers}
-    for turn in turns:
+    rows, calibrated = [], after_rotations(bundle.distributions)
+    of_steps = {number: fixed_errors_deg(calibrated(()), number) for number in numbers}
+    for n_done, turn in enumerate(turns, start=1):
         seen = seen_by(bundle, turn)
         # However many views there are, the first ones are the same.
-        errors = follow(seen, recommended(alike, seen, bundle.affinity), max(numbers))
+        errors = follow(seen, recommended(calibrated, seen, bundle.affinity), max(numbers))
         single = errors[:, 0]
         offset = constant_offset_deg(single)
         rows.append(_row(seen, SINGLE, 1, single, offset))
@@ -276,6 +277,7 @@ def evaluate(
                 last = [follow(seen, choose, number)[:, -1] for _ in range(repeats)]
                 rows.append(_row(seen, name, number, np.concatenate(last), offset))
             rows.append(_row(seen, RECOMMENDED, number, errors[:, number - 1], offset))
+        tell(n_done)
     return pd.DataFrame(rows)
 
 

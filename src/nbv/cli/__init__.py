@@ -433,7 +433,12 @@ def evaluate(
 
     seen = _seen_frames(bundle, manifest, intrinsics, depth_scale, near, far, as_json=json)
     held, turns = seen.recommender.bundle, seen.turns
-    found = evaluate_(held, turns, views or [2, 3, 4, 5])
+
+    def tell(n_done: int) -> None:
+        if len(turns) > 1:
+            print(f"evaluated {n_done} of {len(turns)} recordings", file=sys.stderr)  # noqa: T201
+
+    found = evaluate_(held, turns, views or [2, 3, 4, 5], tell=tell)
     if output is not None:
         write_csv(output, found)
     familiar = familiarity_of(held, turns)

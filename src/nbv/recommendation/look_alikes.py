@@ -88,20 +88,26 @@ def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
     ndarray
         ``[s, k, d]``: of first view k with a further view at the rotation ``step d``, in bins.
     """
-    n_bins = views.shape[1]
+    n_turns, n_bins, _ = views.shape
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
-    turned = views.transpose(0, 2, 1)
-    further = (np.arange(n_bins)[:, None] + np.arange(0, n_bins, step)) % n_bins
+    n_steps = n_bins // step
+
+    def in_steps(rows: Table) -> Table:
+        # Views whole steps apart stand together: no others are of one pair.
+        return rows.reshape(n_turns, n_steps, step, n_bins).transpose(0, 2, 1, 3)
+
+    turned = in_steps(views).transpose(0, 1, 3, 2)
+    further = (np.arange(n_steps)[:, None] + np.arange(n_steps)) % n_steps
 
     def of_pairs(rows: Table) -> Table:
-        return np.take_along_axis(np.matmul(rows, turned), further[None], axis=2)
+        return np.take_along_axis(np.matmul(in_steps(rows), turned), further[None, None], axis=3)
 
     real = of_pairs(so_far * np.cos(angles).astype(np.float32))
     imaginary = of_pairs(so_far * np.sin(angles).astype(np.float32))
     error = np.abs(np.degrees(np.arctan2(imaginary, real))).astype(np.float32)
     if any((_resultant_length(rows) < FLAT).any() for rows in (so_far, views)):
         error[np.hypot(real, imaginary) < FLAT * of_pairs(so_far)] = 90.0
-    return error
+    return error.transpose(0, 2, 1, 3).reshape(n_turns, n_bins, n_steps)
 
 
 def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
