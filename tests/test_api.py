@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +28,23 @@ def evidence() -> nbv.Evidence:
 @pytest.mark.parametrize("name", nbv.__all__)
 def test_each_public_name_is_there(name):
     assert getattr(nbv, name).__name__ == name
+
+
+def test_type_checkers_see_the_same_names():
+    """`from nbv import Recommender` has a type, although nothing is imported before it is used."""
+    imports = [
+        node
+        for node in ast.walk(ast.parse(Path(nbv.__file__).read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("nbv.")
+    ]
+    seen = {name.asname: (node.module, name.name) for node in imports for name in node.names}
+    assert set(seen) == set(nbv.__all__)
+    for name, (module, of_module) in seen.items():
+        assert getattr(import_module(module), of_module) is getattr(nbv, name)
+
+
+def test_all_public_names_are_listed():
+    assert set(nbv.__all__) <= set(dir(nbv))
 
 
 def test_another_name_is_an_attribute_error():

@@ -19,7 +19,32 @@ With an estimator of one's own, by the lookup table of its errors::
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+# What type checkers see of the names below.
+if TYPE_CHECKING:
+    from nbv.bundles.bundle import BundleError as BundleError
+    from nbv.bundles.distribution_tables import DistributionTable as DistributionTable
+    from nbv.bundles.moves import check_axis as check_axis
+    from nbv.bundles.moves import moved_camera as moved_camera
+    from nbv.bundles.next_view import Move as Move
+    from nbv.bundles.next_view import Recommendation as Recommendation
+    from nbv.bundles.recommender import Recommender as Recommender
+    from nbv.calibration.density import Conditionals as Conditionals
+    from nbv.calibration.density import conditionals as conditionals
+    from nbv.errors import UserError as UserError
+    from nbv.frames.depth_files import read_depth as read_depth
+    from nbv.frames.drawn import example_frame as example_frame
+    from nbv.frames.errors import FrameError as FrameError
+    from nbv.frames.intrinsics import Intrinsics as Intrinsics
+    from nbv.recommendation.evidence import Evidence as Evidence
+    from nbv.recommendation.evidence import gather_evidence as gather_evidence
+    from nbv.recommendation.fusion import average as average
+    from nbv.recommendation.fusion import posterior as posterior
+    from nbv.recommendation.lookup import LookupTable as LookupTable
+    from nbv.recommendation.lookup import build_lookup as build_lookup
+    from nbv.recommendation.lookup import load_lookup as load_lookup
+    from nbv.recommendation.lookup import save_lookup as save_lookup
 
 __version__ = "0.1.0"
 
@@ -57,3 +82,8 @@ def __getattr__(name: str) -> Any:
     if name not in _MODULES:
         raise AttributeError(f"module 'nbv' has no attribute {name!r}")
     return getattr(import_module(_MODULES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Return the public names, too, which are not imported yet."""
+    return sorted({*globals(), *__all__})

@@ -351,6 +351,11 @@ def test_a_bundle_without_its_digest_is_refused(bundle_file, tmp_path):
         {"estimator": {}},
         {"estimator": {"n_classes": 120}},
         {"affinity": None},
+        {"affinity": {}},
+        {"affinity": {"power": 16}},
+        {"affinity": {"power": "much", "pseudo_observations": 90}},
+        {"affinity": {"power": float("nan"), "pseudo_observations": 90}},
+        {"provenance": [1]},
     ],
     ids=str,
 )
@@ -381,6 +386,11 @@ def test_arrays_that_do_not_fit_are_one_line(bundle, tmp_path):
         {"turn_weight": np.zeros_like(bundle.turn_weight)},
         {"object_ids": bundle.object_ids[:-1]},
         {"estimator": {**bundle.estimator, "n_classes": 12}},
+        {"paper": replace(bundle.paper, rotation_deg=bundle.paper.rotation_deg + np.int16(9999))},
+        {"familiarity": replace(bundle.familiarity, mean=bundle.familiarity.mean[:-1])},
+        {"familiarity": replace(bundle.familiarity, basis=bundle.familiarity.basis[:, :-1])},
+        {"familiarity": replace(bundle.familiarity, references=bundle.familiarity.references[:0])},
+        {"familiarity": replace(bundle.familiarity, scales=bundle.familiarity.scales[:1])},
     ):
         save_bundle(tmp_path / "a.safetensors", replace(bundle, **changes))
         assert "no sound bundle" in refused(tmp_path / "a.safetensors")

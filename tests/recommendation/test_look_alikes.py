@@ -13,6 +13,7 @@ from nbv.recommendation.criteria.expected_error import expected_error
 from nbv.recommendation.evidence import evidence_of_distributions
 from nbv.recommendation.fusion import product
 from nbv.recommendation.look_alikes import (
+    Expected,
     LookAlikes,
     compared_step,
     error_after_deg,
@@ -178,3 +179,61 @@ def test_one_belief_alone_and_among_others_has_the_same_errors(sharpness: float)
         (own_now,), (own,) = alike.expected_error_deg(beliefs[place : place + 1], **options)
         assert own_now == pytest.approx(now[place], rel=1e-5)
         assert own == pytest.approx(after[place], rel=1e-5)
+
+
+def expected_of(sums: np.ndarray, prior: np.ndarray, weight: float) -> Expected:
+    return Expected(0.0, np.zeros(sums.shape[1]), sums, prior, weight)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n_parts=st.integers(1, 5),
+    steps=st.lists(st.integers(0, 11), min_size=1, max_size=12),
+)
+def test_a_choice_is_never_pessimistic(seed: int, n_parts: int, steps: list[int]) -> None:
+    rng = np.random.default_rng(seed)
+    expected = expected_of(rng.gamma(1.0, 1.0, (n_parts, 12)), rng.gamma(1.0, 0.2, 12), 20.0)
+    more = expected.optimism_deg(np.array(steps) * 30.0)
+    assert more >= -1e-12
+    if n_parts == 1 or len(set(steps)) == 1:
+        assert more == 0.0
+
+
+def test_the_least_of_uncertain_errors_and_its_optimism_are_right_on_average() -> None:
+    """All rotations err by 10 degrees, but no error is known well."""
+    rng, least, raised = np.random.default_rng(0), [], []
+    rotations = np.arange(60) * 6.0
+    for _ in range(2000):
+        sums = rng.normal(10.0, 2.0, (5, 60))
+        least.append(sums.mean(axis=0).min())
+        raised.append(least[-1] + expected_of(sums, np.zeros(60), 5.0).optimism_deg(rotations))
+    assert np.mean(least) < 8.5
+    assert np.mean(raised) == pytest.approx(10.0, abs=0.1)
+
+
+def test_where_one_rotation_is_best_for_all_objects_nothing_is_added() -> None:
+    sums = 10.0 - 8.0 * (np.arange(12) == 7) + np.zeros((5, 12))
+    assert expected_of(sums, np.zeros(12), 5.0).optimism_deg(np.arange(12) * 30.0) == 0.0
+
+
+@pytest.mark.parametrize("most", [None, 20])
+def test_what_one_belief_leads_to_expect_is_as_of_several(
+    rng: np.random.Generator, most: int | None
+) -> None:
+    distributions, belief = turns(rng, 6), turns(rng)[0, 0]
+    ids = ["b", "a", "b", "c", "a", "c"]
+    alike = LookAlikes.of_views(distributions, most, ids).after(5)
+    options = {"power": 5.0, "pseudo_observations": 30.0, "share": rng.uniform(0.1, 1, 6)}
+    (now,), (after,) = alike.expected_error_deg(belief[None], **options)
+    found = alike.expected(belief, **options)
+    assert found.now_deg == pytest.approx(now, rel=1e-5)
+    assert found.after_deg == pytest.approx(after, rel=1e-5)
+    total = (found.sums.sum(axis=0) + found.prior) / found.weight
+    assert total == pytest.approx(after, rel=1e-5)
+    # One object's turns are in one part: with another id for each turn there are more.
+    assert len(found.sums) == 3
+    assert len(LookAlikes.of_views(distributions, most).expected(belief, **options).sums) == 5
+    for part, name in enumerate("abc"):
+        own = np.where(np.array(ids) == name, options["share"], 0.0)
+        alone = alike.expected(belief, **{**options, "share": own})
+        assert found.sums[part] == pytest.approx(alone.sums.sum(axis=0), rel=1e-5)

@@ -345,3 +345,19 @@ def _need_sound(bundle: Bundle) -> None:
         raise ValueError("a number is not finite")
     if not 0 < bundle.extent_m[0] < bundle.extent_m[1]:
         raise ValueError("the plausible extents are no range")
+    if (np.abs(bundle.paper.rotation_deg.astype(np.int64)) > 360).any():
+        raise ValueError("a rotation of the paper's tables is more than a full turn")
+    n_features, n_components = known.basis.shape
+    if not (
+        known.mean.shape == (n_features,)
+        and known.references.shape[1:] == (n_components,)
+        and len(known.references)
+        and known.scales.shape == (2, 2)
+    ):
+        raise ValueError("what is familiar has arrays that do not fit each other")
+    if set(bundle.affinity) != {"power", "pseudo_observations"} or not all(
+        math.isfinite(value) and value > 0 for value in bundle.affinity.values()
+    ):
+        raise ValueError(f"an affinity of {dict(bundle.affinity)}")
+    if not isinstance(bundle.provenance, dict):
+        raise ValueError("a provenance that is no object")

@@ -139,7 +139,7 @@ class DistributionTable:
 
     @cached_property
     def _calibrated(self) -> AfterRotations:
-        return after_rotations(self.distributions)
+        return after_rotations(self.distributions, self.object_ids)
 
     def recommend(
         self,

@@ -258,7 +258,7 @@ def evaluate(
                 f"object {turn.object_id!r}, sequence {turn.sequence!r} has "
                 f"{counted(len(turn.azimuth_deg), 'frame')}, too few for {max(numbers)} views"
             )
-    rows, calibrated = [], after_rotations(bundle.distributions)
+    rows, calibrated = [], after_rotations(bundle.distributions, bundle.object_ids)
     of_steps = {number: fixed_errors_deg(calibrated(()), number) for number in numbers}
     for n_done, turn in enumerate(turns, start=1):
         seen = seen_by(bundle, turn)

@@ -153,16 +153,19 @@ class Recommendation:
         return self.unfamiliarity > 1.0
 
 
-def after_rotations(distributions: NDArray[np.float32]) -> AfterRotations:
+def after_rotations(
+    distributions: NDArray[np.float32], object_ids: Sequence[str]
+) -> AfterRotations:
     """Return what gives the calibration turns after some rotations, of distributions (S, B, B).
 
-    The errors after them take longer to find than all else, so `N_KEPT` of them are kept.
+    Turn s shows the object ``object_ids[s]``. The errors after rotations take longer to find than
+    all else, so `N_KEPT` of them are kept.
     """
 
     @lru_cache(maxsize=N_KEPT)
     def after(bins: tuple[int, ...]) -> LookAlikes:
         if not bins:
-            return LookAlikes.of_views(distributions, MOST_COMPARED)
+            return LookAlikes.of_views(distributions, MOST_COMPARED, object_ids)
         return after(bins[:-1]).after(bins[-1])
 
     return after
@@ -181,7 +184,8 @@ def next_view(
     """Return the pose that views show, and the next view.
 
     Views are fused by product. The next one has the least error that calibration objects, turned
-    alike, made after it (`nbv.recommendation.look_alikes`).
+    alike, made after it (`nbv.recommendation.look_alikes`). Expected errors after it are raised by
+    what the choice makes them too low.
 
     Parameters
     ----------
@@ -207,10 +211,8 @@ def next_view(
     n_bins = len(belief)
     width = 360.0 / n_bins
     alike = calibrated(tuple(round(turn / width) % n_bins for turn in rotations_deg[1:]))
-    (now,), (after,) = alike.expected_error_deg(belief[None], **affinity, share=share)
-    # From the frame of the first view to that of the last one.
+    expected = alike.expected(belief, **affinity, share=share)
     last = rotations_deg[-1]
-    error = np.roll(after, -round(last / width)) if last else after
     taken = tuple(rotation - last for rotation in rotations_deg)
     if allowed_deg is None:
         rotation_deg, is_free = bins_deg(n_bins), _free_bins(n_bins, taken)
@@ -224,22 +226,27 @@ def next_view(
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
         )
     rotation_deg = rotation_deg[is_allowed]
+    error = expected.after_deg
+    if rotation_deg.size:
+        error = error + expected.optimism_deg(rotation_deg + last)
+    # From the frame of the first view to that of the last one.
+    error = np.roll(error, -round(last / width)) if last else error
     if allowed_deg is None:
-        expected, error_after_deg = error[is_allowed], np.where(is_allowed, error, np.inf)
+        cost, error_after_deg = error[is_allowed], np.where(is_allowed, error, np.inf)
     else:
-        expected, places = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
+        cost, places = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
         error_after_deg = np.full(n_bins, np.inf)
         error_after_deg[places] = error[places]
     moves = [
         Move(rotation, abs(rotation), error_deg)
-        for rotation, error_deg in best_rotations(rotation_deg, expected, width)
+        for rotation, error_deg in best_rotations(rotation_deg, cost, width)
     ]
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
     return Recommendation(
         azimuth_deg=float(wrap_deg(direction_deg + last)),
         spread_deg=spread_deg,
-        expected_error_deg=float(now),
+        expected_error_deg=expected.now_deg,
         move=moves[0] if moves else None,
         alternatives=tuple(moves[1:]),
         belief=turned(belief, -last),

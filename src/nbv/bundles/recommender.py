@@ -105,7 +105,7 @@ class Recommender:
 
     @cached_property
     def _calibrated(self) -> AfterRotations:
-        return after_rotations(self.bundle.distributions)
+        return after_rotations(self.bundle.distributions, self.bundle.object_ids)
 
     def crop(
         self,

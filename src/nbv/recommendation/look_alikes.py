@@ -8,12 +8,14 @@ its restriction to one first view.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.angles import nearest_bin
 from nbv.recommendation.evidence import Table
 
 COMPARED_DEG = 6.0
@@ -28,6 +30,9 @@ MOST_COMPARED = 4000
 The tables of all 15,000 views of 125 turns are much larger than the cache of a processor's core.
 How many are enough: docs/reference/bundles/README.md.
 """
+
+N_PARTS = 5
+"""Of the calibration objects, for `Expected.optimism_deg`."""
 
 FLAT = 1e-5
 """Of distributions: below this resultant length the mean direction is rounding, and errs by 90°."""
@@ -150,6 +155,53 @@ def _resultant_length(distributions: Table) -> Table:
 
 
 @dataclass(frozen=True)
+class Expected:
+    """What one belief leads one to expect.
+
+    Attributes
+    ----------
+    now_deg : float
+        The expected error.
+    after_deg : ndarray (B,)
+        The same after a view at every rotation.
+    sums : ndarray (N, M)
+        Of each part of the calibration objects: their weighted errors after a view at each of M
+        rotations, 360 / M degrees apart.
+    prior : ndarray (M,)
+        The same of the pseudo-observations.
+    weight : float
+        Of all observations.
+    """
+
+    now_deg: float
+    after_deg: NDArray[np.float64]
+    sums: NDArray[np.float64]
+    prior: NDArray[np.float64]
+    weight: float
+
+    def optimism_deg(self, rotation_deg: NDArray[np.float64]) -> float:
+        """Return by how much the least expected error is too low, 0 or more.
+
+        The least of uncertain numbers is lower than what they estimate. How much is found by
+        cross-validation of the choice: each part of the objects errs more at the rotation that the
+        other parts choose than at the one that all choose. With one part it is 0.
+
+        Parameters
+        ----------
+        rotation_deg : ndarray (m,)
+            Of which the least is chosen, from the first view.
+        """
+        if len(self.sums) == 1:
+            return 0.0
+        places = nearest_bin(rotation_deg, self.sums.shape[1])
+        sums = self.sums[:, places]
+        total = sums.sum(axis=0) + self.prior[places]
+        of_others = (total - sums).argmin(axis=1)
+        more = sums[np.arange(len(sums)), of_others] - sums[:, total.argmin()]
+        return float(more.sum() / self.weight)
+
+
+@dataclass(frozen=True)
 class LookAlikes:
     """Calibration turns after some rotations.
 
@@ -162,25 +214,32 @@ class LookAlikes:
     first : ndarray (S, K)
         The first views that a belief is compared with, in bins; see `first_views`. With each one,
         the errors of all first views near it count (`near_first_views`).
+    object_ids : sequence of str, or None
+        Of the turns (S,); None where each is of another object. One object's turns are in one part
+        of `Expected.sums`.
     """
 
     so_far: Table
     views: Table
     first: NDArray[np.intp]
+    object_ids: Sequence[str] | None = None
 
     @staticmethod
-    def of_views(distributions: Table, most: int | None = None) -> LookAlikes:
+    def of_views(
+        distributions: Table, most: int | None = None, object_ids: Sequence[str] | None = None
+    ) -> LookAlikes:
         """Return the turns after one view, of distributions (S, B, B) of views a bin apart.
 
         ``most`` of all first views together are compared, as in `first_views`.
         """
         views = in_object_frame(np.asarray(distributions, dtype=np.float32))
-        return LookAlikes(views, views, first_views(views.shape[0], views.shape[1], most))
+        first = first_views(views.shape[0], views.shape[1], most)
+        return LookAlikes(views, views, first, object_ids)
 
     def after(self, rotation_bins: int) -> LookAlikes:
         """Return the turns after one more view, at a rotation from the first one."""
         both = self.so_far * np.roll(self.views, -rotation_bins, axis=1)
-        return LookAlikes(both / both.sum(axis=2, keepdims=True), self.views, self.first)
+        return replace(self, so_far=both / both.sum(axis=2, keepdims=True))
 
     @cached_property
     def _step(self) -> int:
@@ -211,18 +270,54 @@ class LookAlikes:
         share : ndarray (S,), optional
             How much each turn counts; 1 without it.
         """
-        n_turns, n_first = self.first.shape
-        of_turn = np.ones(n_turns) if share is None else np.asarray(share, dtype=np.float64)
-        # The affinity of each belief with each view, whose roots are kept.
-        compared = _joined(np.asarray(beliefs, dtype=np.float32), self._step)
-        weight = self._roots @ np.sqrt(compared).T
-        weight **= power
-        # A first view stands for the degrees that it is apart from the next one.
-        of_view = of_turn * (360.0 / n_first)
-        prior = pseudo_observations / (of_turn.sum() * n_first)
-        sums = _weighted(weight, of_view, self._errors) + prior * (of_turn @ self._errors_by_turn)
+        of_view, prior = self._counts(pseudo_observations, share)
+        weight = self._affinities(beliefs, power)
+        sums = _weighted(weight, of_view, self._errors) + prior
         errors = sums[:, :-1] / sums[:, -1:]
         return errors[:, -1], _between_steps(errors[:, :-1], self._step)
+
+    def expected(
+        self,
+        belief: NDArray[np.floating],
+        power: float,
+        pseudo_observations: float,
+        share: NDArray[np.floating] | None = None,
+    ) -> Expected:
+        """Return what one belief (B,) leads one to expect; other parameters as above."""
+        of_view, prior = self._counts(pseudo_observations, share)
+        weight = self._affinities(belief[None], power)
+        by_part = (self._is_in_part * of_view) @ _of_one(weight, self._errors)
+        sums = by_part.sum(axis=0) + prior
+        errors = sums / sums[-1]
+        (after_deg,) = _between_steps(errors[None, :-2], self._step)
+        steps = by_part[:, :-2], prior[:-2]
+        return Expected(float(errors[-2]), after_deg, *steps, float(sums[-1]))
+
+    def _counts(
+        self, pseudo_observations: float, share: NDArray[np.floating] | None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return how much a first view of each turn counts (S,), and the prior's sums (m + 2,)."""
+        n_turns, n_first = self.first.shape
+        of_turn = np.ones(n_turns) if share is None else np.asarray(share, dtype=np.float64)
+        prior = pseudo_observations / (of_turn.sum() * n_first)
+        # A first view stands for the degrees that it is apart from the next one.
+        return of_turn * (360.0 / n_first), prior * (of_turn @ self._errors_by_turn)
+
+    def _affinities(self, beliefs: NDArray[np.floating], power: float) -> Table:
+        """Return the affinity of each belief (n, B) with each first view, to a power, (S, K, n)."""
+        compared = _joined(np.asarray(beliefs, dtype=np.float32), self._step)
+        weight: Table = self._roots @ np.sqrt(compared).T
+        weight **= power
+        return weight
+
+    @cached_property
+    def _is_in_part(self) -> NDArray[np.float64]:
+        """Whether each turn is in each part of the objects, (N, S)."""
+        n_turns = len(self.views)
+        named = np.arange(n_turns) if self.object_ids is None else np.asarray(self.object_ids)
+        names, number = np.unique(named, return_inverse=True)
+        n_parts = min(N_PARTS, len(names))
+        return np.asarray(number % n_parts == np.arange(n_parts)[:, None], dtype=np.float64)
 
     @property
     def seen(self) -> Table:
@@ -276,15 +371,18 @@ def _interpolation(n_steps: int, step: int) -> NDArray[np.float64]:
 def _weighted(
     weight: Table, of_view: NDArray[np.float64], errors_deg: Table
 ) -> NDArray[np.float64]:
-    """Return the sums (n, m) of errors (S, K, m) by weights (S, K, n) and those of a turn (S,).
-
-    Those of a single belief turn by turn: the threads of a matrix library wait for each other where
-    other programs hold the cores, and take no part in small products. All at once took 16 ms then.
-    """
-    n = weight.shape[2]
-    if n == 1:
-        parts = np.matmul(weight.transpose(0, 2, 1), errors_deg)
-        return np.asarray((of_view @ parts[:, 0])[None])
+    """Return the sums (n, m) of errors (S, K, m) by weights (S, K, n) and those of a turn (S,)."""
+    if weight.shape[2] == 1:
+        return np.asarray((of_view @ _of_one(weight, errors_deg))[None])
     of_turns = weight * of_view.astype(np.float32)[:, None, None]
     rows, table = (each.reshape(-1, each.shape[2]) for each in (of_turns, errors_deg))
     return np.asarray(rows.T @ table, dtype=np.float64)
+
+
+def _of_one(weight: Table, errors_deg: Table) -> Table:
+    """Return the sums (S, m) of errors (S, K, m) by the weights (S, K, 1) of one belief.
+
+    Turn by turn: the threads of a matrix library wait for each other where other programs hold the
+    cores, and take no part in small products. All at once took 16 ms then.
+    """
+    return np.asarray(np.matmul(weight.transpose(0, 2, 1), errors_deg)[:, 0])
