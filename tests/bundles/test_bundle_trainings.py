@@ -296,3 +296,22 @@ def test_what_calibration_brings_is_what_the_kept_draws_say(line, choice):
     cells = [shown(change.loc[n]) for n in (1, 2, 5, 20)]
     text = (ROOT / "docs/turntable.md").read_text("utf-8")
     assert f"| {line} | {' | '.join(cells)} |" in text
+
+
+def test_expected_errors_agree_with_real_ones_as_the_page_says(page):
+    errors = pd.read_csv(ROOT / "docs/reference/bundles/expected_errors.csv")
+    means = errors.groupby("elevation").mean(numeric_only=True).round(1)
+    rows = {row[0]: row[1:] for row in page if len(row) == 3}
+    for line, views, elevation in (
+        ("one view", "one_view", "not given"),
+        ("two views, before the second one is taken", "two_views", "not given"),
+        ("… with the elevation given", "two_views", "given"),
+        ("three views, before the third one is taken", "three_views", "not given"),
+    ):
+        found = means.loc[elevation, [f"{views}_expected", views]]
+        assert rows[line] == [f"{value:.1f}" for value in found]
+    of_mugs = errors.groupby(["elevation", "seed", "object_id"]).mean(numeric_only=True)
+    for views in ("one_view", "two_views", "three_views"):
+        mugs = of_mugs.loc["not given"]
+        missed = mugs[f"{views}_expected"] - mugs[views]
+        assert abs(missed.mean()) < t.ppf(0.975, len(missed) - 1) * sem(missed)

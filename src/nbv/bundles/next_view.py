@@ -214,25 +214,24 @@ def next_view(
     expected = alike.expected(belief, **affinity, share=share)
     last = rotations_deg[-1]
     taken = tuple(rotation - last for rotation in rotations_deg)
+    n_steps = len(expected.total)
     if allowed_deg is None:
-        rotation_deg, is_free = bins_deg(n_bins), _free_bins(n_bins, taken)
+        may = _allowed_bins(n_bins, n_steps, taken, max_travel_deg)
     else:
-        rotation_deg = as_allowed(allowed_deg)
-        is_free = _is_free(rotation_deg, taken)
-    is_allowed = is_free & (np.abs(rotation_deg) <= max_travel_deg)
-    if not is_allowed.any() and _free_bins(n_bins, taken).any():
+        may = _allowed(as_allowed(allowed_deg), n_steps, taken, max_travel_deg)
+    rotation_deg = may.rotation_deg
+    if not rotation_deg.size and _allowed_bins(n_bins, n_steps, taken, 180.0).rotation_deg.size:
         raise UserError(
             "no rotation is allowed: widen --allowed or --max-travel; a view is "
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
         )
-    rotation_deg = rotation_deg[is_allowed]
     error = expected.after_deg
     if rotation_deg.size:
-        error = error + expected.optimism_deg(rotation_deg + last)
+        error = error + expected.optimism_deg(may.is_choice)
     # From the frame of the first view to that of the last one.
     error = np.roll(error, -round(last / width)) if last else error
     if allowed_deg is None:
-        cost, error_after_deg = error[is_allowed], np.where(is_allowed, error, np.inf)
+        cost, error_after_deg = error[may.is_allowed], np.where(may.is_allowed, error, np.inf)
     else:
         cost, places = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
         error_after_deg = np.full(n_bins, np.inf)
@@ -296,14 +295,45 @@ def as_rotation_list(
     return rotations
 
 
-def _is_free(rotation_deg: NDArray[np.float64], taken: tuple[float, ...]) -> NDArray[np.bool_]:
-    """Return which rotations (m,) are not too near to a view that was `taken`."""
+@dataclass(frozen=True)
+class _Allowed:
+    """Rotations from the last view that the camera may take.
+
+    Attributes
+    ----------
+    is_allowed : ndarray (n,)
+        Of those that were asked for, which may be taken.
+    rotation_deg : ndarray (m,)
+        These.
+    is_choice : ndarray (n_steps,)
+        Of rotations from the first view that are evenly apart, which are nearest to one of these.
+    """
+
+    is_allowed: NDArray[np.bool_]
+    rotation_deg: NDArray[np.float64]
+    is_choice: NDArray[np.bool_]
+
+
+def _allowed(
+    rotation_deg: NDArray[np.float64], n_steps: int, taken: tuple[float, ...], max_travel_deg: float
+) -> _Allowed:
+    """Return which rotations (n,) are near enough, and not too near to a view that was `taken`.
+
+    The first of `taken` is the first view.
+    """
     apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
-    return np.asarray(apart >= MIN_SEPARATION_DEG)
+    is_allowed = (apart >= MIN_SEPARATION_DEG) & (np.abs(rotation_deg) <= max_travel_deg)
+    left = rotation_deg[is_allowed]
+    is_choice = np.zeros(n_steps, dtype=bool)
+    is_choice[nearest_bin(left - taken[0], n_steps)] = True
+    return _Allowed(is_allowed, left, is_choice)
 
 
 @lru_cache(maxsize=N_KEPT)
-def _free_bins(n_bins: int, taken: tuple[float, ...]) -> NDArray[np.bool_]:
-    is_free = _is_free(bins_deg(n_bins), taken)
-    is_free.flags.writeable = False
-    return is_free
+def _allowed_bins(
+    n_bins: int, n_steps: int, taken: tuple[float, ...], max_travel_deg: float
+) -> _Allowed:
+    found = _allowed(bins_deg(n_bins), n_steps, taken, max_travel_deg)
+    for array in (found.is_allowed, found.rotation_deg, found.is_choice):
+        array.flags.writeable = False
+    return found

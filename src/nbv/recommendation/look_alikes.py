@@ -15,7 +15,6 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.angles import nearest_bin
 from nbv.recommendation.evidence import Table
 
 COMPARED_DEG = 6.0
@@ -164,22 +163,22 @@ class Expected:
         The expected error.
     after_deg : ndarray (B,)
         The same after a view at every rotation.
-    sums : ndarray (N, M)
-        Of each part of the calibration objects: their weighted errors after a view at each of M
-        rotations, 360 / M degrees apart.
-    prior : ndarray (M,)
-        The same of the pseudo-observations.
+    parts : ndarray (N, M)
+        Weighted errors after a view at each of M rotations, 360 / M degrees apart, summed over each
+        part of the calibration objects.
+    total : ndarray (M,)
+        The same of all objects and of the pseudo-observations.
     weight : float
-        Of all observations.
+        Of all that is in `total`.
     """
 
     now_deg: float
     after_deg: NDArray[np.float64]
-    sums: NDArray[np.float64]
-    prior: NDArray[np.float64]
+    parts: NDArray[np.float64]
+    total: NDArray[np.float64]
     weight: float
 
-    def optimism_deg(self, rotation_deg: NDArray[np.float64]) -> float:
+    def optimism_deg(self, is_choice: NDArray[np.bool_]) -> float:
         """Return by how much the least expected error is too low, 0 or more.
 
         The least of uncertain numbers is lower than what they estimate. How much is found by
@@ -188,17 +187,19 @@ class Expected:
 
         Parameters
         ----------
-        rotation_deg : ndarray (m,)
-            Of which the least is chosen, from the first view.
+        is_choice : ndarray (M,)
+            Which of the M rotations from the first view there are to choose from; one or more.
         """
-        if len(self.sums) == 1:
+        if len(self.parts) == 1:
             return 0.0
-        places = nearest_bin(rotation_deg, self.sums.shape[1])
-        sums = self.sums[:, places]
-        total = sums.sum(axis=0) + self.prior[places]
-        of_others = (total - sums).argmin(axis=1)
-        more = sums[np.arange(len(sums)), of_others] - sums[:, total.argmin()]
-        return float(more.sum() / self.weight)
+        total = np.where(is_choice, self.total, np.inf)
+        of_all = total.argmin()
+        of_others = (total - self.parts).argmin(axis=1).tolist()
+        # A few numbers: quicker than more arrays.
+        more = sum(
+            own[other] - own[of_all] for own, other in zip(self.parts, of_others, strict=True)
+        )
+        return float(more / self.weight)
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,7 @@ class LookAlikes:
         the errors of all first views near it count (`near_first_views`).
     object_ids : sequence of str, or None
         Of the turns (S,); None where each is of another object. One object's turns are in one part
-        of `Expected.sums`.
+        of `Expected.parts`.
     """
 
     so_far: Table
@@ -287,11 +288,11 @@ class LookAlikes:
         of_view, prior = self._counts(pseudo_observations, share)
         weight = self._affinities(belief[None], power)
         by_part = (self._is_in_part * of_view) @ _of_one(weight, self._errors)
-        sums = by_part.sum(axis=0) + prior
+        sums = by_part[-1] + prior
         errors = sums / sums[-1]
         (after_deg,) = _between_steps(errors[None, :-2], self._step)
-        steps = by_part[:, :-2], prior[:-2]
-        return Expected(float(errors[-2]), after_deg, *steps, float(sums[-1]))
+        now_deg, all_weight = float(errors[-2]), float(sums[-1])
+        return Expected(now_deg, after_deg, by_part[:-1, :-2], sums[:-2], all_weight)
 
     def _counts(
         self, pseudo_observations: float, share: NDArray[np.floating] | None
@@ -312,12 +313,13 @@ class LookAlikes:
 
     @cached_property
     def _is_in_part(self) -> NDArray[np.float64]:
-        """Whether each turn is in each part of the objects, (N, S)."""
+        """Whether each turn is in each part of the objects, and in all of them, (N + 1, S)."""
         n_turns = len(self.views)
         named = np.arange(n_turns) if self.object_ids is None else np.asarray(self.object_ids)
         names, number = np.unique(named, return_inverse=True)
         n_parts = min(N_PARTS, len(names))
-        return np.asarray(number % n_parts == np.arange(n_parts)[:, None], dtype=np.float64)
+        is_in_part = number % n_parts == np.arange(n_parts)[:, None]
+        return np.vstack([is_in_part, np.ones(n_turns)])
 
     @property
     def seen(self) -> Table:
