@@ -7,6 +7,13 @@ from collections.abc import Iterable
 from typing import Self
 
 
+def reason_of(error: Exception) -> str:
+    """Return why a file could not be read, in one line."""
+    reason = " ".join(str(error).split()) or type(error).__name__
+    # numpy takes whatever is no array of its own for objects, and tells to load them unsafely.
+    return "it holds no array of numbers" if "pickle" in reason else reason
+
+
 class UserError(Exception):
     """A mistake in the input: one line that names the file, key or value, and what to do.
 

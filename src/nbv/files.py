@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.errors import UserError
+from nbv.errors import UserError, reason_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,8 +73,12 @@ def readable(path: str | Path) -> Iterator[None]:
         raise UserError(f"{path} does not exist; finish the run first") from error
     # No list of what a reader may raise on arbitrary bytes is complete.
     except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise damaged(path, f"cannot be read ({reason})") from error
+        raise damaged(path, f"cannot be read ({reason_of(error)})") from error
+
+
+def missing(path: str | Path) -> str:
+    """Return what is wrong with a path where there is no file."""
+    return "is a folder" if Path(path).is_dir() else "does not exist"
 
 
 def damaged(path: str | Path, what: str) -> UserError:
@@ -146,8 +150,7 @@ def read_numbers(path: Path) -> NDArray[Any]:
         raise UserError(f"{path} does not exist") from error
     # No list of what a reader may raise on arbitrary bytes is complete.
     except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise UserError(f"{path} cannot be read ({reason})") from error
+        raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
 
 
 def read_arrays(path: str | Path, names: Iterable[str] = ()) -> dict[str, NDArray[Any]]:

@@ -261,7 +261,7 @@ def with_about(bundle_file, path, arrays_=None, **changes):
 
 def test_a_missing_file_is_named(tmp_path):
     assert "does not exist" in refused(tmp_path / "none.safetensors", "no-bundle")
-    assert "does not exist" in refused(tmp_path, "no-bundle")
+    assert "is a folder" in refused(tmp_path, "no-bundle")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.0001, 0.001, 0.01, 0.1, 0.5, 0.9, 0.9999])

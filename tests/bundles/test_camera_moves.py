@@ -334,7 +334,7 @@ def test_an_entry_of_a_mask_is_its_share_of_the_circle(mask):
         ([], "give one at least"),
         ([False, False], "give one at least"),
         (np.zeros(0, dtype=bool), "give one at least"),
-        ([30.0, np.nan], "give one at least, in degrees"),
+        ([30.0, np.nan], "one is no finite number of degrees"),
         (np.ones((4, 4), dtype=bool), "a mask of 2 axes"),
         (["30", "60"], "neither numbers of degrees nor booleans"),
         ([1j], "neither numbers of degrees nor booleans"),

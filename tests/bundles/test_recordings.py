@@ -14,6 +14,7 @@ from made_bundles import FOCAL_PX, frame
 from nbv.bundles.manifest import read_manifest, see
 from nbv.errors import UserError
 from nbv.frames.depth_files import read_depth
+from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics
 
 AZIMUTHS = (0.0, 10.0, 20.0, 350.0)
@@ -165,10 +166,18 @@ def test_an_azimuth_that_is_no_number_is_named_with_its_row(folder, value):
     assert "row 4: azimuth_deg is no number" in message
 
 
-@pytest.mark.parametrize("name", ["no.npy", "", ".", "sub/f0.npy"])
-def test_a_missing_file_is_named_with_its_row(folder, name):
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("no.npy", "does not exist"),
+        ("sub/f0.npy", "does not exist"),
+        ("", "is no name"),
+        (".", "is a folder"),
+    ],
+)
+def test_a_missing_file_is_named_with_its_row(folder, name, fault):
     message = refused(manifest(folder, table(file=["f0.npy", name, "f2.npy", "f3.npy"])))
-    assert f"row 3: file {name!r} does not exist" in message
+    assert f"row 3: file {name!r} {fault}" in message
 
 
 @pytest.mark.parametrize("content", [b"", b"\n", b"\xff\xfe\0", b'a,b\n"1', b"\0\0"])
@@ -236,8 +245,18 @@ def test_a_refused_frame_is_told_and_left_out(recommender, folder):
 def test_a_recording_without_a_usable_frame_is_one_line(recommender, folder):
     for place in range(4):
         np.save(folder / f"f{place}.npy", np.zeros((5, 5), np.float32))
-    with pytest.raises(UserError, match="every frame of object 'cup', sequence '1' is refused"):
+    wanted = (
+        "^empty-mask: object 'cup', sequence '1': every frame is refused; the first, .*f0.npy: "
+    )
+    with pytest.raises(FrameError, match=wanted):
         seen(recommender, manifest(folder, table()))
+
+
+def test_a_mistyped_optional_column_is_refused_and_others_may_stand(folder):
+    for name, meant in (("elevation", "elevation_deg"), ("masks", "mask"), ("Elevation_dg", None)):
+        message = refused(manifest(folder, table(**{name: ["1"] * 4})))
+        assert f"a column {name!r}; call it {meant or 'elevation_deg'!r}" in message
+    assert read_manifest(manifest(folder, table(note=["a"] * 4, elevation_deg=["20"] * 4)))
 
 
 def test_a_damaged_frame_is_no_refused_one(recommender, folder):

@@ -23,7 +23,7 @@ from nbv.angles import nearest_bin
 from nbv.bundles.familiarity import Familiarity
 from nbv.errors import NamedError
 from nbv.estimation.folding import network_shapes
-from nbv.files import replacing
+from nbv.files import missing, replacing
 from nbv.rendering.camera import Camera
 
 FORMAT = 3
@@ -228,7 +228,7 @@ def load_bundle(path: str | Path) -> Bundle:
     path = Path(path)
     if not path.is_file():
         raise BundleError(
-            "no-bundle", f"{path} does not exist; name a bundle of this package, or a file"
+            "no-bundle", f"{path} {missing(path)}; name a bundle of this package, or a file"
         )
     try:
         about, arrays = _read(path)

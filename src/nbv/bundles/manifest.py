@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +15,16 @@ from nbv.bundles.recommender import Recommender
 from nbv.bundles.turns import Turn
 from nbv.calibration.pairs import read_rows
 from nbv.errors import UserError
+from nbv.files import missing
 from nbv.frames.depth_files import read_depth, read_mask
 from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics, camera_of
 
 NEEDED = ("object_id", "sequence", "file", "azimuth_deg")
 OPTIONAL = ("mask", "elevation_deg", "fx", "fy", "cx", "cy")
+
+# Of a name that is an optional one, mistyped: elevation is, and note is not.
+_ALIKE = 0.75
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,12 @@ def read_manifest(path: str | Path) -> list[Recording]:
     for name in map(str, table):
         if name != (known := name.strip().lower()) and known in OPTIONAL:
             raise UserError(f"{path}: a column {name!r}; call it {known!r}")
+    absent = [name for name in OPTIONAL if name not in table]
+    for name in map(str, table):
+        if name not in (*NEEDED, *OPTIONAL) and (
+            alike := difflib.get_close_matches(name.lower(), absent, 1, _ALIKE)
+        ):
+            raise UserError(f"{path}: a column {name!r}; call it {alike[0]!r}, or remove it")
     for name in {"azimuth_deg", *OPTIONAL} - {"mask"}:
         if name in table:
             table[name] = _numbers(path, table[name])
@@ -125,7 +136,7 @@ def _files(path: Path, names: pd.Series[str]) -> list[str | None]:
         file = path.parent / name
         is_absent = names.name in OPTIONAL and not name
         if not (is_absent or file.is_file()):
-            _refuse(path, place, f"{names.name} {name!r} does not exist")
+            _refuse(path, place, f"{names.name} {name!r} {missing(file) if name else 'is no name'}")
         found.append(None if is_absent else str(file))
     return found
 
@@ -175,6 +186,7 @@ def see(
         Where a file cannot be read, or no frame is left.
     """
     codes, kept, focal_px = [], [], []
+    first: tuple[str, FrameError] | None = None
     for place, (row, own) in enumerate(
         zip(recording.frames.to_dict("records"), recording.intrinsics, strict=True)
     ):
@@ -193,14 +205,16 @@ def see(
                 raise error.about(row["path"]) from error
         except FrameError as error:
             tell(row["path"], error)
+            first = first or (row["path"], error)
             continue
         codes.append(crop.codes)
         kept.append(place)
         focal_px.append(known.fx if known else float("nan"))
-    if not kept:
-        raise UserError(
-            f"every frame of object {recording.object_id!r}, sequence {recording.sequence!r} is "
-            "refused: see the lines above"
+    if first and not kept:
+        path, refusal = first
+        raise refusal.about(
+            f"object {recording.object_id!r}, sequence {recording.sequence!r}: every frame is "
+            f"refused; the first, {path}"
         )
     crops = np.stack(codes)
     return Turn(

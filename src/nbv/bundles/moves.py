@@ -335,8 +335,10 @@ def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[
     elif given.dtype.kind not in "iuf":
         raise UserError(f"{name}: neither numbers of degrees nor booleans")
     rotations = given.astype(np.float64).ravel()
-    if not rotations.size or not np.isfinite(rotations).all():
+    if not rotations.size:
         raise UserError(f"{name}: give one at least, in degrees")
+    if not np.isfinite(rotations).all():
+        raise UserError(f"{name}: one is no finite number of degrees")
     return rotations
 
 

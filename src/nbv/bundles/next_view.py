@@ -22,6 +22,7 @@ from nbv.bundles.rotations import (
     at_rotations,
     best_rotations,
     bins_deg,
+    need_travel,
 )
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
@@ -205,8 +206,9 @@ def next_view(
     Raises
     ------
     UserError
-        Where there is a further view, but none that is allowed.
+        Where there is a further view, but none that is allowed, or the longest travel is none.
     """
+    need_travel(max_travel_deg)
     belief = fused(distributions, rotations_deg)
     n_bins = len(belief)
     width = 360.0 / n_bins

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from nbv.angles import signed_difference_deg, wrap_deg
 from nbv.calibration.estimates import COLUMNS, Estimates
-from nbv.errors import UserError
+from nbv.errors import UserError, reason_of
+from nbv.files import missing
 
 N_VIEWS = 360
 
@@ -67,11 +68,11 @@ def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
         Where it cannot be read, a column of `needed` is missing, or it has no rows.
     """
     if not path.is_file():
-        raise UserError(f"{path} does not exist; name a file with {', '.join(needed)}")
+        raise UserError(f"{path} {missing(path)}; name a file with {', '.join(needed)}")
     try:
         table = pd.read_csv(path, dtype=str, keep_default_na=False)
     except (OSError, ValueError) as error:
-        raise UserError(f"{path} cannot be read ({' '.join(str(error).split())})") from error
+        raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     for name in needed:
         if name not in table:
             hint = "; commas stand between columns" if table.shape[1] == 1 else ""

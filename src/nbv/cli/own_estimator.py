@@ -174,6 +174,8 @@ def recommend_by_distributions(
 
 
 def _existing(table: Path) -> Path:
-    if not table.exists():
-        raise UserError(f"{table} does not exist; name the file that nbv calibrate wrote")
+    from nbv.files import missing
+
+    if not table.is_file():
+        raise UserError(f"{table} {missing(table)}; name the file that nbv calibrate wrote")
     return table

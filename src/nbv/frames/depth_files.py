@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.errors import UserError
-from nbv.files import replacing
+from nbv.errors import UserError, reason_of
+from nbv.files import missing, replacing
 from nbv.frames.errors import FrameError
 
 DepthImage = NDArray[np.float32]
@@ -165,14 +165,13 @@ def _read_array(path: Path, name: str) -> NDArray[Any]:
         raise UserError(f"{path}: no known kind of file; give {', '.join(ARRAYS + IMAGES)}")
     try:
         if not path.is_file():
-            raise UserError(f"{path} does not exist")
+            raise UserError(f"{path} {missing(path)}")
         values = _read_image(path) if suffix in IMAGES else _read_numpy(path, name)
     except UserError:
         raise
     # No list of what a reader may raise on arbitrary bytes is complete.
     except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise UserError(f"{path} cannot be read ({reason})") from error
+        raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     if not values.size:
         raise UserError(f"{path} holds no pixel")
     return values

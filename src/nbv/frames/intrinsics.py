@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nbv.errors import UserError
+from nbv.errors import UserError, reason_of
 from nbv.frames.depth_files import MILLIMETRE
 from nbv.frames.errors import FrameError
 
@@ -199,8 +199,7 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     except UserError:
         raise
     except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise UserError(f"{path} cannot be read ({reason})") from error
+        raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
 
 
 def _what_is_missing(path: Path) -> str:

@@ -111,14 +111,17 @@ def object_mask(
             )
         if given.shape != depth_m.shape:
             raise UserError(
-                f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}"
+                f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}: "
+                "give a mask of the same pixels"
             )
         if not (n_given := np.count_nonzero(given)):
             raise FrameError("empty-mask", "the mask has no pixel")
         inside &= given
         if (share := np.count_nonzero(inside) / n_given) < LEAST_MEASURED:
             raise FrameError(
-                "little-depth", f"only {share:.0%} of the mask's pixels have a depth; need 30 %"
+                "little-depth",
+                f"only {100 * share:.0f} % of the mask's pixels have a depth; need 30 %: mask the "
+                "object alone, or move the camera",
             )
     near = 0.0 if near_m is None else near_m
     far = np.inf if far_m is None else far_m
@@ -129,8 +132,10 @@ def object_mask(
     if mask is None and far_m is None and inside.any():
         inside &= depth_m < np.quantile(depth_m[inside], NEAREST_SHARE) + reach_m
     if np.count_nonzero(inside) < _LEAST_PIXELS:
+        limits = "" if near_m is None and far_m is None else _limits(depth_m, near, far)
         raise FrameError(
-            "empty-mask", f"{np.count_nonzero(inside)} pixels of the object have a depth; need 30"
+            "empty-mask",
+            f"{np.count_nonzero(inside)} pixels of the object have a depth{limits}; need 30",
         )
     if mask is not None:
         return _without_islands(inside)
@@ -155,6 +160,14 @@ def _without_islands(inside: Mask) -> Mask:
             f"two separate parts of {largest} and {second} pixels: mask one of them",
         )
     return np.asarray(np.array([False, *(size >= ISLAND * largest for size in sizes)])[parts])
+
+
+def _limits(depth_m: DepthImage, near: float, far: float) -> str:
+    seen = depth_m[depth_m > 0]
+    return (
+        f" between --near={near:g} and --far={far:g}, of {seen.min():.2f} to {seen.max():.2f} m in "
+        "the frame"
+    )
 
 
 def _size(shape: tuple[int, ...]) -> str:
