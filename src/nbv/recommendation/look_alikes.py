@@ -104,14 +104,15 @@ def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
     further = (np.arange(n_steps)[:, None] + np.arange(n_steps)) % n_steps
 
     def of_pairs(rows: Table) -> Table:
-        return np.take_along_axis(np.matmul(in_steps(rows), turned), further[None, None], axis=3)
+        return np.asarray(np.matmul(in_steps(rows), turned))
 
     real = of_pairs(so_far * np.cos(angles).astype(np.float32))
     imaginary = of_pairs(so_far * np.sin(angles).astype(np.float32))
     error = np.abs(np.degrees(np.arctan2(imaginary, real))).astype(np.float32)
     if any((_resultant_length(rows) < FLAT).any() for rows in (so_far, views)):
         error[np.hypot(real, imaginary) < FLAT * of_pairs(so_far)] = 90.0
-    return error.transpose(0, 2, 1, 3).reshape(n_turns, n_bins, n_steps)
+    by_rotation = np.take_along_axis(error, further[None, None], axis=3)
+    return by_rotation.transpose(0, 2, 1, 3).reshape(n_turns, n_bins, n_steps)
 
 
 def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
