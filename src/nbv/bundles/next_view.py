@@ -18,6 +18,7 @@ from nbv.angles import (
 from nbv.bundles.beliefs import direction_and_spread_deg, fused, log_bayes_factor, turned
 from nbv.bundles.rotations import (
     MIN_SEPARATION_DEG,
+    are_neighbours,
     as_allowed,
     at_rotations,
     best_rotations,
@@ -220,7 +221,7 @@ def next_view(
     if allowed_deg is None:
         may = _allowed_bins(n_bins, n_steps, taken, max_travel_deg)
     else:
-        may = _allowed(as_allowed(allowed_deg), n_steps, taken, max_travel_deg)
+        may = _allowed(as_allowed(allowed_deg), width, n_steps, taken, max_travel_deg)
     rotation_deg = may.rotation_deg
     if not rotation_deg.size and _allowed_bins(n_bins, n_steps, taken, 180.0).rotation_deg.size:
         raise UserError(
@@ -240,7 +241,7 @@ def next_view(
         error_after_deg[places] = error[places]
     moves = [
         Move(rotation, abs(rotation), error_deg)
-        for rotation, error_deg in best_rotations(rotation_deg, cost, width)
+        for rotation, error_deg in best_rotations(may.rotations, cost, may.near)
     ]
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
@@ -307,17 +308,25 @@ class _Allowed:
         Of those that were asked for, which may be taken.
     rotation_deg : ndarray (m,)
         These.
+    rotations, near : list (m,)
+        The same for `best_rotations`.
     is_choice : ndarray (n_steps,)
         Of rotations from the first view that are evenly apart, which are nearest to one of these.
     """
 
     is_allowed: NDArray[np.bool_]
     rotation_deg: NDArray[np.float64]
+    rotations: list[float]
+    near: list[bool]
     is_choice: NDArray[np.bool_]
 
 
 def _allowed(
-    rotation_deg: NDArray[np.float64], n_steps: int, taken: tuple[float, ...], max_travel_deg: float
+    rotation_deg: NDArray[np.float64],
+    width: float,
+    n_steps: int,
+    taken: tuple[float, ...],
+    max_travel_deg: float,
 ) -> _Allowed:
     """Return which rotations (n,) are near enough, and not too near to a view that was `taken`.
 
@@ -328,14 +337,14 @@ def _allowed(
     left = rotation_deg[is_allowed]
     is_choice = np.zeros(n_steps, dtype=bool)
     is_choice[nearest_bin(left - taken[0], n_steps)] = True
-    return _Allowed(is_allowed, left, is_choice)
+    return _Allowed(is_allowed, left, left.tolist(), are_neighbours(left, width), is_choice)
 
 
 @lru_cache(maxsize=N_KEPT)
 def _allowed_bins(
     n_bins: int, n_steps: int, taken: tuple[float, ...], max_travel_deg: float
 ) -> _Allowed:
-    found = _allowed(bins_deg(n_bins), n_steps, taken, max_travel_deg)
+    found = _allowed(bins_deg(n_bins), 360.0 / n_bins, n_steps, taken, max_travel_deg)
     for array in (found.is_allowed, found.rotation_deg, found.is_choice):
         array.flags.writeable = False
     return found

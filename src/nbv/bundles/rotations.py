@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -57,19 +58,29 @@ def at_rotations(
     return np.asarray(np.interp(rotation_deg, bins, cost, period=360.0))
 
 
+def are_neighbours(rotation_deg: NDArray[np.float64], width: float) -> list[bool]:
+    """Return whether each rotation (m,) and the next one all round are at most a width apart.
+
+    They are in (-180, 180], by their place in [0, 360); the width is that of a bin, degrees.
+    """
+    gap = np.concatenate([rotation_deg[1:], rotation_deg[:1]]) - rotation_deg
+    found: list[bool] = (gap % 360.0 <= width + 1e-9).tolist()
+    return found
+
+
 def best_rotations(
-    rotation_deg: NDArray[np.float64], cost: NDArray[np.floating], width: float
+    rotation_deg: Sequence[float], cost: NDArray[np.floating], near: Sequence[bool]
 ) -> list[tuple[float, float]]:
     """Return rotations of less cost than their neighbours within a bin's width, best first.
 
     Parameters
     ----------
-    rotation_deg : ndarray (m,)
+    rotation_deg : sequence of float (m,)
         In (-180, 180], by their place in [0, 360).
     cost : ndarray (m,)
         No NaN.
-    width : float
-        Of a bin, degrees.
+    near : sequence of bool (m,)
+        From `are_neighbours`.
 
     Returns
     -------
@@ -77,14 +88,17 @@ def best_rotations(
         Of equal costs the one of less travel first; all are `MIN_SEPARATION_DEG` or more apart, and
         there are at most `N_ALTERNATIVES` after the first.
     """
-    gap = np.concatenate([rotation_deg[1:], rotation_deg[:1]]) - rotation_deg
-    rise = np.concatenate([cost[1:], cost[:1]]) - cost
-    is_near = gap % 360.0 <= width + 1e-9
-    beaten, beats = is_near & (rise < 0), is_near & (rise > 0)
-    beaten[1:] |= beats[:-1]
-    beaten[:1] |= beats[-1:]
-    (places,) = (~beaten).nonzero()
-    left = zip(cost[places].tolist(), rotation_deg[places].tolist(), strict=True)
+    # In Python: quicker than many operations on a hundred numbers.
+    costs = cost.tolist()
+    left = [
+        (own, rotation)
+        for own, after, before, is_near, was_near, rotation in zip(
+            *(costs, costs[1:] + costs[:1], costs[-1:] + costs[:-1]),
+            *(near, [*near[-1:], *near[:-1]], rotation_deg),
+            strict=True,
+        )
+        if not ((is_near and after < own) or (was_near and before < own))
+    ]
     least, most = MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG
     found: list[tuple[float, float]] = []
     for of_rotation, rotation in sorted(left, key=lambda one: (one[0], abs(one[1]), one[1] % 360)):
@@ -132,7 +146,8 @@ def ranked_rotations(
             f"{width:g}°"
         )
     rotation_deg = rotation_deg[is_allowed]
-    ranked = best_rotations(rotation_deg, at_rotations(of_bins, rotation_deg), width)
+    near = are_neighbours(rotation_deg, width)
+    ranked = best_rotations(rotation_deg.tolist(), at_rotations(of_bins, rotation_deg), near)
     if allowed_deg is not None or max_travel_deg < of_all.max():
         return ranked
     own = float(signed_deg(np.asarray(lookup.recommend(estimate_deg), dtype=np.float64)))

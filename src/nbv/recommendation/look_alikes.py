@@ -8,9 +8,9 @@ its restriction to one first view.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ How many are enough: docs/reference/bundles/README.md.
 
 N_PARTS = 5
 """Of the calibration objects, for `Expected.optimism_deg`."""
+
+_N_COUNTS = 8
 
 FLAT = 1e-5
 """Of distributions: below this resultant length the mean direction is rounding, and errs by 90°."""
@@ -164,7 +166,7 @@ class Expected:
         The expected error.
     after_deg : ndarray (B,)
         The same after a view at every rotation.
-    parts : ndarray (N, M)
+    parts : ndarray (N, M) float32
         Weighted errors after a view at each of M rotations, 360 / M degrees apart, summed over each
         part of the calibration objects.
     total : ndarray (M,)
@@ -175,7 +177,7 @@ class Expected:
 
     now_deg: float
     after_deg: NDArray[np.float64]
-    parts: NDArray[np.float64]
+    parts: Table
     total: NDArray[np.float64]
     weight: float
 
@@ -201,6 +203,29 @@ class Expected:
             own[other] - own[of_all] for own, other in zip(self.parts, of_others, strict=True)
         )
         return float(more / self.weight)
+
+
+@dataclass(frozen=True)
+class _Counts:
+    """How much calibration counts.
+
+    Attributes
+    ----------
+    of_view : ndarray (S,)
+        A first view of each turn.
+    of_parts : ndarray (N + 1, S) float32
+        The same in each part of the objects, and in all of them.
+    prior : ndarray (m + 2,)
+        The sums of the pseudo-observations, as of `LookAlikes._errors`.
+    """
+
+    of_view: NDArray[np.float64]
+    of_parts: Table
+    prior: NDArray[np.float64]
+
+
+def _bytes(share: NDArray[np.floating] | None) -> bytes | None:
+    return None if share is None else np.asarray(share, dtype=np.float64).tobytes()
 
 
 @dataclass(frozen=True)
@@ -272,9 +297,9 @@ class LookAlikes:
         share : ndarray (S,), optional
             How much each turn counts; 1 without it.
         """
-        of_view, prior = self._counts(pseudo_observations, share)
+        counts = self._counts(pseudo_observations, _bytes(share))
         weight = self._affinities(beliefs, power)
-        sums = _weighted(weight, of_view, self._errors) + prior
+        sums = _weighted(weight, counts.of_view, self._errors) + counts.prior
         errors = sums[:, :-1] / sums[:, -1:]
         return errors[:, -1], _between_steps(errors[:, :-1], self._step)
 
@@ -286,24 +311,30 @@ class LookAlikes:
         share: NDArray[np.floating] | None = None,
     ) -> Expected:
         """Return what one belief (B,) leads one to expect; other parameters as above."""
-        of_view, prior = self._counts(pseudo_observations, share)
+        counts = self._counts(pseudo_observations, _bytes(share))
         weight = self._affinities(belief[None], power)
-        by_part = (self._is_in_part * of_view) @ _of_one(weight, self._errors)
-        sums = by_part[-1] + prior
+        by_part = counts.of_parts @ _of_one(weight, self._errors)
+        sums = by_part[-1] + counts.prior
         errors = sums / sums[-1]
         (after_deg,) = _between_steps(errors[None, :-2], self._step)
         now_deg, all_weight = float(errors[-2]), float(sums[-1])
         return Expected(now_deg, after_deg, by_part[:-1, :-2], sums[:-2], all_weight)
 
-    def _counts(
-        self, pseudo_observations: float, share: NDArray[np.floating] | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return how much a first view of each turn counts (S,), and the prior's sums (m + 2,)."""
-        n_turns, n_first = self.first.shape
-        of_turn = np.ones(n_turns) if share is None else np.asarray(share, dtype=np.float64)
-        prior = pseudo_observations / (of_turn.sum() * n_first)
-        # A first view stands for the degrees that it is apart from the next one.
-        return of_turn * (360.0 / n_first), prior * (of_turn @ self._errors_by_turn)
+    @cached_property
+    def _counts(self) -> Callable[[float, bytes | None], _Counts]:
+        """`_Counts`, by the pseudo-observations and the bytes of the shares; a few are kept."""
+
+        @lru_cache(maxsize=_N_COUNTS)
+        def counts(pseudo_observations: float, share: bytes | None) -> _Counts:
+            n_turns, n_first = self.first.shape
+            of_turn = np.ones(n_turns) if share is None else np.frombuffer(share)
+            prior = pseudo_observations / (of_turn.sum() * n_first)
+            # A first view stands for the degrees that it is apart from the next one.
+            of_view = of_turn * (360.0 / n_first)
+            of_parts = (self._is_in_part * of_view).astype(np.float32)
+            return _Counts(of_view, of_parts, prior * (of_turn @ self._errors_by_turn))
+
+        return counts
 
     def _affinities(self, beliefs: NDArray[np.floating], power: float) -> Table:
         """Return the affinity of each belief (n, B) with each first view, to a power, (S, K, n)."""
