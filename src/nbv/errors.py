@@ -11,7 +11,7 @@ def reason_of(error: Exception) -> str:
     """Return why a file could not be read, in one line."""
     reason = " ".join(str(error).split()) or type(error).__name__
     # numpy takes whatever is no array of its own for objects, and tells to load them unsafely.
-    return "it holds no array of numbers" if "pickle" in reason else reason
+    return "it holds no array of numbers" if "allow_pickle" in reason else reason
 
 
 class UserError(Exception):

@@ -302,16 +302,43 @@ def test_expected_errors_agree_with_real_ones_as_the_page_says(page):
     errors = pd.read_csv(ROOT / "docs/reference/bundles/expected_errors.csv")
     means = errors.groupby("elevation").mean(numeric_only=True).round(1)
     rows = {row[0]: row[1:] for row in page if len(row) == 3}
-    for line, views, elevation in (
-        ("one view", "one_view", "not given"),
-        ("two views, before the second one is taken", "two_views", "not given"),
-        ("… with the elevation given", "two_views", "given"),
-        ("three views, before the third one is taken", "three_views", "not given"),
+    for line, expected, views, elevation in (
+        ("one view", "one_view_expected", "one_view", "not given"),
+        *(
+            (f"{name}, before the {last} one is taken", f"{views}_expected", views, "not given")
+            for name, last, views in (
+                ("two views", "second", "two_views"),
+                ("three views", "third", "three_views"),
+            )
+        ),
+        ("… without what is added", "two_views_least", "two_views", "not given"),
+        ("… with the elevation given", "two_views_expected", "two_views", "given"),
     ):
-        found = means.loc[elevation, [f"{views}_expected", views]]
+        found = means.loc[elevation, [expected, views]]
         assert rows[line] == [f"{value:.1f}" for value in found]
-    of_mugs = errors.groupby(["elevation", "seed", "object_id"]).mean(numeric_only=True)
+    text = " ".join((ROOT / "docs/bundles.md").read_text(encoding="utf-8").split())
+    of_mugs = errors.groupby(["elevation", "training", "object_id"]).mean(numeric_only=True)
+    mugs, known, correlations = of_mugs.loc["not given"], [], []
     for views in ("one_view", "two_views", "three_views"):
-        mugs = of_mugs.loc["not given"]
         missed = mugs[f"{views}_expected"] - mugs[views]
-        assert abs(missed.mean()) < t.ppf(0.975, len(missed) - 1) * sem(missed)
+        known.append(t.ppf(0.975, len(missed) - 1) * sem(missed))
+        assert abs(missed.mean()) < known[-1]
+        correlations.append(np.corrcoef(mugs[f"{views}_expected"], mugs[views])[0, 1])
+    assert "The differences are known to ± {:.1f}, {:.1f} and {:.1f}°.".format(*known) in text
+    assert f"correlation of {correlations[0]:.2f} for one view, and of less than 0.1" in text
+    assert max(correlations[1:]) < 0.1
+    by_elevation = errors.groupby(["elevation", "elevation_deg"]).mean(numeric_only=True)
+    shown = by_elevation[["two_views_expected", "two_views"]]
+    assert (
+        "two views have {:.1f}° for {:.1f}° at 30°, and {:.1f}° for {:.1f}° at 60°; where it is "
+        "given, {:.1f}° for {:.1f}° and {:.1f}° for {:.1f}°."
+    ).format(
+        *(
+            value
+            for elevation in ("not given", "given")
+            for at in (30, 60)
+            for value in shown.loc[(elevation, at)]
+        )
+    ) in text
+    then = errors["two_views_expected_then"].mean()
+    assert f"its expected error is {then:.1f}°, still too low" in text

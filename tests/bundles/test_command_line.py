@@ -309,7 +309,7 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         (["--mask", "m.npy", "f0.npy"], "frames stand before --mask"),
         (["f0.npy", "--rotations", "10"], "the first is 10"),
         (["f0.npy", "--max-travel", "3"], "no rotation is allowed"),
-        (["f0.npy", "--max-travel", "-5"], "a longest travel of -5°: give degrees, 0 or more"),
+        (["f0.npy", "--max-travel", "-5"], "a longest travel of -5.0°: give degrees, 0 or more"),
         (["f0.npy", "--max-travel", "nan"], "a longest travel of nan°"),
         (["f0.npy", "--allowed", "0"], "no rotation is allowed"),
         (["f0.npy", "--allowed", "left"], "left: give rotations in degrees, or a .npy file"),

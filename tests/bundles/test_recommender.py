@@ -24,6 +24,7 @@ from made_bundles import settings as made_settings
 from nbv.angles import circular_distance_deg, travel_deg
 from nbv.bundles.beliefs import direction_and_spread_deg, distributions_of, elevation_share
 from nbv.bundles.familiarity import fit_familiarity, unfamiliarity
+from nbv.bundles.next_view import after_rotations
 from nbv.bundles.recommender import Recommender
 from nbv.bundles.rotations import MIN_SEPARATION_DEG, N_ALTERNATIVES
 from nbv.bundles.turns import Turn
@@ -196,7 +197,7 @@ def test_whole_turns_of_the_camera_do_not_matter(recommender, seed, turns):
 # Expected errors
 
 
-def brute_force(bundle, rows, bins, share=None):
+def brute_force(bundle, rows, bins, share=None, limits=True):
     """From the definitions: the expected error now, those after each rotation from the last frame,
     and by how much the choice of the least of these makes it too low."""
     power, pseudo = bundle.affinity["power"], bundle.affinity["pseudo_observations"]
@@ -227,9 +228,8 @@ def brute_force(bundle, rows, bins, share=None):
     prior = np.ones(len(views)) if share is None else share
     prior = np.repeat(prior, BINS) * pseudo / (prior.sum() * BINS)
     total = weights + prior
-    may = (
-        circular_distance_deg(HERE[:, None], WIDTH * (np.array(bins) - bins[-1])).min(axis=1) >= 15
-    )
+    taken = WIDTH * (np.array(bins) - bins[-1])
+    may = (circular_distance_deg(HERE[:, None], taken).min(axis=1) >= MIN_SEPARATION_DEG) & limits
     names = sorted(set(bundle.object_ids))
     more = 0.0
     best = np.where(may, total @ after, np.inf).argmin()
@@ -260,6 +260,20 @@ def test_expected_errors_are_those_of_objects_that_look_alike(recommender, bins,
     assert free.sum() == BINS - len(bins)
     assert found.expected_error_deg == pytest.approx(now, rel=1e-4)
     assert found.error_after_deg[free] == pytest.approx(after[free] + more, rel=1e-4)
+
+
+def test_what_is_added_is_of_the_rotations_that_may_be_chosen(recommender):
+    unlimited = []
+    for seed, bins, allowed in ((7, (0,), [3, 9, 15]), (5, (0, 6), [2, 20]), (8, (0, -5), [4, 7])):
+        codes, turns = codes_of(seed, len(bins)), [turn * WIDTH for turn in bins]
+        rows = recommender.distributions(codes)
+        limits = np.isin(np.arange(BINS), allowed)
+        _, after, more = brute_force(recommender.bundle, rows, bins, limits=limits)
+        found = recommender.recommend_crops(codes, turns, allowed_deg=np.array(allowed) * WIDTH)
+        free = np.isfinite(found.error_after_deg)
+        assert found.error_after_deg[free] == pytest.approx(after[free] + more, rel=1e-4)
+        unlimited.append(brute_force(recommender.bundle, rows, bins)[2] - more)
+    assert np.abs(unlimited).max() > 0.01
 
 
 def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):
@@ -339,7 +353,17 @@ def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
         turn_weight=np.ones(2, np.float32),
         object_ids=("a", "b"),
     )
-    found = Recommender(rough, "numpy").recommend_crops(codes_of(0, 2), [0.0, 60.0])
+    recommender = Recommender(rough, "numpy")
+    # What is added, by hand, of two rotations that may be chosen.
+    (belief,) = recommender.distributions(codes_of(0, 1))
+    alike = after_rotations(rough.distributions, rough.object_ids)(())
+    expected = alike.expected(belief, **rough.affinity, share=np.ones(2))
+    parts, total = expected.parts[:, [10, 25]].astype(float), expected.total[[10, 25]]
+    more = sum(own[np.argmin(total - own)] - own[np.argmin(total)] for own in parts)
+    limited = recommender.recommend_crops(codes_of(0, 1), allowed_deg=[60.0, 150.0])
+    wanted = expected.after_deg[[20, 50]] + more / expected.weight
+    assert limited.error_after_deg[[20, 50]] == pytest.approx(wanted, rel=1e-5)
+    found = recommender.recommend_crops(codes_of(0, 2), [0.0, 60.0])
     minima = (found.error_after_deg < np.roll(found.error_after_deg, 1)) & (
         found.error_after_deg < np.roll(found.error_after_deg, -1)
     )

@@ -356,7 +356,7 @@ def _need_sound(bundle: Bundle) -> None:
     ):
         raise ValueError("what is familiar has arrays that do not fit each other")
     if set(bundle.affinity) != {"power", "pseudo_observations"} or not all(
-        math.isfinite(value) and value > 0 for value in bundle.affinity.values()
+        math.isfinite(value) and value >= 0 for value in bundle.affinity.values()
     ):
         raise ValueError(f"an affinity of {dict(bundle.affinity)}")
     if not isinstance(bundle.provenance, dict):

@@ -23,8 +23,8 @@ from nbv.frames.intrinsics import Intrinsics, camera_of
 NEEDED = ("object_id", "sequence", "file", "azimuth_deg")
 OPTIONAL = ("mask", "elevation_deg", "fx", "fy", "cx", "cy")
 
-# Of a name that is an optional one, mistyped: elevation is, and note is not.
-_ALIKE = 0.75
+# Of a name that is an optional one, mistyped: one letter of elevation_deg, and not its unit.
+_ALIKE = 0.9
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,11 @@ def read_manifest(path: str | Path) -> list[Recording]:
     for name in map(str, table):
         if name not in (*NEEDED, *OPTIONAL) and (
             alike := difflib.get_close_matches(name.lower(), absent, 1, _ALIKE)
+            or [known for known in absent if known == f"{name.lower()}_deg"]
         ):
-            raise UserError(f"{path}: a column {name!r}; call it {alike[0]!r}, or remove it")
+            raise UserError(
+                f"{path}: a column {name!r}; call it {alike[0]!r} if it is that, or remove it"
+            )
     for name in {"azimuth_deg", *OPTIONAL} - {"mask"}:
         if name in table:
             table[name] = _numbers(path, table[name])

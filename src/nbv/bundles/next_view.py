@@ -20,10 +20,10 @@ from nbv.bundles.rotations import (
     MIN_SEPARATION_DEG,
     are_neighbours,
     as_allowed,
+    as_travel,
     at_rotations,
     best_rotations,
     bins_deg,
-    need_travel,
 )
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
@@ -156,15 +156,15 @@ class Recommendation:
 
 
 def after_rotations(
-    distributions: NDArray[np.float32], object_ids: Sequence[str]
+    distributions: NDArray[np.float32], object_ids: Sequence[str], n_kept: int = N_KEPT
 ) -> AfterRotations:
     """Return what gives the calibration turns after some rotations, of distributions (S, B, B).
 
     Turn s shows the object ``object_ids[s]``. The errors after rotations take longer to find than
-    all else, so `N_KEPT` of them are kept.
+    all else, so `n_kept` of them are kept.
     """
 
-    @lru_cache(maxsize=N_KEPT)
+    @lru_cache(maxsize=n_kept)
     def after(bins: tuple[int, ...]) -> LookAlikes:
         if not bins:
             return LookAlikes.of_views(distributions, MOST_COMPARED, object_ids)
@@ -209,7 +209,7 @@ def next_view(
     UserError
         Where there is a further view, but none that is allowed, or the longest travel is none.
     """
-    need_travel(max_travel_deg)
+    max_travel_deg = as_travel(max_travel_deg)
     belief = fused(distributions, rotations_deg)
     n_bins = len(belief)
     width = 360.0 / n_bins

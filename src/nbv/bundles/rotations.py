@@ -44,10 +44,15 @@ def as_allowed(allowed_deg: ArrayLike) -> NDArray[np.float64]:
     return np.where(is_within, rotation_deg, signed_deg(wrap_deg(rotation_deg)))
 
 
-def need_travel(max_travel_deg: float) -> None:
-    """Refuse a longest travel that is none; UserError says what to give."""
-    if not max_travel_deg >= 0:
-        raise UserError(f"a longest travel of {max_travel_deg:g}°: give degrees, 0 or more")
+def as_travel(max_travel_deg: float) -> float:
+    """Return a longest travel; UserError where it is none."""
+    try:
+        given = float(max_travel_deg)
+    except (TypeError, ValueError):
+        given = float("nan")
+    if not given >= 0:
+        raise UserError(f"a longest travel of {max_travel_deg}°: give degrees, 0 or more")
+    return given
 
 
 def at_rotations(
@@ -132,7 +137,7 @@ def ranked_rotations(
     UserError
         Where no rotation is allowed.
     """
-    need_travel(max_travel_deg)
+    max_travel_deg = as_travel(max_travel_deg)
     n_bins = len(lookup.cost)
     width = 360.0 / n_bins
     of_bins = lookup.cost[nearest_bin(estimate_deg, n_bins)]

@@ -8,9 +8,9 @@ its restriction to one first view.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,7 +186,8 @@ class Expected:
 
         The least of uncertain numbers is lower than what they estimate. How much is found by
         cross-validation of the choice: each part of the objects errs more at the rotation that the
-        other parts choose than at the one that all choose. With one part it is 0.
+        other parts choose than at the one that all choose. The pseudo-observations take part in
+        each choice. With one part it is 0.
 
         Parameters
         ----------
@@ -222,10 +223,6 @@ class _Counts:
     of_view: NDArray[np.float64]
     of_parts: Table
     prior: NDArray[np.float64]
-
-
-def _bytes(share: NDArray[np.floating] | None) -> bytes | None:
-    return None if share is None else np.asarray(share, dtype=np.float64).tobytes()
 
 
 @dataclass(frozen=True)
@@ -297,7 +294,7 @@ class LookAlikes:
         share : ndarray (S,), optional
             How much each turn counts; 1 without it.
         """
-        counts = self._counts(pseudo_observations, _bytes(share))
+        counts = self._counts(pseudo_observations, share)
         weight = self._affinities(beliefs, power)
         sums = _weighted(weight, counts.of_view, self._errors) + counts.prior
         errors = sums[:, :-1] / sums[:, -1:]
@@ -311,7 +308,7 @@ class LookAlikes:
         share: NDArray[np.floating] | None = None,
     ) -> Expected:
         """Return what one belief (B,) leads one to expect; other parameters as above."""
-        counts = self._counts(pseudo_observations, _bytes(share))
+        counts = self._counts(pseudo_observations, share)
         weight = self._affinities(belief[None], power)
         by_part = counts.of_parts @ _of_one(weight, self._errors)
         sums = by_part[-1] + counts.prior
@@ -321,20 +318,27 @@ class LookAlikes:
         return Expected(now_deg, after_deg, by_part[:-1, :-2], sums[:-2], all_weight)
 
     @cached_property
-    def _counts(self) -> Callable[[float, bytes | None], _Counts]:
-        """`_Counts`, by the pseudo-observations and the bytes of the shares; a few are kept."""
+    def _known_counts(self) -> dict[tuple[float, bytes | None], _Counts]:
+        return {}
 
-        @lru_cache(maxsize=_N_COUNTS)
-        def counts(pseudo_observations: float, share: bytes | None) -> _Counts:
-            n_turns, n_first = self.first.shape
-            of_turn = np.ones(n_turns) if share is None else np.frombuffer(share)
-            prior = pseudo_observations / (of_turn.sum() * n_first)
-            # A first view stands for the degrees that it is apart from the next one.
-            of_view = of_turn * (360.0 / n_first)
-            of_parts = (self._is_in_part * of_view).astype(np.float32)
-            return _Counts(of_view, of_parts, prior * (of_turn @ self._errors_by_turn))
-
-        return counts
+    def _counts(self, pseudo_observations: float, share: NDArray[np.floating] | None) -> _Counts:
+        """Return what counts how much; kept, because it is the same for most frames."""
+        of_turn = None if share is None else np.asarray(share, dtype=np.float64)
+        key = pseudo_observations, None if of_turn is None else of_turn.tobytes()
+        known = self._known_counts
+        if key in known:
+            return known[key]
+        if len(known) >= _N_COUNTS:
+            known.clear()
+        n_turns, n_first = self.first.shape
+        if of_turn is None:
+            of_turn = np.ones(n_turns)
+        prior = pseudo_observations / (of_turn.sum() * n_first)
+        # A first view stands for the degrees that it is apart from the next one.
+        of_view = of_turn * (360.0 / n_first)
+        of_parts = (self._is_in_part * of_view).astype(np.float32)
+        known[key] = _Counts(of_view, of_parts, prior * (of_turn @ self._errors_by_turn))
+        return known[key]
 
     def _affinities(self, beliefs: NDArray[np.floating], power: float) -> Table:
         """Return the affinity of each belief (n, B) with each first view, to a power, (S, K, n)."""
