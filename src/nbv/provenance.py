@@ -30,11 +30,11 @@ PACKAGES = (
 def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
     """Return the modules of nbv that a script imports, directly or not, wherever it does so.
 
-    Files are parsed and not run. A registry names optional modules in strings, which no import
-    shows: `chosen` gives those that a configuration chooses, as entries such as
-    ``nbv.rendering.embree:EmbreeRenderer``. Paths are sorted, with the ``__init__`` files of the
-    packages that hold the modules, and with the templates that a module fills in: those of its
-    name, in the folder ``templates`` next to it.
+    Files are parsed and not run; imports for type checkers alone do not count. A registry names
+    optional modules in strings, which no import shows: `chosen` gives those that a configuration
+    chooses, as entries such as ``nbv.rendering.embree:EmbreeRenderer``. Paths are sorted, with the
+    ``__init__`` files of the packages that hold the modules, and with the templates that a module
+    fills in: those of its name, in the folder ``templates`` next to it.
     """
     imports = _imports()
     found: set[str] = set()
@@ -52,7 +52,8 @@ def _imports() -> dict[str, set[str]]:
     """Return what each module of nbv imports of nbv."""
     import grimp
 
-    graph = grimp.build_graph("nbv", cache_dir=None)
+    # What is imported for type checkers alone does not run.
+    graph = grimp.build_graph("nbv", cache_dir=None, exclude_type_checking_imports=True)
     return {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
 
 
