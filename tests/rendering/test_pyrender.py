@@ -31,14 +31,14 @@ def pyrender():
 
 
 def smooth(depth, step=0.05):
-    """Pixels whose neighbourhood lies on one surface, or wholly on the background.
+    """Pixels whose neighbourhood lies on one surface, or wholly on the background; its depth range.
 
     Elsewhere an edge may pass within rounding of a pixel's centre, and one renderer sees the
     surface before it while the other sees the one behind.
     """
     high = ndimage.maximum_filter(depth, (0, 3, 3))
     low = ndimage.minimum_filter(depth, (0, 3, 3))
-    return ((low > 0) & (high - low < step)) | (high == 0)
+    return ((low > 0) & (high - low < step)) | (high == 0), high - low
 
 
 @pytest.mark.parametrize("framing", ["silhouette", "axis"])
@@ -50,14 +50,15 @@ def test_both_renderers_make_the_same_images(embree, pyrender, category, framing
     for elevation in (0.0, 45.0):
         ours = embree.render(*shape, elevation, azimuths, camera)
         theirs = pyrender.render(*shape, elevation, azimuths, camera)
-        inside = smooth(ours)
+        inside, within = smooth(ours)
         assert np.array_equal((ours > 0)[inside], (theirs > 0)[inside])
         visible = inside & (ours > 0)
         assert visible.sum() > 100
-        apart = np.abs(ours - theirs) > 1e-4
+        apart = np.abs(ours - theirs)
         # Ridges lower than the step of `smooth` remain inside it: one pixel in a thousand at most.
-        assert apart[visible].mean() < 1e-3
-        assert apart[~inside].mean() < 0.01
+        assert (apart > 1e-4)[visible].mean() < 1e-3
+        # A GPU rounds the corners of faces to 1/256 of a pixel; `within` is of two pixels or more.
+        assert (apart > 1e-4 + within / 256)[~inside].mean() < 0.01
 
 
 def test_depth_is_sampled_at_the_pixels_centre(embree, pyrender):
