@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 import tempfile
@@ -24,6 +25,7 @@ ONE = Target(1.0, at_most=True)
 # Of the forward pass with torch, over all images of a frame: crop, network, fusion and choice.
 FORWARD = Target(1.5, at_most=True)
 FRAME_MS = {"numpy": 5.0, "onnx": 2.0}
+NEW_ROTATION_MS = 5.0
 START_S = {"numpy": 1.0, "onnx": 1.0}
 HELP_S = 0.3
 IN_A_ROW = 20
@@ -43,7 +45,9 @@ def run(quick: bool) -> list[Figure]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "frame.npy")
         np.save(path, frame.depth_m)
-        return [*_in_memory(bundle, frame, 2 if quick else 40), *_starts(path, 1 if quick else 7)]
+        n_rounds = 2 if quick else 40
+        figures = [*_in_memory(bundle, frame, n_rounds), _at_new_rotations(bundle, n_rounds)]
+        return [*figures, *_starts(path, 1 if quick else 7)]
 
 
 def _in_memory(bundle: Bundle, frame: Frame, n_rounds: int) -> list[Figure]:
@@ -88,6 +92,29 @@ def _in_memory(bundle: Bundle, frame: Frame, n_rounds: int) -> list[Figure]:
             ),
         ]
     return figures
+
+
+def _at_new_rotations(bundle: Bundle, n_rounds: int) -> Figure:
+    """Two frames, at a rotation that is not kept, and at one that is."""
+    recommender, frames = Recommender(bundle, "onnx"), [example_frame(), example_frame(237.0)]
+    rotations = itertools.cycle(range(30, 330, 3))
+
+    def answer(rotation_deg: float) -> None:
+        recommender.recommend(
+            [frame.depth_m for frame in frames],
+            rotations_deg=[0.0, rotation_deg],
+            mask=[frame.mask for frame in frames],
+            intrinsics=frames[0].intrinsics,
+        )
+
+    turns = take_turns([lambda: answer(next(rotations)), lambda: answer(20.0)], n_rounds)
+    new_ms, known_ms = (1e3 * turns.typical(column) for column in (0, 1))
+    return Figure(
+        f"two frames at a new rotation, onnx / {NEW_ROTATION_MS:g} ms",
+        new_ms / NEW_ROTATION_MS,
+        ONE,
+        f"{new_ms:.1f} ms, at a known rotation {known_ms:.1f} ms; {n_rounds} in turn, one thread",
+    )
 
 
 def _starts(frame: Path, n_rounds: int) -> list[Figure]:

@@ -325,8 +325,8 @@ def test_expected_errors_agree_with_real_ones_as_the_page_says(page):
         assert abs(missed.mean()) < known[-1]
         correlations.append(np.corrcoef(mugs[f"{views}_expected"], mugs[views])[0, 1])
     assert "The differences are known to ± {:.1f}, {:.1f} and {:.1f}°.".format(*known) in text
-    assert f"correlation of {correlations[0]:.2f} for one view, and of less than 0.1" in text
-    assert max(correlations[1:]) < 0.1
+    assert f"correlation of {correlations[0]:.2f} for one view, and of less than 0.2" in text
+    assert max(correlations[1:]) < 0.2
     by_elevation = errors.groupby(["elevation", "elevation_deg"]).mean(numeric_only=True)
     shown = by_elevation[["two_views_expected", "two_views"]]
     assert (

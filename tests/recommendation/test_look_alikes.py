@@ -47,7 +47,7 @@ def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Genera
         own = own * np.roll(distributions[1, (first + turn) % bins], -turn)
     own /= own.sum()
     assert alike.seen[1, first] == pytest.approx(own, rel=1e-4)
-    errors = error_after_deg(alike.so_far, alike.views)
+    errors = error_after_deg(alike.so_far, alike.views, alike.first)
     for turn in range(bins):
         other = distributions[1, (first + turn) % bins]
         pose = product(own, other, 15.0 * turn)
@@ -108,24 +108,43 @@ def test_all_errors_count_wherever_a_belief_is_compared(rng: np.random.Generator
         assert found.mean(axis=1) == pytest.approx(errors.mean(axis=1), rel=1e-5)
 
 
-def test_fewer_first_views_are_the_same_views(rng: np.random.Generator) -> None:
-    """Their distributions and weights are those of the same views among all."""
-    distributions, belief = turns(rng), turns(rng)[0, :2]
+@pytest.mark.parametrize(
+    ("n_bins", "most"), [(24, 40), (24, 12), (90, 55), (120, 100), (180, 270), (180, 72)]
+)
+def test_fewer_first_views_are_the_same_views(
+    rng: np.random.Generator, n_bins: int, most: int
+) -> None:
+    """After further views their distributions and errors are those of the same views among all."""
+    distributions = turns(rng, bins=n_bins)
     everything = LookAlikes.of_views(distributions).after(5)
-    fewer = LookAlikes.of_views(distributions, most=40).after(5)
-    assert fewer.first.tolist() == [[k + 2 * n for n in range(12)] for k in (0, 1, 0)]
+    fewer = LookAlikes.of_views(distributions, most).after(5)
+    assert fewer.first.size <= most
     rows = np.arange(3)[:, None], fewer.first
     assert np.array_equal(fewer.seen, everything.seen[rows])
-    errors = near_first_views(error_after_deg(fewer.so_far, fewer.views), fewer.first)
-    errors_now = near_first_views(fewer.error_now_deg[:, :, None], fewer.first)[:, :, 0]
+    assert fewer.errors_deg == pytest.approx(everything.errors_deg[rows], abs=0.01)
+
+
+@pytest.mark.parametrize("rotations", [[], [5], [5, 17]])
+def test_expected_errors_of_fewer_first_views_are_means_by_affinity(
+    rng: np.random.Generator, rotations: list[int]
+) -> None:
+    """Of the errors of all views near each one, or of its own after further views."""
+    distributions, belief = turns(rng), turns(rng)[0, :2]
+    everything = LookAlikes.of_views(distributions)
+    fewer = LookAlikes.of_views(distributions, most=40)
+    for turn in rotations:
+        everything, fewer = everything.after(turn), fewer.after(turn)
+    assert fewer.first.tolist() == [[k + 2 * n for n in range(12)] for k in (0, 1, 0)]
+    rows = np.arange(3)[:, None], fewer.first
+    every_error = everything.errors_deg
+    errors = every_error[rows] if rotations else near_first_views(every_error, fewer.first)
     now, after = fewer.expected_error_deg(belief, 5.0, 30.0)
     for own, own_now, own_after in zip(belief, now, after, strict=True):
-        weight = 30.0 * (np.sqrt(fewer.seen) @ np.sqrt(own)) ** 5.0
+        weight = 30.0 * (np.sqrt(everything.seen[rows]) @ np.sqrt(own)) ** 5.0
         weight += 30.0 / weight.size
-        share = weight / weight.sum()
-        assert own_now == pytest.approx((share * errors_now).sum(), rel=1e-4)
-        wanted = np.tensordot(share, errors)
-        assert own_after == pytest.approx(wanted, rel=1e-4)
+        wanted = np.tensordot(weight / weight.sum(), errors)
+        assert own_after == pytest.approx(wanted[:-1], rel=1e-4)
+        assert own_now == pytest.approx(wanted[-1], rel=1e-4)
 
 
 @pytest.mark.parametrize("step", [2, 3, 4])
@@ -133,8 +152,9 @@ def test_errors_at_whole_steps_are_those_of_all_rotations(
     rng: np.random.Generator, step: int
 ) -> None:
     alike = LookAlikes.of_views(turns(rng)).after(5)
-    wanted = error_after_deg(alike.so_far, alike.views)[:, :, ::step]
-    assert error_after_deg(alike.so_far, alike.views, step=step) == pytest.approx(wanted, abs=1e-3)
+    wanted = error_after_deg(alike.so_far, alike.views, alike.first)[:, :, ::step]
+    found = error_after_deg(alike.so_far, alike.views, alike.first, step)
+    assert found == pytest.approx(wanted, abs=1e-3)
 
 
 def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.Generator) -> None:
@@ -143,7 +163,7 @@ def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.G
     alike = LookAlikes.of_views(distributions).after(7)
     now, after = alike.expected_error_deg(beliefs, 5.0, 30.0)
     views = np.concatenate(alike.seen)
-    errors = np.concatenate(error_after_deg(alike.so_far, alike.views))[:, ::2]
+    errors = np.concatenate(error_after_deg(alike.so_far, alike.views, alike.first))[:, ::2]
     for belief, own_now, own in zip(beliefs, now, after, strict=True):
         pairs = [np.sqrt(rows[..., ::2] + rows[..., 1::2]) for rows in (belief, views)]
         weight = 3.0 * (pairs[1] @ pairs[0]) ** 5.0

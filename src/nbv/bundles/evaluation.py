@@ -66,7 +66,8 @@ def fixed_errors_deg(alike: LookAlikes, n_views: int) -> NDArray[np.float64]:
     may = (apart >= MIN_SEPARATION_DEG) | (steps == round(n_bins / n_views))
     errors = np.full((n_turns, n_bins), np.inf)
     if n_views == 2:
-        errors[:, may] = error_after_deg(alike.so_far, alike.views).mean(axis=1)[:, may]
+        after = error_after_deg(alike.so_far, alike.views, alike.first)
+        errors[:, may] = after.mean(axis=1)[:, may]
         return errors
     for step in steps[may]:
         turned_alike = alike
@@ -259,7 +260,8 @@ def evaluate(
                 f"{counted(len(turn.azimuth_deg), 'frame')}, too few for {max(numbers)} views"
             )
     rows, calibrated = [], after_rotations(bundle.distributions, bundle.object_ids)
-    of_steps = {number: fixed_errors_deg(calibrated(()), number) for number in numbers}
+    every_view = LookAlikes.of_views(bundle.distributions)
+    of_steps = {number: fixed_errors_deg(every_view, number) for number in numbers}
     for n_done, turn in enumerate(turns, start=1):
         seen = seen_by(bundle, turn)
         # However many views there are, the first ones are the same.

@@ -8,6 +8,7 @@ its restriction to one first view.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -45,9 +46,8 @@ def in_object_frame(distributions: Table) -> Table:
     View k of B has the azimuth 360 k / B; entry u of the result is the probability of the pose
     360 u / B degrees ahead of the true one.
     """
-    n_bins = distributions.shape[-1]
-    index = (np.arange(n_bins)[:, None] + np.arange(n_bins)) % n_bins
-    return np.take_along_axis(distributions, index[None], axis=2)
+    n_turns, n_bins, _ = distributions.shape
+    return _started_at(distributions, np.tile(np.arange(n_bins), (n_turns, 1)))
 
 
 def compared_step(n_bins: int) -> int:
@@ -73,8 +73,8 @@ def first_views(n_turns: int, n_bins: int, most: int | None = None) -> NDArray[n
     return np.arange(n_turns)[:, None] % apart + np.arange(0, n_bins, apart)
 
 
-def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
-    """Return the error of the product with further views, (S, B, B / step) float32, degrees.
+def error_after_deg(so_far: Table, views: Table, first: NDArray[np.intp], step: int = 1) -> Table:
+    """Return the error of the product with further views, (S, K, B / step) float32, degrees.
 
     With c of the views so far and c' of a further one, both from `in_object_frame`, the mean
     direction of the product is that of ``sum_u c(u) c'(u) exp(i u)``: one product of matrices for
@@ -82,39 +82,43 @@ def error_after_deg(so_far: Table, views: Table, step: int = 1) -> Table:
 
     Parameters
     ----------
-    so_far : ndarray (S, B, B)
+    so_far : ndarray (S, K, B)
         Of the fused views, by the first one.
     views : ndarray (S, B, B)
         Of single views.
+    first : ndarray (S, K)
+        The first views, from `first_views`.
     step : int
         Further views are so many bins apart; a divisor of B.
 
     Returns
     -------
     ndarray
-        ``[s, k, d]``: of first view k with a further view at the rotation ``step d``, in bins.
+        ``[s, k, d]``: of the k-th first view with a further view at the rotation ``step d``, in
+        bins.
     """
-    n_turns, n_bins, _ = views.shape
-    angles = 2 * np.pi * np.arange(n_bins) / n_bins
-    n_steps = n_bins // step
-
-    def in_steps(rows: Table) -> Table:
-        # Views whole steps apart stand together: no others are of one pair.
-        return rows.reshape(n_turns, n_steps, step, n_bins).transpose(0, 2, 1, 3)
-
-    turned = in_steps(views).transpose(0, 1, 3, 2)
-    further = (np.arange(n_steps)[:, None] + np.arange(n_steps)) % n_steps
+    n_turns, n_first, n_bins = so_far.shape
+    apart, n_steps = n_bins // n_first, n_bins // step
+    common = math.gcd(apart, step)
+    # First views whole steps apart have their further views in common: each such set is a group.
+    n_groups, n_in_group = step // common, n_first * common // step
+    places = first[:, :n_groups, None] + step * np.arange(n_steps)
+    further = views[np.arange(n_turns)[:, None, None], places % n_bins]
+    # Small products are twice as fast of arrays that lie in their order.
+    further = np.ascontiguousarray(further.transpose(0, 1, 3, 2))
 
     def of_pairs(rows: Table) -> Table:
-        return np.asarray(np.matmul(in_steps(rows), turned))
+        groups = rows.reshape(n_turns, n_in_group, n_groups, n_bins).transpose(0, 2, 1, 3)
+        return np.asarray(np.matmul(groups, further))
 
+    angles = 2 * np.pi * np.arange(n_bins) / n_bins
     real = of_pairs(so_far * np.cos(angles).astype(np.float32))
     imaginary = of_pairs(so_far * np.sin(angles).astype(np.float32))
     error = np.abs(np.degrees(np.arctan2(imaginary, real))).astype(np.float32)
-    if any((_resultant_length(rows) < FLAT).any() for rows in (so_far, views)):
-        error[np.hypot(real, imaginary) < FLAT * of_pairs(so_far)] = 90.0
-    by_rotation = np.take_along_axis(error, further[None, None], axis=3)
-    return by_rotation.transpose(0, 2, 1, 3).reshape(n_turns, n_bins, n_steps)
+    error[np.hypot(real, imaginary) < FLAT * of_pairs(so_far)] = 90.0
+    ahead = apart // common * np.arange(n_in_group) % n_steps
+    by_rotation = _started_at(error, np.broadcast_to(ahead, error.shape[:-1]))
+    return by_rotation.transpose(0, 2, 1, 3).reshape(n_turns, n_first, n_steps)
 
 
 def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
@@ -231,22 +235,24 @@ class LookAlikes:
 
     Attributes
     ----------
-    so_far : ndarray (S, B, B) float32
+    so_far : ndarray (S, K, B) float32
         Distributions of the fused views `in_object_frame`, by the first view; rows sum to 1.
     views : ndarray (S, B, B) float32
-        The same of single views.
+        Those of all single views.
     first : ndarray (S, K)
-        The first views that a belief is compared with, in bins; see `first_views`. With each one,
-        the errors of all first views near it count (`near_first_views`).
+        The first views that a belief is compared with, in bins; see `first_views`.
     object_ids : sequence of str, or None
         Of the turns (S,); None where each is of another object. One object's turns are in one part
         of `Expected.parts`.
+    near_deg : ndarray (S, K, M + 1), or None
+        Errors after a view at each of M rotations, and now, that count instead of those of `first`.
     """
 
     so_far: Table
     views: Table
     first: NDArray[np.intp]
     object_ids: Sequence[str] | None = None
+    near_deg: Table | None = None
 
     @staticmethod
     def of_views(
@@ -254,16 +260,26 @@ class LookAlikes:
     ) -> LookAlikes:
         """Return the turns after one view, of distributions (S, B, B) of views a bin apart.
 
-        ``most`` of all first views together are compared, as in `first_views`.
+        ``most`` of all first views together are compared, as in `first_views`. With each one, the
+        errors of all first views near it count (`near_first_views`); after further views, whose
+        errors have to be found while a robot waits, its own alone.
         """
         views = in_object_frame(np.asarray(distributions, dtype=np.float32))
-        first = first_views(views.shape[0], views.shape[1], most)
-        return LookAlikes(views, views, first, object_ids)
+        n_turns, n_bins, _ = views.shape
+        everything = LookAlikes(views, views, first_views(n_turns, n_bins), object_ids)
+        first = first_views(n_turns, n_bins, most)
+        if first.shape == everything.first.shape:
+            return everything
+        near_deg = near_first_views(everything.errors_deg, first)
+        turns = np.arange(n_turns)[:, None]
+        return LookAlikes(views[turns, first], views, first, object_ids, near_deg)
 
     def after(self, rotation_bins: int) -> LookAlikes:
         """Return the turns after one more view, at a rotation from the first one."""
-        both = self.so_far * np.roll(self.views, -rotation_bins, axis=1)
-        return replace(self, so_far=both / both.sum(axis=2, keepdims=True))
+        n_turns, _, n_bins = self.so_far.shape
+        places = (self.first + rotation_bins) % n_bins
+        both = self.so_far * self.views[np.arange(n_turns)[:, None], places]
+        return replace(self, so_far=both / both.sum(axis=2, keepdims=True), near_deg=None)
 
     @cached_property
     def _step(self) -> int:
@@ -271,8 +287,19 @@ class LookAlikes:
 
     @property
     def error_now_deg(self) -> Table:
-        """`error_of_deg` of the turns, (S, B)."""
+        """`error_of_deg` of the turns, (S, K)."""
         return error_of_deg(self.so_far)
+
+    @cached_property
+    def errors_deg(self) -> Table:
+        """The errors after a view at each of M rotations, and now: (S, K, M + 1).
+
+        Those that count for the first views; the rotations are whole steps apart.
+        """
+        if self.near_deg is not None:
+            return self.near_deg
+        after = error_after_deg(self.so_far, self.views, self.first, self._step)
+        return np.concatenate([after, self.error_now_deg[:, :, None]], axis=2)
 
     def expected_error_deg(
         self,
@@ -359,11 +386,8 @@ class LookAlikes:
 
     @property
     def seen(self) -> Table:
-        """The distributions of `first` in the frames of these views, (S, K, B)."""
-        n_turns, n_bins, _ = self.so_far.shape
-        places = (np.arange(n_bins) - self.first[:, :, None]) % n_bins
-        turns = np.arange(n_turns)[:, None, None]
-        return np.asarray(self.so_far[turns, self.first[:, :, None], places])
+        """The distributions in the frames of these views, (S, K, B)."""
+        return _started_at(self.so_far, -self.first % self.so_far.shape[-1])
 
     @cached_property
     def _roots(self) -> Table:
@@ -372,23 +396,26 @@ class LookAlikes:
 
     @cached_property
     def _errors(self) -> Table:
-        """The errors after each rotation, the error now, and 1: (S, K, m + 2).
-
-        The weighted sum of the last is the total weight.
-        """
-        after = error_after_deg(self.so_far, self.views, self._step)
-        errors = np.concatenate([after, self.error_now_deg[:, :, None]], axis=2)
-        of_first = near_first_views(errors, self.first)
-        return np.concatenate([of_first, np.ones_like(of_first[:, :, :1])], axis=2)
+        """`errors_deg`, and 1: (S, K, m + 2). The weighted sum of the last is the total weight."""
+        return np.concatenate([self.errors_deg, np.ones_like(self.errors_deg[:, :, :1])], axis=2)
 
     @cached_property
     def _errors_by_turn(self) -> NDArray[np.float64]:
         return np.asarray(self._errors.sum(axis=1, dtype=np.float64))
 
 
+def _started_at(rows: Table, places: NDArray[np.intp]) -> Table:
+    """Return rows (..., B) that go round, each started at its place (...), 0 to B - 1."""
+    whole = np.concatenate([rows, rows], axis=-1)
+    windows = np.lib.stride_tricks.sliding_window_view(whole, rows.shape[-1], axis=-1)
+    # Whole rows are copied; single indices for all numbers take five times as long.
+    return np.asarray(windows[(*np.ogrid[*(slice(n) for n in places.shape)], places)])
+
+
 def _joined(rows: Table, step: int) -> Table:
     """Return distributions (..., B) over bins that are as large as `step` of before."""
-    return np.asarray(rows.reshape(*rows.shape[:-1], -1, step).sum(axis=-1))
+    # Numpy is slow at sums over short axes.
+    return np.asarray(sum(rows[..., place::step] for place in range(step)))
 
 
 def _between_steps(rows: NDArray[np.float64], step: int) -> NDArray[np.float64]:
