@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.bundle import Bundle, PaperTables, as_kept
-from nbv.bundles.calibration import bin_apart
 from nbv.bundles.familiarity import fit_familiarity
 from nbv.bundles.turns import Turn
+from nbv.calibration.distributions import bin_apart
 from nbv.estimation.networks import build_network
 from nbv.rendering.camera import Camera
 

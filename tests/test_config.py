@@ -33,12 +33,16 @@ CHOICES = [f"{path.parent.name}={path.stem}" for path in sorted(CONFIG.glob("*/*
 
 @pytest.mark.parametrize("choice", CHOICES)
 def test_every_choice_composes_and_validates(choice):
-    needed = ["estimator.pairs=pairs.csv"] if choice == "estimator=external" else []
+    needed = ["estimator.pairs=pairs.csv"] if choice.startswith("estimator=external") else []
     assert load_config(CONFIG, [choice, *needed])["name"]
 
 
 def test_an_external_estimator_and_its_file_belong_together():
-    for overrides in (["estimator=external"], ["estimator.pairs=pairs.csv"]):
+    for overrides in (
+        ["estimator=external"],
+        ["estimator=external_distributions"],
+        ["estimator.pairs=pairs.csv"],
+    ):
         with pytest.raises(UserError, match="needs a file of calibration pairs"):
             load_config(CONFIG, overrides)
 
@@ -78,6 +82,7 @@ def test_every_kind_of_estimator_has_its_file():
     assert {path.stem for path in (CONFIG / "estimator").glob("*.yaml")} == {
         *networks.KINDS,
         "external",
+        "external_distributions",
     }
 
 

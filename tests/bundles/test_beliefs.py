@@ -21,9 +21,8 @@ from nbv.bundles.beliefs import (
     elevation_share,
     fused,
     log_bayes_factor,
-    turned,
 )
-from nbv.calibration.posteriors import on_degrees, posteriors_of
+from nbv.calibration.posteriors import on_degrees, posteriors_of, turned
 from nbv.recommendation.belief import mean_direction_deg, product_of
 
 BINS = 24

@@ -11,13 +11,11 @@ from hypothesis import strategies as st
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.angles import circular_distance_deg
-from nbv.bundles.beliefs import distributions_of, turned
+from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.calibration import (
     DENSITY,
     LEAST_LIMIT,
     PRIOR_TURNS,
-    WIDEST_GAP_DEG,
-    bin_apart,
     paper_tables,
     recalibrated,
     temperature_of,
@@ -25,6 +23,9 @@ from nbv.bundles.calibration import (
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.recommender import Recommender
 from nbv.bundles.turns import Turn
+from nbv.calibration.distributions import bin_apart
+from nbv.calibration.pairs import WIDEST_GAP_DEG
+from nbv.calibration.posteriors import turned
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
 from nbv.recommendation.density_selection import chosen_lookup

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
+from scipy.special import log_softmax
 
+from nbv.angles import circular_distance_deg
 from nbv.bundles.calibration import DENSITY
 from nbv.calibration.density import conditionals
+from nbv.calibration.posteriors import fit_temperature
 from nbv.cli import main
+from nbv.recommendation.belief import mean_direction_deg
+from nbv.recommendation.fusion import product
 from nbv.recommendation.lookup import load_lookup
 from projects import TINY, Project, copy_of_project
 
@@ -122,5 +128,96 @@ def test_a_file_that_does_not_fit_is_one_line(foreign, columns, message) -> None
     pd.read_csv(pairs)[columns].to_csv(other, index=False)
     chosen = (*TINY, "estimator=external", f"estimator.pairs={other}", "name=other")
     done = project.run("--cores", "1", overrides=chosen, fails=True)
+    (line,) = [one for one in done.stderr.splitlines() if one.startswith("nbv: error")]
+    assert message in line
+
+
+N_CLASSES = 24
+
+
+def foreign_distributions() -> pd.DataFrame:
+    """Of eight objects, views of 10°: blunt, sharper where the handle is seen, and too sure."""
+    rng = np.random.default_rng(0)
+    azimuth_deg, classes_deg = np.arange(0.0, 360.0, 10.0), np.arange(N_CLASSES) * 15.0
+    tables = []
+    for name in range(8):
+        seen_deg = azimuth_deg + rng.normal(0.0, 12.0, len(azimuth_deg))
+        sharpness = np.where(circular_distance_deg(azimuth_deg, 90.0) < 60.0, 4.0, 60.0)
+        logits = sharpness[:, None] * np.cos(np.radians(classes_deg - seen_deg[:, None]))
+        p = np.exp(log_softmax(logits, axis=1))
+        table = pd.DataFrame(p, columns=[f"p{k}" for k in range(N_CLASSES)])
+        table.insert(0, "object_id", f"mug-{name}")
+        table.insert(1, "azimuth_deg", azimuth_deg)
+        table.insert(2, "estimate_deg", mean_direction_deg(p))
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
+
+
+DISTRIBUTIONS = (
+    *(item for item in TINY if not item.startswith("categories=")),
+    "categories=[mug]",
+    "estimator=external_distributions",
+    f"estimator.n_classes={N_CLASSES}",
+)
+
+
+@pytest.fixture(scope="module")
+def given(tmp_path_factory) -> tuple[Project, pd.DataFrame]:
+    """A run with extensions on distributions of another program."""
+    folder, table = tmp_path_factory.mktemp("distributions"), foreign_distributions()
+    shuffled = table.sample(frac=1.0, random_state=0)
+    shuffled.to_csv(folder / "pairs.csv", index=False)
+    project = copy_of_project(folder)
+    chosen = (*DISTRIBUTIONS, f"estimator.pairs={folder / 'pairs.csv'}")
+    project.run("--cores", "2", "all", "extensions", overrides=chosen)
+    return project, table
+
+
+@pytest.mark.parametrize("fold", [1, 2])
+def test_distributions_of_another_program_are_fused_by_product(given, fold: int) -> None:
+    """At the temperature of the fold's calibration objects, from views where there are some."""
+    project, table = given
+    splits = pd.read_csv(project.results / "splits/mug.csv", dtype={"object_id": str})
+    roles = splits[splits["fold"] == fold].set_index("object_id")["role"]
+    columns = [f"p{k}" for k in range(N_CLASSES)]
+    calibration = table[table["object_id"].map(roles) == "calibration"]
+    temperature = fit_temperature(
+        np.log(calibration[columns].to_numpy()), calibration["azimuth_deg"].to_numpy()
+    )
+    assert temperature > 1.1
+    place = f"mug/el00/fold{fold}"
+    with np.load(project.results / "estimates" / place / "test_posteriors.npz") as stored:
+        assert float(stored["temperature"]) == pytest.approx(temperature, rel=1e-4)
+    evaluated = project.results / "evaluation" / place / "opposite_product.csv"
+    rows = pd.read_csv(evaluated, dtype={"object_id": str}).set_index(["object_id", "initial_deg"])
+    logits = table.set_index(["object_id", "azimuth_deg"])[columns].map(np.log)
+    for (name, azimuth), own in logits.loc[list(roles[roles == "test"].index)].iterrows():
+        other = logits.loc[name, (azimuth + 180.0) % 360.0]
+        views = [np.exp(log_softmax(one.to_numpy() / temperature)) for one in (own, other)]
+        wanted = circular_distance_deg(product(*views, 180.0), azimuth)
+        assert rows.loc[(name, int(azimuth)), "error_deg"] == pytest.approx(wanted, abs=0.02)
+
+
+def test_methods_of_distributions_are_in_the_tables(given) -> None:
+    project, _ = given
+    named = set(pd.read_csv(project.results / "tables/leaderboard.csv")["method"])
+    assert {"single", "proposed", "error_product", "random_product", "selected"} <= named
+
+
+@pytest.mark.parametrize(
+    ("chosen", "message"),
+    [
+        (
+            ["estimator=external_distributions", "estimator.n_classes=72"],
+            "has 24 columns of probabilities (p0, p1, …), and estimator.n_classes=72: set it to 24",
+        ),
+        (["estimator=external"], "choose estimator=external_distributions with overrides="),
+    ],
+)
+def test_the_number_of_classes_is_that_of_the_file(given, chosen, message) -> None:
+    project, _ = given
+    own = [one for one in DISTRIBUTIONS if not one.startswith(("estimator=", "estimator.n_c"))]
+    pairs = f"estimator.pairs={project.folder / 'pairs.csv'}"
+    done = project.run("--cores", "1", overrides=(*own, *chosen, pairs, "name=no"), fails=True)
     (line,) = [one for one in done.stderr.splitlines() if one.startswith("nbv: error")]
     assert message in line

@@ -14,6 +14,7 @@ except ModuleNotFoundError:
     )
 
 from nbv import provenance
+from nbv.calibration.distributions import need_classes
 from nbv.calibration.pairs import objects_of_pairs
 from nbv.config import (
     load_config,
@@ -96,7 +97,7 @@ try:
     LAYOUT = Layout(f"results/{CONFIG['name']}")
     CATEGORIES = CONFIG["categories"]
     # Estimates come from a file of another program.
-    EXTERNAL = CONFIG["estimator"]["kind"] == "external"
+    EXTERNAL = "pairs" in CONFIG["estimator"]
     METHODS, EXTENSIONS = CONFIG["methods"], CONFIG["extensions"]
     check_methods(METHODS, EXTENSIONS, CONFIG["gives_distributions"])
     check_sensor(CONFIG["sensor"], CATEGORIES)
@@ -105,6 +106,8 @@ try:
         is_local=workflow.is_main_process and workflow.resource_settings.nodes is None
     )
     check_memory(CONFIG, CONFIG["n_objects"] or 0, MEMORY)
+    if EXTERNAL:
+        need_classes(CONFIG["estimator"]["pairs"], CONFIG["estimator"].get("n_classes"))
     OBJECTS = (
         objects_of_pairs(
             CONFIG["estimator"]["pairs"],

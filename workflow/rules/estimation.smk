@@ -93,7 +93,10 @@ if EXTERNAL:
         conda:
             ENVIRONMENT
         resources:
-            mem_mb=per_attempt(1000),
+            # Columns of probabilities take ten times as much in memory as in the file.
+            mem_mb=per_attempt(
+                1000 + 12 * Path(CONFIG["estimator"]["pairs"]).stat().st_size // 10**6
+            ),
             runtime=per_attempt(10),
         script:
             f"{SCRIPTS}/take_estimates.py"

@@ -3,17 +3,17 @@
 from nbv.jobs import job
 
 with job(snakemake):
-    import numpy as np
-
-    from nbv.calibration.estimates import Estimates, write_estimates
+    from nbv.calibration.distributions import read_pair_distributions
     from nbv.calibration.pairs import read_pairs
-    from nbv.calibration.splits import need_objects, objects_with_role, read_splits
+    from nbv.calibration.splits import read_splits
+    from nbv.experiments.held_out import take_fold, write_fold
 
-    given, wildcards = snakemake.input, snakemake.wildcards
-    found = read_pairs(given.pairs, wildcards.category, float(wildcards.elevation))
-    splits = read_splits(given.splits)
-    need_objects(splits, found.object_ids)
-    for role in ("calibration", "test"):
-        names = objects_with_role(splits, int(wildcards.fold), role)
-        rows = found.estimate_deg[[found.object_ids.index(name) for name in names]]
-        write_estimates(snakemake.output[role], Estimates(tuple(names), np.asarray(rows)))
+    given, output, wildcards = snakemake.input, snakemake.output, snakemake.wildcards
+    of_unit = given.pairs, wildcards.category, float(wildcards.elevation)
+    found = take_fold(
+        read_pairs(*of_unit),
+        read_pair_distributions(*of_unit) if output.get("test_posteriors") else {},
+        read_splits(given.splits),
+        int(wildcards.fold),
+    )
+    write_fold(output, found)

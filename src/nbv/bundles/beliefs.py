@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from nbv.calibration.posteriors import LEAST_PROBABILITY
+from nbv.calibration.posteriors import LEAST_PROBABILITY, turned
 
 ELEVATION_BANDWIDTH_DEG = 10.0
 
@@ -21,26 +21,6 @@ def distributions_of(logits: NDArray[np.floating], temperature: float) -> NDArra
     p = np.exp(scaled - scaled.max(axis=-1, keepdims=True))
     p = np.maximum(p / p.sum(axis=-1, keepdims=True), LEAST_PROBABILITY)
     return np.asarray(p / p.sum(axis=-1, keepdims=True))
-
-
-def turned(rows: NDArray[np.floating], turn_deg: ArrayLike) -> NDArray[np.float64]:
-    """Return p(theta + turn) as a function of theta, (..., B), of distributions (..., B).
-
-    Exact for whole bins; linear in between. ``turn_deg`` is one for all, or one for each row. For
-    the number 0.0 the result may be the argument itself.
-    """
-    if isinstance(turn_deg, float) and turn_deg == 0.0:  # a single frame, mostly
-        return np.asarray(rows, dtype=np.float64)
-    n_bins = rows.shape[-1]
-    place = np.asarray(turn_deg, dtype=np.float64) * (n_bins / 360.0)
-    below = np.floor(place)
-    part = (place - below)[..., None]
-    index = (np.arange(n_bins) + below.astype(np.intp)[..., None]) % n_bins
-    shape = np.broadcast_shapes(rows.shape, index.shape)
-    own = np.broadcast_to(rows, shape)
-    at = (np.broadcast_to(each, shape) for each in (index, (index + 1) % n_bins))
-    here, next_ = (np.take_along_axis(own, each, axis=-1) for each in at)
-    return np.asarray((1 - part) * here + part * next_, dtype=np.float64)
 
 
 def fused(

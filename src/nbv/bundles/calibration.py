@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.angles import signed_difference_deg
-from nbv.bundles.beliefs import distributions_of, turned
+from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import FAMILIAR_SHARE, unfamiliarity
 from nbv.bundles.turns import Turn
-from nbv.calibration.pairs import WIDEST_GAP_DEG, full_turn, widest_gap_deg
+from nbv.calibration.distributions import bin_apart
+from nbv.calibration.pairs import full_turn
 from nbv.calibration.posteriors import LEAST_PROBABILITY, fit_temperature
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
@@ -48,30 +48,6 @@ def temperature_of(turns: Sequence[Turn]) -> float:
     logits = np.concatenate([turn.logits for turn in turns]).astype(np.float64)
     azimuth_deg = np.concatenate([turn.azimuth_deg for turn in turns])
     return fit_temperature(logits, azimuth_deg)
-
-
-def bin_apart(azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return distributions (B, B) of views a bin apart, of views (n,) anywhere on a turn.
-
-    Each bin takes the nearest view, whose distribution is turned by what lies between.
-
-    Raises
-    ------
-    UserError
-        Where neighbouring views are farther than `WIDEST_GAP_DEG` apart.
-    """
-    n_bins = rows.shape[1]
-    if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
-        raise UserError(
-            f"views are {gap:.0f}° apart somewhere on the turn; calibration needs one every "
-            f"{WIDEST_GAP_DEG:g}°"
-        )
-    found = np.empty((n_bins, n_bins), dtype=np.float32)
-    for place, azimuth in enumerate(np.arange(n_bins) * (360.0 / n_bins)):
-        apart = signed_difference_deg(azimuth_deg, azimuth)
-        nearest = int(np.abs(apart).argmin())
-        found[place] = turned(rows[nearest], float(apart[nearest]))
-    return found
 
 
 def paper_tables(

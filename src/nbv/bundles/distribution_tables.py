@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.bundles.beliefs import distributions_of
-from nbv.bundles.calibration import bin_apart
 from nbv.bundles.next_view import (
     AfterRotations,
     Recommendation,
@@ -21,7 +20,7 @@ from nbv.bundles.next_view import (
     as_rotation_list,
     next_view,
 )
-from nbv.calibration.distributions import FEWEST_CLASSES, as_distributions
+from nbv.calibration.distributions import FEWEST_CLASSES, as_distributions, bin_apart
 from nbv.calibration.posteriors import TEMPERATURES, fit_temperature, on_degrees
 from nbv.errors import UserError
 from nbv.files import damaged, need_distributions, read_arrays, readable

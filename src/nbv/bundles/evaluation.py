@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.angles import circular_distance_deg, signed_difference_deg, travel_deg
-from nbv.bundles.beliefs import distributions_of, turned
+from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.next_view import AfterRotations, after_rotations
@@ -18,6 +18,7 @@ from nbv.bundles.recommender import turn_share
 from nbv.bundles.rotations import MIN_SEPARATION_DEG
 from nbv.bundles.turns import Turn
 from nbv.calibration.offset import constant_offset_deg, frame_warning
+from nbv.calibration.posteriors import turned
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.bundle import Bundle, as_kept
-from nbv.bundles.calibration import bin_apart, paper_tables, temperature_of
+from nbv.bundles.calibration import paper_tables, temperature_of
 from nbv.bundles.familiarity import fit_familiarity
 from nbv.bundles.mirror import Network
 from nbv.bundles.numpy_network import numpy_network
 from nbv.bundles.turns import Turn
+from nbv.calibration.distributions import bin_apart
 from nbv.depth_images import DepthImages
 from nbv.estimation.weights import Estimator, weights_of
 from nbv.frames.crop import pixel_step

@@ -15,7 +15,7 @@ from nbv.angles import (
     nearest_bin,
     wrap_deg,
 )
-from nbv.bundles.beliefs import direction_and_spread_deg, fused, log_bayes_factor, turned
+from nbv.bundles.beliefs import direction_and_spread_deg, fused, log_bayes_factor
 from nbv.bundles.rotations import (
     MIN_SEPARATION_DEG,
     are_neighbours,
@@ -25,6 +25,7 @@ from nbv.bundles.rotations import (
     best_rotations,
     bins_deg,
 )
+from nbv.calibration.posteriors import turned
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
 from nbv.labels import counted

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,11 @@ N_VIEWS = 360
 
 WIDEST_GAP_DEG = 15.0
 """Between neighbouring views of a calibration turn."""
+
+
+def is_probability(column: str) -> bool:
+    """Return whether a column is one of p0, p1, …: the probability of a class."""
+    return re.fullmatch(r"\s*[pP][ _]?\d+\s*", column) is not None
 
 
 def read_pairs(
@@ -46,12 +52,7 @@ def read_pairs(
         than `WIDEST_GAP_DEG`.
     """
     path = Path(path)
-    table = read_pair_rows(path)
-    for name, wanted in (("category", category), ("elevation_deg", elevation_deg)):
-        if wanted is not None and name in table:
-            table = table[table[name] == wanted]
-            if table.empty:
-                raise UserError(f"{path} has no rows with {name}={wanted}")
+    table = read_pair_rows(path, category, elevation_deg)
     turns = {
         str(name): _object_turn(path, str(name), rows)
         for name, rows in table.groupby("object_id", sort=False)
@@ -59,8 +60,16 @@ def read_pairs(
     return Estimates(tuple(turns), np.stack(list(turns.values())))
 
 
-def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
+def read_rows(
+    path: Path,
+    needed: Sequence[str],
+    chosen: Callable[[str], bool] | None = None,
+    n_rows: int | None = None,
+) -> pd.DataFrame:
     """Read a CSV file that a user wrote, as text: an object may be called NA.
+
+    Of its columns those are read whose names are `chosen`, and of its rows the first `n_rows`; all
+    without these.
 
     Raises
     ------
@@ -70,7 +79,7 @@ def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
     if not path.is_file():
         raise UserError(f"{path} {missing(path)}; name a file with {', '.join(needed)}")
     try:
-        table = pd.read_csv(path, dtype=str, keep_default_na=False)
+        table = pd.read_csv(path, dtype=str, keep_default_na=False, usecols=chosen, nrows=n_rows)
     except (OSError, ValueError) as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     for name in needed:
@@ -82,15 +91,31 @@ def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
     return table
 
 
-def read_pair_rows(path: Path) -> pd.DataFrame:
-    """Read the rows of a file of pairs; errors as of `read_pairs`."""
-    table = read_rows(path, COLUMNS)
+def read_pair_rows(
+    path: Path,
+    category: str | None = None,
+    elevation_deg: float | None = None,
+    *,
+    probabilities: bool = False,
+) -> pd.DataFrame:
+    """Read the rows of a file of pairs; parameters and errors as of `read_pairs`.
+
+    Columns of probabilities, which may be many, are read where `probabilities` are asked for. The
+    index is that of the rows in the file, from 0.
+    """
+    chosen = None if probabilities else lambda column: not is_probability(column)
+    table = read_rows(path, COLUMNS, chosen)
     for name in COLUMNS[1:]:
         table[name] = pd.to_numeric(table[name], errors="coerce")
         if not (finite := np.isfinite(table[name].to_numpy(dtype=np.float64))).all():
             raise UserError(f"{path}, row {int((~finite).argmax()) + 2}: {name} is no number")
     if "elevation_deg" in table:
         table["elevation_deg"] = pd.to_numeric(table["elevation_deg"], errors="coerce")
+    for name, wanted in (("category", category), ("elevation_deg", elevation_deg)):
+        if wanted is not None and name in table:
+            table = table[table[name] == wanted]
+            if table.empty:
+                raise UserError(f"{path} has no rows with {name}={wanted}")
     return table
 
 

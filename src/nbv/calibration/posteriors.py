@@ -77,6 +77,26 @@ def on_degrees(posterior: Floats, n_bins: int = 360) -> Floats:
     return np.asarray(mixed * (n_classes / n_bins))
 
 
+def turned(rows: NDArray[np.floating], turn_deg: ArrayLike) -> NDArray[np.float64]:
+    """Return p(theta + turn) as a function of theta, (..., B), of distributions (..., B).
+
+    Exact for whole bins; linear in between. ``turn_deg`` is one for all, or one for each row. For
+    the number 0.0 the result may be the argument itself.
+    """
+    if isinstance(turn_deg, float) and turn_deg == 0.0:  # a single frame, mostly
+        return np.asarray(rows, dtype=np.float64)
+    n_bins = rows.shape[-1]
+    place = np.asarray(turn_deg, dtype=np.float64) * (n_bins / 360.0)
+    below = np.floor(place)
+    part = (place - below)[..., None]
+    index = (np.arange(n_bins) + below.astype(np.intp)[..., None]) % n_bins
+    shape = np.broadcast_shapes(rows.shape, index.shape)
+    own = np.broadcast_to(rows, shape)
+    at = (np.broadcast_to(each, shape) for each in (index, (index + 1) % n_bins))
+    here, next_ = (np.take_along_axis(own, each, axis=-1) for each in at)
+    return np.asarray((1 - part) * here + part * next_, dtype=np.float64)
+
+
 def log_likelihood(log_posterior: NDArray[np.floating], azimuth_deg: ArrayLike) -> Floats:
     """Return the log densities (...) at azimuths, in nats per degree.
 

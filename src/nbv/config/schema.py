@@ -186,7 +186,8 @@ class Estimator(Section):
 
     @model_validator(mode="after")
     def _check_pairs(self) -> Self:
-        if (self.kind == "external") != (self.pairs is not None):
+        is_external = self.kind in ("external", "external_distributions")
+        if is_external != (self.pairs is not None):
             raise UserError(
                 f"estimator.kind={self.kind} and estimator.pairs={self.pairs}: an external "
                 "estimator needs a file of calibration pairs, and no other has one; choose "
@@ -196,11 +197,13 @@ class Estimator(Section):
 
     @model_validator(mode="after")
     def _check_classes(self) -> Self:
-        absent = self.n_classes is None, self.target_bandwidth_deg is None
-        if any(absent) if self.kind == "classifier" else not all(absent):
+        has = self.n_classes is not None, self.target_bandwidth_deg is not None
+        needs = {"classifier": (True, True), "external_distributions": (True, False)}
+        if has != needs.get(self.kind, (False, False)):
             raise UserError(
                 f"estimator.kind={self.kind}: only a classifier has n_classes and "
-                "target_bandwidth_deg, and it needs both; choose estimator=classifier"
+                "target_bandwidth_deg, and it needs both; choose estimator=classifier "
+                "(estimator=external_distributions has n_classes alone)"
             )
         if self.n_classes is not None and 360 % self.n_classes:
             raise UserError(f"estimator.n_classes={self.n_classes} is no divisor of 360")

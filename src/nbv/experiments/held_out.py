@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from nbv.calibration.distributions import Turns, evenly_apart
 from nbv.calibration.estimates import Estimates, write_estimates
 from nbv.calibration.posteriors import (
     Posteriors,
@@ -81,8 +82,46 @@ def estimate_fold(
     return found
 
 
+def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -> FoldEstimates:
+    """Return what another program found of a fold's calibration and test objects.
+
+    Parameters
+    ----------
+    found : Estimates
+        Of all objects.
+    turns : Turns
+        What distributions it gave, of the same objects; empty where it gave none. Calibration
+        objects choose one temperature.
+    splits : DataFrame
+        From `nbv.calibration.splits.read_splits`.
+    fold : int
+
+    Raises
+    ------
+    UserError
+        As of `nbv.calibration.splits.need_objects` and
+        `nbv.calibration.distributions.evenly_apart`.
+    """
+    need_objects(splits, found.object_ids)
+    names = {role: objects_with_role(splits, fold, role) for role in ("calibration", "test")}
+    temperature = 1.0
+    if turns:
+        azimuths, rows = zip(*(turns[name] for name in names["calibration"]), strict=True)
+        temperature = fit_temperature(np.log(np.concatenate(rows)), np.concatenate(azimuths))
+    taken: FoldEstimates = {}
+    for role, object_ids in names.items():
+        estimate_deg = found.estimate_deg[[found.object_ids.index(name) for name in object_ids]]
+        posteriors = None
+        if turns:
+            n_views = estimate_deg.shape[1]
+            whole = np.stack([evenly_apart(*turns[name], n_views) for name in object_ids])
+            posteriors = posteriors_of(object_ids, np.log(whole.astype(np.float64)), temperature)
+        taken[role] = Estimates(tuple(object_ids), estimate_deg), posteriors
+    return taken
+
+
 def write_fold(paths: Mapping[str, str], found: FoldEstimates) -> None:
-    """Write what `estimate_fold` returned.
+    """Write what `estimate_fold` or `take_fold` returned.
 
     Parameters
     ----------
