@@ -576,13 +576,24 @@ def test_a_turn_the_wrong_way_contradicts_the_frames():
     assert "contradict" in warning
 
 
-def test_intrinsics_of_twice_the_resolution_are_doubted():
+@pytest.mark.parametrize("factor", [0.5, 1.5, 2.0])
+def test_intrinsics_of_another_resolution_are_refused(factor):
     frame, recommender = example_frame(azimuth_deg=250.0), Recommender.load("mug")
     camera = frame.intrinsics
-    doubled = [2 * camera.fx, 2 * camera.fy, 2 * camera.cx, 2 * camera.cy]
-    answer = recommender.recommend(frame.depth_m, intrinsics=doubled)
-    assert any("another resolution" in warning for warning in answer.warnings)
+    scaled = [factor * value for value in (camera.fx, camera.fy, camera.cx, camera.cy)]
+    with pytest.raises(FrameError, match="640 × 480") as error:
+        recommender.recommend(frame.depth_m, intrinsics=scaled)
+    assert error.value.name == "other-resolution"
     assert not recommender.recommend(frame.depth_m, intrinsics=camera).warnings
+
+
+def test_a_principal_point_off_the_middle_is_doubted():
+    frame, recommender = example_frame(azimuth_deg=250.0), Recommender.load("mug")
+    camera = frame.intrinsics
+    answer = recommender.recommend(
+        frame.depth_m, intrinsics=[camera.fx, camera.fy, camera.cx + 150, camera.cy]
+    )
+    assert any("cut out of a larger one" in warning for warning in answer.warnings)
 
 
 # What is familiar

@@ -260,11 +260,25 @@ def test_focal_lengths_alone_serve_every_resolution(rows, columns):
     Intrinsics(575.0, 575.0, columns / 2, rows / 2, columns, rows).need_resolution(rows, columns)
 
 
+@given(factor=st.floats(0.3, 2.9), off=st.floats(-8, 8))
+def test_a_principal_point_in_the_middle_of_another_image_is_refused(factor, off):
+    """Binned, cut in half or doubled: a camera's own tolerance is neither refused nor doubted."""
+    camera = Intrinsics(FX * factor, FY * factor, (320 + off) * factor, (240 + off) * factor)
+    if abs(factor - 1) < 0.1:
+        camera.need_resolution(480, 640)
+        assert not camera.doubts(480, 640)
+    elif abs(factor - 1) > 0.25:
+        with pytest.raises(FrameError, match="640 × 480") as error:
+            camera.need_resolution(480, 640)
+        assert error.value.name == "other-resolution"
+
+
 def test_a_principal_point_off_the_middle_is_doubted():
-    """Twice the resolution, or half of it; a camera's own tolerance is not doubted."""
     assert not WANTED.doubts(480, 640)
     assert not Intrinsics(575.0, 575.0).doubts(480, 640)
-    for factor in (0.5, 2.0):
-        (doubt,) = Intrinsics(FX * factor, FY * factor, CX * factor, CY * factor).doubts(480, 640)
+    for place in ((500.0, 240.0), (320.0, 100.0), (520.0, 100.0)):
+        camera = Intrinsics(FX, FY, *place)
+        camera.need_resolution(480, 640)
+        (doubt,) = camera.doubts(480, 640)
         assert "640 × 480" in doubt
-        assert "another resolution" in doubt
+        assert "cut out" in doubt

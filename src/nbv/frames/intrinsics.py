@@ -20,6 +20,9 @@ from nbv.frames.errors import FrameError
 OFF_CENTRE = 0.2
 """How far a principal point lies from the middle of an image, in its sides, to be remarkable."""
 
+_SAME_SCALE = 0.03
+"""How much two scales of an image may differ to be one."""
+
 
 @dataclass(frozen=True)
 class Intrinsics:
@@ -89,6 +92,18 @@ class Intrinsics:
                     f"{rows} pixels: are the intrinsics of another resolution? Of a frame that "
                     "is cut out of a larger one, give the focal length alone",
                 )
+        if known or self.cx is None or self.cy is None:
+            return
+        # A cut-out frame hardly has its principal point in both directions at the same share.
+        scale, other = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
+        if abs(scale - 1) > OFF_CENTRE and abs(scale - other) < _SAME_SCALE * scale:
+            raise FrameError(
+                "other-resolution",
+                f"the principal point ({self.cx:g}, {self.cy:g}) is the middle of an image of "
+                f"{scale * columns:.0f} × {scale * rows:.0f} pixels, and the frame has {columns} × "
+                f"{rows}: give the intrinsics of this resolution. Of a frame that is cut out of a "
+                "larger one, give the focal length alone",
+            )
 
     def doubts(self, rows: int, columns: int) -> tuple[str, ...]:
         """Return a sentence where they may be for another image than one of this size, or none.
@@ -111,7 +126,7 @@ class Intrinsics:
         return (
             f"the principal point ({self.cx:g}, {self.cy:g}) is far from the middle of {columns} × "
             f"{rows} pixels: is the frame cut out of a larger one, or are the intrinsics of "
-            "another resolution?",
+            "another camera?",
         )
 
 
