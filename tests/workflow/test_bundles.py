@@ -14,8 +14,10 @@ from nbv.bundles.bundle import load_bundle
 from nbv.bundles.evaluation import evaluate
 from nbv.bundles.manifest import read_manifest, see
 from nbv.bundles.recommender import Recommender
+from nbv.cli import main
 from nbv.frames.depth_files import write_depth
 from nbv.frames.drawn import example_frame
+from nbv.meshes.procedural import generate
 from nbv.meshes.store import load_meshes
 from projects import TINY, Project, copy_of_project, finished_project
 
@@ -198,3 +200,36 @@ def two_view_mae(folder: Path) -> float:
 
 def network_of(folder: Path) -> bytes:
     return (folder / "estimators/mug.safetensors").read_bytes()
+
+
+def test_a_folder_of_meshes_becomes_a_bundle_that_answers(tmp_path, capsys, monkeypatch) -> None:
+    """Of a category of one's own, with its size."""
+    folder = tmp_path / "meshes/jug"
+    folder.mkdir(parents=True)
+    for number in range(8):
+        generate("mug", 3, number, least_reach=0.3).export(folder / f"jug-{number}.obj")
+    project = copy_of_project(tmp_path)
+    own = [one for one in CAMERA if not one.startswith(("categories", "elevations", "dataset."))]
+    chosen = (
+        *own,
+        "categories=[jug]",
+        "++elevations_deg.jug=[0,30]",
+        "++sensor.diagonal_m.jug=0.17",
+        "dataset=folder",
+        f"dataset.root={folder.parent}",
+        "dataset.up=+z",
+        "dataset.front=+x",
+        "n_objects=null",
+    )
+    project.run("--cores", "2", "bundles", overrides=chosen)
+    made = project.results / "bundles/jug.safetensors"
+    bundle = load_bundle(made)
+    assert bundle.category == "jug"
+    assert set(bundle.object_ids) <= {f"jug-{number}" for number in range(8)}
+    monkeypatch.chdir(tmp_path)
+    mesh = str(folder / "jug-0.obj")
+    assert main(["render", mesh, "--output", "frame.npy", "--azimuth", "200"]) == 0
+    capsys.readouterr()
+    assert main(["recommend", "frame.npy", "--bundle", str(made), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert 0 <= answer["azimuth_deg"] < 360
