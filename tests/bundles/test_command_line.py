@@ -694,7 +694,7 @@ def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
         (["manifest.csv", "--views", "1"], "needs 2 or more"),
         (["manifest.csv", "--views", "40"], "24 frames, too few for 40 views"),
         (["manifest.csv", "--views", "two"], "two"),
-        (["manifest.csv", "--views", "2.5"], "2.5"),
+        (["manifest.csv", "--views", "2.5"], "--views: '2.5' is no whole number"),
         (["manifest.csv", "--output", "x.json"], "--output=x.json: give a name that ends in .csv"),
         (["manifest.csv", "--output", "pairs.csv/x.csv"], "pairs.csv is a file and no folder"),
         (["manifest.csv", "--intrinsics", "30"], "every frame"),
@@ -816,6 +816,7 @@ def test_an_axis_of_a_mesh_file_may_begin_with_a_hyphen(here, capsys):
         (("--output", "x.npy", "--distance", "800"), "a distance of 800 m"),
         (("--output", "x.npy", "--diagonal", "170"), "a distance of 0.8 m from an object of 170 m"),
         (("mesh.obj", "--output", "x.npy"), "give a mesh file, or --example"),
+        (("--output", "x.npy", "--seed", "1.5"), "--seed: '1.5' is no whole number"),
     ],
 )
 def test_what_cannot_be_rendered_is_one_line(here, capsys, more, message):

@@ -35,6 +35,7 @@ from nbv.cli.arguments import (
     Json,
     Numbers,
     Rotations,
+    WholeNumber,
     WholeNumbers,
     allowed_rotations,
     as_paragraphs,
@@ -478,7 +479,7 @@ def render(
     up: FileAxis = UP,
     front: FileAxis = FRONT,
     sensor: str = "kinect",
-    seed: int = 0,
+    seed: WholeNumber = 0,
     json: Json = False,
 ) -> None:
     """Write the depth frame that a depth camera would take of a mesh.
