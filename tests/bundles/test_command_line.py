@@ -373,6 +373,20 @@ def test_what_cannot_be_recommended_is_one_line(here, capsys, arguments, message
     assert message in fails(capsys, "recommend", *arguments, "--bundle", "b.safetensors")
 
 
+def test_a_frame_that_is_refused_is_named(here, capsys):
+    np.save("dark.npy", np.zeros((ROWS, COLUMNS), np.float32))
+    np.save("none.npy", np.zeros((ROWS, COLUMNS), bool))
+    np.save("all.npy", np.ones((ROWS, COLUMNS), bool))
+    for options, message in (
+        (("dark.npy",), "empty-mask: dark.npy: the frame has no depth at all"),
+        (("f0.npy", "--mask", "none.npy"), "empty-mask: f0.npy: the mask has no pixel"),
+        (("f0.npy", "--mask", "all.npy"), "little-depth: f0.npy: only "),
+        (("f0.npy", "dark.npy", "--rotations", "0", "90"), "empty-mask: dark.npy: the frame has"),
+    ):
+        line = fails(capsys, "recommend", *options, "--bundle", "b.safetensors")
+        assert line.startswith(f"nbv: error: {message}")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

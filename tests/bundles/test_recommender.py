@@ -795,6 +795,20 @@ def test_one_bad_frame_of_several_is_refused_by_its_number(recommender):
         recommender.recommend([FRAMES[0], np.zeros_like(FRAMES[0])], rotations_deg=[0.0, 90.0])
 
 
+def test_a_bad_frame_is_refused_by_its_name_where_it_has_one(recommender):
+    bad = np.zeros_like(FRAMES[0])
+    with pytest.raises(FrameError, match=r"^empty-mask: left: the frame has no depth"):
+        recommender.recommend(bad, names=["left"])
+    with pytest.raises(FrameError, match=r"^empty-mask: right: the frame has no depth"):
+        recommender.recommend([FRAMES[0], bad], rotations_deg=[0, 90], names=["left", "right"])
+    with pytest.raises(UserError, match=r"^a longest travel"):
+        recommender.recommend(FRAMES[0], names=["left"], max_travel_deg=-1.0)
+    with pytest.raises(UserError, match=r"^--far=900: give metres"):
+        recommender.recommend(FRAMES[0], names=["left"], far_m=900.0)
+    with pytest.raises(UserError, match="1 frame and 2 names"):
+        recommender.recommend(FRAMES[0], names=["left", "right"])
+
+
 def test_a_mask_may_be_any_array(recommender):
     mask = FRAMES[0] > 0
     wanted = recommender.recommend(FRAMES[0], mask=mask)

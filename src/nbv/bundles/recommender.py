@@ -165,6 +165,7 @@ class Recommender:
         gravity: ArrayLike | None = None,
         allowed_deg: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
+        names: Sequence[str] | None = None,
     ) -> Recommendation:
         """Return the pose that frames show, and the next view.
 
@@ -196,6 +197,8 @@ class Recommender:
             Rotations from the last frame's place that the camera may take; all without it. An
             array of n booleans is a mask over the circle: entry k is the rotation 360 k / n.
         max_travel_deg : float
+        names : sequence of str, optional
+            What messages call the frames, such as their files; else one of several is counted.
 
         Raises
         ------
@@ -221,14 +224,17 @@ class Recommender:
         masks = _as_masks(mask, len(frames))
         cameras = _as_cameras(intrinsics, len(frames))
         rotations_deg = as_rotation_list(rotations_deg, len(frames))
+        called = _as_names(names, len(frames))
+        # Of all frames: no message should name one.
+        need_metres(near_m, far_m, self.bundle.diagonal_m)
         crops: list[Crop] = []
-        for frame, own, camera in zip(frames, masks, cameras, strict=True):
+        for frame, own, camera, name in zip(frames, masks, cameras, called, strict=True):
             try:
                 crop = self.crop(frame, mask=own, intrinsics=camera, near_m=near_m, far_m=far_m)
             except UserError as error:
-                if len(frames) == 1:
+                if name is None:
                     raise
-                raise error.about(f"frame {len(crops) + 1} of {len(frames)}") from error
+                raise error.about(name) from error
             crops.append(crop)
         doubts = (doubt for crop in crops for doubt in crop.doubts)
         return self._of_crops(
@@ -384,6 +390,17 @@ def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[
             f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"
         )
     return masks
+
+
+def _as_names(names: Sequence[str] | None, n: int) -> Sequence[str | None]:
+    """Return what each of n frames is called; None of a single one without a name."""
+    if names is None:
+        return [None] if n == 1 else [f"frame {place} of {n}" for place in range(1, n + 1)]
+    if len(names) != n:
+        raise UserError(
+            f"{counted(n, 'frame')} and {counted(len(names), 'name')}: give one for each frame"
+        )
+    return names
 
 
 def _as_cameras(

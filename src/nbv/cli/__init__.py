@@ -262,6 +262,7 @@ def recommend(
         gravity=gravity,
         allowed_deg=allowed_rotations(allowed),
         max_travel_deg=max_travel,
+        names=[str(path) for path in frames],
     )
     if place is not None:
         diagonal_m = recommender.bundle.diagonal_m
