@@ -28,6 +28,7 @@ from nbv.calibration.pairs import read_pairs
 from nbv.cli import main
 from nbv.cli.arguments import as_paragraphs
 from nbv.frames.depth_files import read_depth
+from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.density_selection import chosen_lookup
 from nbv.recommendation.lookup import load_lookup, save_lookup
 
@@ -449,6 +450,13 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
         assert told.startswith(f"turn the camera by {rotation:+g}°, travel {abs(rotation):g}°")
 
 
+def test_the_help_names_every_criterion(here, capsys):
+    text = " ".join(run(capsys, "calibrate", "--help").split())
+    _, _, told = text.partition("Of the lookup table: ")
+    told, _, _ = told.replace("│", "").partition(".")
+    assert set(re.findall(r"[a-z]+_[a-z]+|fixed", told)) == set(CRITERIA)
+
+
 def test_pairs_may_begin_with_a_byte_order_mark(pairs, capsys):
     text = pairs.read_text()
     run(capsys, "calibrate", "pairs.csv", "--output", "plain.npz")
@@ -667,6 +675,16 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
         assert cells == [
             f"{row.mae_deg:.1f} ({row.mae_without_offset_deg:.1f})" for row in rows.itertuples()
         ]
+
+
+@pytest.mark.parametrize("warning", ["", "estimates are radians"])
+def test_no_warning_of_a_recording_is_null(manifest, capsys, monkeypatch, warning):
+    import nbv.bundles.evaluation
+
+    monkeypatch.setattr(nbv.bundles.evaluation, "frame_warning", lambda *_: warning)
+    options = ("manifest.csv", "--bundle", "b.safetensors", "--views", "2", "--json")
+    (told,) = json.loads(run(capsys, "evaluate", *options))["familiarity"]
+    assert told["warning"] == (warning or None)
 
 
 def test_an_object_that_calibrated_the_bundle_is_named(manifest, capsys):

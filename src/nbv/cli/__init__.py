@@ -319,7 +319,7 @@ def calibrate(
         The bundle whose network sees the frames.
     criterion
         Of the lookup table: pose_ambiguity (without this option), information_gain,
-        expected_dispersion or expected_error.
+        expected_dispersion, bayes_error, expected_error or fixed.
     intrinsics
         Of frames: fx,fy,cx,cy in pixels, the focal length alone, or a camera file.
     depth_scale
@@ -450,7 +450,10 @@ def evaluate(
             {
                 "errors": found.to_dict("records"),
                 "calibrated_by": calibrated_by,
-                "familiarity": familiar.to_dict("records"),
+                "familiarity": [
+                    about | {"warning": about["warning"] or None}
+                    for about in familiar.to_dict("records")
+                ],
                 **seen.as_json(),
             }
         )
