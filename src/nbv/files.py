@@ -130,6 +130,22 @@ def open_array(path: str | Path) -> NDArray[Any]:
         return stored
 
 
+def read_text(path: Path) -> str:
+    """Return a text that a user wrote, which may begin with a byte order mark.
+
+    Raises
+    ------
+    UserError
+        Where it is not UTF-8; it names the line. What else is wrong with the file is an OSError.
+    """
+    content = path.read_bytes()
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise UserError(f"{path}, line {line}: this is not UTF-8; save the file as UTF-8") from error
+
+
 def read_numbers(path: Path) -> NDArray[Any]:
     """Return the numbers of a file that a user wrote: ``.npy``, ``.json``, or text.
 
@@ -141,11 +157,12 @@ def read_numbers(path: Path) -> NDArray[Any]:
     try:
         if path.suffix.lower() == ".npy":
             return np.asarray(np.load(path, allow_pickle=False))
-        # Some programs begin a text with a byte order mark.
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path)
         if path.suffix.lower() == ".json":
             return np.asarray(json.loads(text), dtype=np.float64)
         return np.array([float(number) for number in text.replace(",", " ").split()])
+    except UserError:
+        raise
     except FileNotFoundError as error:
         raise UserError(f"{path} does not exist") from error
     # No list of what a reader may raise on arbitrary bytes is complete.

@@ -226,8 +226,24 @@ def test_a_camera_that_is_not_calibrated_is_said_to_be_so(tmp_path):
 def test_bytes_that_are_no_text_are_one_line(tmp_path):
     for name in ("a.json", "a.yaml"):
         (tmp_path / name).write_bytes(b"\xff\xfe\x00\x01{")
-        with pytest.raises(UserError, match="cannot be read"):
+        with pytest.raises(UserError, match=rf"{name}, line 1: this is not UTF-8; save the file"):
             camera_of(str(tmp_path / name))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.json", '{"fx": 585,\n "fy": }', "line 2, column 8 is no JSON; mend it there"),
+        ("a.json", "[" * 100_000, "it is nested too deeply"),
+        ("a.yaml", "fx: 585\nfy: [585\n", "line 3, column 1 is no YAML; mend it there"),
+        ("a.yaml", "fx: 585\0", "it is no YAML"),
+    ],
+)
+def test_where_a_camera_file_is_broken_is_said(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(UserError) as error:
+        camera_of(str(tmp_path / name))
+    assert str(error.value) == f"{tmp_path / name} cannot be read ({message})"
 
 
 @pytest.mark.parametrize("text", ["", "camera", "575,575", "1,2,3,x", "no/file.json", "x" * 5000])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from nbv.angles import signed_difference_deg, wrap_deg
 from nbv.calibration.estimates import COLUMNS, Estimates
 from nbv.errors import UserError, reason_of
-from nbv.files import missing
+from nbv.files import missing, read_text
 
 N_VIEWS = 360
 
@@ -70,7 +71,9 @@ def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
     if not path.is_file():
         raise UserError(f"{path} {missing(path)}; name a file with {', '.join(needed)}")
     try:
-        table = pd.read_csv(path, dtype=str, keep_default_na=False)
+        if not (text := read_text(path)).strip():
+            raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
+        table = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     except (OSError, ValueError) as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     for name in needed:

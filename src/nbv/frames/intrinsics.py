@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nbv.errors import UserError, reason_of
+from nbv.files import read_text
 from nbv.frames.depth_files import MILLIMETRE
 from nbv.frames.errors import FrameError
 
@@ -233,7 +234,7 @@ def _of_image(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[str
 
 
 def _read_mapping(path: Path) -> Mapping[str, Any]:
-    text = path.read_text(encoding="utf-8-sig")
+    text = read_text(path)
     if path.suffix.lower() == ".json":
         values = json.loads(text)
     else:
