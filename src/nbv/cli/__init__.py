@@ -238,6 +238,10 @@ def recommend(
     if plot is not None:
         need_writable("--plot", plot, FIGURES)
     place = _known_place(camera_pose, axis)
+    if gravity is not None and len(gravity) != 3:
+        # Before frames are read: what is no number after the option is taken for one.
+        noun = counted(len(gravity), "number")
+        raise UserError(f"--gravity has {noun}; give three, the direction down: x,y,z")
     from nbv.bundles.moves import check_axis, elevation_from_gravity
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask

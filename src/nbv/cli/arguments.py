@@ -17,23 +17,24 @@ Command = TypeVar("Command", bound=Callable[..., None])
 
 def as_whole_number(_kind: Any, tokens: Sequence[Token]) -> int:
     """Return the whole number of an option, which is not rounded to one."""
-    return _whole_number(tokens[0].value)
+    return int(_number(int, tokens[0].value))
 
 
-def _whole_number(text: str) -> int:
+def _number(kind: Callable[[str], float], text: str) -> float:
     try:
-        return int(text)
+        return kind(text)
     except ValueError:
-        raise ValueError(f"{text!r} is no whole number") from None
+        what = "whole number" if kind is int else "number"
+        raise ValueError(f"{text!r} is no {what}") from None
 
 
 def as_numbers(kind: Any, tokens: Sequence[Token]) -> list[Any]:
     """Return the numbers of an option, between commas or spaces; `kind` is a list of some type."""
-    (number,) = kind.__args__
+    (kind_of_number,) = kind.__args__
     texts = [text for token in tokens for text in token.value.replace(",", " ").split()]
     if not texts:
         raise ValueError("give a number")
-    return [_whole_number(text) if number is int else number(text) for text in texts]
+    return [_number(kind_of_number, text) for text in texts]
 
 
 def as_rotations_or_file(_kind: Any, tokens: Sequence[Token]) -> list[float] | Path:
