@@ -223,6 +223,19 @@ def test_a_camera_that_is_not_calibrated_is_said_to_be_so(tmp_path):
         as_intrinsics(np.zeros((3, 3)))
 
 
+@pytest.mark.parametrize("side", ["width", "height"])
+@pytest.mark.parametrize("value", [0, -480])
+def test_an_image_has_a_size(tmp_path, side, value):
+    message = f"intrinsics: {side}={value} must be above 0 \\(pixels\\)"
+    sides = {"width": 640, "height": 480} | {side: value}
+    with pytest.raises(UserError, match=message):
+        Intrinsics(575.0, 575.0, **sides)
+    for name, values in (("a.json", {"cam_K": K}), ("a.yaml", {"k": K})):
+        (tmp_path / name).write_text(as_json(values | sides))
+        with pytest.raises(UserError, match=f"{name}: {message}"):
+            camera_of(str(tmp_path / name))
+
+
 def test_bytes_that_are_no_text_are_one_line(tmp_path):
     for name in ("a.json", "a.yaml"):
         (tmp_path / name).write_bytes(b"\xff\xfe\x00\x01{")

@@ -60,6 +60,13 @@ class Intrinsics:
         if (self.cx is None) != (self.cy is None):
             known, missing = ("cy", "cx") if self.cx is None else ("cx", "cy")
             raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
+        for name in ("width", "height"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise UserError(
+                    f"intrinsics: {name}={value:g} must be above 0 (pixels); give that of the "
+                    "depth image, or leave out width and height"
+                )
 
     def need_resolution(self, rows: int, columns: int) -> None:
         """Raise FrameError ``other-resolution`` where they are for images of another size.
@@ -262,10 +269,10 @@ def _of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
         matrix = [values[name] for name in ("fx", "fy", "cx", "cy")]
     try:
         found = as_intrinsics(matrix)
+        width, height = (int(side) if isinstance(side, int | float) else None for side in size)
+        intrinsics = Intrinsics(found.fx, found.fy, found.cx, found.cy, width, height)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
-    width, height = (int(side) if isinstance(side, int | float) else None for side in size)
-    intrinsics = Intrinsics(found.fx, found.fy, found.cx, found.cy, width, height)
     return DepthCamera(intrinsics, _unit_m(values.get("depth_scale"), path))
 
 
