@@ -147,6 +147,15 @@ def test_a_gap_is_refused(tmp_path, views, gap):
     assert f"{gap}°" in message
 
 
+@pytest.mark.parametrize("first", [0, -180])
+def test_azimuths_in_radians_are_named(tmp_path, first):
+    views = np.arange(first, first + 360)
+    path = written(tmp_path / "p.csv", {"a": (np.radians(views), np.radians(views))})
+    assert "these azimuths seem to be radians: multiply them by 180/π" in refused(path)
+    path = written(tmp_path / "p.csv", {"a": (views[:10], views[:10])})
+    assert "180/π" not in refused(path)
+
+
 @pytest.mark.parametrize("value", ["", "nan", "inf", "north", "1e999", "NA", "12°"])
 @pytest.mark.parametrize("column", ["azimuth_deg", "estimate_deg"])
 def test_what_is_no_number_is_named_with_its_row(tmp_path, value, column):

@@ -14,7 +14,7 @@ from nbv.bundles.beliefs import distributions_of, turned
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import FAMILIAR_SHARE, unfamiliarity
 from nbv.bundles.turns import Turn
-from nbv.calibration.pairs import WIDEST_GAP_DEG, full_turn, widest_gap_deg
+from nbv.calibration.pairs import WIDEST_GAP_DEG, full_turn, radians_hint, widest_gap_deg
 from nbv.calibration.posteriors import LEAST_PROBABILITY, fit_temperature
 from nbv.errors import UserError
 from nbv.recommendation.belief import mean_direction_deg
@@ -64,7 +64,7 @@ def bin_apart(azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64]) -> ND
     if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
         raise UserError(
             f"views are {gap:.0f}° apart somewhere on the turn; calibration needs one every "
-            f"{WIDEST_GAP_DEG:g}°"
+            f"{WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
         )
     found = np.empty((n_bins, n_bins), dtype=np.float32)
     for place, azimuth in enumerate(np.arange(n_bins) * (360.0 / n_bins)):

@@ -149,7 +149,7 @@ def _object_turn(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float6
     if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
         raise UserError(
             f"{path}: the views of object {name!r} leave a gap of {gap:.0f}°; calibration needs a "
-            f"view every {WIDEST_GAP_DEG:g}°"
+            f"view every {WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
         )
     return full_turn(wrap_deg(azimuth_deg), estimate_deg)
 
@@ -158,6 +158,14 @@ def widest_gap_deg(azimuth_deg: NDArray[np.float64]) -> float:
     """Return the widest gap between neighbouring views (n,) on a turn, degrees."""
     ordered = np.sort(wrap_deg(azimuth_deg))
     return float(np.diff(ordered, append=ordered[0] + 360.0).max())
+
+
+def radians_hint(azimuth_deg: NDArray[np.float64]) -> str:
+    """Return the end of a sentence that refuses a gap; empty where azimuths (n,) are degrees."""
+    # One of a turn in radians; in degrees all views would be within 13 of each other.
+    if len(azimuth_deg) > 1 and np.abs(azimuth_deg).max() <= 2 * np.pi:
+        return "; these azimuths seem to be radians: multiply them by 180/π"
+    return ""
 
 
 def full_turn(
