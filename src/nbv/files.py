@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import secrets
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
     The temporary path keeps the suffix, for writers that choose a format by it. An error removes
     the temporary file and leaves `path` as it was. A name is used once: whoever still writes the
-    same file, such as a job whose run was killed, loses its temporary file here and fails.
+    same file, such as a job whose run was killed, loses its temporary file here and fails. An
+    OSError of the temporary file, or of no file, such as of a full disk, names `path`.
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -35,8 +37,17 @@ def replacing(path: str | Path) -> Iterator[Path]:
     try:
         yield temporary
         temporary.replace(target)
+    except OSError as error:
+        if error.errno is None:
+            # numpy's, of a disk that is full.
+            raise OSError(errno.EIO, f"cannot be written ({error})", str(target)) from error
+        if error.filename in (None, temporary, str(temporary)):
+            error.filename = str(target)
+        raise
     finally:
-        temporary.unlink(missing_ok=True)
+        # Where it cannot be removed, what went wrong before says why.
+        with suppress(OSError):
+            temporary.unlink()
 
 
 def write_text(path: str | Path, text: str) -> None:

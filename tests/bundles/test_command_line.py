@@ -793,12 +793,14 @@ def test_a_file_that_cannot_be_written_is_one_line(here, pairs, capsys):
     pytest.importorskip("onnx")
     (here / "file").write_text("")
     assert "file" in fails(capsys, "export", "b.safetensors", "--onnx", "file/x.onnx")
-    message = fails(
-        *(capsys, "calibrate", "pairs.csv", "--output", "file/t.npz"),
-        *("--criterion", "expected_error"),
-    )
+    fast = ("--criterion", "expected_error")
+    message = fails(capsys, "calibrate", "pairs.csv", "--output", "file/t.npz", *fast)
     assert "file" in message
     assert "Errno" not in message
+    # No name of a temporary file, which is longer than the name that was given.
+    long = f"{'a' * 250}.npz"
+    message = fails(capsys, "calibrate", "pairs.csv", "--output", long, *fast)
+    assert message == f"nbv: error: {long}: File name too long"
 
 
 # Render
@@ -941,6 +943,20 @@ def test_a_closed_stream_is_no_traceback(here):
     # Where there is no place for a mistake's line, output is none.
     done = program("nbv inspect no-such 2>&-")
     assert (done.returncode, done.stdout) == (2, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_disk_is_one_line(here, unbuffered):
+    line = "nbv: error: standard output: No space left on device\n"
+    for command in ("inspect b.safetensors", "inspect b.safetensors --json", "--help"):
+        done = program(f"nbv {command} >/dev/full", PYTHONUNBUFFERED=unbuffered)
+        assert (done.returncode, done.stderr) == (2, line)
+    # Of two mistakes the first is told.
+    done = program("nbv inspect no-such --json >/dev/full", PYTHONUNBUFFERED=unbuffered)
+    assert done.returncode == 2
+    assert done.stderr.startswith("nbv: error: no-bundle: ")
+    assert done.stderr.count("\n") == 1
 
 
 def test_paths_are_checked_before_a_network_runs(here, capsys, monkeypatch):

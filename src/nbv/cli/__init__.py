@@ -5,6 +5,7 @@ Commands import what they use when they run, so that ``nbv --help`` stays quick.
 
 from __future__ import annotations
 
+import errno
 import io
 import math
 import os
@@ -70,6 +71,9 @@ app = App(
 
 FIGURES = (".png", ".pdf", ".svg")
 
+# Where files are full, or the disk that they are on.
+OF_FULL_OUTPUT = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
 # Products of small matrices on several threads wait for one another.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -81,24 +85,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
         app(joined_numbers(given), exit_on_error=False, print_error=False)
         sys.stdout.flush()
     except BrokenPipeError:
-        # Whoever read the output has seen enough. The interpreter flushes once more at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Whoever read the output has seen enough.
+        _drop_output()
     except (UserError, CycloptsError, OSError) as error:
         message = _message(error)
-        # An error of standard output itself names no file.
-        can_print = not isinstance(error, OSError) or error.filename is not None
-        if "--json" in given and can_print:
-            name = error.name if isinstance(error, NamedError) else None
-            say_json({"error": {"name": name, "message": message}})
+        # What cannot be printed is said in one line all the same.
+        try:
+            # An error of standard output itself names no file.
+            can_print = not isinstance(error, OSError) or error.filename is not None
+            if "--json" in given and can_print:
+                name = error.name if isinstance(error, NamedError) else None
+                say_json({"error": {"name": name, "message": message}})
+            sys.stdout.flush()
+        except OSError:
+            _drop_output()
         return _refused(message)
     return 0
+
+
+def _drop_output() -> None:
+    """Lead standard output nowhere: the interpreter flushes it once more at its end, and fails."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _message(error: Exception) -> str:
     if not isinstance(error, OSError):
         return " ".join(str(error).split())
+    reason = error.strerror or str(error)
     # Of a file to write: readers name the file themselves.
-    return f"{error.filename}: {error.strerror}" if error.filename else f"{error.strerror}"
+    if error.filename:
+        return f"{error.filename}: {reason}"
+    return f"standard output: {reason}" if error.errno in OF_FULL_OUTPUT else reason
 
 
 def _refused(message: str) -> int:
