@@ -849,7 +849,14 @@ def test_an_axis_of_a_mesh_file_may_begin_with_a_hyphen(here, capsys):
         (("--output", "x.npy", "--sensor", "lidar"), "sensor=lidar: choose from"),
         (("--output", "x.npy", "--azimuth", "nan"), "an azimuth of nan"),
         (("--output", "x.npy", "--distance", "800"), "a distance of 800 m"),
-        (("--output", "x.npy", "--diagonal", "170"), "a distance of 0.8 m from an object of 170 m"),
+        (
+            ("--output", "x.npy", "--diagonal", "5"),
+            "a distance of 0.8 m from an object of 5 m: 7.5 to 100 m are plausible; change the",
+        ),
+        (
+            ("--output", "x.npy", "--distance", "0.01"),
+            "a distance of 0.01 m from an object of 0.17 m: 0.255 to 3.4 m are plausible",
+        ),
         (("mesh.obj", "--output", "x.npy"), "give a mesh file, or --example"),
         (("--output", "x.npy", "--seed", "1.5"), "--seed: '1.5' is no whole number"),
     ],
