@@ -13,6 +13,8 @@ from typing import Self
 _REASONS = (
     # numpy takes whatever is no array of its own for objects, and tells to load them unsafely.
     (".*allow_pickle.*", "it holds no array of numbers"),
+    ("File is not a zip file", "it is no .npz file, or only a part of one"),
+    (".*context manager protocol.*", "it is one array, and no .npz file"),
     ("could not convert string to float: (.*)", "{0} is no number"),
     ("No columns to parse from file", "it is empty"),
     (
