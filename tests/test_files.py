@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import errno
-import os
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +81,7 @@ def test_a_file_that_cannot_be_written_is_named_as_it_was_given(tmp_path):
         with pytest.raises(OSError) as error, files.replacing(target) as temporary:
             write(temporary)
         assert error.value.filename == named
-    assert os.listdir(tmp_path) == ["folder"]
+    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"\xff\xfe\x00", b"a,b\n1,2,3\n"])

@@ -8,7 +8,6 @@ import re
 from collections.abc import Iterable
 from typing import Self
 
-
 # What libraries say of a file, and what it means for whoever wrote it; `{…}` is a group.
 _REASONS = (
     # numpy takes whatever is no array of its own for objects, and tells to load them unsafely.
@@ -21,7 +20,10 @@ _REASONS = (
         r".*Expected (\d+) fields in line (\d+), saw (\d+)",
         "line {1} has {2} columns in place of {0}: is a comma too many, or are quotes missing?",
     ),
-    (r".*EOF inside string starting at row \d+", "a cell begins with a quote and has no second one"),
+    (
+        r".*EOF inside string starting at row \d+",
+        "a cell begins with a quote and has no second one",
+    ),
 )
 
 
@@ -44,6 +46,17 @@ def reason_of(error: Exception) -> str:
         if found := re.fullmatch(pattern, reason):
             return meaning.format(*found.groups())
     return reason
+
+
+def need_number(name: str, value: object) -> None:
+    """Raise UserError where a value is no number, such as a text of one."""
+    try:
+        if not isinstance(value, str | bytes):
+            float(value)  # type: ignore[arg-type]
+            return
+    except (TypeError, ValueError):
+        pass
+    raise UserError(f"{name}: {value!r} is no number")
 
 
 class UserError(Exception):

@@ -36,7 +36,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     same file, such as a job whose run was killed, loses its temporary file here and fails. An
     OSError of the temporary file, or of no file, such as of a full disk, names `path`.
     """
-    target = Path(path)
+    target = as_path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     for left_over in target.parent.glob(f".{escape(target.stem)}.*.partial{escape(target.suffix)}"):
         left_over.unlink(missing_ok=True)
@@ -182,7 +182,8 @@ def read_text(path: Path) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise UserError(f"{path}, line {line}: this is not UTF-8; save the file as UTF-8") from error
+        what = "this is not UTF-8; save the file as UTF-8"
+        raise UserError(f"{path}, line {line}: {what}") from error
 
 
 def read_numbers(path: Path) -> NDArray[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -817,6 +818,43 @@ def test_a_mask_may_be_any_array(recommender):
     for given_ in ([1, 0, 1], 1, np.ones((1, 2, 3, 4))):
         with pytest.raises(UserError):
             recommender.recommend(FRAMES[0], mask=given_)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"depth_m": "frame.npy"}, "depth: 'frame.npy' is text and no array; read the file with"),
+        ({"depth_m": [Path("a.npy")]}, "depth: 'a.npy' is text"),
+        ({"depth_m": None}, "depth holds object, no numbers"),
+        ({"mask": "m.png"}, "mask: 'm.png' is text and no array; give an array"),
+        ({"mask": ["m.png"]}, "mask: 'm.png' is text"),
+        ({"intrinsics": "585"}, "intrinsics: '585' is text; give numbers"),
+        ({"intrinsics": Path("camera.json")}, "intrinsics: 'camera.json' is text"),
+        ({"near_m": "1"}, "--near: '1' is no number"),
+        ({"far_m": [1.0]}, r"--far: \[1.0\] is no number"),
+        ({"elevation_deg": "high"}, "elevation: 'high' is no number"),
+    ],
+)
+def test_an_argument_of_another_type_is_one_line(recommender, options, message):
+    with pytest.raises(UserError, match=message):
+        recommender.recommend(**{"depth_m": FRAMES[0]} | options)
+
+
+def test_a_recommender_is_of_a_bundle(bundle):
+    for name in (3, None):
+        with pytest.raises(UserError, match=f"{name} is no name of a file"):
+            Recommender.load(name)
+    with pytest.raises(UserError, match="'mug' is no bundle; give its name or file to Recommen"):
+        Recommender("mug")
+    with pytest.raises(UserError, match="backend 3: choose from: numpy, onnx"):
+        Recommender(bundle, 3)
+
+
+def test_crops_are_bytes(recommender):
+    codes = recommender.crop(FRAMES[0]).codes
+    for wrong in ("crop", codes, codes[None] / 255):
+        with pytest.raises(UserError, match=r"crops: .*; give \(n, side, side\) uint8"):
+            recommender.recommend_crops(wrong)
 
 
 def test_frames_of_several_sizes_are_arrays(recommender):

@@ -223,6 +223,13 @@ def test_a_camera_that_is_not_calibrated_is_said_to_be_so(tmp_path):
         as_intrinsics(np.zeros((3, 3)))
 
 
+@pytest.mark.parametrize("name", ["fx", "fy", "cx", "cy", "width", "height"])
+def test_every_parameter_is_a_number(name):
+    given_ = {"fx": 575.0, "fy": 575.0, "cx": 320.0, "cy": 240.0} | {name: "575"}
+    with pytest.raises(UserError, match=f"intrinsics: {name}: '575' is no number"):
+        Intrinsics(**given_)
+
+
 @pytest.mark.parametrize("side", ["width", "height"])
 @pytest.mark.parametrize("value", [0, -480])
 def test_an_image_has_a_size(tmp_path, side, value):

@@ -45,7 +45,7 @@ def test_recommendations_are_read_at_the_nearest_bin():
         ]
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, "123", None])
 def test_an_estimate_that_is_no_number_has_no_rotation(bad):
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     for rotations in (table.recommend, table.least_cost):

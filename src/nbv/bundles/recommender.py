@@ -25,7 +25,8 @@ from nbv.bundles.next_view import (
     as_rotation_list,
     next_view,
 )
-from nbv.errors import UserError, nearest
+from nbv.errors import UserError, nearest, need_number
+from nbv.files import as_path
 from nbv.frames.crop import Crop, crop_frame, need_metres, need_plausible_nearest
 from nbv.frames.depth_files import DepthImage, is_in_mask, to_metres
 from nbv.frames.intrinsics import Intrinsics, as_intrinsics
@@ -59,7 +60,7 @@ def bundle_path(name: str | Path) -> Path:
     shipped = shipped_bundles()
     if str(name) in shipped:
         return shipped[str(name)]
-    if not Path(name).exists():
+    if not as_path(name).exists():
         known = nearest(str(name), shipped) if shipped else "no bundle comes with this nbv"
         raise BundleError("no-bundle", f"{str(name)!r}: there is no such file; {known}")
     return Path(name)
@@ -83,6 +84,8 @@ class Recommender:
     """
 
     def __init__(self, bundle: Bundle, backend: str | None = None) -> None:
+        if not isinstance(bundle, Bundle):
+            raise UserError(f"{bundle!r} is no bundle; give its name or file to Recommender.load")
         self.bundle = bundle
         self.network: Network = open_network(bundle, backend)
 
@@ -268,6 +271,12 @@ class Recommender:
         >>> of_crop.move == recommender.recommend(frame.depth_m, intrinsics=frame.intrinsics).move
         True
         """
+        codes = np.asarray(codes)
+        if codes.ndim != 3 or codes.dtype != np.uint8:
+            raise UserError(
+                f"crops: {codes.dtype} of shape {codes.shape}; give (n, side, side) uint8, such as "
+                "the codes of Recommender.crop"
+            )
         rotations_deg = as_rotation_list(rotations_deg, len(codes))
         return self._of_crops(codes, rotations_deg, elevation_deg, allowed_deg, max_travel_deg)
 
@@ -282,6 +291,8 @@ class Recommender:
         doubts: tuple[str, ...] = (),
         rolled: tuple[str, ...] = (),
     ) -> Recommendation:
+        if elevation_deg is not None:
+            need_number("elevation", elevation_deg)
         if elevation_deg is not None and not -90 <= elevation_deg <= 90:
             raise UserError(
                 f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
@@ -365,6 +376,7 @@ def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.gene
         return [depth_m]
     if isinstance(depth_m, list | tuple) and depth_m and isinstance(depth_m[0], np.ndarray):
         return [np.asanyarray(frame) for frame in depth_m]
+    _refuse_text("depth", depth_m, "read the file with nbv.read_depth")
     try:
         values = np.asanyarray(depth_m)
     except ValueError as error:
@@ -380,6 +392,7 @@ def _images_of(values: NDArray[Any]) -> list[NDArray[Any]]:
 def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[ArrayLike | None]:
     if mask is None:
         return [None] * n
+    _refuse_text("mask", mask, "give an array of the file's pixels")
     masks: list[Any]
     if isinstance(mask, list | tuple) and not (mask and np.ndim(mask[0]) == 1):
         masks = list(mask)
@@ -390,6 +403,13 @@ def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[
             f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"
         )
     return masks
+
+
+def _refuse_text(name: str, value: Any, what_to_do: str) -> None:
+    """Refuse the name of a file, alone or in a list, where an array is meant."""
+    for one in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(one, str | bytes | Path):
+            raise UserError(f"{name}: {str(one)!r} is text and no array; {what_to_do}")
 
 
 def _as_names(names: Sequence[str] | None, n: int) -> Sequence[str | None]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.errors import UserError, nearest
+from nbv.errors import UserError, nearest, need_number
 from nbv.frames.crop import FARTHEST, NEAREST
 from nbv.frames.depth_files import DepthImage
 from nbv.frames.intrinsics import Intrinsics
@@ -132,6 +132,8 @@ def draw_frame(
 def _need_view(
     azimuth_deg: float, elevation_deg: float, distance_m: float, diagonal_m: float
 ) -> None:
+    need_number("azimuth", azimuth_deg)
+    need_number("elevation", elevation_deg)
     if not math.isfinite(azimuth_deg):
         raise UserError(f"an azimuth of {azimuth_deg:g}°: give a number of degrees")
     if not -90 <= elevation_deg <= 90:
@@ -141,8 +143,8 @@ def _need_view(
     if not NEAREST * diagonal_m <= distance_m <= FARTHEST * diagonal_m:
         raise UserError(
             f"a distance of {distance_m:g} m from an object of {diagonal_m:g} m: "
-            f"{NEAREST * diagonal_m:.3g} to {FARTHEST * diagonal_m:.3g} m are plausible; change the "
-            "distance or the object's diagonal, both in metres"
+            f"{NEAREST * diagonal_m:.3g} to {FARTHEST * diagonal_m:.3g} m are plausible; change "
+            "the distance or the object's diagonal, both in metres"
         )
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nbv.errors import UserError, reason_of
+from nbv.errors import UserError, need_number, reason_of
 from nbv.files import read_text
 from nbv.frames.depth_files import MILLIMETRE
 from nbv.frames.errors import FrameError
@@ -49,6 +49,9 @@ class Intrinsics:
     height: int | None = None
 
     def __post_init__(self) -> None:
+        for name in ("fx", "fy", "cx", "cy", "width", "height"):
+            if (value := getattr(self, name)) is not None or name in ("fx", "fy"):
+                need_number(f"intrinsics: {name}", value)
         for name in ("fx", "fy"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
@@ -133,6 +136,8 @@ def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
     """
     if isinstance(value, Intrinsics):
         return value
+    if isinstance(value, str | bytes | Path):
+        raise UserError(f"intrinsics: {str(value)!r} is text; give numbers: f, or (fx, fy, cx, cy)")
     try:
         numbers = [float(number) for number in np.ravel(np.asarray(value, dtype=np.float64))]
     except (TypeError, ValueError):

@@ -116,7 +116,8 @@ class LookupTable:
         return np.asarray(self.recommended_delta_deg[self._bins(estimate_deg)])
 
     def _bins(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
-        if not np.isfinite(estimate_deg).all():
+        given = np.asarray(estimate_deg)
+        if given.dtype.kind not in "iuf" or not np.isfinite(given).all():
             raise UserError("an estimate is no finite number of degrees")
         return np.asarray(nearest_bin(estimate_deg, len(self.cost)), dtype=np.int64)
 
