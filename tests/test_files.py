@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import errno
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -52,6 +55,33 @@ def test_whoever_writes_the_same_file_later_is_the_one_who_does(tmp_path):
         orphan()
     assert target.read_text() == "new"
     assert [path.name for path in tmp_path.iterdir()] == [target.name]
+
+
+def test_a_file_that_cannot_be_written_is_named_as_it_was_given(tmp_path):
+    def full_disk(temporary):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def full_disk_of_numpy(temporary):
+        raise OSError("9 requested and 0 written")
+
+    def of_another_file(temporary):
+        raise PermissionError(errno.EACCES, "Permission denied", "other")
+
+    # There is place for this name, but for none that is longer.
+    long = tmp_path / f"{'a' * 250}.csv"
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    for target, write, named in (
+        (long, Path.touch, str(long)),
+        (folder, Path.touch, str(folder)),
+        (tmp_path / "a.csv", full_disk, str(tmp_path / "a.csv")),
+        (tmp_path / "a.csv", full_disk_of_numpy, str(tmp_path / "a.csv")),
+        (tmp_path / "a.csv", of_another_file, "other"),
+    ):
+        with pytest.raises(OSError) as error, files.replacing(target) as temporary:
+            write(temporary)
+        assert error.value.filename == named
+    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"\xff\xfe\x00", b"a,b\n1,2,3\n"])

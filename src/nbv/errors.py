@@ -3,15 +3,60 @@
 from __future__ import annotations
 
 import difflib
+import json
+import re
 from collections.abc import Iterable
 from typing import Self
 
+# What libraries say of a file, and what it means for whoever wrote it; `{…}` is a group.
+_REASONS = (
+    # numpy takes whatever is no array of its own for objects, and tells to load them unsafely.
+    (".*allow_pickle.*", "it holds no array of numbers"),
+    ("File is not a zip file", "it is no .npz file, or only a part of one"),
+    (".*context manager protocol.*", "it is one array, and no .npz file"),
+    ("could not convert string to float: (.*)", "{0} is no number"),
+    ("No columns to parse from file", "it is empty"),
+    (
+        r".*Expected (\d+) fields in line (\d+), saw (\d+)",
+        "line {1} has {2} columns in place of {0}: is a comma too many, or are quotes missing?",
+    ),
+    (
+        r".*EOF inside string starting at row \d+",
+        "a cell begins with a quote and has no second one",
+    ),
+)
+
 
 def reason_of(error: Exception) -> str:
-    """Return why a file could not be read, in one line."""
+    """Return why a file could not be read, in one line; where it is known, the place in a text."""
     reason = " ".join(str(error).split()) or type(error).__name__
-    # numpy takes whatever is no array of its own for objects, and tells to load them unsafely.
-    return "it holds no array of numbers" if "allow_pickle" in reason else reason
+    if isinstance(error, json.JSONDecodeError):
+        return f"line {error.lineno}, column {error.colno} is no JSON; mend it there"
+    if isinstance(error, UnicodeDecodeError):
+        return "it is not UTF-8 text"
+    if isinstance(error, RecursionError):
+        return "it is nested too deeply"
+    # yaml is imported where a file is read, and not for this.
+    if type(error).__module__.partition(".")[0] == "yaml":
+        mark = getattr(error, "problem_mark", None)
+        if mark is None:
+            return "it is no YAML"
+        return f"line {mark.line + 1}, column {mark.column + 1} is no YAML; mend it there"
+    for pattern, meaning in _REASONS:
+        if found := re.fullmatch(pattern, reason):
+            return meaning.format(*found.groups())
+    return reason
+
+
+def need_number(name: str, value: object) -> None:
+    """Raise UserError where a value is no number, such as a text of one."""
+    try:
+        if not isinstance(value, str | bytes):
+            float(value)  # type: ignore[arg-type]
+            return
+    except (TypeError, ValueError):
+        pass
+    raise UserError(f"{name}: {value!r} is no number")
 
 
 class UserError(Exception):

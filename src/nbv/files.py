@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import secrets
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,15 +20,23 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+RUN_AGAIN = "delete the file and run the same command again"
+"""What mends a file of a run."""
+
+CALIBRATE_AGAIN = f"make it again with nbv calibrate, or where it is of a run, {RUN_AGAIN}"
+"""What mends a table that either made."""
+
+
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path in the folder of `path`; it replaces `path` when the block succeeds.
 
     The temporary path keeps the suffix, for writers that choose a format by it. An error removes
     the temporary file and leaves `path` as it was. A name is used once: whoever still writes the
-    same file, such as a job whose run was killed, loses its temporary file here and fails.
+    same file, such as a job whose run was killed, loses its temporary file here and fails. An
+    OSError of the temporary file, or of no file, such as of a full disk, names `path`.
     """
-    target = Path(path)
+    target = as_path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     for left_over in target.parent.glob(f".{escape(target.stem)}.*.partial{escape(target.suffix)}"):
         left_over.unlink(missing_ok=True)
@@ -35,8 +44,17 @@ def replacing(path: str | Path) -> Iterator[Path]:
     try:
         yield temporary
         temporary.replace(target)
+    except OSError as error:
+        if error.errno is None:
+            # numpy's, of a disk that is full.
+            raise OSError(errno.EIO, f"cannot be written ({error})", str(target)) from error
+        if error.filename in (None, temporary, str(temporary)):
+            error.filename = str(target)
+        raise
     finally:
-        temporary.unlink(missing_ok=True)
+        # Where it cannot be removed, what went wrong before says why.
+        with suppress(OSError):
+            temporary.unlink()
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -57,8 +75,14 @@ def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
 
 
 @contextmanager
-def readable(path: str | Path) -> Iterator[None]:
+def readable(path: str | Path, remedy: str = RUN_AGAIN) -> Iterator[None]:
     """Turn whatever a reader raises on a damaged file into one line that names the file.
+
+    Parameters
+    ----------
+    path : path
+    remedy : str
+        What to do where it is damaged.
 
     Raises
     ------
@@ -73,7 +97,7 @@ def readable(path: str | Path) -> Iterator[None]:
         raise UserError(f"{path} does not exist; finish the run first") from error
     # No list of what a reader may raise on arbitrary bytes is complete.
     except Exception as error:
-        raise damaged(path, f"cannot be read ({reason_of(error)})") from error
+        raise damaged(path, f"cannot be read ({reason_of(error)})", remedy) from error
 
 
 def missing(path: str | Path) -> str:
@@ -81,9 +105,24 @@ def missing(path: str | Path) -> str:
     return "is a folder" if Path(path).is_dir() else "does not exist"
 
 
-def damaged(path: str | Path, what: str) -> UserError:
+def damaged(path: str | Path, what: str, remedy: str = RUN_AGAIN) -> UserError:
     """Return the error of a file that holds what none of the project's writers writes."""
-    return UserError(f"{path}: {what}; delete the file and run the same command again")
+    return UserError(f"{path}: {what}; {remedy}")
+
+
+def as_path(value: str | Path) -> Path:
+    """Return a path; UserError where it is none."""
+    try:
+        return Path(value)
+    except TypeError:
+        raise UserError(f"{value!r} is no name of a file") from None
+
+
+def calibrated_file(path: str | Path) -> Path:
+    """Return the path of a file that nbv calibrate, or a run, wrote; UserError where none is."""
+    if not (found := as_path(path)).is_file():
+        raise UserError(f"{path} {missing(path)}; name the file that nbv calibrate wrote")
+    return found
 
 
 def read_csv(path: str | Path) -> pd.DataFrame:
@@ -130,6 +169,23 @@ def open_array(path: str | Path) -> NDArray[Any]:
         return stored
 
 
+def read_text(path: Path) -> str:
+    """Return a text that a user wrote, which may begin with a byte order mark.
+
+    Raises
+    ------
+    UserError
+        Where it is not UTF-8; it names the line. What else is wrong with the file is an OSError.
+    """
+    content = path.read_bytes()
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        what = "this is not UTF-8; save the file as UTF-8"
+        raise UserError(f"{path}, line {line}: {what}") from error
+
+
 def read_numbers(path: Path) -> NDArray[Any]:
     """Return the numbers of a file that a user wrote: ``.npy``, ``.json``, or text.
 
@@ -141,11 +197,12 @@ def read_numbers(path: Path) -> NDArray[Any]:
     try:
         if path.suffix.lower() == ".npy":
             return np.asarray(np.load(path, allow_pickle=False))
-        # Some programs begin a text with a byte order mark.
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path)
         if path.suffix.lower() == ".json":
             return np.asarray(json.loads(text), dtype=np.float64)
         return np.array([float(number) for number in text.replace(",", " ").split()])
+    except UserError:
+        raise
     except FileNotFoundError as error:
         raise UserError(f"{path} does not exist") from error
     # No list of what a reader may raise on arbitrary bytes is complete.
@@ -153,7 +210,9 @@ def read_numbers(path: Path) -> NDArray[Any]:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
 
 
-def read_arrays(path: str | Path, names: Iterable[str] = ()) -> dict[str, NDArray[Any]]:
+def read_arrays(
+    path: str | Path, names: Iterable[str] = (), remedy: str = RUN_AGAIN
+) -> dict[str, NDArray[Any]]:
     """Read a whole `.npz` written by `write_arrays`.
 
     Parameters
@@ -161,33 +220,40 @@ def read_arrays(path: str | Path, names: Iterable[str] = ()) -> dict[str, NDArra
     path : path
     names : iterable of str
         Arrays that have to be there.
+    remedy : str
+        See `readable`.
 
     Raises
     ------
     UserError
         Where one of `names` is missing, and as of `readable`.
     """
-    with readable(path), np.load(path, allow_pickle=False) as stored:
+    with readable(path, remedy), np.load(path, allow_pickle=False) as stored:
         arrays = {name: stored[name] for name in stored.files}
     for name in names:
         if name not in arrays:
-            raise damaged(path, f"holds no array {name!r}")
+            raise damaged(path, f"holds no array {name!r}", remedy)
     return arrays
 
 
 def need_distributions(
-    path: str | Path, densities: NDArray[np.floating[Any]], shape: tuple[int, ...]
+    path: str | Path,
+    densities: NDArray[np.floating[Any]],
+    shape: tuple[int, ...],
+    remedy: str = RUN_AGAIN,
 ) -> None:
     """Raise UserError where the rows of an array of that shape are no distributions.
 
-    They may miss a sum of 1 by what single precision rounds.
+    They may miss a sum of 1 by what single precision rounds. For the remedy see `readable`.
     """
     if densities.shape != shape:
-        raise damaged(path, f"an array has the shape {densities.shape} in place of {shape}")
+        what = f"an array has the shape {densities.shape} in place of {shape}"
+        raise damaged(path, what, remedy)
     sums = densities.sum(axis=-1, dtype=np.float64)
     # Written so that NaN is refused as well.
     if not ((densities >= 0).all() and (np.abs(sums - 1.0) < 1e-3).all()):
-        raise damaged(path, "a row is no distribution: it is negative or does not sum to 1")
+        what = "a row is no distribution: it is negative or does not sum to 1"
+        raise damaged(path, what, remedy)
 
 
 def read_json(path: str | Path) -> Any:

@@ -121,6 +121,12 @@ def test_a_gap_is_refused(views):
     assert f"{widest:.0f}°" in str(error.value)
 
 
+def test_azimuths_in_radians_are_named():
+    views = np.radians(AZIMUTHS)
+    with pytest.raises(UserError, match="these azimuths seem to be radians"):
+        bin_apart(views, np.full((len(views), BINS), 1 / BINS))
+
+
 def test_a_view_every_15_degrees_is_enough():
     views = np.arange(0, 360, WIDEST_GAP_DEG) + 7.0
     assert bin_apart(views, np.full((len(views), 120), 1 / 120)).shape == (120, 120)

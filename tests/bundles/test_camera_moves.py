@@ -286,10 +286,26 @@ def bad_poses():
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", bad_poses())
 def test_what_is_no_rotation_with_a_translation_is_refused(name):
-    with pytest.raises(UserError, match="transposed or scaled"):
+    with pytest.raises(UserError, match="finite" if name == "nan" else "transposed or scaled"):
         as_pose(bad_poses()[name])
     with pytest.raises(UserError, match="camera pose"):
         moved_camera(bad_poses()[name], [0, 0, 0], [0, 0, 1], 30.0)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [
+        ((3, 3), 2.0, "camera pose: the last row is 0 0 0 2, and that of a pose is 0 0 0 1"),
+        ((3, 0), 0.25, "camera pose: the last row is 0.25 0 0 1, and"),
+        ((1, 1), np.nan, "camera pose: row 2 is 0 nan 0 0; give finite numbers"),
+        ((3, 2), -np.inf, "camera pose: row 4 is 0 0 -inf 1; give finite numbers"),
+    ],
+)
+def test_a_wrong_row_of_a_pose_is_shown(place, value, message):
+    pose = np.eye(4)
+    pose[place] = value
+    with pytest.raises(UserError, match=message):
+        as_pose(pose)
 
 
 @pytest.mark.parametrize("values", [np.eye(3), np.ones((3, 4)), [], 1.0])

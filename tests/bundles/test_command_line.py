@@ -28,6 +28,7 @@ from nbv.calibration.pairs import read_pairs
 from nbv.cli import main
 from nbv.cli.arguments import as_paragraphs
 from nbv.frames.depth_files import read_depth
+from nbv.recommendation.criteria import CRITERIA
 from nbv.recommendation.density_selection import chosen_lookup
 from nbv.recommendation.lookup import load_lookup, save_lookup
 
@@ -304,7 +305,7 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         (["f0.npy", "f1.npy"], "2 frames and 1 rotation; give one for each frame"),
         (["f0.npy", "--rotations", "0", "90"], "1 frame and 2 rotations"),
         (["f0.npy", "--rotations", "0", "x"], "x: no known kind of file"),
-        (["f0.npy", "--rotations", "zero"], "zero"),
+        (["f0.npy", "--rotations", "zero"], "--rotations: 'zero' is no number"),
         (["f0.npy", "--rotations="], "give a number"),
         (["--mask", "m.npy", "f0.npy"], "frames stand before --mask"),
         (["f0.npy", "--rotations", "10"], "the first is 10"),
@@ -360,8 +361,9 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
             "axis: the axis is 180° away from up in the image",
         ),
         (["f0.npy", "--elevation", "high"], "high"),
-        (["f0.npy", "--gravity", "0", "1"], "gravity: give three finite numbers"),
-        (["f0.npy", "--gravity", "0", "1", "0", "0"], "gravity: give three finite numbers"),
+        (["f0.npy", "--gravity", "0", "1"], "--gravity has 2 numbers; give three"),
+        (["f0.npy", "--gravity", "0", "9.81", "a"], "--gravity has 2 numbers; give three"),
+        (["f0.npy", "--gravity", "0", "1", "0", "0"], "--gravity has 4 numbers; give three"),
         (["f0.npy", "--gravity", "0,nan,1"], "gravity: give three finite numbers"),
         (["f0.npy", "--gravity", "0,0,inf"], "gravity: give three finite numbers"),
         (["f0.npy", "--gravity", "0,0,0"], "gravity: 0,0,0 is no direction"),
@@ -371,6 +373,20 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
 )
 def test_what_cannot_be_recommended_is_one_line(here, capsys, arguments, message):
     assert message in fails(capsys, "recommend", *arguments, "--bundle", "b.safetensors")
+
+
+def test_a_frame_that_is_refused_is_named(here, capsys):
+    np.save("dark.npy", np.zeros((ROWS, COLUMNS), np.float32))
+    np.save("none.npy", np.zeros((ROWS, COLUMNS), bool))
+    np.save("all.npy", np.ones((ROWS, COLUMNS), bool))
+    for options, message in (
+        (("dark.npy",), "empty-mask: dark.npy: the frame has no depth at all"),
+        (("f0.npy", "--mask", "none.npy"), "empty-mask: f0.npy: the mask has no pixel"),
+        (("f0.npy", "--mask", "all.npy"), "little-depth: f0.npy: only "),
+        (("f0.npy", "dark.npy", "--rotations", "0", "90"), "empty-mask: dark.npy: the frame has"),
+    ):
+        line = fails(capsys, "recommend", *options, "--bundle", "b.safetensors")
+        assert line.startswith(f"nbv: error: {message}")
 
 
 @pytest.mark.parametrize(
@@ -433,6 +449,13 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
         assert printed["cost"] == pytest.approx(float(cost))
         told = run(capsys, "recommend", *options)
         assert told.startswith(f"turn the camera by {rotation:+g}°, travel {abs(rotation):g}°")
+
+
+def test_the_help_names_every_criterion(here, capsys):
+    text = " ".join(run(capsys, "calibrate", "--help").split())
+    _, _, told = text.partition("Of the lookup table: ")
+    told, _, _ = told.replace("│", "").partition(".")
+    assert set(re.findall(r"[a-z]+_[a-z]+|fixed", told)) == set(CRITERIA)
 
 
 def test_pairs_may_begin_with_a_byte_order_mark(pairs, capsys):
@@ -655,6 +678,16 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
         ]
 
 
+@pytest.mark.parametrize("warning", ["", "estimates are radians"])
+def test_no_warning_of_a_recording_is_null(manifest, capsys, monkeypatch, warning):
+    import nbv.bundles.evaluation
+
+    monkeypatch.setattr(nbv.bundles.evaluation, "frame_warning", lambda *_: warning)
+    options = ("manifest.csv", "--bundle", "b.safetensors", "--views", "2", "--json")
+    (told,) = json.loads(run(capsys, "evaluate", *options))["familiarity"]
+    assert told["warning"] == (warning or None)
+
+
 def test_an_object_that_calibrated_the_bundle_is_named(manifest, capsys):
     options = ("manifest.csv", "--bundle", "b.safetensors")
     run(capsys, "calibrate", *options, "--output", "own.safetensors")
@@ -694,7 +727,7 @@ def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
         (["manifest.csv", "--views", "1"], "needs 2 or more"),
         (["manifest.csv", "--views", "40"], "24 frames, too few for 40 views"),
         (["manifest.csv", "--views", "two"], "two"),
-        (["manifest.csv", "--views", "2.5"], "2.5"),
+        (["manifest.csv", "--views", "2.5"], "--views: '2.5' is no whole number"),
         (["manifest.csv", "--output", "x.json"], "--output=x.json: give a name that ends in .csv"),
         (["manifest.csv", "--output", "pairs.csv/x.csv"], "pairs.csv is a file and no folder"),
         (["manifest.csv", "--intrinsics", "30"], "every frame"),
@@ -760,12 +793,14 @@ def test_a_file_that_cannot_be_written_is_one_line(here, pairs, capsys):
     pytest.importorskip("onnx")
     (here / "file").write_text("")
     assert "file" in fails(capsys, "export", "b.safetensors", "--onnx", "file/x.onnx")
-    message = fails(
-        *(capsys, "calibrate", "pairs.csv", "--output", "file/t.npz"),
-        *("--criterion", "expected_error"),
-    )
+    fast = ("--criterion", "expected_error")
+    message = fails(capsys, "calibrate", "pairs.csv", "--output", "file/t.npz", *fast)
     assert "file" in message
     assert "Errno" not in message
+    # No name of a temporary file, which is longer than the name that was given.
+    long = f"{'a' * 250}.npz"
+    message = fails(capsys, "calibrate", "pairs.csv", "--output", long, *fast)
+    assert message == f"nbv: error: {long}: File name too long"
 
 
 # Render
@@ -814,8 +849,16 @@ def test_an_axis_of_a_mesh_file_may_begin_with_a_hyphen(here, capsys):
         (("--output", "x.npy", "--sensor", "lidar"), "sensor=lidar: choose from"),
         (("--output", "x.npy", "--azimuth", "nan"), "an azimuth of nan"),
         (("--output", "x.npy", "--distance", "800"), "a distance of 800 m"),
-        (("--output", "x.npy", "--diagonal", "170"), "a distance of 0.8 m from an object of 170 m"),
+        (
+            ("--output", "x.npy", "--diagonal", "5"),
+            "a distance of 0.8 m from an object of 5 m: 7.5 to 100 m are plausible; change the",
+        ),
+        (
+            ("--output", "x.npy", "--distance", "0.01"),
+            "a distance of 0.01 m from an object of 0.17 m: 0.255 to 3.4 m are plausible",
+        ),
         (("mesh.obj", "--output", "x.npy"), "give a mesh file, or --example"),
+        (("--output", "x.npy", "--seed", "1.5"), "--seed: '1.5' is no whole number"),
     ],
 )
 def test_what_cannot_be_rendered_is_one_line(here, capsys, more, message):
@@ -907,6 +950,20 @@ def test_a_closed_stream_is_no_traceback(here):
     # Where there is no place for a mistake's line, output is none.
     done = program("nbv inspect no-such 2>&-")
     assert (done.returncode, done.stdout) == (2, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_disk_is_one_line(here, unbuffered):
+    line = "nbv: error: standard output: No space left on device\n"
+    for command in ("inspect b.safetensors", "inspect b.safetensors --json", "--help"):
+        done = program(f"nbv {command} >/dev/full", PYTHONUNBUFFERED=unbuffered)
+        assert (done.returncode, done.stderr) == (2, line)
+    # Of two mistakes the first is told.
+    done = program("nbv inspect no-such --json >/dev/full", PYTHONUNBUFFERED=unbuffered)
+    assert done.returncode == 2
+    assert done.stderr.startswith("nbv: error: no-bundle: ")
+    assert done.stderr.count("\n") == 1
 
 
 def test_paths_are_checked_before_a_network_runs(here, capsys, monkeypatch):

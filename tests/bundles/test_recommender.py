@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -806,6 +807,20 @@ def test_one_bad_frame_of_several_is_refused_by_its_number(recommender):
         recommender.recommend([FRAMES[0], np.zeros_like(FRAMES[0])], rotations_deg=[0.0, 90.0])
 
 
+def test_a_bad_frame_is_refused_by_its_name_where_it_has_one(recommender):
+    bad = np.zeros_like(FRAMES[0])
+    with pytest.raises(FrameError, match=r"^empty-mask: left: the frame has no depth"):
+        recommender.recommend(bad, names=["left"])
+    with pytest.raises(FrameError, match=r"^empty-mask: right: the frame has no depth"):
+        recommender.recommend([FRAMES[0], bad], rotations_deg=[0, 90], names=["left", "right"])
+    with pytest.raises(UserError, match=r"^a longest travel"):
+        recommender.recommend(FRAMES[0], names=["left"], max_travel_deg=-1.0)
+    with pytest.raises(UserError, match=r"^--far=900: give metres"):
+        recommender.recommend(FRAMES[0], names=["left"], far_m=900.0)
+    with pytest.raises(UserError, match="1 frame and 2 names"):
+        recommender.recommend(FRAMES[0], names=["left", "right"])
+
+
 def test_a_mask_may_be_any_array(recommender):
     mask = FRAMES[0] > 0
     wanted = recommender.recommend(FRAMES[0], mask=mask)
@@ -814,6 +829,43 @@ def test_a_mask_may_be_any_array(recommender):
     for given_ in ([1, 0, 1], 1, np.ones((1, 2, 3, 4))):
         with pytest.raises(UserError):
             recommender.recommend(FRAMES[0], mask=given_)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"depth_m": "frame.npy"}, "depth: 'frame.npy' is text and no array; read the file with"),
+        ({"depth_m": [Path("a.npy")]}, "depth: 'a.npy' is text"),
+        ({"depth_m": None}, "depth holds object, no numbers"),
+        ({"mask": "m.png"}, "mask: 'm.png' is text and no array; give an array"),
+        ({"mask": ["m.png"]}, "mask: 'm.png' is text"),
+        ({"intrinsics": "585"}, "intrinsics: '585' is text; give numbers"),
+        ({"intrinsics": Path("camera.json")}, "intrinsics: 'camera.json' is text"),
+        ({"near_m": "1"}, "--near: '1' is no number"),
+        ({"far_m": [1.0]}, r"--far: \[1.0\] is no number"),
+        ({"elevation_deg": "high"}, "elevation: 'high' is no number"),
+    ],
+)
+def test_an_argument_of_another_type_is_one_line(recommender, options, message):
+    with pytest.raises(UserError, match=message):
+        recommender.recommend(**{"depth_m": FRAMES[0]} | options)
+
+
+def test_a_recommender_is_of_a_bundle(bundle):
+    for name in (3, None):
+        with pytest.raises(UserError, match=f"{name} is no name of a file"):
+            Recommender.load(name)
+    with pytest.raises(UserError, match="'mug' is no bundle; give its name or file to Recommen"):
+        Recommender("mug")
+    with pytest.raises(UserError, match="backend 3: choose from: numpy, onnx"):
+        Recommender(bundle, 3)
+
+
+def test_crops_are_bytes(recommender):
+    codes = recommender.crop(FRAMES[0]).codes
+    for wrong in ("crop", codes, codes[None] / 255):
+        with pytest.raises(UserError, match=r"crops: .*; give \(n, side, side\) uint8"):
+            recommender.recommend_crops(wrong)
 
 
 def test_frames_of_several_sizes_are_arrays(recommender):

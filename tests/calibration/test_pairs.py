@@ -147,6 +147,15 @@ def test_a_gap_is_refused(tmp_path, views, gap):
     assert f"{gap}°" in message
 
 
+@pytest.mark.parametrize("first", [0, -180])
+def test_azimuths_in_radians_are_named(tmp_path, first):
+    views = np.arange(first, first + 360)
+    path = written(tmp_path / "p.csv", {"a": (np.radians(views), np.radians(views))})
+    assert "these azimuths seem to be radians: multiply them by 180/π" in refused(path)
+    path = written(tmp_path / "p.csv", {"a": (views[:10], views[:10])})
+    assert "180/π" not in refused(path)
+
+
 @pytest.mark.parametrize("value", ["", "nan", "inf", "north", "1e999", "NA", "12°"])
 @pytest.mark.parametrize("column", ["azimuth_deg", "estimate_deg"])
 def test_what_is_no_number_is_named_with_its_row(tmp_path, value, column):
@@ -169,19 +178,21 @@ def test_a_missing_column_is_named(tmp_path, column):
 
 
 @pytest.mark.parametrize(
-    "content",
+    ("content", "message"),
     [
-        b"",
-        b"\n\n",
-        b"object_id,azimuth_deg,estimate_deg\n",
-        b"\xff\xfe\x00",
-        b'a,b\n"1,2\n3',
-        b"\0",
+        (b"", "p.csv is empty; it needs object_id, azimuth_deg, estimate_deg"),
+        (b"\n\n", "p.csv is empty"),
+        (b"object_id,azimuth_deg,estimate_deg\n", "p.csv has no rows"),
+        (b"\xff\xfe\x00", "p.csv, line 1: this is not UTF-8; save the file as UTF-8"),
+        ("a,b\r\ncup,1\r\nTässchen,2".encode("latin-1"), "p.csv, line 3: this is not UTF-8"),
+        (b"a,b\n1,2\n1,2,3\n", "line 3 has 3 columns in place of 2: is a comma too many"),
+        (b'a,b\n"1,2\n3', "a cell begins with a quote and has no second one"),
+        (b"\0", "no column 'object_id'"),
     ],
 )
-def test_a_file_that_is_no_table_is_one_line(tmp_path, content):
+def test_a_file_that_is_no_table_is_one_line(tmp_path, content, message):
     (tmp_path / "p.csv").write_bytes(content)
-    refused(tmp_path / "p.csv")
+    assert message in refused(tmp_path / "p.csv")
 
 
 def test_a_missing_file_is_named(tmp_path):

@@ -109,6 +109,23 @@ def test_a_mesh_file_is_read_with_its_axes(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("cup.npy", "", "no known kind of mesh file; give .obj, .ply, .off, .stl, .glb"),
+        ("cup.obj", "a cup\n", "no line is a vertex, 'v x y z'; is it an OBJ file?"),
+        ("cup.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "the mesh has no faces"),
+        ("cup.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "all faces lie in one point"),
+    ],
+)
+def test_a_file_without_a_mesh_is_one_line(tmp_path, name, content, message):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(UserError) as error:
+        read_mesh(tmp_path / name)
+    assert str(error.value).startswith(f"{tmp_path / name}: ")
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
     ("view", "message"),
     [
         ((np.nan, 10.0, 0.9), "an azimuth of nan"),

@@ -223,11 +223,47 @@ def test_a_camera_that_is_not_calibrated_is_said_to_be_so(tmp_path):
         as_intrinsics(np.zeros((3, 3)))
 
 
+@pytest.mark.parametrize("name", ["fx", "fy", "cx", "cy", "width", "height"])
+def test_every_parameter_is_a_number(name):
+    given_ = {"fx": 575.0, "fy": 575.0, "cx": 320.0, "cy": 240.0} | {name: "575"}
+    with pytest.raises(UserError, match=f"intrinsics: {name}: '575' is no number"):
+        Intrinsics(**given_)
+
+
+@pytest.mark.parametrize("side", ["width", "height"])
+@pytest.mark.parametrize("value", [0, -480])
+def test_an_image_has_a_size(tmp_path, side, value):
+    message = f"intrinsics: {side}={value} must be above 0 \\(pixels\\)"
+    sides = {"width": 640, "height": 480} | {side: value}
+    with pytest.raises(UserError, match=message):
+        Intrinsics(575.0, 575.0, **sides)
+    for name, values in (("a.json", {"cam_K": K}), ("a.yaml", {"k": K})):
+        (tmp_path / name).write_text(as_json(values | sides))
+        with pytest.raises(UserError, match=f"{name}: {message}"):
+            camera_of(str(tmp_path / name))
+
+
 def test_bytes_that_are_no_text_are_one_line(tmp_path):
     for name in ("a.json", "a.yaml"):
         (tmp_path / name).write_bytes(b"\xff\xfe\x00\x01{")
-        with pytest.raises(UserError, match="cannot be read"):
+        with pytest.raises(UserError, match=rf"{name}, line 1: this is not UTF-8; save the file"):
             camera_of(str(tmp_path / name))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.json", '{"fx": 585,\n "fy": }', "line 2, column 8 is no JSON; mend it there"),
+        ("a.json", "[" * 100_000, "it is nested too deeply"),
+        ("a.yaml", "fx: 585\nfy: [585\n", "line 3, column 1 is no YAML; mend it there"),
+        ("a.yaml", "fx: 585\0", "it is no YAML"),
+    ],
+)
+def test_where_a_camera_file_is_broken_is_said(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(UserError) as error:
+        camera_of(str(tmp_path / name))
+    assert str(error.value) == f"{tmp_path / name} cannot be read ({message})"
 
 
 @pytest.mark.parametrize("text", ["", "camera", "575,575", "1,2,3,x", "no/file.json", "x" * 5000])

@@ -54,6 +54,7 @@ def test_a_byte_order_mark_and_another_encoding_lose_no_vertex(tmp_path):
 @pytest.mark.parametrize(
     ("content", "named"),
     [
+        ("hello\nworld\n", "no line is a vertex, 'v x y z'; is it an OBJ file?"),
         (OBJ + "f 0 1 2\n", "line 5: a face refers to vertex 0"),
         (OBJ + "f 1 2 5\n", "vertex 5, of 4"),
         (OBJ + "f -1 -2 -5\n", "line 5: a face refers to vertex -5, of 4 so far"),
@@ -80,6 +81,7 @@ def test_an_obj_that_trimesh_would_misread_is_refused(tmp_path, content, named):
         (OFF.replace("3 0 1 2", "3 0 1"), "a face was cut short"),
         (OFF.replace("3 0 1 2", "2 0 1 2"), "not a face of 3"),
         (OFF.replace("OFF", "4OFF"), "4OFF is not a kind"),
+        ("hello\nworld\n", "it does not begin with OFF; is it an OFF file?"),
         (OFF.replace("4 2 0", "-1 2 0"), "announces -1"),
         ("bell \x07 \x9f" + OFF, "bell ? ?OFF is not a kind"),
     ],

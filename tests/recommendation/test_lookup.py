@@ -45,7 +45,7 @@ def test_recommendations_are_read_at_the_nearest_bin():
         ]
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, "123", None])
 def test_an_estimate_that_is_no_number_has_no_rotation(bad):
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     for rotations in (table.recommend, table.least_cost):
@@ -146,5 +146,21 @@ def test_a_table_that_cannot_be_is_refused(tmp_path, damage):
     arrays = read_arrays(path)
     damage(arrays)
     write_arrays(path, arrays)
-    with pytest.raises(UserError, match=r"pose_ambiguity\.npz: .*; delete the file and run"):
+    with pytest.raises(UserError, match=r"pose_ambiguity\.npz: .*; make it again with nbv calib"):
         lookup.load_lookup(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("no.npz", None, "no.npz does not exist; name the file that nbv calibrate wrote"),
+        ("cut.npz", b"PK\x03\x04", "it is no .npz file, or only a part of one"),
+        ("one.npy", b"", "one.npy: cannot be read "),
+    ],
+)
+def test_a_file_that_is_no_table_is_to_be_made_with_the_program(tmp_path, name, content, message):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(UserError, match="nbv calibrate") as error:
+        lookup.load_lookup(tmp_path / name)
+    assert message in str(error.value)

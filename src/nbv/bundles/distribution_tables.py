@@ -23,7 +23,7 @@ from nbv.bundles.next_view import (
 from nbv.calibration.distributions import FEWEST_CLASSES, as_distributions, bin_apart
 from nbv.calibration.posteriors import TEMPERATURES, fit_temperature, on_degrees
 from nbv.errors import UserError
-from nbv.files import damaged, need_distributions, read_arrays, readable
+from nbv.files import calibrated_file, damaged, need_distributions, read_arrays, readable
 from nbv.labels import counted
 
 AFFINITY: Mapping[str, float] = {"power": 16.0, "pseudo_observations": 90.0}
@@ -31,6 +31,8 @@ AFFINITY: Mapping[str, float] = {"power": 16.0, "pseudo_observations": 90.0}
 
 WIDEST_BIN_DEG = 6.0
 """Of a table: an estimator errs by up to half a class between its classes."""
+
+_AGAIN = "make it again with nbv calibrate"
 
 _PREFIX = "distribution."
 _NAMES = tuple(_PREFIX + name for name in ("object_ids", "temperature", "n_classes", "of_views"))
@@ -233,21 +235,23 @@ class DistributionTable:
         ...     nbv.DistributionTable.load(f"{folder}/table.npz").object_ids
         ('mug-17',)
         """
-        stored = read_arrays(path)
+        stored = read_arrays(calibrated_file(path), (), _AGAIN)
         if any(name not in stored for name in _NAMES):
             raise UserError(
                 f"{path} holds no distributions: make it with nbv calibrate, of pairs that have "
                 "columns p0, p1, …"
             )
-        with readable(path):
+        with readable(path, _AGAIN):
             object_ids, temperature, n_classes, rows = (stored[name] for name in _NAMES)
             n_bins = rows.shape[-1]
-            need_distributions(path, rows, (len(object_ids), n_bins, n_bins))
+            need_distributions(path, rows, (len(object_ids), n_bins, n_bins), _AGAIN)
             least, most = TEMPERATURES
             if not len(rows) or not (rows > 0).all() or not least <= float(temperature) <= most:
-                raise damaged(path, "its distributions or their temperature are out of range")
+                what = "its distributions or their temperature are out of range"
+                raise damaged(path, what, _AGAIN)
             if n_classes.shape or n_classes < FEWEST_CLASSES or _n_bins(int(n_classes)) != n_bins:
-                raise damaged(path, "its number of classes does not fit its distributions")
+                what = "its number of classes does not fit its distributions"
+                raise damaged(path, what, _AGAIN)
             return cls(tuple(map(str, object_ids)), float(temperature), rows, int(n_classes))
 
 

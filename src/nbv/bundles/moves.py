@@ -69,18 +69,28 @@ def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
     if numbers.size != 16:
         raise UserError(f"{name}: {numbers.size} numbers; give the 16 of a 4 × 4 matrix")
     pose = numbers.reshape(4, 4)
+    if not (finite := np.isfinite(pose).all(axis=1)).all():
+        row = int((~finite).argmax())
+        raise UserError(f"{name}: row {row + 1} is {_told(pose[row])}; give finite numbers")
+    if not np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9):
+        raise UserError(
+            f"{name}: the last row is {_told(pose[3])}, and that of a pose is 0 0 0 1; is it "
+            "transposed or scaled?"
+        )
     turn = pose[:3, :3]
     is_rotation = (
-        np.isfinite(pose).all()
-        and (np.abs(turn) < 2).all()  # else the product may overflow
+        (np.abs(turn) < 2).all()  # else the product may overflow
         and np.allclose(turn @ turn.T, np.eye(3), atol=_ROTATION_TOLERANCE)
         and np.linalg.det(turn) > 0
-        and np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9)
     )
     if not is_rotation:
         raise UserError(f"{name}: no rotation with a translation; is it transposed or scaled?")
     _need_metres(pose[:3, 3], name)
     return pose
+
+
+def _told(row: NDArray[np.float64]) -> str:
+    return " ".join(f"{number:g}" for number in row)
 
 
 def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> Pose:

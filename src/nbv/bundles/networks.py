@@ -36,7 +36,7 @@ def open_network(bundle: Bundle, backend: str | None = None) -> Network:
         has_onnx = all(find_spec(name) is not None for name in ("onnx", "onnxruntime"))
         backend = "onnx" if has_onnx else "numpy"
     if backend not in BACKENDS:
-        raise UserError(f"backend {backend!r}: {nearest(backend, BACKENDS)}")
+        raise UserError(f"backend {backend!r}: {nearest(str(backend), BACKENDS)}")
     if not weights_fit(bundle):
         raise UserError("the weights do not fit the network's settings")
     network = _onnx_network(bundle) if backend == "onnx" else _numpy_network(bundle)

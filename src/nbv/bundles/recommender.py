@@ -25,7 +25,8 @@ from nbv.bundles.next_view import (
     as_rotation_list,
     next_view,
 )
-from nbv.errors import UserError, nearest
+from nbv.errors import UserError, nearest, need_number
+from nbv.files import as_path
 from nbv.frames.crop import Crop, crop_frame, need_metres, need_plausible_nearest
 from nbv.frames.depth_files import DepthImage, is_in_mask, to_metres
 from nbv.frames.intrinsics import Intrinsics, as_intrinsics
@@ -59,7 +60,7 @@ def bundle_path(name: str | Path) -> Path:
     shipped = shipped_bundles()
     if str(name) in shipped:
         return shipped[str(name)]
-    if not Path(name).exists():
+    if not as_path(name).exists():
         known = nearest(str(name), shipped) if shipped else "no bundle comes with this nbv"
         raise BundleError("no-bundle", f"{str(name)!r}: there is no such file; {known}")
     return Path(name)
@@ -83,6 +84,8 @@ class Recommender:
     """
 
     def __init__(self, bundle: Bundle, backend: str | None = None) -> None:
+        if not isinstance(bundle, Bundle):
+            raise UserError(f"{bundle!r} is no bundle; give its name or file to Recommender.load")
         self.bundle = bundle
         self.network: Network = open_network(bundle, backend)
 
@@ -165,6 +168,7 @@ class Recommender:
         gravity: ArrayLike | None = None,
         allowed_deg: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
+        names: Sequence[str] | None = None,
     ) -> Recommendation:
         """Return the pose that frames show, and the next view.
 
@@ -196,6 +200,8 @@ class Recommender:
             Rotations from the last frame's place that the camera may take; all without it. An
             array of n booleans is a mask over the circle: entry k is the rotation 360 k / n.
         max_travel_deg : float
+        names : sequence of str, optional
+            What messages call the frames, such as their files; else one of several is counted.
 
         Raises
         ------
@@ -221,14 +227,17 @@ class Recommender:
         masks = _as_masks(mask, len(frames))
         cameras = _as_cameras(intrinsics, len(frames))
         rotations_deg = as_rotation_list(rotations_deg, len(frames))
+        called = _as_names(names, len(frames))
+        # Of all frames: no message should name one.
+        need_metres(near_m, far_m, self.bundle.diagonal_m)
         crops: list[Crop] = []
-        for frame, own, camera in zip(frames, masks, cameras, strict=True):
+        for frame, own, camera, name in zip(frames, masks, cameras, called, strict=True):
             try:
                 crop = self.crop(frame, mask=own, intrinsics=camera, near_m=near_m, far_m=far_m)
             except UserError as error:
-                if len(frames) == 1:
+                if name is None:
                     raise
-                raise error.about(f"frame {len(crops) + 1} of {len(frames)}") from error
+                raise error.about(name) from error
             crops.append(crop)
         doubts = (doubt for crop in crops for doubt in crop.doubts)
         return self._of_crops(
@@ -262,6 +271,12 @@ class Recommender:
         >>> of_crop.move == recommender.recommend(frame.depth_m, intrinsics=frame.intrinsics).move
         True
         """
+        codes = np.asarray(codes)
+        if codes.ndim != 3 or codes.dtype != np.uint8:
+            raise UserError(
+                f"crops: {codes.dtype} of shape {codes.shape}; give (n, side, side) uint8, such as "
+                "the codes of Recommender.crop"
+            )
         rotations_deg = as_rotation_list(rotations_deg, len(codes))
         return self._of_crops(codes, rotations_deg, elevation_deg, allowed_deg, max_travel_deg)
 
@@ -276,6 +291,8 @@ class Recommender:
         doubts: tuple[str, ...] = (),
         rolled: tuple[str, ...] = (),
     ) -> Recommendation:
+        if elevation_deg is not None:
+            need_number("elevation", elevation_deg)
         if elevation_deg is not None and not -90 <= elevation_deg <= 90:
             raise UserError(
                 f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
@@ -359,6 +376,7 @@ def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.gene
         return [depth_m]
     if isinstance(depth_m, list | tuple) and depth_m and isinstance(depth_m[0], np.ndarray):
         return [np.asanyarray(frame) for frame in depth_m]
+    _refuse_text("depth", depth_m, "read the file with nbv.read_depth")
     try:
         values = np.asanyarray(depth_m)
     except ValueError as error:
@@ -374,6 +392,7 @@ def _images_of(values: NDArray[Any]) -> list[NDArray[Any]]:
 def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[ArrayLike | None]:
     if mask is None:
         return [None] * n
+    _refuse_text("mask", mask, "give an array of the file's pixels")
     masks: list[Any]
     if isinstance(mask, list | tuple) and not (mask and np.ndim(mask[0]) == 1):
         masks = list(mask)
@@ -384,6 +403,24 @@ def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[
             f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"
         )
     return masks
+
+
+def _refuse_text(name: str, value: Any, what_to_do: str) -> None:
+    """Refuse the name of a file, alone or in a list, where an array is meant."""
+    for one in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(one, str | bytes | Path):
+            raise UserError(f"{name}: {str(one)!r} is text and no array; {what_to_do}")
+
+
+def _as_names(names: Sequence[str] | None, n: int) -> Sequence[str | None]:
+    """Return what each of n frames is called; None of a single one without a name."""
+    if names is None:
+        return [None] if n == 1 else [f"frame {place} of {n}" for place in range(1, n + 1)]
+    if len(names) != n:
+        raise UserError(
+            f"{counted(n, 'frame')} and {counted(len(names), 'name')}: give one for each frame"
+        )
+    return names
 
 
 def _as_cameras(

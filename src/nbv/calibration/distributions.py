@@ -13,6 +13,7 @@ from nbv.calibration.estimates import COLUMNS
 from nbv.calibration.pairs import (
     WIDEST_GAP_DEG,
     is_probability,
+    radians_hint,
     read_pair_rows,
     read_rows,
     widest_gap_deg,
@@ -96,7 +97,7 @@ def evenly_apart(
     if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
         raise UserError(
             f"views are {gap:.0f}° apart somewhere on the turn; calibration needs one every "
-            f"{WIDEST_GAP_DEG:g}°"
+            f"{WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
         )
     found = np.empty((n_views, rows.shape[1]), dtype=np.float32)
     for place, azimuth in enumerate(np.arange(n_views) * (360.0 / n_views)):
@@ -135,7 +136,7 @@ def read_pair_distributions(
         no distribution.
     """
     path = Path(path)
-    table = read_pair_rows(path, category, elevation_deg, probabilities=True)
+    table = read_pair_rows(path, category, elevation_deg)
     if not _classes(path, table):
         return {}
     rows = _rows(path, table)

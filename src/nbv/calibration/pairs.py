@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from nbv.angles import signed_difference_deg, wrap_deg
 from nbv.calibration.estimates import COLUMNS, Estimates
 from nbv.errors import UserError, reason_of
-from nbv.files import missing
+from nbv.files import missing, read_text
 
 N_VIEWS = 360
 
@@ -52,7 +53,10 @@ def read_pairs(
         than `WIDEST_GAP_DEG`.
     """
     path = Path(path)
-    table = read_pair_rows(path, category, elevation_deg)
+    return _estimates(path, read_pair_rows(path, category, elevation_deg))
+
+
+def _estimates(path: Path, table: pd.DataFrame) -> Estimates:
     turns = {
         str(name): _object_turn(path, str(name), rows)
         for name, rows in table.groupby("object_id", sort=False)
@@ -60,16 +64,8 @@ def read_pairs(
     return Estimates(tuple(turns), np.stack(list(turns.values())))
 
 
-def read_rows(
-    path: Path,
-    needed: Sequence[str],
-    chosen: Callable[[str], bool] | None = None,
-    n_rows: int | None = None,
-) -> pd.DataFrame:
-    """Read a CSV file that a user wrote, as text: an object may be called NA.
-
-    Of its columns those are read whose names are `chosen`, and of its rows the first `n_rows`; all
-    without these.
+def read_rows(path: Path, needed: Sequence[str], n_rows: int | None = None) -> pd.DataFrame:
+    """Read a user's CSV file, or its first `n_rows`, as text: an object may be called NA.
 
     Raises
     ------
@@ -79,7 +75,9 @@ def read_rows(
     if not path.is_file():
         raise UserError(f"{path} {missing(path)}; name a file with {', '.join(needed)}")
     try:
-        table = pd.read_csv(path, dtype=str, keep_default_na=False, usecols=chosen, nrows=n_rows)
+        if not (text := read_text(path)).strip():
+            raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
+        table = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False, nrows=n_rows)
     except (OSError, ValueError) as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     for name in needed:
@@ -92,25 +90,25 @@ def read_rows(
 
 
 def read_pair_rows(
-    path: Path,
-    category: str | None = None,
-    elevation_deg: float | None = None,
-    *,
-    probabilities: bool = False,
+    path: Path, category: str | None = None, elevation_deg: float | None = None
 ) -> pd.DataFrame:
     """Read the rows of a file of pairs; parameters and errors as of `read_pairs`.
 
-    Columns of probabilities, which may be many, are read where `probabilities` are asked for. The
-    index is that of the rows in the file, from 0.
+    The index is that of the rows in the file, from 0.
     """
-    chosen = None if probabilities else lambda column: not is_probability(column)
-    table = read_rows(path, COLUMNS, chosen)
+    table = read_rows(path, COLUMNS)
     for name in COLUMNS[1:]:
         table[name] = pd.to_numeric(table[name], errors="coerce")
         if not (finite := np.isfinite(table[name].to_numpy(dtype=np.float64))).all():
             raise UserError(f"{path}, row {int((~finite).argmax()) + 2}: {name} is no number")
     if "elevation_deg" in table:
         table["elevation_deg"] = pd.to_numeric(table["elevation_deg"], errors="coerce")
+    return _of_unit(path, table, category, elevation_deg)
+
+
+def _of_unit(
+    path: Path, table: pd.DataFrame, category: str | None, elevation_deg: float | None
+) -> pd.DataFrame:
     for name, wanted in (("category", category), ("elevation_deg", elevation_deg)):
         if wanted is not None and name in table:
             table = table[table[name] == wanted]
@@ -136,20 +134,22 @@ def objects_of_pairs(
         Of `read_pairs`; where a column is missing that tells categories or elevations apart; where
         an object is missing at an elevation.
     """
-    columns = read_pair_rows(Path(path)).columns
+    path = Path(path)
+    table = read_pair_rows(path)
     several = {
         "category": ("categories", len(elevations_deg)),
         "elevation_deg": ("elevations", max(map(len, elevations_deg.values()))),
     }
     for name, (what, number) in several.items():
-        if number > 1 and name not in columns:
+        if number > 1 and name not in table:
             raise UserError(
                 f"{path} has no column {name!r}, and the run has {number} {what}: add the column, "
                 "or run one (overrides=[categories=[mug],elevations_deg.mug=[0]])"
             )
     found = {}
     for category, elevations in elevations_deg.items():
-        ids = [read_pairs(path, category, elevation).object_ids for elevation in elevations]
+        units = [_of_unit(path, table, category, elevation) for elevation in elevations]
+        ids = [_estimates(path, unit).object_ids for unit in units]
         if missing := set().union(*ids) - set(ids[0]).intersection(*ids):
             raise UserError(
                 f"{path}: object {min(missing)!r} has no pairs at some elevation of {category}; "
@@ -171,7 +171,7 @@ def _object_turn(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float6
     if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
         raise UserError(
             f"{path}: the views of object {name!r} leave a gap of {gap:.0f}°; calibration needs a "
-            f"view every {WIDEST_GAP_DEG:g}°"
+            f"view every {WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
         )
     return full_turn(wrap_deg(azimuth_deg), estimate_deg)
 
@@ -180,6 +180,14 @@ def widest_gap_deg(azimuth_deg: NDArray[np.float64]) -> float:
     """Return the widest gap between neighbouring views (n,) on a turn, degrees."""
     ordered = np.sort(wrap_deg(azimuth_deg))
     return float(np.diff(ordered, append=ordered[0] + 360.0).max())
+
+
+def radians_hint(azimuth_deg: NDArray[np.float64]) -> str:
+    """Return the end of a sentence that refuses a gap; empty where azimuths (n,) are degrees."""
+    # One of a turn in radians; in degrees all views would be within 13 of each other.
+    if len(azimuth_deg) > 1 and np.abs(azimuth_deg).max() <= 2 * np.pi:
+        return "; these azimuths seem to be radians: multiply them by 180/π"
+    return ""
 
 
 def full_turn(

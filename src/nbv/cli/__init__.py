@@ -5,6 +5,7 @@ Commands import what they use when they run, so that ``nbv --help`` stays quick.
 
 from __future__ import annotations
 
+import errno
 import io
 import math
 import os
@@ -35,6 +36,7 @@ from nbv.cli.arguments import (
     Json,
     Numbers,
     Rotations,
+    WholeNumber,
     WholeNumbers,
     allowed_rotations,
     as_paragraphs,
@@ -69,6 +71,9 @@ app = App(
 
 FIGURES = (".png", ".pdf", ".svg")
 
+# Where files are full, or the disk that they are on.
+OF_FULL_OUTPUT = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
 # Products of small matrices on several threads wait for one another.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -80,24 +85,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
         app(joined_numbers(given), exit_on_error=False, print_error=False)
         sys.stdout.flush()
     except BrokenPipeError:
-        # Whoever read the output has seen enough. The interpreter flushes once more at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Whoever read the output has seen enough.
+        _drop_output()
     except (UserError, CycloptsError, OSError) as error:
         message = _message(error)
-        # An error of standard output itself names no file.
-        can_print = not isinstance(error, OSError) or error.filename is not None
-        if "--json" in given and can_print:
-            name = error.name if isinstance(error, NamedError) else None
-            say_json({"error": {"name": name, "message": message}})
+        # What cannot be printed is said in one line all the same.
+        try:
+            # An error of standard output itself names no file.
+            can_print = not isinstance(error, OSError) or error.filename is not None
+            if "--json" in given and can_print:
+                name = error.name if isinstance(error, NamedError) else None
+                say_json({"error": {"name": name, "message": message}})
+            sys.stdout.flush()
+        except OSError:
+            _drop_output()
         return _refused(message)
     return 0
+
+
+def _drop_output() -> None:
+    """Lead standard output nowhere: the interpreter flushes it once more at its end, and fails."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _message(error: Exception) -> str:
     if not isinstance(error, OSError):
         return " ".join(str(error).split())
+    reason = error.strerror or str(error)
     # Of a file to write: readers name the file themselves.
-    return f"{error.filename}: {error.strerror}" if error.filename else f"{error.strerror}"
+    if error.filename:
+        return f"{error.filename}: {reason}"
+    return f"standard output: {reason}" if error.errno in OF_FULL_OUTPUT else reason
 
 
 def _refused(message: str) -> int:
@@ -237,6 +255,10 @@ def recommend(
     if plot is not None:
         need_writable("--plot", plot, FIGURES)
     place = _known_place(camera_pose, axis)
+    if gravity is not None and len(gravity) != 3:
+        # Before frames are read: what is no number after the option is taken for one.
+        noun = counted(len(gravity), "number")
+        raise UserError(f"--gravity has {noun}; give three, the direction down: x,y,z")
     from nbv.bundles.moves import check_axis, elevation_from_gravity
     from nbv.bundles.recommender import Recommender
     from nbv.frames.depth_files import read_depth, read_mask
@@ -261,6 +283,7 @@ def recommend(
         gravity=gravity,
         allowed_deg=allowed_rotations(allowed),
         max_travel_deg=max_travel,
+        names=[str(path) for path in frames],
     )
     if place is not None:
         diagonal_m = recommender.bundle.diagonal_m
@@ -317,7 +340,7 @@ def calibrate(
         The bundle whose network sees the frames.
     criterion
         Of the lookup table: pose_ambiguity (without this option), information_gain,
-        expected_dispersion or expected_error.
+        expected_dispersion, bayes_error, expected_error or fixed.
     intrinsics
         Of frames: fx,fy,cx,cy in pixels, the focal length alone, or a camera file.
     depth_scale
@@ -448,7 +471,10 @@ def evaluate(
             {
                 "errors": found.to_dict("records"),
                 "calibrated_by": calibrated_by,
-                "familiarity": familiar.to_dict("records"),
+                "familiarity": [
+                    about | {"warning": about["warning"] or None}
+                    for about in familiar.to_dict("records")
+                ],
                 **seen.as_json(),
             }
         )
@@ -478,7 +504,7 @@ def render(
     up: FileAxis = UP,
     front: FileAxis = FRONT,
     sensor: str = "kinect",
-    seed: int = 0,
+    seed: WholeNumber = 0,
     json: Json = False,
 ) -> None:
     """Write the depth frame that a depth camera would take of a mesh.

@@ -15,13 +15,26 @@ from nbv.errors import UserError
 Command = TypeVar("Command", bound=Callable[..., None])
 
 
+def as_whole_number(_kind: Any, tokens: Sequence[Token]) -> int:
+    """Return the whole number of an option, which is not rounded to one."""
+    return int(_number(int, tokens[0].value))
+
+
+def _number(kind: Callable[[str], float], text: str) -> float:
+    try:
+        return kind(text)
+    except ValueError:
+        what = "whole number" if kind is int else "number"
+        raise ValueError(f"{text!r} is no {what}") from None
+
+
 def as_numbers(kind: Any, tokens: Sequence[Token]) -> list[Any]:
     """Return the numbers of an option, between commas or spaces; `kind` is a list of some type."""
-    (number,) = kind.__args__
+    (kind_of_number,) = kind.__args__
     texts = [text for token in tokens for text in token.value.replace(",", " ").split()]
     if not texts:
         raise ValueError("give a number")
-    return [number(text) for text in texts]
+    return [_number(kind_of_number, text) for text in texts]
 
 
 def as_rotations_or_file(_kind: Any, tokens: Sequence[Token]) -> list[float] | Path:
@@ -39,6 +52,7 @@ Numbers = Annotated[list[float] | None, _list_parameter(as_numbers, "NUMBER...")
 # -z is an axis here, and no option.
 FileAxis = Annotated[str, Parameter(allow_leading_hyphen=True)]
 WholeNumbers = Annotated[list[int] | None, _list_parameter(as_numbers, "NUMBER...")]
+WholeNumber = Annotated[int, Parameter(converter=as_whole_number, n_tokens=1, metavar="INT")]
 Rotations = Annotated[
     list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FILE")
 ]

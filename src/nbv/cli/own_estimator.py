@@ -96,10 +96,11 @@ def recommend_by_table(
         raise UserError(f"--estimate={estimate:g}: give an azimuth in degrees")
     from nbv.bundles.moves import check_axis
     from nbv.bundles.rotations import ranked_rotations
+    from nbv.files import calibrated_file
     from nbv.recommendation.criteria import cost_unit
     from nbv.recommendation.lookup import load_lookup
 
-    path = _existing(table)
+    path = calibrated_file(table)
     try:
         lookup = load_lookup(path)
     except UserError as error:
@@ -147,10 +148,11 @@ def recommend_by_distributions(
     from nbv.bundles.distribution_tables import DistributionTable
     from nbv.bundles.moves import check_axis
     from nbv.calibration.distributions import read_distributions
+    from nbv.files import calibrated_file
 
     if table is None:
         raise UserError("--distribution and --table belong together")
-    path = _existing(table)
+    path = calibrated_file(table)
     try:
         known = DistributionTable.load(path)
     except UserError as error:
@@ -171,11 +173,3 @@ def recommend_by_distributions(
         say_json(recommendation_as_json(answer, None, targets))
         return
     say_recommendation(answer, "object", targets)
-
-
-def _existing(table: Path) -> Path:
-    from nbv.files import missing
-
-    if not table.is_file():
-        raise UserError(f"{table} {missing(table)}; name the file that nbv calibrate wrote")
-    return table

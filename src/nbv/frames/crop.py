@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.errors import UserError
+from nbv.errors import UserError, need_number
 from nbv.frames.depth_files import DepthImage
 from nbv.frames.errors import FrameError
 from nbv.frames.intrinsics import Intrinsics
@@ -206,6 +206,8 @@ def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) ->
     """
     limits = (("--near", near_m, FARTHEST), ("--far", far_m, _NO_LIMIT))
     for name, limit_m, most in limits:
+        if limit_m is not None:
+            need_number(name, limit_m)
         if limit_m is not None and not limit_m >= 0:
             raise UserError(f"{name}={limit_m:g}: give metres, 0 or more")
         if limit_m is not None and most * diagonal_m < limit_m < math.inf:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.errors import UserError, reason_of
-from nbv.files import missing, replacing
+from nbv.files import as_path, missing, replacing
 from nbv.frames.errors import FrameError
 
 DepthImage = NDArray[np.float32]
@@ -66,7 +66,7 @@ def read_depth(
     ...     nbv.read_depth(f"{folder}/depth.npy").round(3).tolist()
     [[0.7300000190734863, 0.0]]
     """
-    return to_metres(_read_array(Path(path), "depth"), depth_scale, str(path), unit_m)
+    return to_metres(_read_array(as_path(path), "depth"), depth_scale, str(path), unit_m)
 
 
 def write_depth(path: Path, depth_m: DepthImage) -> None:
@@ -97,7 +97,7 @@ def read_mask(path: str | Path) -> NDArray[np.bool_]:
     Of several arrays in an ``.npz`` it is the one that is called ``mask``. Of an image with a
     channel for opacity, pixels that are transparent are false as well.
     """
-    values = _read_array(Path(path), "mask")
+    values = _read_array(as_path(path), "mask")
     if values.dtype.kind not in _NUMBERS:
         raise UserError(f"{path} holds {values.dtype}, no numbers")
     mask = is_in_mask(values)
@@ -129,6 +129,8 @@ def to_metres(
     Of a masked array, what is masked was not measured.
     """
     values = np.asarray(np.ma.filled(values, 0))
+    if values.dtype.kind not in "iuf":
+        raise UserError(f"{name} holds {values.dtype}, no numbers")
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[:, :, 0]
     if values.ndim != 2:
@@ -144,12 +146,10 @@ def to_metres(
         )
     if values.dtype.kind == "f":
         scale = 1.0 if depth_scale is None else depth_scale
-    elif values.dtype.kind in "iu":
+    else:
         if values.dtype.itemsize == 1:
             raise FrameError("few-levels", f"{name} has 8 bits a pixel, and depth needs 16")
         scale = unit_m if depth_scale is None else depth_scale
-    else:
-        raise UserError(f"{name} holds {values.dtype}, no numbers")
     # What overflows is as far away as what is infinite: nothing was measured.
     with np.errstate(invalid="ignore", over="ignore"):
         metres = values.astype(np.float32)

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.errors import UserError, nearest
+from nbv.errors import UserError, nearest, need_number
 from nbv.frames.crop import FARTHEST, NEAREST
 from nbv.frames.depth_files import DepthImage
 from nbv.frames.intrinsics import Intrinsics
 from nbv.meshes.normalisation import check_mesh, normalise
 from nbv.meshes.reader import MeshReader
+from nbv.meshes.sources.files import EXTENSIONS
 from nbv.meshes.store import Mesh, as_mesh
 from nbv.rendering import open_renderer
 from nbv.rendering.camera import Camera
@@ -131,6 +132,8 @@ def draw_frame(
 def _need_view(
     azimuth_deg: float, elevation_deg: float, distance_m: float, diagonal_m: float
 ) -> None:
+    need_number("azimuth", azimuth_deg)
+    need_number("elevation", elevation_deg)
     if not math.isfinite(azimuth_deg):
         raise UserError(f"an azimuth of {azimuth_deg:g}°: give a number of degrees")
     if not -90 <= elevation_deg <= 90:
@@ -140,7 +143,8 @@ def _need_view(
     if not NEAREST * diagonal_m <= distance_m <= FARTHEST * diagonal_m:
         raise UserError(
             f"a distance of {distance_m:g} m from an object of {diagonal_m:g} m: "
-            f"{NEAREST * diagonal_m:.2g} to {FARTHEST * diagonal_m:.2g} m are plausible"
+            f"{NEAREST * diagonal_m:.3g} to {FARTHEST * diagonal_m:.3g} m are plausible; change "
+            "the distance or the object's diagonal, both in metres"
         )
 
 
@@ -169,8 +173,10 @@ def read_mesh(path: str | Path, up: str = "+z", front: str = "+x") -> Mesh:
     Raises
     ------
     UserError
-        Where it cannot be read, or has no surface.
+        Where it is of no kind in `EXTENSIONS`, cannot be read, or has no surface.
     """
+    if Path(path).suffix.lower() not in EXTENSIONS:
+        raise UserError(f"{path}: no known kind of mesh file; give {', '.join(EXTENSIONS)}")
     mesh = MeshReader().read(Path(path))
     check_mesh(mesh, str(path))
     return as_mesh(normalise(mesh, up, front, 0.0, "box"))

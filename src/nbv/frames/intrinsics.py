@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nbv.errors import UserError, reason_of
+from nbv.errors import UserError, need_number, reason_of
+from nbv.files import read_text
 from nbv.frames.depth_files import MILLIMETRE
 from nbv.frames.errors import FrameError
 
@@ -51,6 +52,9 @@ class Intrinsics:
     height: int | None = None
 
     def __post_init__(self) -> None:
+        for name in ("fx", "fy", "cx", "cy", "width", "height"):
+            if (value := getattr(self, name)) is not None or name in ("fx", "fy"):
+                need_number(f"intrinsics: {name}", value)
         for name in ("fx", "fy"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
@@ -62,6 +66,13 @@ class Intrinsics:
         if (self.cx is None) != (self.cy is None):
             known, missing = ("cy", "cx") if self.cx is None else ("cx", "cy")
             raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
+        for name in ("width", "height"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise UserError(
+                    f"intrinsics: {name}={value:g} must be above 0 (pixels); give that of the "
+                    "depth image, or leave out width and height"
+                )
 
     def need_resolution(self, rows: int, columns: int) -> None:
         """Raise FrameError ``other-resolution`` where they are for images of another size.
@@ -140,6 +151,8 @@ def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
     """
     if isinstance(value, Intrinsics):
         return value
+    if isinstance(value, str | bytes | Path):
+        raise UserError(f"intrinsics: {str(value)!r} is text; give numbers: f, or (fx, fy, cx, cy)")
     try:
         numbers = [float(number) for number in np.ravel(np.asarray(value, dtype=np.float64))]
     except (TypeError, ValueError):
@@ -248,7 +261,7 @@ def _of_image(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[str
 
 
 def _read_mapping(path: Path) -> Mapping[str, Any]:
-    text = path.read_text(encoding="utf-8-sig")
+    text = read_text(path)
     if path.suffix.lower() == ".json":
         values = json.loads(text)
     else:
@@ -276,10 +289,10 @@ def _of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
         matrix = [values[name] for name in ("fx", "fy", "cx", "cy")]
     try:
         found = as_intrinsics(matrix)
+        width, height = (int(side) if isinstance(side, int | float) else None for side in size)
+        intrinsics = Intrinsics(found.fx, found.fy, found.cx, found.cy, width, height)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
-    width, height = (int(side) if isinstance(side, int | float) else None for side in size)
-    intrinsics = Intrinsics(found.fx, found.fy, found.cx, found.cy, width, height)
     return DepthCamera(intrinsics, _unit_m(values.get("depth_scale"), path))
 
 

@@ -159,6 +159,8 @@ def _checked_obj(text: str) -> str:
                     )
                 relative_at = n_vertices if relative_at < 0 else relative_at
             indices += (min(of_face), max(of_face))
+    if not n_vertices:
+        raise ValueError("no line is a vertex, 'v x y z'; is it an OBJ file?")
     if is_mixed and n_coordinates == n_vertices * first_coordinates:
         # Trimesh would cut the numbers of all vertices into rows as long as the first.
         raise ValueError("vertices have different numbers of coordinates")
@@ -171,7 +173,9 @@ def _checked_obj(text: str) -> str:
 
 
 def _check_off(text: str) -> None:
-    kind, _, text = text.partition("OFF")
+    kind, has_kind, text = text.partition("OFF")
+    if not has_kind:
+        raise ValueError("it does not begin with OFF; is it an OFF file?")
     kind = "".join(line.partition("#")[0] for line in kind.splitlines()).strip()
     if kind not in ("", "C", "N", "CN", "ST"):
         raise ValueError(f"{kind[:20]}OFF is not a kind of OFF with three coordinates")

@@ -13,7 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.angles import nearest_bin, travel_deg
 from nbv.errors import UserError
-from nbv.files import damaged, need_distributions, read_arrays, readable, write_arrays
+from nbv.files import (
+    CALIBRATE_AGAIN,
+    calibrated_file,
+    damaged,
+    need_distributions,
+    read_arrays,
+    readable,
+    write_arrays,
+)
 from nbv.recommendation.criteria import tabulate
 from nbv.recommendation.evidence import Evidence
 
@@ -108,7 +116,8 @@ class LookupTable:
         return np.asarray(self.recommended_delta_deg[self._bins(estimate_deg)])
 
     def _bins(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
-        if not np.isfinite(estimate_deg).all():
+        given = np.asarray(estimate_deg)
+        if given.dtype.kind not in "iuf" or not np.isfinite(given).all():
             raise UserError("an estimate is no finite number of degrees")
         return np.asarray(nearest_bin(estimate_deg, len(self.cost)), dtype=np.int64)
 
@@ -251,8 +260,8 @@ def load_lookup(path: str | Path) -> LookupTable:
     'pose_ambiguity'
     """
     names = [item.name for item in fields(LookupTable)]
-    stored = read_arrays(path, names)
-    with readable(path):
+    stored = read_arrays(calibrated_file(path), names, CALIBRATE_AGAIN)
+    with readable(path, CALIBRATE_AGAIN):
         # An array without axes holds a number or a text.
         values: dict[str, Any] = {
             name: stored[name] if stored[name].ndim else stored[name].item() for name in names
@@ -260,12 +269,12 @@ def load_lookup(path: str | Path) -> LookupTable:
         table = LookupTable(**values)
         n_bins = len(table.cost)
         for density in (table.viewpoint_likelihood, table.estimate_likelihood):
-            need_distributions(path, density, (n_bins, n_bins))
+            need_distributions(path, density, (n_bins, n_bins), CALIBRATE_AGAIN)
         if table.cost.shape != (n_bins, n_bins) or not np.isfinite(table.cost).all():
-            raise damaged(path, "a cost is not finite")
+            raise damaged(path, "a cost is not finite", CALIBRATE_AGAIN)
         delta_deg = table.recommended_delta_deg
         if delta_deg.shape != (n_bins,) or not np.issubdtype(delta_deg.dtype, np.integer):
-            raise damaged(path, "the recommended rotations are no whole degrees")
+            raise damaged(path, "the recommended rotations are no whole degrees", CALIBRATE_AGAIN)
         if ((delta_deg < 0) | (delta_deg >= 360)).any():
-            raise damaged(path, "a recommended rotation is not in [0, 360)")
+            raise damaged(path, "a recommended rotation is not in [0, 360)", CALIBRATE_AGAIN)
     return table
