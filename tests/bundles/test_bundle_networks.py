@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +17,8 @@ from nbv.bundles.bundle import as_kept, load_bundle
 from nbv.bundles.making import kept_network, turns_of
 from nbv.bundles.mirror import mirror_averaged
 from nbv.bundles.networks import BACKENDS, open_network
-from nbv.bundles.recommender import Recommender, bundle_path
+from nbv.bundles.recommender import bundle_path
+from nbv.config.compose import load_config
 from nbv.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.estimation.folding import network_shapes
@@ -26,13 +27,14 @@ from nbv.estimation.inference import network_outputs
 from nbv.estimation.networks import build_network
 from nbv.estimation.outputs import decode_classes
 from nbv.estimation.weights import Estimator
-from nbv.frames.drawn import draw_frame
-from nbv.frames.errors import FrameError
 from nbv.meshes.normalisation import normalise
 from nbv.meshes.procedural import generate
 from nbv.meshes.store import as_mesh
 from nbv.recommendation.belief import mean_direction_deg
+from nbv.rendering import open_renderer
 from nbv.rendering.camera import Camera
+from nbv.rendering.noise import build_sensor
+from nbv.rendering.randomisation import Randomisation, randomised_turn
 
 KINDS = {
     "small": (settings(), SIDE),
@@ -115,21 +117,30 @@ def test_the_directions_are_those_of_torch(backend, rng):
 
 @pytest.fixture(scope="module")
 def thousand_crops():
-    """Crops of generated mugs, with a first Kinect's noise, all round, at 0 to 60 degrees."""
-    recommender, crops = Recommender.load("mug"), []
-    size = recommender.bundle.diagonal_m
-    for index in range(12):
+    """Generated mugs, all round, at 0 to 60 degrees, with all that a camera does to them."""
+    config = load_config(
+        Path(__file__).parents[2] / "config",
+        ["experiment=bundles", "estimator=classifier", "randomisation=camera", "sensor=kinect"],
+    )
+    sensor, camera = config["sensor"], load_bundle(bundle_path("mug")).camera
+    renderer, crops = open_renderer("embree"), []
+    for index in range(10):
         mug = as_mesh(normalise(generate("mug", 1, index), "+z", "+x", 0.0, "origin"))
-        for elevation in (0.0, 15.0, 30.0, 45.0, 60.0):
-            for azimuth in np.arange(20) * 18.0 + 1.8 * index:
-                frame = draw_frame(mug, azimuth, elevation, 0.8, size, seed=int(10 * azimuth))
-                # What the noise cuts in two is refused.
-                with suppress(FrameError):
-                    answer = recommender.recommend(
-                        frame.depth_m, mask=frame.mask, intrinsics=frame.intrinsics
-                    )
-                    crops.extend(answer.crops)
-    return np.stack(crops[:1000])
+        crops += [
+            randomised_turn(
+                mug,
+                elevation,
+                np.arange(20) * 18.0 + 1.8 * index,
+                camera,
+                renderer,
+                build_sensor(sensor["name"], sensor["parameters"]),
+                sensor["diagonal_m"]["mug"],
+                Randomisation(**config["randomisation"]),
+                np.random.default_rng([index, int(elevation)]),
+            )
+            for elevation in (0.0, 15.0, 30.0, 45.0, 60.0)
+        ]
+    return np.concatenate(crops)
 
 
 @pytest.mark.slow
