@@ -56,6 +56,8 @@ def need_number(name: str, value: object) -> None:
             return
     except (TypeError, ValueError):
         pass
+    except OverflowError:
+        raise UserError(f"{name}: the number is too large") from None
     raise UserError(f"{name}: {value!r} is no number")
 
 

@@ -842,6 +842,8 @@ def test_a_mask_may_be_any_array(recommender):
         ({"intrinsics": "585"}, "intrinsics: '585' is text; give numbers"),
         ({"intrinsics": Path("camera.json")}, "intrinsics: 'camera.json' is text"),
         ({"near_m": "1"}, "--near: '1' is no number"),
+        ({"far_m": 10**400}, "--far: the number is too large"),
+        ({"intrinsics": 10**400}, "are no numbers; give fx,fy,cx,cy"),
         ({"far_m": [1.0]}, r"--far: \[1.0\] is no number"),
         ({"elevation_deg": "high"}, "elevation: 'high' is no number"),
     ],

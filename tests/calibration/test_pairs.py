@@ -253,3 +253,12 @@ def test_units_that_nothing_tells_apart_are_one_line(tmp_path, absent):
 def test_a_category_without_rows_is_one_line(tmp_path):
     with pytest.raises(UserError, match="no rows with category=chair"):
         read_pairs(units(tmp_path), "chair")
+
+
+def test_a_compressed_file_is_read_as_the_file_itself(tmp_path):
+    table = pd.DataFrame({"object_id": "a", "azimuth_deg": np.arange(0, 360, 15)})
+    table["estimate_deg"] = table["azimuth_deg"] + 1.0
+    for name in ("p.csv", "p.csv.gz"):
+        table.to_csv(tmp_path / name, index=False)
+    plain, packed = (read_pairs(tmp_path / name) for name in ("p.csv", "p.csv.gz"))
+    assert np.array_equal(plain.estimate_deg, packed.estimate_deg)

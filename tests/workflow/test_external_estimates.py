@@ -188,9 +188,14 @@ def test_distributions_of_another_program_are_fused_by_product(given, fold: int)
     place = f"mug/el00/fold{fold}"
     with np.load(project.results / "estimates" / place / "test_posteriors.npz") as stored:
         assert float(stored["temperature"]) == pytest.approx(temperature, rel=1e-4)
+        name, kept = stored["object_ids"][0], stored["log_posterior"][0]
+    logits = table.set_index(["object_id", "azimuth_deg"])[columns].map(np.log)
+    # A view at 3 degrees is that at 0, turned by 3 degrees, a fifth of a class.
+    nearest = np.exp(log_softmax(logits.loc[name, 0.0].to_numpy() / temperature))
+    wanted_row = 0.8 * nearest + 0.2 * np.roll(nearest, 1)
+    assert np.exp(kept[3]) == pytest.approx(wanted_row, abs=1e-4)
     evaluated = project.results / "evaluation" / place / "opposite_product.csv"
     rows = pd.read_csv(evaluated, dtype={"object_id": str}).set_index(["object_id", "initial_deg"])
-    logits = table.set_index(["object_id", "azimuth_deg"])[columns].map(np.log)
     for (name, azimuth), own in logits.loc[list(roles[roles == "test"].index)].iterrows():
         other = logits.loc[name, (azimuth + 180.0) % 360.0]
         views = [np.exp(log_softmax(one.to_numpy() / temperature)) for one in (own, other)]
@@ -211,7 +216,10 @@ def test_methods_of_distributions_are_in_the_tables(given) -> None:
             ["estimator=external_distributions", "estimator.n_classes=72"],
             "has 24 columns of probabilities (p0, p1, …), and estimator.n_classes=72: set it to 24",
         ),
-        (["estimator=external"], "choose estimator=external_distributions with overrides="),
+        (
+            ["estimator=external"],
+            "choose estimator=external_distributions with estimator.n_classes=24",
+        ),
     ],
 )
 def test_the_number_of_classes_is_that_of_the_file(given, chosen, message) -> None:

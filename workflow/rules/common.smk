@@ -197,7 +197,7 @@ def need_meshes():
     """End with one line where the estimator is external."""
     if EXTERNAL:
         stop(
-            "estimator=external has no meshes, images or trainings, and what was asked for needs "
+            f"estimator={CONFIG['estimator']['kind']} has no meshes, images or trainings, and what was asked for needs "
             "them: ask for the report (no target), extensions or leaderboard, or choose another "
             "estimator"
         )

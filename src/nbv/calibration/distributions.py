@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,6 @@ from nbv.angles import signed_difference_deg
 from nbv.calibration.estimates import COLUMNS
 from nbv.calibration.pairs import (
     WIDEST_GAP_DEG,
-    is_probability,
     radians_hint,
     read_pair_rows,
     read_rows,
@@ -84,7 +84,7 @@ def as_distributions(
 
 def evenly_apart(
     azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64], n_views: int
-) -> NDArray[np.float32]:
+) -> NDArray[np.float64]:
     """Return distributions (n_views, B) of views evenly apart, of views (n,) anywhere on a turn.
 
     Each takes the nearest view, whose distribution is turned by what lies between.
@@ -99,7 +99,7 @@ def evenly_apart(
             f"views are {gap:.0f}° apart somewhere on the turn; calibration needs one every "
             f"{WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
         )
-    found = np.empty((n_views, rows.shape[1]), dtype=np.float32)
+    found = np.empty((n_views, rows.shape[1]))
     for place, azimuth in enumerate(np.arange(n_views) * (360.0 / n_views)):
         apart = signed_difference_deg(azimuth_deg, azimuth)
         nearest = int(np.abs(apart).argmin())
@@ -109,7 +109,7 @@ def evenly_apart(
 
 def bin_apart(azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float32]:
     """Return distributions (B, B) of views a bin apart, as `evenly_apart` does."""
-    return evenly_apart(azimuth_deg, rows, rows.shape[1])
+    return evenly_apart(azimuth_deg, rows, rows.shape[1]).astype(np.float32)
 
 
 Turns = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
@@ -159,10 +159,11 @@ def need_classes(path: str | Path, n_classes: int | None) -> None:
     path = Path(path)
     found = len(_classes(path, read_rows(path, COLUMNS, n_rows=1)))
     if n_classes is None and found:
+        may = found >= FEWEST_CLASSES and 360 % found == 0 and found % 2 == 0
+        choose = f"choose estimator=external_distributions with estimator.n_classes={found}, or "
         raise UserError(
-            f"{path} has distributions (p0 to p{found - 1}): choose "
-            f"estimator=external_distributions with overrides=[estimator.n_classes={found}], or "
-            "leave these columns out"
+            f"{path} has distributions (p0 to p{found - 1}): {choose if may else ''}leave these "
+            "columns out"
         )
     if n_classes is not None and found != n_classes:
         raise UserError(
@@ -188,7 +189,8 @@ def read_distributions(path: str | Path) -> NDArray[np.float64]:
 
 def _classes(path: Path, table: pd.DataFrame) -> list[str]:
     """Return the names of the columns of probabilities, in their order."""
-    found = [name for name in map(str, table.columns) if is_probability(name)]
+    given = [str(name) for name in table.columns]
+    found = [name for name in given if re.fullmatch(r"\s*[pP][ _]?\d+\s*", name)]
     wanted = [f"p{number}" for number in range(len(found))]
     if strange := sorted(set(found) - set(wanted)):
         raise UserError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -18,13 +17,10 @@ from nbv.files import missing, read_text
 
 N_VIEWS = 360
 
+_COMPRESSED = (".gz", ".bz2", ".xz", ".zip")
+
 WIDEST_GAP_DEG = 15.0
 """Between neighbouring views of a calibration turn."""
-
-
-def is_probability(column: str) -> bool:
-    """Return whether a column is one of p0, p1, …: the probability of a class."""
-    return re.fullmatch(r"\s*[pP][ _]?\d+\s*", column) is not None
 
 
 def read_pairs(
@@ -75,9 +71,12 @@ def read_rows(path: Path, needed: Sequence[str], n_rows: int | None = None) -> p
     if not path.is_file():
         raise UserError(f"{path} {missing(path)}; name a file with {', '.join(needed)}")
     try:
-        if not (text := read_text(path)).strip():
-            raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
-        table = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False, nrows=n_rows)
+        source: Path | io.StringIO = path
+        if path.suffix not in _COMPRESSED:
+            if not (text := read_text(path)).strip():
+                raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
+            source = io.StringIO(text)
+        table = pd.read_csv(source, dtype=str, keep_default_na=False, nrows=n_rows)
     except (OSError, ValueError) as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     for name in needed:

@@ -191,7 +191,7 @@ class Estimator(Section):
             raise UserError(
                 f"estimator.kind={self.kind} and estimator.pairs={self.pairs}: an external "
                 "estimator needs a file of calibration pairs, and no other has one; choose "
-                "estimator=external with estimator.pairs=<file>"
+                "estimator=external, or external_distributions, with estimator.pairs=<file>"
             )
         return self
 
@@ -201,9 +201,9 @@ class Estimator(Section):
         needs = {"classifier": (True, True), "external_distributions": (True, False)}
         if has != needs.get(self.kind, (False, False)):
             raise UserError(
-                f"estimator.kind={self.kind}: only a classifier has n_classes and "
-                "target_bandwidth_deg, and it needs both; choose estimator=classifier "
-                "(estimator=external_distributions has n_classes alone)"
+                f"estimator.kind={self.kind}: a classifier has n_classes and target_bandwidth_deg, "
+                "and it needs both; external_distributions needs n_classes alone; no other "
+                "estimator has either: choose estimator=classifier"
             )
         if self.n_classes is not None and 360 % self.n_classes:
             raise UserError(f"estimator.n_classes={self.n_classes} is no divisor of 360")

