@@ -27,6 +27,12 @@ def test_training_depends_on_the_network_and_not_on_rendering_or_criteria():
     assert not any(name.startswith(("rendering/", "recommendation/")) for name in found)
 
 
+def test_what_reads_another_programs_pairs_trains_nothing_again():
+    readers = {"calibration/pairs.py", "calibration/distributions.py"}
+    assert readers <= names("take_estimates.py")
+    assert not readers & (names("train_estimator.py") | names("estimate_views.py"))
+
+
 def test_only_the_chosen_renderer_counts():
     found = names("render_depth.py", RENDERERS["embree"])
     assert "rendering/embree.py" in found

@@ -6,7 +6,8 @@ with job(snakemake):
     from nbv.calibration.distributions import read_pair_distributions
     from nbv.calibration.pairs import read_pairs
     from nbv.calibration.splits import read_splits
-    from nbv.experiments.held_out import take_fold, write_fold
+    from nbv.experiments.external import take_fold
+    from nbv.experiments.held_out import write_fold
 
     given, output, wildcards = snakemake.input, snakemake.output, snakemake.wildcards
     of_unit = given.pairs, wildcards.category, float(wildcards.elevation)

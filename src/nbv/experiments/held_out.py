@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from nbv.calibration.distributions import Turns, evenly_apart
 from nbv.calibration.estimates import Estimates, write_estimates
 from nbv.calibration.posteriors import (
     Posteriors,
@@ -83,58 +81,8 @@ def estimate_fold(
     return found
 
 
-def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -> FoldEstimates:
-    """Return what another program found of a fold's calibration and test objects.
-
-    Parameters
-    ----------
-    found : Estimates
-        Of all objects.
-    turns : Turns
-        What distributions it gave, of the same objects; empty where it gave none. Calibration
-        objects choose one temperature.
-    splits : DataFrame
-        From `nbv.calibration.splits.read_splits`.
-    fold : int
-
-    Raises
-    ------
-    UserError
-        As of `nbv.calibration.splits.need_objects` and
-        `nbv.calibration.distributions.evenly_apart`.
-    """
-    need_objects(splits, found.object_ids)
-    names = {role: objects_with_role(splits, fold, role) for role in ("calibration", "test")}
-    temperature = 1.0
-    if turns:
-        azimuths, rows = zip(*(turns[name] for name in names["calibration"]), strict=True)
-        temperature = fit_temperature(np.log(np.concatenate(rows)), np.concatenate(azimuths))
-    taken: FoldEstimates = {}
-    for role, object_ids in names.items():
-        estimate_deg = found.estimate_deg[[found.object_ids.index(name) for name in object_ids]]
-        posteriors = None
-        if turns:
-            n_views = estimate_deg.shape[1]
-            whole = [_full_turn(*turns[name], temperature, n_views) for name in object_ids]
-            posteriors = Posteriors(tuple(object_ids), np.log(np.stack(whole)), temperature)
-        taken[role] = Estimates(tuple(object_ids), estimate_deg), posteriors
-    return taken
-
-
-def _full_turn(
-    azimuth_deg: NDArray[np.float64],
-    rows: NDArray[np.float64],
-    temperature: float,
-    n_views: int,
-) -> NDArray[np.float64]:
-    """Return calibrated distributions (n_views, k) of those of views anywhere on a turn (n, k)."""
-    # The temperature first: it was fitted to distributions as they were given, not turned ones.
-    calibrated = posteriors_of(("",), np.log(rows)[None], temperature).distributions[0]
-    return evenly_apart(azimuth_deg, calibrated, n_views)
-
-
 def write_fold(paths: Mapping[str, str], found: FoldEstimates) -> None:
-    """Write what `estimate_fold` or `take_fold` returned.
+    """Write a fold's estimates.
 
     Parameters
     ----------
