@@ -8,10 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from nbv.bundles.beliefs import distributions_of
 from nbv.calibration.distributions import Turns, evenly_apart
 from nbv.calibration.estimates import Estimates
-from nbv.calibration.posteriors import Posteriors, fit_temperature
+from nbv.calibration.posteriors import Posteriors, fit_temperature, posteriors_of
 from nbv.calibration.splits import need_objects, objects_with_role
 from nbv.experiments.held_out import FoldEstimates
 
@@ -48,11 +47,12 @@ def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -
         posteriors = None
         if turns:
             n_views = estimate_deg.shape[1]
-            # The temperature first: it was fitted to distributions as given, not to turned ones.
-            whole = [
-                evenly_apart(azimuth_deg, distributions_of(np.log(rows), temperature), n_views)
-                for azimuth_deg, rows in (turns[name] for name in object_ids)
-            ]
+            whole = []
+            for name in object_ids:
+                azimuth_deg, rows = turns[name]
+                # The temperature first: it was fitted to distributions as given, not turned ones.
+                own = posteriors_of((name,), np.log(rows)[None], temperature).distributions[0]
+                whole.append(evenly_apart(azimuth_deg, own, n_views))
             posteriors = Posteriors(tuple(object_ids), np.log(np.stack(whole)), temperature)
         taken[role] = Estimates(tuple(object_ids), estimate_deg), posteriors
     return taken
