@@ -29,6 +29,8 @@ NEW_ROTATION_MS = 5.0
 START_S = {"numpy": 1.0, "onnx": 1.0}
 HELP_S = 0.3
 IN_A_ROW = 20
+# More than are kept; the first one is always known.
+_ROTATIONS_DEG = [*range(20, 340, 20)]
 
 _START = """
 import sys, numpy as np
@@ -96,18 +98,22 @@ def _in_memory(bundle: Bundle, frame: Frame, n_rounds: int) -> list[Figure]:
 
 def _at_new_rotations(bundle: Bundle, n_rounds: int) -> Figure:
     """Two frames, at a rotation that is not kept, and at one that is."""
-    recommender, frames = Recommender(bundle, "onnx"), [example_frame(), example_frame(237.0)]
-    rotations = itertools.cycle(range(30, 330, 3))
+    recommender, first = Recommender(bundle, "onnx"), example_frame()
+    frames = {turn: example_frame(first.azimuth_deg + turn) for turn in _ROTATIONS_DEG}
+    rotations = itertools.cycle(_ROTATIONS_DEG[1:])
 
     def answer(rotation_deg: float) -> None:
+        both = first, frames[rotation_deg]
         recommender.recommend(
-            [frame.depth_m for frame in frames],
+            [frame.depth_m for frame in both],
             rotations_deg=[0.0, rotation_deg],
-            mask=[frame.mask for frame in frames],
-            intrinsics=frames[0].intrinsics,
+            mask=[frame.mask for frame in both],
+            intrinsics=first.intrinsics,
         )
 
-    turns = take_turns([lambda: answer(next(rotations)), lambda: answer(20.0)], n_rounds)
+    turns = take_turns(
+        [lambda: answer(next(rotations)), lambda: answer(_ROTATIONS_DEG[0])], n_rounds
+    )
     new_ms, known_ms = (1e3 * turns.typical(column) for column in (0, 1))
     return Figure(
         f"two frames at a new rotation, onnx / {NEW_ROTATION_MS:g} ms",

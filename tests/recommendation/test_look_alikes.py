@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.angles import circular_distance_deg
-from nbv.recommendation.belief import Belief
+from nbv.recommendation.belief import Belief, mean_direction_deg
 from nbv.recommendation.criteria.expected_error import expected_error
 from nbv.recommendation.evidence import evidence_of_distributions
 from nbv.recommendation.fusion import product
@@ -29,13 +29,21 @@ def turns(rng: np.random.Generator, n: int = 3, bins: int = 24) -> np.ndarray:
     return np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
 
 
+def expected_of(
+    alike: LookAlikes, beliefs: np.ndarray, *options: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the expected errors now, and after a view at every rotation, of beliefs (n, B)."""
+    found = [alike.expected(belief, *options) for belief in beliefs]
+    return np.array([one.now_deg for one in found]), np.stack([one.after_deg for one in found])
+
+
 def test_after_one_view_it_is_the_criterion(rng: np.random.Generator) -> None:
     distributions = turns(rng)
     evidence = evidence_of_distributions(distributions, SETTINGS)
     rows = turns(rng)[0].astype(np.float32)
     wanted = expected_error(Belief(rows, evidence), evidence, "product")
     alike = LookAlikes.of_views(distributions)
-    _, found = alike.expected_error_deg(rows, power=5.0, pseudo_observations=30.0)
+    _, found = expected_of(alike, rows, 5.0, 30.0)
     assert found == pytest.approx(wanted, rel=1e-4)
 
 
@@ -47,12 +55,34 @@ def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Genera
         own = own * np.roll(distributions[1, (first + turn) % bins], -turn)
     own /= own.sum()
     assert alike.seen[1, first] == pytest.approx(own, rel=1e-4)
-    errors = error_after_deg(alike.so_far, alike.views, alike.first)
     for turn in range(bins):
         other = distributions[1, (first + turn) % bins]
         pose = product(own, other, 15.0 * turn)
         wanted = circular_distance_deg(pose, 15.0 * first)
-        assert errors[1, first, turn] == pytest.approx(wanted, abs=0.05)
+        assert alike.errors_deg[1, first, turn] == pytest.approx(wanted, abs=0.05)
+    assert alike.errors_deg[..., -1] == pytest.approx(alike.error_now_deg, abs=1e-3)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(1, 12),
+    n_groups=st.integers(1, 5),
+    n_further=st.sampled_from([1, 6, 12, 24]),
+)
+def test_errors_with_further_views_are_those_of_each_product(
+    seed: int, n: int, n_groups: int, n_further: int
+) -> None:
+    """Whatever the order of the groups, and which of them have members."""
+    rng = np.random.default_rng(seed)
+    so_far, further = rng.dirichlet(np.ones(24), n), rng.dirichlet(np.ones(24), (n_groups, 24))
+    further = further[:, :n_further]
+    group, ahead = rng.integers(0, n_groups, n), rng.integers(0, n_further, n)
+    found = error_after_deg(so_far.astype(np.float32), further.astype(np.float32), group, ahead)
+    assert found.shape == (n, n_further)
+    for row in range(n):
+        others = np.roll(further[group[row]], -ahead[row], axis=0)
+        wanted = circular_distance_deg(mean_direction_deg(so_far[row] * others), 0.0)
+        assert found[row] == pytest.approx(wanted, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -120,7 +150,7 @@ def test_fewer_first_views_are_the_same_views(
     fewer = LookAlikes.of_views(distributions, most).after(5)
     assert fewer.first.size <= most
     rows = np.arange(3)[:, None], fewer.first
-    assert np.array_equal(fewer.seen, everything.seen[rows])
+    assert fewer.seen == pytest.approx(everything.seen[rows], rel=1e-6)
     assert fewer.errors_deg == pytest.approx(everything.errors_deg[rows], abs=0.01)
 
 
@@ -138,7 +168,7 @@ def test_expected_errors_of_fewer_first_views_are_means_by_affinity(
     rows = np.arange(3)[:, None], fewer.first
     every_error = everything.errors_deg
     errors = every_error[rows] if rotations else near_first_views(every_error, fewer.first)
-    now, after = fewer.expected_error_deg(belief, 5.0, 30.0)
+    now, after = expected_of(fewer, belief, 5.0, 30.0)
     for own, own_now, own_after in zip(belief, now, after, strict=True):
         weight = 30.0 * (np.sqrt(everything.seen[rows]) @ np.sqrt(own)) ** 5.0
         weight += 30.0 / weight.size
@@ -147,23 +177,13 @@ def test_expected_errors_of_fewer_first_views_are_means_by_affinity(
         assert own_now == pytest.approx(wanted[-1], rel=1e-4)
 
 
-@pytest.mark.parametrize("step", [2, 3, 4])
-def test_errors_at_whole_steps_are_those_of_all_rotations(
-    rng: np.random.Generator, step: int
-) -> None:
-    alike = LookAlikes.of_views(turns(rng)).after(5)
-    wanted = error_after_deg(alike.so_far, alike.views, alike.first)[:, :, ::step]
-    found = error_after_deg(alike.so_far, alike.views, alike.first, step)
-    assert found == pytest.approx(wanted, abs=1e-3)
-
-
 def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.Generator) -> None:
     """In bins of 3 degrees: affinities of pairs of bins, and errors linear between whole steps."""
     distributions, beliefs = turns(rng, 2, 120), turns(rng, 1, 120)[0, :2]
     alike = LookAlikes.of_views(distributions).after(7)
-    now, after = alike.expected_error_deg(beliefs, 5.0, 30.0)
+    now, after = expected_of(alike, beliefs, 5.0, 30.0)
     views = np.concatenate(alike.seen)
-    errors = np.concatenate(error_after_deg(alike.so_far, alike.views, alike.first))[:, ::2]
+    errors = np.concatenate(alike.errors_deg[..., :-1])
     for belief, own_now, own in zip(beliefs, now, after, strict=True):
         pairs = [np.sqrt(rows[..., ::2] + rows[..., 1::2]) for rows in (belief, views)]
         weight = 3.0 * (pairs[1] @ pairs[0]) ** 5.0
@@ -179,29 +199,38 @@ def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.G
 def test_a_turn_that_does_not_count_is_as_if_it_were_not_there(rng: np.random.Generator) -> None:
     distributions, belief = turns(rng), turns(rng)[0, :1]
     all_turns, fewer = LookAlikes.of_views(distributions), LookAlikes.of_views(distributions[:2])
-    now, after = all_turns.expected_error_deg(belief, 5.0, 30.0, np.array([1.0, 1.0, 0.0]))
-    wanted_now, wanted = fewer.expected_error_deg(belief, 5.0, 30.0)
+    now, after = expected_of(all_turns, belief, 5.0, 30.0, np.array([1.0, 1.0, 0.0]))
+    wanted_now, wanted = expected_of(fewer, belief, 5.0, 30.0)
     assert now == pytest.approx(wanted_now, rel=1e-4)
     assert after == pytest.approx(wanted, rel=1e-4)
 
 
-@pytest.mark.parametrize("sharpness", [1.0, 6.0])
-def test_one_belief_alone_and_among_others_has_the_same_errors(sharpness: float) -> None:
-    rng = np.random.default_rng(1)
+def sharp_turns(rng: np.random.Generator, n: int, sharpness: float) -> np.ndarray:
     apart = np.arange(24) - np.arange(24)[:, None]
-    logits = sharpness * np.cos(np.radians(15 * apart)) + rng.normal(0, 0.3, (5, 24, 24))
-    distributions = np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
-    alike = LookAlikes.of_views(distributions)
-    beliefs = distributions[0, ::6]
-    options = {"power": 16.0, "pseudo_observations": 30.0, "share": rng.uniform(0.1, 1, 5)}
-    now, after = alike.expected_error_deg(beliefs, **options)
-    for place in range(len(beliefs)):
-        (own_now,), (own,) = alike.expected_error_deg(beliefs[place : place + 1], **options)
-        assert own_now == pytest.approx(now[place], rel=1e-5)
-        assert own == pytest.approx(after[place], rel=1e-5)
+    logits = sharpness * np.cos(np.radians(15 * apart)) + rng.normal(0, 0.3, (n, 24, 24))
+    return np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
 
 
-def expected_of(parts: np.ndarray, prior: np.ndarray, weight: float) -> Expected:
+@pytest.mark.parametrize("sharpness", [1.0, 6.0, 20.0])
+def test_what_is_left_out_hardly_counts(rng: np.random.Generator, sharpness: float) -> None:
+    """After two views: sums over all first views, but 400 at most for the pseudo-observations."""
+    distributions = sharp_turns(rng, 20, sharpness)
+    alike = LookAlikes.of_views(distributions).after(5)
+    share = rng.uniform(0.1, 1, 20)
+    belief = distributions[3, 7] * np.roll(distributions[3, 12], -5)
+    belief /= belief.sum()
+    weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 16.0 * share[:, None]
+    errors = alike.errors_deg
+    averaged = errors[np.arange(20)[:, None], first_views(20, 24, 400)].mean(axis=1)
+    mean = share @ averaged / share.sum()
+    wanted = (np.tensordot(weight, errors) + 30.0 * mean) / (weight.sum() + 30.0)
+    found = alike.expected(belief, 16.0, 30.0, share)
+    assert found.now_deg == pytest.approx(wanted[-1], rel=1e-3)
+    assert found.after_deg == pytest.approx(wanted[:-1], rel=1e-3)
+    assert averaged.mean(axis=0) == pytest.approx(errors.mean(axis=(0, 1)), rel=0.1)
+
+
+def of_parts(parts: np.ndarray, prior: np.ndarray, weight: float) -> Expected:
     return Expected(0.0, np.zeros(parts.shape[1]), parts, parts.sum(axis=0) + prior, weight)
 
 
@@ -212,7 +241,7 @@ def expected_of(parts: np.ndarray, prior: np.ndarray, weight: float) -> Expected
 )
 def test_a_choice_is_never_pessimistic(seed: int, n_parts: int, steps: list[int]) -> None:
     rng = np.random.default_rng(seed)
-    expected = expected_of(rng.gamma(1.0, 1.0, (n_parts, 12)), rng.gamma(1.0, 0.2, 12), 20.0)
+    expected = of_parts(rng.gamma(1.0, 1.0, (n_parts, 12)), rng.gamma(1.0, 0.2, 12), 20.0)
     more = expected.optimism_deg(np.isin(np.arange(12), steps))
     assert more >= -1e-12
     if n_parts == 1 or len(set(steps)) == 1:
@@ -226,33 +255,33 @@ def test_the_least_of_uncertain_errors_and_its_optimism_are_right_on_average() -
     for _ in range(2000):
         sums = rng.normal(10.0, 2.0, (5, 60))
         least.append(sums.mean(axis=0).min())
-        raised.append(least[-1] + expected_of(sums, np.zeros(60), 5.0).optimism_deg(every))
+        raised.append(least[-1] + of_parts(sums, np.zeros(60), 5.0).optimism_deg(every))
     assert np.mean(least) < 8.5
     assert np.mean(raised) == pytest.approx(10.0, abs=0.1)
 
 
 def test_where_one_rotation_is_best_for_all_objects_nothing_is_added() -> None:
     sums = 10.0 - 8.0 * (np.arange(12) == 7) + np.zeros((5, 12))
-    assert expected_of(sums, np.zeros(12), 5.0).optimism_deg(np.ones(12, dtype=bool)) == 0.0
+    assert of_parts(sums, np.zeros(12), 5.0).optimism_deg(np.ones(12, dtype=bool)) == 0.0
 
 
+@pytest.mark.parametrize("rotations", [[], [5]])
 @pytest.mark.parametrize("most", [None, 20])
-def test_what_one_belief_leads_to_expect_is_as_of_several(
-    rng: np.random.Generator, most: int | None
+def test_parts_are_of_whole_objects(
+    rng: np.random.Generator, most: int | None, rotations: list[int]
 ) -> None:
     distributions, belief = turns(rng, 6), turns(rng)[0, 0]
     ids = ["b", "a", "b", "c", "a", "c"]
-    alike = LookAlikes.of_views(distributions, most, ids).after(5)
-    options = {"power": 5.0, "pseudo_observations": 30.0, "share": rng.uniform(0.1, 1, 6)}
-    (now,), (after,) = alike.expected_error_deg(belief[None], **options)
-    found = alike.expected(belief, **options)
-    assert found.now_deg == pytest.approx(now, rel=1e-5)
-    assert found.after_deg == pytest.approx(after, rel=1e-5)
-    assert found.total / found.weight == pytest.approx(after, rel=1e-5)
+    alike, of_turns = (LookAlikes.of_views(distributions, most, names) for names in (ids, None))
+    for turn in rotations:
+        alike, of_turns = alike.after(turn), of_turns.after(turn)
+    share = rng.uniform(0.1, 1, 6)
+    found = alike.expected(belief, 5.0, 30.0, share)
+    assert found.total / found.weight == pytest.approx(found.after_deg, rel=1e-5)
     # One object's turns are in one part: with another id for each turn there are more.
     assert len(found.parts) == 3
-    assert len(LookAlikes.of_views(distributions, most).expected(belief, **options).parts) == 5
+    assert len(of_turns.expected(belief, 5.0, 30.0).parts) == 5
     for part, name in enumerate("abc"):
-        own = np.where(np.array(ids) == name, options["share"], 0.0)
-        alone = alike.expected(belief, **{**options, "share": own})
-        assert found.parts[part] == pytest.approx(alone.parts.sum(axis=0), rel=1e-5)
+        own = np.where(np.array(ids) == name, share, 0.0)
+        alone = alike.expected(belief, 5.0, 30.0, own)
+        assert found.parts[part] == pytest.approx(alone.parts.sum(axis=0), rel=1e-3)

@@ -61,14 +61,16 @@ def fixed_errors_deg(alike: LookAlikes, n_views: int) -> NDArray[np.float64]:
     By the step, in bins; infinite where two of the views are nearer than `MIN_SEPARATION_DEG`, as
     none are that are chosen. Evenly spaced views may always be taken.
     """
-    n_turns, n_bins, _ = alike.views.shape
+    n_turns, _, n_bins = alike.so_far.shape
     steps = np.arange(n_bins)
     apart = travel_deg(np.arange(1, n_views)[:, None] * steps * (360.0 / n_bins)).min(axis=0)
     may = (apart >= MIN_SEPARATION_DEG) | (steps == round(n_bins / n_views))
     errors = np.full((n_turns, n_bins), np.inf)
     if n_views == 2:
-        after = error_after_deg(alike.so_far, alike.views, alike.first)
-        errors[:, may] = after.mean(axis=1)[:, may]
+        group, ahead = np.zeros(n_bins, dtype=int), np.arange(n_bins)
+        for turn, views in enumerate(alike.so_far):
+            after = error_after_deg(views, views[None], group, ahead)
+            errors[turn, may] = after.mean(axis=0)[may]
         return errors
     for step in steps[may]:
         turned_alike = alike
@@ -137,9 +139,10 @@ def recommended(calibrated: AfterRotations, seen: Seen, affinity: Mapping[str, f
         error = np.empty(beliefs.shape)
         # In their order, what the rotations of two neighbours have in common is found once.
         for place, so_far in enumerate(different.tolist()):
-            rows = of_row.ravel() == place
             alike = calibrated(tuple(so_far[1:]))
-            error[rows] = alike.expected_error_deg(beliefs[rows], **affinity, share=seen.share)[1]
+            for row in np.flatnonzero(of_row.ravel() == place):
+                expected = alike.expected(beliefs[row], **affinity, share=seen.share)
+                error[row] = expected.after_deg
         near = circular_distance_deg(here[:, None], rotations[:, None, :]).min(axis=2)
         return np.asarray(here[np.where(near < MIN_SEPARATION_DEG, np.inf, error).argmin(axis=1)])
 

@@ -35,7 +35,7 @@ LEAST_BAYES_FACTOR = 0.05
 """Below it views contradict each other. Of right ones, one in 20 at the most is below."""
 
 N_KEPT = 6
-"""So many sequences of rotations are remembered; the look-alikes of `mug` take 5 MB for each."""
+"""So many sequences of rotations are remembered; the look-alikes of `mug` take 3 MB for each."""
 
 _LARGEST_LOG = 700.0
 """Below that of the largest number; very many views agree so well."""

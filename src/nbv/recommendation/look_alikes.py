@@ -8,13 +8,12 @@ its restriction to one first view.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from nbv.recommendation.evidence import Table
 
@@ -34,7 +33,11 @@ How many are enough: docs/reference/bundles/README.md.
 N_PARTS = 5
 """Of the calibration objects, for `Expected.optimism_deg`."""
 
-_N_COUNTS = 8
+MOST_AVERAGED = 400
+"""First views at most whose errors after more views are averaged for the pseudo-observations."""
+
+NEGLIGIBLE = 1e-5
+"""Of all that counts: first views with less are left out."""
 
 FLAT = 1e-5
 """Of distributions: below this resultant length the mean direction is rounding, and errs by 90°."""
@@ -73,52 +76,43 @@ def first_views(n_turns: int, n_bins: int, most: int | None = None) -> NDArray[n
     return np.arange(n_turns)[:, None] % apart + np.arange(0, n_bins, apart)
 
 
-def error_after_deg(so_far: Table, views: Table, first: NDArray[np.intp], step: int = 1) -> Table:
-    """Return the error of the product with further views, (S, K, B / step) float32, degrees.
+def error_after_deg(
+    so_far: Table, further: Table, group: NDArray[np.intp], ahead: NDArray[np.intp]
+) -> Table:
+    """Return the errors of the products with further views, (n, M) float32, degrees.
 
-    With c of the views so far and c' of a further one, both from `in_object_frame`, the mean
-    direction of the product is that of ``sum_u c(u) c'(u) exp(i u)``: one product of matrices for
-    all pairs of views.
+    With c of the views so far and c' of a further one, both in the frame of the object, the mean
+    direction of the product is that of ``sum_u c(u) c'(u) exp(i u)``: a product of matrices for
+    all that have their further views in common.
 
     Parameters
     ----------
-    so_far : ndarray (S, K, B)
-        Of the fused views, by the first one.
-    views : ndarray (S, B, B)
-        Of single views.
-    first : ndarray (S, K)
-        The first views, from `first_views`.
-    step : int
-        Further views are so many bins apart; a divisor of B.
+    so_far : ndarray (n, B)
+        Of the fused views.
+    further : ndarray (G, M, B)
+        Of M further views all round, in G groups.
+    group, ahead : ndarray (n,)
+        The group of each one, and which of its further views is the first.
 
     Returns
     -------
     ndarray
-        ``[s, k, d]``: of the k-th first view with a further view at the rotation ``step d``, in
-        bins.
+        ``[i, d]``: with the further view ``d`` after the first.
     """
-    n_turns, n_first, n_bins = so_far.shape
-    apart, n_steps = n_bins // n_first, n_bins // step
-    common = math.gcd(apart, step)
-    # First views whole steps apart have their further views in common: each such set is a group.
-    n_groups, n_in_group = step // common, n_first * common // step
-    places = first[:, :n_groups, None] + step * np.arange(n_steps)
-    further = views[np.arange(n_turns)[:, None, None], places % n_bins]
-    # Small products are twice as fast of arrays that lie in their order.
-    further = np.ascontiguousarray(further.transpose(0, 1, 3, 2))
-
-    def of_pairs(rows: Table) -> Table:
-        groups = rows.reshape(n_turns, n_in_group, n_groups, n_bins).transpose(0, 2, 1, 3)
-        return np.asarray(np.matmul(groups, further))
-
+    n, n_bins = so_far.shape
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
-    real = of_pairs(so_far * np.cos(angles).astype(np.float32))
-    imaginary = of_pairs(so_far * np.sin(angles).astype(np.float32))
-    error = np.abs(np.degrees(np.arctan2(imaginary, real))).astype(np.float32)
-    error[np.hypot(real, imaginary) < FLAT * of_pairs(so_far)] = 90.0
-    ahead = apart // common * np.arange(n_in_group) % n_steps
-    by_rotation = _started_at(error, np.broadcast_to(ahead, error.shape[:-1]))
-    return by_rotation.transpose(0, 2, 1, 3).reshape(n_turns, n_first, n_steps)
+    factors = np.stack([np.cos(angles), np.sin(angles), np.ones(n_bins)]).astype(np.float32)
+    order = np.argsort(group, kind="stable")
+    ordered = group[order]
+    starts = np.flatnonzero(np.diff(ordered, prepend=-1))
+    rows = so_far[order, None] * factors
+    moments = np.empty((n, 3, further.shape[1]), dtype=np.float32)
+    ends = [*starts[1:].tolist(), n]
+    for start, end, place in zip(starts.tolist(), ends, ordered[starts].tolist(), strict=True):
+        np.matmul(rows[start:end], further[place].T, out=moments[start:end])
+    error = np.empty_like(moments[:, 0])
+    error[order] = _angle_deg(*moments.transpose(1, 0, 2))
+    return _started_at(error, ahead)
 
 
 def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
@@ -144,20 +138,18 @@ def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
 
 
 def error_of_deg(so_far: Table) -> Table:
-    """Return the error of the mean direction of distributions `in_object_frame`, degrees."""
-    moment = _moment(so_far)
-    error = np.abs(np.degrees(np.arctan2(moment[..., 1], moment[..., 0]))).astype(np.float32)
-    return np.where(_resultant_length(so_far) < FLAT, np.float32(90.0), error)
-
-
-def _moment(distributions: Table) -> Table:
-    n_bins = distributions.shape[-1]
+    """Return the error of the mean direction of distributions in the object's frame, degrees."""
+    n_bins = so_far.shape[-1]
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
-    return distributions @ np.stack([np.cos(angles), np.sin(angles)], axis=1).astype(np.float32)
+    real, imaginary = (so_far @ of(angles).astype(np.float32) for of in (np.cos, np.sin))
+    return _angle_deg(real, imaginary, so_far.sum(axis=-1))
 
 
-def _resultant_length(distributions: Table) -> Table:
-    return np.asarray(np.linalg.norm(_moment(distributions), axis=-1))
+def _angle_deg(real: Table, imaginary: Table, total: Table) -> Table:
+    """Return how far the directions of moments are from 0, degrees."""
+    angle = np.abs(np.degrees(np.arctan2(imaginary, real)))
+    angle[real**2 + imaginary**2 < (FLAT * total) ** 2] = 90.0
+    return angle
 
 
 @dataclass(frozen=True)
@@ -170,7 +162,7 @@ class Expected:
         The expected error.
     after_deg : ndarray (B,)
         The same after a view at every rotation.
-    parts : ndarray (N, M) float32
+    parts : ndarray (N, M)
         Weighted errors after a view at each of M rotations, 360 / M degrees apart, summed over each
         part of the calibration objects.
     total : ndarray (M,)
@@ -181,7 +173,7 @@ class Expected:
 
     now_deg: float
     after_deg: NDArray[np.float64]
-    parts: Table
+    parts: NDArray[np.float64]
     total: NDArray[np.float64]
     weight: float
 
@@ -211,25 +203,6 @@ class Expected:
 
 
 @dataclass(frozen=True)
-class _Counts:
-    """How much calibration counts.
-
-    Attributes
-    ----------
-    of_view : ndarray (S,)
-        A first view of each turn.
-    of_parts : ndarray (N + 1, S) float32
-        The same in each part of the objects, and in all of them.
-    prior : ndarray (m + 2,)
-        The sums of the pseudo-observations, as of `LookAlikes._errors`.
-    """
-
-    of_view: NDArray[np.float64]
-    of_parts: Table
-    prior: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
 class LookAlikes:
     """Calibration turns after some rotations.
 
@@ -237,21 +210,20 @@ class LookAlikes:
     ----------
     so_far : ndarray (S, K, B) float32
         Distributions of the fused views `in_object_frame`, by the first view; rows sum to 1.
-    views : ndarray (S, B, B) float32
-        Those of all single views.
+    further : ndarray (S, step, M, B) float32
+        Those of all single views of a turn: those that are whole steps apart are together.
     first : ndarray (S, K)
         The first views that a belief is compared with, in bins; see `first_views`.
-    object_ids : sequence of str, or None
-        Of the turns (S,); None where each is of another object. One object's turns are in one part
-        of `Expected.parts`.
+    is_in_part : ndarray (N + 1, S)
+        Whether each turn is in each part of the objects, and in all of them.
     near_deg : ndarray (S, K, M + 1), or None
         Errors after a view at each of M rotations, and now, that count instead of those of `first`.
     """
 
     so_far: Table
-    views: Table
+    further: Table
     first: NDArray[np.intp]
-    object_ids: Sequence[str] | None = None
+    is_in_part: NDArray[np.float64]
     near_deg: Table | None = None
 
     @staticmethod
@@ -262,70 +234,65 @@ class LookAlikes:
 
         ``most`` of all first views together are compared, as in `first_views`. With each one, the
         errors of all first views near it count (`near_first_views`); after further views, whose
-        errors have to be found while a robot waits, its own alone.
+        errors have to be found while a robot waits, its own alone. Turns are of the objects
+        ``object_ids`` (S,); without them, each is of another one. One object's turns are in one
+        part of `Expected.parts`.
         """
         views = in_object_frame(np.asarray(distributions, dtype=np.float32))
         n_turns, n_bins, _ = views.shape
-        everything = LookAlikes(views, views, first_views(n_turns, n_bins), object_ids)
+        by_step = views.reshape(n_turns, -1, compared_step(n_bins), n_bins)
+        further = np.ascontiguousarray(by_step.swapaxes(1, 2))
+        is_in_part = _is_in_part(np.arange(n_turns) if object_ids is None else object_ids)
+        every = first_views(n_turns, n_bins)
+        everything = LookAlikes(views, further, every, is_in_part)
         first = first_views(n_turns, n_bins, most)
-        if first.shape == everything.first.shape:
+        if first.shape == every.shape:
             return everything
         near_deg = near_first_views(everything.errors_deg, first)
-        turns = np.arange(n_turns)[:, None]
-        return LookAlikes(views[turns, first], views, first, object_ids, near_deg)
+        so_far = views[np.arange(n_turns)[:, None], first]
+        return LookAlikes(so_far, further, first, is_in_part, near_deg)
 
     def after(self, rotation_bins: int) -> LookAlikes:
         """Return the turns after one more view, at a rotation from the first one."""
         n_turns, _, n_bins = self.so_far.shape
-        places = (self.first + rotation_bins) % n_bins
-        both = self.so_far * self.views[np.arange(n_turns)[:, None], places]
-        return replace(self, so_far=both / both.sum(axis=2, keepdims=True), near_deg=None)
+        whole, part = np.divmod((self.first + rotation_bins) % n_bins, self._step)
+        both = self.so_far * self.further[np.arange(n_turns)[:, None], part, whole]
+        both /= both.sum(axis=2, keepdims=True)
+        return replace(self, so_far=both, near_deg=None)
 
-    @cached_property
+    @property
     def _step(self) -> int:
-        return compared_step(self.views.shape[-1])
+        return int(self.further.shape[1])
 
     @property
     def error_now_deg(self) -> Table:
         """`error_of_deg` of the turns, (S, K)."""
         return error_of_deg(self.so_far)
 
-    @cached_property
+    @property
+    def seen(self) -> Table:
+        """The distributions in the frames of the first views, (S, K, B)."""
+        return _started_at(self.so_far, -self.first % self.so_far.shape[-1])
+
+    @property
     def errors_deg(self) -> Table:
         """The errors after a view at each of M rotations, and now: (S, K, M + 1).
 
         Those that count for the first views; the rotations are whole steps apart.
         """
+        turn, place = np.indices(self.first.shape)
+        every = self._errors_of(turn.ravel(), place.ravel())
+        return every.reshape(*self.first.shape, -1)
+
+    def _errors_of(self, turn: NDArray[np.intp], place: NDArray[np.intp]) -> Table:
+        """Return `errors_deg` of some of the first views, (n, M + 1)."""
         if self.near_deg is not None:
-            return self.near_deg
-        after = error_after_deg(self.so_far, self.views, self.first, self._step)
-        return np.concatenate([after, self.error_now_deg[:, :, None]], axis=2)
-
-    def expected_error_deg(
-        self,
-        beliefs: NDArray[np.floating],
-        power: float,
-        pseudo_observations: float,
-        share: NDArray[np.floating] | None = None,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the expected error now (n,), and after a view at every rotation (n, B), degrees.
-
-        Between rotations that are whole steps (`compared_step`) it is linear.
-
-        Parameters
-        ----------
-        beliefs : ndarray (n, B)
-            Of objects at hand that were turned alike, in the frames of their first views.
-        power, pseudo_observations : float
-            See `nbv.recommendation.criteria.expected_error.expected_error`.
-        share : ndarray (S,), optional
-            How much each turn counts; 1 without it.
-        """
-        counts = self._counts(pseudo_observations, share)
-        weight = self._affinities(beliefs, power)
-        sums = _weighted(weight, counts.of_view, self._errors) + counts.prior
-        errors = sums[:, :-1] / sums[:, -1:]
-        return errors[:, -1], _between_steps(errors[:, :-1], self._step)
+            return self.near_deg[turn, place]
+        so_far = self.so_far[turn, place]
+        whole, part = np.divmod(self.first[turn, place], self._step)
+        further = self.further.reshape(-1, *self.further.shape[2:])
+        after = error_after_deg(so_far, further, turn * self._step + part, whole)
+        return np.concatenate([after, error_of_deg(so_far)[:, None]], axis=1)
 
     def expected(
         self,
@@ -334,74 +301,86 @@ class LookAlikes:
         pseudo_observations: float,
         share: NDArray[np.floating] | None = None,
     ) -> Expected:
-        """Return what one belief (B,) leads one to expect; other parameters as above."""
-        counts = self._counts(pseudo_observations, share)
-        weight = self._affinities(belief[None], power)
-        by_part = counts.of_parts @ _of_one(weight, self._errors)
-        sums = by_part[-1] + counts.prior
+        """Return what a belief leads one to expect.
+
+        Between rotations that are whole steps (`compared_step`) it is linear.
+
+        Parameters
+        ----------
+        belief : ndarray (B,)
+            Of an object at hand that was turned alike, in the frame of its first view.
+        power, pseudo_observations : float
+            See `nbv.recommendation.criteria.expected_error.expected_error`.
+        share : ndarray (S,), optional
+            How much each turn counts; 1 without it.
+        """
+        n_turns, n_first = self.first.shape
+        of_turn = np.ones(n_turns) if share is None else np.asarray(share)
+        # A first view stands for the degrees that it is apart from the next one.
+        of_view = of_turn * (360.0 / n_first)
+        weight = self._affinities(belief) ** np.float32(power)
+        weight *= of_view.astype(np.float32)[:, None]
+        by_part = self.is_in_part @ self._weighted_errors(weight, pseudo_observations)
+        sums = by_part[-1] + pseudo_observations / of_view.sum() * (of_view @ self._mean_errors)
         errors = sums / sums[-1]
-        (after_deg,) = _between_steps(errors[None, :-2], self._step)
+        after_deg = errors[:-2] @ _interpolation(len(errors) - 2, self._step)
         now_deg, all_weight = float(errors[-2]), float(sums[-1])
         return Expected(now_deg, after_deg, by_part[:-1, :-2], sums[:-2], all_weight)
 
-    @cached_property
-    def _known_counts(self) -> dict[tuple[float, bytes | None], _Counts]:
-        return {}
+    def _affinities(self, belief: NDArray[np.floating]) -> Table:
+        """Return the affinity of a belief (B,) with each first view, (S, K)."""
+        compared = _joined(np.asarray(belief, dtype=np.float32), self._step)
+        return np.asarray(self._roots @ np.sqrt(compared))
 
-    def _counts(self, pseudo_observations: float, share: NDArray[np.floating] | None) -> _Counts:
-        """Return what counts how much; kept, because it is the same for most frames."""
-        of_turn = None if share is None else np.asarray(share, dtype=np.float64)
-        key = pseudo_observations, None if of_turn is None else of_turn.tobytes()
-        known = self._known_counts
-        if key in known:
-            return known[key]
-        if len(known) >= _N_COUNTS:
-            known.clear()
+    def _weighted_errors(self, weight: Table, pseudo_observations: float) -> NDArray[np.floating]:
+        """Return the sums of `errors_deg` by weights (S, K) and of these, by turn, (S, M + 2)."""
+        # Turn by turn: the threads of a matrix library wait for each other where other programs
+        # hold the cores, and take no part in small products.
+        if self._near_errors is not None:
+            return np.asarray(np.matmul(weight[:, None], self._near_errors)[:, 0])
+        least = NEGLIGIBLE * (weight.sum() + pseudo_observations)
+        turn, place = np.nonzero(weight >= least)
+        errors = weight[turn, place, None] * _and_one(self._errors_of(turn, place))
+        sums = np.zeros((len(weight), errors.shape[1]))
+        starts = np.flatnonzero(np.diff(turn, prepend=-1))
+        sums[turn[starts]] = np.add.reduceat(errors, starts)
+        return sums
+
+    @cached_property
+    def _near_errors(self) -> Table | None:
+        return None if self.near_deg is None else _and_one(self.near_deg)
+
+    @cached_property
+    def _mean_errors(self) -> NDArray[np.float64]:
+        """Of each turn, `errors_deg` on average over its first views, and 1: (S, M + 2).
+
+        After more views of some of them: those of the next turn lie between.
+        """
         n_turns, n_first = self.first.shape
-        if of_turn is None:
-            of_turn = np.ones(n_turns)
-        prior = pseudo_observations / (of_turn.sum() * n_first)
-        # A first view stands for the degrees that it is apart from the next one.
-        of_view = of_turn * (360.0 / n_first)
-        of_parts = (self._is_in_part * of_view).astype(np.float32)
-        known[key] = _Counts(of_view, of_parts, prior * (of_turn @ self._errors_by_turn))
-        return known[key]
-
-    def _affinities(self, beliefs: NDArray[np.floating], power: float) -> Table:
-        """Return the affinity of each belief (n, B) with each first view, to a power, (S, K, n)."""
-        compared = _joined(np.asarray(beliefs, dtype=np.float32), self._step)
-        weight: Table = self._roots @ np.sqrt(compared).T
-        weight **= power
-        return weight
-
-    @cached_property
-    def _is_in_part(self) -> NDArray[np.float64]:
-        """Whether each turn is in each part of the objects, and in all of them, (N + 1, S)."""
-        n_turns = len(self.views)
-        named = np.arange(n_turns) if self.object_ids is None else np.asarray(self.object_ids)
-        names, number = np.unique(named, return_inverse=True)
-        n_parts = min(N_PARTS, len(names))
-        is_in_part = number % n_parts == np.arange(n_parts)[:, None]
-        return np.vstack([is_in_part, np.ones(n_turns)])
-
-    @property
-    def seen(self) -> Table:
-        """The distributions in the frames of these views, (S, K, B)."""
-        return _started_at(self.so_far, -self.first % self.so_far.shape[-1])
+        most = None if self.near_deg is not None else MOST_AVERAGED
+        place = first_views(n_turns, n_first, most)
+        turn = np.repeat(np.arange(n_turns), place.shape[1])
+        errors = _and_one(self._errors_of(turn, place.ravel()))
+        of_turns = errors.reshape(*place.shape, -1).mean(axis=1, dtype=np.float64)
+        return np.asarray(of_turns)
 
     @cached_property
     def _roots(self) -> Table:
         """The square roots of `seen`, for `nbv.recommendation.criteria.expected_error.affinity`."""
         return np.sqrt(_joined(self.seen, self._step))
 
-    @cached_property
-    def _errors(self) -> Table:
-        """`errors_deg`, and 1: (S, K, m + 2). The weighted sum of the last is the total weight."""
-        return np.concatenate([self.errors_deg, np.ones_like(self.errors_deg[:, :, :1])], axis=2)
 
-    @cached_property
-    def _errors_by_turn(self) -> NDArray[np.float64]:
-        return np.asarray(self._errors.sum(axis=1, dtype=np.float64))
+def _is_in_part(object_ids: ArrayLike) -> NDArray[np.float64]:
+    """Return whether each turn (S,) is in each part of the objects, and in all, (N + 1, S)."""
+    names, number = np.unique(np.asarray(object_ids), return_inverse=True)
+    n_parts = min(N_PARTS, len(names))
+    is_in_part = number % n_parts == np.arange(n_parts)[:, None]
+    return np.vstack([is_in_part, np.ones(len(number))])
+
+
+def _and_one(errors_deg: Table) -> Table:
+    """Return errors (..., m), and 1: the weighted sum of the last column is the total weight."""
+    return np.concatenate([errors_deg, np.ones_like(errors_deg[..., :1])], axis=-1)
 
 
 def _started_at(rows: Table, places: NDArray[np.intp]) -> Table:
@@ -418,11 +397,6 @@ def _joined(rows: Table, step: int) -> Table:
     return np.asarray(sum(rows[..., place::step] for place in range(step)))
 
 
-def _between_steps(rows: NDArray[np.float64], step: int) -> NDArray[np.float64]:
-    """Return values (n, B) at every bin, of those (n, B / step) at whole steps of a full turn."""
-    return np.asarray(rows @ _interpolation(rows.shape[1], step))
-
-
 @cache
 def _interpolation(n_steps: int, step: int) -> NDArray[np.float64]:
     """Return the matrix (n_steps, n_steps * step) of linear interpolation around a full turn."""
@@ -431,23 +405,3 @@ def _interpolation(n_steps: int, step: int) -> NDArray[np.float64]:
     # A value counts in its own step, and in the previous one, which ends at it.
     between = own[:, :, None] * (1 - part) + previous[:, :, None] * part
     return between.reshape(n_steps, -1)
-
-
-def _weighted(
-    weight: Table, of_view: NDArray[np.float64], errors_deg: Table
-) -> NDArray[np.float64]:
-    """Return the sums (n, m) of errors (S, K, m) by weights (S, K, n) and those of a turn (S,)."""
-    if weight.shape[2] == 1:
-        return np.asarray((of_view @ _of_one(weight, errors_deg))[None])
-    of_turns = weight * of_view.astype(np.float32)[:, None, None]
-    rows, table = (each.reshape(-1, each.shape[2]) for each in (of_turns, errors_deg))
-    return np.asarray(rows.T @ table, dtype=np.float64)
-
-
-def _of_one(weight: Table, errors_deg: Table) -> Table:
-    """Return the sums (S, m) of errors (S, K, m) by the weights (S, K, 1) of one belief.
-
-    Turn by turn: the threads of a matrix library wait for each other where other programs hold the
-    cores, and take no part in small products. All at once took 16 ms then.
-    """
-    return np.asarray(np.matmul(weight.transpose(0, 2, 1), errors_deg)[:, 0])
