@@ -966,6 +966,15 @@ def test_a_full_disk_is_one_line(here, unbuffered):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize("kind", ["png", "pdf"])
+def test_a_picture_that_has_no_space_is_one_line(here, kind):
+    done = program(f"ulimit -f 2; nbv recommend f0.npy --bundle b.safetensors --plot x.{kind}")
+    assert done.returncode == 2
+    assert done.stderr == f"nbv: error: x.{kind}: File too large\n"
+    assert not list(here.glob("*.partial*"))
+    assert not (here / f"x.{kind}").exists()
+
+
 def test_paths_are_checked_before_a_network_runs(here, capsys, monkeypatch):
     monkeypatch.setattr(Recommender, "load", lambda *_: pytest.fail("too late"))
     frames = ("recommend", "f0.npy")

@@ -183,8 +183,8 @@ def widest_gap_deg(azimuth_deg: NDArray[np.float64]) -> float:
 
 def radians_hint(azimuth_deg: NDArray[np.float64]) -> str:
     """Return the end of a sentence that refuses a gap; empty where azimuths (n,) are degrees."""
-    # One of a turn in radians; in degrees all views would be within 13 of each other.
-    if len(azimuth_deg) > 1 and np.abs(azimuth_deg).max() <= 2 * np.pi:
+    is_small = np.abs(azimuth_deg).max() <= 2 * np.pi
+    if is_small and widest_gap_deg(np.degrees(azimuth_deg)) <= WIDEST_GAP_DEG + 1e-6:
         return "; these azimuths seem to be radians: multiply them by 180/π"
     return ""
 

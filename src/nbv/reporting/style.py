@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -231,5 +232,8 @@ def save_figure(figure: Figure, paths: Mapping[str, Path]) -> None:
     """Write a figure as ``png`` (150 dpi), ``pdf`` or ``svg``; a figure gives the same bytes."""
     with mpl.rc_context(RC):
         for kind, path in paths.items():
+            # In memory first: its PDF writer has no clear message for a full disk.
+            whole = io.BytesIO()
+            figure.savefig(whole, format=kind, **SAVED[kind])
             with replacing(path) as temporary:
-                figure.savefig(temporary, format=kind, **SAVED[kind])
+                temporary.write_bytes(whole.getvalue())
