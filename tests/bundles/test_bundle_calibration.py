@@ -196,8 +196,9 @@ def test_a_bundle_is_calibrated_again(bundle):
         found.elevation_deg, [10.0, np.nan, 40.0, *bundle.elevation_deg], equal_nan=True
     )
     assert found.elevation_deg.dtype == found.turn_weight.dtype == np.float32
-    assert found.turn_weight[:3].tolist() == [1.0, 1.0, 1.0]
-    assert found.turn_weight[3:] == pytest.approx(PRIOR_TURNS / len(bundle.object_ids))
+    # The pseudo-observations have the weight that they had next to the bundle's own turns.
+    assert np.array_equal(found.turn_weight[3:], bundle.turn_weight)
+    assert found.turn_weight[:3] == pytest.approx(len(bundle.object_ids) / PRIOR_TURNS)
     # The bundle's own turns stay, as they are at the new temperature.
     prior = np.log(bundle.distributions.astype(float)) * bundle.temperature / found.temperature
     prior -= np.log(np.exp(prior).sum(axis=-1, keepdims=True))
@@ -215,8 +216,20 @@ def test_a_bundle_is_calibrated_again(bundle):
     assert found.paper.elevation_deg.tolist() == bundle.paper.elevation_deg.tolist() == [0.0, 30.0]
     assert np.array_equal(found.paper.rotation_deg, wanted.rotation_deg)
     assert found.weights is bundle.weights
-    assert found.provenance == {**bundle.provenance, "calibrated_by": "recording.csv"}
+    more = {"calibrated_by": "recording.csv", "turns_made_with": len(bundle.object_ids)}
+    assert found.provenance == {**bundle.provenance, **more}
     assert "calibrated_by" not in bundle.provenance
+
+
+def test_calibrations_one_after_the_other_weigh_turns_as_one_with_all(bundle):
+    logits = 2 * soft_turns(np.random.default_rng(5), 3)
+    first, *others = (turn(str(place), logits=rows) for place, rows in enumerate(logits))
+    twice = recalibrated(bundle, [first], "one.csv", ONE_DENSITY)
+    twice = recalibrated(twice, others, "others.csv", ONE_DENSITY)
+    once = recalibrated(bundle, [*others, first], "all.csv", ONE_DENSITY)
+    assert twice.object_ids == once.object_ids
+    assert np.array_equal(twice.turn_weight, once.turn_weight)
+    assert twice.temperature == pytest.approx(once.temperature, rel=0.02)
 
 
 def log_likelihood_at(temperature: float, logits, azimuth_deg) -> float:
@@ -229,7 +242,7 @@ def log_likelihood_at(temperature: float, logits, azimuth_deg) -> float:
 
 @pytest.mark.parametrize("n_turns", [1, 40])
 def test_the_temperature_is_the_likeliest_of_turns_and_of_the_bundles_own(bundle, n_turns):
-    """The bundle's turns together count as `PRIOR_TURNS`, each of the others 1."""
+    """The bundle's turns together count as `PRIOR_TURNS` of the others."""
     logits = 3 * soft_turns(np.random.default_rng(6), n_turns)
     turns = [turn(str(place), logits=rows) for place, rows in enumerate(logits)]
     found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY).temperature
@@ -241,8 +254,9 @@ def test_the_temperature_is_the_likeliest_of_turns_and_of_the_bundles_own(bundle
         return PRIOR_TURNS * float(np.mean(of_own)) + sum(of_turns)
 
     assert total(found) > max(total(found * factor) for factor in (0.97, 0.99, 1.01, 1.03))
-    if n_turns == 40:
-        assert found == pytest.approx(temperature_of(turns), rel=0.1)
+    ends = sorted([bundle.temperature, temperature_of(turns)])
+    assert ends[0] < found < ends[1]
+    assert (abs(found - temperature_of(turns)) < abs(found - bundle.temperature)) == (n_turns == 40)
 
 
 def test_one_turn_does_not_decide_the_temperature(bundle):

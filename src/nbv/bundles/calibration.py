@@ -26,8 +26,11 @@ ENOUGH_VIEWS = 24
 LEAST_LIMIT = 0.5
 """Of unfamiliarity, where a camera's own frames are all very familiar."""
 
-PRIOR_TURNS = 3.0
-"""So many turns of a camera count as much as all turns that a bundle was made with."""
+PRIOR_TURNS = 30.0
+"""So many turns of a camera count as much as all turns that a bundle was made with.
+
+One turn then counts as about four of the 125 of `mug`: docs/turntable.md.
+"""
 
 PAPER = "pose_ambiguity"
 
@@ -91,11 +94,11 @@ def _bins_of(turn: Turn, temperature: float) -> NDArray[np.float32]:
 
 
 def _temperature_with_own(
-    bundle: Bundle, turns: Sequence[Turn], prior_weight: NDArray[np.floating]
+    bundle: Bundle, turns: Sequence[Turn], turn_weight: NDArray[np.floating]
 ) -> float:
-    """Return the likeliest temperature of turns and of a bundle's own, which count as given (S,).
+    """Return the likeliest temperature of n turns and of a bundle's own S.
 
-    Each of the turns counts 1, however many views it has.
+    Each counts as given (n + S,), however many views it has.
     """
     views = slice(None, None, max(1, bundle.n_bins // ENOUGH_VIEWS))
     # At the bundle's temperature; the logits but for a constant of each view.
@@ -103,10 +106,9 @@ def _temperature_with_own(
     bins_deg = (np.arange(bundle.n_bins) * (360.0 / bundle.n_bins))[views]
     logits = [*(turn.logits for turn in turns), *own]
     azimuth_deg = [*(turn.azimuth_deg for turn in turns), *(bins_deg for _ in own)]
-    counts = [*(1.0 for _ in turns), *prior_weight.tolist()]
     weight = [
         np.full(len(angles), count / len(angles))
-        for angles, count in zip(azimuth_deg, counts, strict=True)
+        for angles, count in zip(azimuth_deg, turn_weight.tolist(), strict=True)
     ]
     return fit_temperature(
         np.concatenate(logits).astype(np.float64),
@@ -121,8 +123,10 @@ def recalibrated(
     """Return a bundle with the same network, calibrated by other turns, such as those of a camera.
 
     The familiar range and, where it is known, the focal length of frames without intrinsics are
-    those of the turns. The bundle's own calibration turns stay, and count as much as `PRIOR_TURNS`
-    of the others together, for the temperature too: a turn or two say too little alone. A turn of
+    those of the turns. The bundle's own calibration turns stay, and count together as much as
+    `PRIOR_TURNS` of the others, for the temperature too: a turn or two say too little alone. They
+    keep their weight, 1 each, and with it their weight next to the pseudo-observations. So two
+    calibrations one after the other weigh turns as one with all. A turn of
     unknown elevation counts for all. The paper's table of an elevation is made again where one of
     the turns is nearest to it, of those and the bundle's, each of which counts once.
 
@@ -135,8 +139,10 @@ def recalibrated(
     density : mapping
         See `paper_tables`.
     """
-    prior_weight = bundle.turn_weight * (PRIOR_TURNS / bundle.turn_weight.sum())
-    temperature = _temperature_with_own(bundle, turns, prior_weight)
+    n_made_with = bundle.provenance.get("turns_made_with", len(bundle.object_ids))
+    of_each = np.full(len(turns), n_made_with / PRIOR_TURNS, dtype=np.float32)
+    turn_weight = np.concatenate([of_each, bundle.turn_weight])
+    temperature = _temperature_with_own(bundle, turns, turn_weight)
     rows = np.stack([_bins_of(turn, temperature) for turn in turns])
     prior = bundle.distributions ** np.float32(bundle.temperature / temperature)
     prior /= prior.sum(axis=-1, keepdims=True)
@@ -157,9 +163,10 @@ def recalibrated(
         temperature=temperature,
         object_ids=(*(turn.object_id for turn in turns), *bundle.object_ids),
         elevation_deg=elevation_deg,
-        turn_weight=np.concatenate([np.ones(len(turns)), prior_weight]).astype(np.float32),
+        turn_weight=turn_weight,
         distributions=distributions,
         familiarity=replace(known, threshold=limit * known.threshold),
         paper=replace(bundle.paper, rotation_deg=rotations),
-        provenance=dict(bundle.provenance) | {"calibrated_by": origin},
+        provenance=dict(bundle.provenance)
+        | {"calibrated_by": origin, "turns_made_with": n_made_with},
     )
