@@ -59,12 +59,15 @@ def of_turn(
         row = {"one_view": one, "one_view_expected": answer.expected_error_deg}
         row |= {"two_views": two, "two_views_expected": answer.moves[0].expected_error_deg}
         row |= {"two_views_least": float(least)}
-        if not is_given:
-            then = next_view(views, [0.0, second], calibrated, bundle.affinity, share)
-            third = second + then.moves[0].rotation_deg
-            row |= {"two_views_expected_then": then.expected_error_deg}
-            row |= {"three_views": seen([0.0, second, third])[1]}
-            row |= {"three_views_expected": then.moves[0].expected_error_deg}
+        then = next_view(views, [0.0, second], calibrated, bundle.affinity, share)
+        third = second + then.moves[0].rotation_deg
+        row |= {"two_views_expected_then": then.expected_error_deg}
+        turns = [0.0, second, third]
+        views, three = seen(turns)
+        row |= {"three_views": three}
+        row |= {"three_views_expected": then.moves[0].expected_error_deg}
+        last = next_view(views, turns, calibrated, bundle.affinity, share)
+        row |= {"three_views_expected_then": last.expected_error_deg}
         yield row
 
 

@@ -200,7 +200,7 @@ def test_whole_turns_of_the_camera_do_not_matter(recommender, seed, turns):
 
 def brute_force(bundle, rows, bins, share=None, limits=True):
     """From the definitions: the expected error now, those after each rotation from the last frame,
-    and by how much the choice of the least of these makes it too low."""
+    by how much the choice of the least of these makes it too low, and which one it is."""
     power, pseudo = bundle.affinity["power"], bundle.affinity["pseudo_observations"]
     views = bundle.distributions.astype(float)
     belief = np.ones(BINS)
@@ -239,7 +239,15 @@ def brute_force(bundle, rows, bins, share=None, limits=True):
         of_others = np.where(may, total @ after - weights[own] @ after[own], np.inf).argmin()
         more += weights[own] @ (after[own, of_others] - after[own, best])
     sums = total.sum()
-    return total @ now / sums, total @ after / sums, more / sums if len(names) > 1 else 0.0
+    more = more / sums if len(names) > 1 else 0.0
+    return total @ now / sums, total @ after / sums, more, best
+
+
+def of_last_choice(bundle, rows, bins, share=None):
+    """By how much the choice of the last view made its expected error too low, if it was one."""
+    *_, more, best = brute_force(bundle, rows[:-1], bins[:-1], share)
+    apart = (bins[-1] - bins[-2] - best + BINS // 2) % BINS - BINS // 2
+    return more if abs(apart) <= 1 else 0.0
 
 
 def error_of(product, first) -> float:
@@ -256,9 +264,11 @@ def test_expected_errors_are_those_of_objects_that_look_alike(recommender, bins,
         codes, [turn * WIDTH for turn in bins], elevation_deg=elevation
     )
     share = None if elevation is None else elevation_share(bundle.elevation_deg, elevation)
-    now, after, more = brute_force(bundle, recommender.distributions(codes), bins, share)
+    now, after, more, _ = brute_force(bundle, recommender.distributions(codes), bins, share)
     free = np.isfinite(found.error_after_deg)
     assert free.sum() == BINS - len(bins)
+    if len(bins) > 1:
+        now += of_last_choice(bundle, recommender.distributions(codes), bins, share)
     assert found.expected_error_deg == pytest.approx(now, rel=1e-4)
     assert found.error_after_deg[free] == pytest.approx(after[free] + more, rel=1e-4)
 
@@ -269,12 +279,43 @@ def test_what_is_added_is_of_the_rotations_that_may_be_chosen(recommender):
         codes, turns = codes_of(seed, len(bins)), [turn * WIDTH for turn in bins]
         rows = recommender.distributions(codes)
         limits = np.isin(np.arange(BINS), allowed)
-        _, after, more = brute_force(recommender.bundle, rows, bins, limits=limits)
+        _, after, more, _ = brute_force(recommender.bundle, rows, bins, limits=limits)
         found = recommender.recommend_crops(codes, turns, allowed_deg=np.array(allowed) * WIDTH)
         free = np.isfinite(found.error_after_deg)
         assert found.error_after_deg[free] == pytest.approx(after[free] + more, rel=1e-4)
         unlimited.append(brute_force(recommender.bundle, rows, bins)[2] - more)
     assert np.abs(unlimited).max() > 0.01
+
+
+@pytest.mark.parametrize("seed", [5, 7, 8])
+@pytest.mark.parametrize("bins", [(0,), (0, 6)])
+def test_what_the_choice_of_the_last_view_adds_is_expected_once_it_is_taken(
+    recommender, bins, seed
+):
+    """Within a step of the rotation that the views before it led to."""
+    bundle, codes = recommender.bundle, codes_of(seed, len(bins) + 1)
+    rows = recommender.distributions(codes)
+    *_, more, best = brute_force(bundle, rows[:-1], bins)
+    for off in (-3, -2, -1, 0, 1, 2, 3):
+        turns = (*bins, int(bins[-1] + best + off))
+        found = recommender.recommend_crops(codes, [turn * WIDTH for turn in turns])
+        now, *_ = brute_force(bundle, rows, turns)
+        added = of_last_choice(bundle, rows, turns)
+        assert added == (more if abs(off) <= 1 else 0.0)
+        assert found.expected_error_deg == pytest.approx(now + added, rel=1e-4)
+
+
+def test_views_that_no_calibration_view_is_like_contradict_each_other():
+    frames = [example_frame(azimuth_deg) for azimuth_deg in (270.0, 15.0, 330.0, 240.0)]
+    found = Recommender.load("mug", "numpy").recommend(
+        [frame.depth_m for frame in frames],
+        rotations_deg=[0.0, 315.0, 345.0, 60.0],
+        mask=[frame.mask for frame in frames],
+        intrinsics=frames[0].intrinsics,
+    )
+    assert any("contradict" in warning for warning in found.warnings)
+    assert found.move is not None
+    assert 0 < found.move.expected_error_deg < 90
 
 
 def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):

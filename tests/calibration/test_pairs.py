@@ -152,6 +152,9 @@ def test_azimuths_in_radians_are_named(tmp_path, first):
     views = np.arange(first, first + 360)
     path = written(tmp_path / "p.csv", {"a": (np.radians(views), np.radians(views))})
     assert "these azimuths seem to be radians: multiply them by 180/π" in refused(path)
+    turn = np.radians(np.arange(first, first + 360, 15)).round(2)
+    path = written(tmp_path / "p.csv", {"a": (turn, turn)})
+    assert "180/π" in refused(path)
     for few in (views[:10], np.arange(7), np.zeros(1)):
         path = written(tmp_path / "p.csv", {"a": (few, few)})
         assert "180/π" not in refused(path)

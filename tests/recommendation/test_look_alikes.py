@@ -37,8 +37,10 @@ def expected_of(
     return np.array([one.now_deg for one in found]), np.stack([one.after_deg for one in found])
 
 
-def test_after_one_view_it_is_the_criterion(rng: np.random.Generator) -> None:
-    distributions = turns(rng)
+@pytest.mark.parametrize("n_turns", [3, 30])
+def test_after_one_view_it_is_the_criterion(rng: np.random.Generator, n_turns: int) -> None:
+    """However many turns there are: after one view, all first views count."""
+    distributions = turns(rng, n_turns)
     evidence = evidence_of_distributions(distributions, SETTINGS)
     rows = turns(rng)[0].astype(np.float32)
     wanted = expected_error(Belief(rows, evidence), evidence, "product")
@@ -65,7 +67,7 @@ def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Genera
 
 @given(
     seed=st.integers(0, 2**32 - 1),
-    n=st.integers(1, 12),
+    n=st.integers(0, 12),
     n_groups=st.integers(1, 5),
     n_further=st.sampled_from([1, 6, 12, 24]),
 )
@@ -222,6 +224,7 @@ def test_what_is_left_out_hardly_counts(rng: np.random.Generator, sharpness: flo
     weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 16.0 * share[:, None]
     errors = alike.errors_deg
     averaged = errors[np.arange(20)[:, None], first_views(20, 24, 400)].mean(axis=1)
+    averaged[:, -1] = errors[..., -1].mean(axis=1)
     mean = share @ averaged / share.sum()
     wanted = (np.tensordot(weight, errors) + 30.0 * mean) / (weight.sum() + 30.0)
     found = alike.expected(belief, 16.0, 30.0, share)
@@ -263,6 +266,31 @@ def test_the_least_of_uncertain_errors_and_its_optimism_are_right_on_average() -
 def test_where_one_rotation_is_best_for_all_objects_nothing_is_added() -> None:
     sums = 10.0 - 8.0 * (np.arange(12) == 7) + np.zeros((5, 12))
     assert of_parts(sums, np.zeros(12), 5.0).optimism_deg(np.ones(12, dtype=bool)) == 0.0
+
+
+def test_where_no_view_is_alike_the_mean_of_all_is_expected() -> None:
+    distributions = sharp_turns(np.random.default_rng(2), 4, 60.0)
+    alike = LookAlikes.of_views(distributions).after(5)
+    # A belief that no turn has: of views that contradict each other.
+    belief = np.where(np.arange(24) % 12 == 0, 0.5, 1e-30)
+    found = alike.expected(belief, 64.0, 90.0)
+    errors = alike.errors_deg.mean(axis=(0, 1))
+    assert found.now_deg == pytest.approx(errors[-1], rel=1e-3)
+    assert found.after_deg == pytest.approx(errors[:-1], rel=1e-3)
+    assert found.optimism_deg(np.ones(24, dtype=bool)) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_errors_of_a_belief_do_not_depend_on_those_before_it(rng: np.random.Generator) -> None:
+    """What was found for other beliefs is kept."""
+    distributions, beliefs = sharp_turns(rng, 6, 6.0), sharp_turns(rng, 1, 12.0)[0]
+    kept = LookAlikes.of_views(distributions).after(5)
+    for belief in beliefs:
+        found, alone = (
+            one.expected(belief, 16.0, 30.0)
+            for one in (kept, LookAlikes.of_views(distributions).after(5))
+        )
+        assert found.after_deg == pytest.approx(alone.after_deg, rel=1e-5)
+        assert found.now_deg == pytest.approx(alone.now_deg, rel=1e-5)
 
 
 @pytest.mark.parametrize("rotations", [[], [5]])

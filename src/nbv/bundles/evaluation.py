@@ -58,8 +58,9 @@ class Seen:
 def fixed_errors_deg(alike: LookAlikes, n_views: int) -> NDArray[np.float64]:
     """Return the mean error of each calibration turn with n views at equal steps, (S, B).
 
-    By the step, in bins; infinite where two of the views are nearer than `MIN_SEPARATION_DEG`, as
-    none are that are chosen. Evenly spaced views may always be taken.
+    `alike` is of one view, and every view is a first one. By the step, in bins; infinite where two
+    of the views are nearer than `MIN_SEPARATION_DEG`, as none are that are chosen. Evenly spaced
+    views may always be taken.
     """
     n_turns, _, n_bins = alike.so_far.shape
     steps = np.arange(n_bins)

@@ -29,13 +29,13 @@ from nbv.calibration.posteriors import turned
 from nbv.errors import UserError
 from nbv.frames.errors import FrameError
 from nbv.labels import counted
-from nbv.recommendation.look_alikes import MOST_COMPARED, LookAlikes
+from nbv.recommendation.look_alikes import MOST_COMPARED, Expected, LookAlikes
 
 LEAST_BAYES_FACTOR = 0.05
 """Below it views contradict each other. Of right ones, one in 20 at the most is below."""
 
 N_KEPT = 6
-"""So many sequences of rotations are remembered; the look-alikes of `mug` take 3 MB for each."""
+"""So many sequences of rotations are remembered; the look-alikes of `mug` take 4 MB for each."""
 
 _LARGEST_LOG = 700.0
 """Below that of the largest number; very many views agree so well."""
@@ -161,8 +161,8 @@ def after_rotations(
 ) -> AfterRotations:
     """Return what gives the calibration turns after some rotations, of distributions (S, B, B).
 
-    Turn s shows the object ``object_ids[s]``. The errors after rotations take longer to find than
-    all else, so `n_kept` of them are kept.
+    Turn s shows the object ``object_ids[s]``. Turns after rotations, and the errors that were found
+    for them, are kept for `n_kept` sequences of rotations.
     """
 
     @lru_cache(maxsize=n_kept)
@@ -188,7 +188,8 @@ def next_view(
 
     Views are fused by product. The next one has the least error that calibration objects, turned
     alike, made after it (`nbv.recommendation.look_alikes`). Expected errors after it are raised by
-    what the choice makes them too low.
+    what the choice makes them too low. So is the expected error now, where the last view is the one
+    that those before it led to.
 
     Parameters
     ----------
@@ -214,8 +215,8 @@ def next_view(
     belief = fused(distributions, rotations_deg)
     n_bins = len(belief)
     width = 360.0 / n_bins
-    alike = calibrated(tuple(round(turn / width) % n_bins for turn in rotations_deg[1:]))
-    expected = alike.expected(belief, **affinity, share=share)
+    bins = [round(turn / width) % n_bins for turn in rotations_deg[1:]]
+    expected = calibrated(tuple(bins)).expected(belief, **affinity, share=share)
     last = rotations_deg[-1]
     taken = tuple(rotation - last for rotation in rotations_deg)
     n_steps = len(expected.total)
@@ -229,6 +230,12 @@ def next_view(
             "no rotation is allowed: widen --allowed or --max-travel; a view is "
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
         )
+    chosen_deg = 0.0
+    if len(distributions) > 1:
+        before = calibrated(tuple(bins[:-1])).expected(
+            fused(distributions[:-1], rotations_deg[:-1]), **affinity, share=share
+        )
+        chosen_deg = _of_the_choice(before, rotations_deg, n_bins)
     error = expected.after_deg
     if rotation_deg.size:
         error = error + expected.optimism_deg(may.is_choice)
@@ -249,7 +256,7 @@ def next_view(
     return Recommendation(
         azimuth_deg=float(wrap_deg(direction_deg + last)),
         spread_deg=spread_deg,
-        expected_error_deg=expected.now_deg,
+        expected_error_deg=expected.now_deg + chosen_deg,
         move=moves[0] if moves else None,
         alternatives=tuple(moves[1:]),
         belief=turned(belief, -last),
@@ -259,6 +266,24 @@ def next_view(
         warnings=_contradictions(bayes_factor),
         n_views=len(distributions),
     )
+
+
+def _of_the_choice(before: Expected, rotations_deg: Sequence[float], n_bins: int) -> float:
+    """Return by how much the expected error of views is too low because the last one was chosen.
+
+    It is 0 unless the last view is where those `before` it led, to the nearest rotation or two
+    that are compared. The same calibration errors chose it and are expected of it.
+    """
+    n_steps = len(before.total)
+    *earlier, last = rotations_deg
+    taken = tuple(rotation - earlier[-1] for rotation in earlier)
+    is_choice = _allowed_bins(n_bins, n_steps, taken, 180.0).is_choice
+    if not is_choice.any():
+        return 0.0
+    chosen = np.where(is_choice, before.total, np.inf).argmin() * (360.0 / n_steps)
+    if circular_distance_deg(chosen, last) > 360.0 / n_steps:
+        return 0.0
+    return before.optimism_deg(is_choice)
 
 
 def _contradictions(bayes_factor: float) -> tuple[str, ...]:

@@ -182,9 +182,12 @@ def widest_gap_deg(azimuth_deg: NDArray[np.float64]) -> float:
 
 
 def radians_hint(azimuth_deg: NDArray[np.float64]) -> str:
-    """Return the end of a sentence that refuses a gap; empty where azimuths (n,) are degrees."""
+    """Return the end of a sentence that refuses a gap; empty where azimuths (n,) are degrees.
+
+    In radians they are within a turn and leave no gap that is much wider.
+    """
     is_small = np.abs(azimuth_deg).max() <= 2 * np.pi
-    if is_small and widest_gap_deg(np.degrees(azimuth_deg)) <= WIDEST_GAP_DEG + 1e-6:
+    if is_small and widest_gap_deg(np.degrees(azimuth_deg)) <= 2 * WIDEST_GAP_DEG:
         return "; these azimuths seem to be radians: multiply them by 180/π"
     return ""
 

@@ -34,10 +34,13 @@ N_PARTS = 5
 """Of the calibration objects, for `Expected.optimism_deg`."""
 
 MOST_AVERAGED = 400
-"""First views at most whose errors after more views are averaged for the pseudo-observations."""
+"""First views at most whose errors after more views are averaged for the pseudo-observations.
+
+One of each turn, where there are more turns.
+"""
 
 NEGLIGIBLE = 1e-5
-"""Of all that counts: first views with less are left out."""
+"""Of all that counts, pseudo-observations too: after more views, what counts less is left out."""
 
 FLAT = 1e-5
 """Of distributions: below this resultant length the mean direction is rounding, and errs by 90°."""
@@ -100,15 +103,13 @@ def error_after_deg(
         ``[i, d]``: with the further view ``d`` after the first.
     """
     n, n_bins = so_far.shape
-    angles = 2 * np.pi * np.arange(n_bins) / n_bins
-    factors = np.stack([np.cos(angles), np.sin(angles), np.ones(n_bins)]).astype(np.float32)
     order = np.argsort(group, kind="stable")
     ordered = group[order]
     starts = np.flatnonzero(np.diff(ordered, prepend=-1))
-    rows = so_far[order, None] * factors
+    rows = so_far[order, None] * _moment_factors(n_bins)
     moments = np.empty((n, 3, further.shape[1]), dtype=np.float32)
-    ends = [*starts[1:].tolist(), n]
-    for start, end, place in zip(starts.tolist(), ends, ordered[starts].tolist(), strict=True):
+    ends = np.append(starts, n)[1:]
+    for start, end, place in np.stack([starts, ends, ordered[starts]], axis=1).tolist():
         np.matmul(rows[start:end], further[place].T, out=moments[start:end])
     error = np.empty_like(moments[:, 0])
     error[order] = _angle_deg(*moments.transpose(1, 0, 2))
@@ -139,10 +140,15 @@ def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
 
 def error_of_deg(so_far: Table) -> Table:
     """Return the error of the mean direction of distributions in the object's frame, degrees."""
-    n_bins = so_far.shape[-1]
+    moments = so_far @ _moment_factors(so_far.shape[-1]).T
+    return _angle_deg(*np.moveaxis(moments, -1, 0))
+
+
+@cache
+def _moment_factors(n_bins: int) -> Table:
+    """Return what bins (B,) are weighted with for the parts of a moment, and for 1: (3, B)."""
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
-    real, imaginary = (so_far @ of(angles).astype(np.float32) for of in (np.cos, np.sin))
-    return _angle_deg(real, imaginary, so_far.sum(axis=-1))
+    return np.stack([np.cos(angles), np.sin(angles), np.ones(n_bins)]).astype(np.float32)
 
 
 def _angle_deg(real: Table, imaginary: Table, total: Table) -> Table:
@@ -246,9 +252,10 @@ class LookAlikes:
         every = first_views(n_turns, n_bins)
         everything = LookAlikes(views, further, every, is_in_part)
         first = first_views(n_turns, n_bins, most)
+        errors_deg = everything.errors_deg
         if first.shape == every.shape:
-            return everything
-        near_deg = near_first_views(everything.errors_deg, first)
+            return replace(everything, near_deg=errors_deg)
+        near_deg = near_first_views(errors_deg, first)
         so_far = views[np.arange(n_turns)[:, None], first]
         return LookAlikes(so_far, further, first, is_in_part, near_deg)
 
@@ -280,19 +287,30 @@ class LookAlikes:
 
         Those that count for the first views; the rotations are whole steps apart.
         """
-        turn, place = np.indices(self.first.shape)
-        every = self._errors_of(turn.ravel(), place.ravel())
-        return every.reshape(*self.first.shape, -1)
+        if self.near_deg is not None:
+            return self.near_deg
+        n_turns, n_first = self.first.shape
+        place = np.arange(n_first)
+        # Turn by turn: all at once are more than a cache holds.
+        return np.stack([self._errors_of(np.full(n_first, turn), place) for turn in range(n_turns)])
 
     def _errors_of(self, turn: NDArray[np.intp], place: NDArray[np.intp]) -> Table:
-        """Return `errors_deg` of some of the first views, (n, M + 1)."""
-        if self.near_deg is not None:
-            return self.near_deg[turn, place]
-        so_far = self.so_far[turn, place]
-        whole, part = np.divmod(self.first[turn, place], self._step)
-        further = self.further.reshape(-1, *self.further.shape[2:])
-        after = error_after_deg(so_far, further, turn * self._step + part, whole)
-        return np.concatenate([after, error_of_deg(so_far)[:, None]], axis=1)
+        """Return `errors_deg` of some of the first views after more views, (n, M + 1)."""
+        is_new = np.isnan(self._found[turn, place, -1])
+        if is_new.any():
+            new = turn[is_new], place[is_new]
+            so_far = self.so_far[new]
+            whole, part = np.divmod(self.first[new], self._step)
+            further = self.further.reshape(-1, *self.further.shape[2:])
+            after = error_after_deg(so_far, further, new[0] * self._step + part, whole)
+            self._found[new] = np.concatenate([after, error_of_deg(so_far)[:, None]], axis=1)
+        return self._found[turn, place]
+
+    @cached_property
+    def _found(self) -> Table:
+        """The errors that were found before, (S, K, M + 1); all others are NaN."""
+        n_steps = self.further.shape[2]
+        return np.full((*self.first.shape, n_steps + 1), np.nan, dtype=np.float32)
 
     def expected(
         self,
@@ -356,13 +374,16 @@ class LookAlikes:
 
         After more views of some of them: those of the next turn lie between.
         """
+        if self._near_errors is not None:
+            return np.asarray(self._near_errors.mean(axis=1, dtype=np.float64))
         n_turns, n_first = self.first.shape
-        most = None if self.near_deg is not None else MOST_AVERAGED
-        place = first_views(n_turns, n_first, most)
+        place = first_views(n_turns, n_first, MOST_AVERAGED)
         turn = np.repeat(np.arange(n_turns), place.shape[1])
-        errors = _and_one(self._errors_of(turn, place.ravel()))
-        of_turns = errors.reshape(*place.shape, -1).mean(axis=1, dtype=np.float64)
-        return np.asarray(of_turns)
+        errors = self._errors_of(turn, place.ravel()).reshape(*place.shape, -1)
+        found = _and_one(errors).mean(axis=1, dtype=np.float64)
+        # The errors now are found for all: it takes little.
+        found[:, -2] = self.error_now_deg.mean(axis=1)
+        return np.asarray(found)
 
     @cached_property
     def _roots(self) -> Table:

@@ -232,7 +232,7 @@ def save_figure(figure: Figure, paths: Mapping[str, Path]) -> None:
     """Write a figure as ``png`` (150 dpi), ``pdf`` or ``svg``; a figure gives the same bytes."""
     with mpl.rc_context(RC):
         for kind, path in paths.items():
-            # In memory first: its PDF writer has no clear message for a full disk.
+            # In memory first: matplotlib's PDF writer has no clear message for a full disk.
             whole = io.BytesIO()
             figure.savefig(whole, format=kind, **SAVED[kind])
             with replacing(path) as temporary:
