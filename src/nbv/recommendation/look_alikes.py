@@ -289,26 +289,25 @@ class LookAlikes:
         """
         if self.near_deg is not None:
             return self.near_deg
-        n_turns, n_first = self.first.shape
-        place = np.arange(n_first)
-        # Turn by turn: all at once are more than a cache holds.
-        return np.stack([self._errors_of(np.full(n_first, turn), place) for turn in range(n_turns)])
+        for turn in range(len(self.first)):
+            # Turn by turn: all at once are more than a cache holds.
+            self._find(np.arange(len(self.first))[:, None] == turn)
+        return self._found
 
-    def _errors_of(self, turn: NDArray[np.intp], place: NDArray[np.intp]) -> Table:
-        """Return `errors_deg` of some of the first views after more views, (n, M + 1)."""
-        is_new = np.isnan(self._found[turn, place, -1])
-        if is_new.any():
-            new = turn[is_new], place[is_new]
+    def _find(self, is_needed: NDArray[np.bool_]) -> Table:
+        """Return `_found` with the errors of all first views that are needed, (S, K)."""
+        new = np.nonzero(is_needed & np.isnan(self._found[..., -1]))
+        if new[0].size:
             so_far = self.so_far[new]
             whole, part = np.divmod(self.first[new], self._step)
             further = self.further.reshape(-1, *self.further.shape[2:])
             after = error_after_deg(so_far, further, new[0] * self._step + part, whole)
             self._found[new] = np.concatenate([after, error_of_deg(so_far)[:, None]], axis=1)
-        return self._found[turn, place]
+        return self._found
 
     @cached_property
     def _found(self) -> Table:
-        """The errors that were found before, (S, K, M + 1); all others are NaN."""
+        """`errors_deg` after more views, as far as they were found; all others are NaN."""
         n_steps = self.further.shape[2]
         return np.full((*self.first.shape, n_steps + 1), np.nan, dtype=np.float32)
 
@@ -357,8 +356,11 @@ class LookAlikes:
         if self._near_errors is not None:
             return np.asarray(np.matmul(weight[:, None], self._near_errors)[:, 0])
         least = NEGLIGIBLE * (weight.sum() + pseudo_observations)
-        turn, place = np.nonzero(weight >= least)
-        errors = weight[turn, place, None] * _and_one(self._errors_of(turn, place))
+        is_counted = weight >= least
+        # With those that are averaged, because it takes less time to find them together.
+        found = self._find(is_counted | self._is_averaged)
+        turn, place = np.nonzero(is_counted)
+        errors = weight[turn, place, None] * _and_one(found[turn, place])
         sums = np.zeros((len(weight), errors.shape[1]))
         starts = np.flatnonzero(np.diff(turn, prepend=-1))
         sums[turn[starts]] = np.add.reduceat(errors, starts)
@@ -376,14 +378,22 @@ class LookAlikes:
         """
         if self._near_errors is not None:
             return np.asarray(self._near_errors.mean(axis=1, dtype=np.float64))
-        n_turns, n_first = self.first.shape
-        place = first_views(n_turns, n_first, MOST_AVERAGED)
-        turn = np.repeat(np.arange(n_turns), place.shape[1])
-        errors = self._errors_of(turn, place.ravel()).reshape(*place.shape, -1)
-        found = _and_one(errors).mean(axis=1, dtype=np.float64)
+        found = self._find(self._is_averaged)
+        of_turns = found[self._is_averaged].reshape(len(found), -1, found.shape[2])
+        mean = np.asarray(_and_one(of_turns).mean(axis=1, dtype=np.float64))
         # The errors now are found for all: it takes little.
-        found[:, -2] = self.error_now_deg.mean(axis=1)
-        return np.asarray(found)
+        mean[:, -2] = self.error_now_deg.mean(axis=1)
+        return mean
+
+    @cached_property
+    def _is_averaged(self) -> NDArray[np.bool_]:
+        """Whether a first view's errors after more views are averaged, (S, K)."""
+        n_turns, n_first = self.first.shape
+        is_averaged = np.zeros((n_turns, n_first), dtype=bool)
+        is_averaged[np.arange(n_turns)[:, None], first_views(n_turns, n_first, MOST_AVERAGED)] = (
+            True
+        )
+        return is_averaged
 
     @cached_property
     def _roots(self) -> Table:
