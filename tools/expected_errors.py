@@ -28,7 +28,7 @@ NOT_THERE = 1e-12
 """Share of the object that is left out: a share is above 0."""
 
 KEPT = 160
-"""Rotations whose errors are kept; there are 120 of `mug`, 3 MB each."""
+"""Rotations whose errors are kept; there are 120 of `mug`, 4 MB each."""
 
 
 def of_turn(

@@ -80,7 +80,8 @@ class Recommendation:
     spread_deg : float
         Circular standard deviation of the belief.
     expected_error_deg : float
-        Of `azimuth_deg`: what objects that looked alike erred in calibration.
+        Of `azimuth_deg`: what objects that looked alike erred in calibration; more where the last
+        view is the recommended one, because the same errors chose it.
     move : Move, or None
         The best next view; None where the views so far are all round, so that each further one
         would be nearer than 15° to one of them.

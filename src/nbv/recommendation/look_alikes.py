@@ -389,10 +389,9 @@ class LookAlikes:
     def _is_averaged(self) -> NDArray[np.bool_]:
         """Whether a first view's errors after more views are averaged, (S, K)."""
         n_turns, n_first = self.first.shape
+        place = first_views(n_turns, n_first, MOST_AVERAGED)
         is_averaged = np.zeros((n_turns, n_first), dtype=bool)
-        is_averaged[np.arange(n_turns)[:, None], first_views(n_turns, n_first, MOST_AVERAGED)] = (
-            True
-        )
+        np.put_along_axis(is_averaged, place, True, axis=1)
         return is_averaged
 
     @cached_property
