@@ -22,7 +22,7 @@ from nbv.calibration.posteriors import turned
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.recommendation.belief import mean_direction_deg
-from nbv.recommendation.look_alikes import LookAlikes, error_after_deg
+from nbv.recommendation.look_alikes import LookAlikes, error_after_deg, in_object_frame
 
 SINGLE, RANDOM, FIXED = "single", "random", "best fixed"
 OPPOSITE, SPACED, RECOMMENDED = "opposite", "evenly spaced", "recommended"
@@ -62,14 +62,14 @@ def fixed_errors_deg(alike: LookAlikes, n_views: int) -> NDArray[np.float64]:
     of the views are nearer than `MIN_SEPARATION_DEG`, as none are that are chosen. Evenly spaced
     views may always be taken.
     """
-    n_turns, _, n_bins = alike.so_far.shape
+    n_turns, _, n_bins = alike.seen.shape
     steps = np.arange(n_bins)
     apart = travel_deg(np.arange(1, n_views)[:, None] * steps * (360.0 / n_bins)).min(axis=0)
     may = (apart >= MIN_SEPARATION_DEG) | (steps == round(n_bins / n_views))
     errors = np.full((n_turns, n_bins), np.inf)
     if n_views == 2:
         group, ahead = np.zeros(n_bins, dtype=int), np.arange(n_bins)
-        for turn, views in enumerate(alike.so_far):
+        for turn, views in enumerate(in_object_frame(alike.seen)):
             after = error_after_deg(views, views[None], group, ahead)
             errors[turn, may] = after.mean(axis=0)[may]
         return errors

@@ -52,8 +52,8 @@ def in_object_frame(distributions: Table) -> Table:
     View k of B has the azimuth 360 k / B; entry u of the result is the probability of the pose
     360 u / B degrees ahead of the true one.
     """
-    n_turns, n_bins, _ = distributions.shape
-    return _started_at(distributions, np.tile(np.arange(n_bins), (n_turns, 1)))
+    n_bins = distributions.shape[1]
+    return np.asarray(_turned(distributions)[:, np.arange(n_bins), np.arange(n_bins)])
 
 
 def compared_step(n_bins: int) -> int:
@@ -106,13 +106,13 @@ def error_after_deg(
     order = np.argsort(group, kind="stable")
     ordered = group[order]
     starts = np.flatnonzero(np.diff(ordered, prepend=-1))
-    rows = so_far[order, None] * _moment_factors(n_bins)
-    moments = np.empty((n, 3, further.shape[1]), dtype=np.float32)
+    rows = (so_far[order, None] * _moment_factors(n_bins)).reshape(3 * n, n_bins)
+    moments = np.empty((3 * n, further.shape[1]), dtype=np.float32)
     ends = np.append(starts, n)[1:]
-    for start, end, place in np.stack([starts, ends, ordered[starts]], axis=1).tolist():
+    for start, end, place in np.stack([3 * starts, 3 * ends, ordered[starts]], axis=1).tolist():
         np.matmul(rows[start:end], further[place].T, out=moments[start:end])
-    error = np.empty_like(moments[:, 0])
-    error[order] = _angle_deg(*moments.transpose(1, 0, 2))
+    error = np.empty_like(moments[:n])
+    error[order] = _angle_deg(*(moments[part::3] for part in range(3)))
     return _started_at(error, ahead)
 
 
@@ -138,10 +138,15 @@ def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
     return np.asarray(np.einsum("skum,u->skm", rows, share))
 
 
-def error_of_deg(so_far: Table) -> Table:
-    """Return the error of the mean direction of distributions in the object's frame, degrees."""
-    moments = so_far @ _moment_factors(so_far.shape[-1]).T
-    return _angle_deg(*np.moveaxis(moments, -1, 0))
+def error_of_deg(distributions: Table, true: NDArray[np.intp]) -> Table:
+    """Return the errors of the mean directions of distributions (..., B), degrees.
+
+    The true poses (...) are in bins.
+    """
+    factors = _moment_factors(distributions.shape[-1])
+    real, imaginary, total = np.moveaxis(distributions @ factors.T, -1, 0)
+    cosine, sine, _ = factors[:, true]
+    return _angle_deg(real * cosine + imaginary * sine, imaginary * cosine - real * sine, total)
 
 
 @cache
@@ -153,9 +158,9 @@ def _moment_factors(n_bins: int) -> Table:
 
 def _angle_deg(real: Table, imaginary: Table, total: Table) -> Table:
     """Return how far the directions of moments are from 0, degrees."""
-    angle = np.abs(np.degrees(np.arctan2(imaginary, real)))
-    angle[real**2 + imaginary**2 < (FLAT * total) ** 2] = 90.0
-    return angle
+    angle = np.abs(np.arctan2(imaginary, real)) * np.float32(180.0 / np.pi)
+    is_flat = real**2 + imaginary**2 < (np.float32(FLAT) * total) ** 2
+    return np.where(is_flat, np.float32(90.0), angle)
 
 
 @dataclass(frozen=True)
@@ -214,10 +219,13 @@ class LookAlikes:
 
     Attributes
     ----------
-    so_far : ndarray (S, K, B) float32
-        Distributions of the fused views `in_object_frame`, by the first view; rows sum to 1.
+    seen : ndarray (S, K, B) float32
+        Distributions of the fused views, in the frames of the first views; rows sum to 1.
+    views : ndarray (S, B, B + 1, B) float32
+        Those of all single views of a turn: ``[s, k, r]`` is view k in the frame of the view r bins
+        before it.
     further : ndarray (S, step, M, B) float32
-        Those of all single views of a turn: those that are whole steps apart are together.
+        The same `in_object_frame`: those that are whole steps apart are together.
     first : ndarray (S, K)
         The first views that a belief is compared with, in bins; see `first_views`.
     is_in_part : ndarray (N + 1, S)
@@ -226,7 +234,8 @@ class LookAlikes:
         Errors after a view at each of M rotations, and now, that count instead of those of `first`.
     """
 
-    so_far: Table
+    seen: Table
+    views: Table
     further: Table
     first: NDArray[np.intp]
     is_in_part: NDArray[np.float64]
@@ -244,42 +253,40 @@ class LookAlikes:
         ``object_ids`` (S,); without them, each is of another one. One object's turns are in one
         part of `Expected.parts`.
         """
-        views = in_object_frame(np.asarray(distributions, dtype=np.float32))
-        n_turns, n_bins, _ = views.shape
-        by_step = views.reshape(n_turns, -1, compared_step(n_bins), n_bins)
+        own = np.asarray(distributions, dtype=np.float32)
+        n_turns, n_bins, _ = own.shape
+        by_step = in_object_frame(own).reshape(n_turns, -1, compared_step(n_bins), n_bins)
         further = np.ascontiguousarray(by_step.swapaxes(1, 2))
         is_in_part = _is_in_part(np.arange(n_turns) if object_ids is None else object_ids)
         every = first_views(n_turns, n_bins)
-        everything = LookAlikes(views, further, every, is_in_part)
+        views = _turned(own)
+        everything = LookAlikes(own, views, further, every, is_in_part)
         first = first_views(n_turns, n_bins, most)
         errors_deg = everything.errors_deg
         if first.shape == every.shape:
             return replace(everything, near_deg=errors_deg)
         near_deg = near_first_views(errors_deg, first)
-        so_far = views[np.arange(n_turns)[:, None], first]
-        return LookAlikes(so_far, further, first, is_in_part, near_deg)
+        seen = own[np.arange(n_turns)[:, None], first]
+        return LookAlikes(seen, views, further, first, is_in_part, near_deg)
 
     def after(self, rotation_bins: int) -> LookAlikes:
         """Return the turns after one more view, at a rotation from the first one."""
-        n_turns, _, n_bins = self.so_far.shape
-        whole, part = np.divmod((self.first + rotation_bins) % n_bins, self._step)
-        both = self.so_far * self.further[np.arange(n_turns)[:, None], part, whole]
-        both /= both.sum(axis=2, keepdims=True)
-        return replace(self, so_far=both, near_deg=None)
+        n_turns, _, n_bins = self.seen.shape
+        ahead = rotation_bins % n_bins
+        both = self.views[np.arange(n_turns)[:, None], (self.first + ahead) % n_bins, ahead]
+        both *= self.seen
+        # A product with 1 takes less time than a sum over short rows.
+        both /= (both @ np.ones(n_bins, dtype=np.float32))[:, :, None]
+        return replace(self, seen=both, near_deg=None)
 
     @property
     def _step(self) -> int:
         return int(self.further.shape[1])
 
-    @property
+    @cached_property
     def error_now_deg(self) -> Table:
         """`error_of_deg` of the turns, (S, K)."""
-        return error_of_deg(self.so_far)
-
-    @property
-    def seen(self) -> Table:
-        """The distributions in the frames of the first views, (S, K, B)."""
-        return _started_at(self.so_far, -self.first % self.so_far.shape[-1])
+        return error_of_deg(self.seen, self.first)
 
     @property
     def errors_deg(self) -> Table:
@@ -289,20 +296,25 @@ class LookAlikes:
         """
         if self.near_deg is not None:
             return self.near_deg
-        for turn in range(len(self.first)):
+        n_turns, n_first = self.first.shape
+        every = np.arange(n_first)
+        for turn in range(n_turns):
             # Turn by turn: all at once are more than a cache holds.
-            self._find(np.arange(len(self.first))[:, None] == turn)
+            self._find(np.full(n_first, turn), every)
         return self._found
 
-    def _find(self, is_needed: NDArray[np.bool_]) -> Table:
-        """Return `_found` with the errors of all first views that are needed, (S, K)."""
-        new = np.nonzero(is_needed & np.isnan(self._found[..., -1]))
-        if new[0].size:
-            so_far = self.so_far[new]
-            whole, part = np.divmod(self.first[new], self._step)
+    def _find(self, turn: NDArray[np.intp], place: NDArray[np.intp]) -> Table:
+        """Return `_found` with the errors of some first views (n,) of turns (n,)."""
+        is_new = np.isnan(self._found[turn, place, -1])
+        if is_new.any():
+            new = turn[is_new], place[is_new]
+            first = self.first[new]
+            whole, part = np.divmod(first, self._step)
             further = self.further.reshape(-1, *self.further.shape[2:])
-            after = error_after_deg(so_far, further, new[0] * self._step + part, whole)
-            self._found[new] = np.concatenate([after, error_of_deg(so_far)[:, None]], axis=1)
+            group = new[0] * self._step + part
+            after = error_after_deg(_started_at(self.seen[new], first), further, group, whole)
+            now = self.error_now_deg[new][:, None]
+            self._found[new] = np.concatenate([after, now], axis=1)
         return self._found
 
     @cached_property
@@ -335,7 +347,9 @@ class LookAlikes:
         of_turn = np.ones(n_turns) if share is None else np.asarray(share)
         # A first view stands for the degrees that it is apart from the next one.
         of_view = of_turn * (360.0 / n_first)
-        weight = self._affinities(belief) ** np.float32(power)
+        # Numbers below the least normal one take much longer, and count nothing.
+        least = float(np.finfo(np.float32).tiny) ** (1.0 / power)
+        weight = np.maximum(self._affinities(belief), np.float32(2 * least)) ** np.float32(power)
         weight *= of_view.astype(np.float32)[:, None]
         by_part = self.is_in_part @ self._weighted_errors(weight, pseudo_observations)
         sums = by_part[-1] + pseudo_observations / of_view.sum() * (of_view @ self._mean_errors)
@@ -358,7 +372,7 @@ class LookAlikes:
         least = NEGLIGIBLE * (weight.sum() + pseudo_observations)
         is_counted = weight >= least
         # With those that are averaged, because it takes less time to find them together.
-        found = self._find(is_counted | self._is_averaged)
+        found = self._find(*np.nonzero(is_counted | self._is_averaged))
         turn, place = np.nonzero(is_counted)
         errors = weight[turn, place, None] * _and_one(found[turn, place])
         sums = np.zeros((len(weight), errors.shape[1]))
@@ -378,8 +392,9 @@ class LookAlikes:
         """
         if self._near_errors is not None:
             return np.asarray(self._near_errors.mean(axis=1, dtype=np.float64))
-        found = self._find(self._is_averaged)
-        of_turns = found[self._is_averaged].reshape(len(found), -1, found.shape[2])
+        averaged = np.nonzero(self._is_averaged)
+        found = self._find(*averaged)
+        of_turns = found[averaged].reshape(len(found), -1, found.shape[2])
         mean = np.asarray(_and_one(of_turns).mean(axis=1, dtype=np.float64))
         # The errors now are found for all: it takes little.
         mean[:, -2] = self.error_now_deg.mean(axis=1)
@@ -415,16 +430,21 @@ def _and_one(errors_deg: Table) -> Table:
 
 def _started_at(rows: Table, places: NDArray[np.intp]) -> Table:
     """Return rows (..., B) that go round, each started at its place (...), 0 to B - 1."""
-    whole = np.concatenate([rows, rows], axis=-1)
-    windows = np.lib.stride_tricks.sliding_window_view(whole, rows.shape[-1], axis=-1)
     # Whole rows are copied; single indices for all numbers take five times as long.
-    return np.asarray(windows[(*np.ogrid[*(slice(n) for n in places.shape)], places)])
+    return np.asarray(_turned(rows)[(*np.ogrid[*(slice(n) for n in places.shape)], places)])
+
+
+def _turned(rows: Table) -> Table:
+    """Return rows (..., B) that go round, started at each place, (..., B + 1, B): not copied."""
+    whole = np.concatenate([rows, rows], axis=-1)
+    return np.lib.stride_tricks.sliding_window_view(whole, rows.shape[-1], axis=-1)
 
 
 def _joined(rows: Table, step: int) -> Table:
     """Return distributions (..., B) over bins that are as large as `step` of before."""
     # Numpy is slow at sums over short axes.
-    return np.asarray(sum(rows[..., place::step] for place in range(step)))
+    others = (rows[..., place::step] for place in range(1, step))
+    return np.asarray(sum(others, start=rows[..., ::step]))
 
 
 @cache
