@@ -2,7 +2,9 @@
 
 The mug of the recordings in MANIFEST is rendered from the azimuths of their frames: with its true
 depth, with a first Kinect's noise, and both once more with the pixels of the real frame alone, so
-that what the camera lost there is lost here, too. See docs/reference/bundles/README.md.
+that what the camera lost there is lost here, too. Among these pixels, the rendered mug may still
+show some of its handle where the real one shows nothing of it. So both are rendered a third time,
+without a handle in these frames. See docs/reference/bundles/README.md.
 """
 
 from __future__ import annotations
@@ -41,13 +43,19 @@ VIEWS = {"1": ((3.0, 0.755),), "2": ((25.0, 0.95), (33.0, 0.95))}
 From above, 25° follows from the ellipse of the rim, and 33° from the depth along the wall.
 """
 
+NO_HANDLE_DEG = {"1": (50.0, 128.0), "2": (39.0, 159.0)}
+"""From the first to the last azimuth at which the real crops show no handle, judged by eye."""
+
+N_DRAWS = 10
+"""Draws of the sensor's noise."""
+
 _SHIFT_PX = 8
 
 Codes = NDArray[np.uint8]
 
 
-def the_mug() -> tuple[Mesh, float]:
-    """Return the mug, of unit diagonal, and its diagonal in metres."""
+def the_mug() -> tuple[Mesh, Mesh, float]:
+    """Return the mug, of unit diagonal, the same without its handle, and its diagonal in metres."""
     height = np.linspace(0.0, HEIGHT, 25)
     outer = np.stack([np.full(25, RADIUS), height], axis=-1)
     inside = outer[height > FLOOR][::-1] - (WALL, 0.0)
@@ -57,7 +65,9 @@ def the_mug() -> tuple[Mesh, float]:
     handle = sweep(_handle(), superellipse(HALF_WIDTH, HALF_THICK, 3.0, n=20), (1.0, 0.0, 0.0))
     mug: trimesh.Trimesh = join([body, handle])
     diagonal_m = float(np.linalg.norm(np.ptp(mug.vertices, axis=0)))
-    return as_mesh(normalise(mug, "+z", "+x", 0.0, "origin")), diagonal_m
+    mesh = as_mesh(normalise(mug, "+z", "+x", 0.0, "origin"))
+    # The faces of the body come first.
+    return mesh, mesh._replace(faces=mesh.faces[: len(body.faces)]), diagonal_m
 
 
 def _handle() -> Points:
@@ -86,25 +96,39 @@ def _overlap(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
     return float((one & other).sum() / (one | other).sum())
 
 
-def turns(recommender: Recommender, real: Turn) -> Iterator[tuple[float, str, str, Turn]]:
-    """Yield the elevation, whose depth, whose pixels, and the frames, of one recording."""
+def turns(recommender: Recommender, real: Turn) -> Iterator[tuple[dict[str, object], Turn]]:
+    """Yield what the frames of one recording are like, and these frames."""
+    mug, body, diagonal_m = the_mug()
+    first_deg, last_deg = NO_HANDLE_DEG[real.sequence]
+    shows_none = (real.azimuth_deg >= first_deg) & (real.azimuth_deg <= last_deg)
 
     def of(codes: list[Codes]) -> Turn:
         crops = np.stack(codes)
         return replace(real, codes=crops, logits=recommender.network(crops))
 
-    mesh, diagonal_m = the_mug()
-    for elevation_deg, distance_m in VIEWS[real.sequence]:
-        for sensor, depth in (("none", "true"), ("kinect", "noisy")):
-            crops = []
-            for seed, azimuth_deg in enumerate(real.azimuth_deg):
-                view = float(azimuth_deg), elevation_deg, distance_m, diagonal_m, seed
-                frame = draw_frame(mesh, *view, sensor=sensor)
-                crops.append(recommender.crop(frame.depth_m, intrinsics=frame.intrinsics).codes)
-            yield elevation_deg, depth, "rendered", of(crops)
-            pairs = zip(crops, real.codes, strict=True)
-            yield elevation_deg, depth, "real", of([with_pixels_of(*pair) for pair in pairs])
-    yield math.nan, "real", "real", real
+    def cut(codes: list[Codes]) -> Turn:
+        return of([with_pixels_of(*pair) for pair in zip(codes, real.codes, strict=True)])
+
+    def render(
+        meshes: list[Mesh], view: tuple[float, float], sensor: str, draw: int
+    ) -> list[Codes]:
+        crops = []
+        for place, (mesh, azimuth_deg) in enumerate(zip(meshes, real.azimuth_deg, strict=True)):
+            seed = 1000 * draw + place
+            frame = draw_frame(mesh, float(azimuth_deg), *view, diagonal_m, seed, sensor=sensor)
+            crops.append(recommender.crop(frame.depth_m, intrinsics=frame.intrinsics).codes)
+        return crops
+
+    for view in VIEWS[real.sequence]:
+        for sensor, depth, n_draws in (("none", "true", 1), ("kinect", "noisy", N_DRAWS)):
+            for draw in range(n_draws):
+                line = {"elevation_deg": view[0], "depth": depth, "draw": draw}
+                crops = render([mug] * len(shows_none), view, sensor, draw)
+                yield line | {"pixels": "rendered"}, of(crops)
+                yield line | {"pixels": "real"}, cut(crops)
+                crops = render([body if none else mug for none in shows_none], view, sensor, draw)
+                yield line | {"pixels": "real, no handle"}, cut(crops)
+    yield {"elevation_deg": math.nan, "depth": "real", "draw": 0, "pixels": "real"}, real
 
 
 def main() -> None:
@@ -115,11 +139,10 @@ def main() -> None:
         recommender = Recommender.load(name, "numpy")
         for recording in read_manifest(manifest):
             real = see(recommender, recording, None, None, _refused)
-            for elevation_deg, depth, pixels, turn in turns(recommender, real):
+            for line, turn in turns(recommender, real):
                 errors = evaluate(recommender.bundle, [turn], n_views=(2,), n_random=1)
                 mae_deg = errors.set_index("choice")["mae_deg"]
-                row = {"training": training, "sequence": real.sequence}
-                row |= {"elevation_deg": elevation_deg, "depth": depth, "pixels": pixels}
+                row = {"training": training, "sequence": real.sequence} | line
                 row |= {"one_view_deg": mae_deg[SINGLE], "two_views_deg": mae_deg[RECOMMENDED]}
                 rows.append(row)
     pd.DataFrame(rows).to_csv(sys.stdout, index=False, float_format="%.2f")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import io
 import os
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from nbv.meshes.procedural.mug import handle_reach
 ROOT = Path(__file__).parents[2]
 FRAMES = Path(os.environ.get("NBV_FRAMES", ROOT.parent / "shared/data/frames"))
 KEPT = ROOT / "docs/reference/bundles/same_shape.csv"
+NO_HANDLE = "real, no handle"
 
 LINES = {
     "rendered, true depth": ("true", "rendered"),
@@ -34,7 +36,7 @@ def tool():
 
 
 def test_the_mug_is_as_large_as_was_measured(tool):
-    mesh, diagonal_m = tool.the_mug()
+    mesh, body, diagonal_m = tool.the_mug()
     across, along, height = diagonal_m * np.ptp(mesh.vertices, axis=0)
     assert across == pytest.approx(2 * tool.RADIUS, abs=1e-4)
     # The thickest part of the handle's outline is half of it beyond the centre line.
@@ -42,6 +44,8 @@ def test_the_mug_is_as_large_as_was_measured(tool):
     assert along == pytest.approx(tool.RADIUS + outermost, abs=1e-3)
     assert height == pytest.approx(tool.HEIGHT + tool.WALL / 3, abs=1e-4)
     assert handle_reach(mesh) == pytest.approx(along / across - 1.0, abs=1e-6)
+    distance = np.linalg.norm(body.vertices[np.unique(body.faces)][:, :2], axis=1)
+    assert diagonal_m * distance.max() == pytest.approx(tool.RADIUS, abs=1e-6)
 
 
 @pytest.mark.parametrize(("down", "right"), [(0, 0), (5, -3), (-8, 8)])
@@ -62,13 +66,38 @@ def test_a_moved_crop_is_brought_back_and_filled_from_its_nearest_pixels(tool, d
 @pytest.mark.parametrize("line", LINES)
 def test_the_page_has_the_means_of_the_trainings(line):
     errors = pd.read_csv(KEPT).set_index(["depth", "pixels"]).loc[LINES[line]]
-    errors = errors[errors["elevation_deg"] != 33]
+    errors = errors[(errors["elevation_deg"] != 33) & (errors["draw"] == 0)]
     cells = [
         "{:.1f} and {:.1f}".format(*rows[["one_view_deg", "two_views_deg"]].mean())
         for _, rows in errors.groupby("sequence")
     ]
     page = (ROOT / "docs/bundles.md").read_text(encoding="utf-8").splitlines()
     assert f"| {line} | {' | '.join(cells)} |" in page
+
+
+@pytest.mark.parametrize(
+    ("line", "pixels"),
+    [("with its handle", "real"), ("without a handle where the real one shows none", NO_HANDLE)],
+)
+def test_the_page_has_the_draws_of_the_noise(line, pixels):
+    errors = pd.read_csv(KEPT).query("training == 0 and depth == 'noisy' and pixels == @pixels")
+    cells = []
+    for _, rows in errors.groupby("elevation_deg")["one_view_deg"]:
+        assert len(rows) == 10
+        cells.append(f"{rows.mean():.1f} ({rows.min():.1f} to {rows.max():.1f})")
+    page = (ROOT / "docs/bundles.md").read_text(encoding="utf-8").splitlines()
+    assert f"| {line} | {' | '.join(cells)} |" in page
+
+
+def test_the_real_frames_err_as_much_as_a_mug_without_a_handle_where_they_show_none():
+    errors = pd.read_csv(KEPT).query("training == 0").set_index(["sequence", "pixels"])
+    for sequence in (1, 2):
+        of_sequence = errors.loc[sequence].sort_index()
+        is_real = of_sequence["depth"] == "real"
+        (real,) = of_sequence.loc[is_real, "one_view_deg"]
+        drawn = of_sequence[of_sequence["depth"] == "noisy"].loc[NO_HANDLE]
+        for _, rows in drawn.groupby("elevation_deg")["one_view_deg"]:
+            assert rows.min() <= real <= rows.max()
 
 
 @pytest.mark.skipif(
@@ -80,14 +109,14 @@ def test_the_shipped_bundle_has_the_kept_errors(tool, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", ["same_shape.py", manifest, "mug"])
     _level, above = tool.read_manifest(manifest)
     monkeypatch.setattr(tool, "read_manifest", lambda _: [above])
+    monkeypatch.setattr(tool, "N_DRAWS", 1)
     monkeypatch.setattr(tool, "VIEWS", {above.sequence: tool.VIEWS[above.sequence][:1]})
     tool.main()
-    lines = capsys.readouterr().out.splitlines()
-    found = pd.DataFrame([line.split(",") for line in lines[1:]], columns=lines[0].split(","))
+    found = pd.read_csv(io.StringIO(capsys.readouterr().out), dtype=str, keep_default_na=False)
     kept = pd.read_csv(KEPT, dtype=str, keep_default_na=False).query("training == '0'")
-    keys = ["training", "sequence", "elevation_deg", "depth", "pixels"]
+    keys = ["training", "sequence", "elevation_deg", "depth", "draw", "pixels"]
     both = found.merge(kept, on=keys, suffixes=("", "_kept"))
-    assert len(both) == len(found) == 5
+    assert len(both) == len(found) == 7
     for column in ("one_view_deg", "two_views_deg"):
         errors = both[column].astype(float), both[f"{column}_kept"].astype(float)
         assert errors[0].to_numpy() == pytest.approx(errors[1].to_numpy(), abs=0.15)
