@@ -319,6 +319,21 @@ def test_a_newer_format_says_what_to_do(bundle_file, tmp_path):
     assert "install a newer nbv" in message
 
 
+def test_a_calibration_of_an_earlier_version_says_what_to_do(bundle_file, tmp_path):
+    """It had no count of the turns that the bundle was made with, and weighed them wrongly."""
+    made = load_bundle(bundle_file).provenance
+    old = dict(made) | {"calibrated_by": "own.csv"}
+    path = with_about(bundle_file, tmp_path / "a.safetensors", provenance=old)
+    message = refused(path, "older-calibration")
+    assert str(path) in message
+    assert "own.csv" in message
+    assert "calibrate again" in message
+    now = with_about(
+        bundle_file, tmp_path / "b.safetensors", provenance=old | {"turns_made_with": 4}
+    )
+    assert load_bundle(now).provenance["calibrated_by"] == "own.csv"
+
+
 def test_a_bundle_without_its_digest_is_refused(bundle_file, tmp_path):
     path = with_about(bundle_file, tmp_path / "a.safetensors", sha256="")
     assert "not the bytes that were written" in refused(path)

@@ -223,7 +223,8 @@ def load_bundle(path: str | Path) -> Bundle:
     ------
     BundleError
         ``no-bundle`` where the file is missing or another one, ``damaged-bundle`` also where it is
-        cut short, ``newer-bundle`` where it is of a newer format.
+        cut short, ``newer-bundle`` where it is of a newer format, ``older-calibration`` where a
+        camera calibrated it before `nbv.bundles.calibration.recalibrated` weighed turns as it does.
     """
     path = Path(path)
     if not path.is_file():
@@ -243,6 +244,13 @@ def load_bundle(path: str | Path) -> Bundle:
             raise ValueError("not the bytes that were written")
         bundle = _of_parts(about, arrays)
         _need_sound(bundle)
+        origin = bundle.provenance.get("calibrated_by")
+        if origin is not None and "turns_made_with" not in bundle.provenance:
+            raise BundleError(
+                "older-calibration",
+                f"{path} was calibrated with {origin} by an earlier nbv, which gave turns too "
+                "little weight: calibrate again, from the bundle that it was made of",
+            )
     except BundleError:
         raise
     # No list of what a reader may raise on arbitrary bytes is complete.
