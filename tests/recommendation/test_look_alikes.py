@@ -280,6 +280,18 @@ def test_where_no_view_is_alike_the_mean_of_all_is_expected() -> None:
     assert found.optimism_deg(np.ones(24, dtype=bool)) == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.parametrize("rotations", [[], [5]])
+def test_with_the_power_0_all_views_count_alike(
+    rng: np.random.Generator, rotations: list[int]
+) -> None:
+    alike, belief = LookAlikes.of_views(turns(rng)), turns(rng)[0, 0]
+    for turn in rotations:
+        alike = alike.after(turn)
+    found, errors = alike.expected(belief, 0.0, 0.0), alike.errors_deg.mean(axis=(0, 1))
+    assert found.after_deg == pytest.approx(errors[:-1], rel=1e-4)
+    assert found.now_deg == pytest.approx(errors[-1], rel=1e-4)
+
+
 def test_the_errors_of_a_belief_do_not_depend_on_those_before_it(rng: np.random.Generator) -> None:
     """What was found for other beliefs is kept."""
     distributions, beliefs = sharp_turns(rng, 6, 6.0), sharp_turns(rng, 1, 12.0)[0]

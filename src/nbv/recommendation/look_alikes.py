@@ -348,8 +348,8 @@ class LookAlikes:
         # A first view stands for the degrees that it is apart from the next one.
         of_view = of_turn * (360.0 / n_first)
         # Numbers below the least normal one take much longer, and count nothing.
-        least = float(np.finfo(np.float32).tiny) ** (1.0 / power)
-        weight = np.maximum(self._affinities(belief), np.float32(2 * least)) ** np.float32(power)
+        least = 2.0 * float(np.finfo(np.float32).tiny) ** (1.0 / max(power, 1.0))
+        weight = np.maximum(self._affinities(belief), np.float32(least)) ** np.float32(power)
         weight *= of_view.astype(np.float32)[:, None]
         by_part = self.is_in_part @ self._weighted_errors(weight, pseudo_observations)
         sums = by_part[-1] + pseudo_observations / of_view.sum() * (of_view @ self._mean_errors)
