@@ -292,6 +292,36 @@ def test_with_the_power_0_all_views_count_alike(
     assert found.now_deg == pytest.approx(errors[-1], rel=1e-4)
 
 
+@pytest.mark.parametrize("power", [0.01, 1.0, 16.0, 64.0, 200.0, 3000.0])
+@pytest.mark.parametrize("rotations", [[], [5]])
+def test_the_least_weights_count_as_they_are(
+    rng: np.random.Generator, power: float, rotations: list[int]
+) -> None:
+    """Whatever the power: those that are no normal number in single precision count nothing."""
+    distributions = sharp_turns(rng, 5, 6.0)
+    alike, belief = LookAlikes.of_views(distributions), distributions[2, 3]
+    for turn in rotations:
+        alike = alike.after(turn)
+    affinity = (np.sqrt(alike.seen) @ np.sqrt(belief)).astype(np.float64)
+    weight, errors = 15.0 * affinity**power, alike.errors_deg
+    mean = errors.mean(axis=(0, 1))
+    wanted = (np.tensordot(weight, errors) + 30.0 * mean) / (weight.sum() + 30.0)
+    found = alike.expected(belief, power, 30.0)
+    assert found.now_deg == pytest.approx(wanted[-1], rel=2e-3)
+    assert found.after_deg == pytest.approx(wanted[:-1], rel=2e-3)
+
+
+@pytest.mark.parametrize("most", [None, 20])
+def test_what_was_given_may_be_changed_later(rng: np.random.Generator, most: int | None) -> None:
+    distributions = turns(rng).astype(np.float32)
+    belief = distributions[1, 4].copy()
+    alike = LookAlikes.of_views(distributions, most)
+    before = alike.after(7).expected(belief, 5.0, 30.0)
+    distributions[:] = 1.0 / distributions.shape[-1]
+    after = alike.after(7).expected(belief, 5.0, 30.0)
+    assert np.array_equal(after.after_deg, before.after_deg)
+
+
 def test_the_errors_of_a_belief_do_not_depend_on_those_before_it(rng: np.random.Generator) -> None:
     """What was found for other beliefs is kept."""
     distributions, beliefs = sharp_turns(rng, 6, 6.0), sharp_turns(rng, 1, 12.0)[0]

@@ -52,8 +52,12 @@ def in_object_frame(distributions: Table) -> Table:
     View k of B has the azimuth 360 k / B; entry u of the result is the probability of the pose
     360 u / B degrees ahead of the true one.
     """
-    n_bins = distributions.shape[1]
-    return np.asarray(_turned(distributions)[:, np.arange(n_bins), np.arange(n_bins)])
+    return _in_object_frame(_doubled(distributions))
+
+
+def _in_object_frame(doubled: Table) -> Table:
+    every = np.arange(doubled.shape[1])
+    return np.ascontiguousarray(_windows(doubled)[:, every, every])
 
 
 def compared_step(n_bins: int) -> int:
@@ -141,7 +145,11 @@ def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
 def error_of_deg(distributions: Table, true: NDArray[np.intp]) -> Table:
     """Return the errors of the mean directions of distributions (..., B), degrees.
 
-    The true poses (...) are in bins.
+    Parameters
+    ----------
+    distributions : ndarray (..., B)
+    true : ndarray (...)
+        The true pose of each one, in bins.
     """
     factors = _moment_factors(distributions.shape[-1])
     real, imaginary, total = np.moveaxis(distributions @ factors.T, -1, 0)
@@ -221,21 +229,22 @@ class LookAlikes:
     ----------
     seen : ndarray (S, K, B) float32
         Distributions of the fused views, in the frames of the first views; rows sum to 1.
-    views : ndarray (S, B, B + 1, B) float32
-        Those of all single views of a turn: ``[s, k, r]`` is view k in the frame of the view r bins
-        before it.
+    doubled : ndarray (S, B, 2 B) float32
+        Distributions of the single views of each turn, in their own frames, twice in a row. From
+        place r on, B numbers are view k in the frame of view k - r.
     further : ndarray (S, step, M, B) float32
-        The same `in_object_frame`: those that are whole steps apart are together.
+        The same `in_object_frame`: ``[s, p, m]`` is view ``m * step + p`` of turn s.
     first : ndarray (S, K)
         The first views that a belief is compared with, in bins; see `first_views`.
     is_in_part : ndarray (N + 1, S)
         Whether each turn is in each part of the objects, and in all of them.
     near_deg : ndarray (S, K, M + 1), or None
-        Errors after a view at each of M rotations, and now, that count instead of those of `first`.
+        Errors after a view at each of M rotations, and now. Where they are given, they take the
+        place of the errors of the first views themselves.
     """
 
     seen: Table
-    views: Table
+    doubled: Table
     further: Table
     first: NDArray[np.intp]
     is_in_part: NDArray[np.float64]
@@ -253,27 +262,28 @@ class LookAlikes:
         ``object_ids`` (S,); without them, each is of another one. One object's turns are in one
         part of `Expected.parts`.
         """
-        own = np.asarray(distributions, dtype=np.float32)
-        n_turns, n_bins, _ = own.shape
-        by_step = in_object_frame(own).reshape(n_turns, -1, compared_step(n_bins), n_bins)
+        doubled = _doubled(np.asarray(distributions, dtype=np.float32))
+        n_turns, n_bins, _ = doubled.shape
+        own = doubled[:, :, :n_bins]
+        by_step = _in_object_frame(doubled).reshape(n_turns, -1, compared_step(n_bins), n_bins)
         further = np.ascontiguousarray(by_step.swapaxes(1, 2))
         is_in_part = _is_in_part(np.arange(n_turns) if object_ids is None else object_ids)
         every = first_views(n_turns, n_bins)
-        views = _turned(own)
-        everything = LookAlikes(own, views, further, every, is_in_part)
+        everything = LookAlikes(own, doubled, further, every, is_in_part)
         first = first_views(n_turns, n_bins, most)
         errors_deg = everything.errors_deg
         if first.shape == every.shape:
             return replace(everything, near_deg=errors_deg)
         near_deg = near_first_views(errors_deg, first)
         seen = own[np.arange(n_turns)[:, None], first]
-        return LookAlikes(seen, views, further, first, is_in_part, near_deg)
+        return LookAlikes(seen, doubled, further, first, is_in_part, near_deg)
 
     def after(self, rotation_bins: int) -> LookAlikes:
         """Return the turns after one more view, at a rotation from the first one."""
         n_turns, _, n_bins = self.seen.shape
         ahead = rotation_bins % n_bins
-        both = self.views[np.arange(n_turns)[:, None], (self.first + ahead) % n_bins, ahead]
+        places = np.arange(n_turns)[:, None], (self.first + ahead) % n_bins, ahead
+        both = np.array(_windows(self.doubled)[places])
         both *= self.seen
         # A product with 1 takes less time than a sum over short rows.
         both /= (both @ np.ones(n_bins, dtype=np.float32))[:, :, None]
@@ -285,8 +295,10 @@ class LookAlikes:
 
     @cached_property
     def error_now_deg(self) -> Table:
-        """`error_of_deg` of the turns, (S, K)."""
-        return error_of_deg(self.seen, self.first)
+        """`error_of_deg` of what was seen, by the first view, (S, K); read-only."""
+        errors = error_of_deg(self.seen, self.first)
+        errors.flags.writeable = False
+        return errors
 
     @property
     def errors_deg(self) -> Table:
@@ -304,7 +316,7 @@ class LookAlikes:
         return self._found
 
     def _find(self, turn: NDArray[np.intp], place: NDArray[np.intp]) -> Table:
-        """Return `_found` with the errors of some first views (n,) of turns (n,)."""
+        """Find the errors of first views (n,) of turns (n,), and return `_found`."""
         is_new = np.isnan(self._found[turn, place, -1])
         if is_new.any():
             new = turn[is_new], place[is_new]
@@ -347,9 +359,10 @@ class LookAlikes:
         of_turn = np.ones(n_turns) if share is None else np.asarray(share)
         # A first view stands for the degrees that it is apart from the next one.
         of_view = of_turn * (360.0 / n_first)
-        # Numbers below the least normal one take much longer, and count nothing.
-        least = 2.0 * float(np.finfo(np.float32).tiny) ** (1.0 / max(power, 1.0))
-        weight = np.maximum(self._affinities(belief), np.float32(least)) ** np.float32(power)
+        affinity = self._affinities(belief)
+        # Processors take much longer for a weight below the least normal number. It counts nothing.
+        affinity[affinity < float(np.finfo(np.float32).tiny) ** (1.0 / max(power, 1.0))] = 0.0
+        weight = affinity ** np.float32(power)
         weight *= of_view.astype(np.float32)[:, None]
         by_part = self.is_in_part @ self._weighted_errors(weight, pseudo_observations)
         sums = by_part[-1] + pseudo_observations / of_view.sum() * (of_view @ self._mean_errors)
@@ -430,14 +443,20 @@ def _and_one(errors_deg: Table) -> Table:
 
 def _started_at(rows: Table, places: NDArray[np.intp]) -> Table:
     """Return rows (..., B) that go round, each started at its place (...), 0 to B - 1."""
+    windows = _windows(_doubled(rows))
     # Whole rows are copied; single indices for all numbers take five times as long.
-    return np.asarray(_turned(rows)[(*np.ogrid[*(slice(n) for n in places.shape)], places)])
+    return np.asarray(windows[(*np.ogrid[*(slice(n) for n in places.shape)], places)])
 
 
-def _turned(rows: Table) -> Table:
-    """Return rows (..., B) that go round, started at each place, (..., B + 1, B): not copied."""
-    whole = np.concatenate([rows, rows], axis=-1)
-    return np.lib.stride_tricks.sliding_window_view(whole, rows.shape[-1], axis=-1)
+def _doubled(rows: Table) -> Table:
+    """Return rows (..., B) that go round, twice in a row, (..., 2 B)."""
+    return np.concatenate([rows, rows], axis=-1)
+
+
+def _windows(doubled: Table) -> Table:
+    """Return rows (..., 2 B), each started at every place, (..., B + 1, B): a read-only view."""
+    n_bins = doubled.shape[-1] // 2
+    return np.lib.stride_tricks.sliding_window_view(doubled, n_bins, axis=-1)
 
 
 def _joined(rows: Table, step: int) -> Table:
