@@ -283,7 +283,7 @@ class LookAlikes:
         n_turns, _, n_bins = self.seen.shape
         ahead = rotation_bins % n_bins
         places = np.arange(n_turns)[:, None], (self.first + ahead) % n_bins, ahead
-        both = np.array(_windows(self.doubled)[places])
+        both: Table = _windows(self.doubled)[places]
         both *= self.seen
         # A product with 1 takes less time than a sum over short rows.
         both /= (both @ np.ones(n_bins, dtype=np.float32))[:, :, None]
