@@ -18,7 +18,7 @@ FRAMES = Path(os.environ.get("NBV_FRAMES", ROOT.parent / "shared/data/frames"))
 KEPT = ROOT / "docs/reference/bundles/same_shape.csv"
 NO_HANDLE = "real, no handle"
 
-WITHOUT = "these pixels, no handle where the real one shows none"
+WITHOUT = "these pixels, hidden handles removed"
 LINES = {
     "rendered, true depth": ("true", "rendered"),
     "rendered, noise": ("noisy", "rendered"),
