@@ -53,6 +53,13 @@ def test_the_codes_of_known_depths():
     ]
 
 
+@given(depth=DEPTHS)
+def test_the_reference_is_the_median_bit_for_bit(depth):
+    distance = Camera().distance
+    medians = [np.median(image[image > 0]) if image.any() else distance for image in depth]
+    assert np.array_equal(reference_depth(depth, Camera()), np.array(medians, dtype=np.float32))
+
+
 def test_an_empty_image_is_all_background():
     assert not encode_depth(np.zeros((2, 4, 4), np.float32), Camera()).any()
 

@@ -126,21 +126,21 @@ def crop_frame(
     _need_plausible(distance_m, extent, diagonal_m, extent_m)
     # A pixel covers the same length on the object's middle as in training.
     away_m = distance_m + BEHIND_SURFACE * diagonal_m
-    grid = _middles(camera.image_side) * (pixel_step(camera) * diagonal_m / away_m)
-    # Rays of a camera that is directed at the object are sums of its axes. These become pixels of
-    # the window with a border of one pixel, in homogeneous coordinates.
+    step = pixel_step(camera) * diagonal_m / away_m
+    # From the pixels of a camera that is directed at the object to those of the window, which has a
+    # border of one pixel, in homogeneous coordinates: each of its axes becomes a column.
     column, row = principal[0] - window.left + 1.0, principal[1] - window.top + 1.0
-    pixels = ((intrinsics.fx * x + column * z, intrinsics.fy * y + row * z, z) for x, y, z in axes)
-    across, below, ahead = (
-        (grid * right + onward) + (grid * down)[:, None]
-        for right, down, onward in zip(*pixels, strict=True)
-    )
+    to_pixels = [
+        (intrinsics.fx * x + column * z, intrinsics.fy * y + row * z, z) for x, y, z in axes
+    ]
+    homography = np.array(to_pixels).T * (step, step, 1.0)
+    pixels = homography @ _middles(camera.image_side)
     # What lies outside the window has no depth, as its border here.
     measured = np.zeros((rows + 2, columns + 2), dtype=np.float32)
     np.copyto(measured[1:-1, 1:-1], depth_m, where=mask)
-    places = _places(below / ahead, rows) * (columns + 2) + _places(across / ahead, columns)
-    depth = measured.take(places) / (diagonal_m * ahead)
-    codes = encode_depth(depth[None].astype(np.float32), camera)[0]
+    depth = measured.take(_places(pixels, rows, columns)) / (diagonal_m * pixels[2])
+    images = depth.astype(np.float32).reshape(1, camera.image_side, camera.image_side)
+    codes = encode_depth(images, camera)[0]
     right_m, down_m, ahead_m = (away_m * part for part in towards)
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
     return Crop(codes, distance_m, extent, centre_m, intrinsics.doubts(*window.frame_shape))
@@ -148,19 +148,26 @@ def crop_frame(
 
 @cache
 def _middles(side: int) -> NDArray[np.float64]:
-    """Return the middles of a crop's pixels, from the middle of the crop, pixels."""
-    middles = np.arange(side, dtype=np.float64) + 0.5 - side / 2
+    """Return the middles of a crop's pixels, from the middle of the crop, pixels.
+
+    They are homogeneous coordinates (3, side²): columns, rows and ones.
+    """
+    along = np.arange(side, dtype=np.float64) + 0.5 - side / 2
+    middles = np.stack([np.tile(along, side), np.repeat(along, side), np.ones(side**2)])
     middles.flags.writeable = False
     return middles
 
 
-def _places(position: NDArray[np.float64], length: int) -> NDArray[np.intp]:
-    """Return the pixels of positions along an axis whose border is 0 and length + 1.
+def _places(pixels: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.intp]:
+    """Return the places (n,), row by row, of homogeneous coordinates (3, n) in a bordered window.
 
-    The positions are changed.
+    What lies beyond the border is on it: column 0 or columns + 1, row 0 or rows + 1.
     """
-    np.maximum(position, 0.0, out=position)
-    return np.minimum(position, length + 1.0, out=position).astype(np.intp)
+    positions = pixels[:2] / pixels[2]
+    np.maximum(positions, 0.0, out=positions)
+    np.minimum(positions, [[columns + 1.0], [rows + 1.0]], out=positions)
+    column, row = positions.astype(np.intp)
+    return np.asarray(row * (columns + 2) + column)
 
 
 def _facing(

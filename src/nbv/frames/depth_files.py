@@ -155,7 +155,10 @@ def to_metres(
         metres = values.astype(np.float32)
         if scale != 1.0:
             metres *= np.float32(scale)
-        return np.where(np.isfinite(metres) & (metres > 0), metres, np.float32(0))
+        # Of a number and NaN it is the number.
+        np.fmax(metres, np.float32(0), out=metres)
+    metres[metres == np.inf] = 0
+    return metres
 
 
 def _read_array(path: Path, name: str) -> NDArray[Any]:

@@ -44,11 +44,13 @@ def _reference(visible: Depths, camera: Camera) -> np.float32:
 
 
 def median_depth(visible: Depths) -> np.float32:
-    """Return the median of depths (n,): that of numpy.median, in a sixth of its time."""
-    low, high = (len(visible) - 1) // 2, len(visible) // 2
+    """Return the median of depths (n,): that of numpy.median, in less than a third of its time."""
+    middle = len(visible) // 2
     ordered = visible.copy()
-    ordered.partition((low, high))
-    return np.float32((ordered[low] + ordered[high]) / 2)
+    ordered.partition(middle)
+    # Of an even number there are two in the middle; the lower one is the largest of those before.
+    lower = ordered[middle] if len(visible) % 2 else ordered[:middle].max()
+    return np.float32((lower + ordered[middle]) / 2)
 
 
 def encode_depth(depth: Depths, camera: Camera) -> Codes:
