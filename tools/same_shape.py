@@ -141,9 +141,12 @@ def main() -> None:
             real = see(recommender, recording, None, None, _refused)
             for line, turn in turns(recommender, real):
                 errors = evaluate(recommender.bundle, [turn], n_views=(2,), n_random=1)
-                mae_deg = errors.set_index("choice")["mae_deg"]
+                errors = errors.set_index("choice")
                 row = {"training": training, "sequence": real.sequence} | line
-                row |= {"one_view_deg": mae_deg[SINGLE], "two_views_deg": mae_deg[RECOMMENDED]}
+                for suffix in ("deg", "without_offset_deg"):
+                    mae_deg = errors[f"mae_{suffix}"]
+                    row[f"one_view_{suffix}"] = mae_deg[SINGLE]
+                    row[f"two_views_{suffix}"] = mae_deg[RECOMMENDED]
                 rows.append(row)
     pd.DataFrame(rows).to_csv(sys.stdout, index=False, float_format="%.2f")
 

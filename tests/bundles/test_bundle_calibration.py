@@ -48,6 +48,11 @@ def turn(
     return Turn(name, sequence, elevation, np.asarray(azimuth_deg, float), logits, codes)
 
 
+def without_common_error(logits):
+    """The mean of views and of their mirror images at 0°: errors come in pairs, e and -e."""
+    return (logits + logits[-np.arange(len(logits))][:, -np.arange(logits.shape[1])]) / 2
+
+
 # Views a bin apart
 
 
@@ -184,7 +189,7 @@ def test_each_elevation_has_the_lookup_table_of_its_own_pairs(bundle):
 
 
 def test_a_bundle_is_calibrated_again(bundle):
-    logits = 2 * soft_turns(np.random.default_rng(5), 3)
+    logits = [without_common_error(2 * t) for t in soft_turns(np.random.default_rng(5), 3)]
     turns = [
         turn("x", logits=logits[0], elevation=10.0),
         turn("x", logits=logits[1], elevation=np.nan),
@@ -221,6 +226,20 @@ def test_a_bundle_is_calibrated_again(bundle):
     assert "calibrated_by" not in bundle.provenance
 
 
+@pytest.mark.parametrize("zero", [1.0, -9.0, 90.0])
+def test_the_zero_of_the_turntable_does_not_matter(bundle, zero):
+    """Nor whether several turns have several."""
+    turns = [turn("x", 1), turn("y", 2, azimuth_deg=AZIMUTHS + 4.0)]
+    moved = [
+        replace(turns[0], azimuth_deg=(turns[0].azimuth_deg + zero) % 360),
+        replace(turns[1], azimuth_deg=(turns[1].azimuth_deg - 2 * zero) % 360),
+    ]
+    found, wanted = (recalibrated(bundle, each, "r", ONE_DENSITY) for each in (moved, turns))
+    assert found.temperature == pytest.approx(wanted.temperature)
+    assert found.distributions == pytest.approx(wanted.distributions, abs=1e-6)
+    assert np.array_equal(found.paper.rotation_deg, wanted.paper.rotation_deg)
+
+
 def test_calibrations_one_after_the_other_weigh_turns_as_one_with_all(bundle):
     logits = 2 * soft_turns(np.random.default_rng(5), 3)
     first, *others = (turn(str(place), logits=rows) for place, rows in enumerate(logits))
@@ -243,7 +262,7 @@ def log_likelihood_at(temperature: float, logits, azimuth_deg) -> float:
 @pytest.mark.parametrize("n_turns", [1, 40])
 def test_the_temperature_is_the_likeliest_of_turns_and_of_the_bundles_own(bundle, n_turns):
     """The bundle's turns together count as `PRIOR_TURNS` of the others."""
-    logits = 3 * soft_turns(np.random.default_rng(6), n_turns)
+    logits = [without_common_error(5 * t) for t in soft_turns(np.random.default_rng(6), n_turns)]
     turns = [turn(str(place), logits=rows) for place, rows in enumerate(logits)]
     found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY).temperature
     own = [bundle.temperature * np.log(rows.astype(float)) for rows in bundle.distributions]

@@ -18,6 +18,7 @@ from made_bundles import BINS, COLUMNS, FOCAL_PX, ROWS, WIDTH, frame
 
 pytest.importorskip("cyclopts")
 
+from nbv.angles import signed_difference_deg
 from nbv.bundles.bundle import FORMAT, load_bundle, save_bundle
 from nbv.bundles.calibration import DENSITY, recalibrated
 from nbv.bundles.evaluation import evaluate, familiarity_of
@@ -423,8 +424,7 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz", "--criterion", criterion)
     head, tail = out.splitlines()
     table = pd.read_csv(pairs)
-    errors = np.radians(table["estimate_deg"] - table["azimuth_deg"])
-    offset = np.degrees(np.arctan2(np.sin(errors).mean(), np.cos(errors).mean()))
+    offset = np.median(signed_difference_deg(table["estimate_deg"], table["azimuth_deg"]))
     found = re.fullmatch(r"pairs\.csv: 2 objects; offset ([+-]\d+\.\d)°", head)
     assert float(found[1]) == pytest.approx(offset, abs=0.1)
     assert tail == f"t.npz: {criterion} from 2 objects"
@@ -509,7 +509,7 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
     )
     camera, head, warning, tail = out.splitlines()
     assert camera == ASSUMED
-    assert re.fullmatch(r"cup, sequence 1: 24 frames; offset -\d+\.\d°", head)
+    assert re.fullmatch(r"cup, sequence 1: 24 frames; offset -\d+\.\d°, taken off", head)
     # A network of random weights has no zero.
     assert warning.startswith("careful    ")
     assert tail == "own.safetensors: mug, 1 recording calibrates it"

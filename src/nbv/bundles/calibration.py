@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.angles import wrap_deg
 from nbv.bundles.beliefs import distributions_of
 from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import FAMILIAR_SHARE, unfamiliarity
 from nbv.bundles.turns import Turn
 from nbv.calibration.distributions import bin_apart
+from nbv.calibration.offset import constant_offset_deg
 from nbv.calibration.pairs import full_turn
 from nbv.calibration.posteriors import LEAST_PROBABILITY, fit_temperature
 from nbv.errors import UserError
@@ -86,6 +88,16 @@ def _paper_rotations(
     return table.recommended_delta_deg.astype(np.int16)
 
 
+def without_offset(turn: Turn, temperature: float) -> Turn:
+    """Return a turn whose azimuths count from the zero of its estimates at a temperature.
+
+    What all estimates have in common may be the zero of the turntable, and no view mends it.
+    """
+    estimate_deg = mean_direction_deg(distributions_of(turn.logits, temperature))
+    offset_deg = constant_offset_deg(estimate_deg - turn.azimuth_deg)
+    return replace(turn, azimuth_deg=wrap_deg(turn.azimuth_deg + offset_deg))
+
+
 def _bins_of(turn: Turn, temperature: float) -> NDArray[np.float32]:
     try:
         return bin_apart(turn.azimuth_deg, distributions_of(turn.logits, temperature))
@@ -122,6 +134,8 @@ def recalibrated(
 ) -> Bundle:
     """Return a bundle with the same network, calibrated by other turns, such as those of a camera.
 
+    Each turn counts `without_offset`.
+
     The familiar range and, where it is known, the focal length of frames without intrinsics are
     those of the turns. The bundle's own calibration turns stay, and count together as much as
     `PRIOR_TURNS` of the others, for the temperature too: a turn or two say too little alone. They
@@ -140,6 +154,7 @@ def recalibrated(
         See `paper_tables`.
     """
     n_made_with = bundle.provenance.get("turns_made_with", len(bundle.object_ids))
+    turns = [without_offset(turn, bundle.temperature) for turn in turns]
     of_each = np.full(len(turns), n_made_with / PRIOR_TURNS, dtype=np.float32)
     turn_weight = np.concatenate([of_each, bundle.turn_weight])
     temperature = _temperature_with_own(bundle, turns, turn_weight)

@@ -247,8 +247,8 @@ def evaluate(
     -------
     DataFrame
         ``object_id, sequence, choice, n_views, mae_deg, median_deg, above_45_percent, offset_deg,
-        mae_without_offset_deg``. The offset is the mean direction of all single-view errors of the
-        recording: what is constant may be the turntable's zero.
+        mae_without_offset_deg``. The offset is the circular median of all single-view errors of
+        the recording: what is constant may be the turntable's zero.
 
     Raises
     ------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.angles import direction_deg, signed_difference_deg
+from nbv.angles import signed_difference_deg, wrap_deg
 
 LARGE_OFFSET_DEG = 15.0
 """More than estimators err by on the whole: another zero is likelier."""
@@ -15,10 +15,23 @@ _LEAST_AGREEMENT = 0.5
 
 
 def constant_offset_deg(error_deg: ArrayLike) -> float:
-    """Return the mean direction of errors (n,), degrees in [-180, 180): what all have in common."""
-    angles = np.radians(np.asarray(error_deg, dtype=np.float64))
-    mean = direction_deg(np.cos(angles).mean(), np.sin(angles).mean())
-    return float(signed_difference_deg(mean, 0.0))
+    """Return the circular median of errors (n,), degrees in [-180, 180): what all have in common.
+
+    Without it the mean absolute error is least. A view whose pose cannot be known moves it no more
+    than another one on the same side; it would move a mean by as much as it errs.
+    """
+    error = np.sort(wrap_deg(error_deg))
+    n = len(error)
+    # The least is at one of the errors. From each one, those of the next half turn lie ahead.
+    twice = np.concatenate([error, error + 360.0])
+    sums = np.concatenate([[0.0], np.cumsum(twice)])
+    place, ahead = np.arange(n), np.searchsorted(twice, error + 180.0)
+    in_front = sums[ahead] - sums[place] - (ahead - place) * error
+    behind = (place + n - ahead) * (error + 360.0) - (sums[place + n] - sums[ahead])
+    least = error[np.argmin(in_front + behind)]
+    # Of an even number there may be two: their middle has as little.
+    median = least + np.median(signed_difference_deg(error, least))
+    return float(signed_difference_deg(median, 0.0))
 
 
 def frame_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]) -> str:

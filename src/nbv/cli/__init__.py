@@ -381,14 +381,15 @@ def calibrate(
         estimate_deg = mean_direction_deg(distributions_of(turn.logits, held.temperature))
         about = {"object_id": turn.object_id, "sequence": turn.sequence}
         counts = {"n_frames": len(estimate_deg)}
-        recordings.append(about | counts | offset_of(turn.azimuth_deg, estimate_deg))
+        offset = offset_of(turn.azimuth_deg, estimate_deg, is_taken_off=True)
+        recordings.append(about | counts | offset)
     if not json:
         # Before the tables are made, which takes up to a minute.
         if seen.n_assumed:
             say_assumed_camera(held.focal_px, seen.n_assumed)
         for one in recordings:
             name = f"{one['object_id']}, sequence {one['sequence']}"
-            say_offset(name, counted(one["n_frames"], "frame"), one)
+            say_offset(name, counted(one["n_frames"], "frame"), one, ", taken off")
         sys.stdout.flush()
     save_bundle(output, recalibrated(held, turns, str(source)))
     if json:

@@ -137,20 +137,24 @@ def say_recommendation(
 
 
 def offset_of(
-    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
+    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64], *, is_taken_off: bool
 ) -> dict[str, Any]:
-    """Return the offset that estimates have in common, and what is to be said of it."""
-    from nbv.calibration.offset import constant_offset_deg, offset_warning
+    """Return the offset that estimates have in common, and what is to be said of it.
 
+    Where it `is_taken_off`, it may be as large as it likes.
+    """
+    from nbv.calibration.offset import constant_offset_deg, frame_warning, offset_warning
+
+    warn = frame_warning if is_taken_off else offset_warning
     return {
         "offset_deg": constant_offset_deg(estimate_deg - azimuth_deg),
-        "warning": offset_warning(azimuth_deg, estimate_deg) or None,
+        "warning": warn(azimuth_deg, estimate_deg) or None,
     }
 
 
-def say_offset(name: str, number: str, offset: Mapping[str, Any]) -> None:
-    """Print `offset_of` of some recording or file."""
-    say(f"{name}: {number}; offset {offset['offset_deg']:+.1f}°")
+def say_offset(name: str, number: str, offset: Mapping[str, Any], done: str = "") -> None:
+    """Print `offset_of` of some recording or file, and what was done with it."""
+    say(f"{name}: {number}; offset {offset['offset_deg']:+.1f}°{done}")
     if offset["warning"]:
         say(f"careful    {offset['warning']}")
 

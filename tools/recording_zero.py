@@ -1,0 +1,121 @@
+"""Print where the real mug's handle is in its frames: recording_zero.py MANIFEST > zero.csv.
+
+Frames in which the handle is in front of the body say where it points, without any network. A
+circle of the mug's radius is fitted to the body, seen along the mug's axis; what is farther from
+its middle is the handle. The zero of a recording is what must be added to its azimuths so that the
+handle points at the camera at 270°. See docs/reference/bundles/README.md.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from same_shape import RADIUS, VIEWS
+from scipy.optimize import least_squares
+from scipy.stats import theilslopes
+
+from nbv.angles import signed_difference_deg
+from nbv.bundles.manifest import Recording, read_manifest
+from nbv.frames.depth_files import read_depth
+from nbv.frames.masks import object_mask
+
+IN_FRONT_DEG = 54.0
+"""The handle is seen in front of the body where the camera is at most so far from it."""
+
+HANDLE_M = (0.008, 0.035)
+"""How far from the body's wall the handle is, metres."""
+
+FOCAL_PX, REACH_M = 585.0, 0.09
+WALL_M, NOISE_M = 0.005, 0.002
+
+Points = NDArray[np.float64]
+
+
+def seen_from_the_axis(depth_m: NDArray[np.float32], elevation_deg: float) -> Points:
+    """Return the points (n, 2) of the middle of the mug: to the right, and away from the camera."""
+    rows, columns = np.nonzero(object_mask(depth_m, REACH_M))
+    away = depth_m[rows, columns].astype(np.float64)
+    # The frame is taken to be centred on the mug: what it is off by turns all points alike.
+    right = (columns + 0.5 - depth_m.shape[1] / 2) * away / FOCAL_PX
+    down = (rows + 0.5 - depth_m.shape[0] / 2) * away / FOCAL_PX
+    sine, cosine = np.sin(np.radians(elevation_deg)), np.cos(np.radians(elevation_deg))
+    below = away * sine + down * cosine
+    low, high = np.quantile(below, (0.3, 0.85))
+    points = np.stack([right, away * cosine - down * sine], axis=1)
+    return points[(below >= low) & (below <= high)]
+
+
+def body_axis(points: Points) -> Points:
+    """Return the middle (2,) of the circle of `RADIUS` on whose near side most points lie."""
+    right, away = points.T
+    middle = np.array([(right.min() + right.max()) / 2, np.quantile(away, 0.6) + 0.6 * RADIUS])
+    nearest_m = 2 * WALL_M
+    for _ in range(10):
+        wall = np.abs(np.hypot(*(points - middle).T) - RADIUS) < nearest_m
+        on_wall = points[wall & (away < middle[1])]
+        middle = least_squares(
+            lambda place, wall=on_wall: np.hypot(*(wall - place).T) - RADIUS,
+            middle,
+            loss="soft_l1",
+            f_scale=NOISE_M,
+        ).x
+        nearest_m = WALL_M
+    return middle
+
+
+def handle_deg(points: Points) -> tuple[float, int]:
+    """Return where the handle points, degrees from the direction to the camera, and its pixels.
+
+    Positive where the camera has to move counter-clockwise, seen from above, to face it.
+    """
+    middle = body_axis(points)
+    beyond = np.hypot(*(points - middle).T) - RADIUS
+    near, far = HANDLE_M
+    handle = points[(beyond > near) & (beyond < far) & (points[:, 1] < middle[1])]
+    right, away = handle.mean(axis=0) - middle
+    to_camera, to_handle = np.arctan2(-middle[0], middle[1]), np.arctan2(right, -away)
+    return float(np.degrees(to_handle - to_camera)), len(handle)
+
+
+def zero_deg(azimuth_deg: NDArray[np.float64], of_handle_deg: NDArray[np.float64]) -> float:
+    """Return what must be added to azimuths (n,) so that the handle points at the camera at 270°.
+
+    From a straight line of medians (Theil and Sen): a frame with a wrong azimuth hardly moves it.
+    """
+    from_front = signed_difference_deg(azimuth_deg, 270.0)
+    slope, at_270_deg, *_ = theilslopes(of_handle_deg, from_front, method="joint")
+    return float(at_270_deg / slope)
+
+
+def handles(recording: Recording, elevation_deg: float) -> pd.DataFrame:
+    """Return where the handle points in each frame that has it in front of the body."""
+    is_seen = np.abs(signed_difference_deg(recording.azimuth_deg, 270.0)) <= IN_FRONT_DEG
+    paths, azimuth_deg = recording.frames["path"][is_seen], recording.azimuth_deg[is_seen]
+    found = [handle_deg(seen_from_the_axis(read_depth(path), elevation_deg)) for path in paths]
+    direction_deg, n_pixels = (np.array(column) for column in zip(*found, strict=True))
+    table = {
+        "sequence": recording.sequence,
+        "elevation_deg": elevation_deg,
+        "zero_deg": zero_deg(azimuth_deg, direction_deg),
+        "azimuth_deg": azimuth_deg,
+        "handle_deg": direction_deg,
+        "n_pixels": n_pixels,
+    }
+    return pd.DataFrame(table)
+
+
+def main() -> None:
+    """Print a table of the frames of all recordings."""
+    tables = [
+        handles(recording, elevation_deg)
+        for recording in read_manifest(sys.argv[1])
+        for elevation_deg, _ in VIEWS[recording.sequence]
+    ]
+    pd.concat(tables).to_csv(sys.stdout, index=False, float_format="%.2f")
+
+
+if __name__ == "__main__":
+    main()
