@@ -1,9 +1,10 @@
 """Print where the real mug's handle is in its frames: recording_zero.py MANIFEST > zero.csv.
 
-Frames in which the handle is in front of the body say where it points, without any network. A
-circle of the mug's radius is fitted to the body, seen along the mug's axis; what is farther from
-its middle is the handle. The zero of a recording is what must be added to its azimuths so that the
-handle points at the camera at 270°. See docs/reference/bundles/README.md.
+Depth says where the handle points, without any network. A circle of the mug's radius is fitted to
+the body, seen along the mug's axis; what is farther from its middle is the handle. The zero of a
+recording is what must be added to its azimuths so that the handle points at the camera at 270°; the
+frames with the handle in front of the body say it. The same is measured in frames of a mug of this
+shape that are drawn from there. See docs/reference/bundles/README.md.
 """
 
 from __future__ import annotations
@@ -13,20 +14,21 @@ import sys
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from same_shape import RADIUS, VIEWS
+from same_shape import RADIUS, VIEWS, the_mug
 from scipy.optimize import least_squares
 from scipy.stats import theilslopes
 
-from nbv.angles import signed_difference_deg
+from nbv.angles import signed_difference_deg, wrap_deg
 from nbv.bundles.manifest import Recording, read_manifest
 from nbv.frames.depth_files import read_depth
-from nbv.frames.masks import object_mask
+from nbv.frames.drawn import draw_frame
+from nbv.frames.masks import object_mask, window_of
 
 IN_FRONT_DEG = 54.0
 """The handle is seen in front of the body where the camera is at most so far from it."""
 
-HANDLE_M = (0.008, 0.035)
-"""How far from the body's wall the handle is, metres."""
+HANDLE_M, LEAST_PIXELS = (0.008, 0.035), 15
+"""How far from the body's wall the handle is, metres, and how many pixels are enough."""
 
 FOCAL_PX, REACH_M = 585.0, 0.09
 WALL_M, NOISE_M = 0.005, 0.002
@@ -66,18 +68,21 @@ def body_axis(points: Points) -> Points:
     return middle
 
 
-def handle_deg(points: Points) -> tuple[float, int]:
-    """Return where the handle points, degrees from the direction to the camera, and its pixels.
+def handle_deg(depth_m: NDArray[np.float32], elevation_deg: float) -> float:
+    """Return where the handle points, degrees from the direction to the camera; NaN if unseen.
 
     Positive where the camera has to move counter-clockwise, seen from above, to face it.
     """
+    points = seen_from_the_axis(depth_m, elevation_deg)
     middle = body_axis(points)
     beyond = np.hypot(*(points - middle).T) - RADIUS
     near, far = HANDLE_M
-    handle = points[(beyond > near) & (beyond < far) & (points[:, 1] < middle[1])]
+    handle = points[(beyond > near) & (beyond < far)]
+    if len(handle) < LEAST_PIXELS:
+        return np.nan
     right, away = handle.mean(axis=0) - middle
     to_camera, to_handle = np.arctan2(-middle[0], middle[1]), np.arctan2(right, -away)
-    return float(np.degrees(to_handle - to_camera)), len(handle)
+    return float(np.degrees(to_handle - to_camera))
 
 
 def zero_deg(azimuth_deg: NDArray[np.float64], of_handle_deg: NDArray[np.float64]) -> float:
@@ -90,19 +95,25 @@ def zero_deg(azimuth_deg: NDArray[np.float64], of_handle_deg: NDArray[np.float64
     return float(at_270_deg / slope)
 
 
-def handles(recording: Recording, elevation_deg: float) -> pd.DataFrame:
-    """Return where the handle points in each frame that has it in front of the body."""
-    is_seen = np.abs(signed_difference_deg(recording.azimuth_deg, 270.0)) <= IN_FRONT_DEG
-    paths, azimuth_deg = recording.frames["path"][is_seen], recording.azimuth_deg[is_seen]
-    found = [handle_deg(seen_from_the_axis(read_depth(path), elevation_deg)) for path in paths]
-    direction_deg, n_pixels = (np.array(column) for column in zip(*found, strict=True))
+def handles(recording: Recording, elevation_deg: float, distance_m: float) -> pd.DataFrame:
+    """Return where the handle points in each frame, and in drawn ones, with the zero."""
+    azimuth_deg = recording.azimuth_deg
+    found = [handle_deg(read_depth(path), elevation_deg) for path in recording.frames["path"]]
+    is_in_front = np.abs(signed_difference_deg(azimuth_deg, 270.0)) <= IN_FRONT_DEG
+    zero = zero_deg(azimuth_deg[is_in_front], np.array(found)[is_in_front])
+    mug, _, diagonal_m = the_mug()
+    drawn = []
+    for place, at_deg in enumerate(wrap_deg(azimuth_deg + zero).tolist()):
+        view = at_deg, elevation_deg, distance_m, diagonal_m
+        frame = draw_frame(mug, *view, place, sensor="kinect")
+        drawn.append(handle_deg(frame.depth_m[window_of(frame.mask)[1]], elevation_deg))
     table = {
         "sequence": recording.sequence,
         "elevation_deg": elevation_deg,
-        "zero_deg": zero_deg(azimuth_deg, direction_deg),
+        "zero_deg": zero,
         "azimuth_deg": azimuth_deg,
-        "handle_deg": direction_deg,
-        "n_pixels": n_pixels,
+        "handle_deg": found,
+        "drawn_handle_deg": drawn,
     }
     return pd.DataFrame(table)
 
@@ -110,9 +121,9 @@ def handles(recording: Recording, elevation_deg: float) -> pd.DataFrame:
 def main() -> None:
     """Print a table of the frames of all recordings."""
     tables = [
-        handles(recording, elevation_deg)
+        handles(recording, *view)
         for recording in read_manifest(sys.argv[1])
-        for elevation_deg, _ in VIEWS[recording.sequence]
+        for view in VIEWS[recording.sequence]
     ]
     pd.concat(tables).to_csv(sys.stdout, index=False, float_format="%.2f")
 
