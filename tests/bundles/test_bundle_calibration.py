@@ -19,6 +19,7 @@ from nbv.bundles.calibration import (
     paper_tables,
     recalibrated,
     temperature_of,
+    without_offset,
 )
 from nbv.bundles.familiarity import unfamiliarity
 from nbv.bundles.recommender import Recommender
@@ -238,6 +239,28 @@ def test_the_zero_of_the_turntable_does_not_matter(bundle, zero):
     assert found.temperature == pytest.approx(wanted.temperature)
     assert found.distributions == pytest.approx(wanted.distributions, abs=1e-6)
     assert np.array_equal(found.paper.rotation_deg, wanted.paper.rotation_deg)
+
+
+@pytest.mark.parametrize("temperature", [0.2, 1.0])
+def test_the_offset_is_that_of_the_estimates_at_the_temperature(temperature):
+    given = turn("x", 1, azimuth_deg=AZIMUTHS + 4.0)
+    estimates = mean_direction_deg(distributions_of(given.logits, temperature))
+    errors = (estimates - given.azimuth_deg + 180) % 360 - 180
+    wanted = (given.azimuth_deg + np.median(errors)) % 360
+    found = without_offset(given, temperature).azimuth_deg
+    assert circular_distance_deg(found, wanted).max() < 1e-9
+
+
+@pytest.mark.parametrize("azimuth_deg", [-AZIMUTHS, np.radians(AZIMUTHS), 7.0 * AZIMUTHS])
+def test_azimuths_that_estimates_do_not_follow_stay(azimuth_deg):
+    given = replace(turn("x", 1), azimuth_deg=azimuth_deg % 360)
+    assert without_offset(given, 1.0) is given
+
+
+def test_azimuths_in_radians_are_named_for_a_bundle_too(bundle):
+    given = replace(turn("x", 1), azimuth_deg=np.radians(AZIMUTHS))
+    with pytest.raises(UserError, match="these azimuths seem to be radians"):
+        recalibrated(bundle, [given], "r", ONE_DENSITY)
 
 
 def test_calibrations_one_after_the_other_weigh_turns_as_one_with_all(bundle):

@@ -27,6 +27,7 @@ from nbv.bundles.moves import check_axis, elevation_from_gravity, moved_camera
 from nbv.bundles.recommender import Recommender
 from nbv.calibration.pairs import read_pairs
 from nbv.cli import main
+from nbv.cli.answers import offset_of_frames, say_offset
 from nbv.cli.arguments import as_paragraphs
 from nbv.frames.depth_files import read_depth
 from nbv.recommendation.criteria import CRITERIA
@@ -509,7 +510,7 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
     )
     camera, head, warning, tail = out.splitlines()
     assert camera == ASSUMED
-    assert re.fullmatch(r"cup, sequence 1: 24 frames; offset -\d+\.\d°, taken off", head)
+    assert re.fullmatch(r"cup, sequence 1: 24 frames; offset -\d+\.\d°", head)
     # A network of random weights has no zero.
     assert warning.startswith("careful    ")
     assert tail == "own.safetensors: mug, 1 recording calibrates it"
@@ -529,7 +530,8 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
     }
     assert f"{recording.pop('offset_deg'):+.1f}°" in head
     assert f"careful    {recording.pop('warning')}" == warning
-    assert recording == {"object_id": "cup", "sequence": "1", "n_frames": 24}
+    own = {"object_id": "cup", "sequence": "1", "n_frames": 24, "is_added": False}
+    assert recording == own
     assert Path("json.safetensors").read_bytes() == Path("wanted.safetensors").read_bytes()
     printed = json.loads(
         run(capsys, "recommend", "f0.npy", "--bundle", "own.safetensors", "--json")
@@ -632,6 +634,30 @@ def test_pairs_in_another_frame_are_told(pairs, capsys, change, warning):
         (line,) = told
         assert line.startswith("careful    ")
         assert warning in line
+
+
+@pytest.mark.parametrize(
+    ("change", "is_added", "warning"),
+    [
+        (lambda azimuth: azimuth + 14, True, None),
+        (lambda azimuth: azimuth - 90, True, "an offset of -90.0° is another zero"),
+        (lambda azimuth: azimuth + 170 * (azimuth > 80), True, "is each frame's azimuth right?"),
+        (lambda azimuth: -azimuth, False, "estimates fall where azimuths grow"),
+        (lambda azimuth: np.radians(azimuth), False, "estimates are radians"),
+    ],
+)
+def test_an_offset_of_frames_is_added_and_a_large_one_told(capsys, change, is_added, warning):
+    azimuth_deg = np.arange(0.0, 360.0, 10.0)
+    found = offset_of_frames(azimuth_deg, change(azimuth_deg) % 360)
+    say_offset("cup", "36 frames", found)
+    head, *told = capsys.readouterr().out.splitlines()
+    assert head.endswith(", added to the azimuths") == found["is_added"] == is_added
+    if warning is None:
+        assert not told
+        assert found["warning"] is None
+    else:
+        assert told == [f"careful    {found['warning']}"]
+        assert warning in told[0]
 
 
 # Evaluate

@@ -60,6 +60,12 @@ def test_the_reference_is_the_median_bit_for_bit(depth):
     assert np.array_equal(reference_depth(depth, Camera()), np.array(medians, dtype=np.float32))
 
 
+def test_the_lower_of_two_middle_depths_is_found_wherever_it_lies():
+    """With this seed numpy's partition leaves it in another place than before the upper one."""
+    depth = np.random.default_rng(64).uniform(2, 3, 770).astype(np.float32)
+    assert reference_depth(depth.reshape(1, 1, -1), Camera()) == np.median(depth)
+
+
 def test_an_empty_image_is_all_background():
     assert not encode_depth(np.zeros((2, 4, 4), np.float32), Camera()).any()
 

@@ -15,7 +15,7 @@ from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.familiarity import FAMILIAR_SHARE, unfamiliarity
 from nbv.bundles.turns import Turn
 from nbv.calibration.distributions import bin_apart
-from nbv.calibration.offset import constant_offset_deg
+from nbv.calibration.offset import constant_offset_deg, frame_warning
 from nbv.calibration.pairs import full_turn
 from nbv.calibration.posteriors import LEAST_PROBABILITY, fit_temperature
 from nbv.errors import UserError
@@ -91,9 +91,12 @@ def _paper_rotations(
 def without_offset(turn: Turn, temperature: float) -> Turn:
     """Return a turn whose azimuths count from the zero of its estimates at a temperature.
 
-    What all estimates have in common may be the zero of the turntable, and no view mends it.
+    What all estimates have in common may be the zero of the turntable, and no view mends it. The
+    turn itself where `nbv.calibration.offset.frame_warning` says that estimates do not follow it.
     """
     estimate_deg = mean_direction_deg(distributions_of(turn.logits, temperature))
+    if frame_warning(turn.azimuth_deg, estimate_deg):
+        return turn
     offset_deg = constant_offset_deg(estimate_deg - turn.azimuth_deg)
     return replace(turn, azimuth_deg=wrap_deg(turn.azimuth_deg + offset_deg))
 

@@ -59,7 +59,12 @@ def frame_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.flo
     )
 
 
-def offset_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]) -> str:
+def offset_warning(
+    azimuth_deg: NDArray[np.float64],
+    estimate_deg: NDArray[np.float64],
+    what_to_do: str = "subtract it from the estimates, or add it to the azimuths, and calibrate "
+    "again",
+) -> str:
     """Return what is wrong with the frame of calibration pairs (n,); nothing where all is well.
 
     A lookup table made of pairs whose estimates count from another zero, or the other way round,
@@ -69,10 +74,7 @@ def offset_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.fl
         return warning
     offset = constant_offset_deg(estimate_deg - azimuth_deg)
     if abs(offset) > LARGE_OFFSET_DEG:
-        return (
-            f"an offset of {offset:+.1f}° is another zero rather than an error: subtract it from "
-            "the estimates, or add it to the azimuths, and calibrate again"
-        )
+        return f"an offset of {offset:+.1f}° is another zero rather than an error: {what_to_do}"
     return ""
 
 

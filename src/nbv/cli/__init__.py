@@ -19,7 +19,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from nbv import __version__
 from nbv.cli.answers import (
-    offset_of,
+    offset_of_frames,
     recommendation_as_json,
     say,
     say_assumed_camera,
@@ -381,7 +381,7 @@ def calibrate(
         estimate_deg = mean_direction_deg(distributions_of(turn.logits, held.temperature))
         about = {"object_id": turn.object_id, "sequence": turn.sequence}
         counts = {"n_frames": len(estimate_deg)}
-        offset = offset_of(turn.azimuth_deg, estimate_deg, is_taken_off=True)
+        offset = offset_of_frames(turn.azimuth_deg, estimate_deg)
         recordings.append(about | counts | offset)
     if not json:
         # Before the tables are made, which takes up to a minute.
@@ -389,7 +389,7 @@ def calibrate(
             say_assumed_camera(held.focal_px, seen.n_assumed)
         for one in recordings:
             name = f"{one['object_id']}, sequence {one['sequence']}"
-            say_offset(name, counted(one["n_frames"], "frame"), one, ", taken off")
+            say_offset(name, counted(one["n_frames"], "frame"), one)
         sys.stdout.flush()
     save_bundle(output, recalibrated(held, turns, str(source)))
     if json:

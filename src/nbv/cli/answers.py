@@ -137,23 +137,36 @@ def say_recommendation(
 
 
 def offset_of(
-    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64], *, is_taken_off: bool
+    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
 ) -> dict[str, Any]:
-    """Return the offset that estimates have in common, and what is to be said of it.
+    """Return the offset that estimates have in common, and what is to be said of it."""
+    from nbv.calibration.offset import constant_offset_deg, offset_warning
 
-    Where it `is_taken_off`, it may be as large as it likes.
-    """
-    from nbv.calibration.offset import constant_offset_deg, frame_warning, offset_warning
-
-    warn = frame_warning if is_taken_off else offset_warning
     return {
         "offset_deg": constant_offset_deg(estimate_deg - azimuth_deg),
-        "warning": warn(azimuth_deg, estimate_deg) or None,
+        "warning": offset_warning(azimuth_deg, estimate_deg) or None,
     }
 
 
-def say_offset(name: str, number: str, offset: Mapping[str, Any], done: str = "") -> None:
-    """Print `offset_of` of some recording or file, and what was done with it."""
+def offset_of_frames(
+    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Return `offset_of` of a turn, and whether calibration adds it to the azimuths."""
+    from nbv.calibration.offset import frame_warning, offset_warning
+
+    what_to_do = (
+        "calibration adds it to the azimuths, and the bundle's answers keep its own zero; is each "
+        "frame's azimuth right?"
+    )
+    return offset_of(azimuth_deg, estimate_deg) | {
+        "is_added": not frame_warning(azimuth_deg, estimate_deg),
+        "warning": offset_warning(azimuth_deg, estimate_deg, what_to_do) or None,
+    }
+
+
+def say_offset(name: str, number: str, offset: Mapping[str, Any]) -> None:
+    """Print `offset_of` or `offset_of_frames` of some recording or file."""
+    done = ", added to the azimuths" if offset.get("is_added") else ""
     say(f"{name}: {number}; offset {offset['offset_deg']:+.1f}°{done}")
     if offset["warning"]:
         say(f"careful    {offset['warning']}")
