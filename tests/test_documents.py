@@ -34,6 +34,7 @@ TERMS = (
         "mirror plane",
         "calibration turn",
         "recording",
+        "offset",
         "expected error",
         "unfamiliarity",
     ),
