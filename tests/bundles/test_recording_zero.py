@@ -34,7 +34,8 @@ def printed(tool, manifest, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("sensor", "offset", "within"), [("none", 3.0, 0.5), ("kinect", -10.0, 1.0)]
+    ("sensor", "offset", "within"),
+    [("none", 3.0, 0.5), pytest.param("kinect", -10.0, 1.0, marks=pytest.mark.slow)],
 )
 def test_the_zero_of_drawn_frames_is_found(
     tool, tmp_path, capsys, monkeypatch, sensor, offset, within

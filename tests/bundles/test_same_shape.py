@@ -92,6 +92,7 @@ def test_from_above_the_real_mug_errs_as_one_without_a_handle_where_it_shows_non
             assert f"{rows.min():.1f} to {rows.max():.1f}°" in page
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     not (FRAMES / "manifest.csv").is_file(), reason="the recordings are not here: NBV_FRAMES"
 )
