@@ -30,8 +30,12 @@ IN_FRONT_DEG = 54.0
 HANDLE_M, LEAST_PIXELS = (0.008, 0.035), 15
 """How far from the body's wall the handle is, metres, and how many pixels are enough."""
 
-FOCAL_PX, REACH_M = 585.0, 0.09
+FOCAL_PX = 585.0
+REACH_M = 0.09
+"""How far the mug reaches behind its nearest point, metres."""
+
 WALL_M, NOISE_M = 0.005, 0.002
+"""How far from the circle the wall's points may be, and usually are, metres."""
 
 Points = NDArray[np.float64]
 

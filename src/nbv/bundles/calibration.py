@@ -91,8 +91,8 @@ def _paper_rotations(
 def without_offset(turn: Turn, temperature: float) -> Turn:
     """Return a turn whose azimuths count from the zero of its estimates at a temperature.
 
-    What all estimates have in common may be the zero of the turntable, and no view mends it. The
-    turn itself where `nbv.calibration.offset.frame_warning` says that estimates do not follow it.
+    What all estimates have in common may be the zero of the turntable, and no view mends it. Where
+    estimates do not follow azimuths (`frame_warning`), the turn stays as it is.
     """
     estimate_deg = mean_direction_deg(distributions_of(turn.logits, temperature))
     if frame_warning(turn.azimuth_deg, estimate_deg):

@@ -10,6 +10,12 @@ from nbv.angles import signed_difference_deg, wrap_deg
 LARGE_OFFSET_DEG = 15.0
 """More than estimators err by on the whole: another zero is likelier."""
 
+FOR_PAIRS = "subtract it from the estimates, or add it to the azimuths, and calibrate again"
+FOR_FRAMES = (
+    "calibration adds it to the azimuths, and the bundle's answers keep its own zero; is each "
+    "frame's azimuth right?"
+)
+
 _LEAST_AGREEMENT = 0.5
 """Length of the mean of unit vectors; that of uniformly random differences is near 0."""
 
@@ -60,15 +66,13 @@ def frame_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.flo
 
 
 def offset_warning(
-    azimuth_deg: NDArray[np.float64],
-    estimate_deg: NDArray[np.float64],
-    what_to_do: str = "subtract it from the estimates, or add it to the azimuths, and calibrate "
-    "again",
+    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64], what_to_do: str
 ) -> str:
     """Return what is wrong with the frame of calibration pairs (n,); nothing where all is well.
 
-    A lookup table made of pairs whose estimates count from another zero, or the other way round,
-    recommends rotations for poses that the object does not have.
+    What is to be done about a large offset is `FOR_PAIRS` or `FOR_FRAMES`. A lookup table made of
+    pairs whose estimates count from another zero, or the other way round, recommends rotations for
+    poses that the object does not have.
     """
     if warning := frame_warning(azimuth_deg, estimate_deg):
         return warning

@@ -136,36 +136,38 @@ def say_recommendation(
     say_target(targets)
 
 
-def offset_of(
+def offset_of_pairs(
     azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
 ) -> dict[str, Any]:
     """Return the offset that estimates have in common, and what is to be said of it."""
-    from nbv.calibration.offset import constant_offset_deg, offset_warning
+    from nbv.calibration.offset import FOR_PAIRS
 
-    return {
-        "offset_deg": constant_offset_deg(estimate_deg - azimuth_deg),
-        "warning": offset_warning(azimuth_deg, estimate_deg) or None,
-    }
+    return _offset_of(azimuth_deg, estimate_deg, FOR_PAIRS)
 
 
 def offset_of_frames(
     azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
 ) -> dict[str, Any]:
-    """Return `offset_of` of a turn, and whether calibration adds it to the azimuths."""
-    from nbv.calibration.offset import frame_warning, offset_warning
+    """Return the same of a turn, and whether calibration adds the offset to its azimuths."""
+    from nbv.calibration.offset import FOR_FRAMES, frame_warning
 
-    what_to_do = (
-        "calibration adds it to the azimuths, and the bundle's answers keep its own zero; is each "
-        "frame's azimuth right?"
-    )
-    return offset_of(azimuth_deg, estimate_deg) | {
-        "is_added": not frame_warning(azimuth_deg, estimate_deg),
+    found = _offset_of(azimuth_deg, estimate_deg, FOR_FRAMES)
+    return found | {"is_added": not frame_warning(azimuth_deg, estimate_deg)}
+
+
+def _offset_of(
+    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64], what_to_do: str
+) -> dict[str, Any]:
+    from nbv.calibration.offset import constant_offset_deg, offset_warning
+
+    return {
+        "offset_deg": constant_offset_deg(estimate_deg - azimuth_deg),
         "warning": offset_warning(azimuth_deg, estimate_deg, what_to_do) or None,
     }
 
 
 def say_offset(name: str, number: str, offset: Mapping[str, Any]) -> None:
-    """Print `offset_of` or `offset_of_frames` of some recording or file."""
+    """Print `offset_of_pairs` or `offset_of_frames` of some recording or file."""
     done = ", added to the azimuths" if offset.get("is_added") else ""
     say(f"{name}: {number}; offset {offset['offset_deg']:+.1f}°{done}")
     if offset["warning"]:

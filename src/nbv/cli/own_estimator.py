@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nbv.cli.answers import (
-    offset_of,
+    offset_of_pairs,
     recommendation_as_json,
     say,
     say_json,
@@ -57,7 +57,7 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
     lookup = chosen_lookup(estimates, criterion, DENSITY)
     save_lookup(output, lookup, given.arrays() if given else None)
     pairs = read_pair_rows(source)
-    offset = offset_of(pairs["azimuth_deg"].to_numpy(), pairs["estimate_deg"].to_numpy())
+    offset = offset_of_pairs(pairs["azimuth_deg"].to_numpy(), pairs["estimate_deg"].to_numpy())
     number = counted(len(estimates), "object")
     about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)} | offset
     if given is None:
@@ -68,7 +68,7 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
         say(f"{output}: {criterion} from {number}")
         return
     azimuths, rows = (np.concatenate(parts) for parts in zip(*turns.values(), strict=True))
-    of_means = offset_of(azimuths, mean_direction_deg(rows))
+    of_means = offset_of_pairs(azimuths, mean_direction_deg(rows))
     of_means["warning"] = of_means["warning"] or given.warning or None
     if as_json:
         about["distributions"] = {"temperature": given.temperature} | of_means
