@@ -27,6 +27,11 @@ def test_training_depends_on_the_network_and_not_on_rendering_or_criteria():
     assert not any(name.startswith(("rendering/", "recommendation/")) for name in found)
 
 
+def test_an_edit_of_the_configuration_package_trains_nothing_again():
+    for script in ("train_estimator.py", "pretrain_network.py", "train_bundle.py"):
+        assert not [name for name in names(script) if name.startswith("config/")]
+
+
 def test_what_reads_another_programs_pairs_trains_nothing_again():
     readers = {"calibration/pairs.py", "calibration/distributions.py"}
     assert readers <= names("take_estimates.py")

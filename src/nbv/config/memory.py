@@ -18,8 +18,8 @@ from nbv.errors import UserError
 LARGEST_NODE_BYTES = 4 * 2**40
 """More than a node of any cluster has; jobs that run elsewhere are compared with it."""
 
-INFERENCE_BATCH = 256
-"""Images that a network estimates at once: more take longer, and more memory."""
+# `nbv.estimation.inference.INFERENCE_BATCH`, which is not imported: torch would come with it.
+_INFERENCE_BATCH = 256
 
 _VIEWS = 360
 _UNITS = ("B", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB")
@@ -112,7 +112,7 @@ def needs(settings: Mapping[str, Any], n_objects: int) -> list[Need]:
         # The parameters, their gradients, and AdamW's two moments, all float32.
         Need("training", network, 4 * 4 * n_parameters(estimator, side)),
         Need("training", ("estimator.batch_size", *layers), batch * of_an_image * number_bytes),
-        Need("estimating", layers, INFERENCE_BATCH * widest * number_bytes),
+        Need("estimating", layers, _INFERENCE_BATCH * widest * number_bytes),
         # Draws, their cells and counts; or counts, their weights and 1,001 quantiles.
         Need(
             "resampling",

@@ -8,7 +8,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from nbv.config.memory import INFERENCE_BATCH
 from nbv.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.estimation.hardware import Hardware
@@ -16,6 +15,9 @@ from nbv.estimation.images import to_input
 from nbv.estimation.networks import kind_of
 from nbv.estimation.outputs import Outputs
 from nbv.estimation.weights import Estimator
+
+INFERENCE_BATCH = 256
+"""Images that a network estimates at once: more take longer, and more memory."""
 
 
 def outputs_of_parts(
