@@ -43,8 +43,8 @@ compare: $(READY)
 bundles: $(READY)
 	$(BIN)/snakemake --cores $(CORES) bundles --config experiment=bundles estimator=classifier \
 		randomisation=camera sensor=kinect
-	mkdir -p src/nbv/bundles/shipped
-	cp results/bundles-classifier/bundles/mug.safetensors src/nbv/bundles/shipped/
+	mkdir -p src/nbv/robot/shipped
+	cp results/bundles-classifier/bundles/mug.safetensors src/nbv/robot/shipped/
 
 reference: $(READY)
 	$(BIN)/snakemake --cores $(CORES) reference

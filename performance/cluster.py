@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nbv.config import read_configuration
-from nbv.reporting.runtime import load_measured
+from nbv.experiment.config import read_configuration
+from nbv.experiment.report.runtime import load_measured
 
 REFERENCE = Path(__file__).parents[1] / "docs/reference/paper"
 OF_UNIT = ("lookup", "evaluate_baselines", "evaluate_recommended")

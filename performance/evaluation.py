@@ -12,12 +12,12 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from nbv.angles import circular_distance_deg
-from nbv.calibration.estimates import Estimates
-from nbv.experiments.two_views import COLUMNS, evaluate_method
-from nbv.recommendation.evidence import gather_evidence
-from nbv.recommendation.fusion import average
-from nbv.recommendation.lookup import LookupTable, build_lookup
+from nbv.core.angles import circular_distance_deg
+from nbv.core.estimates import Estimates
+from nbv.core.evidence import gather_evidence
+from nbv.core.fusion import average
+from nbv.core.lookup import LookupTable, build_lookup
+from nbv.experiment.two_views import COLUMNS, evaluate_method
 from performance.figures import Figure, Target
 from performance.lookup import calibration_estimates
 from performance.settings import configuration

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from nbv.recommendation.belief import first_belief, updated
-from nbv.recommendation.criteria import CRITERIA, FOR_TWO_ESTIMATORS
-from nbv.recommendation.evidence import Evidence, gather_evidence
-from nbv.recommendation.fusion import ESTIMATE_FUSIONS
-from nbv.recommendation.lookup import build_lookup
-from nbv.recommendation.next_views import COARSE_BINS, recommended_next
+from nbv.core.belief import first_belief, updated
+from nbv.core.criteria import CRITERIA, FOR_TWO_ESTIMATORS
+from nbv.core.evidence import Evidence, gather_evidence
+from nbv.core.fusion import ESTIMATE_FUSIONS
+from nbv.core.lookup import build_lookup
+from nbv.core.next_views import COARSE_BINS, recommended_next
 from performance.figures import Figure, Target
 from performance.lookup import calibration_estimates
 from performance.settings import configuration

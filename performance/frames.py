@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from nbv.bundles.bundle import Bundle, load_bundle
-from nbv.bundles.recommender import Recommender, bundle_path
-from nbv.estimation.hardware import use_one_thread
-from nbv.estimation.networks import build_network
-from nbv.frames.drawn import Frame, example_frame
+from nbv.experiment.estimation.hardware import use_one_thread
+from nbv.experiment.estimation.networks import build_network
 from nbv.labels import counted
+from nbv.robot.bundle import Bundle, load_bundle
+from nbv.robot.recommender import Recommender, bundle_path
+from nbv.robot.synthetic import Frame, example_frame
 from performance.figures import Figure, Target
 from performance.timing import take_turns
 
@@ -34,7 +34,7 @@ _ROTATIONS_DEG = [*range(20, 340, 20)]
 
 _START = """
 import sys, numpy as np
-from nbv.bundles.recommender import Recommender
+from nbv.robot.recommender import Recommender
 answer = Recommender.load("mug", sys.argv[1]).recommend(np.load(sys.argv[2]))
 assert "torch" not in sys.modules
 """

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nbv.estimation.hardware import choose_hardware, use_one_thread
-from nbv.estimation.training import train_network
-from nbv.recommendation.density_selection import chosen_lookup
-from nbv.recommendation.evidence import gather_evidence
-from nbv.recommendation.lookup import build_lookup
-from nbv.rendering import open_renderer
-from nbv.rendering.camera import Camera
+from nbv.core.density_selection import chosen_lookup
+from nbv.core.evidence import gather_evidence
+from nbv.core.lookup import build_lookup
+from nbv.data.camera import Camera
+from nbv.data.renderers import open_renderer
+from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+from nbv.experiment.estimation.training import train_network
 from performance.figures import Figure
 from performance.lookup import calibration_estimates
 from performance.settings import configuration

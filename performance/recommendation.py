@@ -8,18 +8,18 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from nbv.estimation.hardware import Hardware, choose_hardware, use_one_thread
-from nbv.estimation.images import to_input
-from nbv.estimation.inference import estimate_azimuth
-from nbv.estimation.networks import build_network
-from nbv.estimation.weights import Estimator
-from nbv.meshes.normalisation import normalise
-from nbv.meshes.procedural import generate
-from nbv.recommendation.evidence import gather_evidence
-from nbv.recommendation.lookup import build_lookup
-from nbv.rendering import open_renderer
-from nbv.rendering.camera import Camera
-from nbv.rendering.depth_codes import encode_depth
+from nbv.core.evidence import gather_evidence
+from nbv.core.lookup import build_lookup
+from nbv.data.camera import Camera
+from nbv.data.depth_codes import encode_depth
+from nbv.data.normalisation import normalise
+from nbv.data.procedural import generate
+from nbv.data.renderers import open_renderer
+from nbv.experiment.estimation.hardware import Hardware, choose_hardware, use_one_thread
+from nbv.experiment.estimation.images import to_input
+from nbv.experiment.estimation.inference import estimate_azimuth
+from nbv.experiment.estimation.networks import build_network
+from nbv.experiment.estimation.weights import Estimator
 from performance.figures import Figure, Target
 from performance.lookup import calibration_estimates
 from performance.settings import configuration

@@ -13,10 +13,10 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
+from nbv.data.camera import Camera, object_views
+from nbv.data.procedural import CATEGORIES
+from nbv.data.renderers import open_renderer
 from nbv.errors import UserError
-from nbv.meshes.procedural import CATEGORIES
-from nbv.rendering import open_renderer
-from nbv.rendering.camera import Camera, object_views
 from performance.figures import Figure, Target
 from performance.solids import object_with_faces
 from performance.timing import Turns, on_one_core, take_turns
@@ -94,7 +94,7 @@ def plain_pyrender(mesh: trimesh.Trimesh, azimuths_deg: ArrayLike) -> Depths:
     """Return depth images as pyrender's documentation has them drawn, framed like the project's."""
     import pyrender
 
-    from nbv.rendering.pyrender import _offscreen, _pose  # a process can have one context only
+    from nbv.data.pyrender import _offscreen, _pose  # a process can have one context only
 
     views = object_views(mesh.vertices, mesh.faces, 0.0, azimuths_deg, CAMERA)
     offscreen = _offscreen()

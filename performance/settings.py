@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from nbv.config import load_config
+from nbv.experiment.config import load_config
 
 ROOT = Path(__file__).parents[1]
 

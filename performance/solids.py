@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from nbv.meshes.normalisation import normalise
-from nbv.meshes.procedural import generate
+from nbv.data.normalisation import normalise
+from nbv.data.procedural import generate
 
 
 def object_with_faces(category: str, n_faces: int, index: int = 0) -> trimesh.Trimesh:

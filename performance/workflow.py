@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.config import read_configuration
-from nbv.config.memory import training_objects
 from nbv.errors import UserError
-from nbv.estimation.hardware import choose_hardware, use_one_thread
-from nbv.estimation.training import STEPS_TAKEN
+from nbv.experiment.config import read_configuration
+from nbv.experiment.config.memory import training_objects
+from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+from nbv.experiment.estimation.training import STEPS_TAKEN
+from nbv.experiment.layout import Layout
+from nbv.experiment.report.runtime import efficiency
 from nbv.files import read_csv
-from nbv.layout import Layout
-from nbv.reporting.runtime import efficiency
 from performance.figures import Figure, Target
 from performance.settings import ROOT
 from performance.training import N_VIEWS, bare_and_own

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from nbv.depth_images import DepthImages
-from nbv.estimation.hardware import Hardware
-from nbv.estimation.networks import build_network
-from nbv.estimation.weights import Estimator
+from nbv.data.depth_images import DepthImages
+from nbv.experiment.estimation.hardware import Hardware
+from nbv.experiment.estimation.networks import build_network
+from nbv.experiment.estimation.weights import Estimator
 
 SETTINGS = {
     "kind": "regressor",

@@ -9,13 +9,13 @@ import torch
 import yaml
 from numpy.typing import NDArray
 
-from nbv.bundles.beliefs import distributions_of
-from nbv.bundles.bundle import Bundle, PaperTables, as_kept
-from nbv.bundles.familiarity import fit_familiarity
-from nbv.bundles.turns import Turn
-from nbv.calibration.distributions import bin_apart
-from nbv.estimation.networks import build_network
-from nbv.rendering.camera import Camera
+from nbv.core.beliefs import distributions_of
+from nbv.data.camera import Camera
+from nbv.experiment.estimation.networks import build_network
+from nbv.robot.bundle import Bundle, PaperTables, as_kept
+from nbv.robot.ood import fit_familiarity
+from nbv.robot.pair_distributions import bin_apart
+from nbv.robot.sweeps import Turn
 
 CONFIG = Path(__file__).parents[1] / "config"
 BINS = 24

@@ -67,9 +67,9 @@ BANNED = {
 ALLOWED = {
     "docs/glossary.md": ("beyond the paper",),
     "docs/reference/extensions/README.md": ("docs/reference/beyond",),
-    "src/nbv/config/schema.py": ('"contenders"', '"beside"', '"reading"'),
+    "src/nbv/experiment/config/schema.py": ('"contenders"', '"beside"', '"reading"'),
     # Tests of the messages that name the new key.
-    "tests/test_config.py": ("contenders", "beside", ".reading", '"reading"'),
+    "tests/experiment/test_config.py": ("contenders", "beside", ".reading", '"reading"'),
     "tests/workflow/test_messages.py": ("contenders",),
 }
 TREES = ("src", "workflow", "config", "docs", "tests", "performance", "profiles")

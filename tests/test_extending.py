@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nbv.recommendation.belief import every_belief
+from core.made import evidence_of
+from nbv.core.belief import every_belief
 from projects import Project
-from recommendation.made import evidence_of
 
 TEXT = (Path(__file__).parents[1] / "docs/extending.md").read_text("utf-8")
 EXAMPLE = TEXT.partition("## Add a criterion")[2].partition("\n## ")[0]
@@ -62,7 +62,7 @@ def test_the_example_adds_a_method_to_the_leaderboard_and_trains_nothing(scratch
     package = scratch.folder / name[1]
     criteria = package.with_name("__init__.py")
     replace_line(criteria, entry)
-    last = "from nbv.recommendation.evidence import Evidence, Table"
+    last = "from nbv.core.evidence import Evidence, Table"
     replace_line(criteria, f"{last}\n{imported}")
     replace_line(scratch.folder / "config/config.yaml", configuration)
 

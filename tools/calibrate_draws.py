@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from nbv.bundles.bundle import Bundle
-from nbv.bundles.calibration import DENSITY, recalibrated
-from nbv.bundles.evaluation import OPPOSITE, baselines, follow, recommended, seen_by
-from nbv.bundles.making import turns_of
-from nbv.bundles.next_view import after_rotations
-from nbv.bundles.recommender import Recommender
-from nbv.bundles.turns import Turn
-from nbv.depth_images import open_depth
+from nbv.data.depth_images import open_depth
+from nbv.experiment.make_bundle import turns_of
+from nbv.robot.bundle import Bundle
+from nbv.robot.calibration import DENSITY, recalibrated
+from nbv.robot.evaluation import OPPOSITE, baselines, follow, recommended, seen_by
+from nbv.robot.next_view import after_rotations
+from nbv.robot.recommender import Recommender
+from nbv.robot.sweeps import Turn
 
 N_DRAWS = 13
 N_CALIBRATING = (1, 2, 5, 20)

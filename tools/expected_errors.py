@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.angles import circular_distance_deg
-from nbv.bundles.beliefs import fused
-from nbv.bundles.bundle import Bundle
-from nbv.bundles.next_view import AfterRotations, after_rotations, next_view
-from nbv.bundles.recommender import Recommender, turn_share
-from nbv.bundles.rotations import MIN_SEPARATION_DEG
-from nbv.recommendation.belief import mean_direction_deg
+from nbv.core.angles import circular_distance_deg
+from nbv.core.belief import mean_direction_deg
+from nbv.core.beliefs import fused
+from nbv.robot.bundle import Bundle
+from nbv.robot.next_view import AfterRotations, after_rotations, next_view
+from nbv.robot.recommender import Recommender, turn_share
+from nbv.robot.rotations import MIN_SEPARATION_DEG
 
 EVERY = 5
 """Bins between the first views of a turn."""

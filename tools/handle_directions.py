@@ -13,8 +13,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from nbv.angles import signed_difference_deg
-from nbv.meshes.store import Mesh, load_meshes
+from nbv.core.angles import signed_difference_deg
+from nbv.data.meshes import Mesh, load_meshes
 
 N_POINTS, N_SLICES, N_DIRECTIONS, LEAST_POINTS = 40_000, 12, 36, 200
 # Distances from the body's axis, in its radii: a wall is nearer, and a handle farther.

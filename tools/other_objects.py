@@ -11,14 +11,14 @@ import sys
 import numpy as np
 import pandas as pd
 
-from nbv.angles import circular_distance_deg
-from nbv.bundles.evaluation import LARGE_ERROR_DEG
-from nbv.bundles.recommender import Recommender
+from nbv.core.angles import circular_distance_deg
+from nbv.data.meshes import as_mesh
+from nbv.data.normalisation import normalise
+from nbv.data.procedural import CATEGORIES, generate
 from nbv.errors import UserError
-from nbv.frames.drawn import draw_frame
-from nbv.meshes.normalisation import normalise
-from nbv.meshes.procedural import CATEGORIES, generate
-from nbv.meshes.store import as_mesh
+from nbv.robot.evaluation import LARGE_ERROR_DEG
+from nbv.robot.recommender import Recommender
+from nbv.robot.synthetic import draw_frame
 
 N_OBJECTS, N_VIEWS = 24, 3
 

@@ -18,11 +18,11 @@ from same_shape import RADIUS, VIEWS, the_mug
 from scipy.optimize import least_squares
 from scipy.stats import theilslopes
 
-from nbv.angles import signed_difference_deg, wrap_deg
-from nbv.bundles.manifest import Recording, read_manifest
-from nbv.frames.depth_files import read_depth
-from nbv.frames.drawn import draw_frame
-from nbv.frames.masks import object_mask, window_of
+from nbv.core.angles import signed_difference_deg, wrap_deg
+from nbv.robot.depth_files import read_depth
+from nbv.robot.masks import object_mask, window_of
+from nbv.robot.recordings import Recording, read_manifest
+from nbv.robot.synthetic import draw_frame
 
 IN_FRONT_DEG = 54.0
 """The handle is seen in front of the body where the camera is at most so far from it."""

@@ -21,17 +21,17 @@ import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from nbv.angles import wrap_deg
-from nbv.bundles.evaluation import RECOMMENDED, SINGLE, evaluate
-from nbv.bundles.manifest import read_manifest, see
-from nbv.bundles.recommender import Recommender
-from nbv.bundles.turns import Turn
-from nbv.frames.drawn import draw_frame
-from nbv.frames.errors import FrameError
-from nbv.meshes.normalisation import normalise
-from nbv.meshes.procedural.assembly import join
-from nbv.meshes.procedural.solids import Points, revolve, superellipse, sweep
-from nbv.meshes.store import Mesh, as_mesh
+from nbv.core.angles import wrap_deg
+from nbv.data.meshes import Mesh, as_mesh
+from nbv.data.normalisation import normalise
+from nbv.data.procedural.assembly import join
+from nbv.data.procedural.solids import Points, revolve, superellipse, sweep
+from nbv.robot.errors import FrameError
+from nbv.robot.evaluation import RECOMMENDED, SINGLE, evaluate
+from nbv.robot.recommender import Recommender
+from nbv.robot.recordings import read_manifest, see
+from nbv.robot.sweeps import Turn
+from nbv.robot.synthetic import draw_frame
 
 RADIUS, HEIGHT, WALL, FLOOR = 0.0385, 0.078, 0.0035, 0.006
 """Of the body, metres, as measured in the level recording; wall and floor are usual ones."""

@@ -23,55 +23,55 @@ from typing import TYPE_CHECKING, Any
 
 # What type checkers see of the names below.
 if TYPE_CHECKING:
-    from nbv.bundles.bundle import BundleError as BundleError
-    from nbv.bundles.distribution_tables import DistributionTable as DistributionTable
-    from nbv.bundles.moves import check_axis as check_axis
-    from nbv.bundles.moves import moved_camera as moved_camera
-    from nbv.bundles.next_view import Move as Move
-    from nbv.bundles.next_view import Recommendation as Recommendation
-    from nbv.bundles.recommender import Recommender as Recommender
-    from nbv.calibration.density import Conditionals as Conditionals
-    from nbv.calibration.density import conditionals as conditionals
+    from nbv.core.density import Conditionals as Conditionals
+    from nbv.core.density import conditionals as conditionals
+    from nbv.core.evidence import Evidence as Evidence
+    from nbv.core.evidence import gather_evidence as gather_evidence
+    from nbv.core.fusion import average as average
+    from nbv.core.fusion import posterior as posterior
+    from nbv.core.lookup import LookupTable as LookupTable
+    from nbv.core.lookup import build_lookup as build_lookup
+    from nbv.core.lookup import load_lookup as load_lookup
+    from nbv.core.lookup import save_lookup as save_lookup
     from nbv.errors import UserError as UserError
-    from nbv.frames.depth_files import read_depth as read_depth
-    from nbv.frames.drawn import example_frame as example_frame
-    from nbv.frames.errors import FrameError as FrameError
-    from nbv.frames.intrinsics import Intrinsics as Intrinsics
-    from nbv.recommendation.evidence import Evidence as Evidence
-    from nbv.recommendation.evidence import gather_evidence as gather_evidence
-    from nbv.recommendation.fusion import average as average
-    from nbv.recommendation.fusion import posterior as posterior
-    from nbv.recommendation.lookup import LookupTable as LookupTable
-    from nbv.recommendation.lookup import build_lookup as build_lookup
-    from nbv.recommendation.lookup import load_lookup as load_lookup
-    from nbv.recommendation.lookup import save_lookup as save_lookup
+    from nbv.robot.bundle import BundleError as BundleError
+    from nbv.robot.depth_files import read_depth as read_depth
+    from nbv.robot.distribution_table import DistributionTable as DistributionTable
+    from nbv.robot.errors import FrameError as FrameError
+    from nbv.robot.intrinsics import Intrinsics as Intrinsics
+    from nbv.robot.moves import check_axis as check_axis
+    from nbv.robot.moves import moved_camera as moved_camera
+    from nbv.robot.next_view import Move as Move
+    from nbv.robot.next_view import Recommendation as Recommendation
+    from nbv.robot.recommender import Recommender as Recommender
+    from nbv.robot.synthetic import example_frame as example_frame
 
 __version__ = "0.1.0"
 
 # Names and not imports: `import nbv` stays quick, and no job depends on all of these modules.
 _MODULES = {
-    "Recommender": "nbv.bundles.recommender",
-    "Recommendation": "nbv.bundles.next_view",
-    "Move": "nbv.bundles.next_view",
-    "DistributionTable": "nbv.bundles.distribution_tables",
-    "moved_camera": "nbv.bundles.moves",
-    "check_axis": "nbv.bundles.moves",
-    "BundleError": "nbv.bundles.bundle",
-    "FrameError": "nbv.frames.errors",
-    "Intrinsics": "nbv.frames.intrinsics",
-    "read_depth": "nbv.frames.depth_files",
-    "example_frame": "nbv.frames.drawn",
-    "Conditionals": "nbv.calibration.density",
-    "conditionals": "nbv.calibration.density",
+    "Recommender": "nbv.robot.recommender",
+    "Recommendation": "nbv.robot.next_view",
+    "Move": "nbv.robot.next_view",
+    "DistributionTable": "nbv.robot.distribution_table",
+    "moved_camera": "nbv.robot.moves",
+    "check_axis": "nbv.robot.moves",
+    "BundleError": "nbv.robot.bundle",
+    "FrameError": "nbv.robot.errors",
+    "Intrinsics": "nbv.robot.intrinsics",
+    "read_depth": "nbv.robot.depth_files",
+    "example_frame": "nbv.robot.synthetic",
+    "Conditionals": "nbv.core.density",
+    "conditionals": "nbv.core.density",
     "UserError": "nbv.errors",
-    "Evidence": "nbv.recommendation.evidence",
-    "gather_evidence": "nbv.recommendation.evidence",
-    "average": "nbv.recommendation.fusion",
-    "posterior": "nbv.recommendation.fusion",
-    "LookupTable": "nbv.recommendation.lookup",
-    "build_lookup": "nbv.recommendation.lookup",
-    "load_lookup": "nbv.recommendation.lookup",
-    "save_lookup": "nbv.recommendation.lookup",
+    "Evidence": "nbv.core.evidence",
+    "gather_evidence": "nbv.core.evidence",
+    "average": "nbv.core.fusion",
+    "posterior": "nbv.core.fusion",
+    "LookupTable": "nbv.core.lookup",
+    "build_lookup": "nbv.core.lookup",
+    "load_lookup": "nbv.core.lookup",
+    "save_lookup": "nbv.core.lookup",
 }
 
 __all__ = list(_MODULES)

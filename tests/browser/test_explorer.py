@@ -13,17 +13,17 @@ import pytest
 
 import synthetic
 from conftest import UNITS
-from nbv.angles import circular_distance_deg
-from nbv.calibration.density import Conditionals
-from nbv.calibration.posteriors import posteriors_of, write_posteriors
-from nbv.layout import Layout
-from nbv.recommendation.belief import coarser, first_belief, mean_direction_deg, updated
-from nbv.recommendation.criteria import CRITERIA
-from nbv.recommendation.evidence import Evidence
-from nbv.recommendation.lookup import load_lookup
-from nbv.recommendation.next_views import bisecting_next, recommended_next
-from nbv.reporting.explorer import ExplorerInputs, build_explorer
-from nbv.reporting.explorer.tables import page_table
+from nbv.core.angles import circular_distance_deg
+from nbv.core.belief import coarser, first_belief, mean_direction_deg, updated
+from nbv.core.criteria import CRITERIA
+from nbv.core.density import Conditionals
+from nbv.core.evidence import Evidence
+from nbv.core.lookup import load_lookup
+from nbv.core.next_views import bisecting_next, recommended_next
+from nbv.core.posteriors import posteriors_of, write_posteriors
+from nbv.experiment.explorer import ExplorerInputs, build_explorer
+from nbv.experiment.explorer.tables import page_table
+from nbv.experiment.layout import Layout
 
 METHODS = synthetic.METHODS
 EXPLORED = (("mug", 0), ("mug", 30), ("chair", 0))

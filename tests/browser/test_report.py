@@ -10,16 +10,16 @@ import pytest
 
 import synthetic
 from conftest import UNITS
-from nbv.experiments.run_size import too_small
-from nbv.paper.verdicts import evaluate_claims
-from nbv.reporting.paper.claims import claims_table
-from nbv.reporting.paper.figures import FIGURES, FigureInputs, build_figure
-from nbv.reporting.paper.tables import TABLES, build_table
-from nbv.reporting.report import build_report
-from nbv.reporting.runtime import load_jobs, runtime_table
-from nbv.reporting.settings import ReportSettings
-from nbv.reporting.style import save_figure
-from nbv.reporting.table import write_table
+from nbv.experiment.paper.verdicts import evaluate_claims
+from nbv.experiment.report.claims import claims_table
+from nbv.experiment.report.figures import FIGURES, FigureInputs, build_figure
+from nbv.experiment.report.page import build_report
+from nbv.experiment.report.runtime import load_jobs, runtime_table
+from nbv.experiment.report.settings import ReportSettings
+from nbv.experiment.report.table import write_table
+from nbv.experiment.report.tables import TABLES, build_table
+from nbv.experiment.run_size import too_small
+from nbv.robot.style import save_figure
 
 WIDTHS = (390, 768, 1280)
 N_FOLDS = 3

@@ -46,7 +46,7 @@ class Reader:
 
 
 def dataset(name: str, root: Path) -> Any:
-    from nbv.meshes.sources import open_source
+    from nbv.data.sources import open_source
 
     settings = yaml.safe_load((ROOT / "config" / "dataset" / f"{name}.yaml").read_text())
     return open_source({**settings, "root": str(root)}, 0)
@@ -106,8 +106,8 @@ def meshes_problem(meshes: Mapping[str, Any]) -> str:
 def make_meshes(path: Path) -> None:
     import trimesh
 
-    from nbv.meshes.normalisation import normalise
-    from nbv.meshes.store import save_meshes
+    from nbv.data.meshes import save_meshes
+    from nbv.data.normalisation import normalise
 
     box = normalise(trimesh.creation.box((1, 2, 3)), "+z", "+x", 0.0, "box")
     ball = normalise(trimesh.creation.icosphere(subdivisions=1), "+z", "+x", 0.0, "box")
@@ -115,7 +115,7 @@ def make_meshes(path: Path) -> None:
 
 
 def read_meshes(path: Path) -> Any:
-    from nbv.meshes.store import load_meshes
+    from nbv.data.meshes import load_meshes
 
     return load_meshes(path)
 
@@ -141,14 +141,14 @@ def metadata_problem(objects: Any) -> str:
 
 
 def make_splits(path: Path) -> None:
-    from nbv.calibration.splits import make_splits as divide
+    from nbv.experiment.splits import make_splits as divide
     from nbv.files import write_csv
 
     write_csv(path, divide(IDS, 3, 0.3, np.random.default_rng(0)))
 
 
 def read_splits(path: Path) -> Any:
-    from nbv.calibration import splits
+    from nbv.experiment import splits
 
     return splits.read_splits(path)
 
@@ -167,14 +167,14 @@ def splits_problem(splits: pd.DataFrame) -> str:
 
 
 def make_estimates(path: Path) -> None:
-    from nbv.calibration.estimates import Estimates, write_estimates
+    from nbv.core.estimates import Estimates, write_estimates
 
     estimate_deg = np.random.default_rng(0).uniform(0, 360, (len(IDS), 8))
     write_estimates(path, Estimates(IDS, estimate_deg))
 
 
 def read_estimates(path: Path) -> Any:
-    from nbv.calibration import estimates
+    from nbv.core import estimates
 
     return estimates.read_estimates(path)
 
@@ -187,8 +187,8 @@ def estimates_problem(estimates: Any) -> str:
 
 
 def make_evaluation(path: Path) -> None:
-    from nbv.calibration.estimates import Estimates
-    from nbv.experiments.two_views import evaluate_method
+    from nbv.core.estimates import Estimates
+    from nbv.experiment.two_views import evaluate_method
     from nbv.files import write_csv
 
     rng = np.random.default_rng(0)
@@ -197,7 +197,7 @@ def make_evaluation(path: Path) -> None:
 
 
 def read_evaluation(path: Path) -> Any:
-    from nbv.experiments import results
+    from nbv.experiment import results
 
     return results.read_evaluation(path)
 
@@ -212,7 +212,7 @@ def make_claims(path: Path) -> None:
 
 
 def read_claims(path: Path) -> Any:
-    from nbv.reference.store import read_verdicts
+    from nbv.experiment.reference.store import read_verdicts
 
     return read_verdicts(path.parent)
 
@@ -231,7 +231,7 @@ def densities(n_bins: int) -> np.ndarray:
 
 
 def make_lookup(path: Path) -> None:
-    from nbv.recommendation.lookup import LookupTable, save_lookup
+    from nbv.core.lookup import LookupTable, save_lookup
 
     table, delta = densities(36).astype(np.float32), np.arange(0, 360, 10, dtype=np.int64)
     save_lookup(
@@ -241,7 +241,7 @@ def make_lookup(path: Path) -> None:
 
 
 def read_lookup(path: Path) -> Any:
-    from nbv.recommendation.lookup import load_lookup
+    from nbv.core.lookup import load_lookup
 
     return load_lookup(path)
 
@@ -260,14 +260,14 @@ def lookup_problem(table: Any) -> str:
 
 
 def make_posteriors(path: Path) -> None:
-    from nbv.calibration.posteriors import posteriors_of, write_posteriors
+    from nbv.core.posteriors import posteriors_of, write_posteriors
 
     logits = np.random.default_rng(0).normal(size=(len(IDS), 8, 36))
     write_posteriors(path, posteriors_of(IDS, logits, 1.3))
 
 
 def read_posteriors(path: Path) -> Any:
-    from nbv.calibration import posteriors
+    from nbv.core import posteriors
 
     return posteriors.read_posteriors(path, IDS)
 
@@ -282,14 +282,14 @@ def posteriors_problem(posteriors: Any) -> str:
 
 
 def make_depth(path: Path) -> None:
-    from nbv.depth_images import write_depth
+    from nbv.data.depth_images import write_depth
 
     codes = np.random.default_rng(0).integers(0, 256, (len(IDS), 8, 6, 6), dtype=np.uint8)
     write_depth(path.with_suffix(".npy"), path.with_suffix(".json"), IDS, codes, codes.shape[1:])
 
 
 def read_depth(path: Path) -> Any:
-    from nbv.depth_images import open_depth
+    from nbv.data.depth_images import open_depth
 
     images = open_depth(path.with_suffix(".npy"), path.with_suffix(".json"))
     return images._replace(codes=np.asarray(images.codes))
@@ -305,9 +305,9 @@ def depth_problem(images: Any) -> str:
 def make_estimator(path: Path) -> None:
     import torch
 
-    from nbv.estimation.hardware import choose_hardware
-    from nbv.estimation.networks import build_network
-    from nbv.estimation.weights import Estimator, save_estimator
+    from nbv.experiment.estimation.hardware import choose_hardware
+    from nbv.experiment.estimation.networks import build_network
+    from nbv.experiment.estimation.weights import Estimator, save_estimator
 
     torch.manual_seed(0)
     settings = yaml.safe_load((ROOT / "config" / "estimator" / "regressor.yaml").read_text())
@@ -316,8 +316,8 @@ def make_estimator(path: Path) -> None:
 
 
 def read_estimator(path: Path) -> Any:
-    from nbv.estimation.hardware import choose_hardware
-    from nbv.estimation.weights import load_estimator
+    from nbv.experiment.estimation.hardware import choose_hardware
+    from nbv.experiment.estimation.weights import load_estimator
 
     return load_estimator(path, choose_hardware("cpu"))
 
@@ -336,7 +336,7 @@ def make_configuration(path: Path) -> None:
 
 
 def read_run_configuration(path: Path) -> Any:
-    from nbv.config import read_configuration
+    from nbv.experiment.config import read_configuration
 
     return read_configuration(path.parent)
 
@@ -350,7 +350,7 @@ def make_config(path: Path) -> None:
 
 
 def read_config(path: Path) -> Any:
-    from nbv.config import load_config
+    from nbv.experiment.config import load_config
 
     return load_config(path.parent)
 

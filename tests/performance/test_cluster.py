@@ -18,8 +18,8 @@ from performance.cluster import (
     work_s,
 )
 
-from nbv.config import read_configuration
-from nbv.reporting.runtime import load_measured
+from nbv.experiment.config import read_configuration
+from nbv.experiment.report.runtime import load_measured
 
 SECONDS = st.floats(0.1, 500)
 SIZES = st.builds(

@@ -16,9 +16,9 @@ from performance.solids import object_with_faces
 from performance.timing import Turns, growth_exponent, median_ratio, take_turns
 from performance.workflow import cost, steps_from_random_weights, utilisation
 
-from nbv.estimation.training import STEPS_TAKEN
+from nbv.experiment.estimation.training import STEPS_TAKEN
+from nbv.experiment.report.runtime import load_jobs, summarise_jobs
 from nbv.files import write_csv, write_text
-from nbv.reporting.runtime import load_jobs, summarise_jobs
 
 
 def test_a_quick_run_writes_a_list_of_figures(tmp_path, capsys):

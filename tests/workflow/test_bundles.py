@@ -10,15 +10,15 @@ import pandas as pd
 import pytest
 from safetensors import safe_open
 
-from nbv.bundles.bundle import load_bundle
-from nbv.bundles.evaluation import evaluate
-from nbv.bundles.manifest import read_manifest, see
-from nbv.bundles.recommender import Recommender
 from nbv.cli import main
-from nbv.frames.depth_files import write_depth
-from nbv.frames.drawn import example_frame
-from nbv.meshes.procedural import generate
-from nbv.meshes.store import load_meshes
+from nbv.data.meshes import load_meshes
+from nbv.data.procedural import generate
+from nbv.robot.bundle import load_bundle
+from nbv.robot.depth_files import write_depth
+from nbv.robot.evaluation import evaluate
+from nbv.robot.recommender import Recommender
+from nbv.robot.recordings import read_manifest, see
+from nbv.robot.synthetic import example_frame
 from projects import TINY, Project, copy_of_project, finished_project
 
 pytestmark = pytest.mark.slow
@@ -69,7 +69,7 @@ def test_a_bundle_needs_a_classifier(fresh: Project) -> None:
 
 
 def test_an_edit_of_the_renderer_renders_a_bundles_images_again(made: Project) -> None:
-    path = made.folder / "src/nbv/rendering/embree.py"
+    path = made.folder / "src/nbv/data/embree.py"
     text = path.read_text()
     assert made.would_run(*CAMERA[len(TINY) :], targets=("bundles",)) == {}
     path.write_text(text + "\n\nEDITED = True\n")

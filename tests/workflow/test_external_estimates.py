@@ -9,14 +9,14 @@ import pandas as pd
 import pytest
 from scipy.special import log_softmax
 
-from nbv.angles import circular_distance_deg
-from nbv.bundles.calibration import DENSITY
-from nbv.calibration.density import conditionals
-from nbv.calibration.posteriors import fit_temperature
 from nbv.cli import main
-from nbv.recommendation.belief import mean_direction_deg
-from nbv.recommendation.fusion import product
-from nbv.recommendation.lookup import load_lookup
+from nbv.core.angles import circular_distance_deg
+from nbv.core.belief import mean_direction_deg
+from nbv.core.density import conditionals
+from nbv.core.fusion import product
+from nbv.core.lookup import load_lookup
+from nbv.core.posteriors import fit_temperature
+from nbv.robot.calibration import DENSITY
 from projects import TINY, Project, copy_of_project
 
 pytestmark = pytest.mark.slow

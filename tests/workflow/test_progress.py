@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from nbv.jobs import ERASE_LINE
+from nbv.experiment.jobs import ERASE_LINE
 from projects import ROOT
 
 pytestmark = pytest.mark.slow

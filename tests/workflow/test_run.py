@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from snakemake.utils import Paramspace
+from studies.ablation import ablation_space
 
-from nbv.experiments.ablation import ablation_space
 from projects import TINY
 
 pytestmark = pytest.mark.slow
@@ -140,13 +140,13 @@ def test_another_seed_reruns_everything(finished):
 
 
 def test_an_edit_of_a_metric_reruns_what_reads_errors(scratch):
-    metrics = scratch.folder / "src/nbv/statistics/metrics.py"
+    metrics = scratch.folder / "src/nbv/experiment/statistics/metrics.py"
     metrics.write_text(metrics.read_text() + "\n\nEDITED = True\n")
     assert scratch.would_run() == {"settings": 1, **SHOWN}
 
 
 def test_an_edit_of_a_criterion_leaves_training_alone(scratch):
-    criteria = scratch.folder / "src/nbv/recommendation/criteria/pose_ambiguity.py"
+    criteria = scratch.folder / "src/nbv/core/criteria/pose_ambiguity.py"
     criteria.write_text(criteria.read_text() + "\n\nEDITED = True\n")
     jobs = scratch.would_run()
     assert jobs["lookup"] == 4
@@ -159,7 +159,7 @@ def test_the_explorer_is_made_on_request_of_what_a_finished_run_has(finished):
 
 
 def test_a_comment_elsewhere_reruns_nothing(scratch):
-    for name in ("src/nbv/rendering/pyrender.py", "Snakefile", "config/config.yaml"):
+    for name in ("src/nbv/data/pyrender.py", "Snakefile", "config/config.yaml"):
         path = scratch.folder / name
         path.write_text(path.read_text() + "\n# a remark\n")
     assert scratch.would_run() == {}
@@ -174,7 +174,7 @@ def test_more_views_and_view_sphere_name_the_extension_that_they_need(scratch):
 
 
 def test_touching_a_source_file_reruns_nothing(scratch):
-    (scratch.folder / "src/nbv/statistics/metrics.py").touch()
+    (scratch.folder / "src/nbv/experiment/statistics/metrics.py").touch()
     assert scratch.would_run() == {}
 
 

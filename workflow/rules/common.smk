@@ -14,33 +14,33 @@ except ModuleNotFoundError:
     )
 
 from nbv import provenance
-from nbv.calibration.distributions import need_classes
-from nbv.calibration.pairs import objects_of_pairs
-from nbv.config import (
+from nbv.robot.pair_distributions import need_classes
+from nbv.robot.pairs import objects_of_pairs
+from nbv.experiment.config import (
     load_config,
     snakemake_overrides,
 )
-from nbv.config.memory import available_bytes, check_memory
+from nbv.experiment.config.memory import available_bytes, check_memory
 from nbv.errors import UserError
-from nbv.estimation.warm_start import (
+from nbv.experiment.estimation.warm_start import (
     PRETRAINED,
     STAGES,
     stage_from,
     stage_settings,
     start_of,
 )
-from nbv.experiments.results import ESTIMATED_ROLES
-from nbv.experiments.run_size import too_small
-from nbv.jobs import LAST_ERROR, why_stopped
-from nbv.layout import Layout, bundle_variant, fold_folder, unit_folder
-from nbv.meshes.sources import SOURCES, open_source, select_objects
-from nbv.meshes.store import stored_ids
-from nbv.processes import hold_lock
-from nbv.recommendation.criteria import CRITERIA
-from nbv.recommendation.method_selection import check_methods
-from nbv.recommendation.policies import needs_lookup
-from nbv.rendering import RENDERERS
-from nbv.rendering.noise import SENSORS, check_sensor, sensor_settings
+from nbv.experiment.results import ESTIMATED_ROLES
+from nbv.experiment.run_size import too_small
+from nbv.experiment.jobs import LAST_ERROR, why_stopped
+from nbv.experiment.layout import Layout, bundle_variant, fold_folder, unit_folder
+from nbv.data.sources import SOURCES, open_source, select_objects
+from nbv.data.meshes import stored_ids
+from nbv.experiment.processes import hold_lock
+from nbv.core.criteria import CRITERIA
+from nbv.core.method_selection import check_methods
+from nbv.core.policies import needs_lookup
+from nbv.data.renderers import RENDERERS
+from nbv.data.sensors import SENSORS, check_sensor, sensor_settings
 
 BASE = Path(workflow.basedir)
 STARTED = time.time()
@@ -154,7 +154,7 @@ PRETRAINS = CONFIG["estimator"]["warm_start"] in ("categories", "both")
 LOWEST_UNITS = [
     (category, min(CONFIG["elevations_deg"][category])) for category in CATEGORIES
 ]
-# The wildcards of a unit and of a fold, as the paths of `nbv.layout` take them.
+# The wildcards of a unit and of a fold, as the paths of `nbv.experiment.layout` take them.
 UNIT = ("{category}", "{elevation}")
 FOLD = (*UNIT, "{fold}")
 # Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
@@ -300,7 +300,7 @@ def elevations_of_bundle(path, of_ingredient=True):
 
 def files_of_manifest(path):
     """A manifest, and the frames and masks that it names."""
-    from nbv.bundles.manifest import read_manifest  # only here: it is slow
+    from nbv.robot.recordings import read_manifest  # only here: it is slow
 
     try:
         recordings = read_manifest(path)

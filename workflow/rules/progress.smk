@@ -5,13 +5,13 @@ import os
 from snakemake.logging import logger
 from snakemake.settings.enums import Quietness
 
-from nbv.config import read_configuration
-from nbv.jobs import is_verbose
+from nbv.experiment.config import read_configuration
+from nbv.experiment.jobs import is_verbose
 from nbv.progress.chatter import WithoutChatter
 from nbv.progress.estimate import Job, with_reference
 from nbv.progress.line import Line
 from nbv.progress.run import Planned, RunProgress
-from nbv.reporting.runtime import load_measured
+from nbv.experiment.report.runtime import load_measured
 
 try:
     VERBOSE = is_verbose(config)

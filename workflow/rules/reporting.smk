@@ -1,8 +1,8 @@
 # What people read of the paper: tables, claims, figures, and the page that holds them all.
 
-from nbv.reporting.paper.figures import FIGURES
-from nbv.reporting.paper.tables import TABLES
-from nbv.reporting.settings import (
+from nbv.experiment.report.figures import FIGURES
+from nbv.experiment.report.tables import TABLES
+from nbv.experiment.report.settings import (
     ReportSettings,
     focus_category,
     focus_unit,

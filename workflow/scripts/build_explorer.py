@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
+    from nbv.experiment.explorer import ExplorerInputs, build_explorer
     from nbv.files import write_text
-    from nbv.reporting.explorer import ExplorerInputs, build_explorer
 
     given, params = snakemake.input, snakemake.params
     keys = {

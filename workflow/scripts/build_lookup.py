@@ -1,12 +1,12 @@
 """Build the lookup table of one criterion from the calibration pairs of one fold."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.splits import need_role, read_splits
-    from nbv.recommendation.density_selection import chosen_lookup
-    from nbv.recommendation.lookup import save_lookup
+    from nbv.core.density_selection import chosen_lookup
+    from nbv.core.estimates import read_estimates
+    from nbv.core.lookup import save_lookup
+    from nbv.experiment.splits import need_role, read_splits
 
     calibration = read_estimates(snakemake.input.calibration)
     splits = read_splits(snakemake.input.splits)

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
+    from nbv.experiment.report.page import build_report
     from nbv.files import write_text
-    from nbv.reporting.report import build_report
 
     given, params = snakemake.input, snakemake.params
     page = build_report(

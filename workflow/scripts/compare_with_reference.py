@@ -3,12 +3,12 @@
 import logging
 from pathlib import Path
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.checksums import need_intact
     from nbv.errors import UserError
-    from nbv.reference.compare import compare_runs
+    from nbv.experiment.checksums import need_intact
+    from nbv.experiment.reference.compare import compare_runs
 
     reference, run = Path(snakemake.input.reference).parent, Path(snakemake.params.run)
     need_intact(snakemake.params.run)

@@ -1,13 +1,13 @@
 """Estimate every view of the calibration and the test objects of one fold."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.splits import read_splits
-    from nbv.depth_images import open_depth
-    from nbv.estimation.hardware import choose_hardware, use_one_thread
-    from nbv.estimation.weights import load_estimator
-    from nbv.experiments.held_out import estimate_fold, write_fold
+    from nbv.data.depth_images import open_depth
+    from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.experiment.estimation.weights import load_estimator
+    from nbv.experiment.held_out import estimate_fold, write_fold
+    from nbv.experiment.splits import read_splits
 
     params, given, output = snakemake.params, snakemake.input, snakemake.output
     use_one_thread()

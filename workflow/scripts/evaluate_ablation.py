@@ -1,12 +1,12 @@
 """Evaluate one setting of the ablation on every fold of a category."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import pandas as pd
+    from studies.ablation import ablate
 
-    from nbv.calibration.estimates import read_estimates
-    from nbv.experiments.ablation import ablate
+    from nbv.core.estimates import read_estimates
     from nbv.files import write_csv
 
     params, found = snakemake.params, []

@@ -1,13 +1,13 @@
 """Evaluate the methods that need no lookup table on the test objects of one fold."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.splits import need_role, read_splits
-    from nbv.experiments.two_views import evaluate_method
+    from nbv.core.estimates import read_estimates
+    from nbv.core.seeds import rng_for
+    from nbv.experiment.splits import need_role, read_splits
+    from nbv.experiment.two_views import evaluate_method
     from nbv.files import write_csv
-    from nbv.seeds import rng_for
 
     params, wildcards = snakemake.params, snakemake.wildcards
     test = read_estimates(snakemake.input.test)

@@ -1,16 +1,17 @@
 """Evaluate the extensions on the test objects of one fold."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.posteriors import read_posteriors
-    from nbv.calibration.splits import need_role, read_splits
-    from nbv.experiments.extensions import evaluate_extensions
+    from studies.extensions import evaluate_extensions
+
+    from nbv.core.estimates import read_estimates
+    from nbv.core.lookup import save_lookup
+    from nbv.core.posteriors import read_posteriors
+    from nbv.core.seeds import rng_for
+    from nbv.experiment.splits import need_role, read_splits
+    from nbv.experiment.statistics.object_means import object_means
     from nbv.files import read_csv, write_csv
-    from nbv.recommendation.lookup import save_lookup
-    from nbv.seeds import rng_for
-    from nbv.statistics.object_means import object_means
 
     given, output = snakemake.input, snakemake.output
     params, wildcards = snakemake.params, snakemake.wildcards

@@ -1,15 +1,15 @@
 """Evaluate every choice with every fusion on the test objects of one unit, after one training."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import pandas as pd
+    from studies.confirmation import factorial_beliefs, factorial_objects
+    from studies.factorial import evaluate_factorial
+    from studies.kept_estimates import kept_settings, read_kept
 
-    from nbv.experiments.factorial import evaluate_factorial
-    from nbv.experiments.kept_estimates import kept_settings, read_kept
+    from nbv.core.seeds import rng_for
     from nbv.files import write_csv
-    from nbv.seeds import rng_for
-    from nbv.statistics.confirmation import factorial_beliefs, factorial_objects
 
     wildcards, path = snakemake.wildcards, snakemake.input.kept
     settings, keys = kept_settings(path)

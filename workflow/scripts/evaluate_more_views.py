@@ -1,16 +1,17 @@
 """Take more than two views of the test objects of one fold, by every policy."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.posteriors import read_posteriors
-    from nbv.calibration.splits import need_role, read_splits
-    from nbv.experiments.extensions import stored_evidence
-    from nbv.experiments.more_views import more_views_rows
+    from studies.extensions import stored_evidence
+    from studies.more_views import more_views_rows
+
+    from nbv.core.estimates import read_estimates
+    from nbv.core.evidence import evidence_of_distributions
+    from nbv.core.posteriors import read_posteriors
+    from nbv.core.seeds import rng_for
+    from nbv.experiment.splits import need_role, read_splits
     from nbv.files import read_csv, write_csv
-    from nbv.recommendation.evidence import evidence_of_distributions
-    from nbv.seeds import rng_for
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     splits, products = read_splits(given.splits), {}

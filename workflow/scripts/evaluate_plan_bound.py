@@ -1,10 +1,11 @@
 """Evaluate the plans that other trainings pick, on the test objects of one unit."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.experiments.kept_estimates import kept_settings, read_kept
-    from nbv.experiments.plan_bound import plan_bounds
+    from nbv.experiment.plan_bound import plan_bounds
+    from studies.kept_estimates import kept_settings, read_kept
+
     from nbv.files import write_csv
 
     wildcards, path = snakemake.wildcards, snakemake.input.kept

@@ -1,13 +1,13 @@
 """Evaluate one method that follows a lookup table on the test objects of one fold."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.splits import need_role, read_splits
-    from nbv.experiments.two_views import evaluate_method
+    from nbv.core.estimates import read_estimates
+    from nbv.core.lookup import load_lookup
+    from nbv.experiment.splits import need_role, read_splits
+    from nbv.experiment.two_views import evaluate_method
     from nbv.files import write_csv
-    from nbv.recommendation.lookup import load_lookup
 
     test = read_estimates(snakemake.input.test)
     splits = read_splits(snakemake.input.splits)

@@ -1,12 +1,13 @@
 """Choose rotation and elevation of the second view together, for one category and fold."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.estimates import read_estimates
-    from nbv.calibration.splits import need_role, read_splits
-    from nbv.experiments.extensions import stored_evidence
-    from nbv.experiments.view_sphere import view_sphere_rows
+    from nbv.experiment.view_sphere import view_sphere_rows
+    from studies.extensions import stored_evidence
+
+    from nbv.core.estimates import read_estimates
+    from nbv.experiment.splits import need_role, read_splits
     from nbv.files import read_csv, write_csv
 
     params, fold = snakemake.params, int(snakemake.wildcards.fold)

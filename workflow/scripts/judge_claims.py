@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
 
-    from nbv.experiments.results import load_evaluations
-    from nbv.paper.verdicts import evaluate_claims
-    from nbv.reporting.paper.claims import claims_table
-    from nbv.reporting.table import write_table
+    from nbv.experiment.paper.verdicts import evaluate_claims
+    from nbv.experiment.report.claims import claims_table
+    from nbv.experiment.report.table import write_table
+    from nbv.experiment.results import load_evaluations
 
     given, params = snakemake.input, snakemake.params
     files = zip(params.evaluations, map(Path, given.evaluations), strict=True)

@@ -1,9 +1,9 @@
 """Keep the held-out estimates of one training of every fold in one file."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.experiments.kept_estimates import keep_estimates, read_held_out
+    from studies.kept_estimates import keep_estimates, read_held_out
 
     params, given, wildcards = snakemake.params, snakemake.input, snakemake.wildcards
     training = int(wildcards.shuffle), int(wildcards.replicate)

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.checksums import need_intact
-    from nbv.reference.store import collect_reference
+    from nbv.experiment.checksums import need_intact
+    from nbv.experiment.reference.store import collect_reference
 
     need_intact(snakemake.params.run)
     collect_reference(Path(snakemake.params.run), Path(snakemake.params.reference))

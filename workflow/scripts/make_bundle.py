@@ -1,22 +1,22 @@
 """Put a network and what held-out objects teach about it into one file; test it on others."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import json
     import logging
     from pathlib import Path
 
-    from nbv.bundles.bundle import save_bundle
-    from nbv.bundles.evaluation import evaluate
-    from nbv.bundles.making import kept_network, make_bundle, turns_of
-    from nbv.bundles.mirror import find_mirror_plane, mirror_averaged
-    from nbv.calibration.splits import objects_with_role, read_splits
-    from nbv.depth_images import open_depth
-    from nbv.estimation.hardware import choose_hardware, use_one_thread
-    from nbv.estimation.weights import load_estimator
+    from nbv.data.camera import Camera
+    from nbv.data.depth_images import open_depth
+    from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.experiment.estimation.weights import load_estimator
+    from nbv.experiment.make_bundle import kept_network, make_bundle, turns_of
+    from nbv.experiment.splits import objects_with_role, read_splits
     from nbv.files import write_csv
-    from nbv.rendering.camera import Camera
+    from nbv.robot.bundle import save_bundle
+    from nbv.robot.evaluation import evaluate
+    from nbv.robot.mirror import find_mirror_plane, mirror_averaged
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     use_one_thread()

@@ -1,11 +1,11 @@
 """Load, check and normalise the chosen objects of one category."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.meshes.preparation import prepare_meshes
-    from nbv.meshes.sources import open_source
-    from nbv.meshes.store import save_meshes
+    from nbv.data.meshes import save_meshes
+    from nbv.data.preparation import prepare_meshes
+    from nbv.data.sources import open_source
 
     params = snakemake.params
     source = open_source(params.dataset, params.seed)

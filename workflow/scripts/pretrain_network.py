@@ -1,17 +1,17 @@
 """Train one network on the training objects that all categories have in a fold."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
 
-    from nbv.calibration.splits import need_objects, objects_with_role, read_splits, training_roles
-    from nbv.depth_images import DepthImages, open_depth
-    from nbv.estimation.hardware import choose_hardware, use_one_thread
-    from nbv.estimation.training import train_estimator
-    from nbv.estimation.warm_start import with_category
-    from nbv.estimation.weights import save_estimator
-    from nbv.seeds import seed_for
+    from nbv.core.seeds import seed_for
+    from nbv.data.depth_images import DepthImages, open_depth
+    from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.experiment.estimation.training import train_estimator
+    from nbv.experiment.estimation.warm_start import with_category
+    from nbv.experiment.estimation.weights import save_estimator
+    from nbv.experiment.splits import need_objects, objects_with_role, read_splits, training_roles
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     use_one_thread()

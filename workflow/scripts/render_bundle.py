@@ -1,18 +1,18 @@
 """Render a turn of each object of one category near one elevation, as a real camera sees it."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
 
-    from nbv.depth_images import write_depth
-    from nbv.meshes.store import load_meshes
-    from nbv.rendering import open_renderer
-    from nbv.rendering.camera import Camera
-    from nbv.rendering.noise import IDEAL, build_sensor
-    from nbv.rendering.randomisation import Randomisation, randomised_turn
-    from nbv.rendering.render import N_AZIMUTHS
-    from nbv.seeds import rng_for
+    from nbv.core.seeds import rng_for
+    from nbv.data.camera import Camera
+    from nbv.data.depth_images import write_depth
+    from nbv.data.meshes import load_meshes
+    from nbv.data.randomisation import Randomisation, randomised_turn
+    from nbv.data.render import N_AZIMUTHS
+    from nbv.data.renderers import open_renderer
+    from nbv.data.sensors import IDEAL, build_sensor
 
     params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
     camera = Camera(**params.camera)

@@ -1,14 +1,14 @@
 """Render a full turn of each object of one category at one elevation."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.depth_images import write_depth
-    from nbv.meshes.store import load_meshes
-    from nbv.rendering import open_renderer
-    from nbv.rendering.camera import Camera
-    from nbv.rendering.noise import open_sensor
-    from nbv.rendering.render import N_AZIMUTHS, render_objects
+    from nbv.data.camera import Camera
+    from nbv.data.depth_images import write_depth
+    from nbv.data.meshes import load_meshes
+    from nbv.data.render import N_AZIMUTHS, render_objects
+    from nbv.data.renderers import open_renderer
+    from nbv.data.sensors import open_sensor
 
     params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
     camera = Camera(**params.camera)

@@ -1,12 +1,12 @@
 """Divide one category's objects into folds."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.splits import make_splits
+    from nbv.core.seeds import rng_for
+    from nbv.data.meshes import stored_ids
+    from nbv.experiment.splits import make_splits
     from nbv.files import write_csv
-    from nbv.meshes.store import stored_ids
-    from nbv.seeds import rng_for
 
     params = snakemake.params
     splits = make_splits(

@@ -1,15 +1,15 @@
 """Tabulate what each choice in the paper's method brings."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
+    from studies.ablation import ablation_space
+    from studies.ablation_table import ablation_table
 
-    from nbv.experiments.ablation import ablation_space
+    from nbv.experiment.report.table import write_table
+    from nbv.experiment.statistics.paired import Resampler
     from nbv.files import read_csv
-    from nbv.reporting.extensions.ablation import ablation_table
-    from nbv.reporting.table import write_table
-    from nbv.statistics.paired import Resampler
 
     params = snakemake.params
     rows = {row: read_csv(path) for row, path in enumerate(snakemake.input.rows)}

@@ -1,12 +1,17 @@
 """Tabulate means and contrasts over all trainings."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import pandas as pd
-
-    from nbv.files import read_csv, write_csv
-    from nbv.reporting.extensions.confirmation import (
+    from studies.confirmation import (
+        belief_means,
+        bound_means,
+        method_contrasts,
+        method_means,
+        training_contrasts,
+    )
+    from studies.confirmation_tables import (
         answers_figure,
         beliefs_table,
         bounds_table,
@@ -15,15 +20,10 @@ with job(snakemake):
         densities_table,
         methods_table,
     )
-    from nbv.reporting.style import save_figure
-    from nbv.reporting.table import write_table
-    from nbv.statistics.confirmation import (
-        belief_means,
-        bound_means,
-        method_contrasts,
-        method_means,
-        training_contrasts,
-    )
+
+    from nbv.experiment.report.table import write_table
+    from nbv.files import read_csv, write_csv
+    from nbv.robot.style import save_figure
 
     output = snakemake.output
     read = {

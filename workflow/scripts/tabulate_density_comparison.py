@@ -1,13 +1,14 @@
 """Compare how well the densities of several runs know the azimuth."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.experiments.results import load_evaluations
-    from nbv.layout import files_by_run
-    from nbv.reporting.extensions.densities import DensityRun, density_comparison
-    from nbv.reporting.settings import ReportSettings
-    from nbv.reporting.table import write_table
+    from studies.densities import DensityRun, density_comparison
+
+    from nbv.experiment.layout import files_by_run
+    from nbv.experiment.report.settings import ReportSettings
+    from nbv.experiment.report.table import write_table
+    from nbv.experiment.results import load_evaluations
 
     given, params = snakemake.input, snakemake.params
     files = {

@@ -1,16 +1,16 @@
 """Tabulate what the extensions gain over the paper's method and over Opposite."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
+    from studies.blocks import blocks_of
+    from studies.gains import extension_gains_table
 
-    from nbv.layout import files_by_run
-    from nbv.reporting.extensions.blocks import blocks_of
-    from nbv.reporting.extensions.gains import extension_gains_table
-    from nbv.reporting.table import write_table
-    from nbv.statistics.object_means import load_folds
-    from nbv.statistics.paired import Resampler
+    from nbv.experiment.layout import files_by_run
+    from nbv.experiment.report.table import write_table
+    from nbv.experiment.statistics.object_means import load_folds
+    from nbv.experiment.statistics.paired import Resampler
 
     given, params = snakemake.input, snakemake.params
     objects = files_by_run(params.folds, given.objects)

@@ -1,20 +1,20 @@
 """Compare bundles that lack an ingredient of the randomisation with the one that has all."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import logging
 
     import pandas as pd
+    from studies.ingredients import ingredient_table
 
-    from nbv.bundles.bundle import load_bundle
-    from nbv.bundles.evaluation import evaluate
-    from nbv.bundles.manifest import read_manifest, see
-    from nbv.bundles.recommender import Recommender
+    from nbv.experiment.report.table import write_table
     from nbv.files import read_csv
-    from nbv.frames.errors import FrameError
-    from nbv.reporting.ingredients import ingredient_table
-    from nbv.reporting.table import write_table
+    from nbv.robot.bundle import load_bundle
+    from nbv.robot.errors import FrameError
+    from nbv.robot.evaluation import evaluate
+    from nbv.robot.recommender import Recommender
+    from nbv.robot.recordings import read_manifest, see
 
     params, given = snakemake.params, snakemake.input
     log = logging.getLogger("nbv")

@@ -1,16 +1,16 @@
 """Rank all methods on one run or on several."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
+    from studies.blocks import blocks_of
+    from studies.leaderboard import leaderboard_table
 
-    from nbv.layout import files_by_run
-    from nbv.reporting.extensions.blocks import blocks_of
-    from nbv.reporting.extensions.leaderboard import leaderboard_table
-    from nbv.reporting.table import write_table
-    from nbv.statistics.object_means import load_folds
-    from nbv.statistics.paired import Resampler
+    from nbv.experiment.layout import files_by_run
+    from nbv.experiment.report.table import write_table
+    from nbv.experiment.statistics.object_means import load_folds
+    from nbv.experiment.statistics.paired import Resampler
 
     params = snakemake.params
     files = files_by_run(params.folds, snakemake.input.objects)

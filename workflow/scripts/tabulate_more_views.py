@@ -1,16 +1,16 @@
 """Tabulate and draw error and travel against the number of views."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
+    from studies.blocks import rows_by_category
+    from studies.curves import more_views_figure
+    from studies.more_views_table import more_views_table
 
-    from nbv.reporting.extensions.blocks import rows_by_category
-    from nbv.reporting.extensions.curves import more_views_figure
-    from nbv.reporting.extensions.more_views import more_views_table
-    from nbv.reporting.style import save_figure
-    from nbv.reporting.table import write_table
-    from nbv.statistics.paired import Resampler
+    from nbv.experiment.report.table import write_table
+    from nbv.experiment.statistics.paired import Resampler
+    from nbv.robot.style import save_figure
 
     params, output = snakemake.params, snakemake.output
     files = dict(zip(params.folds, snakemake.input.rows, strict=True))

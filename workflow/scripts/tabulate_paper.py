@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.experiments.results import load_evaluations
-    from nbv.reporting.paper.tables import build_table
-    from nbv.reporting.settings import ReportSettings
-    from nbv.reporting.table import write_table
+    from nbv.experiment.report.settings import ReportSettings
+    from nbv.experiment.report.table import write_table
+    from nbv.experiment.report.tables import build_table
+    from nbv.experiment.results import load_evaluations
 
     given, params = snakemake.input, snakemake.params
     files = zip(params.evaluations, map(Path, given.evaluations), strict=True)

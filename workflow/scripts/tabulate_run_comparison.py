@@ -1,13 +1,14 @@
 """Compare the errors of the same methods in several runs."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.experiments.results import load_evaluations
-    from nbv.layout import files_by_run
-    from nbv.reporting.extensions.runs import run_comparison
-    from nbv.reporting.settings import ReportSettings
-    from nbv.reporting.table import write_table
+    from studies.runs import run_comparison
+
+    from nbv.experiment.layout import files_by_run
+    from nbv.experiment.report.settings import ReportSettings
+    from nbv.experiment.report.table import write_table
+    from nbv.experiment.results import load_evaluations
 
     params = snakemake.params
     files = files_by_run(params.evaluations, snakemake.input.evaluations)

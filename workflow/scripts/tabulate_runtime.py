@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.reporting.runtime import load_jobs, runtime_table
-    from nbv.reporting.table import write_table
+    from nbv.experiment.report.runtime import load_jobs, runtime_table
+    from nbv.experiment.report.table import write_table
 
     given = snakemake.input
     files = zip(

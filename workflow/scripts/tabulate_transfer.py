@@ -1,11 +1,12 @@
 """Tabulate the errors of estimators trained under one condition and tested under another."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.reporting.extensions.transfer import load_transfer, transfer_table
-    from nbv.reporting.settings import ReportSettings
-    from nbv.reporting.table import write_table
+    from studies.transfer import load_transfer, transfer_table
+
+    from nbv.experiment.report.settings import ReportSettings
+    from nbv.experiment.report.table import write_table
 
     params = snakemake.params
     files = dict(zip(params.evaluations, snakemake.input.evaluations, strict=True))

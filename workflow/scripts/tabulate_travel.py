@@ -1,11 +1,12 @@
 """Tabulate and draw error against travel."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.reporting.extensions.curves import travel_curves, travel_figure, travel_table
-    from nbv.reporting.style import save_figure
-    from nbv.reporting.table import write_table
+    from studies.curves import travel_curves, travel_figure, travel_table
+
+    from nbv.experiment.report.table import write_table
+    from nbv.robot.style import save_figure
 
     params, output = snakemake.params, snakemake.output
     curves = travel_curves(dict(zip(params.folds, snakemake.input.rows, strict=True)))

@@ -1,14 +1,14 @@
 """Tabulate what it brings to choose the elevation with the rotation."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
+    from studies.blocks import rows_by_category
 
-    from nbv.reporting.extensions.blocks import rows_by_category
-    from nbv.reporting.extensions.view_sphere import view_sphere_table
-    from nbv.reporting.table import write_table
-    from nbv.statistics.paired import Resampler
+    from nbv.experiment.report.extensions.view_sphere import view_sphere_table
+    from nbv.experiment.report.table import write_table
+    from nbv.experiment.statistics.paired import Resampler
 
     params = snakemake.params
     files = zip(params.folds, snakemake.input.rows, strict=True)

@@ -1,13 +1,13 @@
 """Take the estimates of one fold's calibration and test objects from a file of another program."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.distributions import read_pair_distributions
-    from nbv.calibration.pairs import read_pairs
-    from nbv.calibration.splits import read_splits
-    from nbv.experiments.external import take_fold
-    from nbv.experiments.held_out import write_fold
+    from nbv.experiment.external import take_fold
+    from nbv.experiment.held_out import write_fold
+    from nbv.experiment.splits import read_splits
+    from nbv.robot.pair_distributions import read_pair_distributions
+    from nbv.robot.pairs import read_pairs
 
     given, output, wildcards = snakemake.input, snakemake.output, snakemake.wildcards
     of_unit = given.pairs, wildcards.category, float(wildcards.elevation)

@@ -1,16 +1,16 @@
 """Train the network of a bundle on all elevations of one fold's training objects."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
 
-    from nbv.calibration.splits import need_objects, objects_with_role, read_splits
-    from nbv.depth_images import open_depth
-    from nbv.estimation.hardware import choose_hardware, use_one_thread
-    from nbv.estimation.training import train_network
-    from nbv.estimation.weights import Estimator, save_estimator
-    from nbv.seeds import seed_for
+    from nbv.core.seeds import seed_for
+    from nbv.data.depth_images import open_depth
+    from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.experiment.estimation.training import train_network
+    from nbv.experiment.estimation.weights import Estimator, save_estimator
+    from nbv.experiment.splits import need_objects, objects_with_role, read_splits
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     use_one_thread()

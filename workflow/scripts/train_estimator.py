@@ -4,16 +4,16 @@ A fold's own estimator then estimates the calibration and the test objects, wher
 are asked for.
 """
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.calibration.splits import need_objects, objects_with_role, read_splits, training_roles
-    from nbv.depth_images import open_depth
-    from nbv.estimation.hardware import choose_hardware, use_one_thread
-    from nbv.estimation.training import train_estimator
-    from nbv.estimation.weights import load_estimator, read_start, save_estimator
-    from nbv.experiments.held_out import estimate_fold, write_fold
-    from nbv.seeds import seed_for
+    from nbv.core.seeds import seed_for
+    from nbv.data.depth_images import open_depth
+    from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.experiment.estimation.training import train_estimator
+    from nbv.experiment.estimation.weights import load_estimator, read_start, save_estimator
+    from nbv.experiment.held_out import estimate_fold, write_fold
+    from nbv.experiment.splits import need_objects, objects_with_role, read_splits, training_roles
 
     params, wildcards = snakemake.params, snakemake.wildcards
     given, output = snakemake.input, snakemake.output

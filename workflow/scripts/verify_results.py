@@ -1,13 +1,13 @@
 """Hold every file of a run to the checksum that it had when it was written."""
 
-from nbv.jobs import job
+from nbv.experiment.jobs import job
 
 with job(snakemake):
     import logging
     import shlex
 
-    from nbv.checksums import states_of_files
     from nbv.errors import UserError
+    from nbv.experiment.checksums import states_of_files
 
     params = snakemake.params
     states = states_of_files(params.run)

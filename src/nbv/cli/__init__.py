@@ -48,10 +48,10 @@ from nbv.errors import NamedError, UserError
 from nbv.labels import counted
 
 if TYPE_CHECKING:
-    from nbv.bundles.recommender import Recommender
-    from nbv.bundles.turns import Turn
     from nbv.cli.answers import Place
-    from nbv.frames.errors import FrameError
+    from nbv.robot.errors import FrameError
+    from nbv.robot.recommender import Recommender
+    from nbv.robot.sweeps import Turn
 
 USER_ERROR = 2
 
@@ -259,10 +259,10 @@ def recommend(
         # Before frames are read: what is no number after the option is taken for one.
         noun = counted(len(gravity), "number")
         raise UserError(f"--gravity has {noun}; give three, the direction down: x,y,z")
-    from nbv.bundles.moves import check_axis, elevation_from_gravity
-    from nbv.bundles.recommender import Recommender
-    from nbv.frames.depth_files import read_depth, read_mask
-    from nbv.frames.intrinsics import camera_of
+    from nbv.robot.depth_files import read_depth, read_mask
+    from nbv.robot.intrinsics import camera_of
+    from nbv.robot.moves import check_axis, elevation_from_gravity
+    from nbv.robot.recommender import Recommender
 
     if place is not None and gravity is not None and elevation is None:
         # The axis tells of a roll too, and is the one that the target pose needs.
@@ -291,7 +291,7 @@ def recommend(
         answer = replace(answer, warnings=(*answer.warnings, *rolled))
     targets = target_poses((move.rotation_deg for move in answer.moves), place)
     if plot is not None:
-        from nbv.reporting.recommendation import draw_recommendation
+        from nbv.robot.plot import draw_recommendation
 
         draw_recommendation(answer, plot, recommender.bundle.category)
     focal_px = recommender.bundle.focal_px if intrinsics is None else None
@@ -369,10 +369,10 @@ def calibrate(
     if criterion is not None:
         raise UserError("--criterion is for pairs, which need no --bundle; leave one of them out")
     need_writable("--output", output, [".safetensors"])
-    from nbv.bundles.beliefs import distributions_of
-    from nbv.bundles.bundle import save_bundle
-    from nbv.bundles.calibration import recalibrated
-    from nbv.recommendation.belief import mean_direction_deg
+    from nbv.core.belief import mean_direction_deg
+    from nbv.core.beliefs import distributions_of
+    from nbv.robot.bundle import save_bundle
+    from nbv.robot.calibration import recalibrated
 
     seen = _seen_frames(bundle, source, intrinsics, depth_scale, near, far, as_json=json)
     held, turns = seen.recommender.bundle, seen.turns
@@ -451,9 +451,9 @@ def evaluate(
     """
     if output is not None:
         need_writable("--output", output, [".csv"])
-    from nbv.bundles.evaluation import evaluate as evaluate_
-    from nbv.bundles.evaluation import familiarity_of
     from nbv.files import write_csv
+    from nbv.robot.evaluation import evaluate as evaluate_
+    from nbv.robot.evaluation import familiarity_of
 
     seen = _seen_frames(bundle, manifest, intrinsics, depth_scale, near, far, as_json=json)
     held, turns = seen.recommender.bundle, seen.turns
@@ -548,8 +548,8 @@ def render(
     if example and (up, front) != (UP, FRONT):
         raise UserError("--up and --front are of a mesh file; leave them out with --example")
     need_writable("--output", output, [".npy", ".png"])
-    from nbv.frames.depth_files import write_depth
-    from nbv.frames.drawn import draw_frame, example_mesh, read_mesh
+    from nbv.robot.depth_files import write_depth
+    from nbv.robot.synthetic import draw_frame, example_mesh, read_mesh
 
     shape = example_mesh() if mesh is None else read_mesh(mesh, up, front)
     frame = draw_frame(shape, azimuth, elevation, distance, diagonal, seed, sensor=sensor)
@@ -579,8 +579,8 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
     json
         Print JSON.
     """
-    from nbv.bundles.bundle import format_of, load_bundle
-    from nbv.bundles.recommender import bundle_path
+    from nbv.robot.bundle import format_of, load_bundle
+    from nbv.robot.recommender import bundle_path
 
     path = bundle_path(bundle)
     held = load_bundle(path)
@@ -629,10 +629,10 @@ def export(bundle: str = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
         Print JSON.
     """
     need_writable("--onnx", onnx, [".onnx"])
-    from nbv.bundles.bundle import load_bundle
-    from nbv.bundles.onnx_graph import onnx_model
-    from nbv.bundles.recommender import bundle_path
     from nbv.files import replacing
+    from nbv.robot.bundle import load_bundle
+    from nbv.robot.onnx_graph import onnx_model
+    from nbv.robot.recommender import bundle_path
 
     model = onnx_model(load_bundle(bundle_path(bundle)))
     with replacing(onnx) as temporary:
@@ -682,8 +682,8 @@ def _seen_frames(
     as_json: bool,
 ) -> SeenFrames:
     """Return what a bundle makes of the frames of a manifest, and tell which are left out."""
-    from nbv.bundles.manifest import read_manifest, see
-    from nbv.bundles.recommender import Recommender
+    from nbv.robot.recommender import Recommender
+    from nbv.robot.recordings import read_manifest, see
 
     left_out: dict[str, FrameError] = {}
 
@@ -709,6 +709,6 @@ def _known_place(camera_pose: Path | None, axis: list[float] | None) -> Place | 
         raise UserError("--camera-pose and --axis belong together")
     if len(axis) not in (3, 6):
         raise UserError(f"--axis has {len(axis)} numbers; give a point, or a point and a direction")
-    from nbv.bundles.moves import read_pose
+    from nbv.robot.moves import read_pose
 
     return read_pose(camera_pose), axis[:3], axis[3:] or [0.0, 0.0, 1.0]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from nbv.bundles.next_view import Recommendation
+    from nbv.robot.next_view import Recommendation
 
 
 Place = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
@@ -42,7 +42,7 @@ def target_poses(
     rotations_deg: Iterable[float], place: Place | None
 ) -> list[NDArray[np.float64]] | None:
     """Return the camera's poses (4, 4) after each of several rotations, where its own is known."""
-    from nbv.bundles.moves import moved_camera
+    from nbv.robot.moves import moved_camera
 
     if place is None:
         return None
@@ -140,7 +140,7 @@ def offset_of_pairs(
     azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
 ) -> dict[str, Any]:
     """Return the offset that estimates have in common, and what is to be said of it."""
-    from nbv.calibration.offset import FOR_PAIRS
+    from nbv.core.offset import FOR_PAIRS
 
     return _offset_of(azimuth_deg, estimate_deg, FOR_PAIRS)
 
@@ -149,7 +149,7 @@ def offset_of_frames(
     azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
 ) -> dict[str, Any]:
     """Return the same of a turn, and whether calibration adds the offset to its azimuths."""
-    from nbv.calibration.offset import FOR_FRAMES, frame_warning
+    from nbv.core.offset import FOR_FRAMES, frame_warning
 
     found = _offset_of(azimuth_deg, estimate_deg, FOR_FRAMES)
     return found | {"is_added": not frame_warning(azimuth_deg, estimate_deg)}
@@ -158,7 +158,7 @@ def offset_of_frames(
 def _offset_of(
     azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64], what_to_do: str
 ) -> dict[str, Any]:
-    from nbv.calibration.offset import constant_offset_deg, offset_warning
+    from nbv.core.offset import constant_offset_deg, offset_warning
 
     return {
         "offset_deg": constant_offset_deg(estimate_deg - azimuth_deg),
@@ -180,9 +180,9 @@ def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
     Parameters
     ----------
     found : DataFrame
-        From `nbv.bundles.evaluation.evaluate`.
+        From `nbv.robot.evaluation.evaluate`.
     familiar : DataFrame
-        From `nbv.bundles.evaluation.familiarity_of`.
+        From `nbv.robot.evaluation.familiarity_of`.
     """
     for about in familiar.to_dict("records"):
         is_own = (found["object_id"] == about["object_id"]) & (

@@ -107,7 +107,7 @@ def _is_numbers(text: str) -> bool:
 
 def allowed_rotations(given: list[float] | Path | None) -> Any:
     """Return the rotations of ``--allowed``, read where it names a file."""
-    from nbv.bundles.moves import read_rotations
+    from nbv.robot.moves import read_rotations
 
     return read_rotations(given) if isinstance(given, Path) else given
 

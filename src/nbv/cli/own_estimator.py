@@ -31,15 +31,15 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
     """Make the tables of calibration pairs; see ``nbv calibrate``."""
     import numpy as np
 
-    from nbv.bundles.calibration import DENSITY
-    from nbv.bundles.distribution_tables import DistributionTable
-    from nbv.bundles.manifest import is_manifest
-    from nbv.calibration.distributions import read_pair_distributions
-    from nbv.calibration.pairs import read_pair_rows, read_pairs
-    from nbv.recommendation.belief import mean_direction_deg
-    from nbv.recommendation.criteria import CRITERIA
-    from nbv.recommendation.density_selection import chosen_lookup
-    from nbv.recommendation.lookup import save_lookup
+    from nbv.core.belief import mean_direction_deg
+    from nbv.core.criteria import CRITERIA
+    from nbv.core.density_selection import chosen_lookup
+    from nbv.core.lookup import save_lookup
+    from nbv.robot.calibration import DENSITY
+    from nbv.robot.distribution_table import DistributionTable
+    from nbv.robot.pair_distributions import read_pair_distributions
+    from nbv.robot.pairs import read_pair_rows, read_pairs
+    from nbv.robot.recordings import is_manifest
 
     if criterion not in CRITERIA:
         raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
@@ -94,11 +94,11 @@ def recommend_by_table(
         raise UserError("--estimate and --table belong together; or --distribution and --table")
     if not math.isfinite(estimate):
         raise UserError(f"--estimate={estimate:g}: give an azimuth in degrees")
-    from nbv.bundles.moves import check_axis
-    from nbv.bundles.rotations import ranked_rotations
+    from nbv.core.criteria import cost_unit
+    from nbv.core.lookup import load_lookup
     from nbv.files import calibrated_file
-    from nbv.recommendation.criteria import cost_unit
-    from nbv.recommendation.lookup import load_lookup
+    from nbv.robot.moves import check_axis
+    from nbv.robot.rotations import ranked_rotations
 
     path = calibrated_file(table)
     try:
@@ -145,10 +145,10 @@ def recommend_by_distributions(
     as_json: bool,
 ) -> None:
     """Say the pose and the next view that distributions show; see ``nbv recommend``."""
-    from nbv.bundles.distribution_tables import DistributionTable
-    from nbv.bundles.moves import check_axis
-    from nbv.calibration.distributions import read_distributions
     from nbv.files import calibrated_file
+    from nbv.robot.distribution_table import DistributionTable
+    from nbv.robot.moves import check_axis
+    from nbv.robot.pair_distributions import read_distributions
 
     if table is None:
         raise UserError("--distribution and --table belong together")

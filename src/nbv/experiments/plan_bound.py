@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from studies.kept_estimates import HeldOut, KeptKey
 
-from nbv.experiments.kept_estimates import HeldOut, KeptKey
-from nbv.recommendation.evidence import Table
-from nbv.recommendation.plans import spaced_errors_deg, spacing_bins
+from nbv.core.evidence import Table
+from nbv.core.plans import spaced_errors_deg, spacing_bins
 
 EVENLY_SPACED: Final = "evenly_spaced"
 BEST_OF_OTHERS: Final = "best_of_others"
@@ -32,7 +32,7 @@ def plan_bounds(
     """Return each object's error under the plan that would have been best for each first view.
 
     Plans have equal steps and travel no farther than evenly spaced views; with two views they are
-    all rotations of ``min_separation_deg`` or more (`nbv.recommendation.plans.spacing_bins`). Views
+    all rotations of ``min_separation_deg`` or more (`nbv.core.plans.spacing_bins`). Views
     are fused by product.
 
     Parameters

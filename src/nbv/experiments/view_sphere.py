@@ -12,12 +12,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.angles import circular_distance_deg
-from nbv.calibration.estimates import Estimates
-from nbv.recommendation.belief import coarser, first_belief, mean_direction_deg, updated
-from nbv.recommendation.criteria import CRITERIA, FOR_TWO_ESTIMATORS
-from nbv.recommendation.evidence import Evidence
-from nbv.recommendation.next_views import COARSE_BINS, best_view
+from nbv.core.angles import circular_distance_deg
+from nbv.core.belief import coarser, first_belief, mean_direction_deg, updated
+from nbv.core.criteria import CRITERIA, FOR_TWO_ESTIMATORS
+from nbv.core.estimates import Estimates
+from nbv.core.evidence import Evidence
+from nbv.core.next_views import COARSE_BINS, best_view
 
 COLUMNS = (
     "method",

@@ -8,7 +8,7 @@ import shutil
 import threading
 from typing import TextIO
 
-from nbv.jobs import ERASE_LINE
+from nbv.experiment.jobs import ERASE_LINE
 from nbv.labels import duration
 from nbv.progress.estimate import Estimate
 

@@ -2,7 +2,7 @@
 
 from snakemake.utils import Paramspace
 
-from nbv.experiments.ablation import ablation_space
+from studies.ablation import ablation_space
 
 ABLATIONS = Paramspace(
     ablation_space(), filename_params="*", filename_sep=",", single_wildcard="setting"

@@ -3,8 +3,8 @@
 import collections
 import functools
 
-from nbv.config import load_condition, read_configuration
-from nbv.experiments.kept_estimates import kept_settings
+from nbv.experiment.config import load_condition, read_configuration
+from studies.kept_estimates import kept_settings
 
 REPLICATES = [
     (shuffle, replicate)

@@ -1,6 +1,6 @@
 # Tables that compare this run with finished ones. They are made only where somebody asks for them.
 
-from nbv.reporting.extensions.densities import METHODS as DENSITY_METHODS
+from studies.densities import METHODS as DENSITY_METHODS
 
 
 rule density_comparison:

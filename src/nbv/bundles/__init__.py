@@ -1,1 +1,0 @@
-"""Bundles: everything that a robot needs for one category, in one file."""

@@ -1,1 +1,0 @@
-"""From an estimator's held-out errors to densities on the torus of estimate and viewpoint."""

@@ -1,0 +1,1 @@
+"""Distributions on the circle, criteria, fusion and lookup tables: arrays in, arrays out."""

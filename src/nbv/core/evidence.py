@@ -1,0 +1,251 @@
+"""What is known of one estimator: its calibration estimates, and the conditionals made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.core.density import Conditionals, conditionals
+from nbv.core.posteriors import estimate_likelihood
+
+Table = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What every criterion and every fusion rule may use.
+
+    Attributes
+    ----------
+    estimate_deg : ndarray (n_objects, n_views)
+        Calibration estimates; view k of n has the azimuth 360 k / n. No objects where the
+        conditionals are made of distributions.
+    conditionals : Conditionals
+        V and L, B bins; n must be a multiple of B where a criterion rotates views.
+    bandwidth_deg, pseudo_observations : float
+        The density's settings.
+    settings : mapping
+        The configuration's ``density`` and ``affinity``: what a criterion may be set by.
+    distributions : ndarray (n_objects, n_views, B) float32, optional
+        p(azimuth | image) of calibration images, where the conditionals are made of them.
+    made : dict
+        What several criteria share, so that it is computed once; see `once`.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+    >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+    >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+    >>> evidence.n_bins, evidence.n_views
+    (36, 36)
+    """
+
+    estimate_deg: NDArray[np.float64]
+    conditionals: Conditionals
+    bandwidth_deg: float
+    pseudo_observations: float
+    settings: Mapping[str, Any]
+    distributions: NDArray[np.float32] | None = None
+    made: dict[Any, Table] = field(default_factory=dict, repr=False, compare=False)
+
+    def once(self, key: Any, make: Callable[[], Table]) -> Table:
+        """Return what `make` makes, made at the first call with this key and kept in `made`.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> made = [evidence.once('zeros', lambda: np.zeros(3)) for _ in range(2)]
+        >>> made[0] is made[1]
+        True
+        """
+        if key not in self.made:
+            self.made[key] = make()
+        return self.made[key]
+
+    @property
+    def n_bins(self) -> int:
+        """B, the number of bins round the circle.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> evidence.n_bins
+        36
+        """
+        return self.conditionals.n_bins
+
+    @property
+    def n_views(self) -> int:
+        """Number of views of each calibration object.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> evidence.n_views
+        36
+        """
+        views = self.estimate_deg if self.distributions is None else self.distributions
+        return int(views.shape[1])
+
+    @cached_property
+    def viewpoint(self) -> Table:
+        """V[estimate, viewpoint], (B, B) float32.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> evidence.viewpoint.shape, int(evidence.viewpoint[9].argmax())
+        ((36, 36), 9)
+        """
+        return self.conditionals.viewpoint.astype(np.float32)
+
+    @cached_property
+    def second(self) -> Table:
+        """L twice over, (2 B, B) float32: its rows delta to delta + B are L[theta + delta].
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> evidence.second.shape
+        (72, 36)
+        """
+        return np.tile(self.conditionals.estimate.astype(np.float32), (2, 1))
+
+    @cached_property
+    def moments(self) -> Table:
+        """`first_moments` of the rows of V after every rotation, (B, 2, B, B) float32.
+
+        ``moments[delta, :, e1, e2]``: its direction is the posterior mean pose, its length the
+        resultant length times p(e2 | e1, delta).
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> evidence.moments.shape
+        (36, 2, 36, 36)
+        """
+        return self.first_moments(self.viewpoint, range(self.n_bins))
+
+    def first_moments(self, probabilities: Table, deltas: range) -> Table:
+        """Return the posteriors' first moments after each next estimate, (n_deltas, 2, n, B).
+
+        The real and the imaginary part of sum_theta b(theta) L[theta + delta, e] exp(i theta), of
+        distributions b (n, B) and rotations of the next view in bins.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> evidence.first_moments(evidence.viewpoint[:1], range(0, 36, 9)).shape
+        (4, 2, 1, 36)
+        """
+        n, n_bins = probabilities.shape
+        angles = 2 * np.pi * np.arange(n_bins) / n_bins
+        parts = [probabilities * np.cos(angles), probabilities * np.sin(angles)]
+        # Stacked, one product of matrices serves both parts.
+        found = self.predicted(np.concatenate(parts).astype(np.float32), deltas)
+        return found.reshape(len(deltas), 2, n, n_bins)
+
+    def predicted(self, weights: Table, deltas: range) -> Table:
+        """Return sum_theta w(theta) L[theta + delta, e], (n_deltas, n, B), of weights (n, B).
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> (after,) = evidence.predicted(evidence.viewpoint[:1], range(9, 10))
+        >>> int(after.argmax())  # a quarter turn from 0, in bins
+        9
+        """
+        n, n_bins = weights.shape
+        found = np.empty((len(deltas), n, n_bins), dtype=np.float32)
+        for place, delta in enumerate(deltas):
+            np.matmul(weights, self.second[delta : delta + n_bins], out=found[place])
+        return found
+
+
+def gather_evidence(
+    estimate_deg: NDArray[np.float64],
+    settings: Mapping[str, Any],
+    *,
+    bandwidth_deg: float,
+    pseudo_observations: float,
+    n_bins: int = 360,
+) -> Evidence:
+    """Make evidence of calibration estimates.
+
+    Parameters
+    ----------
+    estimate_deg, settings
+        See `Evidence`.
+    bandwidth_deg, pseudo_observations, n_bins
+        See `nbv.core.density.conditionals`.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> estimates = np.arange(360.0)[None]  # one object, always right
+    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+    >>> nbv.gather_evidence(estimates, density, bandwidth_deg=8, pseudo_observations=3).n_bins
+    360
+    """
+    n_views = estimate_deg.shape[1]
+    azimuth_deg = np.broadcast_to(np.arange(n_views) * (360.0 / n_views), estimate_deg.shape)
+    pair = conditionals(
+        estimate_deg,
+        azimuth_deg,
+        bandwidth_deg=bandwidth_deg,
+        pseudo_observations=pseudo_observations,
+        n_bins=n_bins,
+    )
+    return Evidence(estimate_deg, pair, bandwidth_deg, pseudo_observations, settings)
+
+
+def evidence_of_distributions(
+    distributions: NDArray[np.floating[Any]], settings: Mapping[str, Any]
+) -> Evidence:
+    """Make evidence of a classifier's distributions (n_objects, n_views, B) of calibration images.
+
+    Bins are the classes. Nothing is smoothed, for the distributions are smooth already.
+    """
+    estimates = estimate_likelihood(distributions)
+    pair = Conditionals(estimates.T / estimates.sum(axis=0)[:, None], estimates)
+    views = distributions.astype(np.float32)
+    return Evidence(np.empty((0, len(estimates))), pair, np.nan, np.nan, settings, views)

@@ -1,0 +1,280 @@
+"""The lookup table: everything a robot needs once its calibration is done."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.core.angles import nearest_bin, travel_deg
+from nbv.core.criteria import tabulate
+from nbv.core.evidence import Evidence
+from nbv.errors import UserError
+from nbv.files import (
+    CALIBRATE_AGAIN,
+    calibrated_file,
+    damaged,
+    need_distributions,
+    read_arrays,
+    readable,
+    write_arrays,
+)
+
+
+@dataclass(frozen=True)
+class LookupTable:
+    """A criterion tabulated for one estimator.
+
+    Attributes
+    ----------
+    viewpoint_likelihood : ndarray (B, B) float32
+        V[estimate, viewpoint].
+    estimate_likelihood : ndarray (B, B) float32
+        L[viewpoint, estimate].
+    cost : ndarray (B, B) float32
+        A[estimate, delta], in the unit of `nbv.core.criteria.cost_unit`.
+    recommended_delta_deg : ndarray (B,) int64
+        The rotation of least cost for each estimate, degrees in [0, 360), travel considered.
+    bandwidth_deg, pseudo_observations : float
+        The density's settings.
+    criterion : str
+        A name in `nbv.core.criteria.CRITERIA`.
+    pose_likelihood, spread : str
+        The criterion's settings; see `nbv.core.criteria.pose_ambiguity`.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+    >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+    >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+    >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
+    >>> table.criterion, table.cost.shape
+    ('pose_ambiguity', (36, 36))
+    """
+
+    viewpoint_likelihood: NDArray[np.float32]
+    estimate_likelihood: NDArray[np.float32]
+    cost: NDArray[np.float32]
+    recommended_delta_deg: NDArray[np.int64]
+    bandwidth_deg: float
+    pseudo_observations: float
+    pose_likelihood: str
+    spread: str
+    criterion: str
+
+    def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
+        """Return the rotation to the next view for each estimate, degrees in [0, 360).
+
+        It is that of least cost which travels more than a bin. A view from the same place is no
+        second view: the same image gives the same error again. The cost of a table of few objects
+        may still be least there, because it takes views as independent.
+
+        Raises
+        ------
+        UserError
+            Where an estimate is no finite number.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
+        >>> table.recommend([0.0, 90.0]).shape
+        (2,)
+        """
+        return np.asarray(self._next_view_deg[self._bins(estimate_deg)])
+
+    def least_cost(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
+        """Return the rotation of least cost for each estimate (Eq. 2), whatever it travels.
+
+        Raises
+        ------
+        UserError
+            Where an estimate is no finite number.
+
+        Examples
+        --------
+        >>> import numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
+        >>> bool((table.least_cost([0.0]) == table.recommended_delta_deg[0]).all())
+        True
+        """
+        return np.asarray(self.recommended_delta_deg[self._bins(estimate_deg)])
+
+    def _bins(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
+        given = np.asarray(estimate_deg)
+        if given.dtype.kind not in "iuf" or not np.isfinite(given).all():
+            raise UserError("an estimate is no finite number of degrees")
+        return np.asarray(nearest_bin(estimate_deg, len(self.cost)), dtype=np.int64)
+
+    @cached_property
+    def _next_view_deg(self) -> NDArray[np.int64]:
+        n_bins = len(self.cost)
+        width = 360.0 / n_bins
+        stays = travel_deg(self.recommended_delta_deg) <= width
+        is_far = travel_deg(np.arange(n_bins) * width) > width
+        moving = np.where(is_far, self.cost[stays], np.inf)
+        found = self.recommended_delta_deg.copy()
+        found[stays] = least_cost_delta(moving)
+        return found
+
+
+def least_cost_delta(
+    cost: NDArray[np.floating[Any]],
+    *,
+    travel_cost: float = 0.0,
+    max_travel_deg: float = 180.0,
+) -> NDArray[np.int64]:
+    """Return the argmin of each row of A[belief, delta] (Eq. 2), in degrees.
+
+    Parameters
+    ----------
+    cost : ndarray (n, B)
+    travel_cost : float, 0 or more
+        Added to A for every degree that the camera travels, in A's own unit.
+    max_travel_deg : float in [0, 180]
+        Rotations that travel farther are left out.
+
+    Returns
+    -------
+    ndarray (n,) int64
+        In [0, 360). Of equal minima the one of smallest travel is taken, then the smaller delta.
+
+    Raises
+    ------
+    UserError
+        Where a cost is NaN, which argmin would take for the least.
+    """
+    n_bins = cost.shape[1]
+    deltas = np.arange(n_bins) * (360.0 / n_bins)
+    travel = travel_deg(deltas)
+    order = np.lexsort((deltas, travel))
+    order = order[travel[order] <= max_travel_deg]
+    candidates = cost[:, order]
+    if travel_cost:
+        candidates = candidates + travel_cost * travel[order]
+    if np.isnan(candidates).any():
+        raise UserError("a rotation's cost is NaN: the estimates are damaged; make them again")
+    best = order[np.argmin(candidates, axis=1)]
+    recommended: NDArray[np.int64] = np.rint(deltas[best]).astype(np.int64)
+    return recommended
+
+
+def recommended_delta(
+    cost: NDArray[np.floating[Any]], settings: Mapping[str, Any]
+) -> NDArray[np.int64]:
+    """Return `least_cost_delta` with the ``travel_cost`` and ``max_travel_deg`` of settings."""
+    limits = {key: settings[key] for key in ("travel_cost", "max_travel_deg") if key in settings}
+    return least_cost_delta(cost, **limits)
+
+
+def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") -> LookupTable:
+    """Tabulate a criterion; parameters and errors as of `nbv.core.criteria.tabulate`.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> truth = np.arange(360.0)
+    >>> estimates = np.where(np.abs(truth - 90) < 60, 90.0, truth)  # blind about 90 degrees
+    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+    >>> evidence = nbv.gather_evidence(
+    ...     estimates[None], density, bandwidth_deg=8, pseudo_observations=3
+    ... )
+    >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
+    >>> 60 < table.recommend(90.0) < 300  # leave the blind range
+    np.True_
+    """
+    cost = tabulate(criterion, evidence, fusion)
+    return LookupTable(
+        viewpoint_likelihood=evidence.conditionals.viewpoint.astype(np.float32),
+        estimate_likelihood=evidence.conditionals.estimate.astype(np.float32),
+        cost=cost,
+        recommended_delta_deg=recommended_delta(cost, evidence.settings),
+        bandwidth_deg=float(evidence.bandwidth_deg),
+        pseudo_observations=float(evidence.pseudo_observations),
+        pose_likelihood=evidence.settings["pose_likelihood"],
+        spread=evidence.settings["spread"],
+        criterion=criterion,
+    )
+
+
+def save_lookup(
+    path: str | Path, table: LookupTable, further: Mapping[str, NDArray[Any]] | None = None
+) -> None:
+    """Write a table as `.npz`, one array for each of its attributes; see `load_lookup`.
+
+    ``further`` arrays are kept in the same file.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+    >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+    >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+    >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     nbv.save_lookup(f'{folder}/table.npz', table)
+    ...     nbv.load_lookup(f'{folder}/table.npz').criterion
+    'pose_ambiguity'
+    """
+    arrays = {item.name: np.asarray(getattr(table, item.name)) for item in fields(table)}
+    write_arrays(path, arrays | dict(further or {}))
+
+
+def load_lookup(path: str | Path) -> LookupTable:
+    """Read what `save_lookup` wrote.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read, V or L is no conditional density, a cost is not finite, or a
+        recommended rotation is no whole number of degrees in [0, 360).
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, nbv
+    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+    >>> evidence = nbv.gather_evidence(
+    ...     np.arange(360.0)[None], density, bandwidth_deg=8, pseudo_observations=3, n_bins=120
+    ... )
+    >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     nbv.save_lookup(f"{folder}/table.npz", table)
+    ...     nbv.load_lookup(f"{folder}/table.npz").criterion
+    'pose_ambiguity'
+    """
+    names = [item.name for item in fields(LookupTable)]
+    stored = read_arrays(calibrated_file(path), names, CALIBRATE_AGAIN)
+    with readable(path, CALIBRATE_AGAIN):
+        # An array without axes holds a number or a text.
+        values: dict[str, Any] = {
+            name: stored[name] if stored[name].ndim else stored[name].item() for name in names
+        }
+        table = LookupTable(**values)
+        n_bins = len(table.cost)
+        for density in (table.viewpoint_likelihood, table.estimate_likelihood):
+            need_distributions(path, density, (n_bins, n_bins), CALIBRATE_AGAIN)
+        if table.cost.shape != (n_bins, n_bins) or not np.isfinite(table.cost).all():
+            raise damaged(path, "a cost is not finite", CALIBRATE_AGAIN)
+        delta_deg = table.recommended_delta_deg
+        if delta_deg.shape != (n_bins,) or not np.issubdtype(delta_deg.dtype, np.integer):
+            raise damaged(path, "the recommended rotations are no whole degrees", CALIBRATE_AGAIN)
+        if ((delta_deg < 0) | (delta_deg >= 360)).any():
+            raise damaged(path, "a recommended rotation is not in [0, 360)", CALIBRATE_AGAIN)
+    return table

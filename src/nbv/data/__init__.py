@@ -1,0 +1,1 @@
+"""From meshes to depth images: objects, cameras, renderers and sensors."""

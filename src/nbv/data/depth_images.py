@@ -1,0 +1,139 @@
+"""The depth images of a unit on disk: one array, and the ids of its objects."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.errors import UserError
+from nbv.files import damaged, open_array, read_json, replacing, write_json
+
+Codes = NDArray[np.uint8]
+
+logger = logging.getLogger(__name__)
+
+# Progress is logged at each tenth of the work, but not more often than this.
+_SECONDS_BETWEEN_LINES = 5.0
+
+
+class DepthImages(NamedTuple):
+    """Depth images of full turns of objects.
+
+    Attributes
+    ----------
+    object_ids : tuple of str
+        n objects, all different.
+    codes : ndarray (n, n_views, side, side) uint8
+        See `nbv.data.depth_codes.encode_depth`; view k has the azimuth 360 k / n_views.
+        Mapped into memory: the file is read as far as it is indexed.
+    """
+
+    object_ids: tuple[str, ...]
+    codes: Codes
+
+    def of(self, object_ids: Sequence[str]) -> Codes:
+        """Return the images of some objects, (k, n_views, side, side), in the order given.
+
+        Raises
+        ------
+        UserError
+            Where an object has none.
+        """
+        rows = {name: row for row, name in enumerate(self.object_ids)}
+        if strangers := [name for name in object_ids if name not in rows]:
+            raise UserError(
+                f"object {strangers[0]!r} has no depth images: splits and depth images are of "
+                "different runs; render again"
+            )
+        return np.asarray(self.codes[[rows[name] for name in object_ids]])
+
+
+def write_depth(
+    path: str | Path,
+    objects_path: str | Path,
+    object_ids: Collection[str],
+    images: Iterable[Codes],
+    shape: tuple[int, int, int],
+) -> None:
+    """Write the images of all objects to one `.npy` file, and the objects' ids to another.
+
+    The images go to disk as they are made; memory holds those of one object. Each file appears
+    under its name only when it is complete.
+
+    Parameters
+    ----------
+    path, objects_path : path
+        Of the images and of the ids.
+    object_ids : collection of str
+    images : iterable of (n_views, side, side) uint8
+        Of each object, such as `nbv.data.render.render_objects`.
+    shape : tuple of int
+        (n_views, side, side).
+    """
+    header = {
+        "descr": np.lib.format.dtype_to_descr(np.dtype(np.uint8)),
+        "fortran_order": False,
+        "shape": (len(object_ids), *shape),
+    }
+    progress = _Progress(str(path), len(object_ids), shape[0])
+    # Written, not mapped: a full disk then raises an error instead of a fatal signal.
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, header)
+        for index, codes in enumerate(images):
+            file.write(codes.tobytes())
+            progress.advance(index + 1)
+    write_json(objects_path, list(object_ids))
+
+
+def open_depth(path: str | Path, objects_path: str | Path) -> DepthImages:
+    """Open what `write_depth` wrote.
+
+    Raises
+    ------
+    UserError
+        Where a file cannot be read or the two are not about the same number of objects.
+    """
+    codes: Codes = open_array(path)
+    if codes.ndim != 4 or codes.dtype != np.uint8 or codes.shape[2] != codes.shape[3]:
+        raise damaged(path, "holds no depth images of objects")
+    names = read_json(objects_path)
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise damaged(objects_path, "holds no list of objects")
+    if len(set(names)) != len(names) or len(names) != len(codes):
+        raise damaged(
+            objects_path, f"{len(set(names))} different objects, {path} has images of {len(codes)}"
+        )
+    return DepthImages(tuple(names), codes)
+
+
+class _Progress:
+    def __init__(self, name: str, n_objects: int, images_each: int) -> None:
+        self._name, self._n_objects, self._images_each = name, n_objects, images_each
+        self._start = self._last = time.monotonic()
+        self._tenth = 0
+
+    def advance(self, done: int) -> None:
+        now = time.monotonic()
+        elapsed = max(now - self._start, 1e-9)
+        rate = done * self._images_each / elapsed
+        if done == self._n_objects:
+            images = done * self._images_each
+            logger.info(
+                "%s: %d objects, %d images in %.1f s (%.0f images/s)",
+                *(self._name, done, images, elapsed, rate),
+            )
+            return
+        tenth = 10 * done // self._n_objects
+        if tenth > self._tenth and now - self._last >= _SECONDS_BETWEEN_LINES:
+            self._tenth, self._last = tenth, now
+            left = elapsed / done * (self._n_objects - done)
+            logger.info(
+                "%s: object %d of %d, %.0f images/s, %.0f s left",
+                *(self._name, done, self._n_objects, rate, left),
+            )

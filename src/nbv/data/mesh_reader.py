@@ -1,0 +1,134 @@
+"""Mesh files read in a process of their own, with limits of time and memory.
+
+A file may be hostile, or only damaged in a way that a loader does not expect. It may then take any
+time, any amount of memory, or the process itself; here it takes no more than the limits.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import weakref
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.errors import UserError
+
+if TYPE_CHECKING:
+    import trimesh
+
+PROCESSOR_S = 60
+"""Of processor time for one file. A million faces as text take about ten."""
+
+CLOCK_S = 600
+"""For one file on a busy machine or a slow disk, and the end of what waits for something."""
+
+MAX_BYTES = 4 * 2**30
+"""Of memory, libraries included. A million faces as text take less than half of it."""
+
+
+class MeshReader:
+    """Reads mesh files, one after the other, in one process.
+
+    The process starts with the first file, and again after a file that ended it. It ends with the
+    object, and with the process that made the object, however that ends.
+
+    Parameters
+    ----------
+    processor_s, clock_s : int
+        Seconds for one file.
+    max_bytes : int
+        Of memory. Where the system refuses such a limit, as macOS does, there is none.
+    """
+
+    def __init__(
+        self, processor_s: int = PROCESSOR_S, clock_s: int = CLOCK_S, max_bytes: int = MAX_BYTES
+    ) -> None:
+        self._limits = (processor_s, clock_s, max_bytes)
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def read(self, path: Path) -> trimesh.Trimesh:
+        """Load a mesh file as `nbv.data.mesh_formats.parse_mesh` does.
+
+        Raises
+        ------
+        UserError
+            With the path and the reason, a limit among them.
+        """
+        import trimesh
+
+        if not path.is_file():
+            what = "is no regular file" if path.exists() else "does not exist"
+            raise UserError(f"{path}: {what}; a mesh file expected")
+        process = self._running()
+        try:
+            answer, vertices, faces = _ask(process, path)
+        except (EOFError, BrokenPipeError) as error:
+            reason = self._reason(process.wait())
+            self._end()
+            self._process = None
+            raise UserError(f"{path}: cannot be read as a mesh ({reason})") from error
+        if "refused" in answer:
+            raise UserError(f"{path}: {answer['refused']}")
+        return trimesh.Trimesh(vertices.reshape(-1, 3), faces.reshape(-1, 3), process=False)
+
+    def _running(self) -> subprocess.Popen[bytes]:
+        if self._process is None:
+            # Its import here makes it one of the sources that a result depends on.
+            from nbv.data import mesh_process as reader_process
+
+            self._process = subprocess.Popen(
+                # -P: the current folder may hold anything, and modules are not looked for in it.
+                [sys.executable, "-P", "-m", reader_process.__name__, *map(str, self._limits)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                # What libraries print about a file is not the one line that the user gets.
+                stderr=subprocess.DEVNULL,
+                # A thread more reserves memory, and there is nothing for it to do.
+                env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+            )
+            self._end = weakref.finalize(self, _end, self._process)
+        return self._process
+
+    def _reason(self, status: int) -> str:
+        if status == -signal.SIGPROF:
+            return f"it took more than {self._limits[0]} s of processor time"
+        if status == -signal.SIGALRM:
+            return f"it took more than {self._limits[1]} s"
+        with contextlib.suppress(ValueError):
+            return f"the reader was ended by {signal.Signals(-status).name}; is memory short?"
+        return f"the reader ended with status {status}"
+
+
+def _ask(
+    process: subprocess.Popen[bytes], path: Path
+) -> tuple[dict[str, Any], NDArray[Any], NDArray[Any]]:
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(json.dumps(str(path.absolute())).encode() + b"\n")
+    process.stdin.flush()
+    answer: dict[str, Any] = json.loads(process.stdout.readline() or _died())
+    arrays = []
+    for kind, name in (("<f8", "vertices"), ("<i8", "faces")):
+        size = 3 * 8 * answer.get(name, 0)
+        content = process.stdout.read(size)
+        if len(content) < size:
+            _died()
+        arrays.append(np.frombuffer(content, dtype=kind))
+    return answer, arrays[0], arrays[1]
+
+
+def _died() -> bytes:
+    raise EOFError("the reader is gone")
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.communicate()

@@ -1,0 +1,77 @@
+"""Generated objects of five categories: the data set without a download.
+
+An object is a pure function of (seed, category, index); a mug's handle may have a least reach, and
+a share of mugs a square body. Its frame is the object frame: z up, front +x, turning axis x = y =
+0, a mug's handle at azimuth 270 degrees. Its scale is arbitrary.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+
+import numpy as np
+import trimesh
+
+from nbv.data.procedural import airplane, car, chair, mug, toilet
+from nbv.errors import UserError, nearest
+
+__all__ = ["CATEGORIES", "generate"]
+
+CATEGORIES: dict[str, Callable[[np.random.Generator], trimesh.Trimesh]] = {
+    "airplane": airplane.airplane,
+    "car": car.car,
+    "chair": chair.chair,
+    "mug": mug.mug,
+    "toilet": toilet.toilet,
+}
+
+MOST_LEAST_REACH = 0.5
+"""About every eighth mug has a reach of 0.5. Above it, finding one would take many draws."""
+
+
+def generate(
+    category: str, seed: int, index: int, *, least_reach: float = 0.0, square_share: float = 0.0
+) -> trimesh.Trimesh:
+    """Return object number `index` of a category.
+
+    Parameters
+    ----------
+    category : str
+        A key of :data:`CATEGORIES`.
+    seed : int
+        Seed of the whole data set, >= 0.
+    index : int
+        Number of the object, >= 0. An object does not depend on other objects or their order.
+    least_reach : float
+        Least reach of a mug's handle, in widths of the body, 0 to 0.5
+        (`nbv.data.procedural.mug.handle_reach`). Other categories do not heed it.
+    square_share : float
+        The probability that a mug has a square body, 0 to 1. Other categories do not heed it.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        A concatenation of watertight parts with outward faces, 1,000 to 20,000 faces in all.
+
+    Raises
+    ------
+    UserError
+        If the category is unknown, seed or index is negative, or the least reach or the
+        share is out of range.
+    """
+    if category not in CATEGORIES:
+        message = f"no procedural category {category!r}: {nearest(category, CATEGORIES)}"
+        raise UserError(message)
+    if seed < 0 or index < 0:
+        message = f"procedural {category}: seed {seed} and index {index} must not be negative"
+        raise UserError(message)
+    if not 0 <= least_reach <= MOST_LEAST_REACH:
+        raise UserError(f"a least reach of {least_reach:g}: 0 to {MOST_LEAST_REACH:g} expected")
+    if not 0 <= square_share <= 1:
+        raise UserError(f"a share of square mugs of {square_share:g}: 0 to 1 expected")
+    # crc32, not hash(): Python's hash of a string differs between processes.
+    rng = np.random.default_rng([seed, zlib.crc32(category.encode()), index])
+    if category == "mug":
+        return mug.mug(rng, least_reach, square_share)
+    return CATEGORIES[category](rng)

@@ -1,0 +1,111 @@
+"""Depth images of many objects."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.data.camera import Camera
+from nbv.data.depth_codes import Depths, encode_depth
+from nbv.data.depth_images import Codes
+from nbv.data.meshes import Surface
+from nbv.data.renderers import Renderer
+from nbv.data.sensors import Measure
+from nbv.data.silhouette import crop_measured, sensor_camera
+from nbv.errors import UserError
+
+logger = logging.getLogger(__name__)
+
+N_AZIMUTHS = 360
+"""Views of a full turn."""
+
+
+def render_objects(
+    meshes: Mapping[str, Surface],
+    elevation_deg: float,
+    camera: Camera,
+    renderer: Renderer,
+    measure: Measure | None = None,
+    n_azimuths: int = N_AZIMUTHS,
+) -> Iterator[Codes]:
+    """Yield the encoded depth images of each object.
+
+    Parameters
+    ----------
+    meshes : mapping of str to mesh
+        Normalised meshes by object id.
+    elevation_deg : float
+        In [-90, 90].
+    camera : Camera
+    renderer : Renderer
+    measure : callable or None
+        The sensor, from `nbv.data.sensors.open_sensor`. It measures the images, and the crop
+        follows what it measures (`nbv.data.silhouette`). None keeps the true depth.
+    n_azimuths : int
+        View k is at azimuth 360 k / n_azimuths degrees.
+
+    Yields
+    ------
+    (n_azimuths, side, side) uint8
+        See `nbv.data.depth_codes.encode_depth`.
+
+    Raises
+    ------
+    UserError
+        Naming the object that does not fit the image, that covers no pixel of a view, or of which
+        the sensor measures nothing in any view. Views in which it measures nothing are logged
+        otherwise.
+    """
+    drawn = camera if measure is None else sensor_camera(camera)
+    azimuths_deg = np.arange(n_azimuths) * (360.0 / n_azimuths)
+    for object_id, mesh in meshes.items():
+        try:
+            depth = renderer.render(mesh.vertices, mesh.faces, elevation_deg, azimuths_deg, drawn)
+        except UserError as error:
+            raise UserError(f"{object_id}: {error}") from error
+        except Exception as error:
+            raise RuntimeError(f"{object_id}: {type(error).__name__}: {error}") from error
+        _need_visible(depth, object_id, elevation_deg, azimuths_deg, camera)
+        if measure is not None:
+            depth = crop_measured(measure(depth, object_id), camera)
+            _need_measured(depth, object_id, elevation_deg)
+        yield encode_depth(depth, camera)
+
+
+def _n_blank(depth: Depths) -> int:
+    return int(np.count_nonzero(~depth.any(axis=(1, 2))))
+
+
+def _need_visible(
+    depth: Depths,
+    object_id: str,
+    elevation_deg: float,
+    azimuths_deg: NDArray[np.floating[Any]],
+    camera: Camera,
+) -> None:
+    if n_blank := _n_blank(depth):
+        first = azimuths_deg[int((~depth.any(axis=(1, 2))).argmax())]
+        raise UserError(
+            f"{object_id}: the object covers no pixel in {n_blank} of {len(depth)} views, first at "
+            f"azimuth {first:g}, elevation {elevation_deg:g}: lower camera.distance="
+            f"{camera.distance:g} or camera.fov_deg={camera.fov_deg:g}, raise camera.image_side="
+            f"{camera.image_side}, or list the id in dataset.exclude if its mesh is too thin"
+        )
+
+
+def _need_measured(depth: Depths, object_id: str, elevation_deg: float) -> None:
+    n_blank = _n_blank(depth)
+    if n_blank == len(depth):
+        raise UserError(
+            f"{object_id}: the sensor measures nothing of the object in any view at elevation "
+            f"{elevation_deg:g}: change sensor.parameters, sensor.diagonal_m or camera.distance"
+        )
+    if n_blank:
+        logger.warning(
+            "%s: the sensor measures nothing in %d of %d views at elevation %g",
+            *(object_id, n_blank, len(depth), elevation_deg),
+        )

@@ -1,0 +1,1 @@
+"""The paper's experiment: configuration, estimators, evaluation, statistics and report."""

@@ -1,0 +1,411 @@
+"""What a configuration may hold: every key, type, range and choice, and what names must agree."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Literal, Self, TypeVar
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+from nbv.errors import UserError, nearest
+from nbv.experiment.fold_sizes import enough_objects
+
+T = TypeVar("T")
+
+NAME_RULE = "use letters, digits, '.', '_' and '-', a letter or digit first, 100 at most"
+"""What a name has to be that becomes a part of a path or a wildcard of Snakemake."""
+
+
+def _distinct(values: list[T]) -> list[T]:
+    for index, value in enumerate(values):
+        if value in values[:index]:
+            raise ValueError(f"{value} is there twice")
+    return values
+
+
+def _below_root(folder: str) -> str:
+    path = PurePosixPath(folder)
+    if path.is_absolute() or ".." in path.parts:
+        raise ValueError(f"{folder!r} is not below dataset.root")
+    return folder
+
+
+def _with_known_home(path: str) -> str:
+    try:
+        Path(path).expanduser()
+    except RuntimeError:
+        raise ValueError(f"{path!r}: there is no such user") from None
+    return path
+
+
+Whole = Annotated[int, Field(strict=True)]
+Number = Annotated[float, Field(strict=True)]
+# Far above any use, and small enough for arithmetic; `nbv.experiment.config.memory` refuses what is too much.
+Count = Annotated[Whole, Field(ge=1, le=10**12)]
+Epochs = Annotated[Whole, Field(ge=1, le=10**6)]
+LearningRate = Annotated[Number, Field(gt=0, le=10)]
+Angle = Annotated[Number, Field(ge=-360, le=360)]
+Bandwidth = Annotated[Number, Field(ge=0, le=180)]
+PseudoObservations = Annotated[Number, Field(ge=0, le=10**9)]
+Share = Annotated[Number, Field(ge=0, le=1)]
+Replicate = Annotated[Whole, Field(ge=0, le=999)]
+Elevation = Annotated[Whole, Field(ge=0, le=89)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"), NAME_RULE]
+Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{1,4096}$"), "one line of text"]
+DataPath = Annotated[Text, AfterValidator(_with_known_home)]
+Axis = Annotated[
+    str,
+    Field(pattern=r"^(auto|[+-]?[xyzXYZ]|[^,\s]+(,[^,\s]+){2})$"),
+    "an axis such as +y, a vector such as 0,0,1, or auto",
+]
+Distinct = AfterValidator(_distinct)
+AtLeastOne = Field(min_length=1, max_length=100)
+Framing = Literal["silhouette", "axis"]
+
+FEWEST_PIXELS = 4
+"""Of an object's diagonal in an image: fewer show nothing of where it is seen from."""
+
+RENAMED_KEYS = {
+    "contenders": "extensions",
+    "beside": "compared_runs",
+    "sequence": "more_views",
+    "reading": "pose_likelihood",
+    "rotation": "policy",
+}
+"""New names of earlier keys, in sections that have the new key and not the earlier one."""
+
+RENAMED_VALUES = {
+    "policy": {"entropy": "pose_ambiguity", "chosen": "selected"},
+    "fusion": {"chosen": "selected"},
+}
+"""New names of earlier values, by their key."""
+
+
+class Section(BaseModel):
+    """Keys that belong together. Another key is a mistake."""
+
+    # So that a name of digits needs no quotes.
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, coerce_numbers_to_str=True)
+
+
+class Dataset(Section):
+    """Where meshes come from; see `nbv.data.sources`."""
+
+    source: str
+    root: DataPath | None = None
+    layout: Literal["auto", "v1", "v2", "sem"] = "auto"
+    categories: dict[Name, Annotated[Text, AfterValidator(_below_root)]] = {}
+    up: Axis = "+z"
+    front: Axis = "+x"
+    turn_deg: dict[Name, Angle] = {}
+    centre: Literal["box", "origin"] = "box"
+    handle_reach: Annotated[Number, Field(ge=0, le=0.5), "in widths of a mug's body"] = 0.0
+    square_share: Annotated[Number, Field(ge=0, le=1), "share of mugs"] = 0.0
+    exclude: list[Text] = []
+    exclude_file: DataPath | None = None
+
+    @model_validator(mode="after")
+    def _of_generated_mugs_alone(self) -> Self:
+        # An experiment sets it whatever its data set: what a run says of itself must be true.
+        if self.source != "procedural":
+            self.handle_reach = self.square_share = 0.0
+        return self
+
+
+class Renderer(Section):
+    """Which renderer draws depth; see `nbv.data.renderers`."""
+
+    name: str
+
+
+class Camera(Section):
+    """The depth camera; see `nbv.data.camera`."""
+
+    distance: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"]
+    fov_deg: Annotated[Number, Field(ge=0.05, le=160)]
+    image_side: Annotated[Whole, Field(ge=8, le=10**6)]
+    framing: Framing
+
+    @model_validator(mode="after")
+    def _check_object_is_seen(self) -> Self:
+        width = 2 * self.distance * math.tan(math.radians(self.fov_deg) / 2)
+        if self.image_side / width < FEWEST_PIXELS:
+            raise UserError(
+                f"camera.distance={self.distance:g} with camera.fov_deg={self.fov_deg:g} and "
+                f"camera.image_side={self.image_side} shows an object {self.image_side / width:.2g}"
+                f" pixels wide, and it needs {FEWEST_PIXELS}: bring the camera nearer, narrow its "
+                "view or take more pixels"
+            )
+        return self
+
+
+class Sensor(Section):
+    """How the depth camera measures; see `nbv.data.sensors`."""
+
+    name: str
+    parameters: dict[Name, Annotated[Number, Field(gt=0, le=10**6)]] = {}
+    diagonal_m: dict[Name, Annotated[Number, Field(gt=0, le=1000)]] = {}
+
+
+class Schedule(Section):
+    """How long and at which peak rate a stage trains; see `nbv.experiment.estimation.warm_start`."""
+
+    epochs: Epochs
+    learning_rate: LearningRate
+
+
+class Estimator(Section):
+    """The single-view estimator; see `nbv.experiment.estimation`. A kind omits what it does not have."""
+
+    kind: str
+    channels: Annotated[list[Count], AtLeastOne]
+    hidden: Count
+    epochs: Epochs
+    batch_size: Annotated[Whole, Field(ge=2, le=10**12)]
+    learning_rate: LearningRate
+    weight_decay: Annotated[Number, Field(ge=0, le=10)]
+    device: Literal["auto", "cpu", "cuda", "mps"]
+    precision: Literal["auto", "bfloat16", "float32"]
+    warm_start: Literal["none", "elevations", "categories", "both"] = "none"
+    pretraining: Schedule = Schedule(epochs=2, learning_rate=9e-3)
+    fine_tuning: Schedule = Schedule(epochs=5, learning_rate=4e-3)
+    next_elevation: Schedule = Schedule(epochs=4, learning_rate=4e-3)
+    n_classes: Annotated[Whole, Field(ge=8, le=360), "a divisor of 360"] | None = None
+    target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
+    pairs: str | None = None
+
+    @model_validator(mode="after")
+    def _check_pairs(self) -> Self:
+        is_external = self.kind in ("external", "external_distributions")
+        if is_external != (self.pairs is not None):
+            raise UserError(
+                f"estimator.kind={self.kind} and estimator.pairs={self.pairs}: an external "
+                "estimator needs a file of calibration pairs, and no other has one; choose "
+                "estimator=external, or external_distributions, with estimator.pairs=<file>"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _check_classes(self) -> Self:
+        has = self.n_classes is not None, self.target_bandwidth_deg is not None
+        needs = {"classifier": (True, True), "external_distributions": (True, False)}
+        if has != needs.get(self.kind, (False, False)):
+            raise UserError(
+                f"estimator.kind={self.kind}: a classifier has n_classes and target_bandwidth_deg, "
+                "and it needs both; external_distributions needs n_classes alone; no other "
+                "estimator has either: choose estimator=classifier"
+            )
+        if self.n_classes is not None and 360 % self.n_classes:
+            raise UserError(f"estimator.n_classes={self.n_classes} is no divisor of 360")
+        if self.n_classes is not None and self.n_classes % 2:
+            raise UserError(
+                f"estimator.n_classes={self.n_classes} is odd: the opposite view needs a class"
+            )
+        return self
+
+
+class Density(Section):
+    """The density of calibration pairs; see `nbv.core.density_selection`."""
+
+    pose_likelihood: Literal["given_estimate", "given_truth"]
+    spread: Literal["entropy", "circular_variance"]
+    bandwidths_deg: Annotated[list[Bandwidth], AtLeastOne, Distinct]
+    pseudo_observations: Annotated[list[PseudoObservations], AtLeastOne, Distinct]
+    n_parts: Annotated[Whole, Field(ge=2, le=1000)]
+
+
+class Affinity(Section):
+    """How like distributions count; see `nbv.core.criteria.expected_error`."""
+
+    power: Annotated[Number, Field(gt=0, le=10**4)]
+    pseudo_observations: PseudoObservations
+    caution: Annotated[Number, Field(ge=0, le=100), "in standard errors"] = 2.0
+
+
+class Recommendation(Section):
+    """What travel costs; see `nbv.core.lookup.least_cost_delta`."""
+
+    travel_cost: Annotated[Number, Field(ge=0, le=10**6), "in the criterion's unit per degree"]
+    max_travel_deg: Annotated[Number, Field(ge=0, le=180)]
+
+
+class MoreViews(Section):
+    """More than two views; see `studies.more_views`."""
+
+    n_views: Annotated[Whole, Field(ge=2, le=8)]
+    start_every_deg: Annotated[Whole, Field(ge=1, le=180)]
+    min_separation_deg: Annotated[Number, Field(ge=0, le=45)]
+
+
+class Method(Section):
+    """A policy with a fusion; `nbv.core` knows their names."""
+
+    policy: str
+    fusion: str = "average"
+
+    @field_validator("policy", "fusion")
+    @classmethod
+    def _check_name_is_new(cls, value: str, info: ValidationInfo) -> str:
+        key = str(info.field_name)
+        if value in RENAMED_VALUES[key]:
+            raise ValueError(f"{key} {value!r} is now {RENAMED_VALUES[key][value]!r}")
+        return value
+
+
+class Confirmation(Section):
+    """Trainings beyond the run's own; see `studies.confirmation`."""
+
+    dataset: Name | None = None
+    replicates: Annotated[list[Annotated[list[Replicate], Distinct]], AtLeastOne] = [[0]]
+    kept: Annotated[list[DataPath], Distinct] = []
+
+    @field_validator("replicates")
+    @classmethod
+    def _check_there_is_one(cls, value: list[list[int]]) -> list[list[int]]:
+        if not any(value):
+            raise ValueError("there is no replicate under any shuffle")
+        return value
+
+
+class Condition(Section):
+    """What sees the objects, and how they are framed."""
+
+    sensor: str
+    framing: Framing
+
+
+class Randomisation(Section):
+    """What a camera does that is not known; see `nbv.data.randomisation`."""
+
+    elevation_deg: Annotated[Number, Field(ge=0, le=85)] = 0.0
+    roll_deg: Annotated[Number, Field(ge=0, le=180)] = 0.0
+    size: Annotated[Number, Field(ge=0, le=0.9)] = 0.0
+    nearest: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"] | None = None
+    farthest: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"] | None = None
+    measured: Share = 1.0
+    table: Share = 0.0
+    thin: Share = 0.0
+    inside: Share = 0.0
+    occluded: Share = 0.0
+    patches: Annotated[Number, Field(ge=0, le=100)] = 0.0
+    edge_px: Annotated[Number, Field(ge=0, le=100)] = 0.0
+    shift_px: Annotated[Number, Field(ge=0, le=100)] = 0.0
+
+    @model_validator(mode="after")
+    def _check_distances(self) -> Self:
+        if (self.nearest is None) != (self.farthest is None):
+            raise UserError("randomisation.nearest and randomisation.farthest belong together")
+        if self.nearest is not None and self.farthest is not None and self.farthest < self.nearest:
+            raise UserError(
+                f"randomisation.farthest={self.farthest:g} is less than nearest={self.nearest:g}"
+            )
+        return self
+
+
+class Bundles(Section):
+    """What bundles are compared without, and on which frames; see workflow/rules/bundles.smk."""
+
+    ingredients: dict[Name, dict[Name, Number | None]] = {}
+    replicates: Annotated[list[Replicate], Field(min_length=1), Distinct] = [0]
+    frames: str | None = None
+
+    @model_validator(mode="after")
+    def _check_ingredients(self) -> Self:
+        for name, left_out in self.ingredients.items():
+            for key in left_out:
+                if key not in Randomisation.model_fields:
+                    raise UserError(
+                        f"bundles.ingredients.{name}.{key} is unknown: "
+                        f"{nearest(key, Randomisation.model_fields)}"
+                    )
+        return self
+
+
+class Transfer(Section):
+    """Conditions to train under and to test under; see `studies.transfer`."""
+
+    category: Name | None
+    elevation_deg: Elevation
+    folds: Annotated[list[Whole], Field(min_length=1), Distinct] | None
+    conditions: Annotated[dict[Name, Condition], AtLeastOne]
+
+
+class Config(Section):
+    """Everything a run depends on."""
+
+    experiment: Name
+    name: Name | None
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)]
+    categories: Annotated[list[Name], Field(min_length=1), Distinct]
+    focus_category: Name | None
+    elevations_deg: dict[Name, Annotated[list[Elevation], Field(min_length=1), Distinct]]
+    n_objects: Annotated[Whole, Field(ge=3, le=10**12)] | None
+    n_folds: Annotated[Whole, Field(ge=2, le=1000)]
+    calibration: Literal["holdout", "crossfit"] = "holdout"
+    calibration_fraction: Annotated[Number, Field(gt=0, lt=1)]
+    crossfit_parts: Annotated[Whole, Field(ge=2, le=100)] = 2
+    crossfit_epochs: Epochs | None = None
+    methods: Annotated[dict[Name, Method], AtLeastOne]
+    extensions: dict[Name, Method]
+    compared_runs: list[Name] = []
+    leaderboard_runs: Annotated[list[Name], Distinct]
+    n_resamples: Annotated[Whole, Field(ge=100, le=10**12)]
+    dataset: Dataset
+    renderer: Renderer
+    camera: Camera
+    sensor: Sensor
+    estimator: Estimator
+    density: Density
+    affinity: Affinity = Affinity(power=16, pseudo_observations=90)
+    recommendation: Recommendation
+    more_views: MoreViews
+    transfer: Transfer
+    confirmation: Confirmation = Confirmation()
+    randomisation: Randomisation = Randomisation()
+    bundles: Bundles = Bundles()
+
+    @model_validator(mode="after")
+    def _check_categories(self) -> Self:
+        known, ours = self.elevations_deg, self.categories
+        for category in ours:
+            if category not in known:
+                raise UserError(
+                    f"categories: {category!r} is unknown: {nearest(category, known)} "
+                    "(a new category also needs elevations_deg.<category>)"
+                )
+        focus = {"focus_category": self.focus_category, "transfer.category": self.transfer.category}
+        for key, named in focus.items():
+            if named is not None and named not in ours:
+                raise UserError(f"{key}={named} is no category of this run: {nearest(named, ours)}")
+        of_categories: dict[str, Collection[str]] = {
+            "dataset.turn_deg": self.dataset.turn_deg,
+            "dataset.categories": self.dataset.categories,
+            "sensor.diagonal_m": self.sensor.diagonal_m,
+        }
+        for key, values in of_categories.items():
+            for named in values:
+                if named not in known:
+                    raise UserError(f"{key}.{named}: no such category; {nearest(named, known)}")
+        return self
+
+    @model_validator(mode="after")
+    def _check_folds(self) -> Self:
+        if self.n_objects is not None and not enough_objects(self.n_objects, self.n_folds):
+            raise UserError(
+                f"n_objects={self.n_objects} is out of range: enough to train, calibrate and test "
+                "in each of n_folds, or null for all"
+            )
+        folds = self.transfer.folds or []
+        if not set(folds) <= set(range(1, self.n_folds + 1)):
+            raise UserError(f"transfer.folds={folds} is out of range: 1 to n_folds={self.n_folds}")
+        return self

@@ -1,0 +1,120 @@
+"""The outputs of a trained network for images, and the azimuth that they give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from nbv.data.depth_images import DepthImages
+from nbv.errors import UserError
+from nbv.experiment.estimation.hardware import Hardware
+from nbv.experiment.estimation.images import to_input
+from nbv.experiment.estimation.networks import kind_of
+from nbv.experiment.estimation.outputs import Outputs
+from nbv.experiment.estimation.weights import Estimator
+
+INFERENCE_BATCH = 256
+"""Images that a network estimates at once: more take longer, and more memory."""
+
+
+def outputs_of_parts(
+    estimators: Sequence[Estimator],
+    images: DepthImages,
+    parts: Sequence[Sequence[str]],
+    hardware: Hardware,
+) -> tuple[list[str], Outputs]:
+    """Return the outputs for some objects, divided among estimators.
+
+    Parameters
+    ----------
+    estimators : sequence of Estimator
+        One for each part: the whole is one part, or each is asked about what it has not seen.
+    images : DepthImages
+        All objects of a category.
+    parts : sequence of sequence of str
+        The objects of each part.
+    hardware : Hardware
+
+    Returns
+    -------
+    object_ids : list of str
+        n objects, part by part.
+    outputs : ndarray (n, n_views, k) float64
+
+    Raises
+    ------
+    UserError
+        Where an estimator has seen one of its objects, or images of another size, or its outputs
+        are not finite.
+    """
+    names: list[str] = []
+    outputs = []
+    for estimator, object_ids in zip(estimators, parts, strict=True):
+        if seen := sorted(set(object_ids) & set(estimator.trained_on)):
+            raise UserError(
+                f"object {seen[0]!r} was trained on: its estimates say nothing; train again"
+            )
+        names += object_ids
+        outputs.append(network_outputs(estimator, images.of(object_ids), hardware))
+    return names, np.concatenate(outputs)
+
+
+def network_outputs(
+    estimator: Estimator,
+    codes: NDArray[np.uint8],
+    hardware: Hardware,
+    batch_size: int = INFERENCE_BATCH,
+) -> Outputs:
+    """Return the network's outputs for images.
+
+    Parameters
+    ----------
+    estimator : Estimator
+    codes : ndarray (..., side, side) uint8
+        Depth codes.
+    hardware : Hardware
+    batch_size : int
+
+    Returns
+    -------
+    ndarray (..., k) float64
+
+    Raises
+    ------
+    UserError
+        Where the estimator was trained on images of another size, or its outputs are not finite.
+    """
+    side = codes.shape[-1]
+    if side != estimator.image_side:
+        raise UserError(
+            f"the images have {side} pixels a side, the estimator was trained on "
+            f"{estimator.image_side}; train again"
+        )
+    flat = codes.reshape(-1, side, side)
+    outputs = []
+    with torch.inference_mode(), hardware.autocast():
+        for start in range(0, len(flat), batch_size):
+            output = estimator.network(to_input(flat[start : start + batch_size], hardware))
+            outputs.append(output.float().cpu().numpy().astype(np.float64))
+    found = np.concatenate(outputs).reshape(*codes.shape[:-2], -1)
+    if not np.isfinite(found).all():
+        raise UserError("the estimator's outputs are not finite; train it again")
+    return found
+
+
+def decode(estimator: Estimator, outputs: Outputs, temperature: float = 1.0) -> NDArray[np.float64]:
+    """Return the azimuths that an estimator's outputs (..., k) tell, in [0, 360) (Eq. 4).
+
+    `temperature` divides the outputs; a regressor's angle does not depend on it.
+    """
+    return kind_of(estimator.settings).decode(outputs / temperature)
+
+
+def estimate_azimuth(
+    estimator: Estimator, codes: NDArray[np.uint8], hardware: Hardware
+) -> NDArray[np.float64]:
+    """Estimate the azimuth that each image was taken from: `network_outputs`, then `decode`."""
+    return decode(estimator, network_outputs(estimator, codes, hardware))

@@ -1,0 +1,152 @@
+"""Estimators on disk: safetensors, never pickle, with what they were trained on."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import safetensors
+import safetensors.torch
+from numpy.typing import NDArray
+from torch import nn
+
+from nbv.experiment.checksums import sha256_of
+from nbv.experiment.estimation.hardware import Hardware
+from nbv.experiment.estimation.networks import build_network
+from nbv.experiment.estimation.warm_start import with_category
+from nbv.files import damaged, readable, replacing
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """A trained network and its history.
+
+    Attributes
+    ----------
+    network : torch.nn.Module
+        In evaluation mode.
+    settings : mapping
+        The estimator's settings as it was trained with them.
+    image_side : int
+        Pixels.
+    trained_on : sequence of str
+        The objects it has seen; ``<category>/<object>`` where objects of all categories meet.
+    started_from : mapping, optional
+        ``path`` (from the estimator's own folder) and ``sha256`` of the estimator whose weights it
+        started from.
+    """
+
+    network: nn.Module
+    settings: Mapping[str, Any]
+    image_side: int
+    trained_on: Sequence[str]
+    started_from: Mapping[str, str] | None = None
+
+
+@dataclass(frozen=True)
+class Start:
+    """Weights to start a training from.
+
+    Attributes
+    ----------
+    network : torch.nn.Module
+    origin : mapping
+        See `Estimator.started_from`.
+    """
+
+    network: nn.Module
+    origin: Mapping[str, str]
+
+
+def save_estimator(path: str | Path, estimator: Estimator, hardware: Hardware) -> None:
+    """Write weights and history to a `.safetensors` file."""
+    history = {
+        "settings": dict(estimator.settings),
+        "image_side": estimator.image_side,
+        "trained_on": list(estimator.trained_on),
+        "hardware": str(hardware),
+    }
+    if estimator.started_from is not None:
+        history["started_from"] = dict(estimator.started_from)
+    tensors = {
+        name: tensor.detach().cpu().contiguous()
+        for name, tensor in estimator.network.state_dict().items()
+    }
+    metadata = {"nbv": json.dumps(history, sort_keys=True)}
+    with replacing(path) as temporary:
+        # Not save_file: its error on a full disk is not the system's.
+        temporary.write_bytes(safetensors.torch.save(tensors, metadata=metadata))
+
+
+def load_estimator(path: str | Path, hardware: Hardware) -> Estimator:
+    """Read what `save_estimator` wrote.
+
+    Raises
+    ------
+    UserError
+        Where the file is no estimator of this project.
+    """
+    with readable(path):
+        with safetensors.safe_open(path, framework="pt") as stored:
+            metadata = stored.metadata() or {}
+        if "nbv" not in metadata:
+            raise damaged(path, "not an estimator of nbv")
+        history = json.loads(metadata["nbv"])
+        network = build_network(history["settings"], history["image_side"])
+        network.load_state_dict(safetensors.torch.load_file(path))
+        estimator = Estimator(
+            network.eval(),
+            history["settings"],
+            history["image_side"],
+            history["trained_on"],
+            history.get("started_from"),
+        )
+        if not all(bool(values.isfinite().all()) for values in network.state_dict().values()):
+            raise damaged(path, "a weight is not finite")
+    estimator.network.to(hardware.device)
+    return estimator
+
+
+def read_start(
+    path: str, category: str, object_ids: Sequence[str], output: str, hardware: Hardware
+) -> Start:
+    """Read what a training is to start from.
+
+    Parameters
+    ----------
+    path : str
+        An estimator of the same category, or a network that all categories were pretrained with.
+    category : str
+    object_ids : sequence of str
+        The objects to train on.
+    output : str
+        Where the new estimator is to lie.
+    hardware : Hardware
+
+    Raises
+    ------
+    UserError
+        Where it has seen other objects of the category: one of them may be there to calibrate or
+        to test with. Also as of `load_estimator`.
+    """
+    stored = load_estimator(path, hardware)
+    seen, own = set(stored.trained_on), set(object_ids)
+    qualified = set(with_category(category, object_ids))
+    if seen != own and {name for name in seen if name.startswith(f"{category}/")} != qualified:
+        raise damaged(path, f"it has seen other objects of {category} than what starts from it")
+    relative = os.path.relpath(path, Path(output).parent)
+    return Start(stored.network, {"path": relative, "sha256": sha256_of(path)})
+
+
+def weights_of(estimator: Estimator) -> dict[str, NDArray[np.float32]]:
+    """Return the weights of an estimator by their names, single precision."""
+    return {
+        name: tensor.detach().cpu().contiguous().numpy().astype(np.float32)
+        for name, tensor in estimator.network.state_dict().items()
+        if tensor.is_floating_point()
+    }

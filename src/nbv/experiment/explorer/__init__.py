@@ -1,0 +1,234 @@
+"""One HTML page to play with: turn the camera round an object and see what each method makes of it.
+
+It needs nothing but itself: no network, no server. The errors are those of the evaluation files;
+what a page works out by itself are beliefs after several views (``explorer_beliefs.js``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nbv.core.criteria import CRITERIA
+from nbv.core.lookup import load_lookup
+from nbv.core.posteriors import read_posteriors
+from nbv.data.depth_images import open_depth
+from nbv.errors import UserError
+from nbv.experiment.explorer.images import COLUMNS, ring_of
+from nbv.experiment.explorer.outcomes import (
+    Outcomes,
+    methods_of,
+    outcomes_of,
+    outcomes_text,
+    unit_facts,
+)
+from nbv.experiment.explorer.tables import (
+    cost_error,
+    own_distributions_text,
+    own_error,
+    page_table,
+    probability_error,
+)
+from nbv.experiment.report.templating import HTML
+from nbv.experiment.results import EvaluationFile, Unit, load_evaluations
+from nbv.files import existing
+from nbv.labels import category_label, method_label
+from nbv.robot.style import method_style
+
+LookupFile = tuple[str, int, int, str]
+"""What a lookup table is of: category, elevation in degrees, fold and criterion."""
+
+_MOST_COARSE_BINS = 120
+
+
+@dataclass(frozen=True)
+class ExplorerInputs:
+    """The files and settings that the page is made of.
+
+    Attributes
+    ----------
+    name : str
+        Of the run.
+    policies : mapping of str to str
+        By method: its policy.
+    evaluations : mapping of (category, elevation_deg, fold, method) to Path
+    lookups : mapping of (category, elevation_deg, fold, criterion) to Path
+        Of every fold the same criteria.
+    min_separation_deg : float
+        Of views that the information gain chooses.
+    n_views : int
+        The most views.
+    depth, objects : mapping of (category, elevation_deg) to Path
+        Depth images and the ids of their objects; none where the estimates are of another program.
+    posteriors : mapping of (category, elevation_deg, fold) to Path
+        Distributions of test images, where the estimator gives them.
+    caution : sequence of str
+        What a reader has to know before any number; see `nbv.experiment.run_size`.
+    """
+
+    name: str
+    policies: Mapping[str, str]
+    evaluations: Mapping[EvaluationFile, Path]
+    lookups: Mapping[LookupFile, Path]
+    min_separation_deg: float
+    n_views: int
+    depth: Mapping[Unit, Path] = field(default_factory=dict)
+    objects: Mapping[Unit, Path] = field(default_factory=dict)
+    posteriors: Mapping[tuple[str, int, int], Path] = field(default_factory=dict)
+    caution: Sequence[str] = ()
+
+
+class _Chunks:
+    """The texts of a page by name, and how far the worst of each kind is off."""
+
+    def __init__(self) -> None:
+        self.texts: dict[str, str] = {}
+        self.errors: dict[str, list[float]] = {}
+
+    def add(self, name: str, text: str, **errors: float) -> None:
+        self.texts[name] = text
+        for kind, error in errors.items():
+            self.errors.setdefault(kind, []).append(error)
+
+
+def build_explorer(inputs: ExplorerInputs) -> str:
+    """Return the page of a finished run.
+
+    Raises
+    ------
+    UserError
+        If a file is missing or damaged, files are not about the same objects, or no method follows
+        a lookup table.
+    """
+    if not inputs.lookups:
+        raise UserError("the explorer shows lookup tables, and no method of this run follows one")
+    frames = load_evaluations(inputs.evaluations)
+    methods = methods_of(frames)
+    criteria = list(dict.fromkeys(criterion for *_, criterion in inputs.lookups))
+    chunks = _Chunks()
+    units = []
+    for index, (unit, frame) in enumerate(frames.items()):
+        outcomes = outcomes_of(unit, frame)
+        chunks.add(f"unit-{index}", outcomes_text(outcomes))
+        tables = _add_tables(chunks, inputs, criteria, index, unit, outcomes)
+        images = _add_images(chunks, inputs, index, unit, outcomes)
+        own = _add_own(chunks, inputs, index, unit, outcomes)
+        units.append(
+            {
+                "category": unit[0],
+                "label": category_label(unit[0]),
+                "elevation": unit[1],
+                "tables": tables,
+                "images": images,
+                "own": own,
+                **unit_facts(outcomes),
+            }
+        )
+    facts = {
+        "run": inputs.name,
+        "methods": [_method_facts(name, methods, inputs.policies[name]) for name in methods],
+        "criteria": criteria,
+        "apart": inputs.min_separation_deg,
+        "mostViews": inputs.n_views,
+        "units": units,
+    }
+    return HTML.get_template("explorer.html.j2").render(
+        name=inputs.name,
+        caution=inputs.caution,
+        facts=facts,
+        units=units,
+        methods=facts["methods"],
+        criteria=[name.replace("_", " ") for name in criteria],
+        n_first_views=sum(len(unit["objects"]) * unit["views"] for unit in units),
+        most_views=inputs.n_views,
+        chunks=chunks.texts,
+        errors={kind: _of_kind(kind, found) for kind, found in chunks.errors.items()},
+        cost_units=sorted({unit["tables"][0]["unit"] for unit in units}),
+    )
+
+
+def _of_kind(kind: str, errors: Iterable[float]) -> float:
+    """Return the mean of image errors, and the largest of all others."""
+    return float(np.mean(list(errors))) if kind == "grey" else max(errors)
+
+
+def _method_facts(name: str, methods: tuple[str, ...], policy: str) -> dict[str, Any]:
+    style = method_style(name, methods)
+    return {
+        "name": name,
+        "label": method_label(name),
+        "color": style.color,
+        "criterion": policy if policy in CRITERIA else None,
+    }
+
+
+def _add_tables(
+    chunks: _Chunks,
+    inputs: ExplorerInputs,
+    criteria: list[str],
+    index: int,
+    unit: Unit,
+    outcomes: Outcomes,
+) -> list[dict[str, Any]]:
+    found = []
+    for place, (fold, criterion) in enumerate(_each_table(criteria, outcomes)):
+        table = load_lookup(existing(inputs.lookups[*unit, fold, criterion]))
+        stored = page_table(table)
+        chunks.add(
+            f"table-{index}-{place}",
+            stored.text,
+            probability=probability_error(stored, table),
+            cost=cost_error(stored, table),
+        )
+        coarse = coarse_bins(len(table.cost), outcomes.n_views)
+        found.append({"fold": fold, "criterion": criterion, "coarse": coarse, **stored.facts})
+    return found
+
+
+def _each_table(criteria: list[str], outcomes: Outcomes) -> Iterator[tuple[int, str]]:
+    for fold in sorted(set(outcomes.folds)):
+        for criterion in criteria:
+            yield fold, criterion
+
+
+def coarse_bins(n_bins: int, n_views: int) -> int:
+    """Return the bins that the page chooses further views by.
+
+    At most 120, as in `nbv.core.next_views`; a rotation by a bin leads from view to view,
+    and each bin is an odd number of the table's, so that the centres agree.
+    """
+    return max(
+        n
+        for n in range(1, _MOST_COARSE_BINS + 1)
+        if n_bins % n == 0 and n_views % n == 0 and n_bins // n % 2 == 1
+    )
+
+
+def _add_images(
+    chunks: _Chunks, inputs: ExplorerInputs, index: int, unit: Unit, outcomes: Outcomes
+) -> dict[str, int] | None:
+    if not inputs.depth:
+        return None
+    images = open_depth(existing(inputs.depth[unit]), existing(inputs.objects[unit]))
+    for place, object_id in enumerate(outcomes.object_ids):
+        ring = ring_of(images.of([object_id])[0])
+        chunks.add(f"ring-{index}-{place}", ring.data, grey=ring.grey_error)
+    return {"count": ring.n_images, "side": ring.side, "columns": COLUMNS}
+
+
+def _add_own(
+    chunks: _Chunks, inputs: ExplorerInputs, index: int, unit: Unit, outcomes: Outcomes
+) -> dict[str, int] | None:
+    if not inputs.posteriors:
+        return None
+    for fold in sorted(set(outcomes.folds)):
+        tested = zip(outcomes.object_ids, outcomes.folds, strict=True)
+        ids = [name for name, of in tested if of == fold]
+        posteriors = read_posteriors(existing(inputs.posteriors[*unit, fold]), ids)
+        text = own_distributions_text(posteriors)
+        chunks.add(f"own-{index}-{fold}", text, own=own_error(posteriors))
+    return {"classes": posteriors.log_posterior.shape[2]}

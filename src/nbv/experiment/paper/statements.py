@@ -1,0 +1,228 @@
+"""Statements about results, and when they hold.
+
+A statement is one comparison or a compound of statements. Each gets one of four verdicts:
+
+``holds``
+    *Better(statistic, a, b)*: the 95 % interval of the paired difference excludes zero on the
+    side that favours `a`. *Comparable(statistic, a, b, margin)*: the interval lies inside
+    ±margin. *FreeOfOutliers(a)*: no error lies above the upper quartile by more than 1.5 times
+    the interquartile range. *AtLeast(k, parts)*: k parts hold.
+``does not hold``
+    The interval excludes zero on the other side; it lies outside ±margin altogether; there is
+    an outlier; so many parts do not hold that k cannot be reached.
+``undecided``
+    Neither: the interval includes zero, or reaches over the margin. And wherever fewer than
+    `FEWEST_OBJECTS` test objects are resampled together (those of a category; for σ over folds,
+    those of a fold): an interval over so few means nothing.
+``not run``
+    What it speaks of was not evaluated. A compound is ``not run`` where its verdict depends on
+    parts that were not.
+
+Intervals are not corrected for the number of comparisons.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from nbv.experiment.results import Unit
+from nbv.experiment.statistics.paired import LOWER_IS_BETTER
+
+Verdict = Literal["holds", "does not hold", "undecided", "not run"]
+
+HOLDS: Verdict = "holds"
+FAILS: Verdict = "does not hold"
+UNDECIDED: Verdict = "undecided"
+NOT_RUN: Verdict = "not run"
+VERDICTS: tuple[Verdict, ...] = (HOLDS, FAILS, UNDECIDED, NOT_RUN)
+
+TUKEY_FACTOR = 1.5
+FEWEST_OBJECTS = 5
+"""Test objects that an interval over objects, and so a verdict, needs."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """One method on some images: whole units pooled, or one group, fold or set of azimuths."""
+
+    method: str
+    units: tuple[Unit, ...]
+    group: int | None = None
+    fold: int | None = None
+    initial_deg: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Better:
+    """`a` has the better statistic: lower, or for a pAUC higher."""
+
+    statistic: str
+    a: Term
+    b: Term
+
+
+@dataclass(frozen=True)
+class Comparable:
+    """The statistics differ by less than `margin`, in the statistic's unit."""
+
+    statistic: str
+    a: Term
+    b: Term
+    margin: float
+
+
+@dataclass(frozen=True)
+class FreeOfOutliers:
+    """No error is an outlier by Tukey's rule."""
+
+    a: Term
+
+
+@dataclass(frozen=True)
+class AtLeast:
+    """At least `count` of the parts hold; `label` names the compound among its siblings."""
+
+    count: int
+    parts: tuple[Statement, ...]
+    label: str = ""
+
+
+Interval = tuple[float, float, float]
+"""A value, and the low and the high end of its interval."""
+
+Comparison = Better | Comparable | FreeOfOutliers
+Statement = Comparison | AtLeast
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of the paper, what it compares in words, and the same to be evaluated.
+
+    The title names it where there is no room for the sentence.
+    """
+
+    id: str
+    section: str
+    sentence: str
+    compared: str
+    statement: Statement
+    note: str = ""
+    title: str = ""
+
+
+def all_of(parts: Sequence[Statement], label: str = "") -> AtLeast:
+    """Return the compound that holds where every part does."""
+    return AtLeast(len(parts), tuple(parts), label)
+
+
+def leaves(statement: Statement) -> list[Comparison]:
+    """Return the comparisons of a statement, in their order."""
+    if isinstance(statement, AtLeast):
+        return [leaf for part in statement.parts for leaf in leaves(part)]
+    return [statement]
+
+
+def if_enough(verdict: Verdict, n_objects: int) -> Verdict:
+    """Return a verdict, or that it is open where too few objects are resampled together."""
+    return UNDECIDED if verdict != NOT_RUN and n_objects < FEWEST_OBJECTS else verdict
+
+
+def better_verdict(statistic: str, low: float, high: float) -> Verdict:
+    """Return the verdict of *Better* from the interval of a - b."""
+    if not (low <= high):
+        return NOT_RUN
+    favours_a, favours_b = (
+        (high < 0, low > 0) if LOWER_IS_BETTER[statistic] else (low > 0, high < 0)
+    )
+    return HOLDS if favours_a else FAILS if favours_b else UNDECIDED
+
+
+def comparable_verdict(low: float, high: float, margin: float) -> Verdict:
+    """Return the verdict of *Comparable* from the interval of a - b."""
+    if not (low <= high):
+        return NOT_RUN
+    if -margin < low and high < margin:
+        return HOLDS
+    return FAILS if low > margin or high < -margin else UNDECIDED
+
+
+def combine(count: int, verdicts: Sequence[Verdict]) -> Verdict:
+    """Return the verdict of *AtLeast*: decided only where no open part could change it."""
+    holding = sum(verdict == HOLDS for verdict in verdicts)
+    possible = sum(verdict != FAILS for verdict in verdicts)
+    if holding >= count:
+        return HOLDS
+    if possible < count:
+        return FAILS
+    return NOT_RUN if NOT_RUN in verdicts else UNDECIDED
+
+
+def in_favour(part: Better | Comparable, value: float, low: float, high: float) -> Interval:
+    """Return by how much a difference a - b, with its interval, favours a comparison.
+
+    Parameters
+    ----------
+    part : Better or Comparable
+        What is compared.
+    value, low, high : float
+        The difference and its 95 % interval, in the statistic's unit.
+
+    Returns
+    -------
+    tuple of float
+        Value, low and high, in the same unit. The comparison holds where low is above 0 and does
+        not hold where high is below 0. Of *Comparable*, it is how far the difference is inside
+        the margin.
+    """
+    if isinstance(part, Comparable):
+        inside = min(abs(low), abs(high)) if low * high > 0 else 0.0
+        return (
+            part.margin - abs(value),
+            part.margin - max(abs(low), abs(high)),
+            part.margin - inside,
+        )
+    return (-value, -high, -low) if LOWER_IS_BETTER[part.statistic] else (value, low, high)
+
+
+def deciding(
+    statement: Statement,
+    verdicts: Mapping[Comparison, Verdict],
+    favours: Mapping[Comparison, float],
+) -> Comparison:
+    """Return the comparison that a statement stands or falls with: its verdict is the statement's.
+
+    Of *AtLeast(k, parts)* it is that of the k-th best part: by verdict, and within a verdict by
+    how much the difference favours it.
+
+    Parameters
+    ----------
+    statement : Statement
+        What was judged, decided or not; not one that was not run.
+    verdicts : mapping of Comparison to str
+        Of each of its comparisons.
+    favours : mapping of Comparison to float
+        By how much each is favoured; see `in_favour`.
+    """
+    if not isinstance(statement, AtLeast):
+        return statement
+
+    def merit(part: Statement) -> tuple[int, float]:
+        leaf = deciding(part, verdicts, favours)
+        return _MERIT[combine_statement(part, verdicts)], favours[leaf]
+
+    ranked = sorted(statement.parts, key=merit, reverse=True)
+    return deciding(ranked[statement.count - 1], verdicts, favours)
+
+
+_MERIT: Mapping[Verdict, int] = {HOLDS: 2, UNDECIDED: 1, NOT_RUN: 1, FAILS: 0}
+
+
+def combine_statement(statement: Statement, verdicts: Mapping[Comparison, Verdict]) -> Verdict:
+    """Return a statement's verdict from those of its comparisons."""
+    if isinstance(statement, AtLeast):
+        return combine(
+            statement.count, [combine_statement(part, verdicts) for part in statement.parts]
+        )
+    return verdicts[statement]

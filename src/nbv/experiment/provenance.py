@@ -1,0 +1,110 @@
+"""Where a result comes from: the source files it depends on, and the versions it was made with."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import importlib.metadata
+import json
+import platform
+import subprocess
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+PACKAGES = (
+    "numpy",
+    "scipy",
+    "pandas",
+    "torch",
+    "safetensors",
+    "trimesh",
+    "embreex",
+    "pyrender",
+    "matplotlib",
+    "hydra-core",
+    "snakemake",
+)
+
+
+def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
+    """Return the modules of nbv that a script imports, directly or not, wherever it does so.
+
+    Files are parsed and not run; imports for type checkers alone do not count. A registry names
+    optional modules in strings, which no import shows: `chosen` gives those that a configuration
+    chooses, as entries such as ``nbv.data.embree:EmbreeRenderer``. Paths are sorted, with the
+    ``__init__`` files of the packages that hold the modules, and with the templates that a module
+    fills in: those of its name, in the folder ``templates`` next to it.
+    """
+    imports = _imports()
+    found: set[str] = set()
+    waiting = [*_imported_names(script), *(entry.partition(":")[0] for entry in chosen)]
+    while waiting:
+        module = waiting.pop()
+        if module in imports and module not in found:
+            found.add(module)
+            waiting += [module.rpartition(".")[0], *imports[module]]
+    return sorted({file for module in found for file in _files_of(module)})
+
+
+@functools.cache
+def _imports() -> dict[str, set[str]]:
+    """Return what each module of nbv imports of nbv."""
+    import grimp
+
+    # What is imported for type checkers alone does not run.
+    graph = grimp.build_graph("nbv", cache_dir=None, exclude_type_checking_imports=True)
+    return {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+
+
+def _imported_names(script: str | Path) -> Iterator[str]:
+    """Yield the modules that a script imports, and names in them that may be modules."""
+    for node in ast.walk(ast.parse(Path(script).read_text(encoding="utf-8"), str(script))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+
+
+def _files_of(module: str) -> Iterator[str]:
+    path = Path(__file__).parents[1].joinpath(*module.split("."))
+    yield str(path / "__init__.py" if path.is_dir() else path.with_suffix(".py"))
+    yield from map(str, path.parent.glob(f"templates/{path.name}[._]*"))
+
+
+def git_commit(directory: str | Path = Path(__file__).parent) -> str:
+    """Return the commit checked out in a folder, this package's own unless another is given.
+
+    It is marked ``-dirty`` where files differ from it, and ``unknown`` outside a checkout.
+    """
+    try:
+        described = subprocess.run(
+            ["git", "-C", str(directory), "describe", "--always", "--dirty", "--abbrev=12"],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return described.stdout.strip()
+
+
+def versions() -> dict[str, object]:
+    """Return the versions of Python, the platform and the packages that results depend on."""
+    packages = {}
+    for name in PACKAGES:
+        try:
+            packages[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            packages[name] = "not installed"
+    return {
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "packages": packages,
+    }
+
+
+def read_provenance(root: Path) -> dict[str, Any]:
+    """Read ``provenance.json`` of a run or reference; empty where there is none."""
+    path = root / "provenance.json"
+    return dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else {}

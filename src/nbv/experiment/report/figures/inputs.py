@@ -1,0 +1,180 @@
+"""What figures are made from, and the example that several of them share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import pandas as pd
+
+from nbv.core.criteria import cost_unit
+from nbv.core.lookup import LookupTable, load_lookup
+from nbv.data.depth_images import Codes, open_depth
+from nbv.errors import UserError
+from nbv.experiment.report.examples import Example, choose_example, example_row, hardest_azimuth_deg
+from nbv.experiment.report.settings import ReportSettings, focus_unit
+from nbv.experiment.results import Unit
+from nbv.files import existing
+from nbv.robot.style import MethodStyle, method_style
+
+Key = TypeVar("Key")
+
+_LONGEST_NAME = 16
+
+
+@dataclass(frozen=True)
+class FigureInputs:
+    """Everything that figures are drawn from; `FigureKind.needs` says what each of them reads.
+
+    Attributes
+    ----------
+    evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
+        Frames of `results.load_evaluations`.
+    settings : ReportSettings
+        What to show.
+    depth, objects : mapping of (category, elevation_deg) to Path
+        Depth images, and the ids of their objects.
+    lookups : mapping of (category, elevation_deg, fold) to Path
+        Lookup tables that the method ``settings.subject`` follows.
+    """
+
+    evaluations: Mapping[Unit, pd.DataFrame]
+    settings: ReportSettings = field(default_factory=ReportSettings)
+    depth: Mapping[Unit, Path] = field(default_factory=dict)
+    objects: Mapping[Unit, Path] = field(default_factory=dict)
+    lookups: Mapping[tuple[str, int, int], Path] = field(default_factory=dict)
+
+    @property
+    def focus(self) -> Unit:
+        """The category and elevation that the detailed figures are about."""
+        return focus_unit(self.evaluations, self.settings)
+
+    def views(self, unit: Unit, object_id: str | None = None) -> Codes:
+        """Return one object's depth codes, (n_viewpoints, side, side); the first by default.
+
+        Raises
+        ------
+        UserError
+            If a file is missing or the unit has no such object.
+        """
+        path = _given(self.depth, unit, "depth images")
+        images = open_depth(path, _given(self.objects, unit, "objects of depth images"))
+        if object_id is None:
+            return np.asarray(images.codes[0])
+        if object_id not in images.object_ids:
+            raise UserError(f"{path}: no object {object_id!r}; evaluate the category again")
+        return np.asarray(images.codes[images.object_ids.index(object_id)])
+
+    def lookup(self, fold: int) -> LookupTable:
+        """Return the lookup table of the focus unit in one fold.
+
+        Raises
+        ------
+        UserError
+            If the subject follows none, or its file is missing.
+        """
+        name = f"lookup table of {self.settings.subject}"
+        return load_lookup(existing(_given(self.lookups, (*self.focus, fold), name)))
+
+    def methods(self, unit: Unit) -> tuple[str, ...]:
+        """Return the methods to show that were evaluated for a unit, in order."""
+        present = set(self.evaluations[unit]["method"].astype(str))
+        return tuple(method for method in self.settings.methods if method in present)
+
+    def style(self, method: str) -> MethodStyle:
+        """Return how a method of the settings is drawn."""
+        return method_style(method, self.settings.methods)
+
+
+@dataclass(frozen=True)
+class ExampleView:
+    """The example object seen from the hardest initial azimuth, and what each method made of it.
+
+    Attributes
+    ----------
+    unit, example : Unit, Example
+        The object.
+    azimuth_deg : int
+        Its initial viewpoint: where the category's single-view error is largest.
+    estimate_deg : float
+        Its estimate there.
+    views : (n_viewpoints, side, side) uint8
+        Depth codes of every viewpoint of the object.
+    outcomes : mapping of str to pandas.Series
+        Each method's row of the evaluation.
+    """
+
+    unit: Unit
+    example: Example
+    azimuth_deg: int
+    estimate_deg: float
+    views: Codes
+    outcomes: Mapping[str, pd.Series]
+
+    def view(self, azimuth_deg: float) -> Codes:
+        """Return the image from the viewpoint nearest to an azimuth."""
+        n_views = self.views.shape[0]
+        return np.asarray(self.views[round(azimuth_deg * n_views / 360) % n_views])
+
+    @property
+    def title(self) -> str:
+        """Which object this is."""
+        category, elevation = self.unit
+        fold = self.example.fold
+        # Hashes of 32 digits fill the line; eight tell objects apart, and Table 6 has all.
+        name = self.example.object_id
+        short = name if len(name) <= _LONGEST_NAME else f"{name[:8]}…"
+        return f"{short} ({category}, fold {fold}, elevation {elevation}°)"
+
+
+def example_view(inputs: FigureInputs) -> ExampleView:
+    """Return the example of Figs. 2, 3 and 7."""
+    unit = inputs.focus
+    frame = inputs.evaluations[unit]
+    example = choose_example(frame, inputs.settings)
+    azimuth = hardest_azimuth_deg(frame)
+    outcomes = {}
+    for method in inputs.methods(unit):
+        row = example_row(frame, example, method, azimuth)
+        if row is not None:
+            outcomes[method] = row
+    if not outcomes:
+        raise UserError(f"{unit[0]}: {example.object_id} was not evaluated from {azimuth} degrees")
+    estimate = float(next(iter(outcomes.values()))["initial_estimate_deg"])
+    views = inputs.views(unit, example.object_id)
+    return ExampleView(unit, example, azimuth, estimate, views, outcomes)
+
+
+@dataclass(frozen=True)
+class CostWords:
+    """How figures name what selects the next view, what a lookup table holds, and the table.
+
+    The paper's table goes by the spread that its ambiguity is.
+    """
+
+    selects: str
+    cost: str
+    unit: str
+    table: str
+
+
+def cost_words(lookup: LookupTable) -> CostWords:
+    """Return the words for a lookup table, whatever its criterion."""
+    unit = cost_unit(lookup.criterion, {"spread": lookup.spread})
+    unit = "0–1" if unit == "1" else unit  # the range says more than that there is no unit
+    if lookup.criterion == "pose_ambiguity":
+        spread = lookup.spread.replace("_", " ").capitalize()
+        return CostWords("Ambiguity", "Ambiguity", unit, spread)
+    name = lookup.criterion.replace("_", " ").capitalize()
+    return CostWords(name, "Cost", unit, f"{name}: cost")
+
+
+def _given(files: Mapping[Key, Path], key: Key, kind: str) -> Path:
+    """Return the file of a key, or raise a UserError."""
+    if key not in files:
+        place = " ".join(map(str, key)) if isinstance(key, tuple) else key
+        raise UserError(f"no {kind} for {place}; run that stage first")
+    return files[key]

@@ -1,0 +1,304 @@
+"""The paper's claims as pictures: all in one, and each with its comparisons."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from nbv.experiment.paper import statements
+from nbv.experiment.paper.claim_text import STATISTIC_LABELS, place_text, term_text
+from nbv.experiment.paper.claims import CLAIMS
+from nbv.experiment.paper.published import METHODS
+from nbv.experiment.paper.statements import (
+    AtLeast,
+    Claim,
+    Comparable,
+    Comparison,
+    FreeOfOutliers,
+    Interval,
+    Statement,
+    Term,
+    Verdict,
+)
+from nbv.experiment.statistics.paired import LOWER_IS_BETTER, UNIT_OF
+from nbv.labels import MINUS, method_label, number
+from nbv.robot.style import (
+    AGAINST,
+    FOR,
+    INK,
+    OPEN,
+    RC,
+    SHADE,
+    draw_estimate,
+    label_rows,
+    method_style,
+    new_figure,
+)
+
+Row = Mapping[Hashable, Any]
+
+WIDTH_IN = 3.9
+_ROW_IN = 0.185
+_VERDICTS: Mapping[Verdict, tuple[str, str, str]] = {
+    statements.HOLDS: ("Hold", FOR, "o"),
+    statements.UNDECIDED: ("Undecided", OPEN, "s"),
+    statements.FAILS: ("Do not hold", AGAINST, "X"),
+}
+
+
+@dataclass(frozen=True)
+class _Decided:
+    """A claim with its verdict, and by how much the comparison that decides it favours it.
+
+    Without an interval, `text` says what was found.
+    """
+
+    title: str
+    verdict: Verdict
+    favour: Interval | None
+    text: str = ""
+
+
+@mpl.rc_context(RC)
+def claims_forest(judged: pd.DataFrame) -> Figure:
+    """Draw every claim that was run: by how much it is favoured, with its interval and verdict.
+
+    Parameters
+    ----------
+    judged : DataFrame
+        Of `nbv.experiment.paper.verdicts.read_claims`.
+    """
+    claims = [_decided(claim, rows) for claim, rows in _rows_of(judged)]
+    groups = {
+        verdict: [one for one in claims if one.verdict == verdict]
+        for verdict in _VERDICTS
+        if any(one.verdict == verdict for one in claims)
+    }
+    n_rows = len(claims) + len(groups)
+    figure = new_figure(WIDTH_IN, _ROW_IN * n_rows + 0.6)
+    axes = figure.subplots()
+    labels: list[str] = []
+    headings = []
+    for verdict, found in groups.items():
+        words, color, marker = _VERDICTS[verdict]
+        headings.append(len(labels))
+        labels.append(f"{words}: {len(found)}")
+        axes.plot(0, len(labels) - 1, linestyle="none")
+        for one in found:
+            _draw_decided(axes, one, len(labels), color, marker)
+            labels.append(one.title)
+    axes.axvline(0, color=INK, linewidth=0.9)
+    label_rows(axes, labels, headings)
+    for place, (_, color, _) in zip(headings, map(_VERDICTS.__getitem__, groups), strict=True):
+        axes.get_yticklabels()[place].set_color(color)
+    axes.set_xlabel(f"{MINUS} against the claim     for it +\n(degrees, or points of pAUC)")
+    return figure
+
+
+def _draw_decided(axes: Axes, one: _Decided, place: int, color: str, marker: str) -> None:
+    if one.favour is None:
+        axes.annotate(
+            one.text, (0, place), (5, 0), textcoords="offset points", va="center", fontsize=8
+        )
+        axes.plot(0, place, marker=marker, color=color, markersize=5.5)
+        return
+    value, low, high = one.favour
+    axes.plot([low, high], [place, place], color=color, linewidth=1.6)
+    axes.plot(value, place, marker=marker, color=color, markersize=5.5)
+
+
+@mpl.rc_context(RC)
+def claim_figure(claim: Claim, rows: Mapping[Comparison, Row]) -> Figure:
+    """Draw the comparisons of one claim: our differences with their intervals, and the paper's.
+
+    Parameters
+    ----------
+    claim : Claim
+    rows : mapping of Comparison to row
+        Of `comparisons_of`.
+    """
+    drawn = list(_differences(claim, rows))
+    groups = list(dict.fromkeys(one.group for one in drawn))
+    series = {one.name: one for one in drawn}
+    single_group = len(groups) == 1
+    labels = list(series) if single_group else groups
+    per_row = 1 if single_group else len(series)
+    key = per_row > 1
+    height = _ROW_IN * len(labels) * max(1.0, 0.6 * per_row)
+    margin = max(one.margin for one in drawn)
+    further_in = (0.22 if key else 0.0) + (0.16 if margin else 0.0)
+    figure = new_figure(WIDTH_IN, height + 0.8 + further_in)
+    axes = figure.subplots()
+    if margin:
+        axes.axvspan(-margin, margin, color=SHADE, linewidth=0)
+    for one in drawn:
+        row = labels.index(one.name if single_group else one.group)
+        offset = 0.0 if single_group else _offset(list(series).index(one.name), per_row)
+        style = method_style(one.method, METHODS)
+        draw_estimate(axes, row + offset, style, one.ours, one.published)
+    axes.axvline(0, color=INK, linewidth=0.9)
+    label_rows(axes, labels, [])
+    subject = "" if single_group else f"{_subject(list(series))}: "
+    comparable = f"\ngrey: comparable (±{margin:g})" if margin else ""
+    axes.set_xlabel(f"{subject}{drawn[0].quantity}\n{drawn[0].direction}{comparable}")
+    if key:
+        figure.legend(
+            handles=[_key(one) for one in series.values()],
+            loc="outside lower center",
+            ncols=min(len(series), 4),
+            fontsize=8,
+            handlelength=1.2,
+        )
+    return figure
+
+
+def _subject(names: list[str]) -> str:
+    """Say once what several names share: a difference of which methods."""
+    ends = [name.split(f" {MINUS} ") for name in names]
+    if any(len(pair) != 2 for pair in ends):
+        return names[0]
+    first, second = ({pair[place] for pair in ends} for place in (0, 1))
+    shared = (part.pop() if len(part) == 1 else "each method" for part in (first, second))
+    return f" {MINUS} ".join(shared)
+
+
+def comparisons_of(judged: pd.DataFrame) -> dict[str, dict[Comparison, Row]]:
+    """Return the rows of every claim that was run, by its id and comparison."""
+    return {claim.id: rows for claim, rows in _rows_of(judged)}
+
+
+def _rows_of(judged: pd.DataFrame) -> Iterator[tuple[Claim, dict[Comparison, Row]]]:
+    by_claim = {str(name): part for name, part in judged.groupby("id", sort=False)}
+    for claim in CLAIMS:
+        parts = by_claim[claim.id].sort_values("part").to_dict("records")
+        if parts[0]["verdict"] != statements.NOT_RUN:
+            yield claim, dict(zip(statements.leaves(claim.statement), parts, strict=True))
+
+
+def deciding_comparison(claim: Claim, rows: Mapping[Comparison, Row]) -> Comparison:
+    """Return the comparison that a claim stands or falls with.
+
+    Parameters
+    ----------
+    claim : Claim
+    rows : mapping of Comparison to row
+        Of `comparisons_of`.
+    """
+    verdicts = {part: row["part_verdict"] for part, row in rows.items()}
+    values = {part: _favour(part, row)[0] for part, row in rows.items()}
+    return statements.deciding(claim.statement, verdicts, values)
+
+
+def _favour(part: Comparison, row: Row) -> Interval:
+    if isinstance(part, FreeOfOutliers):
+        return (-float(row["value"]),) * 3
+    value, low, high = (float(row[name]) for name in ("difference", "ci_low", "ci_high"))
+    return statements.in_favour(part, value, low, high)
+
+
+def _decided(claim: Claim, rows: Mapping[Comparison, Row]) -> _Decided:
+    part = deciding_comparison(claim, rows)
+    verdict = rows[part]["verdict"]
+    if isinstance(part, FreeOfOutliers):
+        text = f"{number(rows[part]['value'], 0)} % are outliers"
+        return _Decided(claim.title, verdict, None, text)
+    return _Decided(claim.title, verdict, _favour(part, rows[part]))
+
+
+@dataclass(frozen=True)
+class _Difference:
+    """One mark: where, of which series, and what it shows."""
+
+    group: str
+    name: str
+    method: str
+    quantity: str
+    direction: str
+    ours: Interval
+    published: float
+    margin: float
+
+
+def _differences(claim: Claim, rows: Mapping[Comparison, Row]) -> Iterator[_Difference]:
+    labels = dict(_labels(claim.statement))
+    several = len({part.statistic for part in rows if not isinstance(part, FreeOfOutliers)}) > 1
+    pairs = {part: _pair(part) for part in rows if not isinstance(part, FreeOfOutliers)}
+    # A difference has its rival's colour, unless what differs is compared with one rival.
+    several_methods = len({a.method for a, _ in pairs.values()}) > 1
+    told: set[tuple[str, Term, Term]] = set()
+    for part, row in rows.items():
+        if row["part_verdict"] == statements.NOT_RUN:
+            continue
+        if isinstance(part, FreeOfOutliers):
+            value = float(row["value"])
+            yield _Difference(
+                group=place_text(part.a),
+                name=method_label(part.a.method),
+                method=part.a.method,
+                quantity="errors above the fence (%)",
+                direction="at 0: no outlier",
+                ours=(value, value, value),
+                published=np.nan,
+                margin=0.0,
+            )
+            continue
+        a, b = pairs[part]
+        if (part.statistic, a, b) in told:
+            continue
+        told.add((part.statistic, a, b))
+        sign = 1.0 if a == part.a else -1.0
+        ends = sorted(sign * float(row[name]) for name in ("ci_low", "ci_high"))
+        published = float(row["published_value"]) - float(row["published_versus_value"])
+        statistic = STATISTIC_LABELS[part.statistic]
+        side = "below" if LOWER_IS_BETTER[part.statistic] else "above"
+        unit = "degrees" if UNIT_OF[part.statistic] == "°" else "points"
+        group = labels.get(part) or (statistic if several else place_text(a))
+        yield _Difference(
+            group=group,
+            name=_pair_text(a, b),
+            method=a.method if several_methods else b.method,
+            quantity=f"difference of {'MAE and σ' if several else statistic} ({unit})",
+            direction=f"{side} 0: the first is better",
+            ours=(sign * float(row["difference"]), ends[0], ends[1]),
+            published=sign * published,
+            margin=part.margin if isinstance(part, Comparable) else 0.0,
+        )
+
+
+def _pair(part: statements.Better | Comparable) -> tuple[Term, Term]:
+    """Return the terms of a comparison, the later of the paper's methods first."""
+    a, b = part.a, part.b
+    return (a, b) if METHODS.index(a.method) >= METHODS.index(b.method) else (b, a)
+
+
+def _pair_text(a: Term, b: Term) -> str:
+    if place_text(a) == place_text(b):
+        return f"{method_label(a.method)} {MINUS} {method_label(b.method)}"
+    return f"{term_text(a)} {MINUS} {term_text(b)}"
+
+
+def _labels(statement: Statement, label: str = "") -> Iterator[tuple[Comparison, str]]:
+    """Yield each comparison with the label of the compound that it is a part of."""
+    if isinstance(statement, AtLeast):
+        for part in statement.parts:
+            yield from _labels(part, statement.label or label)
+    else:
+        yield statement, label
+
+
+def _offset(place: int, n: int) -> float:
+    return (place - (n - 1) / 2) * 0.75 / n
+
+
+def _key(one: _Difference) -> Line2D:
+    style = method_style(one.method, METHODS)
+    name = method_label(one.method)
+    return Line2D([], [], color=style.color, marker=style.marker, markersize=5, label=name)

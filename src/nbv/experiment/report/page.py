@@ -1,0 +1,290 @@
+"""One HTML page with everything: what was found, then claims, tables, figures, settings and cost.
+
+It needs nothing but itself: no scripts, no links outward, figures written into the page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+
+from nbv.experiment.config import read_configuration
+from nbv.experiment.paper.claim_text import STATISTIC_LABELS, VERDICT_RULES, by_run
+from nbv.experiment.paper.claims import CLAIMS
+from nbv.experiment.paper.statements import (
+    FAILS,
+    HOLDS,
+    NOT_RUN,
+    UNDECIDED,
+    VERDICTS,
+    Claim,
+    Comparison,
+)
+from nbv.experiment.paper.verdicts import read_claims
+from nbv.experiment.report.figures import FIGURES
+from nbv.experiment.report.forest import (
+    Row,
+    claim_figure,
+    claims_forest,
+    comparisons_of,
+    deciding_comparison,
+)
+from nbv.experiment.report.svg import inline_svg, svg_text
+from nbv.experiment.report.table_picture import table_picture
+from nbv.experiment.report.tables import TABLES
+from nbv.experiment.report.templating import HTML
+from nbv.experiment.results import load_object_ids
+from nbv.experiment.statistics.paired import UNIT_OF
+from nbv.files import existing, read_csv, read_json, readable
+from nbv.labels import category_label, interval_text, number
+
+_SECTIONS = {
+    "claims": "The paper's claims",
+    "tables": "Tables",
+    "figures": "Figures",
+    "settings": "Settings",
+    "runtime": "Running time",
+}
+_MAIN_CLAIM = "outperforms-all"
+_OPENING = "steps"
+_BADGES = {
+    HOLDS: {"sign": "✓", "kind": "holds"},
+    FAILS: {"sign": "✗", "kind": "fails"},
+    UNDECIDED: {"sign": "?", "kind": "open"},
+    NOT_RUN: {"sign": "–", "kind": "none"},
+}
+_UNKNOWN = "not recorded"
+_STARTS = {
+    "none": "each estimator starts from random weights",
+    "elevations": "the lowest elevation starts from random weights, each other one from the "
+    "elevation below",
+    "categories": "each estimator starts from a network of all categories; the paper trains each "
+    "category alone",
+    "both": "the lowest elevation starts from a network of all categories, each other one from the "
+    "elevation below; the paper trains each category alone",
+}
+
+
+def build_report(
+    *,
+    claims: Path,
+    configuration: Path,
+    provenance: Path,
+    splits: Mapping[str, Path],
+    tables: Mapping[str, Path],
+    figures: Mapping[str, Path],
+    table1: Path,
+    runtime: Path,
+    caution: Sequence[str] = (),
+) -> str:
+    """Return the report of an experiment as one self-contained HTML page.
+
+    Parameters
+    ----------
+    claims : path
+        CSV of `nbv.experiment.report.claims.claims_table`.
+    configuration, provenance : path
+        ``configuration.yaml`` and ``provenance.json`` of the run.
+    splits : mapping of category to path
+        Of every category that the configuration names.
+    tables : mapping of name to path
+        HTML fragments of `nbv.experiment.report.table.write_table`, in the order to show them. The
+        paper's tables that are not among them are named as such.
+    figures : mapping of name to path
+        SVG files, likewise.
+    table1 : path
+        CSV of Table 1.
+    runtime : path
+        HTML fragment of `nbv.experiment.report.runtime.runtime_table`.
+    caution : sequence of str
+        What a reader has to know before any number; see `nbv.experiment.run_size`.
+
+    Raises
+    ------
+    UserError
+        If a file is missing.
+    """
+    judged = read_claims(claims).fillna({"note": "", "summary": "", "versus": ""})
+    each = judged.drop_duplicates("id")
+    run, not_run = by_run(judged)
+    rows = comparisons_of(judged)
+    settings = read_configuration(existing(configuration).parent, ("density", "estimator"))
+    made_with = read_json(provenance)
+    shown = {name: _figure(name, path) for name, path in figures.items()}
+    return HTML.get_template("page.html.j2").render(
+        title=f"Best next viewpoint: experiment {settings['name']}",
+        caution=caution,
+        finding=_finding(rows),
+        opening=[
+            *_opening(judged, read_csv(table1)),
+            *(figure for name, figure in shown.items() if name == _OPENING),
+        ],
+        repairs=_repairs(settings["density"]),
+        sections=_SECTIONS,
+        badges=_BADGES,
+        run_facts=[*_run_facts(settings, splits), ("Commit", made_with.get("commit") or _UNKNOWN)],
+        claims_run=[_claim(claim, rows[claim.id], one) for claim, one in _with_claim(run)],
+        claims_not_run=[_claim(claim, {}, one) for claim, one in _with_claim(not_run)],
+        tally=_tally(each["verdict"]),
+        point_tally=_tally(each["point_verdict"]),
+        verdict_rules=VERDICT_RULES,
+        tables={name: _fragment(path) for name, path in tables.items()},
+        absent_tables=[name for name in TABLES if name not in tables],
+        figures=[figure for name, figure in shown.items() if name != _OPENING],
+        absent_figures=[name for name in FIGURES if name not in figures],
+        machine_facts=list(_machine_facts(made_with)),
+        configuration=configuration.read_text(encoding="utf-8").strip(),
+        runtime=_fragment(runtime),
+    )
+
+
+def _finding(rows: Mapping[str, Mapping[Comparison, Row]]) -> str:
+    """Say in one sentence what became of the paper's conclusion."""
+    (claim,) = (claim for claim in CLAIMS if claim.id == _MAIN_CLAIM)
+    says = "The paper concludes that Proposed has a lower error than the three other methods"
+    if _MAIN_CLAIM not in rows:
+        return f"{says}. That is about its five categories together, which this run does not have."
+    part = deciding_comparison(claim, rows[_MAIN_CLAIM])
+    row = rows[_MAIN_CLAIM][part]
+    words = {HOLDS: "holds", FAILS: "does not hold", UNDECIDED: "is undecided"}[row["verdict"]]
+    rival = str(row["versus"]).split(" (")[0]
+    difference = interval_text(row["difference"], row["ci_low"], row["ci_high"])
+    return (
+        f"{says}. Here this {words}: over all categories, the mean error of Proposed is "
+        f"{number(row['value'])}°, that of {rival} {number(row['versus_value'])}°; the difference "
+        f"is {difference} degrees."
+    )
+
+
+def _opening(judged: pd.DataFrame, table1: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """Yield the pictures that the page opens with, other than the figure of the method."""
+    published = " Open: as published." if table1["published"].notna().any() else ""
+    picture = svg_text(table_picture(table1))
+    caption = (
+        "Table 1 as a picture. Filled: our mean absolute error (MAE) by category and method, with "
+        f"its 95 % interval over objects.{published} Single is one view; the others turn the "
+        "camera and average two estimates: after a random rotation, half a turn, or the rotation "
+        "that the table proposes. All see the same objects, so their differences are known better "
+        "than these intervals say."
+    )
+    yield {"name": "table1-picture", "caption": caption, "svg": inline_svg(picture, "p1", caption)}
+    if (judged["verdict"] != NOT_RUN).any():
+        caption = (
+            "The paper's claims. By how much the comparison that decides a claim favours it, with "
+            "its 95 % interval: a claim holds where all of the interval is right of 0, does not "
+            "hold where all of it is left. pAUC: 100 less the mean error, where an error above "
+            "100° counts as 100. σ: standard deviation over folds. Groups: quarters of the circle "
+            "of first views."
+        )
+        drawn = svg_text(claims_forest(judged))
+        yield {"name": "claims-forest", "caption": caption, "svg": inline_svg(drawn, "p2", caption)}
+
+
+def _with_claim(each: pd.DataFrame) -> Iterator[tuple[Claim, Row]]:
+    by_id = {claim.id: claim for claim in CLAIMS}
+    for row in each.to_dict("records"):
+        yield by_id[row["id"]], row
+
+
+def _claim(claim: Claim, rows: Mapping[Comparison, Row], one: Row) -> dict[Hashable, Any]:
+    """Return what the page shows of a claim; without rows it was not run."""
+    shown: dict[Hashable, Any] = {**one, "title": claim.title, "svg": None, "comparisons": []}
+    if rows:
+        label = f"{claim.title}: {one['verdict']}. {one['summary']}"
+        drawn = svg_text(claim_figure(claim, rows))
+        shown["svg"] = inline_svg(drawn, f"claim-{claim.id}", label)
+        shown["comparisons"] = [_comparison(row) for row in rows.values()]
+    return shown
+
+
+def _run_facts(
+    settings: Mapping[str, Any], splits: Mapping[str, Path]
+) -> Iterator[tuple[str, str]]:
+    labels = {category: category_label(category) for category in settings["categories"]}
+    objects = [f"{text} {len(load_object_ids(splits[name]))}" for name, text in labels.items()]
+    elevations = [
+        f"{text} {', '.join(f'{degrees}°' for degrees in settings['elevations_deg'][name])}"
+        for name, text in labels.items()
+    ]
+    yield "Data set", settings["dataset"]["source"]
+    yield "Objects", "; ".join(objects)
+    yield "Elevations", "; ".join(elevations)
+    estimator = settings["estimator"]
+    if pairs := estimator.get("pairs"):
+        yield "Estimates", f"of another program, from {pairs}"
+    else:
+        yield "Training", _STARTS[estimator["warm_start"]]
+
+
+def _repairs(density: Mapping[str, Any]) -> str:
+    """Say in which way Proposed is not the method as it is printed."""
+    repairs = []
+    if density["pose_likelihood"] == "given_estimate":
+        repairs.append("the pose likelihood of Eq. 6 is given the estimate and not the truth")
+    if len(density["bandwidths_deg"]) * len(density["pseudo_observations"]) > 1:
+        repairs.append(
+            "the smoothing is chosen by the errors of the decisions and not by the likelihood"
+        )
+    if min(density["pseudo_observations"]) > 0:
+        repairs.append("each row of the density has uniform pseudo-observations")
+    if not repairs:
+        return "Proposed is the paper's method as it is printed."
+    return (
+        f"Proposed is the paper's method, repaired: {'; '.join(repairs)}. The command snakemake "
+        "confirm compares it with the method as it is printed."
+    )
+
+
+def _machine_facts(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "Python", provenance.get("python", _UNKNOWN)
+    yield "Platform", provenance.get("platform", _UNKNOWN)
+    packages = provenance.get("packages", {})
+    yield "Packages", ", ".join(f"{name} {packages[name]}" for name in sorted(packages))
+
+
+def _tally(verdicts: pd.Series) -> str:
+    counts = verdicts.value_counts()
+    one = ("holds", "does not hold", "is undecided", "was not run")
+    several = ("hold", "do not hold", "are undecided", "were not run")
+    words = zip(VERDICTS, one, several, strict=True)
+    found = [f"{counts[v]} {a if counts[v] == 1 else b}" for v, a, b in words if v in counts]
+    return ", ".join(found)
+
+
+def _fragment(path: Path) -> Markup:
+    """Return HTML that `write_table` has escaped already."""
+    with readable(path):
+        return Markup(path.read_text(encoding="utf-8"))
+
+
+def _figure(name: str, path: Path) -> dict[str, Any]:
+    caption = FIGURES[name].caption
+    text = existing(path).read_text(encoding="utf-8")
+    return {"name": name, "caption": caption, "svg": inline_svg(text, name, caption)}
+
+
+def _comparison(part: Row) -> list[str]:
+    """Return the cells of one of the comparisons that a claim is made of."""
+    unit = UNIT_OF.get(str(part["statistic"]), "")
+    value, versus = (_with_unit(part[key], unit) for key in ("value", "versus_value"))
+    printed, printed_versus = (
+        _with_unit(part[key], unit) for key in ("published_value", "published_versus_value")
+    )
+    difference = "–"
+    if np.isfinite(part["difference"]):
+        difference = interval_text(part["difference"], part["ci_low"], part["ci_high"])
+    statistic = STATISTIC_LABELS.get(str(part["statistic"]), "outliers")
+    compared = f"{part['subject']}, {part['versus']}"
+    published = "–" if printed == "–" else f"{printed}, {printed_versus}"
+    return [
+        compared, statistic, f"{value}, {versus}", difference, published, part["part_verdict"]
+    ]  # fmt: skip
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{number(value)}{unit}" if np.isfinite(value) else "–"

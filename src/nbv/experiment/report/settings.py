@@ -1,0 +1,105 @@
+"""What tables, claims and figures show, and the units and words that they share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from nbv.errors import UserError, nearest
+from nbv.experiment.paper import published
+from nbv.experiment.results import Unit
+from nbv.labels import category_label
+
+TRANSFER = "transfer"
+"""Name of the table trained on × tested on, which is made on request only."""
+
+
+@dataclass(frozen=True)
+class ReportSettings:
+    """Choices that no result depends on, only what is shown of it.
+
+    Attributes
+    ----------
+    methods : tuple of str
+        Columns of the tables, in order; those that were not evaluated are left out.
+    focus_category : str or None
+        The category of Tables 2 and 4 to 7; None takes ``mug``, or else the first one present.
+    reference_elevation_deg : int
+        The elevation of Tables 1, 3 and 5 to 7; a category's lowest one where it was not run.
+    example_fold : int
+        Fold of the examples (Table 6, Figs. 2, 3, 7); the first one where this was not run.
+    example_initial_deg : tuple of int
+        Initial azimuths of Table 6.
+    criterion : str
+        The lookup table that figures show.
+    subject, reference : str
+        Tables close with the paired difference of `subject` to `reference`.
+    n_resamples, seed : int
+        The object bootstrap.
+    """
+
+    methods: tuple[str, ...] = published.METHODS
+    focus_category: str | None = None
+    reference_elevation_deg: int = 0
+    example_fold: int = 2
+    example_initial_deg: tuple[int, ...] = (0, 30, 210, 330)
+    criterion: str = "pose_ambiguity"
+    subject: str = "proposed"
+    reference: str = "opposite"
+    n_resamples: int = 2000
+    seed: int = 0
+
+
+def focus_category(units: Iterable[Unit], settings: ReportSettings) -> str:
+    """Return the category that the detailed tables and figures are about.
+
+    Raises
+    ------
+    UserError
+        If there are no results, or the category asked for has none.
+    """
+    categories = list(dict.fromkeys(category for category, _ in units))
+    if not categories:
+        raise UserError("no evaluated category and elevation; run the workflow first")
+    wanted = settings.focus_category
+    if wanted is None:
+        mug = published.FOCUS_CATEGORY
+        return mug if mug in categories else categories[0]
+    if wanted not in categories:
+        raise UserError(
+            f"focus_category {wanted!r} was not evaluated; {nearest(wanted, categories)}"
+        )
+    return wanted
+
+
+def reference_units(units: Iterable[Unit], settings: ReportSettings) -> list[Unit]:
+    """Return the units that categories are compared by: one of each, in the order given.
+
+    Each category at the reference elevation, or where it was not run, at its lowest one.
+    """
+    by_category: dict[str, list[Unit]] = {}
+    for unit in units:
+        by_category.setdefault(unit[0], []).append(unit)
+    return [(name, common_elevation_deg(own, settings)) for name, own in by_category.items()]
+
+
+def common_elevation_deg(units: Iterable[Unit], settings: ReportSettings) -> int:
+    """Return the reference elevation, or where none of the units has it, their lowest one."""
+    elevations = {elevation for _, elevation in units}
+    wanted = settings.reference_elevation_deg
+    return wanted if wanted in elevations else min(elevations)
+
+
+def unit_label(unit: Unit, common_deg: int) -> str:
+    """Return a unit's category, with its elevation where the heading names another one."""
+    category, elevation = unit
+    label = category_label(category)
+    return label if elevation == common_deg else f"{label} ({elevation}°)"
+
+
+def focus_unit(units: Iterable[Unit], settings: ReportSettings) -> Unit:
+    """Return the focus category at the reference elevation, or at its lowest one."""
+    present = list(units)
+    category = focus_category(present, settings)
+    own = [unit for unit in present if unit[0] == category]
+    return category, common_elevation_deg(own, settings)

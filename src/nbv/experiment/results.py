@@ -1,0 +1,143 @@
+"""Reading what a run wrote, file by file: errors and objects.
+
+A *unit* is one category at one elevation: what a row of Tables 1 to 4 is made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from nbv.core.angles import circular_distance_deg
+from nbv.core.estimates import need_azimuths, objects_of_full_turns, read_estimates
+from nbv.errors import UserError
+from nbv.experiment.splits import read_splits
+from nbv.experiment.two_views import COLUMNS
+from nbv.files import damaged, existing, need_columns, read_csv, readable
+
+Unit = tuple[str, int]
+"""A category and an elevation in degrees."""
+
+EvaluationFile = tuple[str, int, int, str]
+"""What a file of errors is about: category, elevation in degrees, fold (from 1) and method."""
+
+
+EstimatesFile = tuple[str, int, int, str]
+"""What a file of estimates is about: category, elevation in degrees, fold (from 1) and role."""
+
+ESTIMATED_ROLES = ("calibration", "test")
+"""The roles of objects that have estimates."""
+
+
+def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.DataFrame]:
+    """Read the errors of each unit.
+
+    Parameters
+    ----------
+    files : mapping of (category, elevation_deg, fold, method) to path
+
+    Returns
+    -------
+    dict of (category, elevation_deg) to pandas.DataFrame
+        Units in the order of their first file. Columns are ``method, fold`` and
+        `two_views.COLUMNS`, with one row for each method, test object and initial viewpoint.
+        Methods come in the order of their first file, which is the order of the categories of
+        ``method`` as well.
+
+    Raises
+    ------
+    UserError
+        Where a file is missing or damaged, where the methods of a fold are not about the same
+        objects, or where two folds test the same one.
+    """
+    parts: dict[Unit, dict[str, list[pd.DataFrame]]] = {}
+    for (category, elevation_deg, fold, method), path in files.items():
+        frame = read_evaluation(path).assign(method=method, fold=fold)
+        parts.setdefault((category, elevation_deg), {}).setdefault(method, []).append(frame)
+    return {unit: _join(unit, by_method) for unit, by_method in parts.items()}
+
+
+def _join(name: Unit, by_method: Mapping[str, list[pd.DataFrame]]) -> pd.DataFrame:
+    frames = [frame for of_method in by_method.values() for frame in of_method]
+    unit = pd.concat(frames, ignore_index=True)
+    tested = unit[["method", "fold", "object_id"]].drop_duplicates()
+    n_methods = tested.groupby(["fold", "object_id"])["method"].nunique()
+    of_objects = tested.groupby("object_id")["fold"].nunique()
+    where = f"{name[0]} at {name[1]}°"
+    if (n_methods != len(by_method)).any():
+        fold, object_id = n_methods.index[n_methods != len(by_method)][0]
+        raise UserError(
+            f"evaluation of {where}, fold {fold}: object {object_id!r} is not evaluated by every "
+            "method; delete the fold's files and run the same command again"
+        )
+    if (of_objects > 1).any():
+        raise UserError(
+            f"evaluation of {where}: object {of_objects.index[of_objects > 1][0]!r} is tested in "
+            "more than one fold; delete the evaluations and run the same command again"
+        )
+    unit["method"] = pd.Categorical(unit["method"], categories=list(by_method), ordered=True)
+    return unit[["method", "fold", *COLUMNS]]
+
+
+def load_estimate_errors(files: Mapping[EstimatesFile, Path]) -> dict[Unit, pd.DataFrame]:
+    """Read the errors of estimates from one view.
+
+    Parameters
+    ----------
+    files : mapping of (category, elevation_deg, fold, role) to path
+        Of `nbv.core.estimates.write_estimates`; a role of `ESTIMATED_ROLES`.
+
+    Returns
+    -------
+    dict of (category, elevation_deg) to pandas.DataFrame
+        As of `load_evaluations`, with the role as ``method`` and the columns ``method, fold,
+        object_id, initial_deg, error_deg``. An object calibrates in several folds.
+
+    Raises
+    ------
+    UserError
+        Where a file is missing or damaged.
+    """
+    parts: dict[Unit, list[pd.DataFrame]] = {}
+    for (category, elevation_deg, fold, role), path in files.items():
+        estimates = read_estimates(existing(path))
+        errors = circular_distance_deg(estimates.estimate_deg, estimates.azimuth_deg)
+        n_objects, n_views = errors.shape
+        frame = pd.DataFrame(
+            {
+                "method": role,
+                "fold": fold,
+                "object_id": np.repeat(np.asarray(estimates.object_ids, dtype=object), n_views),
+                "initial_deg": np.tile(estimates.azimuth_deg, n_objects),
+                "error_deg": errors.ravel(),
+            }
+        )
+        parts.setdefault((category, elevation_deg), []).append(frame)
+    return {unit: pd.concat(frames, ignore_index=True) for unit, frames in parts.items()}
+
+
+def load_object_ids(splits: Path) -> tuple[str, ...]:
+    """Return a category's objects, from its splits."""
+    read = read_splits(existing(splits))
+    return tuple(read.loc[read["fold"] == read["fold"].min(), "object_id"])
+
+
+def read_evaluation(path: Path) -> pd.DataFrame:
+    """Read one method's errors of one fold; errors as of `load_evaluations`."""
+    frame = read_csv(path)
+    need_columns(path, frame, COLUMNS)
+    objects_of_full_turns(path, frame, "initial_deg")
+    need_azimuths(path, frame, ("initial_estimate_deg", "pose_estimate_deg"))
+    followed = frame.dropna(subset="delta_deg")
+    if len(followed) not in (0, len(frame)):
+        raise damaged(path, "delta_deg is missing in some rows")
+    need_azimuths(path, followed, ("delta_deg", "next_estimate_deg"))
+    with readable(path):
+        error_deg = frame["error_deg"].to_numpy(dtype=np.float64)
+    # Written so that NaN is refused as well.
+    if not ((error_deg >= 0.0) & (error_deg <= 180.0)).all():
+        raise damaged(path, "an error_deg is not in [0, 180]")
+    return frame

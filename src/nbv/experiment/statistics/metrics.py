@@ -1,0 +1,199 @@
+"""Pose-error metrics and their uncertainty. Pure functions of errors in degrees.
+
+An error is the circular distance of an estimated pose from the true one, in [0, 180] degrees.
+The 360 views of one object share its shape and are not independent, so every interval here
+resamples whole objects, with the same resampled objects for every method that is compared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.experiment.statistics.pose_errors import accuracy_area, half_turned
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_MEDIAN_GRID = 1001
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A figure with the ends of its 95 % interval, all in the figure's unit."""
+
+    value: float
+    low: float
+    high: float
+
+    def columns(self, name: str, ends: str = "") -> dict[str, float]:
+        """Return the columns of a tidy table: ``name``, ``<ends>_low`` and ``<ends>_high``.
+
+        The ends are called after `name` unless `ends` says otherwise (``ci`` for a value).
+        """
+        ends = ends or name
+        return {name: self.value, f"{ends}_low": self.low, f"{ends}_high": self.high}
+
+
+def mae_deg(errors_deg: ArrayLike) -> float:
+    """Return the mean absolute error over images, in degrees (Eq. 8).
+
+    Lower is better. A few errors near 180 degrees (front taken for back) move it a great deal;
+    read it together with the PEA or the median. Pool the images of all folds before calling:
+    a mean of fold means weighs images unequally when folds differ in size.
+
+    Parameters
+    ----------
+    errors_deg : (n_images,) float
+        Circular distances in [0, 180].
+
+    Raises
+    ------
+    ValueError
+        If there is no error at all.
+    """
+    return float(np.mean(_non_empty(errors_deg)))
+
+
+def median_deg(errors_deg: ArrayLike) -> float:
+    """Return the median error over images, in degrees (Fig. 9); otherwise as `mae_deg`."""
+    return float(np.median(_non_empty(errors_deg)))
+
+
+def pea(errors_deg: ArrayLike, thresholds_deg: ArrayLike) -> Floats:
+    """Return the pose estimation accuracy at each threshold (Eq. 10).
+
+    The fraction of images, in [0, 1], whose error is strictly below the threshold: PEA(0) is 0
+    even for perfect estimates. Higher is better. Not a figure to compare methods by at one
+    threshold chosen after the fact; use the whole curve or the pAUC.
+
+    Parameters
+    ----------
+    errors_deg : (n_images,) float
+        Circular distances in [0, 180].
+    thresholds_deg : (...) float
+        The result has the same shape.
+    """
+    ordered = np.sort(_non_empty(errors_deg))
+    below = np.searchsorted(ordered, np.asarray(thresholds_deg, dtype=np.float64), side="left")
+    return np.asarray(below / ordered.size, dtype=np.float64)
+
+
+def pauc(errors_deg: ArrayLike) -> float:
+    """Return the area under PEA from 0 to 100 degrees, in percent of its largest value.
+
+    Exactly ``100 - mean(min(error, 100))``: integrating the step of one image from 0 to 100
+    leaves the part of the range above its error. It is thus an MAE that counts no error above
+    100 degrees, and says little that the MAE does not unless half-turns are common. Higher is
+    better. Many published values are lower than this can be (`nbv.experiment.paper.published`). Takes and
+    raises what `mae_deg` does.
+    """
+    return float(np.mean(accuracy_area(_non_empty(errors_deg))))
+
+
+def above_90_percent(errors_deg: ArrayLike) -> float:
+    """Return the share of errors above 90 degrees, in percent: front and back are confused.
+
+    Lower is better. The mean of two opposite estimates is 90 degrees from both, so averaging can
+    turn one error of 180 degrees into two of 90. Takes and raises what `mae_deg` does.
+    """
+    return float(np.mean(half_turned(_non_empty(errors_deg))))
+
+
+def fold_std(values: ArrayLike) -> float:
+    """Return the sample standard deviation (ddof = 1) of one figure per fold, in its unit.
+
+    What the paper calls sigma. It measures how much folds differ (which objects happen to be
+    tested), not how well the average is known: for that use an interval over objects.
+
+    Returns
+    -------
+    float
+        NaN for fewer than two folds.
+    """
+    folds = np.asarray(values, dtype=np.float64)
+    return float(np.std(folds, ddof=1)) if folds.size > 1 else float("nan")
+
+
+def resample_objects(n_objects: int, rng: np.random.Generator, n_resamples: int) -> Ints:
+    """Draw as many objects as there are, with replacement, and return how often each was drawn.
+
+    Takes ``rng.integers(n_objects, size=(n_resamples, n_objects))`` and nothing else.
+
+    Returns
+    -------
+    (n_resamples, n_objects) int
+        Multiplicities; each row sums to ``n_objects``.
+    """
+    drawn = rng.integers(n_objects, size=(n_resamples, n_objects))
+    rows = np.arange(n_resamples)[:, None] * n_objects
+    counts = np.bincount((drawn + rows).ravel(), minlength=n_resamples * n_objects)
+    return counts.reshape(n_resamples, n_objects).astype(np.int64)
+
+
+def resampled_means(values: ArrayLike, objects: Ints, multiplicities: Ints) -> Floats:
+    """Return the mean over images in each resample of the objects.
+
+    Per-object sums and counts are enough, so the cost is that of two small matrix products.
+
+    Parameters
+    ----------
+    values : (n_images,) float
+        Any figure per image.
+    objects : (n_images,) int
+        Object of each image, in [0, n_objects).
+    multiplicities : (n_resamples, n_objects) int
+        From `resample_objects`.
+
+    Returns
+    -------
+    (n_resamples,) float
+        NaN where no image was drawn at all.
+    """
+    n_objects = multiplicities.shape[1]
+    sums = np.bincount(objects, weights=np.asarray(values, dtype=np.float64), minlength=n_objects)
+    counts = np.bincount(objects, minlength=n_objects).astype(np.float64)
+    weights = multiplicities.astype(np.float64)
+    drawn = weights @ counts
+    means = np.full(drawn.shape, np.nan)
+    np.divide(weights @ sums, drawn, out=means, where=drawn > 0)
+    return means
+
+
+def resampled_medians(values: ArrayLike, objects: Ints, multiplicities: Ints) -> Floats:
+    """Return the median over images in each resample of the objects.
+
+    Read off a grid of 1,001 pooled quantiles, so exact to one thousandth in rank: far finer
+    than the spread of the resamples, and a matrix product instead of a sort for each one.
+
+    Parameters and result as for `resampled_means`.
+    """
+    flat = np.asarray(values, dtype=np.float64)
+    grid = np.quantile(flat, np.linspace(0.0, 1.0, _MEDIAN_GRID), method="inverted_cdf")
+    n_objects = multiplicities.shape[1]
+    cell = objects * _MEDIAN_GRID + np.searchsorted(grid, flat, side="left")
+    histogram = np.bincount(cell, minlength=n_objects * _MEDIAN_GRID)
+    up_to = np.cumsum(histogram.reshape(n_objects, _MEDIAN_GRID), axis=1).astype(np.float64)
+    reached = multiplicities.astype(np.float64) @ up_to
+    total = reached[:, -1:]
+    medians = grid[np.argmax(reached >= total / 2, axis=1)]
+    return np.where(total[:, 0] > 0, medians, np.nan)
+
+
+def percentile_interval(samples: ArrayLike, level: float = 0.95) -> tuple[float, float]:
+    """Return the percentile interval of bootstrap samples; NaN samples are left out."""
+    finite = np.asarray(samples, dtype=np.float64)
+    finite = finite[np.isfinite(finite)]
+    if finite.size == 0:
+        return float("nan"), float("nan")
+    low, high = np.quantile(finite, [(1 - level) / 2, (1 + level) / 2])
+    return float(low), float(high)
+
+
+def _non_empty(errors_deg: ArrayLike) -> Floats:
+    errors = np.asarray(errors_deg, dtype=np.float64)
+    if errors.size == 0:
+        raise ValueError("no errors to summarise")
+    return errors

@@ -1,1 +1,0 @@
-"""Experiments: they compute; nothing here is shown."""

@@ -1,1 +1,0 @@
-"""Real depth frames: from a file in any usual form to the crop that a network sees."""

@@ -1,1 +1,0 @@
-"""Meshes: their sources, and the one frame and size that all of them get."""

@@ -1,1 +1,0 @@
-"""Which view to take next: arrays in, arrays out."""

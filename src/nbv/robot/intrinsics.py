@@ -1,0 +1,310 @@
+"""The intrinsic parameters of a pinhole camera, from the files that are in use."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nbv.errors import UserError, need_number, reason_of
+from nbv.files import read_text
+from nbv.robot.depth_files import MILLIMETRE
+from nbv.robot.errors import FrameError
+
+OFF_CENTRE = 0.2
+"""How far a principal point lies from the middle of an image, in its sides, to be remarkable."""
+
+_SAME_SCALE = 0.03
+"""How much two scales of an image may differ to be one."""
+
+_LEAST_SCALE = 0.2
+"""Below it a principal point is near a corner, and the middle of no image of the camera."""
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """Focal lengths and principal point, in pixels.
+
+    Attributes
+    ----------
+    fx, fy : float
+    cx, cy : float, optional
+        None: the middle of the object, as if the camera were directed at it.
+    width, height : int, optional
+        Of the images that they are for, where that is known.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5, width=640, height=480).fx
+    585.0
+    """
+
+    fx: float
+    fy: float
+    cx: float | None = None
+    cy: float | None = None
+    width: int | None = None
+    height: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("fx", "fy", "cx", "cy", "width", "height"):
+            if (value := getattr(self, name)) is not None or name in ("fx", "fy"):
+                need_number(f"intrinsics: {name}", value)
+        for name in ("fx", "fy"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise UserError(f"intrinsics: {name}={value:g} must be above 0 (pixels)")
+        for name in ("cx", "cy"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise UserError(f"intrinsics: {name}={value:g} is no number")
+        if (self.cx is None) != (self.cy is None):
+            known, missing = ("cy", "cx") if self.cx is None else ("cx", "cy")
+            raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
+        for name in ("width", "height"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise UserError(
+                    f"intrinsics: {name}={value:g} must be above 0 (pixels); give that of the "
+                    "depth image, or leave out width and height"
+                )
+
+    def need_resolution(self, rows: int, columns: int) -> None:
+        """Raise FrameError ``other-resolution`` where they are for images of another size.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> camera = nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5, width=640, height=480)
+        >>> camera.need_resolution(rows=480, columns=640)
+        >>> try:
+        ...     camera.need_resolution(rows=240, columns=320)
+        ... except nbv.FrameError as error:
+        ...     error.name
+        'other-resolution'
+        """
+        known = self.width is not None and self.height is not None
+        if known and (self.height, self.width) != (rows, columns):
+            raise FrameError(
+                "other-resolution",
+                f"the intrinsics are for {self.width} × {self.height} pixels, the frame has "
+                f"{columns} × {rows}: scale them, or give those of the depth image",
+            )
+        for name, value, size in (("cx", self.cx, columns), ("cy", self.cy, rows)):
+            if value is not None and not -0.5 * size <= value <= 1.5 * size:
+                raise FrameError(
+                    "other-resolution",
+                    f"the principal point {name}={value:g} lies far outside a frame of {columns} × "
+                    f"{rows} pixels: are the intrinsics of another resolution? Of a frame that "
+                    "is cut out of a larger one, give the focal length alone",
+                )
+        if known or self.cx is None or self.cy is None:
+            return
+        # A cut-out frame hardly has its principal point in both directions at the same share.
+        scale, other = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
+        is_whole = scale > _LEAST_SCALE and abs(scale - other) < _SAME_SCALE * scale
+        if is_whole and abs(scale - 1) > OFF_CENTRE:
+            raise FrameError(
+                "other-resolution",
+                f"the principal point ({self.cx:g}, {self.cy:g}) is the middle of an image of "
+                f"{scale * columns:.0f} × {scale * rows:.0f} pixels, and the frame has {columns} × "
+                f"{rows}: give the intrinsics of this resolution. Of a frame that is cut out of a "
+                "larger one, give the focal length alone, or its own width and height too",
+            )
+
+    def doubts(self, rows: int, columns: int) -> tuple[str, ...]:
+        """Return a sentence where they may be for another image than one of this size, or none.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> camera = nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5)
+        >>> camera.doubts(rows=480, columns=640)
+        ()
+        >>> len(camera.doubts(rows=400, columns=400))
+        1
+        """
+        off = [
+            value is not None and abs(value - (size - 1) / 2) > OFF_CENTRE * size
+            for value, size in ((self.cx, columns), (self.cy, rows))
+        ]
+        if not any(off):
+            return ()
+        return (
+            f"the principal point ({self.cx:g}, {self.cy:g}) is far from the middle of {columns} × "
+            f"{rows} pixels: is the frame cut out of a larger one, or are the intrinsics of "
+            "another camera or resolution?",
+        )
+
+
+def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
+    """Return intrinsics from (f), (fx, fy, cx, cy), or a 3 × 3 matrix of numbers.
+
+    Raises
+    ------
+    UserError
+        For anything else.
+    """
+    if isinstance(value, Intrinsics):
+        return value
+    if isinstance(value, str | bytes | Path):
+        raise UserError(f"intrinsics: {str(value)!r} is text; give numbers: f, or (fx, fy, cx, cy)")
+    try:
+        numbers = [float(number) for number in np.ravel(np.asarray(value, dtype=np.float64))]
+    except (TypeError, ValueError, OverflowError):
+        raise UserError(f"intrinsics: {value!r:.60} are no numbers; give fx,fy,cx,cy") from None
+    if len(numbers) == 1:
+        return Intrinsics(numbers[0], numbers[0])
+    if len(numbers) == 4:
+        return Intrinsics(numbers[0], numbers[1], numbers[2], numbers[3])
+    if len(numbers) == 9 and not any(numbers):
+        raise UserError(
+            "intrinsics: all 9 numbers of the matrix are 0: the camera is not calibrated (a ROS "
+            "driver says so); calibrate it, or give fx,fy,cx,cy"
+        )
+    if len(numbers) == 9:
+        if not np.allclose([numbers[3], *numbers[6:]], [0, 0, 0, 1]):
+            raise UserError(
+                "intrinsics: a 3x3 matrix is fx 0 cx, 0 fy cy, 0 0 1; is this one transposed?"
+            )
+        return Intrinsics(numbers[0], numbers[4], numbers[2], numbers[5])
+    raise UserError(f"intrinsics: {len(numbers)} numbers; give f, or fx,fy,cx,cy, or a 3x3 matrix")
+
+
+@dataclass(frozen=True)
+class DepthCamera:
+    """What is known of the camera that took a frame.
+
+    Attributes
+    ----------
+    intrinsics : Intrinsics, optional
+    unit_m : float
+        Metres per unit of a frame of whole numbers.
+    """
+
+    intrinsics: Intrinsics | None = None
+    unit_m: float = MILLIMETRE
+
+
+def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
+    """Return the camera of a frame, from ``f``, ``fx,fy,cx,cy`` or the name of a camera file.
+
+    A camera file is JSON or YAML: BOP's ``camera.json`` (``fx, fy, cx, cy, width, height``) or
+    ``cam_K``, both with ``depth_scale`` or without; BOP's ``scene_camera.json``, which has a camera
+    for each image; or ROS's ``CameraInfo`` (``k`` or ``K``, or ``camera_matrix.data``).
+
+    Parameters
+    ----------
+    text : str or None
+        None where nothing is known.
+    frame : path
+        The number at the end of its name, without the suffix, is that of the image in a
+        ``scene_camera.json``, as BOP names images. Where all images have the same camera, the name
+        does not matter.
+
+    Raises
+    ------
+    UserError
+        Where the text is none of this, or the file has no camera for the frame.
+    """
+    if text is None:
+        return DepthCamera()
+    parts = text.replace(",", " ").split()
+    try:
+        return DepthCamera(as_intrinsics([float(part) for part in parts]))
+    except ValueError:
+        pass
+    path = Path(text)
+    try:
+        if not path.is_file():
+            raise UserError(f"--intrinsics={text}: {_what_is_missing(path)}")
+        values = _read_mapping(path)
+        return _of_mapping(_of_image(values, path, Path(frame)), path)
+    except UserError:
+        raise
+    except Exception as error:
+        raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
+
+
+def _what_is_missing(path: Path) -> str:
+    if path.is_dir():
+        return "this is a folder; name a camera file in it, or give fx,fy,cx,cy"
+    if path.suffix or len(path.parts) > 1:
+        return "the file does not exist; name a camera file, or give fx,fy,cx,cy"
+    return "no numbers fx,fy,cx,cy, and no file of this name exists"
+
+
+def _of_image(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[str, Any]:
+    """Return what a camera file has for a frame: that of its image, where each has its own."""
+    by_image: dict[int, Mapping[str, Any]] = {
+        int(key): value for key, value in values.items() if str(key).isdecimal()
+    }
+    if not by_image or len(by_image) < len(values):
+        return values
+    cameras = list(by_image.values())
+    if not all(isinstance(camera, Mapping) for camera in cameras):
+        raise UserError(f"{path} holds images without a camera")
+    known = [{key: camera.get(key) for key in ("cam_K", "depth_scale")} for camera in cameras]
+    if all(camera == known[0] for camera in known):
+        return known[0]
+    number = re.search(r"\d+$", frame.stem)
+    if number is None or int(number[0]) not in by_image:
+        raise UserError(
+            f"{path} has cameras of images {min(by_image)} to {max(by_image)}, and none for "
+            f"{frame.name}: a frame is named by its image, as 000012.png is; or give fx,fy,cx,cy"
+        )
+    return by_image[int(number[0])]
+
+
+def _read_mapping(path: Path) -> Mapping[str, Any]:
+    text = read_text(path)
+    if path.suffix.lower() == ".json":
+        values = json.loads(text)
+    else:
+        import yaml
+
+        # `ros2 topic echo --once` ends with the mark of a further document.
+        values = next(iter(yaml.safe_load_all(text)), None)
+    if not isinstance(values, Mapping):
+        raise UserError(f"{path} holds no camera: no names with values")
+    return values
+
+
+def _of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
+    size = (
+        values.get("width", values.get("image_width")),
+        values.get("height", values.get("image_height")),
+    )
+    matrix = next((values[key] for key in ("cam_K", "k", "K") if key in values), None)
+    if matrix is None and isinstance(values.get("camera_matrix"), Mapping):
+        matrix = values["camera_matrix"].get("data")
+    if matrix is None:
+        absent = [name for name in ("fx", "fy", "cx", "cy") if name not in values]
+        if absent:
+            raise UserError(f"{path} holds no {absent[0]}, and no cam_K, K or camera_matrix")
+        matrix = [values[name] for name in ("fx", "fy", "cx", "cy")]
+    try:
+        found = as_intrinsics(matrix)
+        width, height = (int(side) if isinstance(side, int | float) else None for side in size)
+        intrinsics = Intrinsics(found.fx, found.fy, found.cx, found.cy, width, height)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+    return DepthCamera(intrinsics, _unit_m(values.get("depth_scale"), path))
+
+
+def _unit_m(depth_scale: Any, path: Path) -> float:
+    """Return metres per unit, of millimetres per unit as BOP has them."""
+    if depth_scale is None:
+        return MILLIMETRE
+    is_number = isinstance(depth_scale, int | float) and not isinstance(depth_scale, bool)
+    if not (is_number and 0 < depth_scale < math.inf):
+        raise UserError(f"{path}: depth_scale={depth_scale!r} must be above 0 (BOP: millimetres)")
+    return float(depth_scale) * MILLIMETRE

@@ -1,0 +1,438 @@
+"""From depth frames of one object to its pose and to the next view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.core.beliefs import ELEVATION_BANDWIDTH_DEG, distributions_of, elevation_share
+from nbv.errors import UserError, nearest, need_number
+from nbv.files import as_path
+from nbv.labels import counted
+from nbv.robot.bundle import Bundle, BundleError, load_bundle
+from nbv.robot.crop import Crop, crop_frame, need_metres, need_plausible_nearest
+from nbv.robot.depth_files import DepthImage, is_in_mask, to_metres
+from nbv.robot.intrinsics import Intrinsics, as_intrinsics
+from nbv.robot.masks import Window, object_mask, window_of
+from nbv.robot.mirror import Network
+from nbv.robot.moves import elevation_from_gravity, roll_warnings
+from nbv.robot.network import open_network
+from nbv.robot.next_view import (
+    AfterRotations,
+    Recommendation,
+    after_rotations,
+    as_rotation_list,
+    next_view,
+)
+from nbv.robot.ood import unfamiliarity
+
+IntrinsicsLike = Intrinsics | ArrayLike | None
+"""Intrinsics, or their numbers; None where they are not known."""
+
+REACH = 0.75
+"""How far an object reaches behind its nearest point, in diagonals, where nothing masks it."""
+
+
+def shipped_bundles() -> dict[str, Path]:
+    """Return the bundles that come with the package, by name."""
+    folder = resources.files("nbv.robot") / "shipped"
+    if not folder.is_dir():
+        return {}
+    found = {Path(str(item)).stem: Path(str(item)) for item in folder.iterdir()}
+    return {name: path for name, path in sorted(found.items()) if path.suffix == ".safetensors"}
+
+
+def bundle_path(name: str | Path) -> Path:
+    """Return the file of a bundle: that of a shipped one by its name, or the file itself.
+
+    Raises
+    ------
+    UserError
+        Where there is neither.
+    """
+    shipped = shipped_bundles()
+    if str(name) in shipped:
+        return shipped[str(name)]
+    if not as_path(name).exists():
+        known = nearest(str(name), shipped) if shipped else "no bundle comes with this nbv"
+        raise BundleError("no-bundle", f"{str(name)!r}: there is no such file; {known}")
+    return Path(name)
+
+
+class Recommender:
+    """A bundle, ready for frames.
+
+    Parameters
+    ----------
+    bundle : Bundle
+    backend : {"onnx", "numpy"}, optional
+        See `nbv.robot.network.open_network`.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> recommender = nbv.Recommender.load("mug")
+    >>> recommender.bundle.category
+    'mug'
+    """
+
+    def __init__(self, bundle: Bundle, backend: str | None = None) -> None:
+        if not isinstance(bundle, Bundle):
+            raise UserError(f"{bundle!r} is no bundle; give its name or file to Recommender.load")
+        self.bundle = bundle
+        self.network: Network = open_network(bundle, backend)
+
+    @classmethod
+    def load(cls, name: str | Path, backend: str | None = None) -> Recommender:
+        """Return the recommender of a bundle: the name of a shipped one, or a file.
+
+        Raises
+        ------
+        UserError
+            Where there is no such bundle, or it is damaged.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> nbv.Recommender.load("mug").bundle.category
+        'mug'
+        """
+        return cls(load_bundle(bundle_path(name)), backend)
+
+    @cached_property
+    def _calibrated(self) -> AfterRotations:
+        return after_rotations(self.bundle.distributions, self.bundle.object_ids)
+
+    def crop(
+        self,
+        depth_m: ArrayLike,
+        *,
+        mask: ArrayLike | None = None,
+        intrinsics: IntrinsicsLike = None,
+        near_m: float | None = None,
+        far_m: float | None = None,
+    ) -> Crop:
+        """Return what the network sees of a frame; parameters and errors as of `recommend`.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> frame, recommender = nbv.example_frame(), nbv.Recommender.load("mug")
+        >>> crop = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics)
+        >>> crop.codes.shape, crop.codes.dtype.name
+        ((64, 64), 'uint8')
+        """
+        bundle = self.bundle
+        depth, given, window = _in_window(np.asanyarray(depth_m), mask)
+        camera = bundle.focal_px if intrinsics is None else intrinsics
+        known = as_intrinsics([camera] if isinstance(camera, float) else camera)
+        reach_m = REACH * bundle.diagonal_m
+        need_metres(near_m, far_m, bundle.diagonal_m)
+        if mask is None and far_m is None:
+            need_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
+        inside = object_mask(depth, reach_m, given, near_m, far_m)
+        sizes = bundle.diagonal_m, bundle.extent_m
+        return crop_frame(depth, inside, known, bundle.camera, *sizes, window)
+
+    def distributions(self, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Return p(azimuth | image) (n, B) of crops (n, side, side).
+
+        Examples
+        --------
+        >>> import nbv
+        >>> frame, recommender = nbv.example_frame(), nbv.Recommender.load("mug")
+        >>> codes = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics).codes
+        >>> (p,) = recommender.distributions(codes[None])
+        >>> len(p), round(float(p.sum()), 6)
+        (120, 1.0)
+        """
+        return distributions_of(self.network(codes), self.bundle.temperature)
+
+    def recommend(
+        self,
+        depth_m: ArrayLike | Sequence[ArrayLike],
+        *,
+        rotations_deg: float | Sequence[float] = (0.0,),
+        mask: ArrayLike | Sequence[ArrayLike] | None = None,
+        intrinsics: IntrinsicsLike | Sequence[Intrinsics | None] = None,
+        near_m: float | None = None,
+        far_m: float | None = None,
+        elevation_deg: float | None = None,
+        gravity: ArrayLike | None = None,
+        allowed_deg: ArrayLike | None = None,
+        max_travel_deg: float = 180.0,
+        names: Sequence[str] | None = None,
+    ) -> Recommendation:
+        """Return the pose that frames show, and the next view.
+
+        A view from nearly the same place is no second view: what hides the pose there hides it
+        again. So the next view is 15° or more from every view so far.
+
+        Parameters
+        ----------
+        depth_m : (rows, columns), or a sequence of such
+            Depth in metres; NaN or 0 where nothing was measured. Whole numbers are millimetres.
+        rotations_deg : sequence of float
+            Where each frame was taken: degrees about the object from the first frame's place,
+            counter-clockwise seen from above. The first is 0. Of one frame it may be a number.
+        mask : (rows, columns), or a sequence of such, optional
+            Not 0 where the object is. Without it the object is what lies nearest, or between
+            `near_m` and `far_m`.
+        intrinsics : Intrinsics, (fx, fy, cx, cy) or 3 × 3, optional
+            Pixels; or a list of Intrinsics, one for each frame. Without it the focal length of the
+            simulated sensor.
+        near_m, far_m : float, optional
+            Metres.
+        elevation_deg : float, optional
+            Of the camera above the object's base plane, where it is known.
+        gravity : (3,), optional
+            Instead of `elevation_deg`: the direction down in the optical frame of the last frame's
+            camera, of any length. It gives the elevation, and a warning where the camera is rolled.
+            An accelerometer reports the opposite direction.
+        allowed_deg : array-like, optional
+            Rotations from the last frame's place that the camera may take; all without it. An
+            array of n booleans is a mask over the circle: entry k is the rotation 360 k / n.
+        max_travel_deg : float
+        names : sequence of str, optional
+            What messages call the frames, such as their files; else one of several is counted.
+
+        Raises
+        ------
+        nbv.robot.errors.FrameError
+            Where a frame cannot be used; it says why.
+        UserError
+            Where the arguments do not fit each other, or gravity points up in the image.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> frame = nbv.example_frame()
+        >>> answer = nbv.Recommender.load("mug").recommend(frame.depth_m, mask=frame.mask)
+        >>> 0 <= answer.azimuth_deg < 360
+        True
+        """
+        if gravity is not None and elevation_deg is not None:
+            raise UserError("gravity gives the elevation: give it or an elevation, not both")
+        rolled: tuple[str, ...] = ()
+        if gravity is not None:
+            elevation_deg, rolled = elevation_from_gravity(gravity), roll_warnings(gravity)
+        frames = _as_frames(depth_m)
+        masks = _as_masks(mask, len(frames))
+        cameras = _as_cameras(intrinsics, len(frames))
+        rotations_deg = as_rotation_list(rotations_deg, len(frames))
+        called = _as_names(names, len(frames))
+        # Of all frames: no message should name one.
+        need_metres(near_m, far_m, self.bundle.diagonal_m)
+        crops: list[Crop] = []
+        for frame, own, camera, name in zip(frames, masks, cameras, called, strict=True):
+            try:
+                crop = self.crop(frame, mask=own, intrinsics=camera, near_m=near_m, far_m=far_m)
+            except UserError as error:
+                if name is None:
+                    raise
+                raise error.about(name) from error
+            crops.append(crop)
+        doubts = (doubt for crop in crops for doubt in crop.doubts)
+        return self._of_crops(
+            np.array([crop.codes for crop in crops]),
+            rotations_deg,
+            elevation_deg,
+            allowed_deg,
+            max_travel_deg,
+            crops[-1].centre_m,
+            (*dict.fromkeys(doubts),),
+            rolled,
+        )
+
+    def recommend_crops(
+        self,
+        codes: NDArray[np.uint8],
+        rotations_deg: float | Sequence[float] = (0.0,),
+        *,
+        elevation_deg: float | None = None,
+        allowed_deg: ArrayLike | None = None,
+        max_travel_deg: float = 180.0,
+    ) -> Recommendation:
+        """Return what `recommend` does, of crops (n, side, side) uint8.
+
+        Examples
+        --------
+        >>> import nbv
+        >>> frame, recommender = nbv.example_frame(), nbv.Recommender.load("mug")
+        >>> crop = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics)
+        >>> of_crop = recommender.recommend_crops(crop.codes[None])
+        >>> of_crop.move == recommender.recommend(frame.depth_m, intrinsics=frame.intrinsics).move
+        True
+        """
+        codes = np.asarray(codes)
+        if codes.ndim != 3 or codes.dtype != np.uint8:
+            raise UserError(
+                f"crops: {codes.dtype} of shape {codes.shape}; give (n, side, side) uint8, such as "
+                "the codes of Recommender.crop"
+            )
+        rotations_deg = as_rotation_list(rotations_deg, len(codes))
+        return self._of_crops(codes, rotations_deg, elevation_deg, allowed_deg, max_travel_deg)
+
+    def _of_crops(
+        self,
+        codes: NDArray[np.uint8],
+        rotations_deg: list[float],
+        elevation_deg: float | None,
+        allowed_deg: ArrayLike | None,
+        max_travel_deg: float,
+        object_position_m: tuple[float, float, float] | None = None,
+        doubts: tuple[str, ...] = (),
+        rolled: tuple[str, ...] = (),
+    ) -> Recommendation:
+        if elevation_deg is not None:
+            need_number("elevation", elevation_deg)
+        if elevation_deg is not None and not -90 <= elevation_deg <= 90:
+            raise UserError(
+                f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
+            )
+        logits = self.network(codes)
+        answer = next_view(
+            distributions_of(logits, self.bundle.temperature),
+            rotations_deg,
+            self._calibrated,
+            self.bundle.affinity,
+            turn_share(self.bundle, elevation_deg),
+            allowed_deg=allowed_deg,
+            max_travel_deg=max_travel_deg,
+        )
+        unfamiliar = float(unfamiliarity(self.bundle.familiarity, codes, logits).max())
+        return replace(
+            answer,
+            unfamiliarity=unfamiliar,
+            warnings=(
+                *doubts,
+                *_unfamiliar(unfamiliar),
+                *_other_elevation(self.bundle, elevation_deg),
+                *answer.warnings,
+                *rolled,
+            ),
+            crops=tuple(codes),
+            object_position_m=object_position_m,
+        )
+
+
+def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float64]:
+    """Return how much each calibration turn (S,) counts for frames of an elevation, or of any."""
+    weight = np.asarray(bundle.turn_weight, dtype=np.float64)
+    if elevation_deg is None:
+        return weight
+    return weight * elevation_share(bundle.elevation_deg, elevation_deg)
+
+
+def _unfamiliar(unfamiliar: float) -> tuple[str, ...]:
+    if unfamiliar <= 1.0:
+        return ()
+    return (
+        f"a frame is like nothing that was calibrated ({unfamiliar:.1f} times the limit): "
+        "check mask, units and category",
+    )
+
+
+def _other_elevation(bundle: Bundle, elevation_deg: float | None) -> tuple[str, ...]:
+    if elevation_deg is None:
+        return ()
+    known = bundle.elevation_deg[np.isfinite(bundle.elevation_deg)]
+    if not len(known):
+        return ()
+    least, most = float(known.min()), float(known.max())
+    if least - ELEVATION_BANDWIDTH_DEG <= elevation_deg <= most + ELEVATION_BANDWIDTH_DEG:
+        return ()
+    return (
+        f"an elevation of {elevation_deg:g}° is unlike those that were calibrated, "
+        f"{least:g} to {most:g}°: expected errors may be too low",
+    )
+
+
+def _in_window(
+    depth_m: NDArray[Any], mask: ArrayLike | None
+) -> tuple[DepthImage, ArrayLike | None, Window | None]:
+    """Return depth in metres and the mask, in a window around it: most of a frame is not looked at.
+
+    Without a mask that fits, or without depth in it, they are the whole frame's.
+    """
+    given = None if mask is None else is_in_mask(mask)
+    if given is not None and given.shape == depth_m.shape and given.ndim == 2:
+        window, place = window_of(given)
+        part = to_metres(depth_m[place])
+        if part.any():
+            return part, given[place], window
+    return to_metres(depth_m), given, None
+
+
+def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.generic]]:
+    if isinstance(depth_m, np.ndarray) and depth_m.ndim == 2:
+        return [depth_m]
+    if isinstance(depth_m, list | tuple) and depth_m and isinstance(depth_m[0], np.ndarray):
+        return [np.asanyarray(frame) for frame in depth_m]
+    _refuse_text("depth", depth_m, "read the file with nbv.read_depth")
+    try:
+        values = np.asanyarray(depth_m)
+    except ValueError as error:
+        raise UserError("frames of several sizes: give a list of numpy arrays") from error
+    return _images_of(values)
+
+
+def _images_of(values: NDArray[Any]) -> list[NDArray[Any]]:
+    """Return the images of a stack (n, rows, columns), or the one image with up to 4 channels."""
+    return list(values) if values.ndim == 3 and values.shape[2] > 4 else [values]
+
+
+def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[ArrayLike | None]:
+    if mask is None:
+        return [None] * n
+    _refuse_text("mask", mask, "give an array of the file's pixels")
+    masks: list[Any]
+    if isinstance(mask, list | tuple) and not (mask and np.ndim(mask[0]) == 1):
+        masks = list(mask)
+    else:
+        masks = list(_images_of(np.asanyarray(mask)))
+    if len(masks) != n:
+        raise UserError(
+            f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"
+        )
+    return masks
+
+
+def _refuse_text(name: str, value: Any, what_to_do: str) -> None:
+    """Refuse the name of a file, alone or in a list, where an array is meant."""
+    for one in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(one, str | bytes | Path):
+            raise UserError(f"{name}: {str(one)!r} is text and no array; {what_to_do}")
+
+
+def _as_names(names: Sequence[str] | None, n: int) -> Sequence[str | None]:
+    """Return what each of n frames is called; None of a single one without a name."""
+    if names is None:
+        return [None] if n == 1 else [f"frame {place} of {n}" for place in range(1, n + 1)]
+    if len(names) != n:
+        raise UserError(
+            f"{counted(n, 'frame')} and {counted(len(names), 'name')}: give one for each frame"
+        )
+    return names
+
+
+def _as_cameras(
+    intrinsics: IntrinsicsLike | Sequence[Intrinsics | None], n: int
+) -> Sequence[IntrinsicsLike]:
+    each = list(intrinsics) if isinstance(intrinsics, list | tuple) else []
+    if not each or not all(one is None or isinstance(one, Intrinsics) for one in each):
+        of_all: Any = intrinsics
+        return [of_all] * n
+    if len(each) != n:
+        raise UserError(
+            f"{counted(n, 'frame')} and {counted(len(each), 'camera')}: give intrinsics for all, "
+            "or for each frame"
+        )
+    return each

@@ -1,0 +1,100 @@
+"""What each choice in the method brings: one setting at a time is changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import pandas as pd
+
+from nbv.core.criteria import CRITERIA
+from nbv.core.density_selection import (
+    Choice,
+    choose_densities,
+    chosen_evidence,
+    most_likely_density,
+)
+from nbv.core.estimates import Estimates
+from nbv.core.fusion import ESTIMATE_FUSIONS
+from nbv.core.policies import Turns, two_views
+
+ALL = 0
+"""As a number of calibration objects: as many as there are."""
+
+PAPER: Mapping[str, Any] = {
+    "criterion": "pose_ambiguity",
+    "fusion": "average",
+    "pose_likelihood": "given_estimate",
+    "spread": "entropy",
+    "chosen_by": "decision",
+    "bandwidth_deg": 0.0,
+    "pseudo_observations": 0.0,
+    "n_bins": 360,
+    "n_calibration": ALL,
+}
+"""The paper's method as it is run; bandwidth and pseudo-observations are chosen, not given."""
+
+
+def ablation_space() -> pd.DataFrame:
+    """Return the settings tried, one row each; the first is the paper's method.
+
+    ``varied`` names what a row changes. Where ``chosen_by`` is ``given`` the density is the row's
+    ``bandwidth_deg`` and ``pseudo_observations``.
+    """
+    rows = [{"varied": "nothing", **PAPER}]
+    rows += [{"varied": varied, **PAPER, **change} for varied, change in _changes()]
+    return pd.DataFrame(rows)
+
+
+def _changes() -> Iterator[tuple[str, dict[str, Any]]]:
+    for bandwidth in (1.5, 3.0, 6.0, 12.0, 24.0):
+        for alpha in (0.0, 10.0, 100.0):
+            given = {"chosen_by": "given", "bandwidth_deg": bandwidth}
+            yield "density", given | {"pseudo_observations": alpha}
+    yield "chosen_by", {"chosen_by": "likelihood"}
+    for pose_likelihood in ("given_estimate", "given_truth"):
+        for spread in ("entropy", "circular_variance"):
+            change = {"pose_likelihood": pose_likelihood, "spread": spread}
+            if change != {key: PAPER[key] for key in change}:
+                yield "pose_likelihood", change
+    for n_bins in (36, 72, 120, 180):
+        yield "bins", {"n_bins": n_bins}
+    for n_calibration in (2, 5, 10, 15):
+        yield "calibration_objects", {"n_calibration": n_calibration}
+    for criterion in CRITERIA:
+        # The Bayes expectation takes long to tabulate; it is there to choose more views by.
+        for fusion in ESTIMATE_FUSIONS if criterion != "bayes_error" else ():
+            if (criterion, fusion) != (PAPER["criterion"], PAPER["fusion"]):
+                yield "criterion_and_fusion", {"criterion": criterion, "fusion": fusion}
+
+
+def ablate(
+    calibration: Estimates,
+    test: Estimates,
+    instance: Mapping[str, Any],
+    settings: Mapping[str, Any],
+) -> pd.DataFrame:
+    """Return each test object's mean error in one fold, columns ``object_id, error_deg``.
+
+    Parameters
+    ----------
+    calibration, test : Estimates
+        Of one fold.
+    instance : mapping
+        A row of `ablation_space`.
+    settings : mapping
+        The configuration's ``density``.
+    """
+    wanted = instance["n_calibration"]
+    estimate_deg = calibration.estimate_deg[: wanted if wanted != ALL else None]
+    own = dict(settings) | {key: instance[key] for key in ("pose_likelihood", "spread")}
+    method = {"policy": instance["criterion"], "fusion": instance["fusion"]}
+    if instance["chosen_by"] == "given":
+        choice = Choice(instance["bandwidth_deg"], instance["pseudo_observations"])
+    elif instance["chosen_by"] == "likelihood":
+        choice = most_likely_density(estimate_deg, own)
+    else:
+        choice = choose_densities(estimate_deg, {"ablated": method}, own)["ablated"]
+    evidence = chosen_evidence(estimate_deg, choice, own, instance["n_bins"])
+    error = two_views(**method, turns=Turns(test.estimate_deg, evidence)).error_deg
+    return pd.DataFrame({"object_id": test.object_ids, "error_deg": error.mean(axis=1)})

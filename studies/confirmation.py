@@ -1,0 +1,376 @@
+"""What all trainings together say: means of methods, and differences between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from nbv.experiment.plan_bound import BEST_OF_OTHERS, BEST_OF_OWN, EVENLY_SPACED
+from numpy.typing import NDArray
+
+from nbv.errors import UserError
+from nbv.experiment.statistics.object_means import MEAN_COLUMNS, object_means
+from studies.factorial import MORE_VIEWS, SINGLE, Factorial
+from studies.trainings import (
+    Mean,
+    crossed_mean,
+    holm,
+    predicted_by_others,
+)
+
+ALL = "all"
+"""In place of a category: the objects of all categories."""
+
+PLACE = ("dataset", "category")
+TRAINING = ("shuffle", "replicate")
+METHOD = ("choice", "fusion", "n_views")
+OBJECTS_COLUMNS = (*PLACE, *TRAINING, "fold", *METHOD, "object_id", *MEAN_COLUMNS)
+
+METHODS_COLUMNS = (
+    *PLACE,
+    *METHOD,
+    "mae_deg",
+    "low",
+    "high",
+    "pauc",
+    "above_90_percent",
+    "travel_deg",
+    "n_objects",
+    "n_trainings",
+)
+CONTRASTS_COLUMNS = (
+    *PLACE,
+    "contrast",
+    "fusion",
+    "question",
+    "difference_deg",
+    "low",
+    "high",
+    "p_holm",
+    "n_objects",
+    "n_trainings",
+)
+
+BELIEF_COLUMNS = ("log_likelihood", "inside_50_percent", "inside_90_percent")
+"""How well beliefs know the pose; see `nbv.core.simulation.follow`."""
+
+BELIEFS_COLUMNS = (
+    *PLACE,
+    *METHOD,
+    "log_likelihood",
+    "low",
+    "high",
+    *BELIEF_COLUMNS[1:],
+    "n_objects",
+    "n_trainings",
+)
+TRAININGS_COLUMNS = (
+    *PLACE,
+    "contrast",
+    "fusion",
+    *TRAINING,
+    "difference_deg",
+    "low",
+    "high",
+)
+
+BOUNDS_COLUMNS = (
+    *PLACE,
+    "n_views",
+    "evenly_spaced_deg",
+    "best_of_others_deg",
+    "difference_deg",
+    "low",
+    "high",
+    "best_of_own_deg",
+    "n_objects",
+    "n_trainings",
+)
+
+Method = tuple[str, str, int]
+"""A choice, a fusion and a number of views."""
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """One method less another.
+
+    Attributes
+    ----------
+    method, other : (str, str, int)
+        Choice of views, fusion, number of views.
+    question : int
+        Of docs/protocol.md, which this contrast answers; 0: none.
+    """
+
+    method: Method
+    other: Method
+    question: int = 0
+
+    @property
+    def name(self) -> str:
+        """Such as ``expected_error - fixed``; views and another fusion are named where they are."""
+        views = f", {self.method[2]} views" if self.method[2] != 2 else ""
+        fusion = f" ({self.other[1]})" if self.other[1] != self.method[1] else ""
+        return f"{self.method[0]} - {self.other[0]}{fusion}{views}"
+
+
+def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
+    """Return the contrasts of docs/protocol.md that some methods allow."""
+    found = []
+    # A classifier's own question is the product; the paper's method is that of a regressor.
+    has_product = any(fusion == "product" for _, fusion, _ in methods)
+    for fusion in dict.fromkeys(fusion for _, fusion, _ in methods):
+        adaptive, paper = (("expected_error", fusion, 2), ("given_estimate", fusion, 2))
+        opposite = ("opposite", fusion, 2)
+        best_fixed = ("fixed", fusion, 2)
+        answers = has_product == (fusion == "product")
+        found.append(Contrast(adaptive, best_fixed, question=1 if answers else 0))
+        found += [Contrast(adaptive, (other, fusion, 2)) for other in ("opposite", "random")]
+        answers = fusion == "average" and not has_product
+        found.append(Contrast(paper, opposite, question=2 if answers else 0))
+        found.append(Contrast(paper, ("fixed", fusion, 2)))
+    paper = ("given_estimate", "average", 2)
+    found += [
+        Contrast(paper, ("none", "none", 1)),
+        Contrast(("as_printed", "average", 2), paper, question=0 if has_product else 3),
+        Contrast(("expected_error", "product", 2), paper, question=4),
+    ]
+    for n_views in sorted({n for *_, n in methods if n > 2}):
+        for choice, fusion in (
+            ("information_gain", "posterior"),
+            ("information_gain", "product"),
+            ("expected_error", "product"),
+        ):
+            even = ("evenly_spaced", fusion, n_views)
+            question = 5 if choice == "expected_error" else 0
+            found.append(Contrast((choice, fusion, n_views), even, question))
+    known = set(methods)
+    return [one for one in found if {one.method, one.other} <= known]
+
+
+def factorial_objects(made: Factorial) -> pd.DataFrame:
+    """Return the figures of every test object of one fold under every method.
+
+    Columns `METHOD`, ``object_id`` and `MEAN_COLUMNS`: means over first views.
+    """
+    names = {f"{choice}/{fusion}": (choice, fusion) for choice, fusion in made.frames}
+    means = object_means({name: made.frames[pair] for name, pair in names.items()})
+    two = means.assign(
+        choice=means["method"].map(lambda name: names[name][0]),
+        fusion=means["method"].map(lambda name: names[name][1]),
+        n_views=means["method"].map(lambda name: 1 if names[name] == SINGLE else 2),
+    )
+    more = _named(made.more_views[made.more_views["n_views"] > 2])
+    columns = [*METHOD, "object_id", *MEAN_COLUMNS]
+    return pd.concat([two[columns], more[columns]], ignore_index=True)
+
+
+def factorial_beliefs(made: Factorial) -> pd.DataFrame:
+    """Return how well the beliefs of one fold know each test object's pose, after 1 view and more.
+
+    Columns `METHOD`, ``object_id`` and `BELIEF_COLUMNS`: means over first views. After one view
+    the choice is ``none``.
+    """
+    rows = _named(made.more_views)
+    first = (rows["n_views"] == 1) & (rows["choice"] == "evenly_spaced")
+    kept = rows[first | (rows["n_views"] > 1)].copy()
+    kept.loc[kept["n_views"] == 1, "choice"] = SINGLE[0]
+    return kept[[*METHOD, "object_id", *BELIEF_COLUMNS]].reset_index(drop=True)
+
+
+def _named(more_views: pd.DataFrame) -> pd.DataFrame:
+    """Return rows of more views with their choice and fusion; those that are compared."""
+    rows = more_views[more_views["method"].isin(MORE_VIEWS)]
+    return rows.assign(
+        choice=lambda frame: frame["method"].map(lambda name: MORE_VIEWS[name][0]),
+        fusion=lambda frame: frame["method"].map(lambda name: MORE_VIEWS[name][1]),
+    )
+
+
+def belief_means(beliefs: pd.DataFrame) -> pd.DataFrame:
+    """Return how well beliefs know the pose over objects and trainings, columns `BELIEFS_COLUMNS`.
+
+    Parameters and errors as of `method_means`, with `BELIEF_COLUMNS` in place of `MEAN_COLUMNS`.
+    """
+    return _means(beliefs, BELIEF_COLUMNS, BELIEFS_COLUMNS)
+
+
+def method_means(objects: pd.DataFrame) -> pd.DataFrame:
+    """Return the mean of every method over objects and trainings, columns `METHODS_COLUMNS`.
+
+    Parameters
+    ----------
+    objects : DataFrame
+        Columns `OBJECTS_COLUMNS`: one row for each object under each training and method.
+
+    Raises
+    ------
+    UserError
+        Where a training lacks an object or has it twice.
+    """
+    return _means(objects, MEAN_COLUMNS, METHODS_COLUMNS)
+
+
+def _means(objects: pd.DataFrame, names: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:
+    """Return the means of all figures named, with an interval of the first one."""
+    rows = []
+    for place, tables in _tables(objects, names):
+        for method, of_figures in tables.items():
+            first, *others = (crossed_mean(*of_figures[name]) for name in names)
+            interval = first.interval()
+            means = (first.value, interval.low, interval.high, *(other.value for other in others))
+            rows.append((*place, *method, *means, first.n_objects, first.n_trainings))
+    return pd.DataFrame(rows, columns=list(columns))
+
+
+def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
+    """Return differences of MAE between methods, columns `CONTRASTS_COLUMNS`.
+
+    Paired by object and training. Parameters and errors as of `method_means`. Primary contrasts
+    over all categories keep their p-values. Those of all others are adjusted by Holm's method
+    within a data set and category.
+    """
+    rows = []
+    for place, tables in _tables(objects):
+        found: dict[Contrast, Mean] = {}
+        for contrast in contrasts_of(list(tables)):
+            mine, other = (tables[one]["error_deg"] for one in (contrast.method, contrast.other))
+            found[contrast] = crossed_mean(*(a - b for a, b in zip(mine, other, strict=True)))
+        over_all = place[1] == ALL
+        secondary = {
+            one.name + one.method[1]: one for one in found if not (one.question and over_all)
+        }
+        adjusted = holm({name: found[one].p_value for name, one in secondary.items()})
+        for contrast, mean in found.items():
+            interval = mean.interval()
+            p_value = adjusted.get(contrast.name + contrast.method[1], mean.p_value)
+            rows.append(
+                (
+                    *place,
+                    contrast.name,
+                    contrast.method[1],
+                    contrast.question,
+                    *(interval.value, interval.low, interval.high, p_value),
+                    *(mean.n_objects, mean.n_trainings),
+                )
+            )
+    return pd.DataFrame(rows, columns=list(CONTRASTS_COLUMNS))
+
+
+def bound_means(objects: pd.DataFrame) -> pd.DataFrame:
+    """Return what picking a plan can gain over evenly spaced views, columns `BOUNDS_COLUMNS`.
+
+    The difference, with its interval, is that of the plans that other trainings pick.
+
+    Parameters
+    ----------
+    objects : DataFrame
+        `PLACE` and `nbv.experiment.plan_bound.COLUMNS`.
+
+    Raises
+    ------
+    UserError
+        As of `method_means`.
+    """
+    rows = []
+    for place, tables in _tables(objects):
+        errors = {method: figures["error_deg"] for method, figures in tables.items()}
+        for n_views in sorted({n for *_, n in errors}):
+            even, others, own = (
+                errors[choice, "product", n_views]
+                for choice in (EVENLY_SPACED, BEST_OF_OTHERS, BEST_OF_OWN)
+            )
+            gain = crossed_mean(*(a - b for a, b in zip(others, even, strict=True)))
+            interval = gain.interval()
+            means = [crossed_mean(*tables).value for tables in (even, others, own)]
+            differences = (interval.value, interval.low, interval.high)
+            sizes = (gain.n_objects, gain.n_trainings)
+            rows.append((*place, n_views, *means[:2], *differences, means[2], *sizes))
+    return pd.DataFrame(rows, columns=list(BOUNDS_COLUMNS))
+
+
+def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
+    """Return what each training alone shows, columns `TRAININGS_COLUMNS`.
+
+    ``low`` and ``high`` are what the other trainings predict for it
+    (`studies.trainings.predicted_by_others`). Parameters and errors as of `method_means`.
+    Places without three trainings have no rows.
+    """
+    rows = []
+    for (dataset, category), tables in _tables(objects):
+        own = objects[objects["dataset"] == dataset]
+        own = own if category == ALL else own[own["category"] == category]
+        trainings = [key for key, _ in own.groupby(list(TRAINING))]
+        for contrast in contrasts_of(list(tables)):
+            mine, other = (tables[one]["error_deg"] for one in (contrast.method, contrast.other))
+            shown = predicted_by_others([a - b for a, b in zip(mine, other, strict=True)])
+            names = (dataset, category, contrast.name, contrast.method[1])
+            rows += [
+                (*names, *training, one.value, one.low, one.high)
+                for training, one in zip(trainings, shown, strict=bool(shown))
+            ]
+    return pd.DataFrame(rows, columns=list(TRAININGS_COLUMNS))
+
+
+Figures = Mapping[str, Sequence[NDArray[np.float64]]]
+"""By figure of merit, a table (n_trainings, n_objects) of each category."""
+
+
+def _tables(
+    objects: pd.DataFrame, names: Sequence[str] = ("error_deg",)
+) -> Iterator[tuple[tuple[str, str], dict[Method, Figures]]]:
+    """Yield the tables of each data set and category, then of its categories together.
+
+    Categories are together only where all have the same trainings.
+    """
+    for dataset, rows in objects.groupby("dataset", sort=False):
+        of_categories = {
+            str(category): _of_category(part, f"{dataset}, {category}", names)
+            for category, part in rows.groupby("category", sort=False)
+        }
+        for category, tables in of_categories.items():
+            yield (
+                (str(dataset), category),
+                {
+                    method: {name: [table] for name, table in figures.items()}
+                    for method, figures in tables.items()
+                },
+            )
+        trainings = {
+            frozenset(zip(*(part[name] for name in TRAINING), strict=True))
+            for _, part in rows.groupby("category")
+        }
+        if len(of_categories) > 1 and len(trainings) == 1:
+            first, *rest = of_categories.values()
+            shared = [method for method in first if all(method in other for other in rest)]
+            yield (
+                (str(dataset), ALL),
+                {
+                    method: {
+                        name: [tables[method][name] for tables in of_categories.values()]
+                        for name in names
+                    }
+                    for method in shared
+                },
+            )
+
+
+def _of_category(
+    rows: pd.DataFrame, where: str, names: Sequence[str]
+) -> dict[Method, dict[str, NDArray[np.float64]]]:
+    tables: dict[Method, dict[str, NDArray[np.float64]]] = {}
+    for (choice, fusion, n_views), part in rows.groupby(list(METHOD), sort=False):
+        wide = part.set_index([*TRAINING, "object_id"])
+        if wide.index.has_duplicates:
+            raise UserError(f"{where}: an object is tested twice in a training; keep it again")
+        method = (str(choice), str(fusion), int(str(n_views)))
+        tables[method] = {}
+        for name in names:
+            table = wide[name].unstack("object_id")  # noqa: PD010 - nothing to aggregate
+            if table.isna().to_numpy().any():
+                raise UserError(f"{where}: a training lacks an object; finish all folds first")
+            tables[method][name] = table.to_numpy(dtype=np.float64)
+    return tables

@@ -1,0 +1,233 @@
+"""Every choice of the next view with every fusion, on the same estimates of one fold.
+
+A choice and a fusion are told apart only where both vary: the paper's method differs from Opposite
+in the choice, and from its extensions in both. All choices with one fusion fuse alike. An average
+has no density, so each choice has the one that is best for it. A posterior has, and all choices
+share it; the regression of ``expected_error`` has a kernel of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nbv.core.density_selection import (
+    COARSE_BINS,
+    Choice,
+    choose_densities,
+    chosen_evidence,
+    most_likely_density,
+    with_kernel,
+)
+from nbv.core.estimates import Estimates
+from nbv.core.evidence import Evidence, evidence_of_distributions
+from nbv.core.fusion import ESTIMATE_FUSIONS
+from nbv.core.lookup import build_lookup
+from nbv.core.policies import needs_lookup
+from nbv.core.posteriors import Posteriors
+from nbv.experiment.two_views import evaluate_method
+from studies.kept_estimates import HeldOut
+from studies.more_views import more_views_rows
+
+Pair = tuple[str, str]
+"""A choice of the next view and a fusion."""
+
+SINGLE: Final[Pair] = ("none", "none")
+AS_PRINTED: Final[Pair] = ("as_printed", "average")
+"""The paper's method as it reads: T = L, the likeliest smoothing, no pseudo-observations."""
+
+POLICIES: Final[Mapping[str, str]] = {
+    "random": "random",
+    "fixed": "fixed",
+    "opposite": "opposite",
+    "given_truth": "pose_ambiguity",
+    "given_estimate": "pose_ambiguity",
+    "information_gain": "information_gain",
+    "expected_dispersion": "expected_dispersion",
+    "expected_error": "expected_error",
+}
+"""The policy of each choice; the pose ambiguity has two interpretations."""
+
+CHOICES_WITH_TABLES = tuple(choice for choice, policy in POLICIES.items() if needs_lookup(policy))
+REGRESSION = "expected_error"
+
+OF_IMAGES = ("random", "fixed", "opposite", "information_gain", "expected_error")
+"""Choices that are defined where images give distributions, which are fused by product."""
+
+MORE_VIEWS: Final[Mapping[str, Pair]] = {
+    "random": ("random", "posterior"),
+    "evenly_spaced": ("evenly_spaced", "posterior"),
+    "information_gain": ("information_gain", "posterior"),
+    "random_product": ("random", "product"),
+    "evenly_spaced_product": ("evenly_spaced", "product"),
+    "information_gain_product": ("information_gain", "product"),
+    "expected_error_product": ("expected_error", "product"),
+}
+"""Choice and fusion of the policies of `studies.more_views` that are compared."""
+
+DENSITY_COLUMNS = (
+    "choice",
+    "fusion",
+    "bandwidth_deg",
+    "pseudo_observations",
+    "pairs_percent",
+    "validated_error_deg",
+)
+
+RngOf = Callable[[str], np.random.Generator]
+
+
+@dataclass(frozen=True)
+class Factorial:
+    """What became of the test objects of one fold.
+
+    Attributes
+    ----------
+    frames : dict of (choice, fusion) to DataFrame
+        Two views, and one (`SINGLE`); as of `nbv.experiment.two_views.evaluate_method`.
+    more_views : DataFrame
+        As of `studies.more_views.more_views_rows`.
+    densities : DataFrame
+        What calibration objects chose for each choice and fusion; `DENSITY_COLUMNS`.
+        ``pairs_percent`` is the mean share of calibration pairs in a row of V, whose other part are
+        uniform pseudo-observations.
+    """
+
+    frames: dict[Pair, pd.DataFrame]
+    more_views: pd.DataFrame
+    densities: pd.DataFrame
+
+
+def evaluate_factorial(
+    calibration: HeldOut,
+    test: HeldOut,
+    settings: Mapping[str, Any],
+    more_views: Mapping[str, Any],
+    rng_of: RngOf,
+) -> Factorial:
+    """Evaluate every choice with every fusion on the test objects of one fold.
+
+    Tables that choose have `COARSE_BINS` bins; estimates are fused with 360.
+
+    Parameters
+    ----------
+    calibration, test : HeldOut
+        Where they have distributions, the fusion ``product`` and choices by an image's own
+        distribution are added, from first views that are a class apart.
+    settings : mapping
+        The configuration's ``density``, ``recommendation`` and ``affinity``.
+    more_views : mapping
+        The configuration's ``more_views``.
+    rng_of : callable
+        The generator of a choice, by name: random views are the same under every fusion of
+        estimates.
+    """
+    known, tested = calibration.estimates.estimate_deg, test.estimates
+    densities: dict[Pair, Choice] = {}
+    frames = {SINGLE: evaluate_method({"policy": "none", "fusion": "average"}, tested)}
+    for fusion in ESTIMATE_FUSIONS:
+        chosen = _densities(fusion, known, settings)
+        densities |= {(choice, fusion): density for choice, density in chosen.items()}
+        frames |= _estimate_frames(fusion, chosen, known, tested, settings, rng_of)
+    printed = _of_choice("given_truth", settings) | {"pseudo_observations": [0.0]}
+    densities[AS_PRINTED] = most_likely_density(known, printed)
+    coarse = chosen_evidence(known, densities[AS_PRINTED], printed, COARSE_BINS)
+    table = build_lookup(coarse, POLICIES["given_truth"])
+    method = {"policy": POLICIES["given_truth"], "fusion": "average"}
+    frames[AS_PRINTED] = evaluate_method(method, tested, lookup=table)
+    of_images = None
+    if calibration.posteriors is not None and test.posteriors is not None:
+        of_images = evidence_of_distributions(calibration.posteriors.distributions, settings)
+        frames |= _product_frames(test, test.posteriors, of_images, rng_of)
+        step = 360 // test.posteriors.distributions.shape[1]
+        frames = {
+            pair: frame[frame["initial_deg"] % step == 0].reset_index(drop=True)
+            for pair, frame in frames.items()
+        }
+    shared = densities["random", "posterior"]
+    evidence = cache(partial(chosen_evidence, known, shared, settings))
+    evidences: dict[str, Callable[[int], Evidence]] = dict.fromkeys(
+        ("random", "opposite", "information_gain"), lambda n_bins: evidence(n_bins=n_bins)
+    )
+    rows = more_views_rows(
+        tested, evidences, more_views, rng_of("more_views"), test.posteriors, of_images
+    )
+    return Factorial(frames, rows, _densities_frame(densities, known.size / 360))
+
+
+def _of_choice(choice: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of a choice: the pose likelihood has two interpretations."""
+    given = "given_truth" if choice == "given_truth" else "given_estimate"
+    return dict(settings) | {"pose_likelihood": given}
+
+
+def _densities(
+    fusion: str, estimate_deg: NDArray[np.float64], settings: Mapping[str, Any]
+) -> dict[str, Choice]:
+    """Return the density of each choice that has one of its own, and a fusion's own as random's."""
+
+    def best(choices: Sequence[str], shared: Choice | None = None) -> dict[str, Choice]:
+        methods = {one: {"policy": POLICIES[one], "fusion": fusion} for one in choices}
+        own = _of_choice(choices[0], settings)
+        return choose_densities(estimate_deg, methods, own, shared=shared)
+
+    if fusion == "average":
+        others = [choice for choice in CHOICES_WITH_TABLES if choice != "given_truth"]
+        return best(others) | best(["given_truth"])
+    of_fusion = best(["random"])
+    return of_fusion | best([REGRESSION], shared=of_fusion["random"])
+
+
+def _estimate_frames(
+    fusion: str,
+    densities: Mapping[str, Choice],
+    calibration_deg: NDArray[np.float64],
+    test: Estimates,
+    settings: Mapping[str, Any],
+    rng_of: RngOf,
+) -> dict[Pair, pd.DataFrame]:
+    """Return the frame of every choice with one fusion of estimates."""
+    shared = densities.get("random")
+    fine = None if shared is None else chosen_evidence(calibration_deg, shared, settings)
+    frames = {}
+    for choice, policy in POLICIES.items():
+        lookup = None
+        if choice in CHOICES_WITH_TABLES:
+            own = _of_choice(choice, settings)
+            of_table = shared or densities[choice]
+            coarse = chosen_evidence(calibration_deg, of_table, own, COARSE_BINS)
+            kernel = densities.get(choice, of_table)
+            lookup = build_lookup(with_kernel(coarse, kernel), policy, fusion)
+        method = {"policy": policy, "fusion": fusion}
+        frames[choice, fusion] = evaluate_method(method, test, rng_of(choice), lookup, fine)
+    return frames
+
+
+def _product_frames(
+    test: HeldOut, posteriors: Posteriors, evidence: Evidence, rng_of: RngOf
+) -> dict[Pair, pd.DataFrame]:
+    return {
+        (choice, "product"): evaluate_method(
+            {"policy": POLICIES[choice], "fusion": "product"},
+            test.estimates_of_posteriors,
+            rng_of(choice),
+            evidence=evidence,
+            posteriors=posteriors,
+        )
+        for choice in OF_IMAGES
+    }
+
+
+def _densities_frame(densities: Mapping[Pair, Choice], pairs_of_row: float) -> pd.DataFrame:
+    rows = []
+    for pair, chosen in densities.items():
+        alpha = chosen.pseudo_observations
+        share = 100.0 * pairs_of_row / (pairs_of_row + alpha)
+        rows.append((*pair, chosen.bandwidth_deg, alpha, share, chosen.error_deg))
+    return pd.DataFrame(rows, columns=list(DENSITY_COLUMNS))

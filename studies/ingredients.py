@@ -1,0 +1,112 @@
+"""What each ingredient of the randomisation brings: bundles that were trained without it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nbv.experiment.report.table import DECIDED, Cell, Table, difference_cell
+from nbv.labels import category_label, counted, number
+from nbv.robot.evaluation import RECOMMENDED, SINGLE
+from studies.trainings import crossed_mean
+
+ALL = ""
+"""In the place of what is left out: nothing."""
+
+_SHOWN = ((SINGLE, 1, "one view"), (RECOMMENDED, 2, "two views"))
+
+Key = tuple[str, str]
+"""Category, and what the trainings are without."""
+Replicates = Sequence[pd.DataFrame]
+"""What `nbv.robot.evaluation.evaluate` returns of each training, of equally many for each key."""
+
+
+def ingredient_table(rendered: Mapping[Key, Replicates], real: Mapping[Key, Replicates]) -> Table:
+    """Return the errors of bundles that lack an ingredient, less those of the ones with all.
+
+    Parameters
+    ----------
+    rendered : mapping of (str, str) to sequence of DataFrame
+        By category and what is left out, `ALL` first: on test objects, with all that is random.
+    real : mapping
+        The same on recordings of a real camera, or empty.
+    """
+    cells, rows = [], []
+    for category, without in rendered:
+        named = "with all" if without == ALL else f"without {without.replace('_', ' ')}"
+        row = [Cell(f"{category_label(category)}, {named}")]
+        made: dict[str, float | str] = {"category": category, "without": without or "nothing"}
+        for choice, n_views, label in _SHOWN:
+            errors = _of_objects(rendered[category, without], choice, n_views)
+            key = label.replace(" ", "_")
+            if without == ALL:
+                value = float(errors.mean())
+                made |= {key: value, f"{key}_low": np.nan, f"{key}_high": np.nan}
+                row.append(Cell(f"{number(value)}°"))
+            else:
+                with_all = _of_objects(rendered[category, ALL], choice, n_views)
+                found = crossed_mean(errors - with_all).interval()
+                made |= found.columns(key)
+                row.append(difference_cell(found.value, found.low, found.high))
+        for choice, n_views, label in _SHOWN if real else ():
+            of_training = _of_objects(real[category, without], choice, n_views).mean(axis=1)
+            key = f"{label.replace(' ', '_')}_real"
+            made |= {
+                key: float(of_training.mean()),
+                f"{key}_least": float(of_training.min()),
+                f"{key}_greatest": float(of_training.max()),
+            }
+            row.append(Cell(_spread(of_training)))
+        cells.append(made)
+        rows.append(tuple(row))
+    n_trainings = len(next(iter(rendered.values())))
+    return Table(
+        "ingredients",
+        "What is random in training",
+        "What each ingredient of the randomisation brings",
+        pd.DataFrame(cells),
+        ("", *_titles("rendered")) + (tuple(_titles("real")) if real else ()),
+        tuple(rows),
+        (
+            "Rendered: MAE on test objects of a view every 15°, with all that is random. Below the "
+            f"first line it is the difference to it, with a 95 % interval {_over(n_trainings)}. "
+            f"{DECIDED}",
+            *((_real_note(n_trainings),) if real else ()),
+        ),
+    )
+
+
+def _over(n_trainings: int) -> str:
+    if n_trainings == 1:
+        return "over objects; one training each, whose chance the interval does not contain"
+    return f"over objects and {counted(n_trainings, 'training')} of the same images"
+
+
+def _real_note(n_trainings: int) -> str:
+    note = "Real: MAE on recordings with known azimuths"
+    if n_trainings == 1:
+        return f"{note}."
+    return f"{note}, the mean over the trainings, and the least and greatest."
+
+
+def _titles(what: str) -> Iterator[str]:
+    return (f"{label}, {what}" for _, _, label in _SHOWN)
+
+
+def _spread(of_training: NDArray[np.float64]) -> str:
+    mean = f"{number(of_training.mean())}°"
+    if len(of_training) == 1:
+        return mean
+    return f"{mean} ({number(of_training.min())} to {number(of_training.max())})"
+
+
+def _of_objects(trainings: Replicates, choice: str, n_views: int) -> NDArray[np.float64]:
+    """Return the mean error of each object over its recordings, (n_trainings, n_objects)."""
+    of_training = []
+    for found in trainings:
+        rows = found[(found["choice"] == choice) & (found["n_views"] == n_views)]
+        of_training.append(rows.groupby("object_id")["mae_deg"].mean())
+    return pd.concat(of_training, axis=1).to_numpy(dtype=np.float64).T

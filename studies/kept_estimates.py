@@ -1,0 +1,195 @@
+"""Held-out estimates of many trainings in one compact file, enough to redo the statistics.
+
+Estimates are kept as hundredths of a degree from the truth. Distributions are kept for every view
+that is a class apart, in the frame of the truth, as whole tenths of -log p. What is
+read from estimates or from such a file is the same, so both give the same tables.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.core.angles import signed_difference_deg
+from nbv.core.estimates import Estimates, read_estimates
+from nbv.core.posteriors import Posteriors, read_posteriors
+from nbv.errors import UserError
+from nbv.files import damaged, readable, write_arrays
+
+FORMAT = 2
+_SETTINGS = "settings"
+
+KeptKey = tuple[int, int, str, int, int, str]
+"""Shuffle, replicate, category, elevation in degrees, fold (from 1) and role."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What an estimator says of objects that it was not trained on, as precisely as it is kept.
+
+    Attributes
+    ----------
+    object_ids : tuple of str
+        n objects.
+    residual : ndarray (n, n_views) int16
+        Estimate less truth, hundredths of a degree; view k of n_views has the azimuth
+        360 k / n_views.
+    surprisal : ndarray (n, B, B) uint8, optional
+        −10 log p(azimuth | image), by view and by distance from the truth in classes.
+    """
+
+    object_ids: tuple[str, ...]
+    residual: NDArray[np.int16]
+    surprisal: NDArray[np.uint8] | None = None
+
+    @property
+    def estimates(self) -> Estimates:
+        """The estimates of all views, to hundredths of a degree."""
+        n_views = self.residual.shape[1]
+        truth = np.arange(n_views) * (360.0 / n_views)
+        return Estimates(self.object_ids, np.round((truth + self.residual / 100.0) % 360.0, 2))
+
+    @property
+    def posteriors(self) -> Posteriors | None:
+        """The distributions of views one class apart, or None where there are none."""
+        if self.surprisal is None:
+            return None
+        p = np.exp(-0.1 * self.surprisal)
+        turned = _turned(p / p.sum(axis=-1, keepdims=True), 1)
+        return Posteriors(self.object_ids, np.log(turned), 1.0)
+
+    @property
+    def estimates_of_posteriors(self) -> Estimates:
+        """The estimates of the views that `posteriors` has."""
+        n_views = self.residual.shape[1]
+        step = 1 if self.surprisal is None else n_views // self.surprisal.shape[1]
+        return Estimates(self.object_ids, self.estimates.estimate_deg[:, ::step])
+
+
+def held_out(estimates: Estimates, posteriors: Posteriors | None = None) -> HeldOut:
+    """Return estimates, and the distributions of the same images, as precisely as they are kept.
+
+    The number of views has to be a multiple of the number of classes.
+    """
+    away = signed_difference_deg(estimates.estimate_deg, estimates.azimuth_deg)
+    # Half a turn is kept as -18000 whether it was reached one way or the other.
+    residual = (np.rint(away * 100.0) + 18000) % 36000 - 18000
+    surprisal = None
+    if posteriors is not None:
+        p = posteriors.distributions
+        p = p[:, :: p.shape[1] // p.shape[2]]
+        # At most −10 log of the least probability, 138.
+        surprisal = np.rint(-10.0 * np.log(_turned(p, -1))).astype(np.uint8)
+    return HeldOut(estimates.object_ids, residual.astype(np.int16), surprisal)
+
+
+def _turned(p: NDArray[np.float64], way: int) -> NDArray[np.float64]:
+    """Turn the distribution of view k by k classes, (n, B, B)."""
+    n_bins = p.shape[2]
+    classes = (np.arange(n_bins) - way * np.arange(n_bins)[:, None]) % n_bins
+    return np.asarray(np.take_along_axis(p, classes[None], axis=2))
+
+
+def read_held_out(estimates: str | Path, posteriors: str | Path | None = None) -> HeldOut:
+    """Read a fold's estimates, and its distributions where there are any.
+
+    Errors as of `nbv.core.estimates.read_estimates` and
+    `nbv.core.posteriors.read_posteriors`.
+    """
+    found = read_estimates(estimates)
+    return held_out(found, read_posteriors(posteriors, found.object_ids) if posteriors else None)
+
+
+def keep_estimates(
+    path: str | Path, held: Mapping[KeptKey, HeldOut], settings: Mapping[str, Any]
+) -> None:
+    """Write everything that the statistics need; `settings` are the run's configuration."""
+    arrays: dict[str, NDArray[Any]] = {
+        "format": np.asarray(FORMAT),
+        _SETTINGS: np.asarray(json.dumps(settings, sort_keys=True)),
+    }
+    for key, one in held.items():
+        name = _name(key)
+        arrays[f"{name}/objects"] = np.asarray(one.object_ids, dtype=np.str_)
+        arrays[f"{name}/residual"] = one.residual
+        if one.surprisal is not None:
+            arrays[f"{name}/surprisal"] = one.surprisal
+    write_arrays(path, arrays)
+
+
+def kept_settings(path: str | Path) -> tuple[dict[str, Any], list[KeptKey]]:
+    """Return the configuration that a file was kept with, and the keys of what it holds.
+
+    Raises
+    ------
+    UserError
+        Where it is no such file, or of another format.
+    """
+    with readable(path), np.load(path, allow_pickle=False) as stored:
+        if "format" not in stored.files or int(stored["format"]) != FORMAT:
+            raise damaged(path, f"not a file of kept estimates of format {FORMAT}")
+        settings = json.loads(str(stored[_SETTINGS]))
+        suffix = "/residual"
+        names = [name.removesuffix(suffix) for name in stored.files if name.endswith(suffix)]
+    return settings, [_key(name) for name in names]
+
+
+def read_kept(path: str | Path, keys: Iterable[KeptKey] | None = None) -> dict[KeptKey, HeldOut]:
+    """Read what `keep_estimates` wrote, all of it or some keys.
+
+    Raises
+    ------
+    UserError
+        As of `kept_settings`, and where there is no such key.
+    """
+    _, held = kept_settings(path)
+    wanted = held if keys is None else list(keys)
+    for key in wanted:
+        if key not in held:
+            raise UserError(f"{path}: holds no estimates of {_name(key)}; keep them again")
+    found = {}
+    with readable(path), np.load(path, allow_pickle=False) as stored:
+        for key in wanted:
+            name = _name(key)
+            surprisal = f"{name}/surprisal"
+            found[key] = HeldOut(
+                tuple(str(one) for one in stored[f"{name}/objects"]),
+                stored[f"{name}/residual"],
+                stored[surprisal] if surprisal in stored.files else None,
+            )
+    return found
+
+
+def join_kept(path: str | Path, parts: Iterable[str | Path]) -> None:
+    """Write what several files of the same settings keep as one file.
+
+    Raises
+    ------
+    UserError
+        As of `kept_settings`, and where two files were kept with other settings.
+    """
+    held: dict[KeptKey, HeldOut] = {}
+    first: dict[str, Any] | None = None
+    for part in parts:
+        settings, _ = kept_settings(part)
+        first = settings if first is None else first
+        if settings != first:
+            raise UserError(f"{part}: kept with other settings than the others; keep it again")
+        held |= read_kept(part)
+    if first is not None:
+        keep_estimates(path, held, first)
+
+
+def _name(key: KeptKey) -> str:
+    return "/".join(str(part) for part in key)
+
+
+def _key(name: str) -> KeptKey:
+    shuffle, replicate, category, elevation, fold, role = name.split("/")
+    return int(shuffle), int(replicate), category, int(elevation), int(fold), role

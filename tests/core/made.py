@@ -1,0 +1,59 @@
+"""Estimates and evidence made for tests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nbv.core.angles import circular_distance_deg
+from nbv.core.estimates import Estimates
+from nbv.core.evidence import gather_evidence
+
+N_BINS = 24
+SETTINGS = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+FEW_DENSITIES = SETTINGS | {"bandwidths_deg": [6, 12], "pseudo_observations": [10], "n_parts": 2}
+EXTENSIONS = {
+    "random_posterior": {"policy": "random", "fusion": "posterior"},
+    "opposite_posterior": {"policy": "opposite", "fusion": "posterior"},
+    "gain_posterior": {"policy": "information_gain", "fusion": "posterior"},
+    "error_average": {"policy": "expected_error", "fusion": "average"},
+    "selected": {"policy": "selected", "fusion": "selected"},
+    "opposite_selected": {"policy": "opposite", "fusion": "selected"},
+    "oracle_posterior": {"policy": "oracle", "fusion": "posterior"},
+}
+
+
+def estimates(n_objects=3, n_views=48, seed=0, worst_deg=90.0):
+    """Estimates (n_objects, n_views) that are sharp but round one azimuth."""
+    rng = np.random.default_rng(seed)
+    truth = np.arange(n_views) * (360.0 / n_views)
+    spread = 8 + 60 * np.exp(-((circular_distance_deg(truth, worst_deg) / 40) ** 2))
+    return (truth + rng.normal(0, spread, (n_objects, n_views))) % 360
+
+
+def objects(n_objects, seed, hidden_deg=90.0):
+    """The same of full turns in single degrees, a little sharper, with names."""
+    rng = np.random.default_rng(seed)
+    truth = np.arange(360.0)
+    spread = 4 + 40 * np.exp(-((circular_distance_deg(truth, hidden_deg) / 35) ** 2))
+    found = np.round((truth + rng.normal(0, spread, (n_objects, 360))) % 360, 4) % 360
+    return Estimates(tuple(f"{seed}-{k}" for k in range(n_objects)), found)
+
+
+def evidence_of(estimate_deg=None, bandwidth_deg=12.0, pseudo_observations=2.0, n_bins=N_BINS):
+    return gather_evidence(
+        estimates() if estimate_deg is None else estimate_deg,
+        SETTINGS,
+        bandwidth_deg=bandwidth_deg,
+        pseudo_observations=pseudo_observations,
+        n_bins=n_bins,
+    )
+
+
+def hidden_range_estimates(n_objects: int, seed: int = 0) -> np.ndarray:
+    """Estimates of objects whose azimuth cannot be told within 45 degrees of 90."""
+    rng = np.random.default_rng(seed)
+    truth = np.arange(360.0)
+    hidden = np.abs(truth - 90) < 45
+    estimate = truth + rng.normal(0, 4, (n_objects, 360))
+    estimate[:, hidden] = 90 + rng.normal(0, 10, (n_objects, hidden.sum()))
+    return estimate % 360

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nbv.core import angles
+
+degrees = st.floats(-1e4, 1e4, allow_nan=False)
+whole = st.integers(-1440, 1440)
+
+
+def unit(angle_deg: float) -> complex:
+    return cmath.rect(1.0, math.radians(angle_deg))
+
+
+@given(degrees)
+def test_wrapping_keeps_the_direction_and_the_range(angle):
+    wrapped = float(angles.wrap_deg(angle))
+    assert 0.0 <= wrapped < 360.0
+    assert abs(unit(wrapped) - unit(angle)) < 1e-9
+
+
+@given(st.floats(-1e9, 1e9), st.integers(-3, 3))
+def test_wrapping_is_the_remainder_bit_for_bit(angle, turns):
+    near = np.nextafter(360.0 * turns, [-np.inf, np.inf])
+    angles_deg = np.array([angle, 360.0 * turns, *near])
+    remainder = np.mod(angles_deg, 360.0)
+    expected = np.where(remainder >= 360.0, 0.0, remainder)
+    assert angles.wrap_deg(angles_deg).tobytes() == expected.tobytes()
+    one_by_one = np.stack([angles.wrap_deg(float(each)) for each in angles_deg])
+    assert one_by_one.tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("angle", [-1e-17, 360.0, 720.0, -360.0])
+def test_wrapping_never_gives_360(angle):
+    assert angles.wrap_deg(angle) == 0.0
+
+
+def test_angles_in_single_precision_are_computed_in_double():
+    narrow = np.float32([0.1, 359.9, 725.3])
+    np.testing.assert_array_equal(angles.wrap_deg(narrow), np.mod(narrow.astype(np.float64), 360))
+    assert angles.wrap_deg(narrow).dtype == np.float64
+
+
+@given(degrees, degrees)
+def test_signed_difference_turns_b_into_a_the_shorter_way(a, b):
+    turn = float(angles.signed_difference_deg(a, b))
+    assert -180.0 <= turn < 180.0
+    assert abs(unit(b + turn) - unit(a)) < 1e-9
+
+
+@given(degrees, degrees)
+def test_distance_is_the_angle_between_unit_vectors(a, b):
+    distance = float(angles.circular_distance_deg(a, b))
+    chord = abs(unit(a) - unit(b))
+    assert math.isclose(2 * math.sin(math.radians(distance) / 2), chord, abs_tol=1e-7)
+    assert distance == pytest.approx(float(angles.circular_distance_deg(b, a)), abs=1e-9)
+
+
+@given(whole, whole)
+def test_midpoint_is_the_direction_of_the_sum(a, b):
+    middle = float(angles.midpoint_deg(a, b))
+    total = unit(a) + unit(b)
+    if (a - b) % 360 == 180:
+        assert middle == a % 360
+    else:
+        assert abs(total / abs(total) - unit(middle)) < 1e-9
+
+
+def test_midpoint_across_zero_where_the_printed_formula_breaks():
+    assert angles.midpoint_deg(350, 20) == pytest.approx(5.0)
+    assert angles.midpoint_deg(20, 350) == pytest.approx(5.0)
+
+
+@given(whole, st.sampled_from([36, 120, 360, 720]))
+def test_bins_are_centred_and_roll_with_the_angle(k, n_bins):
+    width = 360.0 / n_bins
+    assert angles.nearest_bin(k * width, n_bins) == k % n_bins
+    assert angles.nearest_bin((k - 0.499) * width, n_bins) == k % n_bins
+    assert angles.nearest_bin((k + 0.499) * width, n_bins) == k % n_bins
+
+
+def test_bin_edges_are_half_open():
+    assert angles.nearest_bin([359.5, 0.4999, 0.5, 359.4999], 360).tolist() == [0, 0, 1, 359]
+
+
+def test_travel_goes_the_shorter_way():
+    np.testing.assert_array_equal(angles.travel_deg([0, 90, 180, 270, 359]), [0, 90, 180, 90, 1])

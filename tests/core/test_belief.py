@@ -1,0 +1,82 @@
+"""Beliefs over any number of views, against Bayes' rule written out."""
+
+from __future__ import annotations
+
+import numpy as np
+from tests.core.made import N_BINS, estimates, evidence_of
+
+from nbv.core.angles import circular_distance_deg
+from nbv.core.belief import (
+    Belief,
+    coarser,
+    every_belief,
+    first_belief,
+    mean_direction_deg,
+    updated,
+)
+
+
+def test_beliefs_follow_bayes_rule_view_by_view():
+    evidence = evidence_of()
+    V, L = evidence.conditionals.viewpoint, evidence.conditionals.estimate
+    views = [(90, 100.0), (240, 300.0), (15, 61.0)]
+    belief = first_belief(np.array([40.0]), evidence)
+    expected = V[int(40.0 / 15 + 0.5)].copy()
+    for delta, seen in views:
+        belief = updated(belief, np.array([seen]), np.array([delta]), evidence)
+        for theta in range(N_BINS):
+            expected[theta] *= L[(theta + delta // 15) % N_BINS, int(seen / 15 + 0.5) % N_BINS]
+    np.testing.assert_allclose(belief.probabilities[0], expected / expected.sum(), rtol=1e-4)
+    assert belief.n_views == 4
+    angles = np.radians(np.arange(N_BINS) * 15.0)
+    direction = np.degrees(np.angle(np.sum(expected * np.exp(1j * angles))))
+    assert circular_distance_deg(mean_direction_deg(belief.probabilities)[0], direction) < 0.01
+
+
+def test_the_order_of_views_does_not_matter():
+    evidence, rng = evidence_of(), np.random.default_rng(0)
+    seen, delta = rng.uniform(0, 360, 4), rng.integers(0, N_BINS, 4) * 15
+    ends = []
+    for order in ([0, 1, 2, 3], [3, 1, 0, 2]):
+        belief = first_belief(np.array([10.0]), evidence)
+        for k in order:
+            belief = updated(belief, seen[k : k + 1], delta[k : k + 1], evidence)
+        ends.append(belief.probabilities)
+    np.testing.assert_allclose(*ends, rtol=1e-4)
+
+
+def test_coarser_beliefs_keep_their_mass_and_direction_and_their_estimates():
+    evidence = evidence_of(n_bins=8)
+    fine = np.zeros((3, N_BINS), dtype=np.float32)
+    fine[0, 23] = fine[1, 1] = fine[2, 12] = 1
+    belief = coarser(Belief(fine, evidence_of(), np.array([23, 1, 11]), 2), evidence)
+    assert belief.probabilities[[0, 1, 2], [0, 0, 4]].tolist() == [1, 1, 1]
+    assert belief.probabilities.sum() == 3
+    assert belief.first_bin.tolist() == [0, 0, 4]
+    assert belief.evidence is evidence
+    assert belief.n_views == 2
+
+
+def test_the_beliefs_of_all_estimates_are_those_of_each():
+    evidence = evidence_of()
+    every = every_belief(evidence)
+    one = first_belief(np.arange(N_BINS) * 15.0, evidence)
+    np.testing.assert_array_equal(every.probabilities, one.probabilities)
+    np.testing.assert_array_equal(every.first_bin, one.first_bin)
+
+
+def test_more_views_of_an_honest_estimator_err_less():
+    """Answers drawn anew for every view, as the model says."""
+    evidence = evidence_of(estimates(30, 360), bandwidth_deg=6.0, n_bins=120)
+    unseen = estimates(30, 360, seed=8)
+    objects, starts = np.repeat(np.arange(30), 12), np.tile(np.arange(0, 360, 30), 30)
+    belief = first_belief(unseen[objects, starts], evidence)
+    errors = []
+    for delta in (None, 180, 90, 270):
+        if delta is not None:
+            turn = np.full(len(starts), delta)
+            belief = updated(belief, unseen[objects, (starts + turn) % 360], turn, evidence)
+        pose = mean_direction_deg(belief.probabilities)
+        errors.append(circular_distance_deg(pose, starts).mean())
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 0.5 * errors[0]

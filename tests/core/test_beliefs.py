@@ -1,0 +1,320 @@
+"""Beliefs: turned, fused and summed up, against brute force and exact identities."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.special import softmax
+from scipy.stats import circstd
+
+from nbv.core.angles import circular_distance_deg
+from nbv.core.belief import mean_direction_deg, product_of
+from nbv.core.beliefs import (
+    ELEVATION_BANDWIDTH_DEG,
+    LEAST_PROBABILITY,
+    direction_and_spread_deg,
+    distributions_of,
+    elevation_share,
+    fused,
+    log_bayes_factor,
+)
+from nbv.core.posteriors import on_degrees, posteriors_of, turned
+
+BINS = 24
+WIDTH = 360.0 / BINS
+
+logits = arrays(np.float64, (3, BINS), elements=st.floats(-20, 20))
+whole = st.integers(-60, 60)
+any_turn = st.floats(-800, 800)
+uniform = np.full(BINS, 1 / BINS)
+
+
+def beliefs(seed: int, n: int = 3) -> np.ndarray:
+    return np.random.default_rng(seed).dirichlet(np.full(BINS, 0.7), n) * (1 - 1e-9) + 1e-9 / BINS
+
+
+# Distributions
+
+
+@given(values=logits, temperature=st.floats(0.05, 20.0))
+def test_distributions_are_the_softmax_with_a_floor(values, temperature):
+    found = distributions_of(values, temperature)
+    assert found.dtype == np.float64
+    assert found.sum(axis=1) == pytest.approx(1.0)
+    assert found.min() >= LEAST_PROBABILITY / (1 + BINS * LEAST_PROBABILITY)
+    assert found == pytest.approx(softmax(values / temperature, axis=1), abs=BINS * 1e-6)
+
+
+@given(values=logits, temperature=st.floats(0.05, 20.0))
+def test_distributions_are_those_that_the_experiments_use(values, temperature):
+    wanted = posteriors_of(["a"], values[None], temperature).distributions[0]
+    assert distributions_of(values, temperature) == pytest.approx(wanted, rel=1e-9)
+
+
+@given(values=logits, shift=st.floats(-1e4, 1e4))
+def test_only_differences_of_logits_matter(values, shift):
+    assert distributions_of(values + shift, 1.5) == pytest.approx(
+        distributions_of(values, 1.5), rel=1e-6
+    )
+
+
+def test_large_logits_do_not_overflow():
+    found = distributions_of(np.array([[1e5, 0.0, -1e5]], dtype=np.float32), 0.05)
+    assert found[0] == pytest.approx([1.0, LEAST_PROBABILITY, LEAST_PROBABILITY], rel=1e-5)
+
+
+# Turned
+
+
+@given(values=logits, bins=whole)
+def test_a_turn_by_whole_bins_is_a_roll(values, bins):
+    rows = softmax(values, axis=1)
+    assert np.array_equal(turned(rows, bins * WIDTH), np.roll(rows, -bins, axis=1))
+
+
+@given(seed=st.integers(0, 10**6), turn=any_turn)
+def test_a_turn_keeps_the_total(seed, turn):
+    found = turned(beliefs(seed), turn)
+    assert found.sum(axis=1) == pytest.approx(1.0)
+    assert (found >= 0).all()
+
+
+@given(seed=st.integers(0, 10**6), turn=any_turn, bins=whole)
+def test_turns_add_up(seed, turn, bins):
+    rows = beliefs(seed)
+    both = turned(rows, turn + bins * WIDTH)
+    assert turned(turned(rows, turn), bins * WIDTH) == pytest.approx(both, abs=1e-9)
+    assert turned(turned(rows, bins * WIDTH), turn) == pytest.approx(both, abs=1e-9)
+
+
+@given(seed=st.integers(0, 10**6), turn=any_turn)
+def test_a_turn_and_the_whole_circle_are_the_turn(seed, turn):
+    rows = beliefs(seed)
+    assert turned(rows, turn + 360.0) == pytest.approx(turned(rows, turn), abs=1e-9)
+
+
+@given(seed=st.integers(0, 10**6), turn=any_turn)
+def test_it_is_the_density_between_the_bins(seed, turn):
+    """numpy's periodic interpolation of p at theta + turn."""
+    rows, centres = beliefs(seed), np.arange(BINS) * WIDTH
+    for row, found in zip(rows, turned(rows, turn), strict=True):
+        wanted = np.interp(centres + turn, centres, row, period=360.0)
+        assert found == pytest.approx(wanted, abs=1e-9)
+
+
+@given(seed=st.integers(0, 10**6), degrees=st.integers(-400, 400))
+def test_a_turn_on_a_finer_grid_is_a_roll_too(seed, degrees):
+    """The density between bins is that of `nbv.core.posteriors`."""
+    rows = beliefs(seed)
+    fine = on_degrees(turned(rows, float(degrees)))[:, :: int(WIDTH)]
+    rolled = np.roll(on_degrees(rows), -degrees, axis=1)[:, :: int(WIDTH)]
+    assert fine == pytest.approx(rolled, abs=1e-9)
+
+
+@given(seed=st.integers(0, 10**6), bins=whole)
+def test_the_mean_direction_turns_along(seed, bins):
+    rows = beliefs(seed)
+    moved = mean_direction_deg(turned(rows, bins * WIDTH)) + bins * WIDTH
+    apart = (moved - mean_direction_deg(rows) + 180) % 360 - 180
+    assert apart == pytest.approx(0.0, abs=1e-5)
+
+
+# Fused
+
+
+@given(seed=st.integers(0, 10**6), bins=st.lists(whole, min_size=2, max_size=2))
+def test_a_fused_belief_is_the_product_of_all_views(seed, bins):
+    """p(theta) of the first view, times p_i(theta + rotation_i) of every other one, by loops."""
+    rows = beliefs(seed)
+    rotations = [0, *bins]
+    wanted = np.ones(BINS)
+    for theta in range(BINS):
+        for row, turn in zip(rows, rotations, strict=True):
+            wanted[theta] *= row[(theta + turn) % BINS]
+    wanted /= wanted.sum()
+    found = fused(rows, [turn * WIDTH for turn in rotations])
+    assert found == pytest.approx(wanted, rel=1e-6, abs=1e-12)
+
+
+@given(seed=st.integers(0, 10**6), bins=whole)
+def test_two_views_are_the_product_of_the_experiments(seed, bins):
+    rows = beliefs(seed, 2)
+    wanted = product_of(rows[:1], rows[1:], np.array([bins * WIDTH]))[0]
+    found = fused(rows, [0.0, bins * WIDTH])
+    assert found == pytest.approx(wanted / wanted.sum(), rel=1e-6)
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    order=st.permutations(range(4)),
+    rotations=st.lists(any_turn, min_size=4, max_size=4),
+)
+def test_the_order_of_views_does_not_matter(seed, order, rotations):
+    rows = beliefs(seed, 4)
+    found = fused(rows[list(order)], [rotations[i] for i in order])
+    assert found == pytest.approx(fused(rows, rotations), rel=1e-6, abs=1e-12)
+
+
+@given(seed=st.integers(0, 10**6), turn=any_turn)
+def test_a_uniform_view_is_neutral(seed, turn):
+    row = beliefs(seed, 1)[0]
+    assert fused(np.stack([row, uniform]), [0.0, turn]) == pytest.approx(row)
+    assert fused(np.stack([uniform, row]), [0.0, turn]) == pytest.approx(turned(row, turn))
+
+
+@given(seed=st.integers(0, 10**6))
+def test_one_view_is_itself(seed):
+    row = beliefs(seed, 1)
+    assert fused(row, [0.0]) == pytest.approx(row[0])
+
+
+@given(seed=st.integers(0, 10**6), base=whole, bins=st.lists(whole, min_size=3, max_size=3))
+def test_rotations_from_elsewhere_turn_the_result(seed, base, bins):
+    rows = beliefs(seed)
+    found = fused(rows, [(turn + base) * WIDTH for turn in bins])
+    wanted = turned(fused(rows, [turn * WIDTH for turn in bins]), base * WIDTH)
+    assert found == pytest.approx(wanted, rel=1e-6, abs=1e-12)
+
+
+def test_many_sure_views_do_not_underflow():
+    row = distributions_of(np.where(np.arange(BINS) == 7, 50.0, 0.0)[None], 1.0)
+    found = fused(np.repeat(row, 200, axis=0), [0.0] * 200)
+    assert found[7] == pytest.approx(1.0)
+    assert np.isfinite(found).all()
+    # Views that exclude each other leave both possible.
+    other = fused(np.concatenate([row, row]), [0.0, 3 * WIDTH])
+    assert other[7] == pytest.approx(other[4])
+
+
+def test_views_and_rotations_are_as_many():
+    with pytest.raises(ValueError):
+        fused(beliefs(0), [0.0, 15.0])
+
+
+# Spread
+
+
+def spread_deg(belief: np.ndarray) -> float:
+    return direction_and_spread_deg(belief)[1]
+
+
+@given(seed=st.integers(0, 10**6))
+def test_the_direction_is_the_mean_direction(seed):
+    row = beliefs(seed, 1)
+    found, _ = direction_and_spread_deg(row[0])
+    assert -180 <= found <= 180
+    assert circular_distance_deg(found, mean_direction_deg(row)[0]) < 1e-9
+
+
+@given(counts=arrays(np.int64, (BINS,), elements=st.integers(0, 20)))
+def test_the_spread_is_the_circular_standard_deviation(counts):
+    """That of scipy, of so many samples at the centre of each bin."""
+    angles = np.radians(np.repeat(np.arange(BINS) * WIDTH, counts))
+    if not len(angles):
+        return
+    length = abs(np.exp(1j * angles).mean())
+    if length < 1e-6:
+        return
+    found = spread_deg(counts / counts.sum())
+    assert found == pytest.approx(math.degrees(circstd(angles)), rel=1e-6, abs=1e-5)
+
+
+@given(seed=st.integers(0, 10**6), bins=whole)
+def test_the_spread_does_not_turn(seed, bins):
+    row = beliefs(seed, 1)[0]
+    assert spread_deg(turned(row, bins * WIDTH)) == pytest.approx(spread_deg(row), rel=1e-6)
+
+
+@pytest.mark.parametrize("sigma", [8.0, 15.0, 30.0, 45.0])
+def test_the_spread_of_a_normal_is_its_standard_deviation(sigma):
+    degrees = np.arange(360)
+    apart = (degrees[:, None] - 100 + 360 * np.arange(-3, 4)).astype(float)
+    belief = np.exp(-0.5 * (apart / sigma) ** 2).sum(axis=1)
+    assert spread_deg(belief / belief.sum()) == pytest.approx(sigma, rel=1e-6)
+
+
+def test_the_spread_of_one_bin_is_0_and_of_all_is_finite():
+    assert spread_deg(np.eye(BINS)[5]) == pytest.approx(0.0, abs=1e-5)
+    assert 360 < spread_deg(uniform) < math.inf
+    opposite = (np.eye(BINS)[0] + np.eye(BINS)[12]) / 2
+    assert math.isfinite(spread_deg(opposite))
+
+
+# Elevation
+
+
+@given(
+    known=arrays(np.float64, (5,), elements=st.floats(0, 60)),
+    elevation=st.floats(-10, 80),
+)
+def test_turns_count_by_how_near_their_elevation_is(known, elevation):
+    share = elevation_share(known, elevation)
+    apart = np.abs(known - elevation)
+    assert share.max() == share[apart.argmin()] == 1.0
+    kernel = np.exp(-0.5 * (apart / ELEVATION_BANDWIDTH_DEG) ** 2)
+    nearest = kernel.max()
+    if nearest > 1e-300:
+        assert share == pytest.approx(kernel / nearest, abs=1e-9)
+    order = np.argsort(apart)
+    assert (np.diff(share[order]) <= 1e-12).all()
+
+
+def test_a_frame_from_far_above_takes_the_nearest_turns():
+    """There the kernel itself is 0 in double precision."""
+    assert elevation_share(np.array([0.0, 30.0, 30.0]), 800.0) == pytest.approx([0.0, 1.0, 1.0])
+    assert elevation_share(np.full(4, 20.0), -75.0) == pytest.approx(1.0)
+
+
+def test_what_has_no_known_elevation_counts_whole():
+    known = np.array([0.0, np.nan, 40.0])
+    assert elevation_share(known, 40.0) == pytest.approx([np.exp(-8.0), 1.0, 1.0])
+    assert elevation_share(known, np.nan).tolist() == [1.0, 1.0, 1.0]
+    assert elevation_share(np.full(3, np.nan), 40.0).tolist() == [1.0, 1.0, 1.0]
+
+
+# Whether views fit together
+
+
+@given(st.integers(0, 99), st.lists(whole, min_size=2, max_size=2))
+def test_the_bayes_factor_is_a_sum_over_poses(seed, bins):
+    rows = beliefs(seed)
+    places = [0, *bins]
+    products = [
+        math.prod(row[(pose + place) % BINS] for row, place in zip(rows, places, strict=True))
+        for pose in range(BINS)
+    ]
+    found = math.exp(log_bayes_factor(rows, [WIDTH * place for place in places]))
+    assert found == pytest.approx(BINS**2 * sum(products), rel=1e-9)
+
+
+@given(st.integers(0, 99), st.integers(-20, 20))
+def test_views_without_news_leave_it_as_it_is(seed, place):
+    one = beliefs(seed, 1)
+    assert log_bayes_factor(one, [0.0]) == pytest.approx(0, abs=1e-9)
+    with_another = np.concatenate([one, uniform[None]])
+    assert log_bayes_factor(with_another, [0.0, WIDTH * place]) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("least", [0.02, 0.1, 0.5])
+def test_right_rotations_are_seldom_called_contradictory(least):
+    """Markov's inequality, for distributions that are calibrated."""
+    rng = np.random.default_rng(5)
+    # The share of poses that give an answer, by answer: what a calibrated network says of it.
+    given_pose = rng.dirichlet(np.full(BINS, 0.1), BINS).T
+    posterior = given_pose / given_pose.sum(axis=1, keepdims=True)
+    n, below, below_wrong = 4000, 0, 0
+    for pose, place, wrong in rng.integers(BINS, size=(n, 3)):
+        answers = [
+            rng.choice(BINS, p=given_pose[:, at] / given_pose[:, at].sum())
+            for at in (pose, (pose + place) % BINS)
+        ]
+        rows = posterior[answers] * (1 - 1e-9) + 1e-9 / BINS
+        below += log_bayes_factor(rows, [0.0, WIDTH * place]) < math.log(least)
+        below_wrong += log_bayes_factor(rows, [0.0, WIDTH * wrong]) < math.log(least)
+    assert below / n <= least + 3 * math.sqrt(least / n)
+    assert below_wrong > 2 * below

@@ -1,0 +1,170 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.core.made import N_BINS, estimates, evidence_of
+
+from nbv.core import fusion
+from nbv.core.angles import circular_distance_deg
+from nbv.core.fusion import ESTIMATE_FUSIONS, average, posterior, product
+from nbv.core.policies import Turns, take_second_views
+
+angle = st.integers(0, 3599).map(lambda tenths: tenths / 10)
+turn = st.integers(0, 359)
+
+
+@given(angle, angle, turn, turn)
+def test_averaging_turns_with_the_object(first, second, delta, k):
+    before = fusion.average(first, second, delta)
+    after = fusion.average(first + k, second + k, delta)
+    antipodal = circular_distance_deg(first, second - delta) > 180 - 1e-6
+    assert antipodal or circular_distance_deg(before + k, after) < 1e-6
+
+
+@given(angle, turn)
+def test_two_right_answers_give_the_right_pose(pose, delta):
+    assert circular_distance_deg(fusion.average(pose, pose + delta, delta), pose) < 1e-9
+
+
+@given(angle, angle, turn)
+def test_the_mean_lies_half_way_between_the_two_the_shorter_way(first, second, delta):
+    fused = fusion.average(first, second, delta)
+    apart = circular_distance_deg(first, second - delta)
+    if apart < 180 - 1e-6:
+        assert abs(circular_distance_deg(fused, first) - apart / 2) < 1e-6
+        assert abs(circular_distance_deg(fused, second - delta) - apart / 2) < 1e-6
+
+
+def test_antipodal_answers_fall_back_on_the_first():
+    assert fusion.average(10.0, 250.0, 60) == 10.0
+
+
+def test_second_views_wrap_round():
+    estimate = np.arange(24.0).reshape(2, 12)  # 12 views, 30 degrees apart
+    delta = np.array([[330] * 12, [60] * 12])
+    seen = fusion.at_second_view(estimate, delta)
+    np.testing.assert_array_equal(seen[0], np.roll(estimate[0], 1))
+    np.testing.assert_array_equal(seen[1], np.roll(estimate[1], -2))
+
+
+def test_every_whole_degree_leads_to_its_own_view():
+    seen = fusion.at_second_view(np.arange(360.0)[None], np.arange(360)[None])
+    np.testing.assert_array_equal(seen[0], 2 * np.arange(360) % 360)
+
+
+def test_posterior_fusion_is_the_direction_of_the_sum():
+    evidence = evidence_of()
+    rng = np.random.default_rng(3)
+    first, second = rng.uniform(0, 360, (2, 40))
+    delta = rng.integers(0, N_BINS, 40) * (360 / N_BINS)
+    fused = posterior(first, second, delta, evidence)
+    V, L = evidence.conditionals.viewpoint, evidence.conditionals.estimate
+    for one in range(40):
+        e1, e2 = (int(np.floor(x / 15 + 0.5)) % N_BINS for x in (first[one], second[one]))
+        total = sum(
+            V[e1, t] * L[(t + int(delta[one] // 15)) % N_BINS, e2] * np.exp(2j * np.pi * t / N_BINS)
+            for t in range(N_BINS)
+        )
+        assert circular_distance_deg(fused[one], np.degrees(np.angle(total))) < 0.01
+
+
+def test_many_pairs_at_once_are_fused_like_few():
+    evidence = evidence_of()
+    rng = np.random.default_rng(4)
+    first, second = rng.uniform(0, 360, (2, 30, 100))
+    delta = rng.integers(0, N_BINS, (30, 100)) * (360 / N_BINS)
+    assert first.size > 2 * N_BINS**2
+    at_once = posterior(first, second, delta, evidence)
+    few = np.stack([posterior(*row, evidence) for row in zip(first, second, delta, strict=True)])
+    bins = [np.floor(x / 15 + 0.5).astype(int) % N_BINS for x in (delta, first, second)]
+    real, imaginary = (evidence.moments[bins[0], part, bins[1], bins[2]] for part in (0, 1))
+    # Where the posterior has next to no direction, rounding chooses one.
+    told = np.hypot(real, imaginary) > 1e-4
+    assert told.mean() > 0.9
+    assert circular_distance_deg(at_once, few)[told].max() < 0.01
+
+
+def test_posterior_fusion_trusts_the_view_that_can_be_trusted():
+    """Near 90 degrees this estimator guesses; the other view decides there."""
+    calibration, unseen = estimates(20, 360), estimates(20, 360, seed=1)
+    evidence = evidence_of(calibration, bandwidth_deg=6.0, n_bins=120)
+    opposite = np.full(unseen.shape, 180)
+    turns = Turns(unseen, evidence)
+    by_average, by_posterior = (
+        take_second_views(opposite, name, turns).error_deg for name in ESTIMATE_FUSIONS
+    )
+    hidden = slice(60, 120)
+    assert by_posterior[:, hidden].mean() < 0.6 * by_average[:, hidden].mean()
+
+
+def test_posterior_fusion_needs_evidence():
+    with pytest.raises(ValueError, match=r"^posterior fusion needs evidence$"):
+        posterior(0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("delta", [0.0, 90.0])
+def test_both_fusions_agree_where_both_views_are_right(delta):
+    evidence = evidence_of(np.tile(np.arange(48) * 7.5, (5, 1)), pseudo_observations=0.1)
+    pose = np.arange(N_BINS) * (360.0 / N_BINS)
+    fused = posterior(pose, pose + delta, delta, evidence)
+    assert circular_distance_deg(fused, average(pose, pose + delta, delta)).max() < 1.0
+
+
+def random_rows(seed, n):
+    return np.random.default_rng(seed).dirichlet(np.full(12, 0.5), n)
+
+
+@given(st.integers(0, 99), st.integers(0, 11), st.integers(0, 11))
+def test_the_product_multiplies_in_the_frame_of_the_first_view(seed, delta, k):
+    first, second = random_rows(seed, 1), random_rows(seed + 1, 1)
+    found = product(first, second, np.array([delta * 30]))
+    terms = [first[0, t] * second[0, (t + delta) % 12] for t in range(12)]
+    mean = sum(p * np.exp(2j * np.pi * t / 12) for t, p in enumerate(terms))
+    assert circular_distance_deg(found[0], np.degrees(np.angle(mean))) < 1e-6
+    turned = product(np.roll(first, k, axis=1), np.roll(second, k, axis=1), np.array([delta * 30]))
+    assert circular_distance_deg(turned[0], found[0] + 30 * k) < 1e-6
+
+
+def test_images_that_exclude_each_other_fall_back_on_the_first():
+    first, second = np.eye(12)[[3]], np.eye(12)[[8]]
+    assert product(first, second, np.array([60]))[0] == pytest.approx(90)
+    # Each pair for itself: the other pair here agrees.
+    found = product(np.eye(12)[[3, 4]], np.eye(12)[[8, 6]], np.array([60, 60]))
+    assert found == pytest.approx([90, 120])
+
+
+def test_distributions_of_several_objects_are_fused_each_by_its_own_rotation():
+    """As policies call it: objects by views, and a rotation for each."""
+    first, second = random_rows(0, 6).reshape(2, 3, 12), random_rows(1, 6).reshape(2, 3, 12)
+    delta = np.array([[0, 30, 60], [330, 180, 90]])
+    found = product(first, second, delta)
+    assert found.shape == (2, 3)
+    for one in np.ndindex(2, 3):
+        alone = product(first[one][None], second[one][None], delta[one][None])
+        assert found[one] == pytest.approx(alone[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ESTIMATE_FUSIONS)
+def test_errors_after_every_rotation_are_those_of_fusing_each_pair(name):
+    """With more views than bins: l[delta, object, view], one pair of views at a time."""
+    evidence, estimate = evidence_of(), estimates(2, 2 * N_BINS, seed=5)
+    errors = fusion.rotation_errors_deg(estimate, evidence, name)
+    assert errors.shape == (N_BINS, 2, 2 * N_BINS)
+    assert errors.dtype == np.float32
+    for delta, one, view in [(0, 0, 0), (5, 1, 47), (23, 0, 30), (12, 1, 12)]:
+        second = estimate[one, (view + 2 * delta) % (2 * N_BINS)]
+        fused = fusion.FUSIONS[name](estimate[one, view], second, delta * 15.0, evidence)
+        expected = circular_distance_deg(fused, view * 7.5)
+        assert errors[delta, one, view] == pytest.approx(float(expected), abs=0.02)
+
+
+def test_errors_of_calibration_views_take_one_view_for_each_bin_and_are_made_once():
+    evidence = evidence_of()
+    found = fusion.calibration_errors_deg(evidence, "average")
+    views = evidence.estimate_deg[:, ::2]
+    expected = fusion.rotation_errors_deg(views, evidence, "average")
+    np.testing.assert_array_equal(found, expected)
+    assert fusion.calibration_errors_deg(evidence, "average") is found
+    assert not np.array_equal(fusion.calibration_errors_deg(evidence, "posterior"), found)

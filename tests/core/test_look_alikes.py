@@ -1,0 +1,357 @@
+"""Errors after a further view against a brute force, and against the criterion of two views."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nbv.core.angles import circular_distance_deg
+from nbv.core.belief import Belief, mean_direction_deg
+from nbv.core.criteria.expected_error import expected_error
+from nbv.core.evidence import evidence_of_distributions
+from nbv.core.fusion import product
+from nbv.core.look_alikes import (
+    Expected,
+    LookAlikes,
+    compared_step,
+    error_after_deg,
+    first_views,
+    near_first_views,
+)
+
+SETTINGS = {"affinity": {"power": 5.0, "pseudo_observations": 30.0}}
+
+
+def turns(rng: np.random.Generator, n: int = 3, bins: int = 24) -> np.ndarray:
+    logits = rng.normal(0.0, 2.0, (n, bins, bins))
+    return np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
+
+
+def expected_of(
+    alike: LookAlikes, beliefs: np.ndarray, *options: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the expected errors now, and after a view at every rotation, of beliefs (n, B)."""
+    found = [alike.expected(belief, *options) for belief in beliefs]
+    return np.array([one.now_deg for one in found]), np.stack([one.after_deg for one in found])
+
+
+@pytest.mark.parametrize("n_turns", [3, 30])
+def test_after_one_view_it_is_the_criterion(rng: np.random.Generator, n_turns: int) -> None:
+    """However many turns there are: after one view, all first views count."""
+    distributions = turns(rng, n_turns)
+    evidence = evidence_of_distributions(distributions, SETTINGS)
+    rows = turns(rng)[0].astype(np.float32)
+    wanted = expected_error(Belief(rows, evidence), evidence, "product")
+    alike = LookAlikes.of_views(distributions)
+    _, found = expected_of(alike, rows, 5.0, 30.0)
+    assert found == pytest.approx(wanted, rel=1e-4)
+
+
+def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Generator) -> None:
+    distributions, bins, first = turns(rng), 24, 5
+    alike = LookAlikes.of_views(distributions).after(3).after(10)
+    own = distributions[1, first]
+    for turn in (3, 10):
+        own = own * np.roll(distributions[1, (first + turn) % bins], -turn)
+    own /= own.sum()
+    assert alike.seen[1, first] == pytest.approx(own, rel=1e-4)
+    for turn in range(bins):
+        other = distributions[1, (first + turn) % bins]
+        pose = product(own, other, 15.0 * turn)
+        wanted = circular_distance_deg(pose, 15.0 * first)
+        assert alike.errors_deg[1, first, turn] == pytest.approx(wanted, abs=0.05)
+    assert alike.errors_deg[..., -1] == pytest.approx(alike.error_now_deg, abs=1e-3)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(0, 12),
+    n_groups=st.integers(1, 5),
+    n_further=st.sampled_from([1, 6, 12, 24]),
+)
+def test_errors_with_further_views_are_those_of_each_product(
+    seed: int, n: int, n_groups: int, n_further: int
+) -> None:
+    """Whatever the order of the groups, and which of them have members."""
+    rng = np.random.default_rng(seed)
+    so_far, further = rng.dirichlet(np.ones(24), n), rng.dirichlet(np.ones(24), (n_groups, 24))
+    further = further[:, :n_further]
+    group, ahead = rng.integers(0, n_groups, n), rng.integers(0, n_further, n)
+    found = error_after_deg(so_far.astype(np.float32), further.astype(np.float32), group, ahead)
+    assert found.shape == (n, n_further)
+    for row in range(n):
+        others = np.roll(further[group[row]], -ahead[row], axis=0)
+        wanted = circular_distance_deg(mean_direction_deg(so_far[row] * others), 0.0)
+        assert found[row] == pytest.approx(wanted, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("bins", "step"), [(24, 1), (60, 1), (72, 1), (90, 1), (120, 2), (180, 3), (360, 6), (210, 3)]
+)
+def test_finer_bins_are_compared_at_six_degrees_at_most(bins: int, step: int) -> None:
+    assert compared_step(bins) == step
+
+
+@given(
+    n_turns=st.integers(1, 200),
+    n_bins=st.sampled_from([7, 24, 90, 120]),
+    most=st.integers(1, 30_000),
+)
+def test_first_views_are_evenly_apart_and_everywhere(n_turns: int, n_bins: int, most: int) -> None:
+    first = first_views(n_turns, n_bins, most)
+    of_turn = first.shape[1]
+    apart = np.diff(first, axis=1, append=first[:, :1] + n_bins)
+    assert np.all(apart == n_bins / of_turn)
+    assert first.size <= max(most, n_turns)
+    # No divisor of a full turn would have more.
+    finer = [n for n in range(of_turn + 1, n_bins + 1) if n_bins % n == 0]
+    assert all(n_turns * n > most for n in finer)
+    for place in range(n_bins):
+        if n_turns * of_turn >= n_bins:
+            assert place in first
+
+
+def test_without_a_limit_every_view_is_a_first_one() -> None:
+    assert np.array_equal(first_views(3, 24), np.tile(np.arange(24), (3, 1)))
+
+
+@pytest.mark.parametrize(("n_bins", "most"), [(24, 500), (24, 40), (24, 12), (15, 15), (30, 3)])
+def test_errors_near_first_views_are_those_within_half_the_way(
+    rng: np.random.Generator, n_bins: int, most: int
+) -> None:
+    first = first_views(3, n_bins, most)
+    apart = n_bins // first.shape[1]
+    errors = rng.uniform(0, 180, (3, n_bins, 2)).astype(np.float32)
+    found = near_first_views(errors, first)
+    for turn, places in enumerate(first):
+        for row, place in enumerate(places):
+            # Half a bin at a time, so that a bin that two share is counted once by each.
+            ways = (2 * place + np.arange(-apart + 0.5, apart)) / 2
+            near = errors[turn, np.round(ways).astype(int) % n_bins]
+            assert found[turn, row] == pytest.approx(near.mean(axis=0), rel=1e-4)
+
+
+def test_all_errors_count_wherever_a_belief_is_compared(rng: np.random.Generator) -> None:
+    errors = rng.uniform(0, 180, (3, 24, 5)).astype(np.float32)
+    for most in (9, 12, 24, 36, 72):
+        found = near_first_views(errors, first_views(3, 24, most))
+        assert found.mean(axis=1) == pytest.approx(errors.mean(axis=1), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("n_bins", "most"), [(24, 40), (24, 12), (90, 55), (120, 100), (180, 270), (180, 72)]
+)
+def test_fewer_first_views_are_the_same_views(
+    rng: np.random.Generator, n_bins: int, most: int
+) -> None:
+    """After further views their distributions and errors are those of the same views among all."""
+    distributions = turns(rng, bins=n_bins)
+    everything = LookAlikes.of_views(distributions).after(5)
+    fewer = LookAlikes.of_views(distributions, most).after(5)
+    assert fewer.first.size <= most
+    rows = np.arange(3)[:, None], fewer.first
+    assert fewer.seen == pytest.approx(everything.seen[rows], rel=1e-6)
+    assert fewer.errors_deg == pytest.approx(everything.errors_deg[rows], abs=0.01)
+
+
+@pytest.mark.parametrize("rotations", [[], [5], [5, 17]])
+def test_expected_errors_of_fewer_first_views_are_means_by_affinity(
+    rng: np.random.Generator, rotations: list[int]
+) -> None:
+    """Of the errors of all views near each one, or of its own after further views."""
+    distributions, belief = turns(rng), turns(rng)[0, :2]
+    everything = LookAlikes.of_views(distributions)
+    fewer = LookAlikes.of_views(distributions, most=40)
+    for turn in rotations:
+        everything, fewer = everything.after(turn), fewer.after(turn)
+    assert fewer.first.tolist() == [[k + 2 * n for n in range(12)] for k in (0, 1, 0)]
+    rows = np.arange(3)[:, None], fewer.first
+    every_error = everything.errors_deg
+    errors = every_error[rows] if rotations else near_first_views(every_error, fewer.first)
+    now, after = expected_of(fewer, belief, 5.0, 30.0)
+    for own, own_now, own_after in zip(belief, now, after, strict=True):
+        weight = 30.0 * (np.sqrt(everything.seen[rows]) @ np.sqrt(own)) ** 5.0
+        weight += 30.0 / weight.size
+        wanted = np.tensordot(weight / weight.sum(), errors)
+        assert own_after == pytest.approx(wanted[:-1], rel=1e-4)
+        assert own_now == pytest.approx(wanted[-1], rel=1e-4)
+
+
+def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.Generator) -> None:
+    """In bins of 3 degrees: affinities of pairs of bins, and errors linear between whole steps."""
+    distributions, beliefs = turns(rng, 2, 120), turns(rng, 1, 120)[0, :2]
+    alike = LookAlikes.of_views(distributions).after(7)
+    now, after = expected_of(alike, beliefs, 5.0, 30.0)
+    views = np.concatenate(alike.seen)
+    errors = np.concatenate(alike.errors_deg[..., :-1])
+    for belief, own_now, own in zip(beliefs, now, after, strict=True):
+        pairs = [np.sqrt(rows[..., ::2] + rows[..., 1::2]) for rows in (belief, views)]
+        weight = 3.0 * (pairs[1] @ pairs[0]) ** 5.0
+        total = weight.sum() + 30.0
+        wanted = (weight @ errors + 30.0 * errors.mean(axis=0)) / total
+        assert own[::2] == pytest.approx(wanted, rel=1e-4)
+        assert own[1::2] == pytest.approx((wanted + np.roll(wanted, -1)) / 2, rel=1e-4)
+        error_now = np.concatenate(alike.error_now_deg)
+        wanted_now = (weight @ error_now + 30.0 * error_now.mean()) / total
+        assert own_now == pytest.approx(wanted_now, rel=1e-4)
+
+
+def test_a_turn_that_does_not_count_is_as_if_it_were_not_there(rng: np.random.Generator) -> None:
+    distributions, belief = turns(rng), turns(rng)[0, :1]
+    all_turns, fewer = LookAlikes.of_views(distributions), LookAlikes.of_views(distributions[:2])
+    now, after = expected_of(all_turns, belief, 5.0, 30.0, np.array([1.0, 1.0, 0.0]))
+    wanted_now, wanted = expected_of(fewer, belief, 5.0, 30.0)
+    assert now == pytest.approx(wanted_now, rel=1e-4)
+    assert after == pytest.approx(wanted, rel=1e-4)
+
+
+def sharp_turns(rng: np.random.Generator, n: int, sharpness: float) -> np.ndarray:
+    apart = np.arange(24) - np.arange(24)[:, None]
+    logits = sharpness * np.cos(np.radians(15 * apart)) + rng.normal(0, 0.3, (n, 24, 24))
+    return np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
+
+
+@pytest.mark.parametrize("sharpness", [1.0, 6.0, 20.0])
+def test_what_is_left_out_hardly_counts(rng: np.random.Generator, sharpness: float) -> None:
+    """After two views: sums over all first views, but 400 at most for the pseudo-observations."""
+    distributions = sharp_turns(rng, 20, sharpness)
+    alike = LookAlikes.of_views(distributions).after(5)
+    share = rng.uniform(0.1, 1, 20)
+    belief = distributions[3, 7] * np.roll(distributions[3, 12], -5)
+    belief /= belief.sum()
+    weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 16.0 * share[:, None]
+    errors = alike.errors_deg
+    averaged = errors[np.arange(20)[:, None], first_views(20, 24, 400)].mean(axis=1)
+    averaged[:, -1] = errors[..., -1].mean(axis=1)
+    mean = share @ averaged / share.sum()
+    wanted = (np.tensordot(weight, errors) + 30.0 * mean) / (weight.sum() + 30.0)
+    found = alike.expected(belief, 16.0, 30.0, share)
+    assert found.now_deg == pytest.approx(wanted[-1], rel=1e-3)
+    assert found.after_deg == pytest.approx(wanted[:-1], rel=1e-3)
+    assert averaged.mean(axis=0) == pytest.approx(errors.mean(axis=(0, 1)), rel=0.1)
+
+
+def of_parts(parts: np.ndarray, prior: np.ndarray, weight: float) -> Expected:
+    return Expected(0.0, np.zeros(parts.shape[1]), parts, parts.sum(axis=0) + prior, weight)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n_parts=st.integers(1, 5),
+    steps=st.lists(st.integers(0, 11), min_size=1, max_size=12),
+)
+def test_a_choice_is_never_pessimistic(seed: int, n_parts: int, steps: list[int]) -> None:
+    rng = np.random.default_rng(seed)
+    expected = of_parts(rng.gamma(1.0, 1.0, (n_parts, 12)), rng.gamma(1.0, 0.2, 12), 20.0)
+    more = expected.optimism_deg(np.isin(np.arange(12), steps))
+    assert more >= -1e-12
+    if n_parts == 1 or len(set(steps)) == 1:
+        assert more == 0.0
+
+
+def test_the_least_of_uncertain_errors_and_its_optimism_are_right_on_average() -> None:
+    """All rotations err by 10 degrees, but no error is known well."""
+    rng, least, raised = np.random.default_rng(0), [], []
+    every = np.ones(60, dtype=bool)
+    for _ in range(2000):
+        sums = rng.normal(10.0, 2.0, (5, 60))
+        least.append(sums.mean(axis=0).min())
+        raised.append(least[-1] + of_parts(sums, np.zeros(60), 5.0).optimism_deg(every))
+    assert np.mean(least) < 8.5
+    assert np.mean(raised) == pytest.approx(10.0, abs=0.1)
+
+
+def test_where_one_rotation_is_best_for_all_objects_nothing_is_added() -> None:
+    sums = 10.0 - 8.0 * (np.arange(12) == 7) + np.zeros((5, 12))
+    assert of_parts(sums, np.zeros(12), 5.0).optimism_deg(np.ones(12, dtype=bool)) == 0.0
+
+
+def test_where_no_view_is_alike_the_mean_of_all_is_expected() -> None:
+    distributions = sharp_turns(np.random.default_rng(2), 4, 60.0)
+    alike = LookAlikes.of_views(distributions).after(5)
+    # A belief that no turn has: of views that contradict each other.
+    belief = np.where(np.arange(24) % 12 == 0, 0.5, 1e-30)
+    found = alike.expected(belief, 64.0, 90.0)
+    errors = alike.errors_deg.mean(axis=(0, 1))
+    assert found.now_deg == pytest.approx(errors[-1], rel=1e-3)
+    assert found.after_deg == pytest.approx(errors[:-1], rel=1e-3)
+    assert found.optimism_deg(np.ones(24, dtype=bool)) == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("rotations", [[], [5]])
+def test_with_the_power_0_all_views_count_alike(
+    rng: np.random.Generator, rotations: list[int]
+) -> None:
+    alike, belief = LookAlikes.of_views(turns(rng)), turns(rng)[0, 0]
+    for turn in rotations:
+        alike = alike.after(turn)
+    found, errors = alike.expected(belief, 0.0, 0.0), alike.errors_deg.mean(axis=(0, 1))
+    assert found.after_deg == pytest.approx(errors[:-1], rel=1e-4)
+    assert found.now_deg == pytest.approx(errors[-1], rel=1e-4)
+
+
+@pytest.mark.parametrize("power", [0.01, 1.0, 16.0, 64.0, 200.0, 3000.0])
+@pytest.mark.parametrize("rotations", [[], [5]])
+def test_the_least_weights_count_as_they_are(
+    rng: np.random.Generator, power: float, rotations: list[int]
+) -> None:
+    """Whatever the power: those that are no normal number in single precision count nothing."""
+    distributions = sharp_turns(rng, 5, 6.0)
+    alike, belief = LookAlikes.of_views(distributions), distributions[2, 3]
+    for turn in rotations:
+        alike = alike.after(turn)
+    affinity = (np.sqrt(alike.seen) @ np.sqrt(belief)).astype(np.float64)
+    weight, errors = 15.0 * affinity**power, alike.errors_deg
+    mean = errors.mean(axis=(0, 1))
+    wanted = (np.tensordot(weight, errors) + 30.0 * mean) / (weight.sum() + 30.0)
+    found = alike.expected(belief, power, 30.0)
+    assert found.now_deg == pytest.approx(wanted[-1], rel=2e-3)
+    assert found.after_deg == pytest.approx(wanted[:-1], rel=2e-3)
+
+
+@pytest.mark.parametrize("most", [None, 20])
+def test_what_was_given_may_be_changed_later(rng: np.random.Generator, most: int | None) -> None:
+    distributions = turns(rng).astype(np.float32)
+    belief = distributions[1, 4].copy()
+    alike = LookAlikes.of_views(distributions, most)
+    before = alike.after(7).expected(belief, 5.0, 30.0)
+    distributions[:] = 1.0 / distributions.shape[-1]
+    after = alike.after(7).expected(belief, 5.0, 30.0)
+    assert np.array_equal(after.after_deg, before.after_deg)
+
+
+def test_the_errors_of_a_belief_do_not_depend_on_those_before_it(rng: np.random.Generator) -> None:
+    """What was found for other beliefs is kept."""
+    distributions, beliefs = sharp_turns(rng, 6, 6.0), sharp_turns(rng, 1, 12.0)[0]
+    kept = LookAlikes.of_views(distributions).after(5)
+    for belief in beliefs:
+        found, alone = (
+            one.expected(belief, 16.0, 30.0)
+            for one in (kept, LookAlikes.of_views(distributions).after(5))
+        )
+        assert found.after_deg == pytest.approx(alone.after_deg, rel=1e-5)
+        assert found.now_deg == pytest.approx(alone.now_deg, rel=1e-5)
+
+
+@pytest.mark.parametrize("rotations", [[], [5]])
+@pytest.mark.parametrize("most", [None, 20])
+def test_parts_are_of_whole_objects(
+    rng: np.random.Generator, most: int | None, rotations: list[int]
+) -> None:
+    distributions, belief = turns(rng, 6), turns(rng)[0, 0]
+    ids = ["b", "a", "b", "c", "a", "c"]
+    alike, of_turns = (LookAlikes.of_views(distributions, most, names) for names in (ids, None))
+    for turn in rotations:
+        alike, of_turns = alike.after(turn), of_turns.after(turn)
+    share = rng.uniform(0.1, 1, 6)
+    found = alike.expected(belief, 5.0, 30.0, share)
+    assert found.total / found.weight == pytest.approx(found.after_deg, rel=1e-5)
+    # One object's turns are in one part: with another id for each turn there are more.
+    assert len(found.parts) == 3
+    assert len(of_turns.expected(belief, 5.0, 30.0).parts) == 5
+    for part, name in enumerate("abc"):
+        own = np.where(np.array(ids) == name, share, 0.0)
+        alone = alike.expected(belief, 5.0, 30.0, own)
+        assert found.parts[part] == pytest.approx(alone.parts.sum(axis=0), rel=1e-3)

@@ -1,0 +1,166 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.core.made import evidence_of, hidden_range_estimates
+
+from nbv.core import lookup
+from nbv.errors import UserError
+from nbv.files import read_arrays, write_arrays
+
+
+def test_ties_go_to_the_smallest_travel_and_then_to_the_smaller_delta():
+    flat = np.zeros((2, 8), dtype=np.float32)
+    assert lookup.least_cost_delta(flat).tolist() == [0, 0]
+    flat[:, 0] = 1
+    assert lookup.least_cost_delta(flat).tolist() == [45, 45]  # not 315
+    flat[0, 1] = 1
+    assert lookup.least_cost_delta(flat).tolist() == [315, 45]
+
+
+@pytest.mark.parametrize("travel_cost", [0.0, 1.0])
+def test_a_cost_that_is_not_a_number_is_never_the_least(travel_cost):
+    cost = np.ones((2, 8))
+    cost[1, 3] = np.nan
+    with pytest.raises(UserError, match="cost is NaN"):
+        lookup.least_cost_delta(cost, travel_cost=travel_cost)
+
+
+def test_a_stored_table_comes_back_whole(tmp_path):
+    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    lookup.save_lookup(tmp_path / "pose_ambiguity.npz", table)
+    read = lookup.load_lookup(tmp_path / "pose_ambiguity.npz")
+    for name, value in vars(table).items():
+        np.testing.assert_array_equal(getattr(read, name), value)
+    assert read.cost.dtype == np.float32
+
+
+def test_recommendations_are_read_at_the_nearest_bin():
+    table = lookup.build_lookup(
+        evidence_of(hidden_range_estimates(4), 8, 10, 360), "pose_ambiguity"
+    )
+    for rotations in (table.recommend, table.least_cost):
+        assert rotations([359.6, 0.2, 89.5]).tolist() == [
+            table.recommended_delta_deg[k] for k in (0, 0, 90)
+        ]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, "123", None])
+def test_an_estimate_that_is_no_number_has_no_rotation(bad):
+    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    for rotations in (table.recommend, table.least_cost):
+        for estimate in (bad, [0.0, bad]):
+            with pytest.raises(UserError, match="no finite number"):
+                rotations(estimate)
+
+
+@pytest.mark.parametrize("n_bins", [8, 72, 360])
+def test_a_view_from_the_same_place_is_not_recommended(rng, n_bins):
+    """A table whose costs are least at hand, or a bin next to it, as those of one object may be."""
+    cost = rng.uniform(1, 2, (n_bins, n_bins)).astype(np.float32)
+    width = 360 / n_bins
+    near = np.arange(n_bins) % 5
+    for row in np.flatnonzero(near < 3):
+        cost[row, (0, 1, -1)[near[row]]] = 0
+    deltas = lookup.least_cost_delta(cost)
+    rows = np.full((n_bins, n_bins), 1 / n_bins, np.float32)
+    table = lookup.LookupTable(rows, rows, cost, deltas, 8, 3, "given_estimate", "entropy", "made")
+    every = np.arange(n_bins) * width
+    assert table.least_cost(every).tolist() == deltas.tolist()
+    found = table.recommend(every)
+    travel = np.minimum(found, 360 - found)
+    assert travel.min() > width
+    chosen = cost[np.arange(n_bins), np.rint(found / width).astype(int)]
+    assert np.array_equal(chosen, cost[:, 2:-1].min(axis=1))
+    kept = near >= 3
+    free = np.minimum(deltas, 360 - deltas) > width
+    assert np.array_equal(found[kept & free], deltas[kept & free])
+
+
+def test_an_unknown_criterion():
+    with pytest.raises(UserError, match="did you mean 'pose_ambiguity'"):
+        lookup.build_lookup(evidence_of(), "pose_ambigity")
+
+
+def test_travel_that_costs_is_avoided_and_limits_are_kept():
+    rng = np.random.default_rng(0)
+    table = rng.uniform(0, 1, (50, 72))
+    travel = np.minimum(np.arange(72) * 5, 360 - np.arange(72) * 5)
+    for cost in (0.0, 0.002, 0.05):
+        chosen = lookup.least_cost_delta(table, travel_cost=cost)
+        expected = (table + cost * travel).min(axis=1)
+        bins = chosen // 5
+        reached = table[np.arange(50), bins] + cost * travel[bins]
+        np.testing.assert_allclose(reached, expected)
+    near = lookup.least_cost_delta(table, max_travel_deg=60) // 5
+    assert travel[near].max() <= 60
+    within = np.where(travel <= 60, table, np.inf)
+    np.testing.assert_array_equal(table[np.arange(50), near], within.min(axis=1))
+    assert (lookup.least_cost_delta(table, max_travel_deg=0) == 0).all()
+
+
+def without_a_density(arrays):
+    arrays["viewpoint_likelihood"] *= 1.1
+
+
+def with_a_negative_density(arrays):
+    arrays["estimate_likelihood"][3] = [-1.0, *np.full(35, 2 / 35)]
+
+
+def with_a_cost_that_is_no_number(arrays):
+    arrays["cost"][1, 2] = np.nan
+
+
+def with_a_rotation_out_of_range(arrays):
+    arrays["recommended_delta_deg"][0] = 360
+
+
+def with_rotations_that_are_no_whole_degrees(arrays):
+    arrays["recommended_delta_deg"] = arrays["recommended_delta_deg"] + 0.5
+
+
+def with_another_number_of_bins(arrays):
+    arrays["cost"] = arrays["cost"][:-1]
+
+
+def without_an_array(arrays):
+    del arrays["cost"]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        without_a_density,
+        with_a_negative_density,
+        with_a_cost_that_is_no_number,
+        with_a_rotation_out_of_range,
+        with_rotations_that_are_no_whole_degrees,
+        with_another_number_of_bins,
+        without_an_array,
+    ],
+)
+def test_a_table_that_cannot_be_is_refused(tmp_path, damage):
+    path = tmp_path / "pose_ambiguity.npz"
+    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    lookup.save_lookup(path, table)
+    arrays = read_arrays(path)
+    damage(arrays)
+    write_arrays(path, arrays)
+    with pytest.raises(UserError, match=r"pose_ambiguity\.npz: .*; make it again with nbv calib"):
+        lookup.load_lookup(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("no.npz", None, "no.npz does not exist; name the file that nbv calibrate wrote"),
+        ("cut.npz", b"PK\x03\x04", "it is no .npz file, or only a part of one"),
+        ("one.npy", b"", "one.npy: cannot be read "),
+    ],
+)
+def test_a_file_that_is_no_table_is_to_be_made_with_the_program(tmp_path, name, content, message):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(UserError, match="nbv calibrate") as error:
+        lookup.load_lookup(tmp_path / name)
+    assert message in str(error.value)

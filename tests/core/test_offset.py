@@ -1,0 +1,41 @@
+"""The constant offset of errors around the circle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nbv.core.angles import circular_distance_deg
+from nbv.core.offset import constant_offset_deg
+
+ERRORS = st.lists(st.floats(-1000.0, 1000.0), min_size=1, max_size=12)
+
+
+def mae(errors, offset):
+    return circular_distance_deg(errors, offset).mean()
+
+
+@given(errors=ERRORS, other=st.floats(-180.0, 180.0))
+def test_no_other_offset_leaves_a_smaller_mean_absolute_error(errors, other):
+    offset = constant_offset_deg(errors)
+    assert -180.0 <= offset < 180.0
+    assert mae(errors, offset) <= min(mae(errors, one) for one in (other, *errors)) + 1e-9
+
+
+@given(errors=st.lists(st.floats(-89.0, 89.0), min_size=1, max_size=12))
+def test_within_half_a_turn_it_is_the_median(errors):
+    assert constant_offset_deg(errors) == pytest.approx(np.median(errors), abs=1e-9)
+
+
+@given(errors=st.lists(st.floats(-40.0, 40.0), min_size=1, max_size=12), turn=st.floats(-720, 720))
+def test_it_turns_with_all_errors(errors, turn):
+    moved = constant_offset_deg(np.array(errors) + turn)
+    assert circular_distance_deg(moved, constant_offset_deg(errors) + turn) < 1e-6
+
+
+def test_a_few_views_that_are_far_off_do_not_move_it():
+    """A third of a recording's views does not show the handle."""
+    errors = np.concatenate([np.full(40, 2.0), np.linspace(-80.0, -30.0, 20)])
+    assert constant_offset_deg(errors) == pytest.approx(2.0)

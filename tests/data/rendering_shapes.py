@@ -1,0 +1,43 @@
+"""Meshes that several tests draw."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from nbv.data.normalisation import normalise
+from nbv.data.procedural import generate
+
+
+class Shape(NamedTuple):
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+
+def shape_of(mesh: trimesh.Trimesh, centre: str = "box") -> Shape:
+    mesh = normalise(mesh, "+z", "+x", 0.0, centre)
+    return Shape(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def procedural(category: str) -> Shape:
+    return shape_of(generate(category, seed=0, index=0), "origin")
+
+
+def triangle_soup(seed: int, n_faces: int) -> Shape:
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-1, 1, (n_faces, 1, 3)) + rng.normal(0, 0.4, (n_faces, 3, 3))
+    soup = trimesh.Trimesh(
+        corners.reshape(-1, 3), np.arange(3 * n_faces).reshape(-1, 3), process=False
+    )
+    return shape_of(soup)
+
+
+def turned(shape: Shape, turn_deg: float) -> Shape:
+    turn = np.radians(turn_deg)
+    about_z = np.array(
+        [[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
+    )
+    return Shape(shape.vertices @ about_z.T, shape.faces)

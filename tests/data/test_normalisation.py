@@ -1,0 +1,139 @@
+"""Every way a file can lie in its own frame, and the one frame it ends in."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from nbv.data.normalisation import AXES, check_mesh, direction, frame_rotation, normalise
+from nbv.errors import UserError
+
+PAIRS = [(up, front) for up, front in itertools.permutations(AXES, 2) if up[1] != front[1]]
+FACES = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+TETRAHEDRA = arrays(np.float64, (4, 3), elements=st.floats(-100, 100, width=32)).filter(
+    lambda v: np.linalg.norm(np.ptp(v, axis=0)) > 1e-2
+)
+
+
+def tetrahedron(vertices):
+    return trimesh.Trimesh(vertices, FACES, process=False)
+
+
+def test_there_are_24_pairs_of_axes():
+    assert len(PAIRS) == 24
+
+
+@pytest.mark.parametrize(("up", "front"), PAIRS)
+@given(turn=st.floats(-720, 720))
+def test_rotations_are_proper_and_take_the_axes_where_they_belong(up, front, turn):
+    rotation = frame_rotation(up, front, turn)
+    assert np.allclose(rotation @ rotation.T, np.eye(3))
+    assert np.isclose(np.linalg.det(rotation), 1.0)
+    assert np.allclose(rotation @ direction(up, "up"), [0, 0, 1])
+    azimuth = np.radians(turn)
+    expected = [np.cos(azimuth), np.sin(azimuth), 0]
+    assert np.allclose(rotation @ direction(front, "front"), expected)
+
+
+@pytest.mark.parametrize(("up", "front"), PAIRS)
+def test_vectors_and_axes_say_the_same(up, front):
+    def vector(axis, comma):
+        return comma.join(str(value) for value in direction(axis, "up"))
+
+    expected = frame_rotation(up, front, 0.0)
+    assert np.allclose(frame_rotation(vector(up, ","), vector(front, r"\,"), 0.0), expected)
+
+
+def test_rounded_vectors_still_rotate_properly():
+    rotation = frame_rotation("0.001,0.999,0.01", "0.99,0.002,0", 30.0)
+    assert np.allclose(rotation @ rotation.T, np.eye(3))
+    assert np.isclose(np.linalg.det(rotation), 1.0)
+
+
+@pytest.mark.parametrize(("up", "front"), PAIRS)
+@given(vertices=TETRAHEDRA, turn=st.floats(0, 360), centre=st.sampled_from(["box", "origin"]))
+def test_shape_is_kept_and_size_and_place_are_set(up, front, vertices, turn, centre):
+    mesh = normalise(tetrahedron(vertices), up, front, turn, centre)
+    result = np.asarray(mesh.vertices)
+    low, high = result.min(axis=0), result.max(axis=0)
+    assert np.isclose(np.linalg.norm(high - low), 1.0)
+    assert np.isclose(low[2], -high[2])
+    if centre == "box":
+        assert np.allclose(low, -high)
+    # A similarity without reflection: volumes, with their sign, scale by the cube.
+    sides = [np.linalg.norm(v[1:] - v[0], axis=1) for v in (vertices, result)]
+    scale = sides[1].max() / sides[0][sides[1].argmax()] if sides[1].max() > 0 else 0.0
+    assert np.allclose(sides[1], scale * sides[0], atol=1e-9)
+    volumes = [np.linalg.det(v[1:] - v[0]) for v in (vertices, result)]
+    assert np.isclose(volumes[1], scale**3 * volumes[0], atol=1e-9)
+
+
+@given(vertices=TETRAHEDRA)
+def test_the_origin_may_stay_the_turning_axis(vertices):
+    whole = normalise(tetrahedron(vertices), "+z", "+x", 0.0, "origin")
+    turned = normalise(tetrahedron(vertices), "+z", "+x", 180.0, "origin")
+    assert np.allclose(np.asarray(turned.vertices) * [-1, -1, 1], whole.vertices)
+    scale = np.linalg.norm(np.ptp(vertices, axis=0))
+    assert np.allclose(np.asarray(whole.vertices)[:, :2] * scale, vertices[:, :2])
+
+
+def test_vertices_that_no_face_uses_play_no_part():
+    vertices = np.random.default_rng(0).normal(size=(4, 3))
+    stray = np.vstack([[50.0, 50.0, 50.0], vertices, [np.nan, 0.0, 0.0]])
+    mesh = trimesh.Trimesh(stray, np.array(FACES) + 1, process=False)
+    check_mesh(mesh, "stray.obj")
+    cleaned = normalise(mesh, "+y", "-x", 10.0, "box")
+    plain = normalise(tetrahedron(vertices), "+y", "-x", 10.0, "box")
+    assert np.allclose(cleaned.vertices, plain.vertices)
+    assert np.array_equal(cleaned.faces, plain.faces)
+
+
+@pytest.mark.parametrize(
+    ("up", "front", "named"),
+    [
+        ("+y", "-y", r"up=\+y, front=-y: .*perpendicular"),
+        ("+q", "+x", r"up=\+q: not an axis"),
+        ("+z", "1,2", "front=1,2: not an axis"),
+        ("0,0,0", "+x", "up=0,0,0: not an axis"),
+        ("", "+x", "up=: not an axis"),
+    ],
+)
+def test_axes_without_sense_are_refused(up, front, named):
+    with pytest.raises(UserError, match=named) as caught:
+        frame_rotation(up, front, 0.0)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_centre_is_refused():
+    with pytest.raises(UserError, match=r"centre=boxx: .*did you mean 'box'"):
+        normalise(tetrahedron(np.eye(4, 3)), "+z", "+x", 0.0, "boxx")
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "named"),
+    [
+        (np.eye(4, 3), np.empty((0, 3), int), "no faces"),
+        (np.eye(4, 3), [[0, 1, 9]], "vertex 9, of 4"),
+        (np.eye(4, 3), [[0, 1, -1]], "vertex -1, of 4"),
+        ([[0, 0, 0], [1, np.nan, 0], [0, 1, 0]], [[0, 1, 2]], "vertex 1 is not finite, 1 of 3"),
+        ([[0, 0, 0], [1, 0, 0], [0, np.inf, 0]], [[0, 1, 2]], "vertex 2 is not finite"),
+        (np.ones((3, 3)), [[0, 1, 2]], "in one point"),
+        ([[0, 0, 0], [1e38, 0, 0], [0, 1, 0]], [[0, 1, 2]], "extends over 1e.38, vertex 1"),
+        ([[0, 0, 0], [1.7e308, 0, 0], [-1.7e308, 1, 0]], [[0, 1, 2]], "extends over inf"),
+        (np.eye(3) * 1e-30, [[0, 1, 2]], "extends over"),
+        (np.ones((3, 3)) * [[0], [1], [3]], [[0, 1, 2]], "no area"),
+        (np.eye(4, 3), [[0, 1, 1], [2, 2, 3]], "no area"),
+    ],
+)
+def test_a_mesh_that_cannot_be_drawn_is_refused_by_name(vertices, faces, named):
+    mesh = trimesh.Trimesh(process=False)
+    mesh.vertices, mesh.faces = np.asarray(vertices, float), faces
+    with pytest.raises(UserError, match=f"^some/file.ply: .*{named}") as caught:
+        check_mesh(mesh, "some/file.ply")
+    assert "\n" not in str(caught.value)

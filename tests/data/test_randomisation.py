@@ -1,0 +1,174 @@
+"""What is drawn at random for a camera: what it may change, and what it has to leave alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rendering_shapes import procedural
+from scipy import ndimage
+
+from nbv.data.camera import Camera, object_views
+from nbv.data.depth_codes import encode_depth
+from nbv.data.randomisation import (
+    Randomisation,
+    add_table,
+    lose,
+    move_edge,
+    randomised_turn,
+)
+from nbv.data.renderers import open_renderer
+from nbv.data.silhouette import crop_measured, sensor_camera
+
+CAMERA = Camera(fov_deg=25.0, image_side=48)
+AZIMUTHS = np.arange(0.0, 360.0, 45.0)
+NOTHING = Randomisation(
+    elevation_deg=0,
+    roll_deg=0,
+    size=0,
+    nearest=None,
+    farthest=None,
+    measured=1,
+    table=0,
+    thin=0,
+    inside=0,
+    occluded=0,
+    patches=0,
+    edge_px=0,
+    shift_px=0,
+)
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return procedural("mug")
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    return open_renderer("embree")
+
+
+def turn_of(mesh, renderer, draw, seed=0, elevation=20.0):
+    rng = np.random.default_rng(seed)
+    return randomised_turn(mesh, elevation, AZIMUTHS, CAMERA, renderer, None, 0.17, draw, rng)
+
+
+def test_where_nothing_varies_it_is_the_rendered_image(mesh, renderer):
+    depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, sensor_camera(CAMERA))
+    wanted = encode_depth(crop_measured(depth, CAMERA), CAMERA)
+    assert np.array_equal(turn_of(mesh, renderer, NOTHING), wanted)
+
+
+def test_an_elevation_that_does_not_vary_may_be_any(mesh, renderer):
+    depth = renderer.render(mesh.vertices, mesh.faces, 88.0, AZIMUTHS, sensor_camera(CAMERA))
+    wanted = encode_depth(crop_measured(depth, CAMERA), CAMERA)
+    assert np.array_equal(turn_of(mesh, renderer, NOTHING, elevation=88.0), wanted)
+
+
+def test_a_camera_on_its_head_sees_the_image_on_its_head(mesh, renderer):
+    upright = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+    turned = renderer.render(
+        mesh.vertices, mesh.faces, 20.0, AZIMUTHS, replace(CAMERA, roll_deg=180.0)
+    )
+    assert np.allclose(turned[:, ::-1, ::-1], upright, atol=1e-4)
+
+
+def test_a_camera_that_leans_to_the_right_sees_the_right_above(renderer):
+    # A plate to the right of the axis, seen from azimuth 0, where +y is right.
+    vertices = np.array([[0, 0, -0.05], [0, 0.45, -0.05], [0, 0.45, 0.05], [0, 0, 0.05]])
+    camera = Camera(image_side=48, framing="axis", roll_deg=90.0)
+    depth = renderer.render(vertices, [[0, 1, 2], [0, 2, 3]], 0.0, [0.0], camera)[0]
+    rows, columns = np.nonzero(depth)
+    assert rows.max() < 24
+    assert abs(columns.mean() + 0.5 - 24) < 1
+
+
+def test_distance_leaves_the_size_of_a_pixel_on_the_object(mesh, renderer):
+    near = turn_of(mesh, renderer, NOTHING)
+    far = turn_of(mesh, renderer, replace(NOTHING, nearest=8.0, farthest=8.0))
+    for one, other in zip(near, far, strict=True):
+        box = [np.ptp(np.nonzero(image), axis=1) for image in (one, other)]
+        # Perspective makes the near half larger than the far one.
+        assert np.abs(box[0] - box[1]).max() <= 3
+
+
+def test_the_table_is_level_and_lies_under_the_object(mesh, renderer):
+    rng = np.random.default_rng(0)
+    depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+    views = object_views(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+    floor = float(mesh.vertices[:, 2].min())
+    with_table = depth.copy()
+    add_table(with_table, views, floor, 1.0, rng)
+    assert np.array_equal(with_table[depth > 0], depth[depth > 0])
+    view, row, column = np.nonzero(with_table != depth)
+    assert len(view) > 20
+    principal = views.principal_px[view]
+    x = (column + 0.5 - principal[:, 0]) / CAMERA.focal_px
+    y = (principal[:, 1] - row - 0.5) / CAMERA.focal_px
+    rays = views.forward[view] + x[:, None] * views.right[view] + y[:, None] * views.up[view]
+    points = views.position[view] + with_table[view, row, column][:, None] * rays
+    assert points[:, 2] == pytest.approx(floor, abs=1e-4)
+
+
+@pytest.mark.parametrize("loss", ["thin", "inside", "occluded", "patches"])
+def test_a_loss_takes_pixels_away_and_changes_no_other(mesh, renderer, loss):
+    depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+    before, lost, rng = depth.copy(), 0, np.random.default_rng(0)
+    for image, whole in zip(depth, before, strict=True):
+        lose(image, replace(NOTHING, **{loss: 1}), rng)
+        kept = image > 0
+        assert np.array_equal(image[kept], whole[kept])
+        lost += np.count_nonzero(whole > 0) - np.count_nonzero(kept)
+    assert lost > 0
+
+
+def test_an_edge_that_moves_leaves_the_middle_and_takes_depths_from_nearby(mesh, renderer):
+    whole = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+    rng, grown, shrunk = np.random.default_rng(0), 0, 0
+    for image in whole:
+        moved = image.copy()
+        move_edge(moved, 2.0, rng)
+        seen, new = image > 0, moved > 0
+        both = seen & new
+        assert np.array_equal(moved[both], image[both])
+        assert np.isin(moved[new], image[seen]).all()
+        # Outwards by five standard deviations at most, inwards by a pixel.
+        assert (ndimage.distance_transform_edt(~seen)[new & ~seen] < 11).all()
+        assert (ndimage.distance_transform_edt(seen)[seen & ~new] <= 1.5).all()
+        grown, shrunk = grown + (new & ~seen).sum(), shrunk + (seen & ~new).sum()
+    assert grown > 0
+    assert shrunk > 0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_edge_moves_as_far_as_all_pairs_of_pixels_say(seed):
+    rng = np.random.default_rng(seed)
+    blob = ndimage.gaussian_filter(rng.standard_normal((23, 31)), 3.0) > rng.normal(0.05, 0.05)
+    blob[rng.integers(23), rng.integers(31)] = False
+    image = np.where(blob, 1 + rng.random(blob.shape), 0).astype(np.float32)
+    moved, largest = image.copy(), 3.0
+    move_edge(moved, largest, np.random.default_rng(seed))
+    # The same field, drawn in the same order.
+    again = np.random.default_rng(seed)
+    noise = again.standard_normal(image.shape, dtype=np.float32)
+    field = ndimage.gaussian_filter(noise, again.uniform(1.0, 4.0))
+    field = np.maximum(field * (again.uniform(0.0, largest) / field.std()), -1.0)
+    inside, outside = np.argwhere(blob), np.argwhere(~blob)
+    apart = np.sqrt(((inside[:, None] - outside) ** 2).sum(axis=2))
+    for pixel, to_edge in zip(inside, apart.min(axis=1), strict=True):
+        is_kept = 0.5 - to_edge < field[tuple(pixel)]
+        assert moved[tuple(pixel)] == (image[tuple(pixel)] if is_kept else 0)
+    for pixel, distances in zip(outside, apart.T, strict=True):
+        is_added = distances.min() - 0.5 < field[tuple(pixel)]
+        nearest = inside[distances == distances.min()]
+        wanted = image[tuple(nearest.T)] if is_added else [0]
+        assert moved[tuple(pixel)] in wanted
+
+
+def test_a_turn_depends_on_its_generator_alone(mesh, renderer):
+    draw = Randomisation(7.5, 5, 0.15, 3, 7, 0.6, 0.3, 0.1, 0.25, 0.15, 1, 2, 1.5)
+    one, again, other = (turn_of(mesh, renderer, draw, seed) for seed in (1, 1, 2))
+    assert np.array_equal(one, again)
+    assert not np.array_equal(one, other)

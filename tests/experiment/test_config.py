@@ -1,0 +1,681 @@
+from __future__ import annotations
+
+import json
+import shutil
+from fractions import Fraction
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nbv.core.criteria.pose_ambiguity import POSE_LIKELIHOODS
+from nbv.core.criteria.spreads import SPREADS
+from nbv.data.camera import FRAMINGS
+from nbv.data.sources import shapenet
+from nbv.errors import UserError
+from nbv.experiment.config import (
+    default_of,
+    load_condition,
+    load_config,
+    read_configuration,
+    snakemake_overrides,
+)
+from nbv.experiment.config.compose import equal_cost_epochs
+from nbv.experiment.config.schema import NAME_RULE, Dataset
+from nbv.experiment.estimation import hardware, networks
+
+ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / "config"
+CHOICES = [f"{path.parent.name}={path.stem}" for path in sorted(CONFIG.glob("*/*.yaml"))]
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+def test_every_choice_composes_and_validates(choice):
+    needed = ["estimator.pairs=pairs.csv"] if choice.startswith("estimator=external") else []
+    assert load_config(CONFIG, [choice, *needed])["name"]
+
+
+def test_an_external_estimator_and_its_file_belong_together():
+    for overrides in (
+        ["estimator=external"],
+        ["estimator=external_distributions"],
+        ["estimator.pairs=pairs.csv"],
+    ):
+        with pytest.raises(UserError, match="needs a file of calibration pairs"):
+            load_config(CONFIG, overrides)
+
+
+def test_the_default_is_the_paper():
+    config = load_config(CONFIG)
+    assert config["name"] == "paper"
+    assert (config["n_objects"], config["n_folds"]) == (125, 5)
+    units = [(c, e) for c in config["categories"] for e in config["elevations_deg"][c]]
+    assert len(units) == 10
+
+
+@pytest.mark.parametrize(
+    ("key", "names"),
+    [
+        ("camera.framing", FRAMINGS),
+        ("density.pose_likelihood", POSE_LIKELIHOODS),
+        ("density.spread", SPREADS),
+        ("estimator.device", hardware.DEVICES),
+        ("estimator.precision", hardware.PRECISIONS),
+    ],
+)
+def test_names_are_those_that_the_code_knows(key, names):
+    section, name = key.split(".")
+    assert all(load_config(CONFIG, [f"{key}={n}"])[section][name] == n for n in names)
+    with pytest.raises(UserError, match=f"choose from: {', '.join(sorted(names))}$"):
+        load_config(CONFIG, [f"{key}=0"])
+
+
+def test_every_layout_in_the_schema_is_one_of_shapenet(tmp_path):
+    settings = load_config(CONFIG, ["dataset=shapenet", f"dataset.root={tmp_path}"])["dataset"]
+    for layout in get_args(Dataset.model_fields["layout"].annotation):
+        assert shapenet.open_shapenet(settings | {"layout": layout}, 0).root == tmp_path
+
+
+def test_every_kind_of_estimator_has_its_file():
+    assert {path.stem for path in (CONFIG / "estimator").glob("*.yaml")} == {
+        *networks.KINDS,
+        "external",
+        "external_distributions",
+    }
+
+
+def test_only_an_estimator_that_gives_distributions_has_methods_that_need_them():
+    for estimator, expected in (("regressor", False), ("classifier", True)):
+        config = load_config(CONFIG, [f"estimator={estimator}"])
+        assert config["gives_distributions"] is expected
+        fusions = [method["fusion"] for method in config["extensions"].values()]
+        assert ("product" in fusions) is expected
+        assert "gives_distributions" not in config["estimator"]
+
+
+def plain(value) -> bool:
+    if isinstance(value, dict):
+        return all(type(key) is str and plain(item) for key, item in value.items())
+    if isinstance(value, list):
+        return all(map(plain, value))
+    return type(value) in (str, int, float, bool, type(None))
+
+
+def test_values_are_plain_python_which_is_all_that_snakemake_compares():
+    assert plain(load_config(CONFIG))
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("estimator.epocs=3", "'estimator.epocs' is unknown: did you mean 'estimator.epochs'?"),
+        ("sed=1", "'sed' is unknown: did you mean 'seed'?"),
+        ("renderer=foo", "renderer=foo is unknown: choose from: embree, pyrender"),
+        ("renderer=pyrendr", "renderer=pyrendr is unknown: did you mean 'pyrender'?"),
+        ("experiment=quik", "did you mean 'quick'?"),
+        ("renderer.name=embre", "renderer.name=embre is unknown: did you mean 'embree'?"),
+        ("camera.framing=axs", "camera.framing=axs is unknown: did you mean 'axis'?"),
+        ("density.pose_likelihood=truth", "density.pose_likelihood=truth is unknown"),
+        ("density.spread=entrop", "density.spread=entrop is unknown: did you mean 'entropy'?"),
+        ("estimator.epochs=many", "estimator.epochs=many is not a whole number"),
+        ("n_objects=1.5", "n_objects=1.5 is not a whole number"),
+        ("seed=true", "seed=True is not a whole number"),
+        ("estimator.learning_rate=fast", "estimator.learning_rate=fast is not a number"),
+        ("estimator.learning_rate=nan", "estimator.learning_rate=nan is out of range: a finite"),
+        ("density.bandwidths_deg=4", "density.bandwidths_deg=4 is not a list"),
+        ("camera=near", "camera=near is not a mapping"),
+        ("~seed", "seed is missing"),
+        ("estimator.epochs.more=3", "'estimator.epochs.more' is unknown"),
+        ("methods.proposed.polcy=x", "did you mean 'methods.proposed.policy'?"),
+        (
+            "camera.distance=1",
+            "is out of range: above 1, 1000 at most, in object diagonals",
+        ),
+        ("camera.fov_deg=180", "camera.fov_deg=180 is out of range: 0.05 to 160"),
+        ("recommendation.max_travel_deg=181", "max_travel_deg=181 is out of range: 0 to 180"),
+        ("estimator.channels=[4,0]", "estimator.channels[1]=0 is out of range: 1 to 1000000000000"),
+        ("categories=[mgu]", "'mgu' is unknown: did you mean 'mug'?"),
+        ("elevations_deg.mug=[95]", "elevations_deg.mug[0]=95 is out of range: 0 to 89"),
+        ("estimator.epochs=0", "estimator.epochs=0 is out of range: 1 to 1000000"),
+        ("n_folds=1", "n_folds=1 is out of range: 2 to 1000"),
+        ("seed=-1", "seed=-1 is out of range: 0 to 9223372036854775807"),
+        ("n_objects=3", "n_objects=3 is out of range"),
+        ("dataset.centre=midle", "dataset.centre=midle is unknown: choose from: box, origin"),
+        ("dataset.turn_deg.mgu=270", "dataset.turn_deg.mgu: no such category; did you mean 'mug'"),
+        ("density.bandwidths_deg=[]", "density.bandwidths_deg=[] is out of range: one or more"),
+        ("name='a b'", "name=a b: use letters"),
+        ("estimator", "is not of the form key=value"),
+        ("sensor=kinct", "sensor=kinct is unknown: did you mean 'kinect'?"),
+        ("sensor.diagonal_m.mug=0", "sensor.diagonal_m.mug=0 is out of range: above 0"),
+        ("transfer.folds=[6]", "transfer.folds=[6] is out of range: 1 to n_folds=5"),
+        ("transfer.category=mgu", "transfer.category=mgu is no category of this run"),
+        ("transfer.elevation_deg=90", "transfer.elevation_deg=90 is out of range: 0 to 89"),
+        ("transfer.conditions.stereo.sensor=sterio", "did you mean 'stereo'?"),
+        ("transfer.conditions.axis.framing=axs", "transfer.conditions.axis.framing=axs is unknown"),
+        ("transfer.conditions.new.sensr=ideal", "did you mean 'transfer.conditions.new.sensor'?"),
+        ("transfer.conditions={a b: {sensor: ideal, framing: axis}}", "a b: use letters"),
+        ("calibration=crosfit", "calibration=crosfit is unknown: did you mean 'crossfit'?"),
+        ("crossfit_parts=1", "crossfit_parts=1 is out of range: 2 to 100"),
+        ("crossfit_epochs=0", "crossfit_epochs=0 is out of range: 1 to 1000000"),
+        ("estimator.kind=classifier", "it needs both"),
+        ("estimator.n_classes=72", "a classifier has n_classes"),
+        ("gives_distributions=true", "'gives_distributions' is unknown"),
+        # Every number is finite and in range, element by element.
+        ("density.bandwidths_deg=[8,nan]", "bandwidths_deg[1]=nan is out of range: a finite"),
+        ("density.bandwidths_deg=[inf]", "bandwidths_deg[0]=inf is out of range: a finite"),
+        ("density.bandwidths_deg=[8,200]", "bandwidths_deg[1]=200 is out of range: 0 to 180"),
+        ("density.bandwidths_deg=[8,8.0]", "density.bandwidths_deg: 8.0 is there twice"),
+        ("density.pseudo_observations=[10,nan]", "pseudo_observations[1]=nan is out of range"),
+        ("density.pseudo_observations=[1e300]", "=1e+300 is out of range: 0 to 1000000000"),
+        ("density.n_parts=1001", "density.n_parts=1001 is out of range: 2 to 1000"),
+        ("dataset.turn_deg.mug=nan", "dataset.turn_deg.mug=nan is out of range: a finite number"),
+        ("dataset.turn_deg.mug=361", "dataset.turn_deg.mug=361 is out of range: -360 to 360"),
+        ("sensor.parameters.focal_px=nan", "focal_px=nan is out of range: a finite number"),
+        ("sensor.parameters.focal_px=1e7", "focal_px=10000000.0 is out of range: above 0, 1000000"),
+        ("sensor.diagonal_m.mug=inf", "sensor.diagonal_m.mug=inf is out of range: a finite"),
+        ("sensor.diagonal_m.mug=1001", "diagonal_m.mug=1001 is out of range: above 0, 1000 at"),
+        ("camera.distance=1e6", "camera.distance=1000000.0 is out of range: above 1, 1000 at most"),
+        ("camera.fov_deg=179.9", "camera.fov_deg=179.9 is out of range: 0.05 to 160"),
+        ("camera.image_side=1000001", "is out of range: 8 to 1000000"),
+        (
+            "camera.distance=900",
+            "camera.distance=900 with camera.fov_deg=25 and camera.",
+        ),
+        (
+            "estimator.learning_rate=1e30",
+            "learning_rate=1e+30 is out of range: above 0, 10 at",
+        ),
+        ("estimator.weight_decay=inf", "estimator.weight_decay=inf is out of range: a finite"),
+        ("estimator.weight_decay=11", "estimator.weight_decay=11 is out of range: 0 to 10"),
+        ("recommendation.travel_cost=1e300", "travel_cost=1e+300 is out of range: 0 to 1000000"),
+        (f"seed={2**63}", f"seed={2**63} is out of range: 0 to {2**63 - 1}"),
+        ("n_folds=1001", "n_folds=1001 is out of range: 2 to 1000"),
+        ("n_resamples=99", "n_resamples=99 is out of range: 100 to 1000000000000"),
+        ("n_objects=2", "n_objects=2 is out of range: 3 to 1000000000000"),
+        # What is there twice, empty or of no category.
+        ("categories=[mug,mug]", "categories: mug is there twice"),
+        ("elevations_deg.mug=[0,0]", "elevations_deg.mug: 0 is there twice"),
+        ("transfer.folds=[1,1]", "transfer.folds: 1 is there twice"),
+        ("leaderboard_runs=[a,a]", "leaderboard_runs: a is there twice"),
+        ("methods={}", "methods={} changes nothing; ~methods.<key> leaves a key out"),
+        ("dataset.categories.mgu=x", "dataset.categories.mgu: no such category; did you mean"),
+        ("sensor.diagonal_m.mgu=1", "sensor.diagonal_m.mgu: no such category; did you mean 'mug'"),
+        # Text.
+        ("dataset.root=", "dataset.root=: one line of text"),
+        ("dataset.root=a\nb", r"dataset.root=a\nb: one line of text"),
+        ("dataset.root=\0", r"dataset.root=\x00: one line of text"),
+        ("dataset.root=~nobody-of-that-name/x", "'~nobody-of-that-name/x': there is no such user"),
+        (
+            "dataset.exclude_file=~nobody-of-that-name",
+            "dataset.exclude_file: '~nobody-of-that-name'",
+        ),
+        (
+            "dataset.categories.mug=../../etc",
+            "mug: '../../etc' is not below dataset.root",
+        ),
+        ("dataset.categories.mug=/etc", "dataset.categories.mug: '/etc' is not below dataset.root"),
+        ("dataset.up=up", "dataset.up=up: an axis such as +y, a vector such as 0,0,1, or auto"),
+        ("dataset.handle_reach=0.6", "dataset.handle_reach=0.6 is out of range: 0 to 0.5"),
+        ("dataset.square_share=1.5", "dataset.square_share=1.5 is out of range: 0 to 1"),
+        ("dataset.layout=v3", "dataset.layout=v3 is unknown: choose from: auto, sem, v1, v2"),
+        # What Hydra cannot read, or reads as something else.
+        ("categories=[a{b}c]", "override 'categories=[a{b}c]' cannot be read: "),
+        ("seed=1,2", "override 'seed=1,2' holds several values; write a list as [1,2]"),
+        ("seed=" + "9" * 5000, "cannot be read: "),
+        ("estimator.epochs=" + "[" * 3000, "cannot be read: "),
+        ("dataset.root=???", "configuration key 'dataset.root': Missing mandatory value"),
+        ("seed=${seed}", "configuration key 'seed': Recursive interpolation"),
+    ],
+)
+def test_a_mistake_is_one_line_with_its_key(override, message):
+    with pytest.raises(UserError) as caught:
+        load_config(CONFIG, [override])
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("contenders.x={rotation: fixed}", "configuration key 'contenders' is now 'extensions'"),
+        ("beside=[a]", "configuration key 'beside' is now 'compared_runs'"),
+        ("sequence.n_views=3", "configuration key 'sequence' is now 'more_views'"),
+        ("density.reading=given_truth", "'density.reading' is now 'density.pose_likelihood'"),
+        ("methods.proposed.rotation=fixed", "rotation' is now 'methods.proposed.policy'"),
+        ("extensions.x={rotation: fixed}", "'extensions.x.rotation' is now 'extensions.x.policy'"),
+        ("methods.proposed.policy=entropy", "policy 'entropy' is now 'pose_ambiguity'"),
+        ("extensions.x={policy: chosen}", "extensions.x.policy: policy 'chosen' is now 'selected'"),
+        ("extensions.selected.fusion=chosen", "fusion 'chosen' is now 'selected'"),
+    ],
+)
+def test_an_earlier_name_is_one_line_with_the_new_name(override, message):
+    with pytest.raises(UserError) as caught:
+        load_config(CONFIG, [override])
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_with_an_earlier_name_is_one_line_with_the_new_name(tmp_path):
+    shutil.copytree(CONFIG, tmp_path / "config")
+    decision = tmp_path / "config/density/decision.yaml"
+    decision.write_text(decision.read_text().replace("pose_likelihood", "reading"))
+    with pytest.raises(UserError, match=r"'density\.reading' is now 'density\.pose_likelihood'"):
+        load_config(tmp_path / "config")
+
+
+EARLIER = """
+n_folds: 5
+methods: {proposed: {rotation: entropy, fusion: average}, rotation: {rotation: none}}
+contenders: {chosen: {rotation: chosen, fusion: chosen}}
+density: {reading: given_truth, spread: entropy}
+sequence: {n_views: 5}
+beside: [entropy]
+elevations_deg: {sequence: [0]}
+estimator: {kind: classifier, n_classes: 120}
+dropped: {key: 1}
+"""
+
+
+def test_a_kept_configuration_is_read_under_the_names_of_today(tmp_path):
+    (tmp_path / "configuration.yaml").write_text(EARLIER)
+    assert read_configuration(tmp_path) == {
+        "n_folds": 5,
+        "methods": {
+            "proposed": {"policy": "pose_ambiguity", "fusion": "average"},
+            "rotation": {"policy": "none"},
+        },
+        "extensions": {"chosen": {"policy": "selected", "fusion": "selected"}},
+        "density": {"pose_likelihood": "given_truth", "spread": "entropy"},
+        "more_views": {"n_views": 5},
+        "compared_runs": ["entropy"],
+        "elevations_deg": {"sequence": [0]},
+        "estimator": {"kind": "classifier", "n_classes": 120},
+        "dropped": {"key": 1},
+        "gives_distributions": True,
+    }
+
+
+def test_a_kept_reference_has_the_settings_of_today():
+    kept, ours = read_configuration(ROOT / "docs/reference/paper"), load_config(CONFIG)
+    same = ("methods", "density", "more_views", "gives_distributions")
+    assert {key: kept[key] for key in same} == {key: ours[key] for key in same}
+    assert kept["estimator"] == ours["estimator"]
+
+
+@pytest.mark.parametrize(
+    ("dataset", "reach", "share"),
+    [(["dataset=procedural"], 0.2, 0.3), (["dataset=folder", "dataset.root=/tmp"], 0.0, 0.0)],
+)
+def test_only_generated_mugs_have_settings_of_mugs(dataset, reach, share):
+    settings = load_config(
+        CONFIG,
+        ["experiment=bundles", "estimator=classifier", *dataset, "dataset.square_share=0.3"],
+    )
+    assert settings["dataset"]["handle_reach"] == reach
+    assert settings["dataset"]["square_share"] == share
+
+
+@pytest.mark.parametrize(
+    ("key", "default"),
+    [
+        ("calibration", "holdout"),
+        ("compared_runs", []),
+        ("dataset.centre", "box"),
+        ("methods.any.fusion", "average"),
+        ("seed", "none"),
+        ("density.spread", "none"),
+        ("packages.numpy", "none"),
+        ("sensor.parameters.focal_px", "none"),
+        ("estimator.pretraining", {"epochs": 2, "learning_rate": 9e-3}),
+    ],
+)
+def test_a_key_that_a_configuration_lacks_has_its_default(key, default):
+    assert default_of(key, "none") == default
+
+
+@pytest.mark.parametrize(
+    "override", ["elevations_deg.bottle=[0,30]", "elevations_deg={bottle:[0,30]}"]
+)
+def test_a_category_of_ones_own(override):
+    config = load_config(CONFIG, ["dataset=folder", override, "categories=[bottle]"])
+    assert config["elevations_deg"]["bottle"] == [0, 30]
+
+
+BAD_NAMES = ("..", ".", "", "-a", ".a", "_a", "a/b", "a{b}c", "a b", "a\nb", "é", "a" * 101, "${x}")
+
+
+@pytest.mark.parametrize("name", [name for name in BAD_NAMES if name != "${x}"])
+def test_a_name_that_becomes_a_path_is_one_safe_part_of_it(name):
+    with pytest.raises(UserError) as caught:
+        load_config(CONFIG, [f"name={name}"])
+    assert str(caught.value).startswith("name=")
+    assert str(caught.value).endswith(NAME_RULE)
+
+
+NAMED = {
+    "experiment": "NAME",
+    "name": "NAME",
+    "focus_category": "NAME",
+    "categories": ["mug", "NAME"],
+    "elevations_deg": {"mug": [0], "NAME": [0]},
+    "methods": {"NAME": {"policy": "none"}},
+    "extensions": {"NAME": {"policy": "random"}},
+    "compared_runs": ["NAME"],
+    "leaderboard_runs": ["NAME"],
+    "dataset": {"categories": {"NAME": "folder"}},
+    "dataset.turn_deg": {"NAME": 0},
+    "sensor": {"diagonal_m": {"NAME": 1}},
+    "sensor.parameters": {"NAME": 1},
+    "transfer": {"conditions": {"NAME": {"sensor": "ideal", "framing": "axis"}}},
+    "transfer.category": "NAME",
+}
+
+
+@pytest.mark.parametrize("key", NAMED)
+@pytest.mark.parametrize("name", BAD_NAMES)
+def test_the_same_rule_holds_for_every_name(tmp_path, key, name):
+    """Written in a file, for there is no way to write most of them as an override."""
+    section, _, last = key.partition(".")
+    text = json.dumps({section: {last: NAMED[key]} if last else NAMED[key]} | {"n_folds": 2})
+    written = text.replace('"NAME"', json.dumps(name))
+    (tmp_path / "configuration.yaml").write_text(written, encoding="utf-8")
+    with pytest.raises(UserError) as caught:
+        read_configuration(tmp_path)
+    assert f": {section}" in str(caught.value)
+    assert NAME_RULE in str(caught.value)
+    (tmp_path / "configuration.yaml").write_text(text.replace("NAME", "a.b_c-1"))
+    if key not in ("categories",):
+        assert read_configuration(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["a", "7", "paper-2026.1_b", "a" * 100])
+def test_a_name_of_letters_digits_and_marks(name):
+    assert load_config(CONFIG, [f"name={name}"])["name"] == name
+
+
+def test_at_least_one_method_is_needed():
+    names = load_config(CONFIG)["methods"]
+    with pytest.raises(UserError, match=r"methods=\{\} is out of range: one or more"):
+        load_config(CONFIG, [f"~methods.{name}" for name in names])
+
+
+@pytest.mark.parametrize(
+    "root", ["~/data", "/data/v=2", "/data/(old) set", "it's", "a\\", "a\\'b", "\\\\'"]
+)
+def test_a_path_needs_no_quotes(root):
+    config = load_config(CONFIG, ["dataset=folder", f"dataset.root={root}"])
+    assert config["dataset"]["root"] == root
+
+
+def test_a_method_of_ones_own():
+    config = load_config(CONFIG, ["methods.mine={policy: opposite}"])
+    assert config["methods"]["mine"] == {"policy": "opposite", "fusion": "average"}
+
+
+def test_conditions_can_be_left_out_and_added():
+    config = load_config(
+        CONFIG,
+        [
+            "~transfer.conditions.axis",
+            "transfer.conditions.both={sensor: stereo, framing: axis}",
+        ],
+    )
+    assert list(config["transfer"]["conditions"]) == ["ideal", "kinect", "stereo", "both"]
+
+
+def test_a_condition_is_the_run_but_for_sensor_and_framing():
+    overrides = ["experiment=quick", "camera.framing=axis", "camera.image_side=16", "seed=3"]
+    run = load_config(CONFIG, overrides)
+    for name, condition in run["transfer"]["conditions"].items():
+        found = load_condition(CONFIG, overrides, run, condition)
+        assert found["camera"] == run["camera"] | {"framing": condition["framing"]}
+        assert found["sensor"] == load_config(CONFIG, [f"sensor={condition['sensor']}"])["sensor"]
+        same = {key: value for key, value in found.items() if key not in ("camera", "sensor")}
+        assert same == {key: run[key] for key in same}, name
+
+
+def test_parameters_belong_to_the_sensor_that_they_were_given_for():
+    overrides = ["sensor=stereo", "sensor.parameters.baseline_m=0.1", "sensor.diagonal_m.mug=0.2"]
+    run = load_config(CONFIG, overrides)
+
+    def seen_by(sensor):
+        condition = {"sensor": sensor, "framing": "silhouette"}
+        return load_condition(CONFIG, overrides, run, condition)
+
+    assert seen_by("stereo") == run
+    kinect = seen_by("kinect")["sensor"]
+    assert kinect["parameters"] == load_config(CONFIG, ["sensor=kinect"])["sensor"]["parameters"]
+    assert kinect["diagonal_m"] == run["sensor"]["diagonal_m"]
+
+
+def test_another_data_set_gets_its_own_folder():
+    assert load_config(CONFIG, ["dataset=shapenet"])["name"] == "paper-shapenet"
+    assert load_config(CONFIG, ["dataset=shapenet", "name=mine"])["name"] == "mine"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "name"),
+    [
+        ([], "paper"),
+        (["estimator=classifier"], "paper-classifier"),
+        (["calibration=crossfit"], "paper-crossfit"),
+        (["dataset=shapenet", "estimator=classifier"], "paper-shapenet-classifier"),
+        (["experiment=quick", "calibration=crossfit", "name=mine"], "mine"),
+    ],
+)
+def test_another_estimator_or_calibration_gets_its_own_folder(overrides, name):
+    assert load_config(CONFIG, overrides)["name"] == name
+
+
+@pytest.mark.parametrize("override", ["n_classes=7", "n_classes=4", "target_bandwidth_deg=0"])
+def test_a_classifier_with_settings_out_of_range(override):
+    with pytest.raises(UserError, match=f"estimator.{override}.* is out of range"):
+        load_config(CONFIG, ["estimator=classifier", f"estimator.{override}"])
+
+
+def test_the_opposite_view_is_a_whole_number_of_classes_away():
+    with pytest.raises(UserError, match="n_classes=45 is odd"):
+        load_config(CONFIG, ["estimator=classifier", "estimator.n_classes=45"])
+
+
+def test_a_regressor_has_no_setting_of_a_classifier():
+    assert "n_classes" not in load_config(CONFIG)["estimator"]
+    assert load_config(CONFIG, ["estimator=classifier"])["estimator"]["n_classes"] > 2
+
+
+@given(st.integers(1, 40), st.integers(1, 19), st.integers(2, 5))
+def test_cross_fitting_costs_what_the_hold_out_costs_and_no_epoch_more(epochs, twentieths, parts):
+    objects = 100 * parts
+    fraction = twentieths / 20
+    held_out = Fraction(20 - twentieths, 20) * objects * epochs
+
+    def cost(each):
+        return each * (parts * (objects - objects // parts) + objects)
+
+    found = equal_cost_epochs(epochs, fraction, parts)
+    assert cost(found) <= held_out < cost(found + 1)
+
+
+def test_the_epochs_of_cross_fitting_are_written_down():
+    config = load_config(CONFIG, ["calibration=crossfit", "estimator.epochs=20"])
+    assert config["crossfit_epochs"] == 8
+    assert load_config(CONFIG)["crossfit_epochs"] is None
+    with pytest.raises(UserError, match="crossfit_epochs=0 is out of range: 1 or more"):
+        load_config(CONFIG, ["calibration=crossfit", "estimator.epochs=2"])
+
+
+@pytest.mark.parametrize(
+    ("handed", "expected"),
+    [
+        ({"experiment": "quick"}, ["experiment=quick"]),
+        ({"n_objects": None}, ["n_objects=null"]),
+        ({"overrides": ["a=1", "b=2"]}, ["a=1", "b=2"]),
+        ({"overrides": "[a=[1,2],b={c:[3,4]},d=5]"}, ["a=[1,2]", "b={c:[3,4]}", "d=5"]),
+        ({"overrides": "a=[1,2]"}, ["a=[1,2]"]),
+        ({"overrides": ["a='0", 0, "1'", "b=2"]}, ["a='0,0,1'", "b=2"]),
+        ({}, []),
+    ],
+)
+def test_what_snakemake_hands_over(handed, expected):
+    assert snakemake_overrides(handed) == expected
+
+
+@pytest.mark.parametrize("given", [5, 0, True, 2.5, {"seed": 1}])
+def test_overrides_are_a_list_or_text(given):
+    with pytest.raises(UserError, match=r"--config overrides=.*: write it as overrides="):
+        snakemake_overrides({"overrides": given})
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "message"),
+    [
+        ("config.yaml", b"seed: [1", "cannot be read as YAML"),
+        ("config.yaml", b"", "config.yaml holds no settings"),
+        ("config.yaml", b"text", "config.yaml holds no settings"),
+        ("experiment/paper.yaml", b"\xff\xfe\x00", "cannot be read: it is not UTF-8 text"),
+        ("density/decision.yaml", b"a: &a [1]\nb: *a\n", "aliases (*name) are not"),
+        ("camera.yaml", b"\x00\x01", "cannot be read as YAML"),
+        ("estimator/regressor.yaml", b"kind: a\nkind: b\n", "YAML in line 2: found duplicate key"),
+    ],
+)
+def test_a_damaged_file_of_the_configuration_is_named(tmp_path, file, content, message):
+    shutil.copytree(CONFIG, tmp_path / "config")
+    (tmp_path / "config" / file).write_bytes(content)
+    with pytest.raises(UserError) as caught:
+        load_config(tmp_path / "config", ["seed=${none}"] if file == "camera.yaml" else [])
+    assert file in str(caught.value)
+    assert message in str(caught.value)
+
+
+KEPT = (ROOT / "docs/reference/paper/configuration.yaml").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "holds no settings"),
+        (b"\x89PNG\r\n\x1a\n\x00", "it is not UTF-8 text"),
+        (b"n_folds: 5\x00", "cannot be read as YAML"),
+        (b"- 5", "holds no settings"),
+        (b"n_folds: [5", "cannot be read as YAML"),
+        (b"a: &a {b: 1}\nc: *a\nn_folds: 5", "aliases (*name) are not"),
+        (b"a: !!python/object/apply:os.system [true]\nn_folds: 5", "cannot be read as YAML"),
+        (KEPT.replace(b"n_folds: 5", b""), "n_folds is missing"),
+        (KEPT.replace(b"n_folds: 5", b"n_folds: x"), "n_folds=x is not a whole number"),
+        (KEPT.replace(b"- mug", b"- ../mug"), "categories[3]=../mug: use letters"),
+        (KEPT.replace(b"- mug", b"- cup"), "elevations_deg.cup is missing"),
+        (b"n_folds: 5\ncategories: [mug]\nelevations_deg: {}", "elevations_deg.mug is missing"),
+        (b"n_folds: 5\nmethods: 7", "methods=7 is not a mapping"),
+        (b"n_folds: 5\nsensor: 7", "sensor=7 is not a mapping"),
+        (b"n_folds: 5\nestimator: null", "estimator=None is not a mapping"),
+    ],
+)
+def test_a_damaged_kept_configuration_is_named(tmp_path, content, message):
+    (tmp_path / "configuration.yaml").write_bytes(content)
+    with pytest.raises(UserError) as caught:
+        read_configuration(tmp_path)
+    assert str(caught.value).startswith(str(tmp_path / "configuration.yaml"))
+    assert message in str(caught.value)
+
+
+def test_a_kept_configuration_has_the_keys_that_are_needed(tmp_path):
+    (tmp_path / "configuration.yaml").write_text("n_folds: 5\n")
+    with pytest.raises(UserError, match=r"configuration\.yaml: categories is missing"):
+        read_configuration(tmp_path, ("categories", "methods"))
+
+
+@pytest.mark.parametrize("kept", sorted((ROOT / "docs/reference").rglob("configuration.yaml")))
+def test_every_kept_reference_can_be_read(kept):
+    assert read_configuration(kept.parent, ("categories", "elevations_deg", "methods"))
+
+
+# Fuzzing: whatever is given, the answer is a result or one line.
+
+KEYS = (
+    *("name", "seed", "experiment", "categories", "methods", "estimator", "estimator.epochs"),
+    *("dataset.root", "density.bandwidths_deg", "transfer.conditions.x", "overrides", "sensor"),
+    *("camera.fov_deg", "elevations_deg.mug", "dataset.turn_deg", "compared_runs", "~methods"),
+)
+NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from(["1e999", ".inf", "0x", "1_0"]))
+SNIPPETS = st.sampled_from(
+    ["[", "]", "{", "}", "'", '"', "\\", "${", "}", ",", ":", "=", "~", "+", "@", "/", "..", "\n"]
+)
+TEXTS = st.one_of(st.text(max_size=30), st.lists(SNIPPETS, max_size=8).map("".join))
+LISTS = st.lists(st.one_of(NUMBERS, TEXTS), max_size=3).map(
+    lambda items: "[" + ",".join(map(str, items)) + "]"
+)
+OVERRIDES = st.one_of(
+    TEXTS, st.builds("{}={}".format, st.sampled_from(KEYS), st.one_of(NUMBERS, TEXTS, LISTS))
+)
+# One composition takes a twentieth of a second and more; how long says nothing here.
+FUZZED = settings(max_examples=30, deadline=None)
+
+
+def result_or_one_line(function, *arguments):
+    line = None
+    try:
+        return function(*arguments)
+    except UserError as error:
+        line = str(error)
+    assert line
+    assert line.isprintable()
+    assert len(line) < 1000
+    return None
+
+
+@FUZZED
+@given(st.lists(OVERRIDES, max_size=3))
+def test_any_override_gives_a_configuration_or_one_line(overrides):
+    result_or_one_line(load_config, CONFIG, overrides)
+
+
+SCALARS = st.one_of(NUMBERS, TEXTS, st.none(), st.booleans(), st.binary(max_size=5), st.dates())
+VALUES = st.recursive(
+    SCALARS,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=5), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+
+
+@FUZZED
+@given(st.dictionaries(st.one_of(st.sampled_from(KEYS), st.integers(), TEXTS), VALUES, max_size=4))
+def test_whatever_snakemake_hands_over_gives_overrides_or_one_line(given):
+    overrides = result_or_one_line(snakemake_overrides, given)
+    assert overrides is None or all(type(override) is str for override in overrides)
+
+
+LINES = KEPT.splitlines(keepends=True)
+
+
+def damaged(kept: bytes, place: float, cut: int, inserted: bytes) -> bytes:
+    at = int(place * len(kept))
+    return kept[:at] + inserted + kept[at + cut :]
+
+
+DAMAGED = st.one_of(
+    st.binary(max_size=80),
+    st.builds(damaged, st.just(KEPT), st.floats(0, 1), st.integers(0, 200), st.binary(max_size=4)),
+    st.builds(damaged, st.just(KEPT), st.floats(0, 1), st.just(len(KEPT)), st.just(b"")),
+    st.builds(
+        lambda line, text: KEPT.replace(line, line.partition(b":")[0] + b": " + text.encode()),
+        st.sampled_from(LINES),
+        st.text(st.characters(codec="utf-8"), max_size=10).map(lambda text: text + "\n"),
+    ),
+)
+
+
+@FUZZED
+@given(DAMAGED)
+def test_any_bytes_are_a_configuration_or_one_line(tmp_path_factory, content):
+    root = tmp_path_factory.getbasetemp() / "any bytes"
+    root.mkdir(exist_ok=True)
+    (root / "configuration.yaml").write_bytes(content)
+    result_or_one_line(read_configuration, root)
+
+
+def test_what_cannot_be_printed_is_shown_by_its_escape():
+    assert str(UserError("a\nb\x00c\ud800é")) == r"a\nb\x00c\ud800é"

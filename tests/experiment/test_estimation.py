@@ -1,0 +1,281 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from clock_faces import CLASSES, CPU, NAMES, SETTINGS, clock_faces, named, untrained
+from nbv.core.angles import circular_distance_deg
+from nbv.errors import UserError
+from nbv.experiment.estimation import hardware as hw
+from nbv.experiment.estimation.images import to_input
+from nbv.experiment.estimation.inference import (
+    decode,
+    estimate_azimuth,
+    network_outputs,
+    outputs_of_parts,
+)
+from nbv.experiment.estimation.networks import build_network
+from nbv.experiment.estimation.outputs import class_targets, decode_classes, direction_targets
+from nbv.experiment.estimation.training import train_estimator, train_network
+from nbv.experiment.estimation.weights import Estimator, load_estimator, save_estimator
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    hw.use_one_thread()
+
+
+def test_a_training_on_one_thread_loads_neither_torchs_compiler_nor_scipy():
+    """They take a second or two of every job, and a tenth of one."""
+    code = (
+        "import sys, torch; from clock_faces import CPU, SETTINGS, clock_faces; "
+        "from nbv.experiment.estimation.hardware import use_one_thread; use_one_thread(); "
+        "from nbv.experiment.estimation.training import train_network; "
+        "train_network(clock_faces(1), SETTINGS | {'epochs': 1}, CPU, 0); "
+        "print(torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), "
+        "torch.is_deterministic_algorithms_warn_only_enabled(), "
+        "*(name in sys.modules "
+        "for name in ('torch._inductor', 'torch._dynamo', 'triton', 'scipy')))"
+    )
+    path = os.pathsep.join(sys.path)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"PYTHONPATH": path},
+    )
+    assert done.stdout.split() == ["1", "True", "True", "False", "False", "False", "False"]
+
+
+def test_a_training_is_torchs_adamw_and_one_cycle_schedule_to_the_last_bit():
+    faces = clock_faces(2)
+    trained = train_network(faces, SETTINGS | {"epochs": 2, "weight_decay": 0.1}, CPU, 3)
+    torch.manual_seed(3)
+    network = build_network(SETTINGS, 16).train()
+    images = to_input(faces, CPU)
+    targets = torch.from_numpy(np.tile(direction_targets(SETTINGS, 72), (2, 1)))
+    size, rate = SETTINGS["batch_size"], SETTINGS["learning_rate"]
+    batches = len(images) // size
+    optimiser = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=0.1, fused=True)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, max_lr=rate, total_steps=2 * batches)
+    order = torch.Generator().manual_seed(3)
+    for _ in range(2):
+        for chosen in torch.randperm(len(images), generator=order)[: batches * size].split(size):
+            optimiser.zero_grad()
+            torch.nn.functional.mse_loss(network(images[chosen]), targets[chosen]).backward()
+            optimiser.step()
+            schedule.step()
+    expected = network.state_dict()
+    assert all(torch.equal(value, expected[name]) for name, value in trained.state_dict().items())
+
+
+def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():
+    faces = clock_faces(12)
+    first, again, other = (
+        train_network(faces[:10], SETTINGS | {"epochs": 12}, CPU, seed) for seed in (1, 1, 2)
+    )
+    estimate = estimate_azimuth(Estimator(first, SETTINGS, 16, []), faces[10:], CPU)
+    truth = np.arange(72) * 5.0
+    assert circular_distance_deg(estimate, truth).mean() < 6
+    states = [network.state_dict() for network in (first, again, other)]
+    assert all(torch.equal(states[0][name], states[1][name]) for name in states[0])
+    assert not torch.equal(states[0]["4.weight"], states[2]["4.weight"])
+
+
+def test_a_classifier_learns_to_read_a_clock():
+    faces = clock_faces(12)
+    settings = CLASSES | {"epochs": 12}
+    trained = train_estimator(named(faces), NAMES[:10], settings, CPU, 1)
+    estimate = estimate_azimuth(trained, faces[10:], CPU)
+    assert circular_distance_deg(estimate, np.arange(72) * 5.0).mean() < 6
+
+
+def test_outputs_do_not_depend_on_the_batch():
+    estimator, faces = untrained(), clock_faces(1, 20)
+    whole = network_outputs(estimator, faces, CPU)
+    assert whole.shape == (1, 20, 2)
+    np.testing.assert_allclose(whole, network_outputs(estimator, faces, CPU, 7), atol=1e-5)
+
+
+@given(st.integers(0, 99), st.integers(0, 23), st.floats(0.1, 10))
+def test_decoding_turns_with_the_classes_and_is_the_mean_direction(seed, k, scale):
+    logits = scale * np.random.default_rng(seed).normal(size=24)
+    estimate, turned = decode_classes(logits), decode_classes(np.roll(logits, k))
+    weights = np.exp(logits) / np.exp(logits).sum()
+    mean = sum(w * np.exp(2j * np.pi * c / 24) for c, w in enumerate(weights))
+    assert circular_distance_deg(turned, estimate + 15 * k) < 1e-6
+    assert circular_distance_deg(estimate, np.degrees(np.angle(mean))) < 1e-6
+
+
+def test_a_temperature_moves_a_classifiers_mean_and_leaves_a_regressors_angle():
+    outputs = np.random.default_rng(0).normal(size=(5, 24))
+    cold, warm = (decode(untrained(CLASSES), outputs, t) for t in (0.001, 2.0))
+    # The coldest distribution is its likeliest class alone.
+    assert circular_distance_deg(cold, outputs.argmax(axis=1) * 15.0).max() < 1e-6
+    assert circular_distance_deg(cold, warm).min() > 0.1
+    cold, warm = (decode(untrained(), outputs[:, :2], t) for t in (1.0, 3.0))
+    np.testing.assert_allclose(cold, warm)
+
+
+def test_an_estimator_comes_back_from_its_file_with_its_history(tmp_path):
+    faces = clock_faces(3, 24)
+    trained = train_estimator(named(faces), ["a", "c"], SETTINGS | {"epochs": 1}, CPU, 0)
+    save_estimator(tmp_path / "estimator.safetensors", trained, CPU)
+    read = load_estimator(tmp_path / "estimator.safetensors", CPU)
+    assert list(read.trained_on) == ["a", "c"]
+    assert read.image_side == 16
+    np.testing.assert_array_equal(*(network_outputs(e, faces, CPU) for e in (trained, read)))
+
+
+def test_each_part_is_asked_of_its_own_estimator():
+    torch.manual_seed(0)
+    faces = clock_faces(3, 8)
+    estimators = [untrained(seen=("b",)), untrained(seen=("a", "c"))]
+    parts = [["c", "a"], ["b"]]
+    names, outputs = outputs_of_parts(estimators, named(faces), parts, CPU)
+    assert names == ["c", "a", "b"]
+    for name, found in zip(names, outputs, strict=True):
+        asked = estimators[1] if name == "b" else estimators[0]
+        np.testing.assert_allclose(found, network_outputs(asked, faces["abc".index(name)], CPU))
+
+
+def test_objects_that_were_trained_on_are_refused():
+    estimators = [untrained(seen=("a", "b")), untrained(seen=("c",))]
+    with pytest.raises(UserError, match="'c' was trained on"):
+        outputs_of_parts(estimators, named(clock_faces(3, 8)), [["c"], ["b", "c"]], CPU)
+
+
+def test_an_object_without_images_is_named():
+    with pytest.raises(UserError, match="'d' has no depth images"):
+        outputs_of_parts([untrained()], named(clock_faces(3, 8)), [["a", "d"]], CPU)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"learning_rate": 1e30}, {"weight_decay": 1e38}, {"learning_rate": float("inf")}]
+)
+def test_a_training_that_diverges_stops_and_names_the_setting(wrong):
+    key = next(iter(wrong))
+    with pytest.raises(UserError, match=rf"not finite in epoch 1: lower .*{key}="):
+        train_network(clock_faces(3), SETTINGS | {"epochs": 2} | wrong, CPU, 0)
+
+
+def test_outputs_that_are_not_finite_are_refused():
+    estimator = untrained()
+    torch.nn.init.constant_(next(iter(estimator.network.parameters())), float("nan"))
+    with pytest.raises(UserError, match="outputs are not finite"):
+        network_outputs(estimator, clock_faces(1, 8), CPU)
+
+
+def test_a_damaged_estimator_is_named(tmp_path):
+    path = tmp_path / "estimator.safetensors"
+    save_estimator(path, untrained(), CPU)
+    whole = path.read_bytes()
+    for content in (b"", whole[:100], whole[:-1], b"\xff" * 64, whole.replace(b"nbv", b"xyz")):
+        path.write_bytes(content)
+        with pytest.raises(
+            UserError, match=r"estimator\.safetensors: .*run the same command again"
+        ):
+            load_estimator(path, CPU)
+
+
+def test_images_of_another_size_are_refused():
+    with pytest.raises(UserError, match="32 pixels a side"):
+        network_outputs(untrained(), clock_faces(1, 8, side=32), CPU)
+
+
+def test_every_depth_code_is_exact_in_bfloat16():
+    codes = np.arange(256, dtype=np.uint8).reshape(1, 16, 16)
+    half = to_input(codes, hw.Hardware(torch.device("cpu"), torch.bfloat16))
+    np.testing.assert_array_equal(half.float().numpy().ravel(), np.arange(256) / 128)
+
+
+def test_targets_of_a_regressor_are_unit_vectors():
+    targets = direction_targets(SETTINGS, 4)
+    np.testing.assert_allclose(targets, [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-7)
+
+
+@given(st.sampled_from([8, 24, 72]), st.floats(2, 60))
+def test_targets_of_a_classifier_are_circular_and_centred_on_the_azimuth(n_classes, bandwidth):
+    settings = {"n_classes": n_classes, "target_bandwidth_deg": bandwidth}
+    targets = class_targets(settings, 360).astype(np.float64)
+    np.testing.assert_allclose(targets.sum(axis=1), 1, atol=1e-6)
+    turned = np.roll(targets, (360 // n_classes, 1), axis=(0, 1))
+    np.testing.assert_allclose(turned, targets, atol=1e-6)
+    centres = np.arange(n_classes) * 360 / n_classes
+    for view in (0, 1, 100, 359):
+        apart = circular_distance_deg(centres, view)
+        by_distance = targets[view][np.argsort(apart)]
+        assert (np.diff(by_distance) <= 1e-7).all()
+
+
+@pytest.mark.parametrize("side", [8, 15, 33, 64])
+def test_any_image_side_fits_the_network(side):
+    images = torch.zeros(2, 1, side, side)
+    assert build_network(SETTINGS, side)(images).shape == (2, 2)
+    assert build_network(CLASSES, side)(images).shape == (2, 24)
+
+
+def test_bfloat16_and_float32_answer_alike():
+    faces = clock_faces(8)
+    trained = train_estimator(named(faces), NAMES[:7], SETTINGS, CPU, 0)
+    full = estimate_azimuth(trained, faces[7:], CPU)
+    half = estimate_azimuth(trained, faces[7:], hw.Hardware(torch.device("cpu"), torch.bfloat16))
+    assert np.median(circular_distance_deg(full, half)) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("device", "precision", "message"),
+    [
+        ("cdua", "auto", "did you mean 'cuda'"),
+        ("cpu", "bfloat61", "did you mean 'bfloat16'"),
+        ("cpu", "int8", "choose from: auto, bfloat16, float32"),
+    ],
+)
+def test_unknown_hardware(device, precision, message):
+    with pytest.raises(UserError, match=message):
+        hw.choose_hardware(device, precision)
+
+
+def test_a_device_that_is_not_there_is_refused():
+    if torch.cuda.is_available():
+        pytest.skip("this machine has CUDA")
+    with pytest.raises(UserError, match="device=cuda: this machine has none"):
+        hw.choose_hardware("cuda")
+
+
+@pytest.mark.parametrize(
+    ("cuda", "mps", "device"),
+    [(True, True, "cuda"), (False, True, "mps"), (False, False, "cpu")],
+)
+def test_auto_takes_the_first_device_that_is_there(monkeypatch, cuda, mps, device):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: cuda)
+    monkeypatch.setattr(torch.backends.mps, "is_available", lambda: mps)
+    assert str(hw.choose_hardware("auto", "float32")) == f"{device}, float32"
+
+
+@pytest.mark.parametrize("native", [True, False])
+def test_bfloat16_is_taken_where_the_device_has_it(monkeypatch, native):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "is_bf16_supported", lambda **_: native)
+    taken = "bfloat16" if native else "float32"
+    assert str(hw.choose_hardware("cuda")) == f"cuda, {taken}"
+    assert hw.choose_hardware("cuda", "bfloat16").dtype == torch.bfloat16
+
+
+def test_the_processors_own_precision_is_one_of_two_and_mps_computes_in_float32(monkeypatch):
+    assert hw.choose_hardware("cpu").dtype in (torch.bfloat16, torch.float32)
+    monkeypatch.setattr(torch.backends.mps, "is_available", lambda: True)
+    assert hw.choose_hardware("mps").dtype == torch.float32
+
+
+def test_an_unknown_network():
+    with pytest.raises(UserError, match=r"estimator\.kind=regresor: did you mean 'regressor'"):
+        build_network(SETTINGS | {"kind": "regresor"}, 16)

@@ -1,0 +1,241 @@
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from nbv.errors import UserError
+from nbv.experiment.checksums import write_checksum
+from nbv.experiment.jobs import NO_SPACE, is_verbose, job, why_stopped
+
+
+@pytest.fixture
+def snakemake(tmp_path):
+    yield SimpleNamespace(
+        input=[],
+        output=["out.csv"],
+        log=[str(tmp_path / "logs" / "train" / "mug.log")],
+        rule="train",
+        wildcards=["mug", "00"],
+        config={},
+    )
+    root = logging.getLogger()
+    for handler in root.handlers[:]:
+        if type(handler) in (logging.FileHandler, logging.StreamHandler):
+            root.removeHandler(handler)
+            handler.close()
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (UserError("x.obj: no faces"), "error: x.obj: no faces"),
+        (
+            OSError(errno.ENOSPC, "No space left on device"),
+            "error: out.csv: no space left on the disk; free some and run the same command again",
+        ),
+        (
+            OSError(errno.ENOSPC, "No space left on device", "a.npy"),
+            "error: a.npy: no space left on the disk; free some and run the same command again",
+        ),
+        (
+            OSError(errno.EROFS, "Read-only file system", "a.npy"),
+            "error: a.npy: cannot be written, the file system is read-only",
+        ),
+        (
+            MemoryError("Unable to allocate 7 TiB"),
+            "error: memory ran out (Unable to allocate 7 TiB): use fewer --cores, or smaller "
+            "settings",
+        ),
+        (
+            RuntimeError("[enforce fail] DefaultCPUAllocator: can't allocate memory: 9 bytes"),
+            "error: memory ran out ([enforce fail] DefaultCPUAllocator: can't allocate memory: 9 "
+            "bytes): use fewer --cores, or smaller settings",
+        ),
+        (UserError("two\nlines"), "error: two\\nlines"),
+    ],
+)
+def test_a_mistake_is_one_line_everywhere(snakemake, tmp_path, capsys, error, line):
+    with pytest.raises(SystemExit) as exit_, job(snakemake):
+        raise error
+    assert exit_.value.code == 1
+    assert (tmp_path / "logs" / "last_error.txt").read_text() == line + "\n"
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert f"train mug/00] {line}" in printed
+
+
+def test_an_error_while_tidying_up_hides_no_full_disk(snakemake, capsys):
+    """As with a PDF that matplotlib cannot finish."""
+
+    def write() -> None:
+        try:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        finally:
+            raise AttributeError("'Stream' object has no attribute 'pos'")
+
+    with pytest.raises(SystemExit), job(snakemake):
+        write()
+    assert "error: out.csv: no space left on the disk" in capsys.readouterr().err
+
+
+def test_a_crash_keeps_its_traceback_in_the_log_alone(snakemake, capsys):
+    with pytest.raises(SystemExit), job(snakemake):
+        raise ZeroDivisionError("oh")
+    assert "Traceback" not in capsys.readouterr().err
+    assert "Traceback" in Path(snakemake.log[0]).read_text()
+
+
+def test_progress_goes_to_the_log_and_with_verbose_to_the_terminal(snakemake, capsys):
+    with job(snakemake):
+        logging.getLogger("nbv.experiment.estimation").info("epoch 1")
+        logging.getLogger("nbv.experiment.estimation").warning("no depth")
+        logging.getLogger("nbv.experiment.reference").info("agrees", extra={"for_terminal": True})
+    printed = capsys.readouterr().err
+    assert "epoch 1" not in printed
+    assert "train mug/00] no depth" in printed
+    assert "train mug/00] agrees" in printed
+    logged = Path(snakemake.log[0]).read_text()
+    assert logged.index("epoch 1") < logged.index("no depth") < logged.index("agrees")
+    snakemake.config = {"verbose": True}
+    with job(snakemake):
+        logging.getLogger("nbv.experiment.estimation").info("epoch 1")
+    assert "train mug/00] epoch 1" in capsys.readouterr().err
+
+
+def test_verbose_is_true_or_false():
+    assert not is_verbose({})
+    assert is_verbose({"verbose": True})
+    assert is_verbose({"verbose": "true"})
+    assert not is_verbose({"verbose": "false"})
+    with pytest.raises(UserError, match="--config verbose=maybe: write true or false"):
+        is_verbose({"verbose": "maybe"})
+
+
+def test_inputs_are_held_to_their_checksums_and_outputs_get_theirs(
+    snakemake, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    snakemake.input, snakemake.output = ["results/a/in.csv"], ["results/a/out.csv"]
+    Path("results/a").mkdir(parents=True)
+    Path("results/a/in.csv").write_text("whole")
+    write_checksum("results/a/in.csv")
+    with job(snakemake):
+        Path("results/a/out.csv").write_text("made")
+    assert Path("results/a/checksums/out.csv.sha256").is_file()
+    Path("results/a/in.csv").write_text("wholf")
+    with pytest.raises(SystemExit), job(snakemake):
+        raise AssertionError("a damaged input was read")
+    assert "results/a/in.csv changed" in Path("logs/last_error.txt").read_text()
+
+
+def test_a_log_that_cannot_be_written_is_named(snakemake, tmp_path, capsys):
+    (tmp_path / "logs").write_text("a file where the folder should be")
+    with pytest.raises(SystemExit), job(snakemake):
+        pass
+    assert "mug.log: cannot be written" in capsys.readouterr().err
+
+
+@pytest.fixture
+def ended(snakemake, tmp_path):
+    def run(name, error=None):
+        snakemake.log[0] = str(tmp_path / "results" / "logs" / f"{name}.log")
+        try:
+            with job(snakemake):
+                if error is not None:
+                    raise error
+        except (SystemExit, KeyboardInterrupt):
+            pass
+
+    return run
+
+
+KILLED = "error: killed from outside: "
+
+
+def test_jobs_that_end_without_a_word_were_killed(ended, tmp_path):
+    logs, since = tmp_path / "results" / "logs", time.time() - 5
+    ended("whole")
+    ended("interrupted", KeyboardInterrupt())
+    assert why_stopped(logs, since) == []
+    ended("crashed", ZeroDivisionError())
+    ended("failed", UserError("x"))
+    assert why_stopped(logs, since) == ["error: x"]
+    (logs / "train").mkdir()
+    (logs / "train/mug.log").write_text("[10:00:00 train mug] epoch 3\n")
+    (logs / "train/old.log").write_text("[10:00:00 train old] epoch 3\n")
+    os.utime(logs / "train/old.log", (since - 100, since - 100))
+    failed, killed, advice = why_stopped(logs, since)
+    assert (failed, killed) == ("error: x", f"{KILLED}train/mug")
+    assert "fewer --cores" in advice
+
+
+# What Snakemake logs of a script that ended by itself, that a signal ended, and of a full disk.
+FAILED = "Command 'python train.py' returned non-zero exit status 1."
+SIGNALLED = "Command 'python render.py' died with <Signals.SIGKILL: 9>."
+FULL = f"OSError: [Errno {errno.ENOSPC}] {os.strerror(errno.ENOSPC)}"
+
+
+@pytest.mark.parametrize(
+    ("told", "cut_off", "first"),
+    [
+        (SIGNALLED, False, f"{KILLED}render"),  # it had no time to begin its log
+        (SIGNALLED, True, f"{KILLED}cut"),
+        (f"{FAILED}\n{SIGNALLED}", True, f"{KILLED}cut"),
+        (FAILED, True, None),  # a full disk cut its log off
+        (FULL, False, f"error: {{results}}: {NO_SPACE}"),
+        ("", False, None),
+    ],
+)
+def test_the_log_of_snakemake_says_what_no_job_could(told, cut_off, first, tmp_path):
+    results = tmp_path / "results"
+    logs, of_snakemake = results / "logs", tmp_path / "snakemake.log"
+    logs.mkdir(parents=True)
+    of_snakemake.write_text(told)
+    if cut_off:
+        (logs / "cut.log").write_text("[10:00:00 cut] epo")
+    lines = why_stopped(logs, time.time() - 5, [of_snakemake])
+    assert lines[:1] == ([] if first is None else [first.format(results=results)])
+
+
+# A process called snakemake starts a shell, which starts a job that says how long it lives.
+STARTER = """
+import subprocess, sys
+subprocess.run(["bash", "-c", f"{sys.executable} {sys.argv[1]}; true"])
+"""
+JOB = """
+import time
+from pathlib import Path
+from nbv.experiment.processes import end_with_snakemake
+end_with_snakemake()
+for beat in range(600):
+    Path("beat.txt").write_text(str(beat))
+    time.sleep(0.1)
+"""
+
+
+def test_a_job_ends_soon_after_its_snakemake_was_killed(tmp_path):
+    (tmp_path / "snakemake").write_text(STARTER)
+    (tmp_path / "job.py").write_text(JOB)
+    starter = subprocess.Popen([sys.executable, "snakemake", "job.py"], cwd=tmp_path)
+    beat = tmp_path / "beat.txt"
+    for _ in range(200):
+        if beat.exists():
+            break
+        time.sleep(0.1)
+    starter.send_signal(signal.SIGKILL)
+    starter.wait()
+    deadline = time.monotonic() + 30
+    last = None
+    while beat.read_text() != last and time.monotonic() < deadline:
+        last = beat.read_text()
+        time.sleep(2)
+    assert 0 < int(last) < 400

@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+
+import synthetic
+from conftest import N_FOLDS
+from nbv.errors import UserError
+from nbv.experiment import results
+from nbv.experiment.two_views import COLUMNS
+from nbv.files import write_csv
+
+MUG = ("mug", 0)
+
+
+def load(path):
+    return results.load_evaluations({(*MUG, 1, "single"): path})[MUG]
+
+
+def test_a_unit_has_every_method_fold_object_and_view(evaluations):
+    frame = evaluations[MUG]
+    assert list(frame.columns) == ["method", "fold", *COLUMNS]
+    assert len(frame) == 4 * 9 * synthetic.N_VIEWS
+    assert list(frame["method"].cat.categories) == list(synthetic.METHODS)
+    assert set(frame["object_id"]) == {f"{index:04d}" for index in range(9)}
+    assert frame.loc[frame["method"] == "single", "delta_deg"].isna().all()
+
+
+def test_what_a_file_is_about_is_told_and_not_read_from_its_path(tree, tmp_path):
+    path = synthetic.evaluation_files(tree, [MUG], 1)[*MUG, 1, "single"]
+    copy = tmp_path / "anything.csv"
+    copy.write_bytes(path.read_bytes())
+    units = results.load_evaluations({("spoon", 45, 7, "other"): copy, (*MUG, 1, "single"): path})
+    assert list(units) == [("spoon", 45), MUG]
+    assert set(units["spoon", 45]["fold"]) == {7}
+    assert set(units["spoon", 45]["method"]) == {"other"}
+    pd.testing.assert_frame_equal(
+        units["spoon", 45][list(COLUMNS)], units[MUG][list(COLUMNS)], check_exact=True
+    )
+
+
+def test_units_and_methods_keep_the_order_of_the_files(tree):
+    methods = synthetic.METHODS[::-1]
+    files = synthetic.evaluation_files(tree, [("chair", 0), MUG], N_FOLDS, methods)
+    units = results.load_evaluations(files)
+    assert list(units) == [("chair", 0), MUG]
+    assert list(units[MUG]["method"].cat.categories) == list(methods)
+    assert list(units[MUG]["method"].unique()) == list(methods)
+
+
+def test_objects_come_in_the_order_of_the_splits(tree):
+    ids = results.load_object_ids(synthetic.split_files(tree, [MUG])["mug"])
+    assert ids == tuple(f"{index:04d}" for index in range(9))
+
+
+def test_a_missing_file_is_named(tree):
+    with pytest.raises(UserError, match=r"el00/fold4/single\.csv does not exist"):
+        results.load_evaluations(synthetic.evaluation_files(tree, [MUG], N_FOLDS + 1))
+    with pytest.raises(UserError, match=r"spoon\.csv does not exist"):
+        results.load_object_ids(tree / "splits/spoon.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "cannot be read"),
+        ("object_id,initial_deg\n", "no column 'initial_estimate_deg'"),
+        (",".join(COLUMNS) + "\n", "holds no rows"),
+    ],
+)
+def test_a_broken_file_is_named(tmp_path, text, message):
+    path = tmp_path / "single.csv"
+    path.write_text(text)
+    with pytest.raises(UserError, match=rf"single\.csv: {message}"):
+        load(path)
+
+
+def test_object_ids_are_names_whatever_they_look_like(tree, tmp_path):
+    names = ["0007", "NA", "null", "None", "nan", "1e3", "inf", "-", "true"]
+    path = synthetic.evaluation_files(tree, [MUG], 1)[*MUG, 1, "single"]
+    turn = pd.read_csv(path).head(synthetic.N_VIEWS)
+    write_csv(tmp_path / "single.csv", pd.concat([turn.assign(object_id=name) for name in names]))
+    unit = load(tmp_path / "single.csv")
+    assert unit["object_id"].drop_duplicates().tolist() == names
+    assert unit["delta_deg"].isna().all()
+    splits = [pd.DataFrame({"object_id": names, "fold": fold, "role": "train"}) for fold in (1, 2)]
+    splits[0].loc[::2, "role"] = splits[1].loc[1::2, "role"] = "test"
+    write_csv(tmp_path / "mug.csv", pd.concat(splits))
+    assert results.load_object_ids(tmp_path / "mug.csv") == tuple(names)
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("error_deg", None),
+        ("error_deg", 180.5),
+        ("error_deg", -1.0),
+        ("pose_estimate_deg", 360.0),
+        ("initial_estimate_deg", None),
+        ("initial_estimate_deg", 1e300),
+        ("delta_deg", None),
+        ("delta_deg", 400.0),
+        ("next_estimate_deg", None),
+        ("initial_deg", 17.0),
+        ("object_id", "other"),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused(tree, tmp_path, column, value):
+    path = synthetic.evaluation_files(tree, [MUG], 1)[*MUG, 1, "opposite"]
+    frame = pd.read_csv(path, dtype={"object_id": str})
+    frame.loc[500, column] = value
+    write_csv(tmp_path / "single.csv", frame)
+    with pytest.raises(UserError, match=r"single\.csv: .*; delete the file and run"):
+        load(tmp_path / "single.csv")
+
+
+def test_methods_that_tested_other_objects_are_refused(tree, tmp_path):
+    files = synthetic.evaluation_files(tree, [MUG], 1)
+    frame = pd.read_csv(files[*MUG, 1, "opposite"], dtype={"object_id": str})
+    fewer = frame[frame["object_id"] != frame["object_id"].iloc[0]]
+    write_csv(tmp_path / "opposite.csv", fewer)
+    files[*MUG, 1, "opposite"] = tmp_path / "opposite.csv"
+    with pytest.raises(UserError, match=r"mug at 0°, fold 1: object '0000' is not evaluated by"):
+        results.load_evaluations(files)
+
+
+def test_an_object_tested_in_two_folds_is_refused(tree):
+    files = synthetic.evaluation_files(tree, [MUG], 2)
+    for method in synthetic.METHODS:
+        files[*MUG, 2, method] = files[*MUG, 1, method]
+    with pytest.raises(UserError, match="'0000' is tested in more than one fold"):
+        results.load_evaluations(files)

@@ -1,0 +1,150 @@
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from clock_faces import CPU, SETTINGS, clock_faces, named, untrained
+from nbv.errors import UserError
+from nbv.experiment.config import load_config
+from nbv.experiment.estimation.training import train_estimator, train_network
+from nbv.experiment.estimation.warm_start import (
+    STAGES,
+    stage_from,
+    stage_settings,
+    start_of,
+    with_category,
+)
+from nbv.experiment.estimation.weights import Estimator, read_start, save_estimator
+from projects import ROOT
+
+ELEVATIONS = st.sets(st.integers(0, 89), min_size=1)
+
+
+@given(ELEVATIONS, st.sampled_from(["none", "elevations", "categories", "both"]))
+def test_every_chain_of_starts_ends_with_what_the_setting_says(elevations, warm_start):
+    for elevation in elevations:
+        chain: list[int | str | None] = [elevation]
+        while isinstance(chain[-1], int):
+            chain.append(start_of(warm_start, elevations, chain[-1]))
+        *steps, last = chain
+        if warm_start in ("elevations", "both"):
+            assert steps == sorted((e for e in elevations if e <= elevation), reverse=True)
+        else:
+            assert steps == [elevation]
+        assert last == ("pretrained" if warm_start in ("categories", "both") else None)
+
+
+@pytest.mark.parametrize("kind", ["regressor", "classifier"])
+def test_a_stage_has_its_own_epochs_and_rate_and_nothing_of_the_others(kind):
+    estimator = load_config(ROOT / "config", [f"estimator={kind}"])["estimator"]
+    stages = {stage: stage_settings(estimator, stage) for stage in STAGES}
+    for stage, settings in stages.items():
+        own = estimator if stage == "training" else estimator[stage]
+        assert (settings["epochs"], settings["learning_rate"]) == (
+            own["epochs"],
+            own["learning_rate"],
+        )
+    # What a training from random weights is recorded with: the same keys as ever.
+    assert set(stages["training"]) == set(estimator) - {"warm_start", *STAGES}
+    assert all(set(settings) == set(stages["training"]) for settings in stages.values())
+
+
+@pytest.mark.parametrize(
+    ("start", "stage"), [(None, "training"), ("pretrained", "fine_tuning"), (0, "next_elevation")]
+)
+def test_what_a_training_starts_from_decides_its_stage(start, stage):
+    assert stage_from(start) == stage
+
+
+@given(st.integers(1, 100), st.integers(1, 100), st.integers(1, 100))
+def test_stages_keep_their_proportion_where_epochs_are_fewer(whole, fewer, own):
+    estimator = {
+        "epochs": whole,
+        "learning_rate": 0.1,
+        "fine_tuning": {"epochs": own, "learning_rate": 0.2},
+    }
+    assert stage_settings(estimator, "training", fewer)["epochs"] == fewer
+    epochs = stage_settings(estimator, "fine_tuning", fewer)["epochs"]
+    assert epochs >= 1
+    assert abs(epochs - own * fewer / whole) <= max(0.5, 1 - own * fewer / whole)
+
+
+def test_a_training_starts_from_the_weights_given_and_leaves_them(rng):
+    faces = clock_faces(4)
+    start = train_network(faces, SETTINGS | {"epochs": 2}, CPU, 0)
+    before = {name: values.clone() for name, values in start.state_dict().items()}
+    still = {"epochs": 1, "learning_rate": 1e-12, "weight_decay": 0.0}
+    warm = train_network(faces, SETTINGS | still, CPU, 1, start)
+    cold = train_network(faces, SETTINGS | still, CPU, 1)
+    own, other = dict(warm.named_parameters()), dict(cold.named_parameters())
+    for name, values in start.named_parameters():
+        torch.testing.assert_close(values, own[name], atol=1e-6, rtol=0)
+    assert any(not torch.allclose(values, other[name]) for name, values in start.named_parameters())
+    for name, values in start.state_dict().items():
+        assert torch.equal(values, before[name])
+
+
+def saved(path, seen, settings=SETTINGS) -> str:
+    save_estimator(path, untrained(settings, seen=tuple(seen)), CPU)
+    return str(path)
+
+
+def test_an_estimator_says_what_it_started_from(tmp_path):
+    (tmp_path / "el00").mkdir()
+    path = saved(tmp_path / "el00/estimator.safetensors", ["a", "c"])
+    start = read_start(path, "mug", ["c", "a"], str(tmp_path / "el15/one.safetensors"), CPU)
+    settings = SETTINGS | {"epochs": 1}
+    trained = train_estimator(named(clock_faces(3, 24)), ["a", "c"], settings, CPU, 0, start)
+    digest = hashlib.sha256((tmp_path / "el00/estimator.safetensors").read_bytes()).hexdigest()
+    assert trained.started_from == {"path": "../el00/estimator.safetensors", "sha256": digest}
+    assert trained.trained_on == ["a", "c"]
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [
+        ["a", "b"],
+        ["a"],
+        ["a", "c", "b"],
+        with_category("mug", ["a", "b", "c"]),
+        with_category("mug", ["a"]) + with_category("car", ["c"]),
+        [],
+    ],
+)
+def test_what_has_seen_other_objects_of_the_category_is_no_start(tmp_path, seen):
+    path = saved(tmp_path / "start.safetensors", seen)
+    with pytest.raises(UserError, match=r"start\.safetensors: it has seen other objects of mug"):
+        read_start(path, "mug", ["a", "c"], path, CPU)
+
+
+def test_objects_of_other_categories_may_have_the_same_names(tmp_path):
+    seen = with_category("mug", ["a", "c"]) + with_category("car", ["a", "b"])
+    path = saved(tmp_path / "start.safetensors", seen)
+    start = read_start(path, "mug", ["c", "a"], path, CPU)
+    assert isinstance(start.network, torch.nn.Module)
+
+
+def test_a_start_of_another_size_is_refused(tmp_path):
+    path = saved(tmp_path / "start.safetensors", "abc", SETTINGS | {"hidden": 16})
+    start = read_start(path, "mug", list("abc"), path, CPU)
+    with pytest.raises(UserError, match="starts from a network of another size"):
+        train_network(clock_faces(3), SETTINGS, CPU, 0, start.network)
+
+
+def test_the_same_start_and_seed_give_the_same_bits():
+    faces = clock_faces(3, 24)
+    settings = SETTINGS | {"epochs": 1}
+    start = train_network(faces, settings, CPU, 0)
+    first, again = (
+        Estimator(train_network(faces, settings, CPU, 1, start), settings, 16, "abc")
+        for _ in range(2)
+    )
+    for one, other in zip(
+        first.network.state_dict().values(), again.network.state_dict().values(), strict=True
+    ):
+        np.testing.assert_array_equal(one.numpy(), other.numpy())

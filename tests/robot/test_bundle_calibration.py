@@ -1,0 +1,343 @@
+"""What held-out turns teach about a network."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from made_bundles import BINS, WIDTH, random_codes, soft_turns
+from nbv.core.angles import circular_distance_deg
+from nbv.core.belief import mean_direction_deg
+from nbv.core.beliefs import distributions_of
+from nbv.core.density_selection import chosen_lookup
+from nbv.core.posteriors import turned
+from nbv.errors import UserError
+from nbv.robot.calibration import (
+    DENSITY,
+    LEAST_LIMIT,
+    PRIOR_TURNS,
+    paper_tables,
+    recalibrated,
+    temperature_of,
+    without_offset,
+)
+from nbv.robot.ood import unfamiliarity
+from nbv.robot.pair_distributions import bin_apart
+from nbv.robot.pairs import WIDEST_GAP_DEG
+from nbv.robot.recommender import Recommender
+from nbv.robot.sweeps import Turn
+
+AZIMUTHS = np.arange(BINS) * WIDTH
+# Where the choice of a density does not matter.
+ONE_DENSITY = {**DENSITY, "bandwidths_deg": [8], "pseudo_observations": [10]}
+
+
+def turn(
+    name="a", seed=0, azimuth_deg=AZIMUTHS, elevation=0.0, logits=None, codes=None, sequence="1"
+):
+    rng = np.random.default_rng(seed)
+    n = len(azimuth_deg)
+    if logits is None:
+        classes = np.arange(BINS) * WIDTH
+        aim = 3.0 * np.cos(np.radians(classes - np.asarray(azimuth_deg)[:, None]))
+        logits = aim + rng.normal(0, 0.5, (n, BINS))
+    codes = random_codes(rng, n) if codes is None else codes
+    return Turn(name, sequence, elevation, np.asarray(azimuth_deg, float), logits, codes)
+
+
+def without_common_error(logits):
+    """The mean of views and of their mirror images at 0°: errors come in pairs, e and -e."""
+    return (logits + logits[-np.arange(len(logits))][:, -np.arange(logits.shape[1])]) / 2
+
+
+# Views a bin apart
+
+
+@given(order=st.permutations(range(BINS)), start=st.integers(-3, 3))
+def test_views_a_bin_apart_stay_as_they_are_in_any_order(order, start):
+    rows = np.random.default_rng(0).dirichlet(np.ones(BINS), BINS)
+    order = np.array(order)
+    azimuth_deg = AZIMUTHS[order] + 360.0 * start
+    assert np.array_equal(bin_apart(azimuth_deg, rows[order]), rows.astype(np.float32))
+
+
+@given(seed=st.integers(0, 10**6), times=st.integers(2, 5))
+def test_views_between_the_bins_do_not_matter_where_bins_have_their_own(seed, times):
+    rng = np.random.default_rng(seed)
+    azimuth_deg = np.arange(BINS * times) * (WIDTH / times)
+    rows = rng.dirichlet(np.ones(BINS), len(azimuth_deg))
+    assert np.array_equal(bin_apart(azimuth_deg, rows), rows[::times].astype(np.float32))
+
+
+@given(seed=st.integers(0, 10**6), base=st.integers(0, BINS - 1))
+def test_a_turn_of_the_object_turns_views_and_rows(seed, base):
+    """Azimuths that all grow by some bins give the same table, rolled along both axes."""
+    rng = np.random.default_rng(seed)
+    azimuth_deg = (np.arange(0, 360, 7.5) + rng.uniform(-3, 3, 48)) % 360
+    rows = rng.dirichlet(np.ones(BINS), 48)
+    moved = bin_apart(azimuth_deg + base * WIDTH, np.roll(rows, base, axis=1))
+    wanted = np.roll(bin_apart(azimuth_deg, rows), (base, base), axis=(0, 1))
+    assert moved == pytest.approx(wanted, abs=1e-6)
+
+
+@given(seed=st.integers(0, 10**6), n=st.integers(30, 200))
+def test_each_bin_takes_its_nearest_view(seed, n):
+    """By a search over all views, for each bin."""
+    rng = np.random.default_rng(seed)
+    azimuth_deg = (np.arange(n) * 360.0 / n + rng.uniform(0, 360.0 / n)) % 360
+    order = rng.permutation(n)
+    azimuth_deg, rows = azimuth_deg[order], rng.dirichlet(np.ones(BINS), n)
+    found = bin_apart(azimuth_deg, rows)
+    assert found.sum(axis=1) == pytest.approx(1.0, abs=1e-5)
+    for bin_, row in enumerate(found):
+        apart = circular_distance_deg(azimuth_deg, bin_ * WIDTH)
+        tied = np.flatnonzero(apart < apart.min() + 1e-9)
+        choices = [
+            turned(rows[view], (azimuth_deg[view] - bin_ * WIDTH + 180) % 360 - 180)
+            for view in tied
+        ]
+        assert min(np.abs(row - choice).max() for choice in choices) < 1e-6
+
+
+@given(offset=st.floats(0.0, 15.0))
+def test_a_sure_network_stays_right(offset):
+    """Views off the bins, each with all its mass at its own azimuth: between two bins."""
+    azimuth_deg = AZIMUTHS + offset
+    rows = np.stack(
+        [
+            np.interp((AZIMUTHS - a + 180) % 360 - 180, [-WIDTH, 0, WIDTH], [0, 1, 0])
+            for a in azimuth_deg
+        ]
+    )
+    rows /= rows.sum(axis=1, keepdims=True)
+    found = mean_direction_deg(bin_apart(azimuth_deg, rows))
+    assert circular_distance_deg(found, AZIMUTHS).max() < 0.1
+
+
+@pytest.mark.parametrize("views", [[0], [0, 180], list(range(0, 340, 5)), list(range(10, 355, 15))])
+def test_a_gap_is_refused(views):
+    views = np.array(views, dtype=float)
+    with pytest.raises(UserError, match="° apart somewhere on the turn") as error:
+        bin_apart(views, np.full((len(views), BINS), 1 / BINS))
+    widest = np.diff(np.sort(views), append=views.min() + 360).max()
+    assert f"{widest:.0f}°" in str(error.value)
+
+
+def test_azimuths_in_radians_are_named():
+    views = np.radians(AZIMUTHS)
+    with pytest.raises(UserError, match="these azimuths seem to be radians"):
+        bin_apart(views, np.full((len(views), BINS), 1 / BINS))
+
+
+def test_a_view_every_15_degrees_is_enough():
+    views = np.arange(0, 360, WIDEST_GAP_DEG) + 7.0
+    assert bin_apart(views, np.full((len(views), 120), 1 / 120)).shape == (120, 120)
+
+
+def test_a_gap_over_0_degrees_is_seen():
+    views = np.arange(10.0, 351.0, 10.0)
+    with pytest.raises(UserError, match="20°"):
+        bin_apart(views, np.full((len(views), BINS), 1 / BINS))
+
+
+# Temperature
+
+
+@pytest.mark.parametrize("temperature", [0.3, 1.0, 4.0])
+def test_the_temperature_of_samples_is_found(temperature):
+    """Truths that are drawn from the distributions at a temperature, at the classes' centres."""
+    rng = np.random.default_rng(0)
+    logits = rng.normal(0, 3, (4000, BINS))
+    p = np.exp(logits / temperature)
+    p /= p.sum(axis=1, keepdims=True)
+    truth = np.array([rng.choice(BINS, p=row) for row in p]) * WIDTH
+    halves = [
+        turn(azimuth_deg=truth[part], logits=logits[part]) for part in (np.s_[:1500], np.s_[1500:])
+    ]
+    assert temperature_of(halves) == pytest.approx(temperature, rel=0.1)
+
+
+def test_logits_that_grow_raise_the_temperature():
+    one, other = turn(), turn(logits=5 * turn().logits)
+    assert temperature_of([other]) == pytest.approx(5 * temperature_of([one]), rel=1e-3)
+
+
+# The paper's tables
+
+
+def test_each_elevation_has_the_lookup_table_of_its_own_pairs(bundle):
+    """As made of calibration pairs that are a degree apart."""
+    density = {**DENSITY, "bandwidths_deg": [6, 12], "pseudo_observations": [10]}
+    found = paper_tables(bundle.elevation_deg, bundle.distributions, density)
+    assert found.elevation_deg.tolist() == [0.0, 30.0]
+    angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
+    for elevation, rotations in zip(found.elevation_deg, found.rotation_deg, strict=True):
+        of_level = bundle.distributions[bundle.elevation_deg == elevation]
+        means = np.degrees(np.angle(of_level @ angles))
+        # Views between two bins take the error of the nearer one; of equals, that of the first.
+        view = np.arange(360)
+        near = np.array([np.abs((AZIMUTHS - v + 180) % 360 - 180).argmin() for v in view])
+        estimates = (means[:, near] + view - AZIMUTHS[near]) % 360
+        wanted = chosen_lookup(estimates, "pose_ambiguity", density).recommended_delta_deg
+        assert np.mean(rotations == wanted) > 0.99
+
+
+# A bundle for another camera
+
+
+def test_a_bundle_is_calibrated_again(bundle):
+    logits = [without_common_error(2 * t) for t in soft_turns(np.random.default_rng(5), 3)]
+    turns = [
+        turn("x", logits=logits[0], elevation=10.0),
+        turn("x", logits=logits[1], elevation=np.nan),
+        turn("y", logits=logits[2], elevation=40.0),
+    ]
+    found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY)
+    assert found.object_ids == ("x", "x", "y", *bundle.object_ids)
+    assert np.array_equal(
+        found.elevation_deg, [10.0, np.nan, 40.0, *bundle.elevation_deg], equal_nan=True
+    )
+    assert found.elevation_deg.dtype == found.turn_weight.dtype == np.float32
+    # The pseudo-observations have the weight that they had next to the bundle's own turns.
+    assert np.array_equal(found.turn_weight[3:], bundle.turn_weight)
+    assert found.turn_weight[:3] == pytest.approx(len(bundle.object_ids) / PRIOR_TURNS)
+    # The bundle's own turns stay, as they are at the new temperature.
+    prior = np.log(bundle.distributions.astype(float)) * bundle.temperature / found.temperature
+    prior -= np.log(np.exp(prior).sum(axis=-1, keepdims=True))
+    assert np.log(found.distributions[3:]) == pytest.approx(prior, abs=1e-3)
+    for row, own in zip(found.distributions[:3], logits, strict=True):
+        assert row == pytest.approx(distributions_of(own, found.temperature), rel=1e-5)
+    known = bundle.familiarity
+    scores = np.concatenate([unfamiliarity(known, one.codes, one.logits) for one in turns])
+    limit = max(np.quantile(scores, 0.95), LEAST_LIMIT)
+    assert found.familiarity.threshold == pytest.approx(limit * known.threshold)
+    assert np.array_equal(found.familiarity.references, known.references)
+    # Each turn counts for the nearest table; without an elevation, for the lowest.
+    of_table = np.array([0.0, 0.0, 30.0, *bundle.elevation_deg])
+    wanted = paper_tables(of_table, found.distributions, ONE_DENSITY)
+    assert found.paper.elevation_deg.tolist() == bundle.paper.elevation_deg.tolist() == [0.0, 30.0]
+    assert np.array_equal(found.paper.rotation_deg, wanted.rotation_deg)
+    assert found.weights is bundle.weights
+    more = {"calibrated_by": "recording.csv", "turns_made_with": len(bundle.object_ids)}
+    assert found.provenance == {**bundle.provenance, **more}
+    assert "calibrated_by" not in bundle.provenance
+
+
+@pytest.mark.parametrize("zero", [1.0, -9.0, 90.0])
+def test_the_zero_of_the_turntable_does_not_matter(bundle, zero):
+    """Nor whether several turns have several."""
+    turns = [turn("x", 1), turn("y", 2, azimuth_deg=AZIMUTHS + 4.0)]
+    moved = [
+        replace(turns[0], azimuth_deg=(turns[0].azimuth_deg + zero) % 360),
+        replace(turns[1], azimuth_deg=(turns[1].azimuth_deg - 2 * zero) % 360),
+    ]
+    found, wanted = (recalibrated(bundle, each, "r", ONE_DENSITY) for each in (moved, turns))
+    assert found.temperature == pytest.approx(wanted.temperature)
+    assert found.distributions == pytest.approx(wanted.distributions, abs=1e-6)
+    assert np.array_equal(found.paper.rotation_deg, wanted.paper.rotation_deg)
+
+
+@pytest.mark.parametrize("temperature", [0.2, 1.0])
+def test_the_offset_is_that_of_the_estimates_at_the_temperature(temperature):
+    given = turn("x", 1, azimuth_deg=AZIMUTHS + 4.0)
+    estimates = mean_direction_deg(distributions_of(given.logits, temperature))
+    errors = (estimates - given.azimuth_deg + 180) % 360 - 180
+    wanted = (given.azimuth_deg + np.median(errors)) % 360
+    found = without_offset(given, temperature).azimuth_deg
+    assert circular_distance_deg(found, wanted).max() < 1e-9
+
+
+@pytest.mark.parametrize("azimuth_deg", [-AZIMUTHS, np.radians(AZIMUTHS), 7.0 * AZIMUTHS])
+def test_azimuths_that_estimates_do_not_follow_stay(azimuth_deg):
+    given = replace(turn("x", 1), azimuth_deg=azimuth_deg % 360)
+    assert without_offset(given, 1.0) is given
+
+
+def test_azimuths_in_radians_are_named_for_a_bundle_too(bundle):
+    given = replace(turn("x", 1), azimuth_deg=np.radians(AZIMUTHS))
+    with pytest.raises(UserError, match="these azimuths seem to be radians"):
+        recalibrated(bundle, [given], "r", ONE_DENSITY)
+
+
+def test_calibrations_one_after_the_other_weigh_turns_as_one_with_all(bundle):
+    logits = 2 * soft_turns(np.random.default_rng(5), 3)
+    first, *others = (turn(str(place), logits=rows) for place, rows in enumerate(logits))
+    twice = recalibrated(bundle, [first], "one.csv", ONE_DENSITY)
+    twice = recalibrated(twice, others, "others.csv", ONE_DENSITY)
+    once = recalibrated(bundle, [*others, first], "all.csv", ONE_DENSITY)
+    assert twice.object_ids == once.object_ids
+    assert np.array_equal(twice.turn_weight, once.turn_weight)
+    assert twice.temperature == pytest.approx(once.temperature, rel=0.02)
+
+
+def log_likelihood_at(temperature: float, logits, azimuth_deg) -> float:
+    """The mean over views whose azimuths are classes' centres, by hand."""
+    scaled = logits / temperature
+    logs = scaled - np.log(np.exp(scaled).sum(axis=1, keepdims=True))
+    place = np.rint(azimuth_deg / WIDTH).astype(int)
+    return float(np.mean([row[c] for row, c in zip(logs, place, strict=True)]))
+
+
+@pytest.mark.parametrize("n_turns", [1, 40])
+def test_the_temperature_is_the_likeliest_of_turns_and_of_the_bundles_own(bundle, n_turns):
+    """The bundle's turns together count as `PRIOR_TURNS` of the others."""
+    logits = [without_common_error(5 * t) for t in soft_turns(np.random.default_rng(6), n_turns)]
+    turns = [turn(str(place), logits=rows) for place, rows in enumerate(logits)]
+    found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY).temperature
+    own = [bundle.temperature * np.log(rows.astype(float)) for rows in bundle.distributions]
+
+    def total(temperature: float) -> float:
+        of_own = [log_likelihood_at(temperature, rows, AZIMUTHS) for rows in own]
+        of_turns = [log_likelihood_at(temperature, t.logits, t.azimuth_deg) for t in turns]
+        return PRIOR_TURNS * float(np.mean(of_own)) + sum(of_turns)
+
+    assert total(found) > max(total(found * factor) for factor in (0.97, 0.99, 1.01, 1.03))
+    ends = sorted([bundle.temperature, temperature_of(turns)])
+    assert ends[0] < found < ends[1]
+    assert (abs(found - temperature_of(turns)) < abs(found - bundle.temperature)) == (n_turns == 40)
+
+
+def test_one_turn_does_not_decide_the_temperature(bundle):
+    """One that is nearly always right would make a bundle three times as sure."""
+    easy = turn("x", logits=3.0 * np.eye(BINS) + np.zeros((BINS, BINS)))
+    alone = temperature_of([easy])
+    found = recalibrated(bundle, [easy], "recording.csv", ONE_DENSITY).temperature
+    own = temperature_of([turn("y", logits=bundle.temperature * np.log(bundle.distributions[0]))])
+    assert alone < found < 2 * max(own, bundle.temperature)
+    assert found > 3 * alone
+
+
+def test_a_paper_table_without_new_turns_stays(bundle):
+    marked = replace(bundle.paper, rotation_deg=np.full((2, 360), 77, np.int16))
+    known = replace(bundle, paper=marked)
+    found = recalibrated(known, [turn("x", elevation=31.0)], "recording.csv", ONE_DENSITY)
+    assert (found.paper.rotation_deg[0] == 77).all()
+    assert (found.paper.rotation_deg[1] != 77).any()
+    assert (known.paper.rotation_deg == 77).all()
+
+
+def test_without_elevations_all_turns_count_alike(bundle):
+    turns = [turn("x", 1, elevation=np.nan), turn("y", 2, elevation=np.nan)]
+    found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY)
+    found = replace(found, elevation_deg=np.full(len(found.elevation_deg), np.nan, np.float32))
+    codes = np.random.default_rng(0).integers(0, 256, (1, 32, 32)).astype(np.uint8)
+    recommender = Recommender(found, "numpy")
+    one, other = (recommender.recommend_crops(codes, elevation_deg=e) for e in (None, 20.0))
+    assert one.move == other.move
+
+
+def test_the_cameras_focal_length_is_kept_where_it_is_known(bundle):
+    unknown, *known = (
+        replace(turn(name), focal_px=f) for name, f in zip("abc", (np.nan, 610, 620), strict=True)
+    )
+    assert recalibrated(bundle, [unknown], "r", ONE_DENSITY).focal_px == bundle.focal_px
+    assert recalibrated(bundle, [unknown, *known], "r", ONE_DENSITY).focal_px == 615
+
+
+def test_a_turn_with_a_gap_does_not_calibrate(bundle):
+    with pytest.raises(UserError, match=r"^object 'b', sequence '1': views"):
+        recalibrated(bundle, [turn(), turn("b", azimuth_deg=AZIMUTHS[3:])], "recording.csv")

@@ -1,0 +1,495 @@
+"""A bundle as a file: what was written comes back, and what was damaged is one line."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import replace
+from fnmatch import fnmatch
+from pathlib import Path
+
+import numpy as np
+import pytest
+import safetensors
+import safetensors.numpy
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from made_bundles import made_bundle, random_codes, random_weights, settings
+from nbv.core.look_alikes import LookAlikes
+from nbv.errors import UserError
+from nbv.robot.bundle import (
+    FORMAT,
+    PROBABILITY_STEP,
+    BundleError,
+    as_kept,
+    as_steps,
+    from_steps,
+    load_bundle,
+    save_bundle,
+)
+from nbv.robot.evaluation import best_fixed_deg, fixed_errors_deg
+from nbv.robot.ood import unfamiliarity
+from nbv.robot.recommender import Recommender, bundle_path, turn_share
+
+BUNDLES = Path(__file__).parents[2] / "docs" / "bundles.md"
+
+# What the document says
+
+
+def test_the_document_names_every_array_and_entry_of_a_bundle():
+    rows = [line for line in BUNDLES.read_text("utf-8").splitlines() if line.startswith("| `")]
+    documented = [name for row in rows for name in re.findall(r"`([^`]+)`", row.split("|")[1])]
+    with safetensors.safe_open(bundle_path("mug"), framework="numpy") as stored:
+        held = {*stored.keys(), *json.loads(stored.metadata()["nbv"])}
+    assert {name for name in held if any(fnmatch(name, one) for one in documented)} == held
+    assert [one for one in documented if not any(fnmatch(name, one) for name in held)] == []
+
+
+def test_the_best_fixed_rotation_of_the_shipped_bundle_is_as_documented():
+    held = load_bundle(bundle_path("mug"))
+    errors = fixed_errors_deg(LookAlikes.of_views(held.distributions), 2)
+    found = {
+        elevation: best_fixed_deg(errors, turn_share(held, elevation))
+        for elevation in (None, 0.0, 15.0, 30.0, 45.0, 60.0)
+    }
+    assert found.pop(None) == 183.0
+    assert found.pop(60.0) == 144.0
+    assert (min(found.values()), max(found.values())) == (177.0, 183.0)
+    text = " ".join(BUNDLES.read_text("utf-8").split())
+    assert "is 183° where the elevation is not known" in text
+    assert "144° at an elevation of 60°, and 177 to 183° at each lower one" in text
+
+
+# Round trips
+
+
+def test_everything_but_distributions_comes_back_exactly(bundle, bundle_file):
+    found = load_bundle(bundle_file)
+    assert set(found.weights) == set(bundle.weights)
+    for name, array in bundle.weights.items():
+        assert found.weights[name].dtype == array.dtype
+        assert found.weights[name].shape == array.shape
+        assert np.array_equal(found.weights[name], array), name
+    for name in ("mean", "basis", "references", "scales"):
+        wanted = getattr(bundle.familiarity, name)
+        assert np.array_equal(getattr(found.familiarity, name), wanted), name
+    assert found.familiarity.threshold == bundle.familiarity.threshold
+    assert np.array_equal(found.elevation_deg, bundle.elevation_deg)
+    for name in (
+        *("category", "estimator", "camera", "diagonal_m", "extent_m", "focal_px", "temperature"),
+        *("object_ids", "affinity", "provenance", "n_bins"),
+    ):
+        assert getattr(found, name) == getattr(bundle, name), name
+
+
+def test_distributions_come_back_within_the_step(bundle, bundle_file):
+    found = load_bundle(bundle_file).distributions
+    assert found.dtype == np.float32
+    assert found.sum(axis=-1) == pytest.approx(1.0, abs=1e-5)
+    # Half a step, and what the rows are divided by to sum to 1 again.
+    ratio = np.log(found) - np.log(bundle.distributions)
+    assert np.abs(ratio - np.median(ratio, axis=-1, keepdims=True)).max() < PROBABILITY_STEP + 1e-4
+    assert np.abs(ratio).max() < 1.5 * PROBABILITY_STEP
+
+
+def test_a_second_round_changes_nothing(bundle_file, tmp_path):
+    once = load_bundle(bundle_file)
+    save_bundle(tmp_path / "twice.safetensors", once)
+    twice = load_bundle(tmp_path / "twice.safetensors")
+    apart = as_steps(once.distributions).astype(int) - as_steps(twice.distributions)
+    assert np.abs(apart).max() <= 1
+    assert all(np.array_equal(once.weights[name], twice.weights[name]) for name in once.weights)
+
+
+def test_the_same_bundle_gives_the_same_bytes(bundle, bundle_file, tmp_path):
+    save_bundle(tmp_path / "again.safetensors", bundle)
+    assert (tmp_path / "again.safetensors").read_bytes() == bundle_file.read_bytes()
+
+
+def test_it_does_not_matter_how_arrays_lie_in_memory(bundle, bundle_file, tmp_path):
+    """safetensors writes memory as it lies: an array in another order came back scrambled."""
+
+    def other_order(array):
+        return np.asfortranarray(array)
+
+    familiarity = replace(
+        bundle.familiarity,
+        basis=other_order(bundle.familiarity.basis),
+        references=other_order(bundle.familiarity.references),
+    )
+    changed = replace(
+        bundle,
+        weights={name: other_order(array) for name, array in bundle.weights.items()},
+        distributions=other_order(bundle.distributions),
+        elevation_deg=np.repeat(bundle.elevation_deg, 2)[::2],
+        familiarity=familiarity,
+    )
+    save_bundle(tmp_path / "a.safetensors", changed)
+    assert (tmp_path / "a.safetensors").read_bytes() == bundle_file.read_bytes()
+
+
+def test_what_is_familiar_stays_familiar(bundle, bundle_file, rng):
+    codes, logits = random_codes(rng, 50), rng.normal(0, 1, (50, bundle.n_bins))
+    loaded = load_bundle(bundle_file).familiarity
+    scores = [unfamiliarity(known, codes, logits) for known in (bundle.familiarity, loaded)]
+    assert np.array_equal(*scores)
+
+
+def test_matrices_take_two_bytes_and_keep_eleven_bits(tmp_path):
+    weights = random_weights(settings())
+    save_bundle(tmp_path / "a.safetensors", made_bundle(weights=weights))
+    found = load_bundle(tmp_path / "a.safetensors").weights
+    rounded = as_kept(weights)
+    for name, array in weights.items():
+        assert found[name].dtype == np.float32
+        assert np.array_equal(found[name], rounded[name]), name
+        # The smallest half numbers are 2^-24 apart.
+        within = np.maximum(np.abs(array) * 2**-11, 2**-25) if array.ndim > 1 else 0.0
+        assert (np.abs(found[name] - array) <= within).all(), name
+    with safetensors.safe_open(tmp_path / "a.safetensors", framework="numpy") as stored:
+        for name, array in weights.items():
+            assert stored.get_tensor(f"network.{name}").itemsize == (2 if array.ndim > 1 else 4)
+
+
+def test_a_file_of_format_1_is_rounded_once(bundle_file, tmp_path):
+    """All of its weights are in single precision."""
+    weights = random_weights(settings(), seed=1)
+    of_names = {f"network.{name}": array.copy("C") for name, array in weights.items()}
+    old = with_about(bundle_file, tmp_path / "old.safetensors", of_names, format=1)
+    found = load_bundle(old)
+    assert all(np.array_equal(found.weights[n], array) for n, array in as_kept(weights).items())
+    save_bundle(tmp_path / "new.safetensors", found)
+    again = load_bundle(tmp_path / "new.safetensors").weights
+    assert all(np.array_equal(again[name], array) for name, array in found.weights.items())
+
+
+def test_a_mirror_plane_comes_back_and_older_files_have_none(tmp_path):
+    for plane_deg in (None, 0.0, 82.5):
+        path = tmp_path / "new.safetensors"
+        save_bundle(path, made_bundle(mirror_plane_deg=plane_deg))
+        assert load_bundle(path).mirror_plane_deg == plane_deg
+    old = with_about(path, tmp_path / "old.safetensors", mirror_plane_deg=None, format=2)
+    assert load_bundle(old).mirror_plane_deg is None
+    cut = with_about(path, tmp_path / "cut.safetensors", mirror_plane_deg=None)
+    assert "mirror_plane_deg" in refused(cut)
+
+
+def test_provenance_may_be_any_json(tmp_path):
+    provenance = {"versions": {"numpy": "2.4"}, "epochs": {10: "ten", 2: "two"}, "ü": [1.5, None]}
+    save_bundle(tmp_path / "a.safetensors", made_bundle(provenance=provenance))
+    found = load_bundle(tmp_path / "a.safetensors").provenance
+    assert found == {**provenance, "epochs": {"10": "ten", "2": "two"}}
+
+
+def test_a_bundle_serves_from_its_file(recommender, bundle_file):
+    codes = np.random.default_rng(3).integers(0, 256, (4, 32, 32)).astype(np.uint8)
+    loaded = Recommender.load(bundle_file, "numpy")
+    assert np.array_equal(loaded.distributions(codes), recommender.distributions(codes))
+
+
+# Steps
+
+
+@given(arrays(np.float64, (4, 24), elements=st.floats(1e-6, 1.0)))
+def test_steps_keep_probabilities_within_half_a_step(values):
+    rows = values / values.sum(axis=1, keepdims=True)
+    steps = as_steps(rows)
+    assert steps.dtype == np.uint8
+    kept = np.exp(-PROBABILITY_STEP * steps.astype(float))
+    in_range = rows > np.exp(-255 * PROBABILITY_STEP)
+    assert np.abs(np.log(kept / rows))[in_range].max() <= PROBABILITY_STEP / 2 + 1e-9
+    assert from_steps(steps) == pytest.approx(kept / kept.sum(axis=1, keepdims=True), rel=1e-4)
+
+
+@given(arrays(np.uint8, (3, 16)))
+def test_steps_of_steps_are_the_same(steps):
+    """Up to the same number of steps in the whole row, which the sum of 1 takes off."""
+    again = as_steps(from_steps(steps)).astype(int)
+    apart = again - steps
+    inside = (again < 255) & (steps < 255)
+    for row, kept in zip(apart, inside, strict=True):
+        if kept.any():
+            assert row[kept].max() - row[kept].min() <= 1
+
+
+def test_impossible_and_certain_have_steps():
+    steps = as_steps(np.array([0.0, 1e-40, 1e-6, 1.0, 1.0 + 1e-7]))
+    assert steps.tolist() == [255, 255, 255, 0, 0]
+    assert np.exp(-255 * PROBABILITY_STEP) == pytest.approx(1e-6, rel=0.1)
+
+
+# Damage
+
+
+def refused(path, name="damaged-bundle") -> str:
+    with pytest.raises(BundleError) as error:
+        load_bundle(path)
+    message = str(error.value)
+    assert "\n" not in message
+    assert path.name in message
+    assert error.value.name == name
+    assert message.startswith(f"{name}: ")
+    return message
+
+
+def written(path, content: bytes):
+    path.write_bytes(content)
+    return path
+
+
+def with_about(bundle_file, path, arrays_=None, **changes):
+    """The same arrays, or some others, with other metadata, and with the digest of both.
+
+    What is to be None is left out.
+    """
+    with safetensors.safe_open(bundle_file, framework="numpy") as stored:
+        about = json.loads(stored.metadata()["nbv"])
+        held = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
+    arrays_ = held | (arrays_ or {})
+    about.pop("sha256")
+    about |= changes
+    about = {name: value for name, value in about.items() if changes.get(name, 0) is not None}
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    for name, array in sorted(arrays_.items()):
+        digest.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
+    about = {"sha256": digest.hexdigest()} | about
+    return written(path, safetensors.numpy.save(arrays_, metadata={"nbv": json.dumps(about)}))
+
+
+def test_a_missing_file_is_named(tmp_path):
+    assert "does not exist" in refused(tmp_path / "none.safetensors", "no-bundle")
+    assert "is a folder" in refused(tmp_path, "no-bundle")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.0001, 0.001, 0.01, 0.1, 0.5, 0.9, 0.9999])
+def test_a_file_that_is_cut_short_is_one_line(bundle_file, tmp_path, share):
+    content = bundle_file.read_bytes()
+    refused(written(tmp_path / "a.safetensors", content[: int(share * len(content))]))
+
+
+def test_a_longer_file_is_one_line(bundle_file, tmp_path):
+    refused(written(tmp_path / "a.safetensors", bundle_file.read_bytes() + b"\0"))
+
+
+def test_other_files_are_no_bundles(bundle, tmp_path):
+    refused(written(tmp_path / "a.safetensors", b"not a bundle at all" * 100))
+    np.save(tmp_path / "a.npy", np.ones(5))
+    refused(tmp_path / "a.npy")
+    plain = safetensors.numpy.save(dict(bundle.weights))
+    assert "no bundle of nbv" in refused(written(tmp_path / "b.safetensors", plain), "no-bundle")
+    other = safetensors.numpy.save(dict(bundle.weights), metadata={"format": "pt"})
+    assert "no bundle of nbv" in refused(written(tmp_path / "c.safetensors", other), "no-bundle")
+
+
+def test_an_estimator_is_no_bundle(tmp_path):
+    import torch
+
+    from made_bundles import SIDE, settings
+    from nbv.experiment.estimation.hardware import choose_hardware
+    from nbv.experiment.estimation.networks import build_network
+    from nbv.experiment.estimation.weights import Estimator, save_estimator
+
+    torch.manual_seed(0)
+    estimator = Estimator(build_network(settings(), SIDE), settings(), SIDE, ["a"])
+    save_estimator(tmp_path / "e.safetensors", estimator, choose_hardware("cpu", "float32"))
+    assert "is an estimator, no bundle" in refused(tmp_path / "e.safetensors", "no-bundle")
+
+
+def test_weights_that_do_not_fit_the_settings_are_damage(bundle, bundle_file, tmp_path):
+    wide = bundle.weights["2.weight"]
+    for weights in (
+        {name: array for name, array in bundle.weights.items() if name != "2.weight"},
+        {**bundle.weights, "2.weight": wide[:, :-1]},
+        {**bundle.weights, "9.weight": wide},
+    ):
+        save_bundle(tmp_path / "a.safetensors", replace(bundle, weights=weights))
+        assert "do not fit" in refused(tmp_path / "a.safetensors")
+    for missing in ("channels", "hidden"):
+        kept = {key: value for key, value in bundle.estimator.items() if key != missing}
+        refused(with_about(bundle_file, tmp_path / "b.safetensors", estimator=kept))
+
+
+def test_a_newer_format_says_what_to_do(bundle_file, tmp_path):
+    path = with_about(bundle_file, tmp_path / "a.safetensors", format=FORMAT + 1)
+    message = refused(path, "newer-bundle")
+    assert f"format {FORMAT + 1}" in message
+    assert "install a newer nbv" in message
+
+
+def test_a_calibration_of_an_earlier_version_says_what_to_do(bundle_file, tmp_path):
+    """It had no count of the turns that the bundle was made with, and weighed them wrongly."""
+    made = load_bundle(bundle_file).provenance
+    old = dict(made) | {"calibrated_by": "own.csv"}
+    path = with_about(bundle_file, tmp_path / "a.safetensors", provenance=old)
+    message = refused(path, "older-calibration")
+    assert str(path) in message
+    assert "own.csv" in message
+    assert "calibrate again" in message
+    now = with_about(
+        bundle_file, tmp_path / "b.safetensors", provenance=old | {"turns_made_with": 4}
+    )
+    assert load_bundle(now).provenance["calibrated_by"] == "own.csv"
+
+
+def test_a_bundle_without_its_digest_is_refused(bundle_file, tmp_path):
+    path = with_about(bundle_file, tmp_path / "a.safetensors", sha256="")
+    assert "not the bytes that were written" in refused(path)
+    assert load_bundle(with_about(bundle_file, tmp_path / "b.safetensors")).category == "mug"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"format": "one"},
+        {"camera": None},
+        {"camera": {"lens": 3}},
+        {"extent_m": [0.1]},
+        {"extent_m": [0.2, 0.1]},
+        {"extent_m": [0.0, 0.1]},
+        {"extent_m": [float("nan"), 0.1]},
+        {"diagonal_m": 0.0},
+        {"diagonal_m": "large"},
+        {"focal_px": -600.0},
+        {"temperature": float("nan")},
+        {"temperature": float("inf")},
+        {"familiar_within": 0.0},
+        {"mirror_plane_deg": 180.0},
+        {"mirror_plane_deg": -7.5},
+        {"mirror_plane_deg": 91.0},
+        {"mirror_plane_deg": float("nan")},
+        {"mirror_plane_deg": "none"},
+        {"object_ids": []},
+        {"object_ids": ["a"]},
+        {"estimator": {}},
+        {"estimator": {"n_classes": 120}},
+        {"affinity": None},
+        {"affinity": {}},
+        {"affinity": {"power": 16}},
+        {"affinity": {"power": "much", "pseudo_observations": 90}},
+        {"affinity": {"power": float("nan"), "pseudo_observations": 90}},
+        {"provenance": [1]},
+    ],
+    ids=str,
+)
+def test_metadata_that_makes_no_sense_is_one_line(bundle_file, tmp_path, changes):
+    path = with_about(bundle_file, tmp_path / "a.safetensors", **changes)
+    assert "no sound bundle" in refused(path)
+
+
+@pytest.mark.parametrize("name", ["weights", "familiarity", "elevation_deg", "turn_weight"])
+def test_numbers_that_are_not_finite_are_one_line(bundle, tmp_path, name):
+    changed = {
+        "weights": {key: array.copy() for key, array in bundle.weights.items()},
+        "familiarity": replace(bundle.familiarity, mean=np.full(512, np.inf, np.float32)),
+        "elevation_deg": bundle.elevation_deg + np.float32(np.inf),
+        "turn_weight": bundle.turn_weight * np.float32(np.inf),
+    }
+    next(iter(changed["weights"].values())).flat[0] = np.nan
+    save_bundle(tmp_path / "a.safetensors", replace(bundle, **{name: changed[name]}))
+    assert "not finite" in refused(tmp_path / "a.safetensors")
+
+
+def test_arrays_that_do_not_fit_are_one_line(bundle, tmp_path):
+    for changes in (
+        {"distributions": bundle.distributions[:-1]},
+        {"distributions": bundle.distributions[:, :-1]},
+        {"elevation_deg": bundle.elevation_deg[:-1]},
+        {"turn_weight": bundle.turn_weight[:-1]},
+        {"turn_weight": np.zeros_like(bundle.turn_weight)},
+        {"object_ids": bundle.object_ids[:-1]},
+        {"estimator": {**bundle.estimator, "n_classes": 12}},
+        {"paper": replace(bundle.paper, rotation_deg=bundle.paper.rotation_deg + np.int16(9999))},
+        {"familiarity": replace(bundle.familiarity, mean=bundle.familiarity.mean[:-1])},
+        {"familiarity": replace(bundle.familiarity, basis=bundle.familiarity.basis[:, :-1])},
+        {"familiarity": replace(bundle.familiarity, references=bundle.familiarity.references[:0])},
+        {"familiarity": replace(bundle.familiarity, scales=bundle.familiarity.scales[:1])},
+    ):
+        save_bundle(tmp_path / "a.safetensors", replace(bundle, **changes))
+        assert "no sound bundle" in refused(tmp_path / "a.safetensors")
+
+
+def test_random_damage_is_one_line_or_harmless(bundle, bundle_file, tmp_path):
+    """200 times: bytes that are changed, taken out, put in, or exchanged."""
+    content, rng = bundle_file.read_bytes(), np.random.default_rng(20)
+    header = int.from_bytes(content[:8], "little") + 8
+    n_refused = 0
+    for case in range(200):
+        damaged = bytearray(content)
+        # Half of the time in the header, which is short.
+        end = header if case % 2 else len(content)
+        place, length = int(rng.integers(0, end)), int(rng.integers(1, 40))
+        kind = case // 2 % 5
+        if kind == 0:
+            damaged[place] ^= 1 << int(rng.integers(0, 8))
+        elif kind == 1:
+            damaged[place : place + length] = rng.bytes(length)
+        elif kind == 2:
+            del damaged[place : place + length]
+        elif kind == 3:
+            damaged[place:place] = rng.bytes(length)
+        else:
+            damaged[place : place + length] = bytes(length)
+        path = written(tmp_path / "a.safetensors", bytes(damaged))
+        try:
+            found = load_bundle(path)
+        except UserError as error:
+            message = str(error)
+        else:
+            # Only where nothing that is used has changed: a name that nobody reads.
+            assert all(
+                np.array_equal(found.weights[name], bundle.weights[name]) for name in bundle.weights
+            )
+            assert found.camera == bundle.camera
+            continue
+        n_refused += 1
+        assert "\n" not in message
+        assert "a.safetensors" in message
+    assert n_refused >= 190
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_bit_anywhere_in_an_array_is_noticed(bundle_file, tmp_path, seed):
+    content, rng = bytearray(bundle_file.read_bytes()), np.random.default_rng(seed)
+    header = int.from_bytes(content[:8], "little") + 8
+    for _ in range(20):
+        place, bit = int(rng.integers(header, len(content))), 1 << int(rng.integers(0, 8))
+        content[place] ^= bit
+        assert "no sound bundle" in refused(written(tmp_path / "a.safetensors", bytes(content)))
+        content[place] ^= bit
+    load_bundle(written(tmp_path / "a.safetensors", bytes(content)))
+
+
+# Names
+
+
+def test_a_bundle_is_found_by_its_file(bundle_file, tmp_path, monkeypatch):
+    assert bundle_path(bundle_file) == bundle_file
+    assert bundle_path(str(bundle_file)) == bundle_file
+    monkeypatch.chdir(bundle_file.parent)
+    assert bundle_path(bundle_file.name).resolve() == bundle_file.resolve()
+
+
+def test_shipped_bundles_are_found_by_their_names(tmp_path, monkeypatch):
+    from nbv.robot import recommender as module
+
+    (tmp_path / "shipped").mkdir()
+    for name in ("mug.safetensors", "chair.safetensors", "README.md"):
+        (tmp_path / "shipped" / name).write_bytes(b"")
+    monkeypatch.setattr(module.resources, "files", lambda package: tmp_path)
+    assert list(module.shipped_bundles()) == ["chair", "mug"]
+    assert bundle_path("mug") == tmp_path / "shipped" / "mug.safetensors"
+    with pytest.raises(UserError, match="did you mean 'mug'"):
+        bundle_path("mugg")
+    with pytest.raises(UserError, match="choose from: chair, mug"):
+        bundle_path("spaceship")
+
+
+def test_without_shipped_bundles_a_name_is_one_line(tmp_path, monkeypatch):
+    from nbv.robot import recommender as module
+
+    monkeypatch.setattr(module.resources, "files", lambda package: tmp_path)
+    with pytest.raises(UserError, match="no bundle comes with this nbv"):
+        bundle_path("mug")

@@ -1,0 +1,363 @@
+"""Depth images and masks from files: every form gives the same metres, or one line."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from PIL import Image
+
+from nbv.errors import UserError
+from nbv.robot.depth_files import read_depth, read_mask, to_metres, write_depth
+from nbv.robot.errors import FrameError
+
+MILLIMETRES = np.array([[0, 1, 400], [1234, 10000, 65535]], dtype=np.uint16)
+METRES = MILLIMETRES.astype(np.float32) * np.float32(0.001)
+
+
+def saved(path: Path, values) -> Path:
+    np.save(path, values)
+    return path
+
+
+def image(path: Path, values, **options) -> Path:
+    Image.fromarray(values).save(path, **options)
+    return path
+
+
+def pgm(path: Path, values, largest: int, comment: str = "") -> Path:
+    rows, columns = values.shape
+    header = f"P5\n{comment}{columns} {rows}\n{largest}\n"
+    path.write_bytes(header.encode() + values.astype(">u2").tobytes())
+    return path
+
+
+# Every form
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64, ">f4"])
+def test_numbers_with_a_decimal_point_are_metres(tmp_path, dtype):
+    values = np.array([[0.5, 1.25], [4.0, 0.0]], dtype=dtype)
+    found = read_depth(saved(tmp_path / "a.npy", values))
+    assert found.dtype == np.float32
+    assert np.array_equal(found, values.astype(np.float32))
+
+
+def test_what_was_not_measured_is_0(tmp_path):
+    values = np.array([[np.nan, np.inf, -np.inf], [-0.5, -0.0, 0.75]])
+    found = read_depth(saved(tmp_path / "a.npy", values))
+    assert np.array_equal(found, [[0, 0, 0], [0, 0, 0.75]])
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_beyond_single_precision_are_no_measurement():
+    assert np.array_equal(to_metres(np.array([[1e300, 1.0]])), [[0, 1]])
+    assert np.array_equal(to_metres(np.array([[3e38, 1.0]]), depth_scale=10.0), [[0, 10]])
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, ">u2", np.int32, np.uint32, np.int64])
+def test_whole_numbers_are_millimetres(tmp_path, dtype):
+    found = read_depth(saved(tmp_path / "a.npy", MILLIMETRES.astype(dtype)))
+    assert found.dtype == np.float32
+    assert np.array_equal(found, METRES)
+
+
+@pytest.mark.parametrize("scale", [0.0, -0.001, float("nan"), float("inf"), 1000.0])
+def test_a_depth_scale_is_metres_per_unit(scale):
+    with pytest.raises(UserError, match=f"--depth-scale={scale:g}: give metres per unit"):
+        to_metres(MILLIMETRES, depth_scale=scale)
+
+
+def test_negative_whole_numbers_are_no_measurement():
+    found = to_metres(np.array([[-5, 5]], dtype=np.int16))
+    assert found == pytest.approx(np.array([[0.0, 0.005]]), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.PNG", "a.tif", "a.tiff"])
+def test_images_of_16_bits_are_millimetres(tmp_path, name):
+    assert np.array_equal(read_depth(image(tmp_path / name, MILLIMETRES)), METRES)
+
+
+def test_tiff_images_may_hold_metres(tmp_path):
+    metres = np.array([[0.5, np.nan], [2.0, -1.0]], dtype=np.float32)
+    assert np.array_equal(read_depth(image(tmp_path / "a.tif", metres)), [[0.5, 0], [2, 0]])
+
+
+@pytest.mark.parametrize("largest", [65535, 10000, 4095])
+@pytest.mark.parametrize("comment", ["", "# CREATOR: a camera of 1999\n"])
+def test_pgm_numbers_do_not_depend_on_the_largest_that_the_file_names(tmp_path, largest, comment):
+    values = np.array([[0, 1, 2], [999, 4000, 4095]], dtype=np.uint16)
+    found = read_depth(pgm(tmp_path / "a.pgm", values, largest, comment))
+    assert np.array_equal(found, values.astype(np.float32) * np.float32(0.001))
+
+
+def test_pgm_may_be_text(tmp_path):
+    path = tmp_path / "a.pgm"
+    path.write_text("P2 # plain\n2 1 # columns, rows\n3000\n1500 3000\n")
+    assert read_depth(path) == pytest.approx(np.array([[1.5, 3.0]]))
+
+
+@given(
+    values=arrays(np.uint16, (2, 3), elements=st.integers(0, 300)),
+    largest=st.integers(300, 65535),
+)
+def test_every_number_of_a_pgm_comes_back(tmp_path_factory, values, largest):
+    path = pgm(tmp_path_factory.mktemp("pgm") / "a.pgm", values, largest)
+    assert np.array_equal(np.rint(read_depth(path, depth_scale=1.0)), values)
+
+
+def test_what_is_written_is_read_again(tmp_path):
+    metres = np.array([[0.0, 0.7504], [2.0, 65.535]], dtype=np.float32)
+    for name, off in (("a.png", 0.0005), ("A.PNG", 0.0005), ("a.npy", 0.0), ("A.NPY", 0.0)):
+        write_depth(tmp_path / name, metres)
+        assert np.abs(read_depth(tmp_path / name) - metres).max() <= off + 1e-6
+    with pytest.raises(UserError, match=r"b\.png: 65\.6 m are too far for a PNG"):
+        write_depth(tmp_path / "b.png", metres + np.float32(0.1))
+    assert not (tmp_path / "b.png").exists()
+
+
+def test_archives_give_the_array_called_depth_or_their_only_one(tmp_path):
+    other = np.ones((2, 3), dtype=np.float32)
+    np.savez(tmp_path / "a.npz", colour=other, depth=MILLIMETRES)
+    np.savez_compressed(tmp_path / "b.npz", whatever=MILLIMETRES)
+    assert np.array_equal(read_depth(tmp_path / "a.npz"), METRES)
+    assert np.array_equal(read_depth(tmp_path / "b.npz"), METRES)
+    np.savez(tmp_path / "c.npz", colour=other, range=MILLIMETRES)
+    with pytest.raises(UserError, match="call one of them 'depth'"):
+        read_depth(tmp_path / "c.npz")
+
+
+def test_a_mask_is_the_array_called_mask(tmp_path):
+    np.savez(tmp_path / "a.npz", depth=MILLIMETRES, mask=INSIDE)
+    assert np.array_equal(read_mask(tmp_path / "a.npz"), INSIDE)
+    np.savez(tmp_path / "b.npz", depth=MILLIMETRES, scores=INSIDE)
+    with pytest.raises(UserError, match="holds depth, scores: call one of them 'mask'"):
+        read_mask(tmp_path / "b.npz")
+
+
+def test_a_channel_of_its_own_is_no_colour(tmp_path):
+    found = read_depth(saved(tmp_path / "a.npy", MILLIMETRES[:, :, None]))
+    assert np.array_equal(found, METRES)
+
+
+def test_the_scale_is_metres_per_unit(tmp_path):
+    # RealSense in tenths of a millimetre, and metres that were kept as centimetres.
+    tenths, centimetres = saved(tmp_path / "a.npy", MILLIMETRES), tmp_path / "b.npy"
+    assert read_depth(tenths, 1e-4) == pytest.approx(METRES / 10)
+    np.save(centimetres, 100 * METRES)
+    assert read_depth(centimetres, 0.01) == pytest.approx(METRES)
+    # What a camera file says holds for whole numbers alone, where nothing else is said.
+    assert read_depth(tenths, unit_m=1e-4) == pytest.approx(METRES / 10)
+    assert read_depth(tenths, 1e-4, unit_m=7.0) == pytest.approx(METRES / 10)
+    metres = saved(tmp_path / "c.npy", METRES)
+    assert np.array_equal(read_depth(metres, unit_m=7.0), METRES)
+
+
+@given(scale=st.floats(1e-5, 10.0), values=arrays(np.uint16, (3, 4)))
+def test_whole_numbers_are_multiplied_by_the_scale(scale, values):
+    assert to_metres(values, scale) == pytest.approx(values.astype(np.float64) * scale, rel=1e-6)
+
+
+@pytest.mark.parametrize("scale", [0.0, -0.001, float("nan"), float("inf")])
+def test_a_scale_is_above_0(scale):
+    with pytest.raises(UserError, match="--depth-scale"):
+        to_metres(MILLIMETRES, scale)
+
+
+@given(arrays(np.float32, (2, 3), elements=st.floats(0, 50, width=32)))
+def test_metres_stay_metres(depth):
+    once = to_metres(depth)
+    assert np.array_equal(once, depth)
+    assert np.array_equal(to_metres(once), once)
+
+
+def test_what_is_given_is_not_changed():
+    depth = np.array([[np.nan, -1.0]], dtype=np.float32)
+    to_metres(depth)
+    assert np.isnan(depth[0, 0])
+    assert depth[0, 1] == -1.0
+
+
+# What is refused
+
+
+def refused(name: str, path: Path) -> str:
+    with pytest.raises(FrameError, match=path.name) as error:
+        read_depth(path)
+    assert error.value.name == name
+    assert str(error.value).startswith(f"{name}: ")
+    return str(error.value)
+
+
+@pytest.mark.parametrize("suffix", ["png", "tif", "pgm"])
+def test_8_bits_are_too_few(tmp_path, suffix):
+    refused("few-levels", image(tmp_path / f"a.{suffix}", MILLIMETRES.astype(np.uint8)))
+    refused("few-levels", saved(tmp_path / "a.npy", MILLIMETRES.astype(np.uint8)))
+
+
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "LA", "P"])
+def test_colour_images_are_refused(tmp_path, mode):
+    Image.new("RGB", (4, 3), (10, 20, 30)).convert(mode).save(tmp_path / "a.png")
+    refused("colour-image", tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("shape", [(7,), (2, 3, 3), (2, 6, 8), (2, 2, 2, 2)])
+def test_arrays_without_rows_and_columns_alone_are_refused(tmp_path, shape):
+    message = refused("colour-image", saved(tmp_path / "a.npy", np.ones(shape)))
+    is_colour = shape == (2, 3, 3)
+    assert ("a colour image" if is_colour else f"an array of shape {shape}") in message
+
+
+@pytest.mark.parametrize(
+    "values",
+    [np.array([["a"]]), np.ones((2, 2), complex), np.ones((2, 2), bool), np.zeros((2, 2), "f4,i4")],
+    ids=["text", "complex", "bool", "fields"],
+)
+def test_what_is_no_number_is_refused(tmp_path, values):
+    with pytest.raises(UserError, match=r"a\.npy holds .*, no numbers"):
+        read_depth(saved(tmp_path / "a.npy", values))
+
+
+def damaged_files() -> dict[str, bytes]:
+    def stored(write) -> bytes:
+        buffer = io.BytesIO()
+        write(buffer)
+        return buffer.getvalue()
+
+    png = stored(lambda file: Image.fromarray(MILLIMETRES).save(file, "png"))
+    npy = stored(lambda file: np.save(file, MILLIMETRES))
+    npz = stored(lambda file: np.savez(file, depth=MILLIMETRES))
+    pickled = stored(lambda file: np.save(file, np.array([[{}]], object)))
+    other = stored(lambda file: zipfile.ZipFile(file, "w").writestr("depth.txt", "1 2 3"))
+    return {
+        "empty.npy": b"",
+        "empty.npz": b"",
+        "empty.png": b"",
+        "cut.npy": npy[:-3],
+        "head.npy": npy[:40],
+        "cut.npz": npz[: len(npz) // 2],
+        "cut.png": png[: len(png) // 2],
+        "text.npy": b"0.5 0.6\n0.7 0.8\n",
+        "text.png": b"not an image",
+        "text.tif": b"II*\0",
+        "text.pgm": b"P5\n3 2\n",
+        "objects.npy": pickled,
+        "none.npz": stored(lambda file: np.savez(file)),
+        "other.npz": other,
+        "nothing.npy": stored(lambda file: np.save(file, np.zeros((0, 4)))),
+        "huge.npy": npy.replace(b"(2, 3)", b"(9, 9)"),
+    }
+
+
+@pytest.mark.parametrize("name", damaged_files())
+@pytest.mark.parametrize("read", [read_depth, read_mask])
+def test_a_damaged_file_is_named_in_one_line(tmp_path, name, read):
+    path = tmp_path / name
+    path.write_bytes(damaged_files()[name])
+    with pytest.raises(UserError, match=name) as error:
+        read(path)
+    assert "\n" not in str(error.value)
+    # numpy's own words tell to load what may hold code.
+    assert "pickle" not in str(error.value)
+
+
+@pytest.mark.filterwarnings("ignore:.*:UserWarning:PIL")
+@given(data=st.data())
+def test_no_byte_makes_more_than_one_line(tmp_path_factory, data):
+    name = data.draw(st.sampled_from(["a.png", "a.npy", "a.npz", "a.tif", "a.pgm"]))
+    path = tmp_path_factory.mktemp("damage") / name
+    if path.suffix == ".npy":
+        np.save(path, MILLIMETRES)
+    elif path.suffix == ".npz":
+        np.savez(path, depth=MILLIMETRES)
+    else:
+        image(path, MILLIMETRES.astype(np.int32) if path.suffix == ".pgm" else MILLIMETRES)
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 3))):
+        content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
+    path.write_bytes(content)
+    message, found = "", np.zeros((1, 1), np.float32)
+    try:
+        found = read_depth(path)
+    except UserError as error:
+        message = str(error)
+    assert "\n" not in message
+    assert found.dtype == np.float32
+    assert np.isfinite(found).all()
+    assert (found >= 0).all()
+
+
+@pytest.mark.parametrize("read", [read_depth, read_mask])
+def test_missing_files_and_other_kinds_are_named(tmp_path, read):
+    with pytest.raises(UserError, match=r"no\.npy does not exist"):
+        read(tmp_path / "no.npy")
+    (tmp_path / "folder.npy").mkdir()
+    with pytest.raises(UserError, match=r"folder\.npy is a folder"):
+        read(tmp_path / "folder.npy")
+    (tmp_path / "a.jpg").write_bytes(b"")
+    with pytest.raises(UserError, match=r"a\.jpg: no known kind of file; give \.npy"):
+        read(tmp_path / "a.jpg")
+    with pytest.raises(UserError, match="cannot be read"):
+        read(tmp_path / ("x" * 300 + ".npy"))
+    with pytest.raises(UserError, match="3 is no name of a file"):
+        read(3)
+
+
+# Masks
+
+INSIDE = np.array([[0, 1, 0, 1], [1, 0, 0, 1], [0, 0, 0, 1]], dtype=bool)
+
+
+@pytest.mark.parametrize("dtype", [bool, np.uint8, np.uint16, np.int32, np.float32])
+def test_a_mask_is_where_the_file_is_not_0(tmp_path, dtype):
+    values = INSIDE.astype(dtype) * (1 if dtype is bool else 7)
+    assert np.array_equal(read_mask(saved(tmp_path / "a.npy", values)), INSIDE)
+    np.savez(tmp_path / "a.npz", values)
+    assert np.array_equal(read_mask(tmp_path / "a.npz"), INSIDE)
+
+
+def test_what_is_not_a_number_is_not_in_the_mask(tmp_path):
+    values = np.where(INSIDE, 1.0, np.nan)
+    assert np.array_equal(read_mask(saved(tmp_path / "a.npy", values)), INSIDE)
+
+
+@pytest.mark.parametrize("mode", ["1", "L", "I;16", "RGB", "RGBA", "LA", "P"])
+def test_every_kind_of_image_is_a_mask(tmp_path, mode):
+    grey = Image.fromarray(255 * INSIDE.astype(np.uint8))
+    made = Image.fromarray(9 * INSIDE.astype(np.uint16)) if mode == "I;16" else grey.convert(mode)
+    made.save(tmp_path / "a.png")
+    assert np.array_equal(read_mask(tmp_path / "a.png"), INSIDE)
+
+
+def test_one_colour_is_enough(tmp_path):
+    colours = np.zeros((*INSIDE.shape, 3), dtype=np.uint8)
+    colours[INSIDE] = (0, 0, 1)
+    assert np.array_equal(read_mask(image(tmp_path / "a.png", colours)), INSIDE)
+
+
+def test_what_is_transparent_is_not_in_the_mask(tmp_path):
+    colours = np.full((*INSIDE.shape, 4), 200, dtype=np.uint8)
+    colours[..., 3] = 255 * INSIDE
+    assert np.array_equal(read_mask(image(tmp_path / "a.png", colours)), INSIDE)
+
+
+def test_a_transparent_colour_of_a_palette_is_not_in_the_mask(tmp_path):
+    palette = Image.fromarray(INSIDE.astype(np.uint8)).convert("P")
+    palette.putpalette([255, 255, 255, 200, 200, 200])
+    palette.save(tmp_path / "a.png", transparency=0)
+    assert np.array_equal(read_mask(tmp_path / "a.png"), INSIDE)
+
+
+def test_a_mask_has_rows_and_columns(tmp_path):
+    with pytest.raises(UserError, match="rows and columns"):
+        read_mask(saved(tmp_path / "a.npy", np.ones(5)))
+    with pytest.raises(UserError, match="no numbers"):
+        read_mask(saved(tmp_path / "b.npy", np.array([["a"]])))
+    with pytest.raises(UserError, match="no numbers"):
+        read_mask(saved(tmp_path / "c.npy", np.zeros((2, 2), "f4,i4")))

@@ -1,0 +1,320 @@
+"""Intrinsics from numbers and from the camera files that are in use."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nbv.errors import UserError
+from nbv.robot.errors import FrameError
+from nbv.robot.intrinsics import DepthCamera, Intrinsics, as_intrinsics, camera_of
+
+FX, FY, CX, CY = 572.41, 573.57, 325.26, 242.05
+K = [FX, 0.0, CX, 0.0, FY, CY, 0.0, 0.0, 1.0]
+WANTED = Intrinsics(FX, FY, CX, CY)
+SIZED = Intrinsics(FX, FY, CX, CY, 640, 480)
+
+pixels = st.floats(0.1, 1e5)
+
+
+def as_json(value):
+    return json.dumps(value)
+
+
+ROS_INFO = f"""\
+header:
+  stamp: {{sec: 1, nanosec: 0}}
+  frame_id: camera_depth_optical_frame
+height: 480
+width: 640
+distortion_model: plumb_bob
+d: [0.0, 0.0, 0.0, 0.0, 0.0]
+k: {K}
+r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+p: [1.0, 0.0, 2.0, 0.0, 0.0, 3.0, 4.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+"""
+CALIBRATION = {
+    "image_width": 640,
+    "image_height": 480,
+    "camera_name": "head",
+    "camera_matrix": {"rows": 3, "cols": 3, "data": K},
+    "distortion_coefficients": {"rows": 1, "cols": 5, "data": [0.0] * 5},
+}
+FILES = {
+    # BOP: one camera for all images, and one of scene_camera.json.
+    "camera.json": (
+        as_json({"cx": CX, "cy": CY, "depth_scale": 0.1, "fx": FX, "fy": FY}).replace(
+            "}", ', "height": 480, "width": 640}'
+        ),
+        SIZED,
+    ),
+    "bop.json": (as_json({"cam_K": K, "depth_scale": 1.0}), WANTED),
+    "info.yaml": (ROS_INFO, SIZED),
+    # As `ros2 topic echo --once` prints it.
+    "echo.yaml": (ROS_INFO + "---\n", SIZED),
+    "ros1.yml": (ROS_INFO.replace("\nk:", "\nK:").replace("\nd:", "\nD:"), SIZED),
+    "calibration.yaml": (yaml.safe_dump(CALIBRATION), SIZED),
+    "nested.json": (as_json({"K": np.reshape(K, (3, 3)).tolist()}), WANTED),
+    "numbers.txt": (f"fx: {FX}\nfy: {FY}\ncx: {CX}\ncy: {CY}\n", WANTED),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_camera_file_gives_the_same_camera(tmp_path, name):
+    text, wanted = FILES[name]
+    for encoding in ("utf-8", "utf-8-sig"):
+        (tmp_path / name).write_text(text, encoding=encoding)
+        assert camera_of(str(tmp_path / name)).intrinsics == wanted
+
+
+@given(f=pixels)
+def test_one_number_is_both_focal_lengths(f):
+    assert as_intrinsics(f) == as_intrinsics([f]) == Intrinsics(f, f)
+    assert camera_of(repr(f)) == DepthCamera(Intrinsics(f, f))
+
+
+@given(fx=pixels, fy=pixels, cx=pixels, cy=pixels)
+def test_numbers_a_matrix_and_a_text_say_the_same(fx, fy, cx, cy):
+    wanted = Intrinsics(fx, fy, cx, cy)
+    matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    assert as_intrinsics((fx, fy, cx, cy)) == wanted
+    assert as_intrinsics(matrix) == as_intrinsics(matrix.ravel().tolist()) == wanted
+    assert camera_of(f"{fx!r}, {fy!r},{cx!r} ,{cy!r}").intrinsics == wanted
+    assert camera_of(f"{fx!r} {fy!r}  {cx!r} {cy!r}").intrinsics == wanted
+    assert camera_of(",".join(map(repr, matrix.ravel().tolist()))).intrinsics == wanted
+    assert as_intrinsics(wanted) is wanted
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [np.reshape(K, (3, 3)).T, np.reshape(K, (3, 3)) / 2, np.arange(1.0, 10.0), np.ones((3, 3))],
+    ids=["transposed", "scaled", "counted", "ones"],
+)
+def test_what_is_no_camera_matrix_is_refused(matrix):
+    with pytest.raises(UserError, match="0 0 1"):
+        as_intrinsics(matrix)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [[], [1, 2], [1, 2, 3], [1] * 5, np.eye(4), "abc", ["a"] * 4, None, {"fx": 1}, [[1], [2, 3]]],
+    ids=repr,
+)
+def test_rubbish_is_one_line(value):
+    with pytest.raises(UserError, match="intrinsics") as error:
+        as_intrinsics(value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("bad", [0.0, -575.0, float("nan"), float("inf")])
+def test_focal_lengths_are_above_0(bad):
+    for numbers in ([bad], [bad, FY, CX, CY], [FX, bad, CX, CY]):
+        with pytest.raises(UserError, match="must be above 0"):
+            as_intrinsics(numbers)
+
+
+@pytest.mark.parametrize(("known", "missing"), [("cx", "cy"), ("cy", "cx")])
+def test_half_a_principal_point_is_none(known, missing):
+    with pytest.raises(UserError, match=f"{known} without {missing}"):
+        Intrinsics(FX, FY, **{known: 320.0})
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
+def test_the_principal_point_is_finite(bad):
+    with pytest.raises(UserError, match="cx="):
+        as_intrinsics([FX, FY, bad, CY])
+    with pytest.raises(UserError, match="cy="):
+        as_intrinsics([FX, FY, CX, bad])
+
+
+SCENE = {
+    "3": {"cam_K": K, "depth_scale": 0.1, "cam_R_w2c": [1, 0, 0, 0, 1, 0, 0, 0, 1]},
+    "12": {"cam_K": [2 * value for value in K[:8]] + [1], "depth_scale": 1.0},
+}
+
+
+def test_a_scene_has_a_camera_for_each_image(tmp_path):
+    path = tmp_path / "scene_camera.json"
+    path.write_text(json.dumps(SCENE))
+    for frame in ("000003.png", "depth/3.png", Path("scene/depth_0003.tif")):
+        found = camera_of(str(path), frame)
+        assert found.intrinsics == WANTED
+        assert found.unit_m == pytest.approx(1e-4)
+    other = camera_of(str(path), "000012.png")
+    assert other.intrinsics == Intrinsics(2 * FX, 2 * FY, 2 * CX, 2 * CY)
+    assert other.unit_m == 0.001
+    for frame in ("000004.png", "depth.png", "12_depth.png", ""):
+        with pytest.raises(UserError, match="cameras of images 3 to 12, and none for"):
+            camera_of(str(path), frame)
+
+
+def test_where_all_images_have_one_camera_the_name_does_not_matter(tmp_path):
+    path = tmp_path / "scene_camera.json"
+    path.write_text(json.dumps({str(image): SCENE["3"] for image in range(5)}))
+    assert camera_of(str(path), "frame.png") == camera_of(str(path), "000004.png")
+    assert camera_of(str(path), "frame.png").intrinsics == WANTED
+
+
+def test_a_camera_file_says_what_whole_numbers_count(tmp_path):
+    path = tmp_path / "camera.json"
+    for scale in (0.1, 1.0, 2, 0.25):
+        path.write_text(json.dumps({"cam_K": K, "depth_scale": scale}))
+        assert camera_of(str(path)).unit_m == pytest.approx(scale / 1000)
+    for scale in ("0.1", 0, -1, True, float("nan"), [1]):
+        path.write_text(json.dumps({"cam_K": K, "depth_scale": scale}))
+        with pytest.raises(UserError, match=r"camera\.json: depth_scale="):
+            camera_of(str(path))
+
+
+def test_nothing_is_known_of_a_camera_that_is_not_given():
+    assert camera_of(None, "frame.png") == DepthCamera(None, 0.001)
+
+
+@pytest.mark.parametrize("text", ["no.json", "no/camera", "camera.yaml"])
+def test_a_missing_camera_file_is_said_to_be_missing(tmp_path, monkeypatch, text):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=f"--intrinsics={text}: the file does not exist"):
+        camera_of(text)
+
+
+BAD_FILES = {
+    "scene.json": '{"0": [1, 2], "1": {}}',
+    "empty.json": "",
+    "empty.yaml": "",
+    "list.json": "[1, 2, 3, 4]",
+    "number.yaml": "575",
+    "cut.json": '{"cam_K": [1, 0,',
+    "tabs.yaml": "k:\n\t- 1\n",
+    "other.json": '{"camera": "head"}',
+    "half.json": '{"fx": 1, "fy": 1, "cx": 1}',
+    "short.json": '{"cam_K": [1, 2, 3]}',
+    "text.json": '{"cam_K": "wide"}',
+    "null.json": '{"fx": null, "fy": 1, "cx": 1, "cy": 1}',
+    "names.json": '{"cam_K": {"fx": 1}}',
+    "zero.yaml": f"k: {[0.0] * 9}",
+    "infinite.json": as_json({"cam_K": K}).replace("}", ', "width": Infinity, "height": 480}'),
+    "nan.yaml": f"k: {K}\nwidth: .nan\nheight: 480\n",
+    "transposed.json": as_json({"cam_K": np.reshape(K, (3, 3)).T.tolist()}),
+    "nodata.yaml": "camera_matrix: {rows: 3}",
+    "deep.json": "[" * 100_000,
+    "code.yaml": "!!python/object/apply:os.getcwd []",
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_a_file_without_a_camera_is_one_line(tmp_path, name):
+    (tmp_path / name).write_text(BAD_FILES[name])
+    with pytest.raises(UserError, match=name) as error:
+        camera_of(str(tmp_path / name))
+    assert "\n" not in str(error.value)
+
+
+def test_a_camera_that_is_not_calibrated_is_said_to_be_so(tmp_path):
+    (tmp_path / "info.yaml").write_text(f"width: 640\nheight: 480\nk: {[0.0] * 9}\n")
+    with pytest.raises(UserError, match=r"info\.yaml: .* the camera is not calibrated"):
+        camera_of(str(tmp_path / "info.yaml"))
+    with pytest.raises(UserError, match="the camera is not calibrated"):
+        as_intrinsics(np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("name", ["fx", "fy", "cx", "cy", "width", "height"])
+def test_every_parameter_is_a_number(name):
+    given_ = {"fx": 575.0, "fy": 575.0, "cx": 320.0, "cy": 240.0} | {name: "575"}
+    with pytest.raises(UserError, match=f"intrinsics: {name}: '575' is no number"):
+        Intrinsics(**given_)
+
+
+@pytest.mark.parametrize("side", ["width", "height"])
+@pytest.mark.parametrize("value", [0, -480])
+def test_an_image_has_a_size(tmp_path, side, value):
+    message = f"intrinsics: {side}={value} must be above 0 \\(pixels\\)"
+    sides = {"width": 640, "height": 480} | {side: value}
+    with pytest.raises(UserError, match=message):
+        Intrinsics(575.0, 575.0, **sides)
+    for name, values in (("a.json", {"cam_K": K}), ("a.yaml", {"k": K})):
+        (tmp_path / name).write_text(as_json(values | sides))
+        with pytest.raises(UserError, match=f"{name}: {message}"):
+            camera_of(str(tmp_path / name))
+
+
+def test_bytes_that_are_no_text_are_one_line(tmp_path):
+    for name in ("a.json", "a.yaml"):
+        (tmp_path / name).write_bytes(b"\xff\xfe\x00\x01{")
+        with pytest.raises(UserError, match=rf"{name}, line 1: this is not UTF-8; save the file"):
+            camera_of(str(tmp_path / name))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.json", '{"fx": 585,\n "fy": }', "line 2, column 8 is no JSON; mend it there"),
+        ("a.json", "[" * 100_000, "it is nested too deeply"),
+        ("a.yaml", "fx: 585\nfy: [585\n", "line 3, column 1 is no YAML; mend it there"),
+        ("a.yaml", "fx: 585\0", "it is no YAML"),
+    ],
+)
+def test_where_a_camera_file_is_broken_is_said(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(UserError) as error:
+        camera_of(str(tmp_path / name))
+    assert str(error.value) == f"{tmp_path / name} cannot be read ({message})"
+
+
+@pytest.mark.parametrize("text", ["", "camera", "575,575", "1,2,3,x", "no/file.json", "x" * 5000])
+def test_text_that_is_neither_numbers_nor_a_file_is_one_line(text):
+    with pytest.raises(UserError):
+        camera_of(text)
+
+
+def test_intrinsics_of_another_resolution_are_refused():
+    SIZED.need_resolution(480, 640)
+    for rows, columns in ((240, 320), (640, 480), (480, 641)):
+        with pytest.raises(FrameError, match="640 × 480 pixels") as error:
+            SIZED.need_resolution(rows, columns)
+        assert error.value.name == "other-resolution"
+
+
+def test_a_principal_point_far_outside_is_of_another_resolution():
+    WANTED.need_resolution(480, 640)
+    # A crop of an image keeps its intrinsics, so that its own middle may lie off the frame a bit.
+    WANTED.need_resolution(200, 300)
+    for rows, columns in ((480, 200), (120, 640)):
+        with pytest.raises(FrameError, match="another resolution") as error:
+            WANTED.need_resolution(rows, columns)
+        assert error.value.name == "other-resolution"
+
+
+@given(rows=st.integers(1, 5000), columns=st.integers(1, 5000))
+def test_focal_lengths_alone_serve_every_resolution(rows, columns):
+    Intrinsics(575.0, 575.0).need_resolution(rows, columns)
+    Intrinsics(575.0, 575.0, columns / 2, rows / 2, columns, rows).need_resolution(rows, columns)
+
+
+@given(factor=st.floats(0.3, 2.9), off=st.floats(-8, 8))
+def test_a_principal_point_in_the_middle_of_another_image_is_refused(factor, off):
+    """Binned, cut in half or doubled: a camera's own tolerance is neither refused nor doubted."""
+    camera = Intrinsics(FX * factor, FY * factor, (320 + off) * factor, (240 + off) * factor)
+    if abs(factor - 1) < 0.1:
+        camera.need_resolution(480, 640)
+        assert not camera.doubts(480, 640)
+    elif abs(factor - 1) > 0.25:
+        with pytest.raises(FrameError, match="640 × 480") as error:
+            camera.need_resolution(480, 640)
+        assert error.value.name == "other-resolution"
+
+
+def test_a_principal_point_off_the_middle_is_doubted():
+    assert not WANTED.doubts(480, 640)
+    assert not Intrinsics(575.0, 575.0).doubts(480, 640)
+    for place in ((500.0, 240.0), (320.0, 100.0), (520.0, 100.0)):
+        camera = Intrinsics(FX, FY, *place)
+        camera.need_resolution(480, 640)
+        (doubt,) = camera.doubts(480, 640)
+        assert "640 × 480" in doubt
+        assert "cut out" in doubt

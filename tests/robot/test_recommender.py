@@ -1,0 +1,1000 @@
+"""From frames to the pose and the next view."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from made_bundles import (
+    BINS,
+    COLUMNS,
+    DIAGONAL_M,
+    FOCAL_PX,
+    ROWS,
+    WIDTH,
+    frame,
+    random_codes,
+    random_weights,
+)
+from made_bundles import settings as made_settings
+from nbv.core.angles import circular_distance_deg, travel_deg
+from nbv.core.belief import mean_direction_deg
+from nbv.core.beliefs import direction_and_spread_deg, distributions_of, elevation_share
+from nbv.errors import UserError
+from nbv.robot.crop import crop_frame
+from nbv.robot.errors import FrameError
+from nbv.robot.intrinsics import Intrinsics
+from nbv.robot.masks import object_mask
+from nbv.robot.next_view import after_rotations
+from nbv.robot.ood import fit_familiarity, unfamiliarity
+from nbv.robot.recommender import Recommender
+from nbv.robot.rotations import MIN_SEPARATION_DEG, N_ALTERNATIVES
+from nbv.robot.sweeps import Turn
+from nbv.robot.synthetic import example_frame
+
+HERE = np.arange(BINS) * WIDTH
+FRAMES = [frame(seed) for seed in range(4)]
+seeds = st.integers(0, 10**6)
+whole = st.integers(-BINS, BINS)
+
+
+def codes_of(seed: int, n: int) -> np.ndarray:
+    return random_codes(np.random.default_rng(seed), n)
+
+
+def telling(bundle, sureness: float = 8.0) -> Recommender:
+    """A recommender whose network reads the azimuth's class off the first pixel of a crop."""
+    made = Recommender(bundle, "numpy")
+
+    def network(codes):
+        classes = codes[:, 0, 0].astype(int)
+        apart = np.radians((np.arange(BINS) - classes[:, None]) * WIDTH)
+        return (sureness * np.cos(apart)).astype(np.float32)
+
+    made.network = network
+    return made
+
+
+def told(*classes: int) -> np.ndarray:
+    codes = np.zeros((len(classes), 32, 32), dtype=np.uint8)
+    codes[:, 0, 0] = np.array(classes) % BINS
+    return codes
+
+
+# Beliefs
+
+
+@settings(max_examples=25)
+@given(seed=seeds, rotations=st.lists(whole, min_size=0, max_size=3))
+def test_the_belief_is_that_of_the_last_frame(recommender, seed, rotations):
+    rotations = [0.0, *(turn * WIDTH for turn in rotations)]
+    if any_alike(rotations):
+        return
+    codes = codes_of(seed, len(rotations))
+    found = recommender.recommend_crops(codes, rotations)
+    rows = recommender.distributions(codes)
+    # By its definition: the product at the azimuths that each frame then had.
+    wanted = np.ones(BINS)
+    for row, rotation in zip(rows, rotations, strict=True):
+        bins = round((rotation - rotations[-1]) / WIDTH)
+        wanted *= row[(np.arange(BINS) + bins) % BINS]
+    assert found.belief == pytest.approx(wanted / wanted.sum(), rel=1e-6, abs=1e-12)
+    assert found.belief.sum() == pytest.approx(1.0)
+    mean = mean_direction_deg(found.belief[None])[0]
+    assert circular_distance_deg(found.azimuth_deg, mean) < 1e-6
+    assert 0 <= found.azimuth_deg < 360
+    assert found.spread_deg == pytest.approx(direction_and_spread_deg(found.belief)[1])
+
+
+def any_alike(rotations) -> bool:
+    """Whether a rotation leaves too little room: frames everywhere, or one taken twice."""
+    return len({round(turn / WIDTH) % BINS for turn in rotations}) < len(rotations)
+
+
+@given(first=st.integers(0, BINS - 1), bins=st.integers(1, BINS - 1))
+def test_frames_that_agree_give_the_azimuth_of_the_last(bundle, first, bins):
+    found = telling(bundle).recommend_crops(told(first, first + bins), [0.0, bins * WIDTH])
+    assert circular_distance_deg(found.azimuth_deg, (first + bins) * WIDTH) < 1e-6
+    assert found.belief.argmax() == (first + bins) % BINS
+    one = telling(bundle).recommend_crops(told(first))
+    assert found.spread_deg < one.spread_deg
+
+
+@pytest.mark.parametrize("turn", [-100.0, 7.5, 20.0, 359.0])
+def test_a_rotation_between_the_bins_is_followed(bundle, turn):
+    """The second frame sees the azimuth that the first frame and the rotation imply."""
+    made, first = telling(bundle), 5 * WIDTH
+    classes = np.arange(BINS) * WIDTH
+    second = np.radians(classes - first - turn)
+
+    def network(codes):
+        rows = np.stack([np.cos(np.radians(classes - first)), np.cos(second)])
+        return (5 * rows).astype(np.float32)
+
+    made.network = network
+    found = made.recommend_crops(told(0, 0), [0.0, turn])
+    assert circular_distance_deg(found.azimuth_deg, first + turn) < 1.0
+
+
+def test_frames_are_counted_in_the_crops(recommender):
+    codes = codes_of(0, 3)
+    found = recommender.recommend_crops(codes, [0.0, 60.0, 120.0])
+    assert np.array_equal(np.stack(found.crops), codes)
+
+
+@pytest.mark.parametrize("together", [list, np.ma.stack])
+def test_what_a_masked_array_masks_counts_as_nothing(recommender, together):
+    """Neither were its depths measured, nor does it show the object where it masks."""
+    top = np.zeros(FRAMES[0].shape, dtype=bool)
+    top[: ROWS // 2] = True
+    rotations = [0.0, 60.0]
+    wanted = recommender.recommend(
+        [np.where(top, 0, one) for one in FRAMES[:2]], rotations_deg=rotations
+    )
+    depths = together([np.ma.array(one, mask=top) for one in FRAMES[:2]])
+    masks = together([np.ma.array(one > 0, mask=top) for one in FRAMES[:2]])
+    for found in (
+        recommender.recommend(depths, rotations_deg=rotations),
+        recommender.recommend(FRAMES[:2], mask=masks, rotations_deg=rotations),
+    ):
+        assert np.array_equal(found.crops, wanted.crops)
+
+
+# Which frame is called the first
+
+
+@settings(max_examples=25)
+@given(
+    seed=seeds,
+    order=st.permutations(range(2)),
+    bins=st.permutations([0, 3, 8, 13, 18]).map(lambda places: places[:3]),
+)
+def test_it_does_not_matter_which_frame_is_called_the_first(recommender, seed, order, bins):
+    """The same three frames, the same one last: the others in any order, and any place as 0."""
+    codes = codes_of(seed, 3)
+    answers = []
+    for places in ([0, 1, 2], [*order, 2]):
+        rotations = [(bins[place] - bins[places[0]]) * WIDTH for place in places]
+        answers.append(recommender.recommend_crops(codes[places], rotations))
+    one, other = answers
+    assert circular_distance_deg(one.azimuth_deg, other.azimuth_deg) < 1e-6
+    assert one.belief == pytest.approx(other.belief, rel=1e-6, abs=1e-12)
+    assert one.expected_error_deg == pytest.approx(other.expected_error_deg, rel=1e-3)
+    assert one.error_after_deg == pytest.approx(other.error_after_deg, rel=1e-3)
+    assert one.move.expected_error_deg == pytest.approx(other.move.expected_error_deg, rel=1e-3)
+    assert one.unfamiliarity == other.unfamiliarity
+
+
+@settings(max_examples=25)
+@given(seed=seeds, bins=st.integers(2, BINS - 2))
+def test_another_frame_as_the_last_turns_the_answer(recommender, seed, bins):
+    codes = codes_of(seed, 2)
+    one = recommender.recommend_crops(codes, [0.0, bins * WIDTH])
+    other = recommender.recommend_crops(codes[::-1], [0.0, -bins * WIDTH])
+    # Single precision: what an image's logits are depends a little on its place among others.
+    assert circular_distance_deg(one.azimuth_deg, other.azimuth_deg + bins * WIDTH) < 1e-2
+    assert one.belief == pytest.approx(np.roll(other.belief, bins), rel=1e-4, abs=1e-12)
+    turned_back = np.roll(other.error_after_deg, -bins)
+    assert one.error_after_deg == pytest.approx(turned_back, rel=1e-3)
+
+
+@settings(max_examples=25)
+@given(seed=seeds, turns=st.integers(-3, 3))
+def test_whole_turns_of_the_camera_do_not_matter(recommender, seed, turns):
+    codes = codes_of(seed, 2)
+    one = recommender.recommend_crops(codes, [0.0, 90.0])
+    other = recommender.recommend_crops(codes, [0.0, 90.0 + 360.0 * turns])
+    assert circular_distance_deg(one.azimuth_deg, other.azimuth_deg) < 1e-6
+    assert one.belief == pytest.approx(other.belief)
+    assert np.array_equal(one.error_after_deg, other.error_after_deg)
+    assert one.move == other.move
+
+
+# Expected errors
+
+
+def brute_force(bundle, rows, bins, share=None, limits=True):
+    """From the definitions: the expected error now, those after each rotation from the last frame,
+    by how much the choice of the least of these makes it too low, and which one it is."""
+    power, pseudo = bundle.affinity["power"], bundle.affinity["pseudo_observations"]
+    views = bundle.distributions.astype(float)
+    belief = np.ones(BINS)
+    for row, turn in zip(rows, bins, strict=True):
+        belief *= np.roll(row, -turn)
+    belief /= belief.sum()
+    weights, now, after = [], [], []
+    for turn_, own in enumerate(views):
+        for first in range(BINS):
+            product = np.ones(BINS)
+            for turn in bins:
+                product *= np.roll(own[(first + turn) % BINS], -turn)
+            product /= product.sum()
+            alike = WIDTH * np.sqrt(belief * product).sum() ** power
+            weights.append(alike * (1.0 if share is None else share[turn_]))
+            now.append(error_of(product, first))
+            after.append(
+                [
+                    error_of(
+                        product * np.roll(own[(first + bins[-1] + d) % BINS], -bins[-1] - d), first
+                    )
+                    for d in range(BINS)
+                ]
+            )
+    weights, now, after = np.array(weights), np.array(now), np.array(after)
+    prior = np.ones(len(views)) if share is None else share
+    prior = np.repeat(prior, BINS) * pseudo / (prior.sum() * BINS)
+    total = weights + prior
+    taken = WIDTH * (np.array(bins) - bins[-1])
+    may = (circular_distance_deg(HERE[:, None], taken).min(axis=1) >= MIN_SEPARATION_DEG) & limits
+    names = sorted(set(bundle.object_ids))
+    more = 0.0
+    best = np.where(may, total @ after, np.inf).argmin()
+    for part in range(min(5, len(names))):
+        own = np.array([name in names[part::5] for name in bundle.object_ids]).repeat(BINS)
+        of_others = np.where(may, total @ after - weights[own] @ after[own], np.inf).argmin()
+        more += weights[own] @ (after[own, of_others] - after[own, best])
+    sums = total.sum()
+    more = more / sums if len(names) > 1 else 0.0
+    return total @ now / sums, total @ after / sums, more, best
+
+
+def of_last_choice(bundle, rows, bins, share=None):
+    """By how much the choice of the last view made its expected error too low, if it was one."""
+    *_, more, best = brute_force(bundle, rows[:-1], bins[:-1], share)
+    apart = (bins[-1] - bins[-2] - best + BINS // 2) % BINS - BINS // 2
+    return more if abs(apart) <= 1 else 0.0
+
+
+def error_of(product, first) -> float:
+    angles = 2 * np.pi * np.arange(BINS) / BINS
+    mean = np.degrees(np.angle((product * np.exp(1j * angles)).sum()))
+    return abs((mean - first * WIDTH + 180) % 360 - 180)
+
+
+@pytest.mark.parametrize("bins", [(0,), (0, 6), (0, -5), (0, 7, 16)])
+@pytest.mark.parametrize("elevation", [None, 12.0])
+def test_expected_errors_are_those_of_objects_that_look_alike(recommender, bins, elevation):
+    bundle, codes = recommender.bundle, codes_of(7, len(bins))
+    found = recommender.recommend_crops(
+        codes, [turn * WIDTH for turn in bins], elevation_deg=elevation
+    )
+    share = None if elevation is None else elevation_share(bundle.elevation_deg, elevation)
+    now, after, more, _ = brute_force(bundle, recommender.distributions(codes), bins, share)
+    free = np.isfinite(found.error_after_deg)
+    assert free.sum() == BINS - len(bins)
+    if len(bins) > 1:
+        now += of_last_choice(bundle, recommender.distributions(codes), bins, share)
+    assert found.expected_error_deg == pytest.approx(now, rel=1e-4)
+    assert found.error_after_deg[free] == pytest.approx(after[free] + more, rel=1e-4)
+
+
+def test_what_is_added_is_of_the_rotations_that_may_be_chosen(recommender):
+    unlimited = []
+    for seed, bins, allowed in ((7, (0,), [3, 9, 15]), (5, (0, 6), [2, 20]), (8, (0, -5), [4, 7])):
+        codes, turns = codes_of(seed, len(bins)), [turn * WIDTH for turn in bins]
+        rows = recommender.distributions(codes)
+        limits = np.isin(np.arange(BINS), allowed)
+        _, after, more, _ = brute_force(recommender.bundle, rows, bins, limits=limits)
+        found = recommender.recommend_crops(codes, turns, allowed_deg=np.array(allowed) * WIDTH)
+        free = np.isfinite(found.error_after_deg)
+        assert found.error_after_deg[free] == pytest.approx(after[free] + more, rel=1e-4)
+        unlimited.append(brute_force(recommender.bundle, rows, bins)[2] - more)
+    assert np.abs(unlimited).max() > 0.01
+
+
+@pytest.mark.parametrize("seed", [5, 7, 8])
+@pytest.mark.parametrize("bins", [(0,), (0, 6)])
+def test_what_the_choice_of_the_last_view_adds_is_expected_once_it_is_taken(
+    recommender, bins, seed
+):
+    """Within a step of the rotation that the views before it led to."""
+    bundle, codes = recommender.bundle, codes_of(seed, len(bins) + 1)
+    rows = recommender.distributions(codes)
+    *_, more, best = brute_force(bundle, rows[:-1], bins)
+    for off in (-3, -2, -1, 0, 1, 2, 3):
+        turns = (*bins, int(bins[-1] + best + off))
+        found = recommender.recommend_crops(codes, [turn * WIDTH for turn in turns])
+        now, *_ = brute_force(bundle, rows, turns)
+        added = of_last_choice(bundle, rows, turns)
+        assert added == (more if abs(off) <= 1 else 0.0)
+        assert found.expected_error_deg == pytest.approx(now + added, rel=1e-4)
+
+
+def test_views_that_no_calibration_view_is_like_contradict_each_other():
+    frames = [example_frame(azimuth_deg) for azimuth_deg in (270.0, 15.0, 330.0, 240.0)]
+    found = Recommender.load("mug", "numpy").recommend(
+        [frame.depth_m for frame in frames],
+        rotations_deg=[0.0, 315.0, 345.0, 60.0],
+        mask=[frame.mask for frame in frames],
+        intrinsics=frames[0].intrinsics,
+    )
+    assert any("contradict" in warning for warning in found.warnings)
+    assert found.move is not None
+    assert 0 < found.move.expected_error_deg < 90
+
+
+def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):
+    codes = codes_of(3, 1)
+    for kept, elevation in ((0.0, -60.0), (30.0, 90.0)):
+        of_it = np.flatnonzero(bundle.elevation_deg == kept)
+        only = replace(
+            bundle,
+            distributions=bundle.distributions[of_it],
+            elevation_deg=bundle.elevation_deg[of_it],
+            turn_weight=bundle.turn_weight[of_it],
+            object_ids=tuple(bundle.object_ids[place] for place in of_it),
+        )
+        wanted = Recommender(only, "numpy").recommend_crops(codes)
+        found = Recommender(bundle, "numpy").recommend_crops(codes, elevation_deg=elevation)
+        assert found.error_after_deg == pytest.approx(wanted.error_after_deg, rel=1e-4)
+        assert found.expected_error_deg == pytest.approx(wanted.expected_error_deg, rel=1e-4)
+        assert found.belief == pytest.approx(wanted.belief)
+
+
+# Where the camera may go
+
+
+def check_moves(found):
+    moves = found.moves
+    assert len(moves) <= 1 + N_ALTERNATIVES
+    errors = [move.expected_error_deg for move in moves]
+    assert errors == sorted(errors)
+    assert found.move.expected_error_deg == np.min(found.error_after_deg)
+    for place, move in enumerate(moves):
+        assert -180 < move.rotation_deg <= 180
+        assert move.travel_deg == abs(move.rotation_deg) == travel_deg(move.rotation_deg)
+        bin_ = round(move.rotation_deg / WIDTH) % BINS
+        assert bin_ * WIDTH == pytest.approx(move.rotation_deg % 360)
+        assert move.expected_error_deg == found.error_after_deg[bin_]
+        # Each is the best of its neighbourhood.
+        assert move.expected_error_deg <= found.error_after_deg[(bin_ + 1) % BINS]
+        assert move.expected_error_deg <= found.error_after_deg[bin_ - 1]
+        for other in moves[:place]:
+            assert circular_distance_deg(move.rotation_deg, other.rotation_deg) >= 15
+
+
+@settings(max_examples=40)
+@given(
+    seed=seeds,
+    # Nearer to a limit than this, rounding decides.
+    rotations=st.lists(st.floats(-400, 400).map(lambda degrees: round(degrees, 3)), max_size=3),
+    max_travel=st.floats(60, 180).map(lambda degrees: round(degrees, 3)),
+)
+def test_moves_keep_to_what_the_camera_may_do(recommender, seed, rotations, max_travel):
+    rotations = [0.0, *rotations]
+    codes = codes_of(seed, len(rotations))
+    apart = circular_distance_deg(HERE[:, None], np.array(rotations) - rotations[-1]).min(axis=1)
+    wanted = (apart >= MIN_SEPARATION_DEG) & (travel_deg(HERE) <= max_travel)
+    if not (apart >= MIN_SEPARATION_DEG).any():
+        assert recommender.recommend_crops(codes, rotations, max_travel_deg=max_travel).moves == ()
+        return
+    if not wanted.any():
+        with pytest.raises(UserError, match="no rotation is allowed"):
+            recommender.recommend_crops(codes, rotations, max_travel_deg=max_travel)
+        return
+    found = recommender.recommend_crops(codes, rotations, max_travel_deg=max_travel)
+    assert np.array_equal(np.isfinite(found.error_after_deg), wanted)
+    check_moves(found)
+
+
+def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
+    """Three degrees a bin, and errors, found at every second one, with many minima."""
+    estimator = made_settings(120, hidden=40)
+    rng = np.random.default_rng(0)
+    rough = replace(
+        bundle,
+        estimator=estimator,
+        weights=random_weights(estimator),
+        distributions=rng.dirichlet(np.full(120, 0.3), (2, 120)).astype(np.float32) + 1e-6,
+        elevation_deg=np.zeros(2, np.float32),
+        turn_weight=np.ones(2, np.float32),
+        object_ids=("a", "b"),
+    )
+    recommender = Recommender(rough, "numpy")
+    # What is added, by hand, of two rotations that may be chosen.
+    (belief,) = recommender.distributions(codes_of(0, 1))
+    alike = after_rotations(rough.distributions, rough.object_ids)(())
+    expected = alike.expected(belief, **rough.affinity, share=np.ones(2))
+    parts, total = expected.parts[:, [10, 25]].astype(float), expected.total[[10, 25]]
+    more = sum(own[np.argmin(total - own)] - own[np.argmin(total)] for own in parts)
+    limited = recommender.recommend_crops(codes_of(0, 1), allowed_deg=[60.0, 150.0])
+    wanted = expected.after_deg[[20, 50]] + more / expected.weight
+    assert limited.error_after_deg[[20, 50]] == pytest.approx(wanted, rel=1e-5)
+    found = recommender.recommend_crops(codes_of(0, 2), [0.0, 60.0])
+    minima = (found.error_after_deg < np.roll(found.error_after_deg, 1)) & (
+        found.error_after_deg < np.roll(found.error_after_deg, -1)
+    )
+    assert minima.sum() > 15
+    moves = found.moves
+    assert len(moves) == 1 + N_ALTERNATIVES
+    rotations = np.array([move.rotation_deg for move in moves])
+    apart = circular_distance_deg(rotations[:, None], rotations)
+    assert apart[~np.eye(len(moves), dtype=bool)].min() >= 15
+    # Each is the least error that is far enough from all before it.
+    bins = 3.0 * np.arange(120)
+    for place, move in enumerate(moves):
+        free = minima & (
+            circular_distance_deg(bins[:, None], rotations[:place]).min(axis=1, initial=360) >= 15
+        )
+        assert move.expected_error_deg == found.error_after_deg[free].min()
+
+
+def test_limits_do_not_change_the_errors_of_what_is_left(recommender):
+    codes = codes_of(1, 1)
+    free = recommender.recommend_crops(codes)
+    limited = recommender.recommend_crops(codes, max_travel_deg=90.0, allowed_deg=HERE[::2])
+    left = np.isfinite(limited.error_after_deg)
+    assert 0 < left.sum() < BINS - 1
+    # What a choice makes its error too low depends on how many there are to choose from.
+    less = free.error_after_deg[left] - limited.error_after_deg[left]
+    assert less == pytest.approx(less[0], abs=1e-9)
+    assert limited.expected_error_deg == free.expected_error_deg
+    assert np.array_equal(limited.belief, free.belief)
+
+
+@given(seed=seeds, bins=st.lists(st.integers(-BINS, BINS), min_size=1, max_size=5))
+def test_only_allowed_rotations_are_taken(recommender, seed, bins):
+    allowed = [turn * WIDTH for turn in bins]
+    wanted = {turn % BINS for turn in bins} - {0}
+    codes = codes_of(seed, 1)
+    if not wanted:
+        with pytest.raises(UserError, match="no rotation is allowed"):
+            recommender.recommend_crops(codes, allowed_deg=allowed)
+        return
+    found = recommender.recommend_crops(codes, allowed_deg=allowed)
+    assert set(np.flatnonzero(np.isfinite(found.error_after_deg))) == wanted
+    check_moves(found)
+
+
+@given(rotation=st.floats(-720, 720))
+def test_an_allowed_rotation_is_answered_as_it_was_given(recommender, rotation):
+    codes = codes_of(0, 1)
+    if travel_deg(rotation) < MIN_SEPARATION_DEG:
+        with pytest.raises(UserError, match="no rotation is allowed"):
+            recommender.recommend_crops(codes, allowed_deg=[rotation])
+        return
+    found = recommender.recommend_crops(codes, allowed_deg=[rotation])
+    if -180 < rotation <= 180:
+        assert found.move.rotation_deg == rotation
+    assert -180 < found.move.rotation_deg <= 180
+    assert circular_distance_deg(found.move.rotation_deg, rotation) < 1e-9
+    assert found.move.travel_deg == abs(found.move.rotation_deg)
+    assert found.alternatives == ()
+    (bin_,) = np.flatnonzero(np.isfinite(found.error_after_deg))
+    assert circular_distance_deg(bin_ * WIDTH, rotation) <= WIDTH / 2 + 1e-9
+    # The expected error lies between those of the bins on either side, each the only one allowed.
+    place = rotation % 360 / WIDTH
+    bins = {int(at) % BINS for at in (np.floor(place), np.ceil(place))}
+    if not bins & {0}:
+        alone = [recommender.recommend_crops(codes, allowed_deg=[at * WIDTH]) for at in bins]
+        sides = [answer.move.expected_error_deg for answer in alone]
+        assert min(sides) - 1e-9 <= found.move.expected_error_deg <= max(sides) + 1e-9
+
+
+def test_allowed_rotations_are_ranked(recommender):
+    """Dense ones too: of neighbours within a bin the best, of all that are apart the order."""
+    codes = codes_of(2, 1)
+    allowed = np.arange(-180.0, 180.0, 2.5)
+    found = recommender.recommend_crops(codes, allowed_deg=allowed)
+    moves = found.moves
+    assert all(move.rotation_deg in {*allowed, 180.0} for move in moves)
+    free = recommender.recommend_crops(codes)
+    assert found.move.expected_error_deg <= free.move.expected_error_deg
+    few = recommender.recommend_crops(codes, allowed_deg=[40.25, -75.5, 131.0])
+    moves = few.moves
+    assert {move.rotation_deg for move in moves} == {40.25, -75.5, 131.0}
+    errors = [move.expected_error_deg for move in moves]
+    assert errors == sorted(errors)
+
+
+@given(seed=seeds, mask=st.lists(st.booleans(), min_size=2, max_size=50))
+def test_booleans_are_a_mask_over_the_circle(recommender, seed, mask):
+    codes = codes_of(seed, 1)
+    allowed = [360 * place / len(mask) for place, may in enumerate(mask) if may]
+    if not any(travel_deg(rotation) >= MIN_SEPARATION_DEG for rotation in allowed):
+        with pytest.raises(UserError, match="allowed"):
+            recommender.recommend_crops(codes, allowed_deg=np.array(mask))
+        return
+    found = recommender.recommend_crops(codes, allowed_deg=np.array(mask))
+    wanted = recommender.recommend_crops(codes, allowed_deg=allowed)
+    assert found.moves == wanted.moves
+    assert np.array_equal(found.error_after_deg, wanted.error_after_deg)
+
+
+def test_allowed_rotations_count_from_the_last_frame(recommender):
+    found = recommender.recommend_crops(codes_of(0, 2), [0.0, 90.0], allowed_deg=[90.0, -45.0])
+    assert np.flatnonzero(np.isfinite(found.error_after_deg)).tolist() == [6, 21]
+    # Back to the first frame is no new view.
+    with pytest.raises(UserError, match="no rotation is allowed"):
+        recommender.recommend_crops(codes_of(0, 2), [0.0, 90.0], allowed_deg=[-90.0])
+
+
+def test_where_nothing_is_allowed_is_one_line(recommender):
+    codes = codes_of(0, 1)
+    for options in (
+        {"max_travel_deg": 14.9},
+        {"max_travel_deg": 0.0},
+        {"allowed_deg": [0.0]},
+        {"allowed_deg": [5.0, -7.0, 360.0]},
+        {"allowed_deg": [90.0], "max_travel_deg": 60.0},
+    ):
+        with pytest.raises(UserError, match="widen --allowed or --max-travel"):
+            recommender.recommend_crops(codes, **options)
+
+
+@pytest.mark.parametrize("options", [{}, {"allowed_deg": [90.0]}, {"max_travel_deg": 10.0}])
+def test_frames_all_round_have_a_pose_and_no_next_view(recommender, options):
+    everywhere = np.arange(BINS) * WIDTH
+    codes = codes_of(0, BINS)
+    found = recommender.recommend_crops(codes, everywhere, **options)
+    assert found.move is None
+    assert found.moves == found.alternatives == ()
+    assert np.isinf(found.error_after_deg).all()
+    # The pose is that of the same frames in another order, with room for a next view.
+    half = recommender.recommend_crops(codes[:12], everywhere[:12])
+    assert half.move is not None
+    assert half.moves == (half.move, *half.alternatives)
+    assert found.n_views == BINS
+    logs = np.log(recommender.distributions(codes))
+    product = np.exp(sum(np.roll(row, -place) for place, row in enumerate(logs)))
+    back = np.roll(product / product.sum(), BINS - 1)
+    assert found.belief == pytest.approx(back, abs=1e-6)
+
+
+@pytest.mark.parametrize("allowed", [[], [np.nan], [30.0, np.inf]])
+def test_allowed_rotations_are_numbers(recommender, allowed):
+    with pytest.raises(UserError, match="allowed rotations"):
+        recommender.recommend_crops(codes_of(0, 1), allowed_deg=allowed)
+
+
+@pytest.mark.parametrize(
+    ("n", "rotations", "message"),
+    [
+        (1, [0.0, 90.0], "1 frame and 2 rotations; give one for each frame"),
+        (2, [0.0], "2 frames and 1 rotation; give one for each frame"),
+        (2, 0.0, "2 frames and 1 rotation; give one for each frame"),
+        (2, [], "2 frames and 0 rotations"),
+        (1, [[0.0]], "1 frame and 1 rotation"),
+        (1, "here", "'here' are no numbers"),
+        (1, 5.0, "the first is 5"),
+        (2, [10.0, 20.0], "the first is 10"),
+        (2, [0.0, np.nan], "no finite number"),
+        (2, [0.0, np.inf], "no finite number"),
+    ],
+)
+def test_rotations_that_do_not_fit_the_frames_are_refused(recommender, n, rotations, message):
+    with pytest.raises(UserError, match=message):
+        recommender.recommend_crops(codes_of(0, n), rotations)
+    with pytest.raises(UserError, match=message):
+        recommender.recommend(FRAMES[:n], rotations_deg=rotations)
+
+
+@pytest.mark.parametrize("rotations", [0, 0.0, np.float32(0), np.zeros(1), [0], (0.0,)])
+def test_of_one_frame_the_rotation_may_be_a_number(recommender, rotations):
+    same(
+        recommender.recommend(FRAMES[0], rotations_deg=rotations), recommender.recommend(FRAMES[0])
+    )
+    codes = codes_of(0, 1)
+    same(recommender.recommend_crops(codes, rotations), recommender.recommend_crops(codes))
+
+
+@pytest.mark.parametrize(
+    ("elevation", "is_told"),
+    [(None, False), (-7.0, False), (15.0, False), (37.0, False), (-20.0, True), (70.0, True)],
+)
+def test_an_elevation_unlike_all_that_were_calibrated_is_told(recommender, elevation, is_told):
+    """The bundle's are 0 and 30 degrees."""
+    found = recommender.recommend_crops(codes_of(0, 1), elevation_deg=elevation)
+    assert any("is unlike those that were calibrated, 0 to 30°" in w for w in found.warnings) == (
+        is_told
+    )
+
+
+def test_an_elevation_is_a_number(recommender):
+    with pytest.raises(UserError, match="elevation of nan"):
+        recommender.recommend_crops(codes_of(0, 1), elevation_deg=float("nan"))
+
+
+# What is doubted
+
+
+def test_a_turn_the_wrong_way_contradicts_the_frames():
+    recommender = Recommender.load("mug")
+    frames = [example_frame(azimuth_deg=azimuth).depth_m for azimuth in (75.0, 165.0)]
+    intrinsics = example_frame().intrinsics
+    right, wrong = (
+        recommender.recommend(frames, rotations_deg=[0.0, turn], intrinsics=intrinsics)
+        for turn in (90.0, -90.0)
+    )
+    assert right.bayes_factor > 0.5
+    assert not right.warnings
+    assert wrong.bayes_factor < 0.05
+    (warning,) = wrong.warnings
+    assert "contradict" in warning
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.5, 2.0])
+def test_intrinsics_of_another_resolution_are_refused(factor):
+    frame, recommender = example_frame(azimuth_deg=250.0), Recommender.load("mug")
+    camera = frame.intrinsics
+    scaled = [factor * value for value in (camera.fx, camera.fy, camera.cx, camera.cy)]
+    with pytest.raises(FrameError, match="640 × 480") as error:
+        recommender.recommend(frame.depth_m, intrinsics=scaled)
+    assert error.value.name == "other-resolution"
+    assert not recommender.recommend(frame.depth_m, intrinsics=camera).warnings
+
+
+def test_a_principal_point_off_the_middle_is_doubted():
+    frame, recommender = example_frame(azimuth_deg=250.0), Recommender.load("mug")
+    camera = frame.intrinsics
+    answer = recommender.recommend(
+        frame.depth_m, intrinsics=[camera.fx, camera.fy, camera.cx + 150, camera.cy]
+    )
+    assert any("cut out of a larger one" in warning for warning in answer.warnings)
+
+
+# What is familiar
+
+
+def test_the_least_familiar_frame_counts(recommender):
+    codes = codes_of(11, 3)
+    known = recommender.bundle.familiarity
+    apart = unfamiliarity(known, codes, recommender.network(codes))
+    alone = [recommender.recommend_crops(codes[i : i + 1]).unfamiliarity for i in range(3)]
+    assert alone == pytest.approx(apart, rel=1e-5)
+    together = recommender.recommend_crops(codes, [0.0, 60.0, 120.0])
+    assert together.unfamiliarity == pytest.approx(max(alone), rel=1e-5)
+    assert together.is_unfamiliar == (together.unfamiliarity > 1)
+
+
+def test_what_no_calibration_image_resembles_is_less_familiar(bundle, recommender):
+    azimuth_deg = np.arange(BINS) * WIDTH
+    turns = []
+    for name in "abc":
+        codes = random_codes(np.random.default_rng(ord(name)), BINS)
+        logits = recommender.network(codes)
+        turns.append(Turn(name, "1", 0.0, azimuth_deg, logits, codes))
+    made = Recommender(replace(bundle, familiarity=fit_familiarity(turns)), "numpy")
+    strange = np.full((1, 32, 32), 255, dtype=np.uint8)
+    known, other = (made.recommend_crops(codes) for codes in (codes_of(12, 1), strange))
+    assert not known.is_unfamiliar
+    assert other.unfamiliarity > known.unfamiliarity
+
+
+# Frames
+
+
+def same(one, other):
+    assert np.array_equal(np.stack(one.crops), np.stack(other.crops))
+    assert np.array_equal(one.belief, other.belief)
+    assert one.move == other.move
+    assert one.azimuth_deg == other.azimuth_deg
+
+
+def test_a_frame_may_be_given_in_many_forms(recommender):
+    depth = FRAMES[0]
+    wanted = recommender.recommend(depth)
+    hole = np.where(depth > 0, depth, np.nan)
+    for given_ in (
+        [depth],
+        (depth,),
+        depth[None],
+        depth.astype(np.float64),
+        hole,
+        np.where(depth > 0, depth, -1.0),
+        depth[:, :, None],
+        depth.tolist(),
+        np.asfortranarray(depth),
+    ):
+        same(recommender.recommend(given_), wanted)
+    assert np.isnan(hole).any()
+
+
+def test_whole_numbers_are_millimetres(recommender):
+    millimetres = np.rint(FRAMES[0] * 1000).astype(np.uint16)
+    same(recommender.recommend(millimetres), recommender.recommend(millimetres / 1000))
+
+
+def test_several_frames_may_be_a_list_or_an_array(recommender):
+    rotations = [0.0, 60.0, -60.0]
+    wanted = recommender.recommend(FRAMES[:3], rotations_deg=rotations)
+    same(recommender.recommend(np.stack(FRAMES[:3]), rotations_deg=rotations), wanted)
+    same(recommender.recommend(tuple(FRAMES[:3]), rotations_deg=np.array(rotations)), wanted)
+    crops = np.stack([recommender.crop(depth).codes for depth in FRAMES[:3]])
+    same(recommender.recommend_crops(crops, rotations), wanted)
+
+
+def test_frames_may_have_other_sizes(recommender):
+    wanted = recommender.recommend(FRAMES[:2], rotations_deg=[0.0, 45.0])
+    padded = np.pad(FRAMES[1], ((7, 9), (20, 4)))
+    same(recommender.recommend([FRAMES[0], padded], rotations_deg=[0.0, 45.0]), wanted)
+
+
+def test_frames_are_not_changed(recommender):
+    before = FRAMES[0].copy()
+    recommender.recommend(FRAMES[0], mask=FRAMES[0] > 0)
+    assert np.array_equal(FRAMES[0], before)
+
+
+def test_the_same_frame_gives_the_same_answer(bundle, recommender):
+    same(recommender.recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
+    same(Recommender(bundle, "numpy").recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
+
+
+def test_a_mask_takes_the_object_from_its_surroundings(recommender):
+    wanted = recommender.recommend(FRAMES[0])
+    table = np.where(FRAMES[0] > 0, FRAMES[0], 0.55).astype(np.float32)
+    mask = FRAMES[0] > 0
+    same(recommender.recommend(table, mask=mask), wanted)
+    same(recommender.recommend(table, mask=[255 * mask.astype(np.uint8)]), wanted)
+    same(recommender.recommend([table], mask=mask[None]), wanted)
+    with pytest.raises(FrameError, match="mask-at-border"):
+        recommender.recommend(table)
+
+
+@settings(max_examples=25)
+@given(seed=seeds, kind=st.sampled_from([bool, np.uint8, float]))
+def test_only_the_part_of_a_frame_around_the_mask_is_looked_at(recommender, seed, kind):
+    """And the crop is that of the whole frame, to the bit."""
+    rng = np.random.default_rng(seed)
+    depth = frame(seed, row=int(rng.integers(30, 60)), column=int(rng.integers(35, 85)))
+    mask = (depth > 0) & (rng.random(depth.shape) < 0.98)
+    depth = np.where(depth > 0, depth, rng.uniform(0.5, 0.9)).astype(np.float32)
+    bundle = recommender.bundle
+    camera = Intrinsics(FOCAL_PX, 0.97 * FOCAL_PX, 58.3, 46.1)
+    inside = object_mask(depth, 1.0, mask)
+    sizes = bundle.diagonal_m, bundle.extent_m
+    wanted = crop_frame(depth, inside, camera, bundle.camera, *sizes)
+    found = recommender.crop(depth, mask=3 * mask.astype(kind), intrinsics=camera)
+    assert np.array_equal(found.codes, wanted.codes)
+    assert found.distance_m == wanted.distance_m
+    assert found.extent_m == wanted.extent_m
+
+
+def test_a_repeated_sequence_of_rotations_has_the_same_answer(bundle):
+    """What calibration turns make of rotations is kept: no answer depends on those before it."""
+    kept = Recommender(bundle, "numpy")
+    for rotations in ([0.0], [0.0, 60.0], [0.0, 90.0], [0.0, 60.0, 120.0], [0.0], [0.0, 60.0]):
+        codes = codes_of(len(rotations), len(rotations))
+        fresh = Recommender(bundle, "numpy").recommend_crops(codes, rotations)
+        found = kept.recommend_crops(codes, rotations)
+        assert np.array_equal(found.error_after_deg, fresh.error_after_deg)
+        same(found, fresh)
+
+
+def test_near_and_far_take_the_object_from_its_surroundings(recommender):
+    wanted = recommender.recommend(FRAMES[0])
+    wall = np.where(FRAMES[0] > 0, FRAMES[0], 0.9).astype(np.float32)
+    wall[5:20, 5:20] = 0.2
+    same(recommender.recommend(wall, near_m=0.3, far_m=0.8), wanted)
+
+
+def test_without_intrinsics_the_bundle_has_a_focal_length(recommender):
+    wanted = recommender.recommend(FRAMES[0])
+    middle = COLUMNS / 2, ROWS / 2
+    for intrinsics in ([FOCAL_PX], FOCAL_PX, int(FOCAL_PX)):
+        same(recommender.recommend(FRAMES[0], intrinsics=intrinsics), wanted)
+    # With a principal point the object is seen from where the camera is.
+    in_view = recommender.recommend(FRAMES[0], intrinsics=(FOCAL_PX, FOCAL_PX, *middle))
+    for intrinsics in (
+        Intrinsics(FOCAL_PX, FOCAL_PX, *middle, COLUMNS, ROWS),
+        np.array([[FOCAL_PX, 0, middle[0]], [0, FOCAL_PX, middle[1]], [0, 0, 1]]),
+    ):
+        same(recommender.recommend(FRAMES[0], intrinsics=intrinsics), in_view)
+    apart = in_view.crops[0].astype(int) - wanted.crops[0]
+    assert np.abs(apart).max() <= 1
+    other = recommender.recommend(FRAMES[0], intrinsics=1.3 * FOCAL_PX)
+    assert not np.array_equal(other.crops[0], wanted.crops[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("empty-mask", lambda depth: {"depth_m": np.zeros_like(depth)}),
+        ("few-levels", lambda depth: {"depth_m": (depth * 100).astype(np.uint8)}),
+        ("colour-image", lambda depth: {"depth_m": [np.stack([depth] * 3, axis=2)]}),
+        ("implausible-size", lambda depth: {"depth_m": depth, "intrinsics": 50.0}),
+        ("mask-at-border", lambda depth: {"depth_m": depth[:, 60:]}),
+        (
+            "other-resolution",
+            lambda depth: {
+                "depth_m": depth,
+                "intrinsics": Intrinsics(150.0, 150.0, width=9, height=9),
+            },
+        ),
+        ("little-depth", lambda depth: {"depth_m": depth, "mask": np.ones_like(depth)}),
+    ],
+)
+def test_a_frame_that_cannot_be_used_is_refused(recommender, name, change):
+    with pytest.raises(FrameError) as error:
+        recommender.recommend(**change(FRAMES[0]))
+    assert error.value.name == name
+
+
+@pytest.mark.parametrize("unit", [1000.0, 10_000.0, 4000.0, 0.001])
+@pytest.mark.parametrize("surroundings", ["nothing", "wall", "mask"])
+def test_a_wrong_unit_is_named_however_the_object_is_found(recommender, unit, surroundings):
+    """What reaches as far as an object in metres is a sliver of it in millimetres."""
+    depth, options = FRAMES[0], {}
+    if surroundings == "mask":
+        options["mask"] = depth > 0
+    elif surroundings == "wall":
+        depth = np.where(depth > 0, depth, 0.9).astype(np.float32)
+    recommender.recommend(depth, **options)
+    with pytest.raises(FrameError, match="multiply depths or --depth-scale") as error:
+        recommender.recommend(depth * np.float32(unit), **options)
+    assert error.value.name == "implausible-distance"
+    if surroundings == "mask" or unit != 4000.0:
+        assert f"depths {1 / unit:g} times as large" in str(error.value)
+
+
+def test_what_is_nearest_may_be_nearer_than_the_middle_of_the_object(recommender):
+    """A handle that points to the camera: its own distance would be too short."""
+    depth = frame(0, distance=2.2)
+    depth[depth > 0] -= np.float32(0.1 * DIAGONAL_M)
+    depth[40:46, 55:65] = 1.2 * DIAGONAL_M
+    recommender.recommend(depth, intrinsics=[60.0])
+    with pytest.raises(FrameError, match="implausible-distance"):
+        recommender.recommend(0.3 * depth, intrinsics=[60.0])
+
+
+def test_one_bad_frame_of_several_is_refused_by_its_number(recommender):
+    with pytest.raises(FrameError, match=r"^empty-mask: frame 2 of 2: "):
+        recommender.recommend([FRAMES[0], np.zeros_like(FRAMES[0])], rotations_deg=[0.0, 90.0])
+
+
+def test_a_bad_frame_is_refused_by_its_name_where_it_has_one(recommender):
+    bad = np.zeros_like(FRAMES[0])
+    with pytest.raises(FrameError, match=r"^empty-mask: left: the frame has no depth"):
+        recommender.recommend(bad, names=["left"])
+    with pytest.raises(FrameError, match=r"^empty-mask: right: the frame has no depth"):
+        recommender.recommend([FRAMES[0], bad], rotations_deg=[0, 90], names=["left", "right"])
+    with pytest.raises(UserError, match=r"^a longest travel"):
+        recommender.recommend(FRAMES[0], names=["left"], max_travel_deg=-1.0)
+    with pytest.raises(UserError, match=r"^--far=900: give metres"):
+        recommender.recommend(FRAMES[0], names=["left"], far_m=900.0)
+    with pytest.raises(UserError, match="1 frame and 2 names"):
+        recommender.recommend(FRAMES[0], names=["left", "right"])
+
+
+def test_a_mask_may_be_any_array(recommender):
+    mask = FRAMES[0] > 0
+    wanted = recommender.recommend(FRAMES[0], mask=mask)
+    for given_ in (mask.tolist(), [mask.tolist()], np.where(mask, 1.0, np.nan), (mask,)):
+        same(recommender.recommend(FRAMES[0], mask=given_), wanted)
+    for given_ in ([1, 0, 1], 1, np.ones((1, 2, 3, 4))):
+        with pytest.raises(UserError):
+            recommender.recommend(FRAMES[0], mask=given_)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"depth_m": "frame.npy"}, "depth: 'frame.npy' is text and no array; read the file with"),
+        ({"depth_m": [Path("a.npy")]}, "depth: 'a.npy' is text"),
+        ({"depth_m": None}, "depth holds object, no numbers"),
+        ({"mask": "m.png"}, "mask: 'm.png' is text and no array; give an array"),
+        ({"mask": ["m.png"]}, "mask: 'm.png' is text"),
+        ({"intrinsics": "585"}, "intrinsics: '585' is text; give numbers"),
+        ({"intrinsics": Path("camera.json")}, "intrinsics: 'camera.json' is text"),
+        ({"near_m": "1"}, "--near: '1' is no number"),
+        ({"far_m": 10**400}, "--far: the number is too large"),
+        ({"intrinsics": 10**400}, "are no numbers; give fx,fy,cx,cy"),
+        ({"far_m": [1.0]}, r"--far: \[1.0\] is no number"),
+        ({"elevation_deg": "high"}, "elevation: 'high' is no number"),
+    ],
+)
+def test_an_argument_of_another_type_is_one_line(recommender, options, message):
+    with pytest.raises(UserError, match=message):
+        recommender.recommend(**{"depth_m": FRAMES[0]} | options)
+
+
+def test_a_recommender_is_of_a_bundle(bundle):
+    for name in (3, None):
+        with pytest.raises(UserError, match=f"{name} is no name of a file"):
+            Recommender.load(name)
+    with pytest.raises(UserError, match="'mug' is no bundle; give its name or file to Recommen"):
+        Recommender("mug")
+    with pytest.raises(UserError, match="backend 3: choose from: numpy, onnx"):
+        Recommender(bundle, 3)
+
+
+def test_crops_are_bytes(recommender):
+    codes = recommender.crop(FRAMES[0]).codes
+    for wrong in ("crop", codes, codes[None] / 255):
+        with pytest.raises(UserError, match=r"crops: .*; give \(n, side, side\) uint8"):
+            recommender.recommend_crops(wrong)
+
+
+def test_frames_of_several_sizes_are_arrays(recommender):
+    rows = FRAMES[0].tolist()
+    with pytest.raises(UserError, match="give a list of numpy arrays"):
+        recommender.recommend([rows, rows[1:]], rotations_deg=[0.0, 90.0])
+
+
+def test_masks_are_as_many_as_frames(recommender):
+    mask = FRAMES[0] > 0
+    with pytest.raises(UserError, match="2 frames and 1 mask:"):
+        recommender.recommend(FRAMES[:2], rotations_deg=[0.0, 90.0], mask=mask)
+    with pytest.raises(UserError, match="1 frame and 2 masks"):
+        recommender.recommend(FRAMES[0], mask=[mask, mask])
+    with pytest.raises(UserError, match="the mask has"):
+        recommender.recommend(FRAMES[0], mask=mask.T)
+
+
+def test_a_mask_of_colours_is_refused(recommender):
+    mask = FRAMES[0] > 0
+    for given_ in (np.dstack([mask] * 3), [np.dstack([mask] * 3)], np.dstack([mask] * 4)):
+        with pytest.raises(UserError, match="the mask has 3 axes"):
+            recommender.recommend(FRAMES[0], mask=given_)
+    same(
+        recommender.recommend(FRAMES[0], mask=mask[:, :, None]),
+        recommender.recommend(FRAMES[0], mask=mask),
+    )
+
+
+def test_each_frame_may_have_a_camera_of_its_own(recommender):
+    one, other = (Intrinsics(f, f, 60.0, 45.0) for f in (FOCAL_PX, 1.2 * FOCAL_PX))
+    rotations = [0.0, 60.0]
+    found = recommender.recommend(FRAMES[:2], rotations_deg=rotations, intrinsics=[one, other])
+    crops = [
+        recommender.crop(depth, intrinsics=camera).codes
+        for depth, camera in zip(FRAMES[:2], (one, other), strict=True)
+    ]
+    same(found, recommender.recommend_crops(np.stack(crops), rotations))
+    with pytest.raises(UserError, match="2 frames and 3 cameras"):
+        recommender.recommend(FRAMES[:2], rotations_deg=rotations, intrinsics=[one] * 3)
+
+
+@pytest.mark.parametrize(
+    ("limits", "name"),
+    [({"near_m": 300.0}, "--near=300"), ({"near_m": 0.3, "far_m": 900.0}, "--far=900")],
+)
+def test_limits_in_millimetres_are_refused(recommender, limits, name):
+    with pytest.raises(UserError, match=f"{name}: give metres; the object is 0.18 to 2.4 m away"):
+        recommender.recommend(FRAMES[0], **limits)
+    recommender.recommend(FRAMES[0], near_m=0.3, far_m=np.inf)
+
+
+def test_a_frame_without_any_depth_says_so(recommender):
+    for nothing in (np.nan, 0.0, -1.0, np.inf):
+        with pytest.raises(FrameError, match="the frame has no depth at all"):
+            recommender.recommend(np.full_like(FRAMES[0], nothing))
+
+
+def test_the_unit_and_the_size_of_the_object_go_together(bundle, recommender):
+    """An object twice as large, twice as far away, with a bundle for such objects."""
+    large = replace(
+        bundle,
+        diagonal_m=2 * DIAGONAL_M,
+        extent_m=(2 * bundle.extent_m[0], 2 * bundle.extent_m[1]),
+    )
+    same(Recommender(large, "numpy").recommend(2 * FRAMES[0]), recommender.recommend(FRAMES[0]))
+
+
+def test_both_backends_give_the_same_answer(bundle, recommender):
+    pytest.importorskip("onnx")
+    pytest.importorskip("onnxruntime")
+    other = Recommender(bundle, "onnx")
+    for rotations in ([0.0], [0.0, 45.0, -120.0]):
+        frames = FRAMES[: len(rotations)]
+        one = recommender.recommend(frames, rotations_deg=rotations)
+        two = other.recommend(frames, rotations_deg=rotations)
+        assert circular_distance_deg(one.azimuth_deg, two.azimuth_deg) < 0.01
+        assert one.belief == pytest.approx(two.belief, abs=1e-4)
+        assert one.error_after_deg == pytest.approx(two.error_after_deg, rel=1e-3)
+        assert one.unfamiliarity == pytest.approx(two.unfamiliarity, rel=1e-3)
+
+
+def test_distributions_are_those_of_the_logits(recommender):
+    codes = codes_of(5, 4)
+    logits = recommender.network(codes)
+    wanted = distributions_of(logits, recommender.bundle.temperature)
+    assert np.array_equal(recommender.distributions(codes), wanted)
+    belief = recommender.recommend_crops(codes[:1]).belief
+    assert belief == pytest.approx(wanted[0], rel=1e-4)

@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from studies.ablation import PAPER, ablate, ablation_space
+from studies.extensions import evaluate_extensions
+from tests.core.made import FEW_DENSITIES, objects
+
+
+def test_the_first_row_is_the_papers_method_and_every_other_changes_it():
+    space = ablation_space()
+    assert dict(space.iloc[0].drop("varied")) == dict(PAPER)
+    assert not space.drop(columns="varied").duplicated().any()
+    calibration, test = objects(6, 0), objects(5, 1)
+    plain = ablate(calibration, test, PAPER, FEW_DENSITIES)
+    method = {"paper": {"policy": "pose_ambiguity", "fusion": "average"}}
+    frame = evaluate_extensions(
+        calibration, test, method, FEW_DENSITIES, lambda name: np.random.default_rng(0)
+    ).frames["paper"]
+    expected = frame.groupby("object_id")["error_deg"].mean()
+    np.testing.assert_allclose(plain.set_index("object_id")["error_deg"], expected, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"chosen_by": "given", "bandwidth_deg": 6.0, "pseudo_observations": 10.0},
+        {"chosen_by": "likelihood"},
+        {"n_bins": 72},
+        {"n_calibration": 2},
+        {"criterion": "expected_error", "fusion": "posterior"},
+    ],
+)
+def test_every_kind_of_ablation_gives_an_error_for_each_object(change):
+    calibration, test = objects(6, 0), objects(5, 1)
+    found = ablate(calibration, test, {**PAPER, **change}, FEW_DENSITIES)
+    assert found["object_id"].tolist() == list(test.object_ids)
+    assert found["error_deg"].between(0, 60).all()

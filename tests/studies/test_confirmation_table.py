@@ -1,0 +1,256 @@
+"""Means and contrasts over all trainings."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pandas as pd
+import pytest
+from nbv.experiment.plan_bound import COLUMNS
+from studies.confirmation import (
+    ALL,
+    BELIEF_COLUMNS,
+    BELIEFS_COLUMNS,
+    CONTRASTS_COLUMNS,
+    METHODS_COLUMNS,
+    OBJECTS_COLUMNS,
+    TRAININGS_COLUMNS,
+    Contrast,
+    belief_means,
+    bound_means,
+    contrasts_of,
+    method_contrasts,
+    method_means,
+    training_contrasts,
+)
+from studies.trainings import crossed_mean, holm, predicted_by_others
+
+from nbv.errors import UserError
+
+SHIFT = {
+    ("none", "none", 1): 4.0,
+    ("random", "average", 2): 3.0,
+    ("fixed", "average", 2): 2.0,
+    ("opposite", "average", 2): 2.5,
+    ("given_estimate", "average", 2): 1.5,
+    ("as_printed", "average", 2): 3.5,
+    ("expected_error", "average", 2): 1.0,
+    ("fixed", "product", 2): 0.5,
+    ("expected_error", "product", 2): 0.0,
+    ("evenly_spaced", "product", 3): -0.5,
+    ("expected_error", "product", 3): -1.0,
+}
+TRAININGS = [(0, 0), (0, 1), (1, 0)]
+SIZES = {"mug": 8, "car": 5}
+
+
+def objects_frame(noise=0.3):
+    rng = np.random.default_rng(0)
+    rows = []
+    for (category, n), training in itertools.product(SIZES.items(), TRAININGS):
+        for method, shift in SHIFT.items():
+            for k in range(n):
+                error = 10 + k + shift + rng.normal(0, noise)
+                figures = (error, 100 - error, 5.0, 90.0)
+                fold = 1 + (k + training[0]) % 2
+                rows.append(
+                    ("real", category, *training, fold, *method, f"{category}{k}", *figures)
+                )
+    return pd.DataFrame(rows, columns=list(OBJECTS_COLUMNS))
+
+
+@pytest.fixture(scope="module")
+def objects():
+    return objects_frame()
+
+
+def table_of(objects, category, method):
+    """Errors (n_trainings, n_objects), by loops."""
+    part = objects[objects["category"] == category]
+    names = sorted(set(part["object_id"]))
+    table = np.empty((len(TRAININGS), len(names)))
+    for row in part.itertuples():
+        if (row.choice, row.fusion, row.n_views) == method:
+            table[TRAININGS.index((row.shuffle, row.replicate)), names.index(row.object_id)] = (
+                row.error_deg
+            )
+    return table
+
+
+def test_means_are_over_objects_and_trainings(objects):
+    found = method_means(objects)
+    assert tuple(found.columns) == METHODS_COLUMNS
+    assert len(found) == 3 * len(SHIFT)
+    indexed = found.set_index(["category", "choice", "fusion", "n_views"])
+    for method in SHIFT:
+        tables = [table_of(objects, category, method) for category in SIZES]
+        parts = [crossed_mean(table) for table in tables]
+        for category, mean in zip((*SIZES, ALL), (*parts, crossed_mean(*tables)), strict=True):
+            row = indexed.loc[(category, *method)]
+            ends = mean.interval()
+            assert row["mae_deg"] == pytest.approx(mean.value)
+            assert (row["low"], row["high"]) == pytest.approx((ends.low, ends.high))
+            assert row["n_objects"] == mean.n_objects
+            assert row["n_trainings"] == 3
+            assert row["pauc"] == pytest.approx(100 - mean.value)
+    assert set(found["above_90_percent"]) == {5.0}
+
+
+def test_beliefs_have_the_same_means(objects):
+    figures = ["error_deg", "pauc_percent", "above_90_percent"]
+    renamed = objects.rename(columns=dict(zip(figures, BELIEF_COLUMNS, strict=True)))
+    found, expected = belief_means(renamed), method_means(objects)
+    assert tuple(found.columns) == BELIEFS_COLUMNS
+    ours = ["log_likelihood", "low", "high", "inside_50_percent", "inside_90_percent"]
+    theirs = ["mae_deg", "low", "high", "pauc", "above_90_percent"]
+    np.testing.assert_array_equal(found[ours], expected[theirs])
+
+
+def test_contrasts_are_paired_by_object_and_training(objects):
+    found = method_contrasts(objects)
+    assert tuple(found.columns) == CONTRASTS_COLUMNS
+    indexed = found.set_index(["category", "contrast", "fusion"])
+    row = indexed.loc[("mug", "expected_error - fixed", "average")]
+    mine, other = (
+        table_of(objects, "mug", (choice, "average", 2)) for choice in ("expected_error", "fixed")
+    )
+    mean = crossed_mean(mine - other)
+    assert row["difference_deg"] == pytest.approx(mean.value)
+    assert row["difference_deg"] == pytest.approx(-1.0, abs=0.3)
+    # Objects differ by degrees, the difference does not: it is paired.
+    assert row["high"] - row["low"] < 1.0
+
+
+def test_all_but_primary_contrasts_over_all_categories_are_adjusted_together(objects):
+    found = method_contrasts(objects)
+    for category in ("car", ALL):
+        raw, primary = {}, set()
+        for contrast in contrasts_of(list(SHIFT)):
+            tables = [
+                table_of(objects, one, contrast.method) - table_of(objects, one, contrast.other)
+                for one in (SIZES if category == ALL else [category])
+            ]
+            key = contrast.name, contrast.method[1]
+            raw[key] = crossed_mean(*tables).p_value
+            if contrast.question and category == ALL:
+                primary.add(key)
+        adjusted = holm({"|".join(key): p for key, p in raw.items() if key not in primary})
+        rows = found[found["category"] == category].set_index(["contrast", "fusion"])
+        for key, p_value in raw.items():
+            expected = p_value if key in primary else adjusted["|".join(key)]
+            assert rows.loc[key, "p_holm"] == pytest.approx(expected)
+
+
+def test_each_training_is_compared_with_the_others(objects):
+    found = training_contrasts(objects)
+    assert tuple(found.columns) == TRAININGS_COLUMNS
+    assert len(found) == 3 * len(contrasts_of(list(SHIFT))) * len(TRAININGS)
+    keys = ["category", "contrast", "fusion", "shuffle", "replicate"]
+    indexed = found.set_index(keys)
+    for category in (*SIZES, ALL):
+        tables = [
+            table_of(objects, one, ("expected_error", "average", 2))
+            - table_of(objects, one, ("fixed", "average", 2))
+            for one in (SIZES if category == ALL else [category])
+        ]
+        for training, expected in zip(TRAININGS, predicted_by_others(tables), strict=True):
+            row = indexed.loc[(category, "expected_error - fixed", "average", *training)]
+            shown = row["difference_deg"], row["low"], row["high"]
+            assert shown == pytest.approx((expected.value, expected.low, expected.high))
+
+
+def test_categories_are_together_only_under_the_same_trainings(objects):
+    some = objects[(objects["category"] == "mug") | (objects["shuffle"] == 0)]
+    assert set(method_means(some)["category"]) == {"mug", "car"}
+
+
+def test_fewer_than_three_trainings_and_unlike_ones_are_not_compared(objects):
+    two = objects[objects["shuffle"] == 0]
+    assert training_contrasts(two).empty
+    some = objects[(objects["category"] == "mug") | (objects["shuffle"] == 0)]
+    assert set(training_contrasts(some)["category"]) == {"mug"}
+
+
+def test_names_say_what_differs():
+    names = {one.name for one in contrasts_of(list(SHIFT))}
+    assert names == {
+        "expected_error - fixed",
+        "expected_error - opposite",
+        "expected_error - random",
+        "given_estimate - opposite",
+        "given_estimate - fixed",
+        "given_estimate - none (none)",
+        "as_printed - given_estimate",
+        "expected_error - given_estimate (average)",
+        "expected_error - evenly_spaced, 3 views",
+    }
+    assert Contrast(("a", "x", 2), ("b", "x", 2)).name == "a - b"
+
+
+def test_a_regressor_answers_for_the_paper_and_a_classifier_for_the_product():
+    regressor = [method for method in SHIFT if method[1] != "product"]
+    answers = {
+        name: {
+            (one.question, one.name, one.method[1]) for one in contrasts_of(methods) if one.question
+        }
+        for name, methods in (("classifier", list(SHIFT)), ("regressor", regressor))
+    }
+    assert answers["classifier"] == {
+        (1, "expected_error - fixed", "product"),
+        (4, "expected_error - given_estimate (average)", "product"),
+        (5, "expected_error - evenly_spaced, 3 views", "product"),
+    }
+    assert answers["regressor"] == {
+        (1, "expected_error - fixed", "average"),
+        (2, "given_estimate - opposite", "average"),
+        (3, "as_printed - given_estimate", "average"),
+    }
+
+
+def test_a_training_without_an_object_or_with_it_twice_is_named(objects):
+    with pytest.raises(UserError, match="real, mug: a training lacks an object"):
+        method_means(objects.drop(index=objects.index[0]))
+    twice = pd.concat([objects, objects.iloc[[0]]])
+    with pytest.raises(UserError, match="real, mug: an object is tested twice"):
+        method_contrasts(twice)
+
+
+def test_one_category_has_no_line_for_all(objects):
+    found = method_means(objects[objects["category"] == "mug"])
+    assert set(found["category"]) == {"mug"}
+
+
+def bound_objects():
+    """Objects of one data set: what others pick is 2° better, but for chance."""
+    rng = np.random.default_rng(0)
+    gain = {"evenly_spaced": 0.0, "best_of_others": -2.0, "best_of_own": -4.0}
+    return pd.DataFrame(
+        [
+            ("real", category, *training, choice, "product", 2, f"{category}{k}", 10.0 + of_choice)
+            for (category, n), training in itertools.product(SIZES.items(), TRAININGS)
+            for k in range(n)
+            for choice, of_choice in ((one, at + rng.normal(0, 0.3)) for one, at in gain.items())
+        ],
+        columns=["dataset", "category", *COLUMNS],
+    )
+
+
+def test_bounds_are_paired_by_object_and_training():
+    objects = bound_objects()
+    found = bound_means(objects)
+    assert list(found["category"]) == [*SIZES, ALL]
+    of_choice = dict(list(objects.groupby("choice")))
+    for category, n in SIZES.items():
+        row = found[found["category"] == category].iloc[0]
+        tables = {
+            name: part[part["category"] == category]["error_deg"].to_numpy().reshape(-1, n)
+            for name, part in of_choice.items()
+        }
+        gain = crossed_mean(tables["best_of_others"] - tables["evenly_spaced"])
+        expected = [gain.value, gain.interval().low, gain.interval().high]
+        np.testing.assert_allclose(list(row[["difference_deg", "low", "high"]]), expected)
+        for name, table in tables.items():
+            assert row[f"{name}_deg"] == pytest.approx(table.mean())
+    assert found["n_trainings"].eq(3).all()
+    assert list(found["n_objects"]) == [*SIZES.values(), sum(SIZES.values())]
