@@ -5,12 +5,15 @@ from __future__ import annotations
 import ast
 import functools
 import importlib.metadata
+import importlib.util
 import json
 import platform
 import subprocess
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
+
+_TEMPLATES = Path(__file__).parent / "templates"
 
 PACKAGES = (
     "numpy",
@@ -34,7 +37,7 @@ def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
     optional modules in strings, which no import shows: `chosen` gives those that a configuration
     chooses, as entries such as ``nbv.data.embree:EmbreeRenderer``. Paths are sorted, with the
     ``__init__`` files of the packages that hold the modules, and with the templates that a module
-    fills in: those of its name, in the folder ``templates`` next to it.
+    fills in: those of its name, in the folder ``templates``.
     """
     imports = _imports()
     found: set[str] = set()
@@ -49,12 +52,19 @@ def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
 
 @functools.cache
 def _imports() -> dict[str, set[str]]:
-    """Return what each module of nbv imports of nbv."""
+    """Return what each module imports of nbv and of the studies."""
     import grimp
 
     # What is imported for type checkers alone does not run.
-    graph = grimp.build_graph("nbv", cache_dir=None, exclude_type_checking_imports=True)
+    graph = grimp.build_graph(*_folders(), cache_dir=None, exclude_type_checking_imports=True)
     return {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+
+
+@functools.cache
+def _folders() -> dict[str, Path]:
+    """Return the folders of the packages that results depend on; `studies` only in a checkout."""
+    specs = {name: importlib.util.find_spec(name) for name in ("nbv", "studies")}
+    return {name: Path(str(spec.origin)).parent for name, spec in specs.items() if spec}
 
 
 def _imported_names(script: str | Path) -> Iterator[str]:
@@ -67,9 +77,10 @@ def _imported_names(script: str | Path) -> Iterator[str]:
 
 
 def _files_of(module: str) -> Iterator[str]:
-    path = Path(__file__).parents[1].joinpath(*module.split("."))
+    package, *parts = module.split(".")
+    path = _folders()[package].joinpath(*parts)
     yield str(path / "__init__.py" if path.is_dir() else path.with_suffix(".py"))
-    yield from map(str, path.parent.glob(f"templates/{path.name}[._]*"))
+    yield from map(str, _TEMPLATES.glob(f"{path.name}[._]*"))
 
 
 def git_commit(directory: str | Path = Path(__file__).parent) -> str:
