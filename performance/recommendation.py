@@ -15,8 +15,7 @@ from nbv.data.depth_codes import encode_depth
 from nbv.data.normalisation import normalise
 from nbv.data.procedural import generate
 from nbv.data.renderers import open_renderer
-from nbv.experiment.estimation.hardware import Hardware, choose_hardware, use_one_thread
-from nbv.experiment.estimation.images import to_input
+from nbv.experiment.estimation.hardware import Hardware, choose_hardware, to_input, use_one_thread
 from nbv.experiment.estimation.inference import estimate_azimuth
 from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.estimation.weights import Estimator

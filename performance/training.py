@@ -10,8 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from nbv.experiment.estimation.hardware import Hardware, choose_hardware, use_one_thread
-from nbv.experiment.estimation.images import to_input
+from nbv.experiment.estimation.hardware import Hardware, choose_hardware, to_input, use_one_thread
 from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.estimation.training import train_network
 from performance.figures import Figure, Target

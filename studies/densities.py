@@ -17,10 +17,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.core.angles import nearest_bin
-from nbv.core.criteria.spreads import circular_variance, entropy
-from nbv.core.estimates import Estimates, read_estimates
+from nbv.core.criteria import circular_variance, entropy
+from nbv.core.estimates import Estimates
+from nbv.core.logits import log_likelihood, on_degrees
 from nbv.core.lookup import load_lookup
-from nbv.core.posteriors import log_likelihood, on_degrees, read_posteriors
+from nbv.experiment.estimates import read_estimates, read_posteriors
 from nbv.experiment.report.cells import CELL_COLUMNS, method_cells, shared_resampler
 from nbv.experiment.report.settings import ReportSettings, common_elevation_deg, unit_label
 from nbv.experiment.report.table import DECIDED, Cell, Row, Table, difference_cell

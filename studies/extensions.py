@@ -11,12 +11,11 @@ import numpy as np
 import pandas as pd
 
 from nbv.core.density_selection import Choice, chosen_evidence
-from nbv.core.estimates import Estimates
+from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
 from nbv.core.fusion import OF_DISTRIBUTIONS
 from nbv.core.lookup import LookupTable
 from nbv.core.method_selection import Methods, SelectedMethod, select_methods
-from nbv.core.posteriors import Posteriors
 from nbv.experiment.two_views import evaluate_method
 from studies.travel import travel_rows
 

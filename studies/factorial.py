@@ -25,12 +25,11 @@ from nbv.core.density_selection import (
     most_likely_density,
     with_kernel,
 )
-from nbv.core.estimates import Estimates
+from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence, evidence_of_distributions
 from nbv.core.fusion import ESTIMATE_FUSIONS
 from nbv.core.lookup import build_lookup
 from nbv.core.policies import needs_lookup
-from nbv.core.posteriors import Posteriors
 from nbv.experiment.two_views import evaluate_method
 from studies.kept_estimates import HeldOut
 from studies.more_views import more_views_rows

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.angles import signed_difference_deg
-from nbv.core.estimates import Estimates, read_estimates
-from nbv.core.posteriors import Posteriors, read_posteriors
+from nbv.core.estimates import Estimates, Posteriors
 from nbv.errors import UserError
+from nbv.experiment.estimates import read_estimates, read_posteriors
 from nbv.files import damaged, readable, write_arrays
 
 FORMAT = 2
@@ -99,8 +99,8 @@ def _turned(p: NDArray[np.float64], way: int) -> NDArray[np.float64]:
 def read_held_out(estimates: str | Path, posteriors: str | Path | None = None) -> HeldOut:
     """Read a fold's estimates, and its distributions where there are any.
 
-    Errors as of `nbv.core.estimates.read_estimates` and
-    `nbv.core.posteriors.read_posteriors`.
+    Errors as of `nbv.experiment.estimates.read_estimates` and
+    `nbv.experiment.estimates.read_posteriors`.
     """
     found = read_estimates(estimates)
     return held_out(found, read_posteriors(posteriors, found.object_ids) if posteriors else None)

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.core.criteria import FOR_MORE_VIEWS
-from nbv.core.estimates import Estimates
+from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
 from nbv.core.next_views import (
     COARSE_BINS,
@@ -26,7 +26,6 @@ from nbv.core.plans import (
     plans_of,
     step_by_step,
 )
-from nbv.core.posteriors import Posteriors
 from nbv.core.simulation import (
     DistributionViews,
     EstimatedViews,

@@ -9,7 +9,7 @@ import torch
 import yaml
 from numpy.typing import NDArray
 
-from nbv.core.beliefs import distributions_of
+from nbv.core.logits import from_logits
 from nbv.data.camera import Camera
 from nbv.experiment.estimation.networks import build_network
 from nbv.robot.bundle import Bundle, PaperTables, as_kept
@@ -96,7 +96,7 @@ def made_bundle(seed: int = 0, **changes) -> Bundle:
             codes = random_codes(rng, BINS)
             logits = soft_turns(rng, 1)[0]
             turns.append(Turn(name, f"{elevation:g}", elevation, azimuth_deg, logits, codes))
-            rows.append(bin_apart(azimuth_deg, distributions_of(logits, 1.0)))
+            rows.append(bin_apart(azimuth_deg, from_logits(logits, 1.0)))
     values = {
         "category": "mug",
         "weights": weights,

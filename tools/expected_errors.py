@@ -14,8 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import mean_direction_deg
-from nbv.core.beliefs import fused
+from nbv.core.distributions import mean_direction_deg, product_of_views
 from nbv.robot.bundle import Bundle
 from nbv.robot.next_view import AfterRotations, after_rotations, next_view
 from nbv.robot.recommender import Recommender, turn_share
@@ -45,7 +44,7 @@ def of_turn(
         def seen(rotations: list[float], first: int = first) -> tuple[NDArray[np.float64], float]:
             places = [(first + round(turn / width)) % bundle.n_bins for turn in rotations]
             views = rows[places]
-            found = mean_direction_deg(fused(views, rotations)[None])[0]
+            found = mean_direction_deg(product_of_views(views, rotations)[None])[0]
             return views, float(circular_distance_deg(found, first * width))
 
         views, one = seen([0.0])

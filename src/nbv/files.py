@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import secrets
 from collections.abc import Iterable, Iterator, Mapping
@@ -273,3 +274,9 @@ def existing(path: str | Path) -> Path:
     if not Path(path).is_file():
         raise UserError(f"{path} does not exist; finish the run first, or is it another folder?")
     return Path(path)
+
+
+def sha256_of(path: str) -> str:
+    """Return the SHA-256 of a file, in hexadecimal."""
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -14,13 +14,15 @@ import pytest
 import synthetic
 from conftest import UNITS
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import coarser, first_belief, mean_direction_deg, updated
+from nbv.core.belief import coarser, first_belief, updated
 from nbv.core.criteria import CRITERIA
 from nbv.core.density import Conditionals
+from nbv.core.distributions import mean_direction_deg
+from nbv.core.estimates import posteriors_of
 from nbv.core.evidence import Evidence
 from nbv.core.lookup import load_lookup
 from nbv.core.next_views import bisecting_next, recommended_next
-from nbv.core.posteriors import posteriors_of, write_posteriors
+from nbv.experiment.estimates import write_posteriors
 from nbv.experiment.explorer import ExplorerInputs, build_explorer
 from nbv.experiment.explorer.tables import page_table
 from nbv.experiment.layout import Layout

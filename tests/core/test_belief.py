@@ -6,14 +6,8 @@ import numpy as np
 from tests.core.made import N_BINS, estimates, evidence_of
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import (
-    Belief,
-    coarser,
-    every_belief,
-    first_belief,
-    mean_direction_deg,
-    updated,
-)
+from nbv.core.belief import Belief, coarser, every_belief, first_belief, updated
+from nbv.core.distributions import mean_direction_deg
 
 
 def test_beliefs_follow_bayes_rule_view_by_view():

@@ -15,16 +15,14 @@ from nbv.core.criteria import (
     CRITERIA,
     FOR_MORE_VIEWS,
     FOR_TWO_ESTIMATORS,
-    cost_unit,
-    tabulate,
-)
-from nbv.core.criteria.pose_ambiguity import (
     POSE_LIKELIHOODS,
+    SPREADS,
+    cost_unit,
     pose_likelihood,
+    rotation_groups,
+    tabulate,
     two_view_poses,
 )
-from nbv.core.criteria.rotations import rotation_groups
-from nbv.core.criteria.spreads import SPREADS
 from nbv.core.density import Conditionals, conditionals
 from nbv.core.evidence import Evidence, gather_evidence
 from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS

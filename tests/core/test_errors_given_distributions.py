@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
-from nbv.core.criteria import CRITERIA
-from nbv.core.criteria.expected_error import affinity
+from nbv.core.criteria import CRITERIA, affinity
 from nbv.core.evidence import evidence_of_distributions
 from nbv.core.fusion import product, rotation_errors_deg
 from nbv.core.policies import Turns, two_views

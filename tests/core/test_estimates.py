@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nbv.core.estimates import Estimates, read_estimates, write_estimates
+from nbv.core.estimates import Estimates
 from nbv.errors import UserError
+from nbv.experiment.estimates import read_estimates, write_estimates
 
 
 def test_estimates_come_back_to_four_decimals(tmp_path):

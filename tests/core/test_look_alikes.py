@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import Belief, mean_direction_deg
-from nbv.core.criteria.expected_error import expected_error
+from nbv.core.belief import Belief
+from nbv.core.criteria import expected_error
+from nbv.core.distributions import mean_direction_deg
 from nbv.core.evidence import evidence_of_distributions
 from nbv.core.fusion import product
 from nbv.core.look_alikes import (

@@ -17,8 +17,7 @@ from tests.core.test_errors_given_distributions import (
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
-from nbv.core.criteria import CRITERIA
-from nbv.core.criteria.expected_error import affinity
+from nbv.core.criteria import CRITERIA, affinity
 from nbv.core.fusion import rotation_errors_deg
 from nbv.core.next_views import evenly_spaced_travel_deg, recommended_next
 from nbv.core.plans import (

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nbv.core.criteria.pose_ambiguity import POSE_LIKELIHOODS
-from nbv.core.criteria.spreads import SPREADS
+from nbv.core.criteria import POSE_LIKELIHOODS, SPREADS
 from nbv.data.camera import FRAMINGS
 from nbv.data.sources import shapenet
 from nbv.errors import UserError

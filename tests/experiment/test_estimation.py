@@ -14,15 +14,19 @@ from clock_faces import CLASSES, CPU, NAMES, SETTINGS, clock_faces, named, untra
 from nbv.core.angles import circular_distance_deg
 from nbv.errors import UserError
 from nbv.experiment.estimation import hardware as hw
-from nbv.experiment.estimation.images import to_input
+from nbv.experiment.estimation.hardware import to_input
 from nbv.experiment.estimation.inference import (
     decode,
     estimate_azimuth,
     network_outputs,
     outputs_of_parts,
 )
-from nbv.experiment.estimation.networks import build_network
-from nbv.experiment.estimation.outputs import class_targets, decode_classes, direction_targets
+from nbv.experiment.estimation.networks import (
+    build_network,
+    class_targets,
+    decode_classes,
+    direction_targets,
+)
 from nbv.experiment.estimation.training import train_estimator, train_network
 from nbv.experiment.estimation.weights import Estimator, load_estimator, save_estimator
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import torch
 
-from nbv.core.posteriors import fit_temperature
+from nbv.core.logits import fit_temperature
 from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.experiment.estimation.hardware import Hardware

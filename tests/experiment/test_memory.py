@@ -24,8 +24,7 @@ from nbv.experiment.config.memory import (
     needs,
     training_objects,
 )
-from nbv.experiment.estimation.hardware import choose_hardware
-from nbv.experiment.estimation.images import to_input
+from nbv.experiment.estimation.hardware import choose_hardware, to_input
 from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.splits import make_splits, objects_with_role
 from nbv.experiment.statistics.metrics import resample_objects, resampled_medians

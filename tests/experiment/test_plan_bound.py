@@ -15,7 +15,7 @@ from studies.kept_estimates import held_out
 from tests.experiment.test_two_views import N_CLASSES, hidden_handle, mean_directions
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import mean_direction_deg
+from nbv.core.distributions import mean_direction_deg
 
 N_OBJECTS = 3
 

@@ -6,12 +6,11 @@ from studies.extensions import evaluate_extensions
 from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.estimates import Estimates
+from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import gather_evidence
 from nbv.core.fusion import FUSIONS
 from nbv.core.lookup import build_lookup
 from nbv.core.method_selection import select_methods
-from nbv.core.posteriors import Posteriors
 from nbv.experiment.two_views import COLUMNS, evaluate_method
 
 RNG = np.random.default_rng(0)

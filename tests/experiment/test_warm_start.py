@@ -12,14 +12,8 @@ from clock_faces import CPU, SETTINGS, clock_faces, named, untrained
 from nbv.errors import UserError
 from nbv.experiment.config import load_config
 from nbv.experiment.estimation.training import train_estimator, train_network
-from nbv.experiment.estimation.warm_start import (
-    STAGES,
-    stage_from,
-    stage_settings,
-    start_of,
-    with_category,
-)
-from nbv.experiment.estimation.weights import Estimator, read_start, save_estimator
+from nbv.experiment.estimation.warm_start import STAGES, stage_from, stage_settings, start_of
+from nbv.experiment.estimation.weights import Estimator, read_start, save_estimator, with_category
 from projects import ROOT
 
 ELEVATIONS = st.sets(st.integers(0, 89), min_size=1)

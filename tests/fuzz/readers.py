@@ -167,7 +167,8 @@ def splits_problem(splits: pd.DataFrame) -> str:
 
 
 def make_estimates(path: Path) -> None:
-    from nbv.core.estimates import Estimates, write_estimates
+    from nbv.core.estimates import Estimates
+    from nbv.experiment.estimates import write_estimates
 
     estimate_deg = np.random.default_rng(0).uniform(0, 360, (len(IDS), 8))
     write_estimates(path, Estimates(IDS, estimate_deg))
@@ -260,7 +261,8 @@ def lookup_problem(table: Any) -> str:
 
 
 def make_posteriors(path: Path) -> None:
-    from nbv.core.posteriors import posteriors_of, write_posteriors
+    from nbv.core.estimates import posteriors_of
+    from nbv.experiment.estimates import write_posteriors
 
     logits = np.random.default_rng(0).normal(size=(len(IDS), 8, 36))
     write_posteriors(path, posteriors_of(IDS, logits, 1.3))

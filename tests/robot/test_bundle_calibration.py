@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import mean_direction_deg
-from nbv.core.beliefs import distributions_of
 from nbv.core.density_selection import chosen_lookup
-from nbv.core.posteriors import turned
+from nbv.core.distributions import mean_direction_deg, rotated
+from nbv.core.logits import from_logits
 from nbv.errors import UserError
 from nbv.robot.calibration import (
     DENSITY,
@@ -97,7 +96,7 @@ def test_each_bin_takes_its_nearest_view(seed, n):
         apart = circular_distance_deg(azimuth_deg, bin_ * WIDTH)
         tied = np.flatnonzero(apart < apart.min() + 1e-9)
         choices = [
-            turned(rows[view], (azimuth_deg[view] - bin_ * WIDTH + 180) % 360 - 180)
+            rotated(rows[view], (azimuth_deg[view] - bin_ * WIDTH + 180) % 360 - 180)
             for view in tied
         ]
         assert min(np.abs(row - choice).max() for choice in choices) < 1e-6
@@ -210,7 +209,7 @@ def test_a_bundle_is_calibrated_again(bundle):
     prior -= np.log(np.exp(prior).sum(axis=-1, keepdims=True))
     assert np.log(found.distributions[3:]) == pytest.approx(prior, abs=1e-3)
     for row, own in zip(found.distributions[:3], logits, strict=True):
-        assert row == pytest.approx(distributions_of(own, found.temperature), rel=1e-5)
+        assert row == pytest.approx(from_logits(own, found.temperature), rel=1e-5)
     known = bundle.familiarity
     scores = np.concatenate([unfamiliarity(known, one.codes, one.logits) for one in turns])
     limit = max(np.quantile(scores, 0.95), LEAST_LIMIT)
@@ -244,7 +243,7 @@ def test_the_zero_of_the_turntable_does_not_matter(bundle, zero):
 @pytest.mark.parametrize("temperature", [0.2, 1.0])
 def test_the_offset_is_that_of_the_estimates_at_the_temperature(temperature):
     given = turn("x", 1, azimuth_deg=AZIMUTHS + 4.0)
-    estimates = mean_direction_deg(distributions_of(given.logits, temperature))
+    estimates = mean_direction_deg(from_logits(given.logits, temperature))
     errors = (estimates - given.azimuth_deg + 180) % 360 - 180
     wanted = (given.azimuth_deg + np.median(errors)) % 360
     found = without_offset(given, temperature).azimuth_deg

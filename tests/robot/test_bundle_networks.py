@@ -12,8 +12,8 @@ import torch
 
 from made_bundles import SIDE, made_bundle, random_codes, random_weights, settings
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import mean_direction_deg
-from nbv.core.beliefs import distributions_of
+from nbv.core.distributions import mean_direction_deg
+from nbv.core.logits import from_logits
 from nbv.data.camera import Camera
 from nbv.data.depth_images import DepthImages
 from nbv.data.meshes import as_mesh
@@ -26,8 +26,7 @@ from nbv.errors import UserError
 from nbv.experiment.config.compose import load_config
 from nbv.experiment.estimation.hardware import choose_hardware
 from nbv.experiment.estimation.inference import network_outputs
-from nbv.experiment.estimation.networks import build_network
-from nbv.experiment.estimation.outputs import decode_classes
+from nbv.experiment.estimation.networks import build_network, decode_classes
 from nbv.experiment.estimation.weights import Estimator
 from nbv.experiment.make_bundle import kept_network, turns_of
 from nbv.robot.bundle import as_kept, load_bundle
@@ -99,7 +98,7 @@ def test_the_outputs_are_those_of_torch(backend, kind, plane_deg, rng):
     )
     # A random distribution has hardly a direction: what counts is the error of its moment.
     angles = 2 * np.pi * np.arange(wanted.shape[1]) / wanted.shape[1]
-    length = np.abs(distributions_of(wanted, 1.0) @ np.exp(1j * angles))
+    length = np.abs(from_logits(wanted, 1.0) @ np.exp(1j * angles))
     assert (apart * length).max() < 0.001
 
 
@@ -109,7 +108,7 @@ def test_the_directions_are_those_of_torch(backend, rng):
         bundle = bundle_of("small", seed)
         codes = random_codes(rng, 200)
         directions = [
-            mean_direction_deg(distributions_of(network(codes), bundle.temperature))
+            mean_direction_deg(from_logits(network(codes), bundle.temperature))
             for network in (network_with(backend, bundle), torch_network(bundle))
         ]
         assert circular_distance_deg(*directions).max() < 0.01
@@ -149,7 +148,7 @@ def test_torch_agrees_on_a_thousand_crops_to_a_hundredth_of_a_degree(backend, th
     bundle = load_bundle(bundle_path("mug"))
     assert len(thousand_crops) == 1000
     found, wanted = (
-        mean_direction_deg(distributions_of(network(thousand_crops), bundle.temperature))
+        mean_direction_deg(from_logits(network(thousand_crops), bundle.temperature))
         for network in (network_with(backend, bundle), torch_network(bundle))
     )
     assert circular_distance_deg(found, wanted).max() <= 0.01

@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nbv.core.angles import circular_distance_deg, wrap_deg
-from nbv.core.estimates import Estimates, write_estimates
+from nbv.core.estimates import Estimates
 from nbv.errors import UserError
 from nbv.experiment.config import load_config
+from nbv.experiment.estimates import write_estimates
 from nbv.robot.calibration import DENSITY
 from nbv.robot.pairs import N_VIEWS, WIDEST_GAP_DEG, objects_of_pairs, read_pairs
 

@@ -23,8 +23,8 @@ from made_bundles import (
 )
 from made_bundles import settings as made_settings
 from nbv.core.angles import circular_distance_deg, travel_deg
-from nbv.core.belief import mean_direction_deg
-from nbv.core.beliefs import direction_and_spread_deg, distributions_of, elevation_share
+from nbv.core.distributions import direction_and_spread_deg, mean_direction_deg
+from nbv.core.logits import from_logits
 from nbv.errors import UserError
 from nbv.robot.crop import crop_frame
 from nbv.robot.errors import FrameError
@@ -34,7 +34,7 @@ from nbv.robot.next_view import after_rotations
 from nbv.robot.ood import fit_familiarity, unfamiliarity
 from nbv.robot.recommender import Recommender
 from nbv.robot.rotations import MIN_SEPARATION_DEG, N_ALTERNATIVES
-from nbv.robot.sweeps import Turn
+from nbv.robot.sweeps import Turn, elevation_share
 from nbv.robot.synthetic import example_frame
 
 HERE = np.arange(BINS) * WIDTH
@@ -994,7 +994,7 @@ def test_both_backends_give_the_same_answer(bundle, recommender):
 def test_distributions_are_those_of_the_logits(recommender):
     codes = codes_of(5, 4)
     logits = recommender.network(codes)
-    wanted = distributions_of(logits, recommender.bundle.temperature)
+    wanted = from_logits(logits, recommender.bundle.temperature)
     assert np.array_equal(recommender.distributions(codes), wanted)
     belief = recommender.recommend_crops(codes[:1]).belief
     assert belief == pytest.approx(wanted[0], rel=1e-4)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.core.angles import circular_distance_deg
-from nbv.core.beliefs import distributions_of
 from nbv.core.fusion import product
+from nbv.core.logits import from_logits
 from nbv.core.look_alikes import LookAlikes
 from nbv.errors import UserError
 from nbv.robot.evaluation import (
@@ -92,7 +92,7 @@ def test_a_constant_offset_is_told_and_taken_off(bundle, offset):
 
 def test_the_offset_is_the_circular_median_of_single_view_errors(bundle):
     turn = recording(3)
-    rows = distributions_of(turn.logits, bundle.temperature)
+    rows = from_logits(turn.logits, bundle.temperature)
     angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
     errors = error(np.degrees(np.angle(rows @ angles)), turn.azimuth_deg)
     left = [np.abs(error(errors, one)).mean() for one in errors]
@@ -112,7 +112,7 @@ def test_the_offset_is_the_circular_median_of_single_view_errors(bundle):
 
 def two_view_errors(bundle, turn, rotation) -> np.ndarray:
     """From every frame, with the frame that is nearest to the rotation."""
-    rows = distributions_of(turn.logits, bundle.temperature)
+    rows = from_logits(turn.logits, bundle.temperature)
     found = []
     for first, azimuth in enumerate(turn.azimuth_deg):
         apart = circular_distance_deg(turn.azimuth_deg - azimuth, rotation)
@@ -136,7 +136,7 @@ def test_the_opposite_view_is_half_a_turn_away(bundle, seed):
 @pytest.mark.parametrize("n_views", [3, 4, 6])
 def test_evenly_spaced_views_are_the_product_of_all(bundle, n_views):
     turn = recording(5)
-    rows = distributions_of(turn.logits, bundle.temperature)
+    rows = from_logits(turn.logits, bundle.temperature)
     step = BINS // n_views
     angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
     wanted = []
@@ -240,7 +240,7 @@ def test_the_papers_views_are_those_of_the_table_of_the_nearest_elevation(
 ):
     """Without a known elevation the lowest table; estimates are averaged as directions."""
     turn = recording(2, elevation=elevation)
-    rows = distributions_of(turn.logits, bundle.temperature)
+    rows = from_logits(turn.logits, bundle.temperature)
     angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
     estimates = np.degrees(np.angle(rows @ angles)) % 360
     wanted = []

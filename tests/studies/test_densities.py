@@ -11,8 +11,10 @@ from studies.densities import DensityRun, density_comparison
 
 import synthetic
 from conftest import N_FOLDS
-from nbv.core.posteriors import on_degrees, posteriors_of, write_posteriors
+from nbv.core.estimates import posteriors_of
+from nbv.core.logits import on_degrees
 from nbv.errors import UserError
+from nbv.experiment.estimates import write_posteriors
 from nbv.experiment.report.settings import ReportSettings
 
 UNIT = ("mug", 0)

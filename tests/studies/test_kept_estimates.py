@@ -17,9 +17,9 @@ from studies.kept_estimates import (
 from tests.core.made import objects
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.estimates import Estimates, write_estimates
-from nbv.core.posteriors import Posteriors, write_posteriors
+from nbv.core.estimates import Estimates, Posteriors
 from nbv.errors import UserError
+from nbv.experiment.estimates import write_estimates, write_posteriors
 
 N_CLASSES = 24
 KEY = (1, 2, "coffee_mug", 15, 3, "test")

@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 from studies.runs import estimator_comparison, run_comparison
 
-from nbv.core.estimates import Estimates, write_estimates
+from nbv.core.estimates import Estimates
 from nbv.errors import UserError
+from nbv.experiment.estimates import write_estimates
 from nbv.experiment.report.settings import ReportSettings
 from nbv.experiment.results import load_estimate_errors
 

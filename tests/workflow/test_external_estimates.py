@@ -11,11 +11,11 @@ from scipy.special import log_softmax
 
 from nbv.cli import main
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import mean_direction_deg
 from nbv.core.density import conditionals
+from nbv.core.distributions import mean_direction_deg
 from nbv.core.fusion import product
+from nbv.core.logits import fit_temperature
 from nbv.core.lookup import load_lookup
-from nbv.core.posteriors import fit_temperature
 from nbv.robot.calibration import DENSITY
 from projects import TINY, Project, copy_of_project
 

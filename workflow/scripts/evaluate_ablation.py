@@ -6,7 +6,7 @@ with job(snakemake):
     import pandas as pd
     from studies.ablation import ablate
 
-    from nbv.core.estimates import read_estimates
+    from nbv.experiment.estimates import read_estimates
     from nbv.files import write_csv
 
     params, found = snakemake.params, []

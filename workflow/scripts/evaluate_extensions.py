@@ -5,10 +5,9 @@ from nbv.experiment.jobs import job
 with job(snakemake):
     from studies.extensions import evaluate_extensions
 
-    from nbv.core.estimates import read_estimates
     from nbv.core.lookup import save_lookup
-    from nbv.core.posteriors import read_posteriors
     from nbv.core.seeds import rng_for
+    from nbv.experiment.estimates import read_estimates, read_posteriors
     from nbv.experiment.splits import need_role, read_splits
     from nbv.experiment.statistics.object_means import object_means
     from nbv.files import read_csv, write_csv

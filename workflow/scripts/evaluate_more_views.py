@@ -6,10 +6,9 @@ with job(snakemake):
     from studies.extensions import stored_evidence
     from studies.more_views import more_views_rows
 
-    from nbv.core.estimates import read_estimates
     from nbv.core.evidence import evidence_of_distributions
-    from nbv.core.posteriors import read_posteriors
     from nbv.core.seeds import rng_for
+    from nbv.experiment.estimates import read_estimates, read_posteriors
     from nbv.experiment.splits import need_role, read_splits
     from nbv.files import read_csv, write_csv
 

@@ -6,7 +6,7 @@ with job(snakemake):
     from nbv.experiment.view_sphere import view_sphere_rows
     from studies.extensions import stored_evidence
 
-    from nbv.core.estimates import read_estimates
+    from nbv.experiment.estimates import read_estimates
     from nbv.experiment.splits import need_role, read_splits
     from nbv.files import read_csv, write_csv
 

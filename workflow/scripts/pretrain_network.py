@@ -9,8 +9,7 @@ with job(snakemake):
     from nbv.data.depth_images import DepthImages, open_depth
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
     from nbv.experiment.estimation.training import train_estimator
-    from nbv.experiment.estimation.warm_start import with_category
-    from nbv.experiment.estimation.weights import save_estimator
+    from nbv.experiment.estimation.weights import save_estimator, with_category
     from nbv.experiment.splits import need_objects, objects_with_role, read_splits, training_roles
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input

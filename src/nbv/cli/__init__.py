@@ -369,8 +369,8 @@ def calibrate(
     if criterion is not None:
         raise UserError("--criterion is for pairs, which need no --bundle; leave one of them out")
     need_writable("--output", output, [".safetensors"])
-    from nbv.core.belief import mean_direction_deg
-    from nbv.core.beliefs import distributions_of
+    from nbv.core.distributions import mean_direction_deg
+    from nbv.core.logits import from_logits
     from nbv.robot.bundle import save_bundle
     from nbv.robot.calibration import recalibrated
 
@@ -378,7 +378,7 @@ def calibrate(
     held, turns = seen.recommender.bundle, seen.turns
     recordings: list[dict[str, Any]] = []
     for turn in turns:
-        estimate_deg = mean_direction_deg(distributions_of(turn.logits, held.temperature))
+        estimate_deg = mean_direction_deg(from_logits(turn.logits, held.temperature))
         about = {"object_id": turn.object_id, "sequence": turn.sequence}
         counts = {"n_frames": len(estimate_deg)}
         offset = offset_of_frames(turn.azimuth_deg, estimate_deg)

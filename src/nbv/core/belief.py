@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.angles import direction_deg, nearest_bin
+from nbv.core.angles import nearest_bin
+from nbv.core.distributions import product_of
 from nbv.core.evidence import Evidence, Table
 
 Angles = NDArray[np.float64]
@@ -91,28 +92,6 @@ def multiplied(
     product = product_of(belief.probabilities, distributions, delta_deg)
     rows = (product / product.sum(axis=1, keepdims=True)).astype(np.float32)
     return replace(belief, probabilities=rows, n_views=belief.n_views + 1)
-
-
-def product_of(
-    own: NDArray[np.floating[Any]],
-    other: NDArray[np.floating[Any]],
-    delta_deg: NDArray[np.floating[Any]] | NDArray[np.int64],
-) -> NDArray[np.floating[Any]]:
-    """Return own(theta) other(theta + delta), (n, B), in the frame of the first view.
-
-    Bayes' rule for images that are independent given the pose, with a uniform prior. Where the two
-    distributions exclude each other it is the own one.
-    """
-    n_bins = own.shape[1]
-    seen = (np.arange(n_bins) + nearest_bin(delta_deg, n_bins).reshape(-1, 1)) % n_bins
-    both = own * np.take_along_axis(other, seen, axis=1)
-    return np.where(both.sum(axis=1, keepdims=True) > 0, both, own)
-
-
-def mean_direction_deg(probabilities: NDArray[np.floating[Any]]) -> Angles:
-    """Return the mean direction of each distribution (n, B), in [0, 360)."""
-    angles = 2 * np.pi * np.arange(probabilities.shape[1]) / probabilities.shape[1]
-    return direction_deg(probabilities @ np.cos(angles), probabilities @ np.sin(angles))
 
 
 def coarser(belief: Belief, evidence: Evidence) -> Belief:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.density import Conditionals, conditionals
-from nbv.core.posteriors import estimate_likelihood
+from nbv.core.distributions import estimate_likelihood
 
 Table = NDArray[np.float32]
 

@@ -15,7 +15,7 @@ from nbv.core.angles import (
     nearest_bin,
     wrap_deg,
 )
-from nbv.core.belief import mean_direction_deg, product_of
+from nbv.core.distributions import mean_direction_deg, product_of
 from nbv.core.evidence import Evidence
 
 Angles = NDArray[np.float64]

@@ -351,7 +351,7 @@ class LookAlikes:
         belief : ndarray (B,)
             Of an object at hand that was turned alike, in the frame of its first view.
         power, pseudo_observations : float
-            See `nbv.core.criteria.expected_error.expected_error`.
+            See `nbv.core.criteria.expected_error`.
         share : ndarray (S,), optional
             How much each turn counts; 1 without it.
         """
@@ -424,7 +424,7 @@ class LookAlikes:
 
     @cached_property
     def _roots(self) -> Table:
-        """The square roots of `seen`, for `nbv.core.criteria.expected_error.affinity`."""
+        """The square roots of `seen`, for `nbv.core.criteria.affinity`."""
         return np.sqrt(_joined(self.seen, self._step))
 
 

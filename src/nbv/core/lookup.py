@@ -45,7 +45,7 @@ class LookupTable:
     criterion : str
         A name in `nbv.core.criteria.CRITERIA`.
     pose_likelihood, spread : str
-        The criterion's settings; see `nbv.core.criteria.pose_ambiguity`.
+        The criterion's settings; see `nbv.core.criteria`.
 
     Examples
     --------

@@ -12,12 +12,11 @@ from scipy import stats
 
 from nbv.core.criteria import CRITERIA, FOR_ESTIMATES
 from nbv.core.density_selection import Choice, choose_densities, chosen_evidence
-from nbv.core.estimates import Estimates
+from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence, evidence_of_distributions
 from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
 from nbv.core.lookup import LookupTable, build_lookup
 from nbv.core.policies import ORACLE, POLICIES, SINGLE, needs_lookup
-from nbv.core.posteriors import Posteriors
 from nbv.errors import UserError, nearest
 
 SELECTED = "selected"

@@ -16,12 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import Belief, mean_direction_deg
-from nbv.core.criteria.expected_error import (
-    BELIEFS_AT_ONCE,
-    need_first_view,
-    view_weights,
-)
+from nbv.core.belief import Belief
+from nbv.core.criteria import BELIEFS_AT_ONCE, need_first_view, view_weights
+from nbv.core.distributions import mean_direction_deg
 from nbv.core.evidence import Evidence, Table, evidence_of_distributions
 from nbv.core.fusion import Rotations
 from nbv.core.next_views import NextView, recommended_next
@@ -182,7 +179,7 @@ def excess_of_plans(belief: Belief, evidence: Evidence, errors: Table, caution: 
     """Return what each plan is expected to err more than the first one.
 
     A regression on the first view's distribution as of
-    `nbv.core.criteria.expected_error.expected_error`, of the difference between a plan's
+    `nbv.core.criteria.expected_error`, of the difference between a plan's
     errors and those of the first plan. `caution` standard errors over calibration objects are
     added: few objects hold few of the rare large errors, so the least of many means is too
     hopeful. With one object alone nothing but the first plan is trusted.

@@ -10,16 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.angles import circular_distance_deg, nearest_bin, travel_deg
-from nbv.core.belief import (
-    Belief,
-    first_belief,
-    mean_direction_deg,
-    multiplied,
-    updated,
-)
+from nbv.core.belief import Belief, first_belief, multiplied, updated
+from nbv.core.distributions import mean_direction_deg, region_coverage
 from nbv.core.evidence import Evidence
 from nbv.core.next_views import NextView
-from nbv.core.posteriors import region_coverage
 
 Floats = NDArray[np.floating]
 Indices = NDArray[np.intp]
@@ -136,7 +130,7 @@ def follow(
     ndarray (5, n_objects, n_starts, n_views)
         `FIGURES` after each view: error and total travel in degrees; the log of the belief in the
         truth, nats per degree; whether the regions of 50 and 90 % hold the truth, percent
-        (`nbv.core.posteriors.region_coverage`).
+        (`nbv.core.distributions.region_coverage`).
     """
     n_objects, n_azimuths = views.shape[:2]
     objects, starts, belief = first_views(views, start_every_deg)

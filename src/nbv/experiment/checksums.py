@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 from pathlib import Path
 from typing import Literal
 
 from nbv.errors import UserError
 from nbv.experiment.layout import Layout, checksum_of
-from nbv.files import write_text
+from nbv.files import sha256_of, write_text
 
 State = Literal["intact", "damaged", "missing", "without checksum"]
 
@@ -77,12 +76,6 @@ def need_intact(root: str) -> None:
             f"{damaged[0]} changed after it was written, {len(damaged)} files in all: "
             "the target verify says how to make them again"
         )
-
-
-def sha256_of(path: str) -> str:
-    """Return the SHA-256 of a file, in hexadecimal."""
-    with Path(path).open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _written(record: str) -> str:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from nbv.core.estimates import Estimates
-from nbv.core.posteriors import Posteriors, fit_temperature, posteriors_of
+from nbv.core.estimates import Estimates, Posteriors, posteriors_of
+from nbv.core.logits import fit_temperature
 from nbv.experiment.held_out import FoldEstimates
 from nbv.experiment.splits import need_objects, objects_with_role
 from nbv.robot.pair_distributions import Turns, evenly_apart

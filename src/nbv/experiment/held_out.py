@@ -7,14 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from nbv.core.estimates import Estimates, write_estimates
-from nbv.core.posteriors import (
-    Posteriors,
-    fit_temperature,
-    posteriors_of,
-    write_posteriors,
-)
+from nbv.core.estimates import Estimates, Posteriors, posteriors_of
+from nbv.core.logits import fit_temperature
 from nbv.data.depth_images import DepthImages
+from nbv.experiment.estimates import write_estimates, write_posteriors
 from nbv.experiment.estimation.hardware import Hardware
 from nbv.experiment.estimation.inference import decode, outputs_of_parts
 from nbv.experiment.estimation.weights import Estimator
@@ -50,7 +46,7 @@ def estimate_fold(
     hardware : Hardware
     distributions : bool
         Whether outputs are logits of distributions. Calibration objects then choose one
-        temperature (`nbv.core.posteriors.fit_temperature`).
+        temperature (`nbv.core.logits.fit_temperature`).
 
     Returns
     -------

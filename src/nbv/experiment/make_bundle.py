@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.beliefs import distributions_of
+from nbv.core.logits import from_logits
 from nbv.data.camera import Camera
 from nbv.data.depth_images import DepthImages
 from nbv.experiment.estimation.weights import Estimator, weights_of
@@ -116,7 +116,7 @@ def make_bundle(
     n_objects = len({name.rpartition("/")[0] for name in estimator.trained_on})
     elevation_deg = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
     distributions = np.stack(
-        [bin_apart(t.azimuth_deg, distributions_of(t.logits, temperature)) for t in turns]
+        [bin_apart(t.azimuth_deg, from_logits(t.logits, temperature)) for t in turns]
     )
     diagonal_m = float(sensor["diagonal_m"][category])
     length_m = pixel_step(camera) * diagonal_m

@@ -13,6 +13,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+UNRELATED = {"nbv.experiment.jobs"}
+"""Modules that change no result: logs, checksums and the messages of jobs that fail."""
+
 _TEMPLATES = Path(__file__).parent / "templates"
 
 PACKAGES = (
@@ -36,17 +39,18 @@ def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
     Files are parsed and not run; imports for type checkers alone do not count. A registry names
     optional modules in strings, which no import shows: `chosen` gives those that a configuration
     chooses, as entries such as ``nbv.data.embree:EmbreeRenderer``. Paths are sorted, with the
-    ``__init__`` files of the packages that hold the modules, and with the templates that a module
-    fills in: those of its name, in the folder ``templates``.
+    templates that a module fills in: those of its name, in the folder ``templates``. An
+    ``__init__`` file counts where something is imported from it. What `UNRELATED` imports does
+    not count.
     """
     imports = _imports()
     found: set[str] = set()
     waiting = [*_imported_names(script), *(entry.partition(":")[0] for entry in chosen)]
     while waiting:
         module = waiting.pop()
-        if module in imports and module not in found:
+        if module in imports and module not in found | UNRELATED:
             found.add(module)
-            waiting += [module.rpartition(".")[0], *imports[module]]
+            waiting += imports[module]
     return sorted({file for module in found for file in _files_of(module)})
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.estimates import need_azimuths, objects_of_full_turns, read_estimates
 from nbv.errors import UserError
+from nbv.experiment.estimates import need_azimuths, objects_of_full_turns, read_estimates
 from nbv.experiment.splits import read_splits
 from nbv.experiment.two_views import COLUMNS
 from nbv.files import damaged, existing, need_columns, read_csv, readable
@@ -88,7 +88,7 @@ def load_estimate_errors(files: Mapping[EstimatesFile, Path]) -> dict[Unit, pd.D
     Parameters
     ----------
     files : mapping of (category, elevation_deg, fold, role) to path
-        Of `nbv.core.estimates.write_estimates`; a role of `ESTIMATED_ROLES`.
+        Of `nbv.experiment.estimates.write_estimates`; a role of `ESTIMATED_ROLES`.
 
     Returns
     -------

@@ -14,7 +14,6 @@ import numpy as np
 import pandas as pd
 
 from nbv.errors import UserError
-from nbv.experiment.fold_sizes import enough_objects
 from nbv.files import damaged, read_csv
 
 ROLES = ("train", "calibration", "test")
@@ -170,3 +169,9 @@ def need_role(splits: pd.DataFrame, fold: int, role: str, object_ids: Iterable[s
             f"object {different[0]!r} {what} {role} object of fold {fold}: estimates and splits "
             "are of different runs; make the estimates again"
         )
+
+
+def enough_objects(n_objects: int, n_folds: int) -> bool:
+    """Say whether each fold can test one object and has two more, to train and to calibrate."""
+    largest = -(-n_objects // n_folds)
+    return n_objects >= n_folds and n_objects - largest >= 2

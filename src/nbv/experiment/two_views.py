@@ -9,11 +9,10 @@ import numpy as np
 import pandas as pd
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.estimates import Estimates
+from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
 from nbv.core.lookup import LookupTable
 from nbv.core.policies import Turns, two_views
-from nbv.core.posteriors import Posteriors
 
 COLUMNS = (
     "object_id",

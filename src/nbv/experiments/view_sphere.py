@@ -13,8 +13,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import coarser, first_belief, mean_direction_deg, updated
+from nbv.core.belief import coarser, first_belief, updated
 from nbv.core.criteria import CRITERIA, FOR_TWO_ESTIMATORS
+from nbv.core.distributions import mean_direction_deg
 from nbv.core.estimates import Estimates
 from nbv.core.evidence import Evidence
 from nbv.core.next_views import COARSE_BINS, best_view

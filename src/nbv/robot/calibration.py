@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.angles import wrap_deg
-from nbv.core.belief import mean_direction_deg
-from nbv.core.beliefs import distributions_of
 from nbv.core.density_selection import chosen_lookup
+from nbv.core.distributions import mean_direction_deg
+from nbv.core.logits import LEAST_PROBABILITY, fit_temperature, from_logits
 from nbv.core.offset import constant_offset_deg, frame_warning
-from nbv.core.posteriors import LEAST_PROBABILITY, fit_temperature
 from nbv.errors import UserError
 from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.ood import FAMILIAR_SHARE, unfamiliarity
@@ -94,7 +93,7 @@ def without_offset(turn: Turn, temperature: float) -> Turn:
     What all estimates have in common may be the zero of the turntable, and no view mends it. Where
     estimates do not follow azimuths (`frame_warning`), the turn stays as it is.
     """
-    estimate_deg = mean_direction_deg(distributions_of(turn.logits, temperature))
+    estimate_deg = mean_direction_deg(from_logits(turn.logits, temperature))
     if frame_warning(turn.azimuth_deg, estimate_deg):
         return turn
     offset_deg = constant_offset_deg(estimate_deg - turn.azimuth_deg)
@@ -103,7 +102,7 @@ def without_offset(turn: Turn, temperature: float) -> Turn:
 
 def _bins_of(turn: Turn, temperature: float) -> NDArray[np.float32]:
     try:
-        return bin_apart(turn.azimuth_deg, distributions_of(turn.logits, temperature))
+        return bin_apart(turn.azimuth_deg, from_logits(turn.logits, temperature))
     except UserError as error:
         raise error.about(f"object {turn.object_id!r}, sequence {turn.sequence!r}") from error
 

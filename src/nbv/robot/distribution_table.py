@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.beliefs import distributions_of
-from nbv.core.posteriors import TEMPERATURES, fit_temperature, on_degrees
+from nbv.core.logits import TEMPERATURES, fit_temperature, from_logits, on_degrees
 from nbv.errors import UserError
 from nbv.files import calibrated_file, damaged, need_distributions, read_arrays, readable
 from nbv.labels import counted
@@ -261,7 +260,7 @@ def _n_bins(n_classes: int) -> int:
 
 def _in_bins(rows: NDArray[np.float64], temperature: float, n_bins: int) -> NDArray[np.float64]:
     """Return calibrated distributions (n, B), linear between the centres of classes (n, k)."""
-    calibrated = distributions_of(np.log(rows), temperature)
+    calibrated = from_logits(np.log(rows), temperature)
     return calibrated if n_bins == rows.shape[1] else on_degrees(calibrated, n_bins)
 
 

@@ -10,11 +10,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.core.angles import circular_distance_deg, signed_difference_deg, travel_deg
-from nbv.core.belief import mean_direction_deg
-from nbv.core.beliefs import distributions_of
+from nbv.core.distributions import mean_direction_deg, rotated
+from nbv.core.logits import from_logits
 from nbv.core.look_alikes import LookAlikes, error_after_deg, in_object_frame
 from nbv.core.offset import constant_offset_deg, frame_warning
-from nbv.core.posteriors import turned
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.robot.bundle import Bundle, PaperTables
@@ -98,7 +97,7 @@ Chooser = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float6
 """The next rotations from the first views (n,), of beliefs (n, B) and rotations so far (n, t)."""
 
 
-def follow(seen: Seen, choose: Chooser, n_views: int) -> NDArray[np.float64]:
+def replay(seen: Seen, choose: Chooser, n_views: int) -> NDArray[np.float64]:
     """Return the signed error of the pose after each number of views, from every first frame.
 
     Each next view is the frame nearest to the chosen rotation that was not taken yet.
@@ -124,7 +123,7 @@ def follow(seen: Seen, choose: Chooser, n_views: int) -> NDArray[np.float64]:
         np.put_along_axis(apart, taken, np.inf, axis=1)
         following = apart.argmin(axis=1)
         rotation = turns[np.arange(n), following]
-        logs = logs + np.log(turned(seen.distributions[following], rotation))
+        logs = logs + np.log(rotated(seen.distributions[following], rotation))
         taken = np.column_stack([taken, following])
     return np.stack(errors, axis=1)
 
@@ -226,7 +225,7 @@ def seen_by(bundle: Bundle, turn: Turn) -> Seen:
         turn.object_id,
         turn.sequence,
         turn.azimuth_deg,
-        distributions_of(turn.logits, bundle.temperature),
+        from_logits(turn.logits, bundle.temperature),
         turn_share(bundle, turn.elevation_deg),
     )
 
@@ -270,7 +269,7 @@ def evaluate(
     for n_done, turn in enumerate(turns, start=1):
         seen = seen_by(bundle, turn)
         # However many views there are, the first ones are the same.
-        errors = follow(seen, recommended(calibrated, seen, bundle.affinity), max(numbers))
+        errors = replay(seen, recommended(calibrated, seen, bundle.affinity), max(numbers))
         single = errors[:, 0]
         offset = constant_offset_deg(single)
         rows.append(_row(seen, SINGLE, 1, single, offset))
@@ -281,7 +280,7 @@ def evaluate(
             rng = np.random.default_rng(seed)
             for name, choose in baselines(number, fixed, rng).items():
                 repeats = n_random if name == RANDOM else 1
-                last = [follow(seen, choose, number)[:, -1] for _ in range(repeats)]
+                last = [replay(seen, choose, number)[:, -1] for _ in range(repeats)]
                 rows.append(_row(seen, name, number, np.concatenate(last), offset))
             rows.append(_row(seen, RECOMMENDED, number, errors[:, number - 1], offset))
         tell(n_done)

@@ -20,7 +20,7 @@ def folded_convolutions(
 ) -> list[tuple[Weights, Weights]]:
     """Return kernel and bias of every convolution of `nbv.experiment.estimation.networks`, for depth codes.
 
-    Codes are divided by 128, as `nbv.experiment.estimation.images.to_input` does, in the first kernel. Batch
+    Codes are divided by 128, as `nbv.experiment.estimation.hardware.to_input` does, in the first kernel. Batch
     normalisation is folded into the convolution before it.
 
     Parameters

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.posteriors import fit_temperature, mean_log_likelihood
+from nbv.core.logits import fit_temperature, mean_log_likelihood
 from nbv.robot.sweeps import Turn
 
 Network = Callable[[NDArray[np.uint8]], NDArray[np.float32]]

@@ -15,9 +15,13 @@ from nbv.core.angles import (
     nearest_bin,
     wrap_deg,
 )
-from nbv.core.beliefs import direction_and_spread_deg, fused, log_bayes_factor
+from nbv.core.distributions import (
+    direction_and_spread_deg,
+    log_bayes_factor,
+    product_of_views,
+    rotated,
+)
 from nbv.core.look_alikes import MOST_COMPARED, Expected, LookAlikes
-from nbv.core.posteriors import turned
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.robot.errors import FrameError
@@ -101,7 +105,7 @@ class Recommendation:
     warnings : tuple of str
         What may be wrong with the frames, a sentence each.
     n_views : int
-        How many views the belief is fused of.
+        How many views the belief is the product of.
     crops : tuple of ndarray (side, side) uint8
         What the network saw of each frame; none where no frame was seen.
     object_position_m : tuple of float, or None
@@ -187,7 +191,7 @@ def next_view(
 ) -> Recommendation:
     """Return the pose that views show, and the next view.
 
-    Views are fused by product. The next one has the least error that calibration objects, turned
+    Views are fused by product. The next one has the least error that calibration objects, rotated
     alike, made after it (`nbv.core.look_alikes`). Expected errors after it are raised by
     what the choice makes them too low. So is the expected error now, where the last view is the one
     that those before it led to.
@@ -213,7 +217,7 @@ def next_view(
         Where there is a further view, but none that is allowed, or the longest travel is none.
     """
     max_travel_deg = as_travel(max_travel_deg)
-    belief = fused(distributions, rotations_deg)
+    belief = product_of_views(distributions, rotations_deg)
     n_bins = len(belief)
     width = 360.0 / n_bins
     bins = [round(turn / width) % n_bins for turn in rotations_deg[1:]]
@@ -234,7 +238,7 @@ def next_view(
     chosen_deg = 0.0
     if len(distributions) > 1:
         before = calibrated(tuple(bins[:-1])).expected(
-            fused(distributions[:-1], rotations_deg[:-1]), **affinity, share=share
+            product_of_views(distributions[:-1], rotations_deg[:-1]), **affinity, share=share
         )
         chosen_deg = _of_the_choice(before, rotations_deg, n_bins)
     error = expected.after_deg
@@ -260,7 +264,7 @@ def next_view(
         expected_error_deg=expected.now_deg + chosen_deg,
         move=moves[0] if moves else None,
         alternatives=tuple(moves[1:]),
-        belief=turned(belief, -last),
+        belief=rotated(belief, -last),
         error_after_deg=error_after_deg,
         unfamiliarity=math.nan,
         bayes_factor=bayes_factor,

@@ -10,8 +10,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import signed_difference_deg
+from nbv.core.distributions import rotated
 from nbv.core.estimates import COLUMNS
-from nbv.core.posteriors import LEAST_PROBABILITY, turned
+from nbv.core.logits import LEAST_PROBABILITY
 from nbv.errors import UserError
 from nbv.files import read_numbers
 from nbv.robot.pairs import (
@@ -87,7 +88,7 @@ def evenly_apart(
 ) -> NDArray[np.float64]:
     """Return distributions (n_views, B) of views evenly apart, of views (n,) anywhere on a turn.
 
-    Each takes the nearest view, whose distribution is turned by what lies between.
+    Each takes the nearest view, whose distribution is rotated by what lies between.
 
     Raises
     ------
@@ -103,7 +104,7 @@ def evenly_apart(
     for place, azimuth in enumerate(np.arange(n_views) * (360.0 / n_views)):
         apart = signed_difference_deg(azimuth_deg, azimuth)
         nearest = int(np.abs(apart).argmin())
-        found[place] = turned(rows[nearest], float(apart[nearest]))
+        found[place] = rotated(rows[nearest], float(apart[nearest]))
     return found
 
 

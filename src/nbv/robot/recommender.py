@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.beliefs import ELEVATION_BANDWIDTH_DEG, distributions_of, elevation_share
+from nbv.core.logits import from_logits
 from nbv.errors import UserError, nearest, need_number
 from nbv.files import as_path
 from nbv.labels import counted
@@ -32,6 +32,7 @@ from nbv.robot.next_view import (
     next_view,
 )
 from nbv.robot.ood import unfamiliarity
+from nbv.robot.sweeps import ELEVATION_BANDWIDTH_DEG, elevation_share
 
 IntrinsicsLike = Intrinsics | ArrayLike | None
 """Intrinsics, or their numbers; None where they are not known."""
@@ -153,7 +154,7 @@ class Recommender:
         >>> len(p), round(float(p.sum()), 6)
         (120, 1.0)
         """
-        return distributions_of(self.network(codes), self.bundle.temperature)
+        return from_logits(self.network(codes), self.bundle.temperature)
 
     def recommend(
         self,
@@ -299,7 +300,7 @@ class Recommender:
             )
         logits = self.network(codes)
         answer = next_view(
-            distributions_of(logits, self.bundle.temperature),
+            from_logits(logits, self.bundle.temperature),
             rotations_deg,
             self._calibrated,
             self.bundle.affinity,

@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from nbv.errors import UserError, nearest
-from nbv.experiment.fold_sizes import enough_objects
+from nbv.experiment.splits import enough_objects
 
 T = TypeVar("T")
 
@@ -225,7 +225,7 @@ class Density(Section):
 
 
 class Affinity(Section):
-    """How like distributions count; see `nbv.core.criteria.expected_error`."""
+    """How like distributions count; see `nbv.core.criteria`."""
 
     power: Annotated[Number, Field(gt=0, le=10**4)]
     pseudo_observations: PseudoObservations

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
-from nbv.experiment.estimation.hardware import Hardware
-from nbv.experiment.estimation.images import to_input
-from nbv.experiment.estimation.networks import kind_of
-from nbv.experiment.estimation.outputs import Outputs
+from nbv.experiment.estimation.hardware import Hardware, to_input
+from nbv.experiment.estimation.networks import Outputs, kind_of
 from nbv.experiment.estimation.weights import Estimator
 
 INFERENCE_BATCH = 256

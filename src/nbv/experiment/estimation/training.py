@@ -16,8 +16,7 @@ from torch import nn
 
 from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
-from nbv.experiment.estimation.hardware import Hardware
-from nbv.experiment.estimation.images import to_input
+from nbv.experiment.estimation.hardware import Hardware, to_input
 from nbv.experiment.estimation.networks import build_network, kind_of
 from nbv.experiment.estimation.weights import Estimator, Start
 

@@ -7,7 +7,7 @@ fewer epochs. No calibration or test object of the fold is seen on the way.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from typing import Any, Final, Literal
 
 PRETRAINED: Final = "pretrained"
@@ -71,8 +71,3 @@ def stage_settings(
         "epochs": max(round(own["epochs"] * share), 1),
         "learning_rate": own["learning_rate"],
     }
-
-
-def with_category(category: str, object_ids: Sequence[str]) -> list[str]:
-    """Return ``<category>/<object>``: an id of its own where objects of all categories meet."""
-    return [f"{category}/{object_id}" for object_id in object_ids]

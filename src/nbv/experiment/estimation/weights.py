@@ -15,11 +15,9 @@ import safetensors.torch
 from numpy.typing import NDArray
 from torch import nn
 
-from nbv.experiment.checksums import sha256_of
 from nbv.experiment.estimation.hardware import Hardware
 from nbv.experiment.estimation.networks import build_network
-from nbv.experiment.estimation.warm_start import with_category
-from nbv.files import damaged, readable, replacing
+from nbv.files import damaged, readable, replacing, sha256_of
 
 
 @dataclass(frozen=True)
@@ -150,3 +148,8 @@ def weights_of(estimator: Estimator) -> dict[str, NDArray[np.float32]]:
         for name, tensor in estimator.network.state_dict().items()
         if tensor.is_floating_point()
     }
+
+
+def with_category(category: str, object_ids: Sequence[str]) -> list[str]:
+    """Return ``<category>/<object>``: an id of its own where objects of all categories meet."""
+    return [f"{category}/{object_id}" for object_id in object_ids]

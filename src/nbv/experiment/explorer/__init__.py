@@ -15,9 +15,9 @@ import numpy as np
 
 from nbv.core.criteria import CRITERIA
 from nbv.core.lookup import load_lookup
-from nbv.core.posteriors import read_posteriors
 from nbv.data.depth_images import open_depth
 from nbv.errors import UserError
+from nbv.experiment.estimates import read_posteriors
 from nbv.experiment.explorer.images import COLUMNS, ring_of
 from nbv.experiment.explorer.outcomes import (
     Outcomes,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.criteria import cost_unit
+from nbv.core.estimates import Posteriors
 from nbv.core.lookup import LookupTable
-from nbv.core.posteriors import Posteriors
 from nbv.experiment.explorer.encoding import (
     Quantised,
     as_text,

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from nbv.core.angles import nearest_bin, wrap_deg
-from nbv.core.criteria.pose_ambiguity import two_view_poses
-from nbv.core.criteria.spreads import SPREADS
+from nbv.core.criteria import SPREADS, two_view_poses
 from nbv.core.lookup import LookupTable
 from nbv.experiment.report.figures.depth import depth_limits, draw_depth
 from nbv.experiment.report.figures.inputs import (

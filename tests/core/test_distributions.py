@@ -1,4 +1,4 @@
-"""Beliefs: turned, fused and summed up, against brute force and exact identities."""
+"""Distributions: rotated, multiplied and summed up, against brute force and exact identities."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.special import softmax
+from scipy.special import softmax as softmax_of_scipy
 from scipy.stats import circstd
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import mean_direction_deg, product_of
-from nbv.core.beliefs import (
-    ELEVATION_BANDWIDTH_DEG,
-    LEAST_PROBABILITY,
+from nbv.core.distributions import (
     direction_and_spread_deg,
-    distributions_of,
-    elevation_share,
-    fused,
     log_bayes_factor,
+    mean_direction_deg,
+    product_of,
+    product_of_views,
+    rotated,
 )
-from nbv.core.posteriors import on_degrees, posteriors_of, turned
+from nbv.core.estimates import posteriors_of
+from nbv.core.logits import LEAST_PROBABILITY, from_logits, on_degrees
+from nbv.robot.sweeps import ELEVATION_BANDWIDTH_DEG, elevation_share
 
 BINS = 24
 WIDTH = 360.0 / BINS
@@ -43,28 +43,26 @@ def beliefs(seed: int, n: int = 3) -> np.ndarray:
 
 @given(values=logits, temperature=st.floats(0.05, 20.0))
 def test_distributions_are_the_softmax_with_a_floor(values, temperature):
-    found = distributions_of(values, temperature)
+    found = from_logits(values, temperature)
     assert found.dtype == np.float64
     assert found.sum(axis=1) == pytest.approx(1.0)
     assert found.min() >= LEAST_PROBABILITY / (1 + BINS * LEAST_PROBABILITY)
-    assert found == pytest.approx(softmax(values / temperature, axis=1), abs=BINS * 1e-6)
+    assert found == pytest.approx(softmax_of_scipy(values / temperature, axis=1), abs=BINS * 1e-6)
 
 
 @given(values=logits, temperature=st.floats(0.05, 20.0))
 def test_distributions_are_those_that_the_experiments_use(values, temperature):
     wanted = posteriors_of(["a"], values[None], temperature).distributions[0]
-    assert distributions_of(values, temperature) == pytest.approx(wanted, rel=1e-9)
+    assert from_logits(values, temperature) == pytest.approx(wanted, rel=1e-9)
 
 
 @given(values=logits, shift=st.floats(-1e4, 1e4))
 def test_only_differences_of_logits_matter(values, shift):
-    assert distributions_of(values + shift, 1.5) == pytest.approx(
-        distributions_of(values, 1.5), rel=1e-6
-    )
+    assert from_logits(values + shift, 1.5) == pytest.approx(from_logits(values, 1.5), rel=1e-6)
 
 
 def test_large_logits_do_not_overflow():
-    found = distributions_of(np.array([[1e5, 0.0, -1e5]], dtype=np.float32), 0.05)
+    found = from_logits(np.array([[1e5, 0.0, -1e5]], dtype=np.float32), 0.05)
     assert found[0] == pytest.approx([1.0, LEAST_PROBABILITY, LEAST_PROBABILITY], rel=1e-5)
 
 
@@ -73,13 +71,13 @@ def test_large_logits_do_not_overflow():
 
 @given(values=logits, bins=whole)
 def test_a_turn_by_whole_bins_is_a_roll(values, bins):
-    rows = softmax(values, axis=1)
-    assert np.array_equal(turned(rows, bins * WIDTH), np.roll(rows, -bins, axis=1))
+    rows = softmax_of_scipy(values, axis=1)
+    assert np.array_equal(rotated(rows, bins * WIDTH), np.roll(rows, -bins, axis=1))
 
 
 @given(seed=st.integers(0, 10**6), turn=any_turn)
 def test_a_turn_keeps_the_total(seed, turn):
-    found = turned(beliefs(seed), turn)
+    found = rotated(beliefs(seed), turn)
     assert found.sum(axis=1) == pytest.approx(1.0)
     assert (found >= 0).all()
 
@@ -87,31 +85,31 @@ def test_a_turn_keeps_the_total(seed, turn):
 @given(seed=st.integers(0, 10**6), turn=any_turn, bins=whole)
 def test_turns_add_up(seed, turn, bins):
     rows = beliefs(seed)
-    both = turned(rows, turn + bins * WIDTH)
-    assert turned(turned(rows, turn), bins * WIDTH) == pytest.approx(both, abs=1e-9)
-    assert turned(turned(rows, bins * WIDTH), turn) == pytest.approx(both, abs=1e-9)
+    both = rotated(rows, turn + bins * WIDTH)
+    assert rotated(rotated(rows, turn), bins * WIDTH) == pytest.approx(both, abs=1e-9)
+    assert rotated(rotated(rows, bins * WIDTH), turn) == pytest.approx(both, abs=1e-9)
 
 
 @given(seed=st.integers(0, 10**6), turn=any_turn)
 def test_a_turn_and_the_whole_circle_are_the_turn(seed, turn):
     rows = beliefs(seed)
-    assert turned(rows, turn + 360.0) == pytest.approx(turned(rows, turn), abs=1e-9)
+    assert rotated(rows, turn + 360.0) == pytest.approx(rotated(rows, turn), abs=1e-9)
 
 
 @given(seed=st.integers(0, 10**6), turn=any_turn)
 def test_it_is_the_density_between_the_bins(seed, turn):
     """numpy's periodic interpolation of p at theta + turn."""
     rows, centres = beliefs(seed), np.arange(BINS) * WIDTH
-    for row, found in zip(rows, turned(rows, turn), strict=True):
+    for row, found in zip(rows, rotated(rows, turn), strict=True):
         wanted = np.interp(centres + turn, centres, row, period=360.0)
         assert found == pytest.approx(wanted, abs=1e-9)
 
 
 @given(seed=st.integers(0, 10**6), degrees=st.integers(-400, 400))
 def test_a_turn_on_a_finer_grid_is_a_roll_too(seed, degrees):
-    """The density between bins is that of `nbv.core.posteriors`."""
+    """The density between bins is that of `nbv.core.logits.on_degrees`."""
     rows = beliefs(seed)
-    fine = on_degrees(turned(rows, float(degrees)))[:, :: int(WIDTH)]
+    fine = on_degrees(rotated(rows, float(degrees)))[:, :: int(WIDTH)]
     rolled = np.roll(on_degrees(rows), -degrees, axis=1)[:, :: int(WIDTH)]
     assert fine == pytest.approx(rolled, abs=1e-9)
 
@@ -119,7 +117,7 @@ def test_a_turn_on_a_finer_grid_is_a_roll_too(seed, degrees):
 @given(seed=st.integers(0, 10**6), bins=whole)
 def test_the_mean_direction_turns_along(seed, bins):
     rows = beliefs(seed)
-    moved = mean_direction_deg(turned(rows, bins * WIDTH)) + bins * WIDTH
+    moved = mean_direction_deg(rotated(rows, bins * WIDTH)) + bins * WIDTH
     apart = (moved - mean_direction_deg(rows) + 180) % 360 - 180
     assert apart == pytest.approx(0.0, abs=1e-5)
 
@@ -137,7 +135,7 @@ def test_a_fused_belief_is_the_product_of_all_views(seed, bins):
         for row, turn in zip(rows, rotations, strict=True):
             wanted[theta] *= row[(theta + turn) % BINS]
     wanted /= wanted.sum()
-    found = fused(rows, [turn * WIDTH for turn in rotations])
+    found = product_of_views(rows, [turn * WIDTH for turn in rotations])
     assert found == pytest.approx(wanted, rel=1e-6, abs=1e-12)
 
 
@@ -145,7 +143,7 @@ def test_a_fused_belief_is_the_product_of_all_views(seed, bins):
 def test_two_views_are_the_product_of_the_experiments(seed, bins):
     rows = beliefs(seed, 2)
     wanted = product_of(rows[:1], rows[1:], np.array([bins * WIDTH]))[0]
-    found = fused(rows, [0.0, bins * WIDTH])
+    found = product_of_views(rows, [0.0, bins * WIDTH])
     assert found == pytest.approx(wanted / wanted.sum(), rel=1e-6)
 
 
@@ -156,44 +154,46 @@ def test_two_views_are_the_product_of_the_experiments(seed, bins):
 )
 def test_the_order_of_views_does_not_matter(seed, order, rotations):
     rows = beliefs(seed, 4)
-    found = fused(rows[list(order)], [rotations[i] for i in order])
-    assert found == pytest.approx(fused(rows, rotations), rel=1e-6, abs=1e-12)
+    found = product_of_views(rows[list(order)], [rotations[i] for i in order])
+    assert found == pytest.approx(product_of_views(rows, rotations), rel=1e-6, abs=1e-12)
 
 
 @given(seed=st.integers(0, 10**6), turn=any_turn)
 def test_a_uniform_view_is_neutral(seed, turn):
     row = beliefs(seed, 1)[0]
-    assert fused(np.stack([row, uniform]), [0.0, turn]) == pytest.approx(row)
-    assert fused(np.stack([uniform, row]), [0.0, turn]) == pytest.approx(turned(row, turn))
+    assert product_of_views(np.stack([row, uniform]), [0.0, turn]) == pytest.approx(row)
+    assert product_of_views(np.stack([uniform, row]), [0.0, turn]) == pytest.approx(
+        rotated(row, turn)
+    )
 
 
 @given(seed=st.integers(0, 10**6))
 def test_one_view_is_itself(seed):
     row = beliefs(seed, 1)
-    assert fused(row, [0.0]) == pytest.approx(row[0])
+    assert product_of_views(row, [0.0]) == pytest.approx(row[0])
 
 
 @given(seed=st.integers(0, 10**6), base=whole, bins=st.lists(whole, min_size=3, max_size=3))
 def test_rotations_from_elsewhere_turn_the_result(seed, base, bins):
     rows = beliefs(seed)
-    found = fused(rows, [(turn + base) * WIDTH for turn in bins])
-    wanted = turned(fused(rows, [turn * WIDTH for turn in bins]), base * WIDTH)
+    found = product_of_views(rows, [(turn + base) * WIDTH for turn in bins])
+    wanted = rotated(product_of_views(rows, [turn * WIDTH for turn in bins]), base * WIDTH)
     assert found == pytest.approx(wanted, rel=1e-6, abs=1e-12)
 
 
 def test_many_sure_views_do_not_underflow():
-    row = distributions_of(np.where(np.arange(BINS) == 7, 50.0, 0.0)[None], 1.0)
-    found = fused(np.repeat(row, 200, axis=0), [0.0] * 200)
+    row = from_logits(np.where(np.arange(BINS) == 7, 50.0, 0.0)[None], 1.0)
+    found = product_of_views(np.repeat(row, 200, axis=0), [0.0] * 200)
     assert found[7] == pytest.approx(1.0)
     assert np.isfinite(found).all()
     # Views that exclude each other leave both possible.
-    other = fused(np.concatenate([row, row]), [0.0, 3 * WIDTH])
+    other = product_of_views(np.concatenate([row, row]), [0.0, 3 * WIDTH])
     assert other[7] == pytest.approx(other[4])
 
 
 def test_views_and_rotations_are_as_many():
     with pytest.raises(ValueError):
-        fused(beliefs(0), [0.0, 15.0])
+        product_of_views(beliefs(0), [0.0, 15.0])
 
 
 # Spread
@@ -227,7 +227,7 @@ def test_the_spread_is_the_circular_standard_deviation(counts):
 @given(seed=st.integers(0, 10**6), bins=whole)
 def test_the_spread_does_not_turn(seed, bins):
     row = beliefs(seed, 1)[0]
-    assert spread_deg(turned(row, bins * WIDTH)) == pytest.approx(spread_deg(row), rel=1e-6)
+    assert spread_deg(rotated(row, bins * WIDTH)) == pytest.approx(spread_deg(row), rel=1e-6)
 
 
 @pytest.mark.parametrize("sigma", [8.0, 15.0, 30.0, 45.0])

@@ -1,0 +1,119 @@
+"""Estimates and distributions of full turns of objects on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from nbv.core.estimates import COLUMNS, Estimates, Posteriors
+from nbv.errors import UserError
+from nbv.files import (
+    damaged,
+    need_columns,
+    need_distributions,
+    read_arrays,
+    read_csv,
+    readable,
+    write_arrays,
+    write_csv,
+)
+
+
+def write_estimates(path: str | Path, estimates: Estimates) -> None:
+    """Write estimates as a table with the columns `COLUMNS`."""
+    n_objects, n_views = estimates.estimate_deg.shape
+    columns = (
+        np.repeat(np.asarray(estimates.object_ids, dtype=object), n_views),
+        np.tile(estimates.azimuth_deg.astype(int), n_objects),
+        # Rounding to 4 decimals may turn 359.99999 into 360.0, which is 0.
+        (np.round(estimates.estimate_deg, 4) % 360.0).ravel(),
+    )
+    write_csv(path, pd.DataFrame(dict(zip(COLUMNS, columns, strict=True))))
+
+
+def read_estimates(path: str | Path) -> Estimates:
+    """Read what `write_estimates` wrote; further columns, as older files have, are ignored.
+
+    Raises
+    ------
+    UserError
+        Where columns or views are missing, or an estimate is not in [0, 360).
+    """
+    frame = read_csv(path)
+    need_columns(path, frame, COLUMNS)
+    object_ids = objects_of_full_turns(path, frame, "azimuth_deg")
+    need_azimuths(path, frame, ("estimate_deg",))
+    estimate_deg = frame["estimate_deg"].to_numpy(dtype=np.float64)
+    return Estimates(object_ids, estimate_deg.reshape(len(object_ids), -1))
+
+
+def objects_of_full_turns(
+    path: str | Path, frame: pd.DataFrame, azimuth_column: str
+) -> tuple[str, ...]:
+    """Return the objects of a table that has a row for each view of a full turn of each object.
+
+    Raises
+    ------
+    UserError
+        Where the rows are not one object after the other, or the azimuths of an object are not
+        0, 360 / n_views, ….
+    """
+    object_ids = tuple(frame["object_id"].drop_duplicates())
+    n_views, odd = divmod(len(frame), len(object_ids))
+    azimuth_deg = np.tile(np.arange(n_views) * (360.0 / n_views), len(object_ids))
+    if (
+        odd
+        or not np.array_equal(frame[azimuth_column].to_numpy(), azimuth_deg)
+        or not np.array_equal(frame["object_id"], np.repeat(object_ids, n_views))
+    ):
+        raise damaged(path, "not a full turn of equally spaced views of each object")
+    return object_ids
+
+
+def need_azimuths(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
+    """Raise UserError where a column holds anything but numbers in [0, 360)."""
+    for name in columns:
+        with readable(path):
+            values = frame[name].to_numpy(dtype=np.float64)
+        # Written so that NaN is refused as well.
+        wrong = ~((values >= 0.0) & (values < 360.0))
+        if wrong.any():
+            row = int(np.flatnonzero(wrong)[0])
+            raise damaged(path, f"{name}={values[row]} in row {row + 1} is not in [0, 360)")
+
+
+def write_posteriors(path: str | Path, posteriors: Posteriors) -> None:
+    """Write distributions, their logs as float32."""
+    write_arrays(
+        path,
+        {
+            "object_ids": np.asarray(posteriors.object_ids, dtype=np.str_),
+            "log_posterior": posteriors.log_posterior.astype(np.float32),
+            "temperature": np.asarray(posteriors.temperature),
+        },
+    )
+
+
+def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
+    """Read what `write_posteriors` wrote.
+
+    Raises
+    ------
+    UserError
+        Where it is about other objects than those given, or in another order, or is damaged.
+    """
+    stored = read_arrays(path, ("object_ids", "log_posterior", "temperature"))
+    names = tuple(str(name) for name in stored["object_ids"])
+    if names != tuple(object_ids):
+        raise UserError(f"{path}: not of the objects that the estimates are of; make both again")
+    with readable(path):
+        posteriors = Posteriors(names, stored["log_posterior"], float(stored["temperature"]))
+        _, n_views, n_classes = posteriors.log_posterior.shape
+        as_kept = np.exp(posteriors.log_posterior.astype(np.float64))
+        need_distributions(path, as_kept, (len(names), n_views, n_classes))
+        if not 0.0 < posteriors.temperature < np.inf:
+            raise damaged(path, f"the temperature {posteriors.temperature} is not above 0")
+    return posteriors
