@@ -17,7 +17,7 @@ from nbv.core.estimates import Estimates
 from nbv.core.evidence import gather_evidence
 from nbv.core.fusion import average
 from nbv.core.lookup import LookupTable, build_lookup
-from nbv.experiment.two_views import COLUMNS, evaluate_method
+from nbv.experiment.results import COLUMNS, evaluate_method
 from performance.figures import Figure, Target
 from performance.lookup import calibration_estimates
 from performance.settings import configuration

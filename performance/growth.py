@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nbv.core.density_selection import chosen_lookup
 from nbv.core.evidence import gather_evidence
 from nbv.core.lookup import build_lookup
+from nbv.core.selection import chosen_lookup
 from nbv.data.camera import Camera
 from nbv.data.renderers import open_renderer
 from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread

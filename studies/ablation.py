@@ -8,15 +8,10 @@ from typing import Any
 import pandas as pd
 
 from nbv.core.criteria import CRITERIA
-from nbv.core.density_selection import (
-    Choice,
-    choose_densities,
-    chosen_evidence,
-    most_likely_density,
-)
 from nbv.core.estimates import Estimates
 from nbv.core.fusion import ESTIMATE_FUSIONS
 from nbv.core.policies import Turns, two_views
+from nbv.core.selection import Choice, choose_densities, chosen_evidence, most_likely_density
 
 ALL = 0
 """As a number of calibration objects: as many as there are."""

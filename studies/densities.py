@@ -22,8 +22,14 @@ from nbv.core.estimates import Estimates
 from nbv.core.logits import log_likelihood, on_degrees
 from nbv.core.lookup import load_lookup
 from nbv.experiment.estimates import read_estimates, read_posteriors
-from nbv.experiment.report.cells import CELL_COLUMNS, method_cells, shared_resampler
-from nbv.experiment.report.settings import ReportSettings, common_elevation_deg, unit_label
+from nbv.experiment.report.settings import (
+    CELL_COLUMNS,
+    ReportSettings,
+    common_elevation_deg,
+    method_cells,
+    shared_resampler,
+    unit_label,
+)
 from nbv.experiment.report.table import DECIDED, Cell, Row, Table, difference_cell
 from nbv.experiment.results import Unit
 from nbv.experiment.statistics.object_means import FoldFile

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.core.density_selection import Choice, chosen_evidence
 from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
 from nbv.core.fusion import OF_DISTRIBUTIONS
 from nbv.core.lookup import LookupTable
-from nbv.core.method_selection import Methods, SelectedMethod, select_methods
-from nbv.experiment.two_views import evaluate_method
+from nbv.core.selection import Choice, Methods, SelectedMethod, chosen_evidence, select_methods
+from nbv.experiment.results import evaluate_method
 from studies.travel import travel_rows
 
 CHOICE_COLUMNS = (
@@ -63,7 +62,7 @@ def evaluate_extensions(
     calibration, test : Estimates
         Of one fold.
     extensions, settings : mapping
-        See `nbv.core.method_selection.select_methods`.
+        See `nbv.core.selection.select_methods`.
     rng_of : callable
         The generator of an extension, by name.
     calibration_posteriors, test_posteriors : Posteriors, optional

@@ -17,7 +17,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.core.density_selection import (
+from nbv.core.estimates import Estimates, Posteriors
+from nbv.core.evidence import Evidence, evidence_of_distributions
+from nbv.core.fusion import ESTIMATE_FUSIONS
+from nbv.core.lookup import build_lookup
+from nbv.core.policies import needs_lookup
+from nbv.core.selection import (
     COARSE_BINS,
     Choice,
     choose_densities,
@@ -25,12 +30,7 @@ from nbv.core.density_selection import (
     most_likely_density,
     with_kernel,
 )
-from nbv.core.estimates import Estimates, Posteriors
-from nbv.core.evidence import Evidence, evidence_of_distributions
-from nbv.core.fusion import ESTIMATE_FUSIONS
-from nbv.core.lookup import build_lookup
-from nbv.core.policies import needs_lookup
-from nbv.experiment.two_views import evaluate_method
+from nbv.experiment.results import evaluate_method
 from studies.kept_estimates import HeldOut
 from studies.more_views import more_views_rows
 
@@ -89,7 +89,7 @@ class Factorial:
     Attributes
     ----------
     frames : dict of (choice, fusion) to DataFrame
-        Two views, and one (`SINGLE`); as of `nbv.experiment.two_views.evaluate_method`.
+        Two views, and one (`SINGLE`); as of `nbv.experiment.results.evaluate_method`.
     more_views : DataFrame
         As of `studies.more_views.more_views_rows`.
     densities : DataFrame

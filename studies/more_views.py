@@ -33,7 +33,7 @@ from nbv.core.simulation import (
     first_views,
     follow,
 )
-from nbv.experiment.statistics.pose_errors import accuracy_area, half_turned
+from nbv.experiment.statistics.metrics import accuracy_area, half_turned
 
 Floats = NDArray[np.float64]
 Run = Callable[..., Floats]

@@ -13,8 +13,14 @@ import numpy as np
 import pandas as pd
 
 from nbv.experiment.layout import unit_folder
-from nbv.experiment.report.cells import CELL_COLUMNS, method_cells, shared_resampler
-from nbv.experiment.report.settings import ReportSettings, common_elevation_deg, unit_label
+from nbv.experiment.report.settings import (
+    CELL_COLUMNS,
+    ReportSettings,
+    common_elevation_deg,
+    method_cells,
+    shared_resampler,
+    unit_label,
+)
 from nbv.experiment.report.table import DECIDED, Cell, Row, Table, difference_cell
 from nbv.experiment.results import ESTIMATED_ROLES, Unit
 from nbv.experiment.statistics.paired import PairedErrors, pair_methods, pool

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from nbv.experiment.report.cells import cell, shared_resampler
-from nbv.experiment.report.settings import ReportSettings
+from nbv.experiment.report.settings import ReportSettings, cell, shared_resampler
 from nbv.experiment.report.table import Cell, Row, Table
 from nbv.experiment.results import Unit, load_evaluations
 from nbv.experiment.statistics.object_means import mae_difference, mae_interval

@@ -12,8 +12,8 @@ from nbv.core.angles import nearest_bin, travel_deg
 from nbv.core.estimates import Estimates
 from nbv.core.fusion import ESTIMATE_FUSIONS, Rotations, rotation_errors_deg
 from nbv.core.lookup import least_cost_delta
-from nbv.core.method_selection import SelectedMethod
 from nbv.core.policies import Turns, take_second_views
+from nbv.core.selection import SelectedMethod
 
 # Multiples of the travel cost at which, for the average estimate, staying costs as little as going.
 RELATIVE_COSTS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0)

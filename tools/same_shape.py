@@ -24,8 +24,7 @@ from scipy import ndimage
 from nbv.core.angles import wrap_deg
 from nbv.data.meshes import Mesh, as_mesh
 from nbv.data.normalisation import normalise
-from nbv.data.procedural.assembly import join
-from nbv.data.procedural.solids import Points, revolve, superellipse, sweep
+from nbv.data.procedural.solids import Points, join, revolve, superellipse, sweep
 from nbv.robot.errors import FrameError
 from nbv.robot.evaluation import RECOMMENDED, SINGLE, evaluate
 from nbv.robot.recommender import Recommender

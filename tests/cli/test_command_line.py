@@ -23,8 +23,8 @@ from nbv.cli.answers import offset_of_frames, say_offset
 from nbv.cli.arguments import as_paragraphs
 from nbv.core.angles import signed_difference_deg
 from nbv.core.criteria import CRITERIA
-from nbv.core.density_selection import chosen_lookup
 from nbv.core.lookup import load_lookup, save_lookup
+from nbv.core.selection import chosen_lookup
 from nbv.robot.bundle import FORMAT, load_bundle, save_bundle
 from nbv.robot.calibration import DENSITY, recalibrated
 from nbv.robot.depth_files import read_depth

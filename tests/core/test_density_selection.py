@@ -12,13 +12,9 @@ from tests.core.made import (
     objects,
 )
 
-from nbv.core.density_selection import (
-    choose_densities,
-    chosen_lookup,
-    most_likely_density,
-)
 from nbv.core.lookup import build_lookup
 from nbv.core.policies import Turns, take_second_views
+from nbv.core.selection import choose_densities, chosen_lookup, most_likely_density
 from nbv.errors import UserError
 
 

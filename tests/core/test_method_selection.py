@@ -7,13 +7,8 @@ import pytest
 from studies.extensions import choices_frame, stored_evidence
 from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
-from nbv.core.density_selection import Choice
 from nbv.core.estimates import Posteriors
-from nbv.core.method_selection import (
-    check_methods,
-    select_methods,
-    surely_better,
-)
+from nbv.core.selection import Choice, check_methods, select_methods, surely_better
 from nbv.errors import UserError
 
 METHODS = {

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from nbv.data.camera import Camera
-from nbv.data.sensors.kinect import Kinect
-from nbv.data.sensors.stereo import Stereo
+from nbv.data.sensors.triangulation import Kinect, Stereo
 from nbv.experiment.config import load_config
 
 CONFIG = Path(__file__).parents[2] / "config"

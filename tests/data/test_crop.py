@@ -12,10 +12,10 @@ from rendering_shapes import shape_of
 from sensor_images import CONFIGURED
 
 from nbv.data.camera import Camera
+from nbv.data.depth_codes import crop_measured, sensor_camera
 from nbv.data.render import render_objects
 from nbv.data.renderers import open_renderer
 from nbv.data.sensors import open_sensor, sensor_settings
-from nbv.data.silhouette import crop_measured, sensor_camera
 
 SIDE = 9
 DEPTHS = arrays(

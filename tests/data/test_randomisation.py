@@ -10,7 +10,7 @@ from rendering_shapes import procedural
 from scipy import ndimage
 
 from nbv.data.camera import Camera, object_views
-from nbv.data.depth_codes import encode_depth
+from nbv.data.depth_codes import crop_measured, encode_depth, sensor_camera
 from nbv.data.randomisation import (
     Randomisation,
     add_table,
@@ -19,7 +19,6 @@ from nbv.data.randomisation import (
     randomised_turn,
 )
 from nbv.data.renderers import open_renderer
-from nbv.data.silhouette import crop_measured, sensor_camera
 
 CAMERA = Camera(fov_deg=25.0, image_side=48)
 AZIMUTHS = np.arange(0.0, 360.0, 45.0)

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from mesh_files import READER, pointer, put, refused, source_of
 
-from nbv.data.preparation import prepare_meshes
+from nbv.data.meshes import prepare_meshes
 from nbv.data.sources import select_objects
 from nbv.files import read_csv, write_csv
 

@@ -6,8 +6,8 @@ import pytest
 from experiment.table_readers import html_cells, pipe_rows
 from nbv.experiment.paper.claims import CLAIMS
 from nbv.experiment.paper.verdicts import evaluate_claims
-from nbv.experiment.report.claims import claims_table
 from nbv.experiment.report.table import table_html, table_latex, table_markdown
+from nbv.experiment.report.tables import claims_table
 
 
 @pytest.fixture

@@ -20,19 +20,20 @@ from conftest import N_FOLDS, UNITS
 from nbv.core.lookup import load_lookup
 from nbv.errors import UserError
 from nbv.experiment.explorer import ExplorerInputs, build_explorer, coarse_bins
-from nbv.experiment.explorer.encoding import (
+from nbv.experiment.explorer.images import (
+    COLUMNS,
     byte_planes,
     half_turn,
     hundredths,
     quantised,
     quantised_logs,
+    ring_of,
     rows_differenced,
 )
-from nbv.experiment.explorer.images import COLUMNS, ring_of
 from nbv.experiment.explorer.outcomes import expected_pose, outcomes_of
 from nbv.experiment.explorer.tables import cost_error, page_table, probability_error
 from nbv.experiment.layout import Layout
-from nbv.experiment.report.figures.depth import depth_limits, shade
+from nbv.experiment.report.figures.views import depth_limits, shade
 
 FOLDS = range(1, N_FOLDS + 1)
 POLICIES = {

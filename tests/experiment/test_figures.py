@@ -16,11 +16,11 @@ from nbv.core.angles import circular_distance_deg
 from nbv.core.evidence import gather_evidence
 from nbv.core.lookup import build_lookup, load_lookup, save_lookup
 from nbv.errors import UserError
-from nbv.experiment.report import examples
 from nbv.experiment.report.figures import FIGURES, FigureInputs, build_figure, steps
-from nbv.experiment.report.figures.depth import depth_limits, shade
 from nbv.experiment.report.figures.inputs import example_view
+from nbv.experiment.report.figures.views import depth_limits, shade
 from nbv.experiment.report.settings import ReportSettings
+from nbv.experiment.report.tables import hardest_azimuth_deg
 from nbv.robot.style import save_figure
 
 FOLD = 2  # of the examples
@@ -325,7 +325,7 @@ def test_a_category_without_the_reference_elevation_is_shown_at_its_own(inputs, 
 
 
 def test_the_hardest_azimuth_of_the_mug_is_in_the_hidden_range(evaluations):
-    assert 30 <= examples.hardest_azimuth_deg(evaluations["mug", 0]) <= 150
+    assert 30 <= hardest_azimuth_deg(evaluations["mug", 0]) <= 150
 
 
 def test_a_figure_needs_no_more_than_it_says(inputs):

@@ -5,9 +5,8 @@ import pytest
 
 from nbv.experiment.paper.claims import CLAIMS
 from nbv.experiment.paper.verdicts import evaluate_claims
-from nbv.experiment.report.forest import claim_figure, claims_forest, comparisons_of
+from nbv.experiment.report.forest import claim_figure, claims_forest, comparisons_of, table_picture
 from nbv.experiment.report.settings import ReportSettings
-from nbv.experiment.report.table_picture import table_picture
 from nbv.experiment.report.tables import build_table
 from nbv.labels import method_label
 from nbv.robot.style import AGAINST, FOR, OPEN

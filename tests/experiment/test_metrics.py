@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from nbv.experiment.statistics import metrics
-from nbv.experiment.statistics.pose_errors import accuracy_area, half_turned
+from nbv.experiment.statistics.metrics import accuracy_area, half_turned
 
 errors_strategy = arrays(np.float64, st.integers(1, 40), elements=st.floats(0, 180))
 

@@ -7,7 +7,7 @@ import synthetic
 from conftest import N_FOLDS
 from nbv.errors import UserError
 from nbv.experiment import results
-from nbv.experiment.two_views import COLUMNS
+from nbv.experiment.results import COLUMNS
 from nbv.files import write_csv
 
 MUG = ("mug", 0)

@@ -10,8 +10,8 @@ from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import gather_evidence
 from nbv.core.fusion import FUSIONS
 from nbv.core.lookup import build_lookup
-from nbv.core.method_selection import select_methods
-from nbv.experiment.two_views import COLUMNS, evaluate_method
+from nbv.core.selection import select_methods
+from nbv.experiment.results import COLUMNS, evaluate_method
 
 RNG = np.random.default_rng(0)
 SETTINGS = {"pose_likelihood": "given_estimate", "spread": "entropy"}

@@ -7,7 +7,7 @@ from studies.extensions import choices_frame, stored_evidence
 from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 from nbv.core.estimates import Estimates
-from nbv.core.method_selection import select_methods
+from nbv.core.selection import select_methods
 
 
 def test_great_circles():

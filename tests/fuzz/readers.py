@@ -189,7 +189,7 @@ def estimates_problem(estimates: Any) -> str:
 
 def make_evaluation(path: Path) -> None:
     from nbv.core.estimates import Estimates
-    from nbv.experiment.two_views import evaluate_method
+    from nbv.experiment.results import evaluate_method
     from nbv.files import write_csv
 
     rng = np.random.default_rng(0)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.core.angles import circular_distance_deg
-from nbv.core.density_selection import chosen_lookup
 from nbv.core.distributions import mean_direction_deg, rotated
 from nbv.core.logits import from_logits
+from nbv.core.selection import chosen_lookup
 from nbv.errors import UserError
 from nbv.robot.calibration import (
     DENSITY,

@@ -10,7 +10,7 @@ from nbv.core.angles import circular_distance_deg
 from nbv.core.estimates import Posteriors
 from nbv.core.evidence import evidence_of_distributions
 from nbv.core.logits import log_likelihood
-from nbv.core.method_selection import select_methods
+from nbv.core.selection import select_methods
 
 SETTINGS = {"n_views": 4, "start_every_deg": 60, "min_separation_deg": 15}
 WITH_THE_PAPERS = EXTENSIONS | {

@@ -11,10 +11,9 @@ from studies.transfer import load_transfer, transfer_table
 
 from nbv.errors import UserError
 from nbv.experiment.reference.store import read_cells
-from nbv.experiment.report.cells import CELL_COLUMNS
-from nbv.experiment.report.settings import ReportSettings
+from nbv.experiment.report.settings import CELL_COLUMNS, ReportSettings
 from nbv.experiment.report.table import write_table
-from nbv.experiment.two_views import COLUMNS
+from nbv.experiment.results import COLUMNS
 
 CONDITIONS = {
     "clean": {"sensor": "ideal", "framing": "silhouette"},

@@ -5,8 +5,8 @@ import pytest
 from studies.travel import pooled_travel, travel_rows
 from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
-from nbv.core.method_selection import select_methods
 from nbv.core.policies import Turns, two_views
+from nbv.core.selection import select_methods
 
 
 def test_travel_curves_start_at_the_table_and_end_by_staying():

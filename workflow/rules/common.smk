@@ -37,7 +37,7 @@ from nbv.data.sources import SOURCES, open_source, select_objects
 from nbv.data.meshes import stored_ids
 from nbv.experiment.processes import hold_lock
 from nbv.core.criteria import CRITERIA
-from nbv.core.method_selection import check_methods
+from nbv.core.selection import check_methods
 from nbv.core.policies import needs_lookup
 from nbv.data.renderers import RENDERERS
 from nbv.data.sensors import SENSORS, check_sensor, sensor_settings

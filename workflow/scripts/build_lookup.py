@@ -3,8 +3,8 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.core.density_selection import chosen_lookup
     from nbv.core.lookup import save_lookup
+    from nbv.core.selection import chosen_lookup
     from nbv.experiment.estimates import read_estimates
     from nbv.experiment.splits import need_role, read_splits
 

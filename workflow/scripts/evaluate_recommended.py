@@ -5,8 +5,8 @@ from nbv.experiment.jobs import job
 with job(snakemake):
     from nbv.core.lookup import load_lookup
     from nbv.experiment.estimates import read_estimates
+    from nbv.experiment.results import evaluate_method
     from nbv.experiment.splits import need_role, read_splits
-    from nbv.experiment.two_views import evaluate_method
     from nbv.files import write_csv
 
     test = read_estimates(snakemake.input.test)

@@ -8,8 +8,8 @@ with job(snakemake):
     import numpy as np
 
     from nbv.experiment.paper.verdicts import evaluate_claims
-    from nbv.experiment.report.claims import claims_table
     from nbv.experiment.report.table import write_table
+    from nbv.experiment.report.tables import claims_table
     from nbv.experiment.results import load_evaluations
 
     given, params = snakemake.input, snakemake.params

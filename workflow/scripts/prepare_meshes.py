@@ -3,8 +3,7 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.data.meshes import save_meshes
-    from nbv.data.preparation import prepare_meshes
+    from nbv.data.meshes import prepare_meshes, save_meshes
     from nbv.data.sources import open_source
 
     params = snakemake.params

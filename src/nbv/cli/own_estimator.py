@@ -32,9 +32,9 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
     import numpy as np
 
     from nbv.core.criteria import CRITERIA
-    from nbv.core.density_selection import chosen_lookup
     from nbv.core.distributions import mean_direction_deg
     from nbv.core.lookup import save_lookup
+    from nbv.core.selection import chosen_lookup
     from nbv.robot.calibration import DENSITY
     from nbv.robot.distribution_table import DistributionTable
     from nbv.robot.pair_distributions import read_pair_distributions

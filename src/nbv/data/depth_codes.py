@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from nbv.data.camera import Camera
 from nbv.data.depth_images import Codes
@@ -99,3 +102,40 @@ def decode_depth(codes: Codes) -> Depths:
     """
     offsets = (codes.astype(np.float32) - ZERO_CODE) * np.float32(STEP)
     return np.where(codes > 0, offsets, np.float32(np.nan))
+
+
+def sensor_camera(camera: Camera) -> Camera:
+    """Return the camera that draws what a sensor measures before the crop.
+
+    Its image holds the whole object, for which it may need half a pixel more room than `camera`.
+    Its pixels lie where they lie without framing, so the true outline does not enter the crop.
+    """
+    return replace(camera, whole_pixels=True)
+
+
+def crop_measured(depth: Depths, camera: Camera) -> Depths:
+    """Return measured images with the measured pixels in the middle.
+
+    Parameters
+    ----------
+    depth : (k, side, side) float32
+        As the sensor measures it; 0 where nothing is measured.
+    camera : Camera
+        With ``framing="axis"`` the images stay as they are.
+
+    Returns
+    -------
+    (k, side, side) float32
+        The same values. The bounding box of the nonzero pixels lies in the middle, or half a pixel
+        to the left of (above) it where the number of free columns (rows) is odd. An image without
+        a measurement stays empty.
+    """
+    if camera.framing == "axis":
+        return depth
+    cropped = np.zeros_like(depth)
+    for image, out in zip(depth, cropped, strict=True):
+        for box in ndimage.find_objects((image > 0).astype(np.uint8)):
+            measured = image[box]
+            top, left = (np.array(image.shape) - measured.shape) // 2
+            out[top : top + measured.shape[0], left : left + measured.shape[1]] = measured
+    return cropped

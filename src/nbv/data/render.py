@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.data.camera import Camera
-from nbv.data.depth_codes import Depths, encode_depth
+from nbv.data.depth_codes import Depths, crop_measured, encode_depth, sensor_camera
 from nbv.data.depth_images import Codes
 from nbv.data.meshes import Surface
 from nbv.data.renderers import Renderer
 from nbv.data.sensors import Measure
-from nbv.data.silhouette import crop_measured, sensor_camera
 from nbv.errors import UserError
 
 logger = logging.getLogger(__name__)
@@ -44,7 +43,7 @@ def render_objects(
     renderer : Renderer
     measure : callable or None
         The sensor, from `nbv.data.sensors.open_sensor`. It measures the images, and the crop
-        follows what it measures (`nbv.data.silhouette`). None keeps the true depth.
+        follows what it measures (`nbv.data.depth_codes`). None keeps the true depth.
     n_azimuths : int
         View k is at azimuth 360 k / n_azimuths degrees.
 

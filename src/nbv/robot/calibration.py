@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.angles import wrap_deg
-from nbv.core.density_selection import chosen_lookup
 from nbv.core.distributions import mean_direction_deg
 from nbv.core.logits import LEAST_PROBABILITY, fit_temperature, from_logits
 from nbv.core.offset import constant_offset_deg, frame_warning
+from nbv.core.selection import chosen_lookup
 from nbv.errors import UserError
 from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.ood import FAMILIAR_SHARE, unfamiliarity
@@ -68,7 +68,7 @@ def paper_tables(
     distributions : ndarray (S, B, B)
         p(azimuth | image) of views a bin apart. Their mean directions are the estimates.
     density : mapping
-        See `nbv.core.density_selection.choose_densities`.
+        See `nbv.core.selection.choose_densities`.
     """
     of_turn = np.rint(elevation_deg)
     levels = np.unique(of_turn)

@@ -15,8 +15,7 @@ from nbv.data.meshes import Mesh, as_mesh
 from nbv.data.normalisation import check_mesh, normalise
 from nbv.data.renderers import open_renderer
 from nbv.data.sensors import Sensor
-from nbv.data.sensors.kinect import Kinect
-from nbv.data.sensors.stereo import Stereo
+from nbv.data.sensors.triangulation import Kinect, Stereo
 from nbv.data.sources.files import EXTENSIONS
 from nbv.errors import UserError, nearest, need_number
 from nbv.robot.crop import FARTHEST, NEAREST

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from nbv.data.procedural.assembly import join
-from nbv.data.procedural.solids import Points, fillet, revolve, superellipse, sweep
+from nbv.data.procedural.solids import Points, fillet, join, revolve, superellipse, sweep
 
 # So many that the facets of the body do not reveal the viewpoint.
 _AROUND = 96

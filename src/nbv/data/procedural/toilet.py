@@ -10,18 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from nbv.data.procedural.assembly import both_sides, centred, join, turned
 from nbv.data.procedural.solids import (
     Points,
     Solids,
+    both_sides,
     box,
+    centred,
     fillet,
+    join,
     loft,
     revolve,
     slab,
     stack_outlines,
     superellipse,
     tube,
+    turned,
 )
 
 _POINTS = 56

@@ -27,8 +27,8 @@ from nbv.errors import UserError, nearest
 
 IDEAL = "ideal"
 SENSORS: Mapping[str, str] = {
-    "kinect": "nbv.data.sensors.kinect:Kinect",
-    "stereo": "nbv.data.sensors.stereo:Stereo",
+    "kinect": "nbv.data.sensors.triangulation:Kinect",
+    "stereo": "nbv.data.sensors.triangulation:Stereo",
 }
 
 Measure = Callable[[Depths, str], Depths]

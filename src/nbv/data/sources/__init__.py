@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     import trimesh
 
 SOURCES: Mapping[str, str] = {
-    "folder": "nbv.data.sources.folder:FolderSource",
-    "modelnet": "nbv.data.sources.modelnet:ModelNetSource",
+    "folder": "nbv.data.sources.files:FolderSource",
+    "modelnet": "nbv.data.sources.files:ModelNetSource",
     "procedural": "nbv.data.sources.procedural:ProceduralSource",
     "shapenet": "nbv.data.sources.shapenet:open_shapenet",
 }

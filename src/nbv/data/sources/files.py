@@ -1,4 +1,4 @@
-"""The common part of all sources of mesh files: root, exclusions, loading and messages."""
+"""Sources of mesh files: what they have in common, a folder of meshes, and ModelNet."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from nbv.errors import UserError
 
 if TYPE_CHECKING:
     import trimesh
+
 
 logger = logging.getLogger(__name__)
 
@@ -182,3 +183,43 @@ def expanded(path: str, key: str) -> Path:
         return Path(path).expanduser()
     except RuntimeError as error:
         raise UserError(f"{key}={path}: there is no such home folder") from error
+
+
+class FolderSource(FileSource):
+    """A folder for each category; `dataset.categories` may rename it. Ids are stems."""
+
+    name = "folder"
+
+    def find(self, category: str) -> dict[str, Path]:
+        """Return the mesh files of a category's folder."""
+        folder = self.need_folder(self.root / self.label(category), f"the {category} meshes")
+        return self.by_stem(p for p in folder.iterdir() if p.suffix.lower() in EXTENSIONS)
+
+    def whereabouts(self, category: str) -> str:
+        """Return the folder and the kinds of file in it."""
+        return f"{self.root / self.label(category)} ({' '.join(EXTENSIONS)})"
+
+
+# The data set's own split is for classification; our folds use all objects.
+_PARTS = ("train", "test")
+
+
+class ModelNetSource(FileSource):
+    """Both parts of a category together. Ids are stems, such as "chair_0001"."""
+
+    name = "modelnet"
+
+    def find(self, category: str) -> dict[str, Path]:
+        """Return the OFF files of a category's parts."""
+        folder = self.need_folder(self.root / self.label(category), f"the {category} meshes")
+        parts = [folder / part for part in _PARTS if (folder / part).is_dir()]
+        if not parts:
+            raise UserError(
+                f"dataset=modelnet: {folder} holds neither train/ nor test/; "
+                "give the unpacked ModelNet folder as dataset.root"
+            )
+        return self.by_stem(path for part in parts for path in part.glob("*.off"))
+
+    def whereabouts(self, category: str) -> str:
+        """Return the folders of a category's parts."""
+        return f"{self.root / self.label(category)}/{{train,test}}/*.off"

@@ -215,7 +215,7 @@ class Estimator(Section):
 
 
 class Density(Section):
-    """The density of calibration pairs; see `nbv.core.density_selection`."""
+    """The density of calibration pairs; see `nbv.core.selection`."""
 
     pose_likelihood: Literal["given_estimate", "given_truth"]
     spread: Literal["entropy", "circular_variance"]

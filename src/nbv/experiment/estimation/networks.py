@@ -66,7 +66,6 @@ def decode_classes(outputs: Outputs) -> Outputs:
     return decode_directions(softmax(outputs) @ unit)
 
 
-
 def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.Module:
     channels = settings["channels"]
     # The first layer's maps are the largest: normalising them too took a sixth of the time of

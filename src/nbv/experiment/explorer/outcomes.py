@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 
 from nbv.errors import UserError
-from nbv.experiment.explorer.encoding import Hundredths, as_text, byte_planes, half_turn, hundredths
+from nbv.experiment.explorer.images import Hundredths, as_text, byte_planes, half_turn, hundredths
 from nbv.experiment.results import Unit
-from nbv.experiment.statistics.pose_errors import HALF_TURN_DEG
+from nbv.experiment.statistics.metrics import HALF_TURN_DEG
 
 
 @dataclass(frozen=True)

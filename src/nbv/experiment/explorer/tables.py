@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nbv.core.criteria import cost_unit
 from nbv.core.estimates import Posteriors
 from nbv.core.lookup import LookupTable
-from nbv.experiment.explorer.encoding import (
+from nbv.experiment.explorer.images import (
     Quantised,
     as_text,
     quantised,

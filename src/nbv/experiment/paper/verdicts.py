@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from nbv.experiment.paper import published, statements
-from nbv.experiment.paper.claim_text import summarise, term_text
 from nbv.experiment.paper.claims import CLAIMS
 from nbv.experiment.paper.statements import (
     VERDICTS,
@@ -23,6 +22,8 @@ from nbv.experiment.paper.statements import (
     Term,
     Verdict,
     combine_statement,
+    summarise,
+    term_text,
 )
 from nbv.experiment.results import Unit
 from nbv.experiment.statistics import paired

@@ -45,9 +45,8 @@ from nbv.experiment.reference.store import (
     read_verdicts,
     table_files,
 )
-from nbv.experiment.report.cells import CELL_COLUMNS
 from nbv.experiment.report.layout import HALF_TURNS
-from nbv.experiment.report.settings import TRANSFER
+from nbv.experiment.report.settings import CELL_COLUMNS, TRANSFER
 from nbv.labels import method_label, number
 
 IDENTICAL, WITHIN, OUTSIDE, UNJUDGED = "identical", "within", "outside", "not judged"

@@ -13,8 +13,7 @@ from nbv.errors import UserError
 from nbv.experiment.config import default_of, read_configuration
 from nbv.experiment.paper.verdicts import need_verdicts
 from nbv.experiment.provenance import read_provenance
-from nbv.experiment.report.cells import CELL_COLUMNS
-from nbv.experiment.report.settings import TRANSFER
+from nbv.experiment.report.settings import CELL_COLUMNS, TRANSFER
 from nbv.files import existing, need_columns, read_csv, replacing
 
 log = logging.getLogger(__name__)

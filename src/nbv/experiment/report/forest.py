@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from nbv.experiment.paper import statements
-from nbv.experiment.paper.claim_text import STATISTIC_LABELS, place_text, term_text
 from nbv.experiment.paper.claims import CLAIMS
 from nbv.experiment.paper.published import METHODS
 from nbv.experiment.paper.statements import (
+    STATISTIC_LABELS,
     AtLeast,
     Claim,
     Comparable,
@@ -27,6 +27,8 @@ from nbv.experiment.paper.statements import (
     Statement,
     Term,
     Verdict,
+    place_text,
+    term_text,
 )
 from nbv.experiment.statistics.paired import LOWER_IS_BETTER, UNIT_OF
 from nbv.labels import MINUS, method_label, number
@@ -302,3 +304,39 @@ def _key(one: _Difference) -> Line2D:
     style = method_style(one.method, METHODS)
     name = method_label(one.method)
     return Line2D([], [], color=style.color, marker=style.marker, markersize=5, label=name)
+
+
+_ROW_IN = 0.185
+
+
+@mpl.rc_context(RC)
+def table_picture(cells: pd.DataFrame) -> Figure:
+    """Draw a table of MAE by row and method.
+
+    Parameters
+    ----------
+    cells : DataFrame
+        Of ``table1.csv``; see `nbv.experiment.report.settings`.
+    """
+    shown = cells[cells["metric"] == "mae"]
+    methods = tuple(dict.fromkeys(shown["method"].astype(str)))
+    rows = list(shown.groupby("row_label", sort=False))
+    figure = new_figure(WIDTH_IN, _ROW_IN * (len(shown) + len(rows)) + 0.6)
+    axes = figure.subplots()
+    labels: list[str] = []
+    headings = []
+    for name, part in rows:
+        headings.append(len(labels))
+        labels.append(str(name))
+        for found in part.to_dict("records"):
+            ours = float(found["value"]), float(found["ci_low"]), float(found["ci_high"])
+            style = method_style(str(found["method"]), methods)
+            draw_estimate(axes, len(labels), style, ours, float(found["published"]))
+            labels.append(method_label(str(found["method"])))
+    label_rows(axes, labels, headings)
+    axes.set_xlim(left=0)
+    key = "filled: ours, 95 % interval"
+    if np.isfinite(shown["published"]).any():
+        key += "; open: the paper's"
+    axes.set_xlabel(f"MAE (degrees)\n{key}")
+    return figure

@@ -14,16 +14,18 @@ import pandas as pd
 from markupsafe import Markup
 
 from nbv.experiment.config import read_configuration
-from nbv.experiment.paper.claim_text import STATISTIC_LABELS, VERDICT_RULES, by_run
 from nbv.experiment.paper.claims import CLAIMS
 from nbv.experiment.paper.statements import (
     FAILS,
     HOLDS,
     NOT_RUN,
+    STATISTIC_LABELS,
     UNDECIDED,
+    VERDICT_RULES,
     VERDICTS,
     Claim,
     Comparison,
+    by_run,
 )
 from nbv.experiment.paper.verdicts import read_claims
 from nbv.experiment.report.figures import FIGURES
@@ -33,9 +35,9 @@ from nbv.experiment.report.forest import (
     claims_forest,
     comparisons_of,
     deciding_comparison,
+    table_picture,
 )
 from nbv.experiment.report.svg import inline_svg, svg_text
-from nbv.experiment.report.table_picture import table_picture
 from nbv.experiment.report.tables import TABLES
 from nbv.experiment.report.templating import HTML
 from nbv.experiment.results import load_object_ids
@@ -87,7 +89,7 @@ def build_report(
     Parameters
     ----------
     claims : path
-        CSV of `nbv.experiment.report.claims.claims_table`.
+        CSV of `nbv.experiment.report.tables.claims_table`.
     configuration, provenance : path
         ``configuration.yaml`` and ``provenance.json`` of the run.
     splits : mapping of category to path

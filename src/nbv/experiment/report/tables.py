@@ -1,36 +1,149 @@
 """The paper's Tables 1 to 7 from our results, laid out as in the paper.
 
-Their CSV files are tidy, one row per cell; see `nbv.experiment.report.cells` for the columns.
+Their CSV files are tidy, one row per cell; see `nbv.experiment.report.settings` for the columns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from nbv.core.angles import circular_distance_deg
 from nbv.errors import UserError, nearest
 from nbv.experiment.paper import published
+from nbv.experiment.paper.statements import VERDICT_RULES, by_run
 from nbv.experiment.report import layout
-from nbv.experiment.report.cells import CELL_COLUMNS, cell, method_cells, shared_resampler
-from nbv.experiment.report.examples import choose_example, example_row
 from nbv.experiment.report.layout import METRIC_TITLES, Body
 from nbv.experiment.report.settings import (
+    CELL_COLUMNS,
     ReportSettings,
+    cell,
     common_elevation_deg,
     focus_category,
     focus_unit,
+    method_cells,
     reference_units,
+    shared_resampler,
     unit_label,
 )
-from nbv.experiment.report.table import Table
+from nbv.experiment.report.table import Cell, Part, Row, Table
 from nbv.experiment.results import Unit
 from nbv.experiment.statistics import paired
 from nbv.experiment.statistics.paired import PairedErrors, pair_methods
-from nbv.labels import category_label
+from nbv.labels import category_label, method_label
+
+_BASELINE = "single"
+_SMOOTHING_DEG = 15.0
+
+
+@dataclass(frozen=True)
+class Example:
+    """One test object, the fold that tested it, and why it was taken."""
+
+    object_id: str
+    fold: int
+    reason: str
+
+
+def choose_example(frame: pd.DataFrame, settings: ReportSettings) -> Example:
+    """Return the test object with the median single-view error in the example fold.
+
+    The lower median where their number is even; the first by name where errors tie. The middle
+    object is neither the easiest nor the hardest, and no choice by the result of the method
+    that the example is to show.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        One unit, from `results.load_evaluations`.
+    settings : ReportSettings
+        Gives the fold.
+    """
+    folds = sorted(frame["fold"].unique())
+    fold = int(settings.example_fold if settings.example_fold in folds else folds[0])
+    in_fold = frame[frame["fold"] == fold]
+    method = _baseline(in_fold)
+    errors = in_fold[in_fold["method"] == method].groupby("object_id")["error_deg"].mean()
+    ordered = errors.sort_index().sort_values(kind="stable")
+    chosen = str(ordered.index[(len(ordered) - 1) // 2])
+    reason = (
+        f"the one with the median {method_label(method)} error of that fold's {len(ordered)} test "
+        "objects"
+    )
+    return Example(chosen, fold, reason)
+
+
+def example_row(
+    frame: pd.DataFrame, example: Example, method: str, azimuth_deg: float
+) -> pd.Series | None:
+    """Return the evaluation of one method on the example, or None where it was not made."""
+    rows = frame[
+        (frame["method"] == method)
+        & (frame["object_id"] == example.object_id)
+        & (frame["fold"] == example.fold)
+        & (frame["initial_deg"] == azimuth_deg)
+    ]
+    return None if rows.empty else rows.iloc[0]
+
+
+def hardest_azimuth_deg(frame: pd.DataFrame) -> int:
+    """Return the initial azimuth around which the single-view error is largest.
+
+    The mean over objects, then over 31 degrees, so that one odd view does not decide; where the
+    category hides what tells its pose, that is the middle of the hidden range.
+    """
+    single = frame[frame["method"] == _baseline(frame)]
+    by_azimuth = single.groupby("initial_deg")["error_deg"].mean()
+    azimuths = by_azimuth.index.to_numpy(dtype=np.float64)
+    near = circular_distance_deg(azimuths[:, None], azimuths[None, :]) <= _SMOOTHING_DEG
+    smooth = (near @ by_azimuth.to_numpy(dtype=np.float64)) / near.sum(axis=1)
+    return int(azimuths[int(np.argmax(smooth))])
+
+
+def _baseline(frame: pd.DataFrame) -> str:
+    present = list(frame["method"].astype(str).unique())
+    return _BASELINE if _BASELINE in present else present[0]
+
+
+def claims_table(claims: pd.DataFrame) -> Table:
+    """Return one row per claim: sentence, verdicts, our figures, and the paper's own.
+
+    Those that were not run come last, under a heading of their own. The CSV file is what
+    `nbv.experiment.paper.verdicts.evaluate_claims` returned: a row for each comparison.
+    """
+    header = (
+        "Section",
+        "The paper says",
+        "What is compared",
+        "Verdict",
+        "By point estimates",
+        "Our figures",
+        "The paper's own figures",
+    )
+    run, not_run = (tuple(map(_row, part.to_dict("records"))) for part in by_run(claims))
+    parts = (Part(run), Part(not_run, "Not run"))
+    title, n_text = "The paper's claims", len(header)
+    return Table(
+        "claims", title, title, claims, header, parts, VERDICT_RULES, n_text_columns=n_text
+    )
+
+
+def _row(claim: Mapping[Hashable, Any]) -> Row:
+    note = f" ({claim['note']})" if claim["note"] else ""
+    return (
+        Cell(str(claim["section"])),
+        Cell(claim["sentence"]),
+        Cell(f"{claim['compared']}{note}"),
+        Cell(claim["verdict"]),
+        Cell(claim["point_verdict"]),
+        Cell(claim["summary"] or "–"),
+        Cell(claim["published_verdict"]),
+    )
+
 
 Evaluations = Mapping[Unit, pd.DataFrame]
 """Frames of `results.load_evaluations` by category and elevation."""

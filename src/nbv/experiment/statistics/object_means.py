@@ -11,9 +11,8 @@ import pandas as pd
 
 from nbv.core.angles import travel_deg
 from nbv.errors import UserError
-from nbv.experiment.statistics.metrics import Interval
+from nbv.experiment.statistics.metrics import Interval, accuracy_area, half_turned
 from nbv.experiment.statistics.paired import PairedErrors, Resampler, estimate
-from nbv.experiment.statistics.pose_errors import accuracy_area, half_turned
 from nbv.files import existing, read_csv
 
 FoldFile = tuple[str, int, int]

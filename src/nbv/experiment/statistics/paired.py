@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from nbv.errors import UserError
 from nbv.experiment.statistics import metrics
-from nbv.experiment.statistics.metrics import Floats, Interval, Ints
-from nbv.experiment.statistics.pose_errors import accuracy_area, half_turned
+from nbv.experiment.statistics.metrics import Floats, Interval, Ints, accuracy_area, half_turned
 
 VIEWPOINT_GROUPS: Mapping[int, tuple[int, int]] = {
     1: (315, 45),

@@ -9,7 +9,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from nbv.errors import UserError, nearest
-from nbv.experiment.report.figures import choice, errors, heatmaps, steps, views
+from nbv.experiment.report.figures import choice, errors, steps, views
 from nbv.experiment.report.figures.inputs import FigureInputs
 from nbv.robot.style import RC
 
@@ -91,7 +91,7 @@ FIGURES: Mapping[str, FigureKind] = {
         "groups.",
     ),
     "heatmaps": FigureKind(
-        heatmaps.lookup_maps,
+        views.lookup_maps,
         "One fold's lookup table: the true viewpoint's likelihood given the estimate, and the cost "
         "of each rotation with the recommended one marked. A good estimator's likelihood lies on "
         "the dotted diagonal.",

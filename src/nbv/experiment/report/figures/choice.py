@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from nbv.core.angles import nearest_bin, wrap_deg
 from nbv.core.criteria import SPREADS, two_view_poses
 from nbv.core.lookup import LookupTable
-from nbv.experiment.report.figures.depth import depth_limits, draw_depth
 from nbv.experiment.report.figures.inputs import (
     ExampleView,
     FigureInputs,
     cost_words,
     example_view,
 )
+from nbv.experiment.report.figures.views import depth_limits, draw_depth
 from nbv.labels import method_label
 from nbv.robot.style import INK, MUTED, azimuth_axis, mark_azimuth, method_style, new_figure
 

@@ -14,8 +14,8 @@ from nbv.experiment.report.figures.inputs import FigureInputs
 from nbv.experiment.report.settings import common_elevation_deg, reference_units, unit_label
 from nbv.experiment.results import Unit
 from nbv.experiment.statistics import metrics
+from nbv.experiment.statistics.metrics import PAUC_LIMIT_DEG
 from nbv.experiment.statistics.paired import PairedErrors, pair_methods
-from nbv.experiment.statistics.pose_errors import PAUC_LIMIT_DEG
 from nbv.labels import method_label
 from nbv.robot.style import INK, MUTED, azimuth_axis, new_figure, panel_grid
 

@@ -17,7 +17,6 @@ from PIL import Image
 from nbv.core.angles import circular_distance_deg, nearest_bin, wrap_deg
 from nbv.core.lookup import LookupTable
 from nbv.experiment.report.figures.choice import two_view_belief
-from nbv.experiment.report.figures.depth import depth_limits, draw_depth
 from nbv.experiment.report.figures.inputs import (
     CostWords,
     ExampleView,
@@ -25,6 +24,7 @@ from nbv.experiment.report.figures.inputs import (
     cost_words,
     example_view,
 )
+from nbv.experiment.report.figures.views import depth_limits, draw_depth
 from nbv.files import replacing
 from nbv.robot.style import INK, MUTED, RC, azimuth_axis, mark_azimuth, method_style, new_figure
 

@@ -1,15 +1,55 @@
-"""What the estimator sees: examples by category (Fig. 5), elevation (6) and group (8)."""
+"""What the estimator sees (Figs. 5, 6, 8), and lookup tables as heat maps."""
 
 from __future__ import annotations
 
-import numpy as np
-from matplotlib.figure import Figure
+from typing import Any
 
-from nbv.experiment.report.figures.depth import depth_limits, draw_depth
-from nbv.experiment.report.figures.inputs import FigureInputs
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from nbv.data.depth_images import Codes
+from nbv.experiment.report.figures.inputs import FigureInputs, cost_words
 from nbv.experiment.report.settings import common_elevation_deg, reference_units, unit_label
 from nbv.experiment.statistics.paired import VIEWPOINT_GROUPS
-from nbv.robot.style import INK, MUTED, SHADE, new_figure
+from nbv.robot.style import INK, MUTED, SHADE, azimuth_axis, new_figure
+
+_FAR_GREY, _NEAR_GREY = 0.12, 0.86
+_BACKGROUND = 0
+
+
+def depth_limits(images: Codes) -> tuple[int, int]:
+    """Return the farthest and nearest code of some images, for one grey scale among them."""
+    seen = images[images != _BACKGROUND]
+    return (int(seen.min()), int(seen.max())) if seen.size else (1, 255)
+
+
+def shade(codes: Codes, limits: tuple[int, int]) -> NDArray[np.float64]:
+    """Return grey levels in [0, 1]: dark far, light near, and white where nothing was hit.
+
+    The nearest grey stays short of white, so that the outline shows.
+    """
+    low, high = limits
+    nearness = (codes.astype(np.float64) - low) / max(high - low, 1)
+    grey = _FAR_GREY + (_NEAR_GREY - _FAR_GREY) * np.clip(nearness, 0.0, 1.0)
+    return np.where(codes == _BACKGROUND, 1.0, grey)
+
+
+def draw_depth(axes: Axes, codes: Codes, limits: tuple[int, int], title: str = "") -> None:
+    """Fill the axes with one image in a thin frame."""
+    axes.imshow(shade(codes, limits), cmap="gray", vmin=0.0, vmax=1.0, interpolation="none")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.grid(visible=False)
+    for spine in axes.spines.values():
+        spine.set_visible(True)
+        spine.set_color(MUTED)
+        spine.set_linewidth(0.6)
+    if title:
+        axes.set_title(title)
+
 
 _AZIMUTHS_DEG = tuple(range(0, 360, 45))
 _CELL_IN = 1.05
@@ -87,4 +127,51 @@ def groups(inputs: FigureInputs) -> Figure:
         fontsize=10,
         y=0.985,
     )
+    return figure
+
+
+_DECADES = 3.0
+
+
+def lookup_maps(inputs: FigureInputs) -> Figure:
+    """V[estimate, viewpoint] and A[estimate, δ], with the recommended δ of each estimate."""
+    unit = inputs.focus
+    folds = sorted(inputs.evaluations[unit]["fold"].unique())
+    wanted = inputs.settings.example_fold
+    fold = int(wanted if wanted in folds else folds[0])
+    lookup = inputs.lookup(fold)
+    words = cost_words(lookup)
+    likelihood = np.asarray(lookup.viewpoint_likelihood, dtype=np.float64)
+    cost = np.asarray(lookup.cost, dtype=np.float64)
+    figure = new_figure(8.6, 4.1)
+    left, right = figure.subplots(1, 2)
+    half = 180 / likelihood.shape[0]
+    extent = (-half, 360 - half, -half, 360 - half)
+    top = likelihood.max()
+    image: Any = {"origin": "lower", "extent": extent, "cmap": "cividis"}
+    image |= {"interpolation": "none", "aspect": "auto"}
+    shown = left.imshow(likelihood.T, norm=LogNorm(top / 10**_DECADES, top), **image)
+    left.plot([0, 360], [0, 360], color="black", linewidth=1.0, linestyle=":")
+    left.set_title("Viewpoint likelihood V[e, φ]")
+    azimuth_axis(left, "True viewpoint φ (degrees)", vertical=True)
+    figure.colorbar(shown, ax=left, label="Probability per bin (log scale)", extend="min")
+    shown = right.imshow(cost.T, **image)
+    n_bins = cost.shape[0]
+    right.plot(
+        np.arange(n_bins) * 360 / n_bins,
+        lookup.recommended_delta_deg,
+        linestyle="",
+        marker="o",
+        markersize=2.2,
+        color="white",
+        markeredgecolor="black",
+        markeredgewidth=0.3,
+    )
+    right.set_title(f"{words.table} A[e, δ], dots: recommended")
+    azimuth_axis(right, "Rotation δ (degrees)", vertical=True)
+    figure.colorbar(shown, ax=right, label=f"{words.cost} ({words.unit}); lower is better")
+    for axes in (left, right):
+        azimuth_axis(axes, "Estimate e (degrees)")
+        axes.grid(visible=False)
+    figure.suptitle(f"Lookup table of {unit[0]}, elevation {unit[1]}°, fold {fold}", fontsize=10)
     return figure
