@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from studies.ablation import PAPER, ablate, ablation_space
 from studies.extensions import evaluate_extensions
+
 from tests.core.made import FEW_DENSITIES, objects
 
 

@@ -23,10 +23,10 @@ from studies.confirmation_tables import (
     methods_table,
 )
 from studies.factorial import DENSITY_COLUMNS
-from tests.studies.test_confirmation_table import SHIFT, objects_frame
 
 from nbv.experiment.report.table import table_markdown
 from nbv.labels import interval_text
+from tests.studies.test_confirmation_table import SHIFT, objects_frame
 
 NO_TRAININGS = pd.DataFrame(columns=list(TRAININGS_COLUMNS))
 

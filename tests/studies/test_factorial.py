@@ -15,13 +15,13 @@ from studies.factorial import (
     evaluate_factorial,
 )
 from studies.kept_estimates import held_out
-from tests.core.made import FEW_DENSITIES
-from tests.experiment.test_two_views import N_CLASSES, hidden_handle, mean_directions
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.fusion import ESTIMATE_FUSIONS
 from nbv.core.policies import needs_lookup
 from nbv.core.selection import COARSE_BINS
+from tests.core.made import FEW_DENSITIES
+from tests.experiment.test_two_views import N_CLASSES, hidden_handle, mean_directions
 
 SETTINGS = FEW_DENSITIES | {
     "affinity": {"power": 16, "pseudo_observations": 90, "caution": 2.0},

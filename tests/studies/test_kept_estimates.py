@@ -14,12 +14,12 @@ from studies.kept_estimates import (
     read_held_out,
     read_kept,
 )
-from tests.core.made import objects
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.estimates import Estimates, Posteriors
 from nbv.errors import UserError
 from nbv.experiment.estimates import write_estimates, write_posteriors
+from tests.core.made import objects
 
 N_CLASSES = 24
 KEY = (1, 2, "coffee_mug", 15, 3, "test")

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from studies.extensions import choices_frame, stored_evidence
 from studies.more_views import more_views_rows
-from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.estimates import Posteriors
 from nbv.core.evidence import evidence_of_distributions
 from nbv.core.logits import log_likelihood
 from nbv.core.selection import select_methods
+from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 SETTINGS = {"n_views": 4, "start_every_deg": 60, "min_separation_deg": 15}
 WITH_THE_PAPERS = EXTENSIONS | {

@@ -3,10 +3,10 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 from studies.travel import pooled_travel, travel_rows
-from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 from nbv.core.policies import Turns, two_views
 from nbv.core.selection import select_methods
+from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 
 def test_travel_curves_start_at_the_table_and_end_by_staying():

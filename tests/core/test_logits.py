@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import log_softmax
 
-from nbv.core import posteriors
-from nbv.errors import UserError
-from nbv.files import read_arrays, write_arrays
+from nbv.core.distributions import estimate_likelihood, region_coverage
+from nbv.core.logits import TEMPERATURES, fit_temperature, log_likelihood, on_degrees
 
 
 def random_logits(seed: int, shape=(6, 24)) -> np.ndarray:
@@ -18,9 +17,9 @@ def random_logits(seed: int, shape=(6, 24)) -> np.ndarray:
 @given(st.integers(0, 99), st.sampled_from([8, 24, 72, 120, 360]))
 def test_densities_over_degrees_keep_their_mass_and_turn_with_the_classes(seed, k):
     p = np.exp(log_softmax(random_logits(seed, (3, k)), axis=-1))
-    spread = posteriors.on_degrees(p)
+    spread = on_degrees(p)
     np.testing.assert_allclose(spread.sum(axis=1), 1.0)
-    turned = posteriors.on_degrees(np.roll(p, 1, axis=1))
+    turned = on_degrees(np.roll(p, 1, axis=1))
     np.testing.assert_allclose(turned, np.roll(spread, 360 // k, axis=1))
     np.testing.assert_allclose(spread[:, :: 360 // k] * (360 / k), p)
 
@@ -28,15 +27,15 @@ def test_densities_over_degrees_keep_their_mass_and_turn_with_the_classes(seed, 
 @given(st.integers(0, 99), st.sampled_from([8, 72]))
 def test_the_log_likelihood_reads_the_density_at_the_azimuth(seed, k):
     logs = log_softmax(random_logits(seed, (360, k)), axis=-1)
-    spread = posteriors.on_degrees(np.exp(logs))
-    found = posteriors.log_likelihood(logs, np.arange(360))
+    spread = on_degrees(np.exp(logs))
+    found = log_likelihood(logs, np.arange(360))
     np.testing.assert_allclose(found, np.log(np.diag(spread)))
 
 
 @pytest.mark.parametrize("k", [8, 72, 360])
 def test_a_uniform_density_has_minus_log_360_nats_per_degree(k):
     logs = np.full((5, k), -np.log(k))
-    found = posteriors.log_likelihood(logs, [0, 1, 99.5, 180, 359])
+    found = log_likelihood(logs, [0, 1, 99.5, 180, 359])
     np.testing.assert_allclose(found, -np.log(360))
 
 
@@ -48,7 +47,7 @@ def test_regions_hold_just_their_share_of_truths_drawn_from_the_distribution(cou
     """An identity, ties and zeros included; and the region is the smallest that does."""
     drawn = np.array(counts) / sum(counts)
     bins = np.arange(len(drawn))
-    inside = posteriors.region_coverage(np.tile(drawn, (len(drawn), 1)), bins, level)
+    inside = region_coverage(np.tile(drawn, (len(drawn), 1)), bins, level)
     assert drawn @ inside == pytest.approx(level)
     assert (inside[drawn == 0] == 0).all()
     left, size = level, 0.0
@@ -68,10 +67,10 @@ def test_the_temperature_is_the_best_of_a_grid(seed, scale):
 
     def loss(temperature):
         logs = log_softmax(logits / temperature, axis=-1)
-        return -posteriors.log_likelihood(logs, azimuth).mean()
+        return -log_likelihood(logs, azimuth).mean()
 
-    found = posteriors.fit_temperature(logits, azimuth)
-    grid = np.geomspace(*posteriors.TEMPERATURES, 200)
+    found = fit_temperature(logits, azimuth)
+    grid = np.geomspace(*TEMPERATURES, 200)
     assert loss(found) <= min(map(loss, grid)) + 1e-6
 
 
@@ -79,46 +78,14 @@ def test_a_hotter_network_has_a_proportionally_higher_temperature():
     azimuth = np.arange(0, 360, 3)
     wrong = np.random.default_rng(0).normal(0, 25, 120)
     logits = 5 * np.cos(np.radians(np.arange(0, 360, 15) - (azimuth + wrong)[:, None]))
-    cold, hot = (posteriors.fit_temperature(s * logits, azimuth) for s in (1, 4))
+    cold, hot = (fit_temperature(s * logits, azimuth) for s in (1, 4))
     assert hot == pytest.approx(4 * cold, rel=1e-3)
 
 
 def test_answers_are_the_mean_distribution_of_each_viewpoint():
     logs = log_softmax(random_logits(4, (3, 48, 24)), axis=-1)
-    found = posteriors.estimate_likelihood(np.exp(logs))
+    found = estimate_likelihood(np.exp(logs))
     # 7.5 degrees a view and 15 a class: centred on the even views, half-way ones go upwards.
     for viewpoint in range(24):
         views = [2 * viewpoint - 1, 2 * viewpoint]
         np.testing.assert_allclose(found[viewpoint], np.exp(logs[:, views]).mean(axis=(0, 1)))
-
-
-def test_posteriors_come_back_with_their_temperature(tmp_path):
-    logits = random_logits(3, (2, 5, 24))
-    made = posteriors.posteriors_of(["007", "NA"], logits, 1.7)
-    posteriors.write_posteriors(tmp_path / "p.npz", made)
-    read = posteriors.read_posteriors(tmp_path / "p.npz", ["007", "NA"])
-    assert (read.object_ids, read.temperature) == (("007", "NA"), 1.7)
-    np.testing.assert_allclose(read.log_posterior, log_softmax(logits / 1.7, axis=-1), atol=1e-5)
-    np.testing.assert_allclose(read.as_trained, log_softmax(logits, axis=-1), atol=1e-4)
-    with pytest.raises(UserError, match=r"p\.npz: not of the objects"):
-        posteriors.read_posteriors(tmp_path / "p.npz", ["NA", "007"])
-
-
-@pytest.mark.parametrize("name", ["log_posterior", "temperature", "object_ids"])
-def test_damaged_posteriors_are_refused(tmp_path, name):
-    path = tmp_path / "p.npz"
-    made = posteriors.posteriors_of(["a", "b"], random_logits(3, (2, 5, 24)), 1.7)
-    posteriors.write_posteriors(path, made)
-    whole = read_arrays(path)
-    wrong = {
-        "log_posterior": [whole["log_posterior"] + 0.1, whole["log_posterior"] * np.nan],
-        "temperature": [np.array(0.0), np.array(np.nan), np.array([1.0, 2.0])],
-        "object_ids": [whole["object_ids"][:1]],
-    }
-    for array in wrong[name]:
-        write_arrays(path, whole | {name: array})
-        with pytest.raises(UserError, match=r"p\.npz: "):
-            posteriors.read_posteriors(path, ["a", "b"])
-    write_arrays(path, {key: array for key, array in whole.items() if key != name})
-    with pytest.raises(UserError, match=rf"p\.npz: holds no array '{name}'"):
-        posteriors.read_posteriors(path, ["a", "b"])
