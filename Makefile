@@ -88,7 +88,7 @@ audit: $(AUDIT)
 	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements-docs.lock
 
 licences: $(AUDIT) $(DOCS)
-	$(BIN)/python tools/licences.py > docs/licences.md
+	$(BIN)/python tools/licences.py
 
 soak: $(READY)
 	$(BIN)/python -m tests.fuzz

@@ -55,20 +55,6 @@ def test_the_locked_versions_are_those_that_the_project_asks_for() -> None:
     assert (stated["name"], stated["version"]) == ("torch", versions["torch"])
 
 
-def test_the_table_of_licences_has_every_locked_package() -> None:
-    rows = re.findall(
-        r"^\| ([\w.-]+) \| ([\w.]+) \| (.+) \|$",
-        (ROOT / "docs/licences.md").read_text("utf-8"),
-        re.MULTILINE,
-    )
-    table = {name: version for name, version, _ in rows if name != "package"}
-    assert table == locked(), "run make licences"
-    assert not [name for name, _, licence in rows if licence in ("", "UNKNOWN")]
-
-
-GRANT = "Permission is hereby granted, free of\ncharge, to any person obtaining a copy"
-
-
 class Package:
     """An installed package with this metadata and this licence text."""
 

@@ -29,11 +29,9 @@ WHERE = {
 }
 
 HEAD = """\
-# Licences
-
 What nbv is run, tested, checked, audited and documented with: every package that the locks install
-on Linux with Python 3.11. `make PYTHON=python3.11 licences` makes this page of the packages'
-metadata. nbv itself is under the MIT licence and contains no code of these packages.
+on Linux with Python 3.11. nbv itself is under the MIT licence and contains no code of these
+packages.
 
 The registry's build of torch for Linux also brings NVIDIA's CUDA libraries, under NVIDIA's own
 licence. A build of torch for processors alone brings none.
@@ -87,7 +85,7 @@ def licence_of(package: Distribution) -> str:
 
 
 def table() -> str:
-    """Return the page."""
+    """Return the Markdown table of all locked packages, with its introduction."""
     rows = []
     for name, version in sorted(locked().items()):
         try:

@@ -28,7 +28,6 @@ SECTIONS = {
         "docs/tests",
         "CONTRIBUTING",
         "CHANGELOG",
-        "docs/licences",
     ),
 }
 
