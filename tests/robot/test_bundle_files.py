@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from dataclasses import replace
-from fnmatch import fnmatch
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +15,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from made_bundles import made_bundle, random_codes, random_weights, settings
-from nbv.core.look_alikes import LookAlikes
 from nbv.errors import UserError
 from nbv.robot.bundle import (
     FORMAT,
@@ -30,38 +26,8 @@ from nbv.robot.bundle import (
     load_bundle,
     save_bundle,
 )
-from nbv.robot.evaluation import best_fixed_deg, fixed_errors_deg
 from nbv.robot.ood import unfamiliarity
-from nbv.robot.recommender import Recommender, bundle_path, turn_share
-
-BUNDLES = Path(__file__).parents[2] / "docs" / "bundles.md"
-
-# What the document says
-
-
-def test_the_document_names_every_array_and_entry_of_a_bundle():
-    rows = [line for line in BUNDLES.read_text("utf-8").splitlines() if line.startswith("| `")]
-    documented = [name for row in rows for name in re.findall(r"`([^`]+)`", row.split("|")[1])]
-    with safetensors.safe_open(bundle_path("mug"), framework="numpy") as stored:
-        held = {*stored.keys(), *json.loads(stored.metadata()["nbv"])}
-    assert {name for name in held if any(fnmatch(name, one) for one in documented)} == held
-    assert [one for one in documented if not any(fnmatch(name, one) for name in held)] == []
-
-
-def test_the_best_fixed_rotation_of_the_shipped_bundle_is_as_documented():
-    held = load_bundle(bundle_path("mug"))
-    errors = fixed_errors_deg(LookAlikes.of_views(held.distributions), 2)
-    found = {
-        elevation: best_fixed_deg(errors, turn_share(held, elevation))
-        for elevation in (None, 0.0, 15.0, 30.0, 45.0, 60.0)
-    }
-    assert found.pop(None) == 183.0
-    assert found.pop(60.0) == 144.0
-    assert (min(found.values()), max(found.values())) == (177.0, 183.0)
-    text = " ".join(BUNDLES.read_text("utf-8").split())
-    assert "is 183° where the elevation is not known" in text
-    assert "144° at an elevation of 60°, and 177 to 183° at each lower one" in text
-
+from nbv.robot.recommender import Recommender, bundle_path
 
 # Round trips
 

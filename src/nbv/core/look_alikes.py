@@ -27,7 +27,6 @@ MOST_COMPARED = 4000
 """First views at most that a belief is compared with: neighbours are alike.
 
 The tables of all 15,000 views of 125 turns are much larger than the cache of a processor's core.
-How many are enough: docs/reference/bundles/README.md.
 """
 
 N_PARTS = 5
