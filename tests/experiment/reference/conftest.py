@@ -41,7 +41,7 @@ def finished(evaluations, tmp_path_factory):
     packages = {"numpy": "2.4.0", "torch": "2.13.0"}
     (root / "provenance.json").write_text(json.dumps({"commit": "0123", "packages": packages}))
     (root / "figures").mkdir()
-    for name in ("pea.png", "pea.pdf", "figure8.png"):
+    for name in ("pea.png", "figure7.png", "figure8.pdf", "figure8.png"):
         (root / "figures" / name).write_bytes(name.encode())
     for kind in ("csv", "md"):
         (root / "tables" / f"runtime.{kind}").write_text("rule,jobs\n")

@@ -33,8 +33,8 @@ def test_a_reference_keeps_what_a_reviewer_reads(finished, tmp_path):
     written = collect_reference(finished, reference)
     kept, run = files(reference), files(finished)
     assert {str(path.relative_to(reference)) for path in written} == set(kept)
-    expected = {f"tables/{name}.{kind}" for name in TABLES for kind in ("csv", "md", "tex")}
-    expected |= {"figures/pea.png", "figures/figure8.png", "claims.csv", "claims.md"}
+    expected = {f"tables/{name}.{kind}" for name in TABLES for kind in ("csv", "md")}
+    expected |= {"figures/figure7.png", "figures/figure8.png", "claims.csv", "claims.md"}
     expected |= {"runtime.csv", "runtime.md", "configuration.yaml", "provenance.json"}
     assert set(kept) == expected
     for name, content in kept.items():
@@ -50,13 +50,13 @@ def test_a_reference_made_again_loses_what_the_run_has_not(run, tmp_path, caplog
     assert "clean commit" not in caplog.text
     (run.parent / "bench.json").unlink()
     (reference / "README.md").write_text("kept\n")
-    for kind in ("csv", "md", "tex"):
+    for kind in ("csv", "md"):
         (run / "tables" / f"table7.{kind}").unlink()
-    (run / "figures" / "pea.png").unlink()
+    (run / "figures" / "figure7.png").unlink()
     (run / "provenance.json").write_text(json.dumps({"commit": "0123-dirty"}))
     collect_reference(run, reference)
     kept = files(reference)
-    assert not any("table7" in name or "pea" in name for name in kept)
+    assert not any("table7" in name or "figure7" in name for name in kept)
     assert {"README.md", "tables/table1.csv"} <= set(kept)
     assert "not made at a clean commit but at 0123-dirty" in caplog.text
 

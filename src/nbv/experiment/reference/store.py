@@ -45,7 +45,7 @@ _SURROUNDINGS = frozenset(
 # What the paper's own tables do not depend on.
 _OF_EXTENSIONS = frozenset({TRANSFER, "extensions", "leaderboard_runs", "more_views"})
 _FREE_TRAVEL = {"travel_cost": 0.0, "max_travel_deg": 180.0}
-_KEPT = ("tables/*.csv", "tables/*.md", "tables/*.tex", "figures/*.png")
+_KEPT = ("tables/*.csv", "tables/*.md", "figures/figure[0-9].png")
 _REQUIRED = (
     "claims.csv",
     "claims.md",
@@ -59,7 +59,7 @@ _REQUIRED = (
 def collect_reference(run: Path, reference: Path) -> list[Path]:
     """Copy what a reviewer reads of a run, byte for byte, to be committed as a reference.
 
-    Tables, figures as PNG, claims, runtime, configuration and provenance: a few MB. The runtime
+    Tables, the paper's figures, claims, runtime, configuration and provenance: about 1 MB. The runtime
     goes to the folder above the tables. ``bench.json``, which ``python -m performance`` writes to
     the folder of the runs, goes to that of the references where there is one. Tables and figures
     that the reference had and the run has not are removed; whatever else is there is left alone.
