@@ -59,10 +59,11 @@ _REQUIRED = (
 def collect_reference(run: Path, reference: Path) -> list[Path]:
     """Copy what a reviewer reads of a run, byte for byte, to be committed as a reference.
 
-    Tables, the paper's figures, claims, runtime, configuration and provenance: about 1 MB. The runtime
-    goes to the folder above the tables. ``bench.json``, which ``python -m performance`` writes to
-    the folder of the runs, goes to that of the references where there is one. Tables and figures
-    that the reference had and the run has not are removed; whatever else is there is left alone.
+    Tables, the paper's figures, claims, runtime, configuration and provenance: about 1 MB. The
+    runtime goes to the folder above the tables. ``bench.json``, which ``python -m performance``
+    writes to the folder of the runs, goes to that of the references where there is one. Tables and
+    figures that the reference had and the run has not are removed; whatever else is there is left
+    alone.
 
     Parameters
     ----------
