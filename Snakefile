@@ -58,7 +58,6 @@ include: "workflow/rules/extensions/common.smk"
 include: "workflow/rules/extensions/methods.smk"
 include: "workflow/rules/extensions/leaderboard.smk"
 include: "workflow/rules/extensions/more_views.smk"
-include: "workflow/rules/extensions/view_sphere.smk"
 include: "workflow/rules/extensions/travel.smk"
 include: "workflow/rules/extensions/ablation.smk"
 include: "workflow/rules/extensions/transfer.smk"
@@ -73,7 +72,6 @@ rule extensions:
         rules.extension_gains.output,
         rules.more_views.output,
         rules.travel.output,
-        rules.view_sphere.output if SPHERE_CATEGORIES else [],
 
 
 onstart:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nbv.core.belief import first_belief, updated
-from nbv.core.criteria import CRITERIA, FOR_TWO_ESTIMATORS
+from nbv.core.criteria import CRITERIA, FOR_MORE_VIEWS
 from nbv.core.evidence import Evidence, gather_evidence
 from nbv.core.fusion import ESTIMATE_FUSIONS
 from nbv.core.lookup import build_lookup
@@ -63,7 +63,7 @@ def _steps(quick: bool) -> list[Figure]:
     taken = np.zeros((1, 1), dtype=np.int64)
     rng = np.random.default_rng(0)
     figures = []
-    for criterion in FOR_TWO_ESTIMATORS:
+    for criterion in ("pose_ambiguity", *FOR_MORE_VIEWS):
         next_view = recommended_next(criterion, coarse, 15.0)
 
         def one_more_view(next_view=next_view) -> None:  # type: ignore[no-untyped-def]

@@ -14,7 +14,6 @@ from nbv.core.belief import Belief, coarser, every_belief, first_belief, updated
 from nbv.core.criteria import (
     CRITERIA,
     FOR_MORE_VIEWS,
-    FOR_TWO_ESTIMATORS,
     POSE_LIKELIHOODS,
     SPREADS,
     cost_unit,
@@ -147,9 +146,9 @@ def test_groups_of_rotations_are_all_of_them_in_order_and_fit_the_cache(numbers_
 
 
 def test_each_factor_of_the_pose_ambiguity_belongs_to_the_estimator_of_its_view():
-    """On the view sphere: T of the first elevation for the first view, the other's for the second.
+    """T of the first estimator for the first view, the other's for the second.
 
-    With the second elevation's T for both, the cost would differ by far more than rounding.
+    With the second estimator's T for both, the cost would differ by far more than rounding.
     """
     first = evidence_of(estimates(9), pseudo_observations=0.1)
     second = evidence_of(estimates(9, seed=3, worst_deg=250.0), pseudo_observations=0.1)
@@ -303,7 +302,7 @@ def test_turning_the_object_rolls_the_rows_and_leaves_the_rotations(criterion, f
 
 
 @pytest.mark.parametrize("k", [2, 10])
-@pytest.mark.parametrize("criterion", FOR_TWO_ESTIMATORS)
+@pytest.mark.parametrize("criterion", ["pose_ambiguity", *FOR_MORE_VIEWS])
 def test_turning_the_belief_and_the_object_together_changes_nothing(criterion, belief, k):
     evidence = belief.evidence
     turned = evidence_of((np.roll(evidence.estimate_deg, 2 * k, axis=1) + 15 * k) % 360)
@@ -387,12 +386,12 @@ def test_unknown_names(settings, message):
 
 
 def test_coarse_beliefs_are_asked_in_coarse_bins():
-    """As more views and the view sphere do."""
+    """As more views do."""
     estimate = estimates(6, 360)
     fine = gather_evidence(estimate, SETTINGS, bandwidth_deg=8, pseudo_observations=9, n_bins=72)
     coarse = gather_evidence(estimate, SETTINGS, bandwidth_deg=8, pseudo_observations=9, n_bins=24)
     belief = first_belief(np.array([90.0, 250.0]), fine)
-    for criterion in FOR_TWO_ESTIMATORS:
+    for criterion in ("pose_ambiguity", *FOR_MORE_VIEWS):
         slow = CRITERIA[criterion](belief, fine, "posterior")[:, ::3]
         fast = CRITERIA[criterion](coarser(belief, coarse), coarse, "posterior")
         for one in range(2):

@@ -1,4 +1,4 @@
-"""Every next view after any number of views, and over elevations."""
+"""Every next view after any number of views."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from nbv.core.angles import circular_distance_deg, travel_deg
 from nbv.core.belief import Belief
 from nbv.core.criteria import CRITERIA
 from nbv.core.next_views import (
-    best_view,
     evenly_spaced_travel_deg,
     random_next,
     recommended_next,
@@ -79,12 +78,3 @@ def test_random_views_never_repeat():
     taken = np.tile(np.arange(359), (50, 1))
     belief = Belief(np.zeros((50, 360), dtype=np.float32), evidence)
     assert (random_next(belief, taken, rng) == 359).all()
-
-
-def test_the_best_view_is_the_least_cost_of_all_elevations():
-    """Of equals the first elevation, and there the smallest travel."""
-    costs = {30: np.ones((3, 8)), 0: np.ones((3, 8)), 60: np.ones((3, 8))}
-    costs[0][1, 6] = costs[60][2, 3] = 0.5
-    delta, elevation = best_view(costs)
-    assert elevation.tolist() == [30, 0, 60]
-    assert delta.tolist() == [0, 270, 135]

@@ -384,8 +384,6 @@ FOR_ESTIMATES = frozenset({"bayes_error"})
 FOR_MORE_VIEWS = ("information_gain", "expected_dispersion", "bayes_error")
 """Criteria that are defined after any number of views."""
 
-FOR_TWO_ESTIMATORS = ("pose_ambiguity", *FOR_MORE_VIEWS)
-"""Criteria that are defined where another estimator takes the next view."""
 
 
 def cost_unit(criterion: str, settings: Mapping[str, Any]) -> str:

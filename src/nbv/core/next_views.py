@@ -1,10 +1,9 @@
-"""How every next view is chosen after any number of views, and over several elevations."""
+"""How every next view is chosen after any number of views."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,20 +130,3 @@ def evenly_spaced_next(n_views: int) -> NextView:
         return np.full(n, round(taken * n_bins / n_views) * (360 // n_bins), dtype=np.int64)
 
     return next_view
-
-
-def best_view(
-    costs: Mapping[int, NDArray[np.floating[Any]]],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the rotation and the elevation of least cost, (n,) each.
-
-    Parameters
-    ----------
-    costs : mapping of int to ndarray (n, B)
-        By elevation; of equals the first elevation, there the smallest travel.
-    """
-    deltas = np.stack([least_cost_delta(cost) for cost in costs.values()])
-    least = np.stack([cost.min(axis=1) for cost in costs.values()])
-    best = least.argmin(axis=0)
-    rows = np.arange(best.size)
-    return deltas[best, rows], np.array(list(costs))[best].astype(np.int64)

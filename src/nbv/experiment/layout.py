@@ -121,10 +121,6 @@ class Layout:
         """Return one of a fold's files on extensions: ``choices``, ``objects``, ``travel``, …."""
         return self._of_fold("extensions", category, elevation, fold, f"{name}.csv")
 
-    def view_sphere(self, category: str, fold: int | str) -> str:
-        """Return a fold's errors where the elevation of the second view is chosen as well."""
-        return f"{self.root}/extensions/{category}/view_sphere/fold{fold}.csv"
-
     def ablation(self, setting: str) -> str:
         """Return the errors under one setting of the ablation."""
         return f"{self.root}/ablation/{setting}.csv"

@@ -64,16 +64,6 @@ def leaderboard_files(name):
     return files
 
 
-# Files of every elevation.
-
-
-def at_every_elevation(path):
-    return lambda wildcards: [
-        path(wildcards.category, elevation, wildcards.fold)
-        for elevation in CONFIG["elevations_deg"][wildcards.category]
-    ]
-
-
 # Conditions of transfer, and the files made under them.
 
 
@@ -117,15 +107,6 @@ def need_posterior(*policies):
 def rows_of_more_views(wildcards):
     need_posterior("random", "opposite")
     return [LAYOUT.extension(*fold, "more_views") for fold in folds_of(REFERENCE_UNITS)]
-
-
-def rows_of_view_sphere(wildcards):
-    need_posterior("opposite")
-    return [
-        LAYOUT.view_sphere(category, fold)
-        for category in SPHERE_CATEGORIES
-        for fold in FOLDS
-    ]
 
 
 # The runs that this one is compared with.

@@ -38,7 +38,6 @@ def test_no_two_things_share_a_path():
     found = [path(*place) for path in OF_FOLD for place in places]
     found += [LAYOUT.depth(category, elevation) for category, elevation, fold in places if fold < 2]
     found += [path(c) for path in (LAYOUT.meshes, LAYOUT.splits) for c in ("mug", "chair")]
-    found += [LAYOUT.view_sphere("mug", fold) for fold in (1, 2)]
     found += [LAYOUT.ablation("one"), LAYOUT.log("train"), LAYOUT.benchmark("train")]
     found += [LAYOUT.table("table1", kind) for kind in ("csv", "md", "tex", "html")]
     found += [LAYOUT.figure("figure2", kind) for kind in ("png", "pdf")]
