@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from nbv.experiment.plan_bound import BEST_OF_OTHERS, BEST_OF_OWN, EVENLY_SPACED
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
@@ -74,19 +73,6 @@ TRAININGS_COLUMNS = (
     "difference_deg",
     "low",
     "high",
-)
-
-BOUNDS_COLUMNS = (
-    *PLACE,
-    "n_views",
-    "evenly_spaced_deg",
-    "best_of_others_deg",
-    "difference_deg",
-    "low",
-    "high",
-    "best_of_own_deg",
-    "n_objects",
-    "n_trainings",
 )
 
 Method = tuple[str, str, int]
@@ -258,38 +244,6 @@ def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
                 )
             )
     return pd.DataFrame(rows, columns=list(CONTRASTS_COLUMNS))
-
-
-def bound_means(objects: pd.DataFrame) -> pd.DataFrame:
-    """Return what picking a plan can gain over evenly spaced views, columns `BOUNDS_COLUMNS`.
-
-    The difference, with its interval, is that of the plans that other trainings pick.
-
-    Parameters
-    ----------
-    objects : DataFrame
-        `PLACE` and `nbv.experiment.plan_bound.COLUMNS`.
-
-    Raises
-    ------
-    UserError
-        As of `method_means`.
-    """
-    rows = []
-    for place, tables in _tables(objects):
-        errors = {method: figures["error_deg"] for method, figures in tables.items()}
-        for n_views in sorted({n for *_, n in errors}):
-            even, others, own = (
-                errors[choice, "product", n_views]
-                for choice in (EVENLY_SPACED, BEST_OF_OTHERS, BEST_OF_OWN)
-            )
-            gain = crossed_mean(*(a - b for a, b in zip(others, even, strict=True)))
-            interval = gain.interval()
-            means = [crossed_mean(*tables).value for tables in (even, others, own)]
-            differences = (interval.value, interval.low, interval.high)
-            sizes = (gain.n_objects, gain.n_trainings)
-            rows.append((*place, n_views, *means[:2], *differences, means[2], *sizes))
-    return pd.DataFrame(rows, columns=list(BOUNDS_COLUMNS))
 
 
 def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:

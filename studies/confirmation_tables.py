@@ -112,36 +112,6 @@ def densities_table(densities: pd.DataFrame) -> Table:
     )
 
 
-def bounds_table(bounds: pd.DataFrame) -> Table:
-    """Return `studies.confirmation.bound_means` as a table."""
-    parts = []
-    for (dataset, category), part in bounds.groupby(["dataset", "category"], sort=False):
-        rows = [
-            (
-                Cell(str(row["n_views"])),
-                Cell(number(row["evenly_spaced_deg"], 2)),
-                Cell(number(row["best_of_others_deg"], 2)),
-                difference_cell(row["difference_deg"], row["low"], row["high"]),
-                Cell(number(row["best_of_own_deg"], 2)),
-            )
-            for _, row in part.iterrows()
-        ]
-        parts.append(Part(tuple(rows), f"{dataset}, {category_label(str(category))}"))
-    title = "What picking a plan can gain"
-    header = ("Views", "Evenly spaced", "Picked by others", "Difference", "Picked by itself")
-    notes = (
-        "MAE in degrees, fused by product. Plans have equal steps and travel no farther than "
-        "evenly spaced views.",
-        "Picked by others: for each object and first view, the plan of least mean error under all "
-        "other trainings. It knows the object, which no robot does.",
-        "Picked by itself: the plan of least error under the training that scores it, which is too "
-        "hopeful.",
-        DECIDED,
-        _INTERVALS,
-    )
-    return Table("plan_bounds", title, title, bounds, header, tuple(parts), notes)
-
-
 def _counts(values: pd.Series, unit: str = "") -> str:
     counts = values.value_counts().sort_index()
     return ", ".join(f"{value:g}{unit} ({n})" for value, n in counts.items())

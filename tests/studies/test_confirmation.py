@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 from studies.confirmation import (
     BELIEF_COLUMNS,
-    BOUNDS_COLUMNS,
     TRAININGS_COLUMNS,
     belief_means,
     method_contrasts,
@@ -16,7 +15,6 @@ from studies.confirmation import (
 from studies.confirmation_tables import (
     answers_figure,
     beliefs_table,
-    bounds_table,
     contrasts_figure,
     contrasts_table,
     densities_table,
@@ -167,13 +165,3 @@ def test_without_an_answer_there_is_no_figure(contrasts, drawn):
     none = pd.DataFrame(columns=contrasts.columns).astype({"question": int})
     with pytest.raises(ValueError, match="no contrast answers a question"):
         drawn(none)
-
-
-def test_bounds_have_a_row_for_each_number_of_views():
-    row = ("real", "mug", 3, 2.0, 1.25, -0.75, -1.0, -0.5, 0.5, 25, 3)
-    undecided = ("real", "mug", 4, 1.0, 0.75, -0.25, -0.6, 0.1, 0.25, 25, 3)
-    table = bounds_table(pd.DataFrame([row, undecided], columns=list(BOUNDS_COLUMNS)))
-    first, second = table.parts[0].rows
-    texts = ["3", "2.00", "1.25", "−0.75 (−1.00 to −0.50)", "0.50"]
-    assert [cell.text for cell in first] == texts
-    assert [row[3].after for row in (first, second)] == ["*", ""]

@@ -7,7 +7,6 @@ import itertools
 import numpy as np
 import pandas as pd
 import pytest
-from nbv.experiment.plan_bound import COLUMNS
 from studies.confirmation import (
     ALL,
     BELIEF_COLUMNS,
@@ -18,7 +17,6 @@ from studies.confirmation import (
     TRAININGS_COLUMNS,
     Contrast,
     belief_means,
-    bound_means,
     contrasts_of,
     method_contrasts,
     method_means,
@@ -219,38 +217,3 @@ def test_a_training_without_an_object_or_with_it_twice_is_named(objects):
 def test_one_category_has_no_line_for_all(objects):
     found = method_means(objects[objects["category"] == "mug"])
     assert set(found["category"]) == {"mug"}
-
-
-def bound_objects():
-    """Objects of one data set: what others pick is 2° better, but for chance."""
-    rng = np.random.default_rng(0)
-    gain = {"evenly_spaced": 0.0, "best_of_others": -2.0, "best_of_own": -4.0}
-    return pd.DataFrame(
-        [
-            ("real", category, *training, choice, "product", 2, f"{category}{k}", 10.0 + of_choice)
-            for (category, n), training in itertools.product(SIZES.items(), TRAININGS)
-            for k in range(n)
-            for choice, of_choice in ((one, at + rng.normal(0, 0.3)) for one, at in gain.items())
-        ],
-        columns=["dataset", "category", *COLUMNS],
-    )
-
-
-def test_bounds_are_paired_by_object_and_training():
-    objects = bound_objects()
-    found = bound_means(objects)
-    assert list(found["category"]) == [*SIZES, ALL]
-    of_choice = dict(list(objects.groupby("choice")))
-    for category, n in SIZES.items():
-        row = found[found["category"] == category].iloc[0]
-        tables = {
-            name: part[part["category"] == category]["error_deg"].to_numpy().reshape(-1, n)
-            for name, part in of_choice.items()
-        }
-        gain = crossed_mean(tables["best_of_others"] - tables["evenly_spaced"])
-        expected = [gain.value, gain.interval().low, gain.interval().high]
-        np.testing.assert_allclose(list(row[["difference_deg", "low", "high"]]), expected)
-        for name, table in tables.items():
-            assert row[f"{name}_deg"] == pytest.approx(table.mean())
-    assert found["n_trainings"].eq(3).all()
-    assert list(found["n_objects"]) == [*SIZES.values(), sum(SIZES.values())]

@@ -24,7 +24,7 @@ SMALL = (
     "more_views.start_every_deg=90",
     "confirmation.replicates=[[0],[0]]",
 )
-TABLES = ("methods", "contrasts", "beliefs", "densities", "plan_bounds")
+TABLES = ("methods", "contrasts", "beliefs", "densities")
 TRAININGS = {(0, 0): "", (1, 0): "confirmation/shuffle1/replicate0/"}
 
 

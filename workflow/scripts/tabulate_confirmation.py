@@ -6,7 +6,6 @@ with job(snakemake):
     import pandas as pd
     from studies.confirmation import (
         belief_means,
-        bound_means,
         method_contrasts,
         method_means,
         training_contrasts,
@@ -14,7 +13,6 @@ with job(snakemake):
     from studies.confirmation_tables import (
         answers_figure,
         beliefs_table,
-        bounds_table,
         contrasts_figure,
         contrasts_table,
         densities_table,
@@ -44,8 +42,6 @@ with job(snakemake):
         "beliefs": beliefs_table(belief_means(read["beliefs"])),
         "densities": densities_table(read["densities"]),
     }
-    if "plan_bounds" in read:
-        tables["plan_bounds"] = bounds_table(bound_means(read["plan_bounds"]))
     write_csv(output.trainings_csv, of_trainings)
     for name, table in tables.items():
         paths = {kind: output[f"{name}_{kind}"] for kind in ("csv", "md")}

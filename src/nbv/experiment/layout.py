@@ -59,11 +59,6 @@ class Layout:
         unit = unit_folder(category, elevation)
         return f"{self.root}/confirmation/{name}/{place}/{unit}.csv"
 
-    def plan_bound(self, run: str, category: str, elevation: int | str) -> str:
-        """Return each object's error under the plans that other trainings pick."""
-        unit = unit_folder(category, elevation)
-        return f"{self.root}/confirmation/plan_bounds/{run}/{unit}.csv"
-
     def confirmation(self, name: str, kind: str) -> str:
         """Return a table or figure over all trainings."""
         return f"{self.root}/confirmation/{name}.{kind}"

@@ -213,8 +213,8 @@ def dataset_name(settings):
 
 
 # The file that a run's estimates were kept in (None: this run's), what it holds (shuffle, replicate,
-# category and elevation), its data set, and whether it has distributions.
-KeptRun = collections.namedtuple("KeptRun", "path keys dataset distributions")
+# category and elevation), and its data set.
+KeptRun = collections.namedtuple("KeptRun", "path keys dataset")
 
 
 @functools.cache
@@ -226,7 +226,7 @@ def kept_runs():
             for shuffle, replicate in REPLICATES
             for unit in LOWEST_UNITS
         ]
-        own = KeptRun(None, keys, dataset_name(CONFIG), CONFIG["gives_distributions"])
+        own = KeptRun(None, keys, dataset_name(CONFIG))
         return {CONFIG["name"]: own}
     found = {}
     for path in CONFIG["confirmation"]["kept"]:
@@ -249,17 +249,13 @@ def kept_runs():
                     f"confirmation.kept: {path} and {other.path} have the same categories of "
                     f"the data set {dataset}"
                 )
-        found[run] = KeptRun(path, keys, dataset, settings["gives_distributions"])
+        found[run] = KeptRun(path, keys, dataset)
     return found
 
 
 def kept_file(wildcards):
     path = kept_runs()[wildcards.run].path
     return path or LAYOUT.kept_estimates(wildcards.shuffle, wildcards.replicate)
-
-
-def kept_file_of_all_trainings(wildcards):
-    return kept_runs()[wildcards.run].path or LAYOUT.all_kept_estimates
 
 
 def factorial_files(name):
@@ -270,32 +266,11 @@ def factorial_files(name):
     ]
 
 
-def bounded_units():
-    """Run, category and elevation of the units that other trainings can pick plans for."""
-    return [
-        (run, *unit)
-        for run, kept in kept_runs().items()
-        if kept.distributions
-        for unit in dict.fromkeys(key[2:] for key in kept.keys)
-        if len([key for key in kept.keys if key[2:] == unit]) > 1
-    ]
-
-
-def bound_files(wildcards):
-    return [LAYOUT.plan_bound(*unit) for unit in bounded_units()]
-
-
 def statistics_places():
     """By kind of file, what each one is of."""
-    kept = kept_runs().values()
     of_training = [
         {"dataset": run.dataset} | dict(zip(("shuffle", "replicate", "category"), key))
-        for run in kept
+        for run in kept_runs().values()
         for key in run.keys
     ]
-    of_unit = [
-        {"dataset": kept_runs()[run].dataset, "category": category}
-        for run, category, _ in bounded_units()
-    ]
-    places = dict.fromkeys(OF_FACTORIAL, of_training)
-    return places | ({"plan_bounds": of_unit} if of_unit else {})
+    return dict.fromkeys(OF_FACTORIAL, of_training)

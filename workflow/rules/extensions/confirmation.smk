@@ -164,42 +164,15 @@ rule evaluate_factorial:
         f"{SCRIPTS}/evaluate_factorial.py"
 
 
-rule evaluate_plan_bound:
-    input:
-        sources("evaluate_plan_bound"),
-        kept=kept_file_of_all_trainings,
-    output:
-        LAYOUT.plan_bound("{run}", *UNIT),
-    log:
-        LAYOUT.log(f"evaluate_plan_bound/{{run}}/{unit_folder(*UNIT)}"),
-    benchmark:
-        LAYOUT.benchmark(f"evaluate_plan_bound/{{run}}/{unit_folder(*UNIT)}")
-    wildcard_constraints:
-        category="[^/]+",
-    conda:
-        ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(2000),
-        runtime=per_attempt(20),
-    script:
-        f"{SCRIPTS}/evaluate_plan_bound.py"
-
-
 rule statistics:
     input:
         sources("tabulate_confirmation"),
         **{name: factorial_files(name) for name in OF_FACTORIAL},
-        plan_bounds=bound_files,
     output:
         **{
             f"{name}_{kind}": LAYOUT.confirmation(name, kind)
             for name in ("methods", "contrasts", "beliefs", "densities")
             for kind in ("csv", "md")
-        },
-        **{
-            f"plan_bounds_{kind}": LAYOUT.confirmation("plan_bounds", kind)
-            for kind in ("csv", "md")
-            if bounded_units()
         },
         **{
             f"{name}_{kind}": LAYOUT.confirmation(name, kind)
