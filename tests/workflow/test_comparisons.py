@@ -32,8 +32,9 @@ def other(finished: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of a cross-fitted classifier; the default run lies in the same folder."""
     folder = tmp_path_factory.mktemp("compared") / "project"
     shutil.copytree(finished.folder, folder, symlinks=True)
-    targets = ("density_comparison", "run_comparison")
-    Project(folder).run("--cores", "2", *targets, overrides=(*OTHER, "compared_runs=[tiny]"))
+    Project(folder).run(
+        "--cores", "2", "run_comparison", overrides=(*OTHER, "compared_runs=[tiny]")
+    )
     return folder / "results/other"
 
 
@@ -64,9 +65,6 @@ def test_image_distributions_recommend_for_the_images_of_the_default_run(other):
 
 
 def test_both_runs_are_shown(other):
-    cells = pd.read_csv(other / "tables/density_comparison.csv")
-    densities = {"other:estimate", "other:as_trained", "other:posterior", "tiny:estimate"}
-    assert set(cells["method"]) == densities
     text = (other / "tables/run_comparison.md").read_text()
     assert "| MAE | other | tiny | tiny − other |" in text
     assert "| Mug: Gain product |" in text

@@ -124,15 +124,6 @@ def methods_in(run):
     return [*run_settings(run)["methods"], *own]
 
 
-def density_methods(run):
-    """The methods whose errors tell what a density brings."""
-    kinds = [
-        "estimate",
-        *(["posterior"] if run_settings(run)["gives_distributions"] else []),
-    ]
-    return sorted({name for kind in kinds for name in DENSITY_METHODS[kind].values()})
-
-
 def compared_keys(names_of, units=None):
     """Run, category, elevation, fold, and one of the names that a run has, of every file."""
     return [
@@ -155,13 +146,6 @@ def compared(path, names_of, units=None):
     return files
 
 
-def proposed_lookup(run):
-    methods, name = run_settings(run)["methods"], SETTINGS.subject
-    if name not in methods or not needs_lookup(methods[name]["policy"]):
-        stop(f"the run {run} has no lookup table of a method {name}")
-    return [methods[name]["policy"]]
-
-
 def estimated_roles(run):
     theirs = run_settings(run).get("calibration", "holdout")
     if theirs != CONFIG["calibration"]:
@@ -170,14 +154,6 @@ def estimated_roles(run):
             f"{CONFIG['calibration']}, so their calibration objects differ; leave it out"
         )
     return ESTIMATED_ROLES
-
-
-def test_estimates(run):
-    return ["test"]
-
-
-def test_posteriors(run):
-    return ["test"] if run_settings(run)["gives_distributions"] else []
 
 
 # Trainings beyond the run's own.

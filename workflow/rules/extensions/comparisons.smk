@@ -1,37 +1,5 @@
 # Tables that compare this run with finished ones. They are made only where somebody asks for them.
 
-from studies.densities import METHODS as DENSITY_METHODS
-
-
-rule density_comparison:
-    input:
-        sources("tabulate_density_comparison"),
-        evaluations=compared(Layout.evaluation, density_methods),
-        estimates=compared(Layout.estimates, test_estimates),
-        lookups=compared(Layout.lookup, proposed_lookup),
-        posteriors=compared(Layout.posteriors, test_posteriors),
-    output:
-        csv=LAYOUT.table("density_comparison", "csv"),
-        md=LAYOUT.table("density_comparison", "md"),
-        tex=LAYOUT.table("density_comparison", "tex"),
-    log:
-        LAYOUT.log("density_comparison"),
-    conda:
-        ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(2000),
-        runtime=per_attempt(10),
-    params:
-        evaluations=lambda wildcards: compared_keys(density_methods),
-        estimates=lambda wildcards: compared_keys(test_estimates),
-        lookups=lambda wildcards: compared_keys(proposed_lookup),
-        posteriors=lambda wildcards: compared_keys(test_posteriors),
-        settings=RESAMPLED,
-        caution=CAUTION,
-    script:
-        f"{SCRIPTS}/tabulate_density_comparison.py"
-
-
 rule run_comparison:
     input:
         sources("tabulate_run_comparison"),
