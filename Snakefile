@@ -61,7 +61,7 @@ include: "workflow/rules/extensions/more_views.smk"
 include: "workflow/rules/extensions/travel.smk"
 include: "workflow/rules/extensions/ablation.smk"
 include: "workflow/rules/extensions/transfer.smk"
-include: "workflow/rules/extensions/comparisons.smk"
+include: "workflow/rules/extensions/runs.smk"
 include: "workflow/rules/extensions/confirmation.smk"
 include: "workflow/rules/bundles.smk"
 

@@ -1,12 +1,13 @@
-"""The errors of the same methods, or of single views, in several runs, image by image.
+"""Several runs side by side: the errors of one view and of each method.
 
 Columns of the tidy table are `cells.CELL_COLUMNS`: ``method`` is the run, ``row`` is
-``<category> <method>``, and ``difference*`` compares with the first run.
+``<place> <method> <role>`` with a place such as ``mug/el00``, ``mug`` (all its elevations) or
+``all`` (all categories), and ``difference*`` compares with the first run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -22,128 +23,112 @@ from nbv.experiment.report.settings import (
     unit_label,
 )
 from nbv.experiment.report.table import DECIDED, Cell, Row, Table, difference_cell
-from nbv.experiment.results import ESTIMATED_ROLES, Unit
+from nbv.experiment.results import Unit
 from nbv.experiment.statistics.paired import PairedErrors, pair_methods, pool
 from nbv.labels import MINUS, category_label, method_label, number
 
-_NOTE = (
+RunErrors = Mapping[str, Mapping[Unit, pd.DataFrame]]
+"""The errors of all images, by run and unit."""
+
+_NAME = "runs"
+_SINGLE = "single"
+_NOTES = (
+    "Mean absolute errors. No training of a fold has seen its calibration objects or its test "
+    "objects.",
     "Differences are paired image by image, with 95 % intervals over objects; those do not contain "
-    "the chance of training."
+    f"the chance of training. {DECIDED}",
 )
 
 
-def run_comparison(
-    runs: Mapping[str, Mapping[Unit, pd.DataFrame]], settings: ReportSettings
-) -> Table:
-    """Return the MAE of every method in every run, with paired differences to the first run.
+def runs_table(estimates: RunErrors, evaluations: RunErrors, settings: ReportSettings) -> Table:
+    """Return the MAE of Single and of every method in every run, with differences to the first run.
 
-    ``runs`` has by run the frames of `nbv.experiment.results.load_evaluations` for the same units
-    and test images. A method needs to be in one of them alone.
+    A category's elevations are also pooled, and so are the categories.
 
-    Raises
-    ------
-    UserError
-        Where runs were tested on different images.
-    """
-    first = next(iter(runs))
-    elevation = common_elevation_deg(runs[first], settings)
-    samples = {}
-    for unit in runs[first]:
-        errors = _of_runs(runs, [unit])
-        for method, part in errors.groupby("method", sort=False):
-            label = f"{unit_label(unit, elevation)}: {method_label(str(method))}"
-            samples[f"{unit[0]} {method}", label] = _paired(part, unit[0])
-    notes = ("Mean absolute errors over test images.", _NOTE)
-    title = "The same methods in several runs"
-    return _table("run_comparison", title, samples, list(runs), settings, notes)
-
-
-def estimator_comparison(
-    runs: Mapping[str, Mapping[Unit, pd.DataFrame]], settings: ReportSettings
-) -> Table:
-    """Return the MAE of one view in every run, with paired differences to the first run.
-
-    ``runs`` has by run the frames of `nbv.experiment.results.load_estimate_errors` for the same
-    units and objects. Calibration objects have lines of their own: what is chosen on them is not
-    chosen on test objects. A category's elevations are also pooled, and so are the categories.
+    Parameters
+    ----------
+    estimates : mapping of str to mapping of (category, elevation_deg) to DataFrame
+        Errors of one view from `nbv.experiment.results.load_estimate_errors`. All runs have the
+        same units and roles.
+    evaluations : mapping of str to mapping of (category, elevation_deg) to DataFrame
+        Errors of two views from `nbv.experiment.results.load_evaluations`. A run may lack methods
+        that another one has.
+    settings : ReportSettings
+        The reference elevation and the resamples.
 
     Raises
     ------
     UserError
-        Where runs have estimates of different images.
+        Where runs have errors of different images.
     """
-    units = list(next(iter(runs.values())))
-    elevation = common_elevation_deg(units, settings)
-    samples = {}
-    for role in ESTIMATED_ROLES:
-        of_category = {}
-        for category in dict.fromkeys(category for category, _ in units):
-            own = [unit for unit in units if unit[0] == category]
-            for unit in own:
-                label = f"{unit_label(unit, elevation)}: {role} objects"
-                name = f"{unit_folder(*unit)} {role}"
-                samples[name, label] = _paired(_of_runs(runs, [unit], role), category)
-            # An object is resampled with its images at all elevations.
-            of_category[category] = _paired(_of_runs(runs, own, role), category)
-            if len(own) > 1:
-                label = f"{category_label(category)}, all elevations: {role} objects"
-                samples[f"{category} {role}", label] = of_category[category]
-        if len(of_category) > 1:
-            label = f"All categories: {role} objects"
-            samples[f"all {role}", label] = pool(list(of_category.values()))
-    notes = (
-        "Mean absolute errors of one view. No training of a fold has seen its calibration objects "
-        "or its test objects.",
-        _NOTE,
-    )
-    title = "Estimators of several runs"
-    return _table("estimator_comparison", title, samples, list(runs), settings, notes)
-
-
-def _of_runs(
-    runs: Mapping[str, Mapping[Unit, pd.DataFrame]], units: list[Unit], method: str | None = None
-) -> pd.DataFrame:
-    """Return the errors of some units in all runs, of one method or of all."""
-    frames = [
-        evaluations[unit].assign(run=run, elevation_deg=unit[1])
-        for run, evaluations in runs.items()
-        for unit in units
-    ]
-    errors = pd.concat(frames).astype({"method": str})
-    return errors if method is None else errors[errors["method"] == method]
-
-
-def _paired(errors: pd.DataFrame, category: str) -> PairedErrors:
-    by_run = errors.drop(columns="method").rename(columns={"run": "method"})
-    # The order of images at several elevations is the same in all runs.
-    return pair_methods(by_run.sort_values("elevation_deg", kind="stable"), category)
-
-
-def _table(
-    name: str,
-    title: str,
-    samples: Mapping[tuple[str, str], PairedErrors],
-    runs: list[str],
-    settings: ReportSettings,
-    notes: tuple[str, ...],
-) -> Table:
-    """Return a table with a row for each sample, whose key is the row's name and its label."""
+    runs = list(estimates)
+    units = list(estimates[runs[0]])
     shown = replace(settings, methods=tuple(runs), reference=runs[0])
     resampler = shared_resampler(settings)
-    cells = [
-        cell
-        for (row, label), sample in samples.items()
-        for cell in method_cells(name, row, label, "mae", sample, resampler, shown)
-    ]
+    lines = _lines(estimates, evaluations)
+    cells = []
+    for place, place_label, categories in _places(units, common_elevation_deg(units, settings)):
+        for (method, role), errors in lines.items():
+            sample = pool([_paired(errors, *category) for category in categories.items()])
+            row = f"{place} {method} {role}"
+            label = f"{place_label}: {method_label(method)}, {role} objects"
+            cells += method_cells(_NAME, row, label, "mae", sample, resampler, shown)
     frame = pd.DataFrame(cells, columns=list(CELL_COLUMNS))
     by_label = frame.groupby("row_label", sort=False)
     rows = tuple(_row(str(label), part, runs) for label, part in by_label)
     header = ("MAE", *runs, *(f"{run} {MINUS} {runs[0]}" for run in runs[1:]))
-    return Table(name, title, title, frame, header, rows, (" ".join((*notes, DECIDED)),))
+    title = "Runs side by side"
+    return Table(_NAME, title, title, frame, header, rows, _NOTES)
+
+
+def _lines(
+    estimates: RunErrors, evaluations: RunErrors
+) -> dict[tuple[str, str], dict[tuple[str, Unit], pd.DataFrame]]:
+    """Return by method and role the errors of each run and unit."""
+    lines: dict[tuple[str, str], dict[tuple[str, Unit], pd.DataFrame]] = {}
+    for run, of_units in estimates.items():
+        for unit, errors in of_units.items():
+            for role, part in errors.groupby("method", sort=False):
+                lines.setdefault((_SINGLE, str(role)), {})[run, unit] = part
+    for run, of_units in evaluations.items():
+        for unit, errors in of_units.items():
+            for method, part in errors.groupby("method", observed=True, sort=False):
+                lines.setdefault((str(method), "test"), {})[run, unit] = part
+    return lines
+
+
+def _places(
+    units: list[Unit], common_deg: int
+) -> Iterator[tuple[str, str, Mapping[str, list[Unit]]]]:
+    """Yield the name, the label and the units by category of everything that has rows."""
+    by_category: dict[str, list[Unit]] = {}
+    for unit in units:
+        by_category.setdefault(unit[0], []).append(unit)
+    for category, own in by_category.items():
+        for unit in own:
+            yield unit_folder(*unit), unit_label(unit, common_deg), {category: [unit]}
+        if len(own) > 1:
+            yield category, f"{category_label(category)}, all elevations", {category: own}
+    if len(by_category) > 1:
+        yield "all", "All categories", by_category
+
+
+def _paired(
+    errors: Mapping[tuple[str, Unit], pd.DataFrame], category: str, units: list[Unit]
+) -> PairedErrors:
+    """Return the errors of all runs; an object is resampled with its images at all elevations."""
+    parts = [
+        part.assign(method=run, elevation_deg=unit[1])
+        for (run, unit), part in errors.items()
+        if unit in units
+    ]
+    # The order of images at several elevations is the same in all runs.
+    by_elevation = pd.concat(parts).sort_values("elevation_deg", kind="stable")
+    return pair_methods(by_elevation, category)
 
 
 def _row(label: str, part: pd.DataFrame, runs: list[str]) -> Row:
-    """Return a method's errors run by run, then the differences; a dash where there is none."""
+    """Return the errors run by run, then the differences; a dash where a run has none."""
     found = {cell["method"]: cell for cell in part.to_dict("records")}
     values = [Cell(f"{number(found[run]['value'])}°" if run in found else "–") for run in runs]
     differences = [Cell("–")] * (len(runs) - 1)

@@ -1,11 +1,11 @@
-"""Methods of several runs, image by image."""
+"""Several runs side by side, image by image."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 import pytest
-from studies.runs import estimator_comparison, run_comparison
+from studies.runs import runs_table
 
 from nbv.core.estimates import Estimates
 from nbv.errors import UserError
@@ -16,52 +16,6 @@ from nbv.experiment.results import load_estimate_errors
 from .made import texts
 
 SETTINGS = ReportSettings(n_resamples=200)
-SHARED = ["single", "opposite"]
-
-
-@pytest.fixture(scope="module")
-def first(evaluations):
-    frame = evaluations["mug", 0].astype({"method": str})
-    return frame[frame["method"].isin(SHARED)]
-
-
-@pytest.fixture(scope="module")
-def second(evaluations):
-    """Errors half as large, and a method that the first run lacks."""
-    frame = evaluations["mug", 0].astype({"method": str})
-    frame = frame[frame["method"].isin([*SHARED, "proposed"])]
-    return frame.assign(
-        error_deg=frame["error_deg"] / 2,
-        method=frame["method"].replace({"proposed": "gain_product"}),
-    )
-
-
-def test_runs_differ_image_by_image(first, second):
-    runs = {"first": {("mug", 0): first}, "second": {("mug", 0): second}}
-    table = run_comparison(runs, SETTINGS)
-    cells = table.cells.set_index(["row", "method"])
-    for method in SHARED:
-        errors = first.loc[first["method"] == method, "error_deg"]
-        one, other = (cells.loc[(f"mug {method}", run)] for run in runs)
-        assert one["value"] == pytest.approx(errors.mean())
-        assert np.isnan(one["difference"])
-        assert other["difference"] == pytest.approx(-errors.mean() / 2)
-        # Every image's error is halved, and so is each resample's.
-        assert other["difference_low"] == pytest.approx(-other["ci_high"])
-        assert other["difference_high"] == pytest.approx(-other["ci_low"])
-    assert table.header == ("MAE", "first", "second", "second − first")
-    missing, value, difference = texts(table)["Mug: Gain product"]
-    assert (missing, difference) == ("–", "–")
-    assert value.endswith("°")
-
-
-def test_runs_that_were_tested_on_other_objects_are_refused(first):
-    other = first.assign(object_id=first["object_id"] + "x")
-    runs = {"first": {("mug", 0): first}, "other": {("mug", 0): other}}
-    with pytest.raises(UserError, match="other was evaluated on other images than first"):
-        run_comparison(runs, SETTINGS)
-
-
 UNITS = (("mug", 0), ("mug", 30), ("chair", 0))
 ROLES = {"calibration": (("b", "c"), ("a", "c")), "test": (("a",), ("b",))}
 N_VIEWS = 8
@@ -91,10 +45,14 @@ def estimates(tmp_path, rng):
     return runs, pd.DataFrame(errors, columns=columns)
 
 
-def test_estimators_differ_unit_by_unit_and_pooled(estimates):
+def side_by_side(files, evaluations=None):
+    estimates = {run: load_estimate_errors(paths) for run, paths in files.items()}
+    return runs_table(estimates, evaluations or {}, SETTINGS)
+
+
+def test_single_differs_unit_by_unit_and_pooled(estimates):
     files, errors = estimates
-    runs = {run: load_estimate_errors(paths) for run, paths in files.items()}
-    table = estimator_comparison(runs, SETTINGS)
+    table = side_by_side(files)
     cells = table.cells.set_index(["row", "method"])
     groups = {
         f"{c}/el{e:02d}": (errors["category"] == c) & (errors["elevation"] == e) for c, e in UNITS
@@ -105,23 +63,20 @@ def test_estimators_differ_unit_by_unit_and_pooled(estimates):
         for role in ROLES:
             part = errors[chosen & (errors["role"] == role)]
             means = part.groupby("run")["error"].mean()
-            cold, warm = (cells.loc[(f"{name} {role}", run)] for run in runs)
+            cold, warm = (cells.loc[(f"{name} single {role}", run)] for run in files)
             assert (cold["value"], warm["value"]) == pytest.approx((means["cold"], means["warm"]))
+            assert np.isnan(cold["difference"])
             assert warm["difference"] == pytest.approx(means["warm"] - means["cold"])
             assert warm["difference_low"] <= warm["difference"] <= warm["difference_high"]
             of_objects = part.groupby(["category", "object"]).ngroups
             assert warm["n_objects"] == of_objects
-    assert "Mug, all elevations: calibration objects" in texts(table)
+    assert "Mug, all elevations: Single, calibration objects" in texts(table)
 
 
-def test_a_category_of_one_elevation_alone_has_two_rows(estimates):
+def test_a_category_of_one_elevation_alone_has_a_row_for_each_role(estimates):
     files, _ = estimates
-    runs = {
-        run: load_estimate_errors({key: path for key, path in paths.items() if key[0] == "chair"})
-        for run, paths in files.items()
-    }
-    rows = list(texts(estimator_comparison(runs, SETTINGS)))
-    assert rows == ["Chair: calibration objects", "Chair: test objects"]
+    rows = list(texts(side_by_side(of_unit(files, ("chair", 0)))))
+    assert rows == ["Chair: Single, calibration objects", "Chair: Single, test objects"]
 
 
 def test_an_object_of_all_elevations_is_resampled_as_one(estimates):
@@ -131,9 +86,53 @@ def test_an_object_of_all_elevations_is_resampled_as_one(estimates):
         run: paths | {("mug", 30, *rest): paths["mug", 0, *rest] for _, _, *rest in paths}
         for run, paths in files.items()
     }
-    runs = {run: load_estimate_errors(paths) for run, paths in same.items()}
-    cells = estimator_comparison(runs, SETTINGS).cells.set_index(["row", "method"])
+    cells = side_by_side(same).cells.set_index(["row", "method"])
     numbers = ["value", "difference", "difference_low", "difference_high"]
     for role in ROLES:
-        one, both = (cells.loc[(f"{name} {role}", "warm"), numbers] for name in ("mug/el00", "mug"))
+        one, both = (
+            cells.loc[(f"{name} single {role}", "warm"), numbers] for name in ("mug/el00", "mug")
+        )
         np.testing.assert_allclose(one.to_numpy(float), both.to_numpy(float))
+
+
+def of_unit(files, unit):
+    return {
+        run: {key: path for key, path in paths.items() if key[:2] == unit}
+        for run, paths in files.items()
+    }
+
+
+def test_methods_differ_image_by_image(estimates, evaluations):
+    """The second run's errors are half as large, and it has a method that the first one lacks."""
+    files, _ = estimates
+    frame = evaluations["mug", 0].astype({"method": str})
+    opposite = frame[frame["method"] == "opposite"]
+    more = frame[frame["method"].isin(["opposite", "proposed"])]
+    more = more.assign(
+        error_deg=more["error_deg"] / 2,
+        method=more["method"].replace({"proposed": "gain_product"}),
+    )
+    methods = {"cold": {("mug", 0): opposite}, "warm": {("mug", 0): more}}
+    table = side_by_side(of_unit(files, ("mug", 0)), methods)
+    cells = table.cells.set_index(["row", "method"])
+    mean = opposite["error_deg"].mean()
+    cold, warm = (cells.loc[("mug/el00 opposite test", run)] for run in files)
+    assert cold["value"] == pytest.approx(mean)
+    assert warm["difference"] == pytest.approx(-mean / 2)
+    # Every image's error is halved, and so is each resample's.
+    assert warm["difference_low"] == pytest.approx(-warm["ci_high"])
+    assert warm["difference_high"] == pytest.approx(-warm["ci_low"])
+    assert table.header == ("MAE", "cold", "warm", "warm − cold")
+    missing, value, difference = texts(table)["Mug: Gain product, test objects"]
+    assert (missing, difference) == ("–", "–")
+    assert value.endswith("°")
+
+
+def test_runs_that_were_tested_on_other_objects_are_refused(estimates, evaluations):
+    files, _ = estimates
+    frame = evaluations["mug", 0].astype({"method": str})
+    opposite = frame[frame["method"] == "opposite"]
+    other = opposite.assign(object_id=opposite["object_id"] + "x")
+    methods = {"cold": {("mug", 0): opposite}, "warm": {("mug", 0): other}}
+    with pytest.raises(UserError, match="warm was evaluated on other images than cold"):
+        side_by_side(of_unit(files, ("mug", 0)), methods)

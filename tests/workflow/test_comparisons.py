@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 from pathlib import Path
@@ -32,9 +33,7 @@ def other(finished: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of a cross-fitted classifier; the default run lies in the same folder."""
     folder = tmp_path_factory.mktemp("compared") / "project"
     shutil.copytree(finished.folder, folder, symlinks=True)
-    Project(folder).run(
-        "--cores", "2", "run_comparison", overrides=(*OTHER, "compared_runs=[tiny]")
-    )
+    Project(folder).run("--cores", "2", "runs", overrides=(*OTHER, "compared_runs=[tiny]"))
     return folder / "results/other"
 
 
@@ -64,10 +63,12 @@ def test_image_distributions_recommend_for_the_images_of_the_default_run(other):
         assert (opposite["delta_deg"] == 180).all()
 
 
-def test_both_runs_are_shown(other):
-    text = (other / "tables/run_comparison.md").read_text()
+def test_runs_of_different_calibration_are_compared_on_test_objects_alone(other):
+    text = (other / "tables/runs.md").read_text()
     assert "| MAE | other | tiny | tiny − other |" in text
-    assert "| Mug: Gain product |" in text
+    assert "| Mug: Gain product, test objects |" in text
+    assert "| Mug: Single, test objects |" in text
+    assert "calibration objects |" not in text
 
 
 def test_cross_fitting_calibrates_with_every_object_that_is_not_tested(other):
@@ -91,31 +92,26 @@ def trained_on(path):
         return set(json.loads(stored.metadata()["nbv"])["trained_on"])
 
 
-def test_estimators_of_two_runs_are_compared_on_the_objects_that_they_have_not_seen(scratch):
+def test_runs_that_calibrate_alike_are_compared_on_calibration_objects_too(scratch):
     overrides = (*TINY, "name=longer", "estimator.epochs=2", "compared_runs=[tiny]")
-    scratch.run("--cores", "2", "estimator_comparison", overrides=overrides)
-    longer = scratch.folder / "results/longer"
-    cells = pd.read_csv(longer / "tables/estimator_comparison.csv").set_index(["row", "method"])
-    for category in ("mug", "chair"):
+    scratch.run("--cores", "2", "runs", overrides=overrides)
+    results = scratch.folder / "results"
+    cells = pd.read_csv(results / "longer/tables/runs.csv").set_index(["row", "method"])
+    for category, run in itertools.product(("mug", "chair"), ("longer", "tiny")):
         for role in ("calibration", "test"):
-            for run in ("longer", "tiny"):
-                files = (longer.parent / run / "estimates" / category).rglob(f"{role}.csv")
-                rows = pd.concat([pd.read_csv(path) for path in files])
-                apart = abs(rows["estimate_deg"] - rows["azimuth_deg"])
-                found = cells.loc[(f"{category}/el00 {role}", run), "value"]
-                assert found == pytest.approx(np.minimum(apart, 360 - apart).mean(), abs=1e-3)
-    assert not (longer / "evaluation").exists()
-
-
-def test_estimators_with_other_calibration_objects_are_not_compared(other):
-    project, settings = Project(other.parents[1]), (*OTHER, "compared_runs=[tiny]")
-    done = project.run("--cores", "1", "estimator_comparison", overrides=settings, fails=True)
-    assert "nbv: error: compared_runs: the run tiny has calibration=holdout" in done.stderr
-    assert "Traceback" not in done.stderr
+            files = (results / run / "estimates" / category).rglob(f"{role}.csv")
+            rows = pd.concat([pd.read_csv(path) for path in files])
+            apart = abs(rows["estimate_deg"] - rows["azimuth_deg"])
+            found = cells.loc[(f"{category}/el00 single {role}", run), "value"]
+            assert found == pytest.approx(np.minimum(apart, 360 - apart).mean(), abs=1e-3)
+        files = (results / run / "evaluation" / category).rglob("opposite.csv")
+        mean = pd.concat([pd.read_csv(path) for path in files])["error_deg"].mean()
+        found = cells.loc[(f"{category}/el00 opposite test", run), "value"]
+        assert found == pytest.approx(mean, abs=1e-3)
 
 
 def test_a_compared_run_that_is_not_there_is_named(finished):
     settings = (*OTHER, "compared_runs=[nowhere]")
-    done = finished.run("--cores", "1", "run_comparison", overrides=settings, fails=True)
+    done = finished.run("--cores", "1", "runs", overrides=settings, fails=True)
     assert "nbv: error: results/nowhere/configuration.yaml does not exist" in done.stderr
     assert "Traceback" not in done.stderr

@@ -74,7 +74,7 @@ def test_overrides_that_are_no_list(fresh):
 @pytest.mark.parametrize(
     ("target", "key", "content", "message"),
     [
-        ("run_comparison", "compared_runs", b"\x89PNG\r\n\x1a\n", "it is not UTF-8 text"),
+        ("runs", "compared_runs", b"\x89PNG\r\n\x1a\n", "it is not UTF-8 text"),
         ("leaderboard", "leaderboard_runs", b"n_folds: 5\n", "categories is missing"),
     ],
 )

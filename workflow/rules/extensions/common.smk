@@ -13,6 +13,7 @@ REPLICATES = [
 ]
 
 
+@functools.cache
 def run_settings(run):
     """The configuration of a finished run."""
     if run == CONFIG["name"]:
@@ -117,43 +118,45 @@ def compared_runs():
     return list(dict.fromkeys([CONFIG["name"], *CONFIG["compared_runs"]]))
 
 
-def methods_in(run):
-    """The paper's methods, and those that multiply an estimator's distributions."""
-    extensions = run_settings(run)["extensions"].items()
-    own = [name for name, method in extensions if method.get("fusion") == "product"]
-    return [*run_settings(run)["methods"], *own]
+def two_view_methods(run):
+    """The paper's methods of two views, and those that multiply an estimator's distributions."""
+    settings = run_settings(run)
+    return [
+        *(name for name, one in settings["methods"].items() if one["policy"] != "none"),
+        *(
+            name
+            for name, one in settings["extensions"].items()
+            if one.get("fusion") == "product"
+        ),
+    ]
 
 
-def compared_keys(names_of, units=None):
+def compared_roles(run):
+    """Calibration objects are the same ones only where all runs calibrate alike."""
+    ways = {run_settings(one).get("calibration", "holdout") for one in compared_runs()}
+    return ESTIMATED_ROLES if len(ways) == 1 else ["test"]
+
+
+def compared_keys(names_of):
     """Run, category, elevation, fold, and one of the names that a run has, of every file."""
     return [
         (run, *fold, name)
         for run in compared_runs()
-        for fold in folds_of(REFERENCE_UNITS if units is None else units)
+        for fold in folds_of(UNITS)
         for name in names_of(run)
     ]
 
 
-def compared(path, names_of, units=None):
+def compared(path, names_of):
     """The files of all runs. Those of other runs are not made here; they have to be there."""
 
     def files(wildcards):
         return [
             run_file(run, path(Layout(f"results/{run}"), *place), "compared_runs")
-            for run, *place in compared_keys(names_of, units)
+            for run, *place in compared_keys(names_of)
         ]
 
     return files
-
-
-def estimated_roles(run):
-    theirs = run_settings(run).get("calibration", "holdout")
-    if theirs != CONFIG["calibration"]:
-        stop(
-            f"compared_runs: the run {run} has calibration={theirs}, this one "
-            f"{CONFIG['calibration']}, so their calibration objects differ; leave it out"
-        )
-    return ESTIMATED_ROLES
 
 
 # Trainings beyond the run's own.
