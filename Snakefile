@@ -69,7 +69,6 @@ include: "workflow/rules/bundles.smk"
 rule extensions:
     input:
         rules.leaderboard.output,
-        rules.extension_gains.output,
         rules.more_views.output,
         rules.travel.output,
 

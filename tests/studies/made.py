@@ -1,4 +1,4 @@
-"""Objects' errors and choices of several methods, made for the purpose."""
+"""Objects' errors of several methods, made for the purpose."""
 
 from __future__ import annotations
 
@@ -50,18 +50,6 @@ def object_rows(shifts=SHIFTS, categories=CATEGORIES, noise=0.1, n_objects=30):
 
 def blocks(shifts=SHIFTS, **rest):
     return blocks_of({"run": object_rows(shifts, **rest)})
-
-
-def choices(errors, categories=CATEGORIES):
-    """What `load_folds` reads of choices, with these cross-validated errors in every fold."""
-    rows = [
-        (category, 0, fold, method, error)
-        for category in categories
-        for fold in (1, 2)
-        for method, error in errors.items()
-    ]
-    columns = ["category", "elevation_deg", "fold", "method", "validated_error_deg"]
-    return pd.DataFrame(rows, columns=columns)
 
 
 def without(mapping, *names):

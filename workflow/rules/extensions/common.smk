@@ -51,18 +51,16 @@ def leaderboard_folds(wildcards):
     return keys
 
 
-def leaderboard_files(name):
-    """The extension files of that name, of every run."""
-
-    def files(wildcards):
-        return [
-            run_file(
-                run, Layout(f"results/{run}").extension(*fold, name), "leaderboard_runs"
-            )
-            for run, *fold in leaderboard_folds(wildcards)
-        ]
-
-    return files
+def leaderboard_files(wildcards):
+    """The objects' errors in every run."""
+    return [
+        run_file(
+            run,
+            Layout(f"results/{run}").extension(*fold, "objects"),
+            "leaderboard_runs",
+        )
+        for run, *fold in leaderboard_folds(wildcards)
+    ]
 
 
 # Conditions of transfer, and the files made under them.

@@ -1,10 +1,10 @@
-# All methods ranked, over this run or several, and what the extensions gain.
+# All methods ranked, over this run or several.
 
 
 rule leaderboard:
     input:
         sources("tabulate_leaderboard"),
-        objects=leaderboard_files("objects"),
+        objects=leaderboard_files,
     output:
         csv=LAYOUT.table("leaderboard", "csv"),
         md=LAYOUT.table("leaderboard", "md"),
@@ -26,31 +26,3 @@ rule leaderboard:
         caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_leaderboard.py"
-
-
-rule extension_gains:
-    input:
-        sources("tabulate_extension_gains"),
-        objects=leaderboard_files("objects"),
-        choices=leaderboard_files("choices"),
-    output:
-        csv=LAYOUT.table("extension_gains", "csv"),
-        md=LAYOUT.table("extension_gains", "md"),
-        tex=LAYOUT.table("extension_gains", "tex"),
-    log:
-        LAYOUT.log("extension_gains"),
-    benchmark:
-        LAYOUT.benchmark("extension_gains")
-    conda:
-        ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(10),
-    params:
-        folds=leaderboard_folds,
-        methods=METHODS | EXTENSIONS,
-        n_resamples=CONFIG["n_resamples"],
-        seed=CONFIG["seed"],
-        caution=CAUTION,
-    script:
-        f"{SCRIPTS}/tabulate_extension_gains.py"
