@@ -1,4 +1,4 @@
-"""Curves of extensions: error against travel, and against the number of views."""
+"""Tables and curves of error against the number of views, and against travel."""
 
 from __future__ import annotations
 
@@ -10,33 +10,75 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nbv.experiment.report.table import Table
-from nbv.labels import category_label, method_label
+from nbv.experiment.report.table import DECIDED, Cell, Table, difference_cell
+from nbv.experiment.statistics.object_means import mae_difference, mae_interval, paired_objects
+from nbv.experiment.statistics.paired import Resampler
+from nbv.files import existing, read_csv
+from nbv.labels import category_label, method_label, number
 from nbv.robot.style import RC, Panels, method_style, panel_grid
-from studies.blocks import rows_by_category
 from studies.travel import ANY_DIRECTION, pooled_travel
 
 _PRODUCT = "_product"
 _PANEL_IN = (3.4, 2.9)
 
 
-def _draw(axes: Axes, x: pd.Series, y: pd.Series, method: str, methods: tuple[str, ...]) -> None:
-    style = method_style(method, methods)
-    axes.plot(x, y, label=method_label(method), marker=style.marker, markersize=4, **style.curve)
+def read_rows(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFrame]:
+    """Read rows by category and fold; return each category's, with their ``fold``."""
+    parts: dict[str, list[pd.DataFrame]] = {}
+    for (category, fold), path in files.items():
+        parts.setdefault(category, []).append(read_csv(existing(path)).assign(fold=fold))
+    return {category: pd.concat(found) for category, found in parts.items()}
 
 
-def _add_key(grid: Panels) -> None:
-    named = {
-        label: handle
-        for axes in grid.panels
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    grid.add_key(list(named.values()))
+def more_views_table(rows_by_category: Mapping[str, pd.DataFrame], resampler: Resampler) -> Table:
+    """Return error and travel against the number of views, by category and policy.
+
+    The rows have `studies.more_views.COLUMNS` and ``fold``. The last column compares a
+    policy's three views with four at random.
+    """
+    cells, printed = [], []
+    views = sorted({n for rows in rows_by_category.values() for n in rows["n_views"]})
+    for category, rows in rows_by_category.items():
+        named = rows.assign(method=rows["method"] + "@" + rows["n_views"].astype(str))
+        sample = paired_objects(named, category)
+        travel = named.groupby("method")["travel_deg"].mean()
+        for method in dict.fromkeys(rows["method"]):
+            row, last = [Cell(f"{category_label(category)}: {method_label(method)}")], Cell("–")
+            for n_views in views:
+                name = f"{method}@{n_views}"
+                if name not in sample.errors_deg:
+                    row.append(Cell("–"))
+                    continue
+                found = mae_interval(sample, name, resampler)
+                made = {"category": category, "method": method, "n_views": n_views}
+                made |= found.columns("value", "ci") | {"travel_deg": travel[name]}
+                if n_views == 3 and method != "random" and "random@4" in sample.errors_deg:
+                    less = mae_difference(sample, name, "random@4", resampler)
+                    made |= less.columns("to_random_4")
+                    last = difference_cell(less.value, less.low, less.high)
+                cells.append(made)
+                row.append(Cell(number(found.value), after=f"[{travel[name]:.0f}°]"))
+            printed.append((*row, last))
+    header = ("Policy", *(f"{n} view{'s' if n > 1 else ''}" for n in views), "3 views − Random's 4")
+    notes = (
+        f"MAE in degrees [mean travel from view to view]; {_fusions(rows_by_category)}.",
+        f"Last column: paired by object, 95 % interval. {DECIDED}",
+        "Evenly spaced knows the number of views before the first view; its last one is shown.",
+    )
+    title = "Error and travel against the number of views"
+    return Table("more_views", title, title, pd.DataFrame(cells), header, tuple(printed), notes)
+
+
+def _fusions(rows_by_category: Mapping[str, pd.DataFrame]) -> str:
+    methods = {method for rows in rows_by_category.values() for method in rows["method"]}
+    if any(method.endswith("_product") for method in methods):
+        return "fused by posterior, or by product where the policy's name says so"
+    return "all fused by posterior"
 
 
 @mpl.rc_context(RC)
 def more_views_figure(cells: pd.DataFrame) -> Figure:
-    """Draw the cells of `more_views.more_views_table`, a panel for each category and fusion."""
+    """Draw the cells of `more_views_table`, a panel for each category and fusion."""
     by_product = cells["method"].str.endswith(_PRODUCT)
     drawn = cells.assign(by_product=by_product, policy=cells["method"].str.removesuffix(_PRODUCT))
     policies = tuple(dict.fromkeys(drawn["policy"]))
@@ -63,7 +105,7 @@ def travel_curves(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFra
     """
     return {
         category: pooled_travel({int(str(fold)): part for fold, part in rows.groupby("fold")})
-        for category, rows in rows_by_category(files).items()
+        for category, rows in read_rows(files).items()
     }
 
 
@@ -92,3 +134,17 @@ def travel_table(curves: Mapping[str, pd.DataFrame]) -> Table:
     cells = pd.concat([curve.assign(category=category) for category, curve in curves.items()])
     title = "Error against travel"
     return Table("travel", title, title, cells, header=(), rows=(), decimals=6)
+
+
+def _draw(axes: Axes, x: pd.Series, y: pd.Series, method: str, methods: tuple[str, ...]) -> None:
+    style = method_style(method, methods)
+    axes.plot(x, y, label=method_label(method), marker=style.marker, markersize=4, **style.curve)
+
+
+def _add_key(grid: Panels) -> None:
+    named = {
+        label: handle
+        for axes in grid.panels
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    grid.add_key(list(named.values()))

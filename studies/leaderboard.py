@@ -1,8 +1,14 @@
-"""All methods on all data sets."""
+"""All methods on all data sets.
+
+Methods are compared within a block: the objects' errors of one run and category. The
+configuration's methods and extensions come as one mapping of a name to its ``policy`` and its
+``fusion``, which is the average where it is not given. Names say nothing.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,20 +16,57 @@ from scipy import stats
 
 from nbv.experiment.report.table import Cell, Table
 from nbv.experiment.statistics.metrics import Floats
-from nbv.experiment.statistics.object_means import indistinct_from_best, mae_difference
-from nbv.experiment.statistics.paired import Resampler
-from nbv.labels import category_label, number
-from studies.blocks import (
-    CELL_COLUMNS,
-    ORACLE,
-    SELECTED,
-    SUBJECT,
-    Blocks,
-    Methods,
-    block_cell,
-    method_with,
-    shared_methods,
+from nbv.experiment.statistics.object_means import (
+    indistinct_from_best,
+    mae_difference,
+    mae_interval,
+    paired_objects,
 )
+from nbv.experiment.statistics.paired import PairedErrors, Resampler
+from nbv.labels import category_label, number
+
+Block = tuple[str, str]
+"""A run and a category."""
+
+Blocks = Mapping[Block, PairedErrors]
+Methods = Mapping[str, Mapping[str, str]]
+
+_ORACLE = "oracle"
+_SELECTED = "selected"
+_SUBJECT = "proposed"
+
+_COLUMNS = (
+    "run",
+    "category",
+    "method",
+    "value",
+    "ci_low",
+    "ci_high",
+    "among_best",
+    "versus",
+    "difference",
+    "difference_low",
+    "difference_high",
+    "n_objects",
+)
+
+
+def blocks_of(
+    runs: Mapping[str, pd.DataFrame], elevation_deg: int = 0
+) -> dict[Block, PairedErrors]:
+    """Return the objects' errors of each run and category at its reference elevation.
+
+    Where a category was not run at it, its lowest one is taken. ``runs`` has by a run's name what
+    `nbv.experiment.statistics.object_means.load_folds` read of ``objects.csv``.
+    """
+    blocks = {}
+    for run, means in runs.items():
+        for category, rows in means.groupby("category", sort=False):
+            present = rows["elevation_deg"].unique()
+            taken = elevation_deg if elevation_deg in present else present.min()
+            at = rows[rows["elevation_deg"] == taken]
+            blocks[run, str(category)] = paired_objects(at, str(category))
+    return blocks
 
 
 def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) -> Table:
@@ -32,15 +75,15 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
     Bold is the lowest of a column. An asterisk marks what is above it with the whole interval of
     the difference. Oracles are bounds and are not ranked.
     """
-    shown = shared_methods(blocks, methods)
-    ranked = [method for method in shown if methods[method]["policy"] != ORACLE]
-    opposite = method_with(methods, "opposite", "average")
+    shown = _shared_methods(blocks, methods)
+    ranked = [method for method in shown if methods[method]["policy"] != _ORACLE]
+    opposite = _method_with(methods, "opposite", "average")
     cells, texts = [], {method: [Cell(method.replace("_", " "))] for method in shown}
     for block, sample in blocks.items():
         best = indistinct_from_best(sample, ranked, resampler)
         for method in shown:
-            made = block_cell(block, method, sample, resampler) | {"among_best": method in best}
-            versus = opposite if method != opposite else SUBJECT
+            made = _block_cell(block, method, sample, resampler) | {"among_best": method in best}
+            versus = opposite if method != opposite else _SUBJECT
             if versus in shown:
                 found = mae_difference(sample, method, versus, resampler)
                 made |= {"versus": versus, **found.columns("difference")}
@@ -60,7 +103,7 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
         "excludes 0. Oracles know the truth: they are bounds and are not ranked.",
         *_rank_notes(methods, dict(zip(ranked, errors.T, strict=True)), ranks),
     )
-    frame = pd.DataFrame(cells, columns=list(CELL_COLUMNS))
+    frame = pd.DataFrame(cells, columns=list(_COLUMNS))
     return Table("leaderboard", "Leaderboard", "Leaderboard", frame, header, tuple(rows), notes)
 
 
@@ -73,8 +116,8 @@ def _rank_notes(methods: Methods, mae: Mapping[str, Floats], ranks: Floats) -> I
         f"Friedman test over {n_blocks} columns that all methods rank alike: "
         f"p = {friedman.pvalue:.2g}."
     )
-    selected = method_with(methods, SELECTED, SELECTED)
-    for versus in (method_with(methods, "opposite", SELECTED), SUBJECT):
+    selected = _method_with(methods, _SELECTED, _SELECTED)
+    for versus in (_method_with(methods, "opposite", _SELECTED), _SUBJECT):
         if selected and versus and {selected, versus} <= mae.keys():
             gaps = mae[selected] - mae[versus]
             if gaps.any():
@@ -83,3 +126,36 @@ def _rank_notes(methods: Methods, mae: Mapping[str, Floats], ranks: Floats) -> I
                     f"{versus.replace('_', ' ')}: p = {stats.wilcoxon(gaps).pvalue:.2g} (with "
                     f"{n_blocks} columns no less than {2 ** (1 - n_blocks):.2g} is possible)."
                 )
+
+
+def _shared_methods(blocks: Blocks, methods: Methods) -> list[str]:
+    """Return the methods of the configuration that every block has.
+
+    Of several with the same policy and fusion, only the first is ranked: they are one method.
+    """
+    first = next(iter(blocks.values()))
+    everywhere = [m for m in first.errors_deg if all(m in s.errors_deg for s in blocks.values())]
+    named = {
+        _method_with(methods, m["policy"], m.get("fusion", "average")) for m in methods.values()
+    }
+    return [method for method in everywhere if method in named]
+
+
+def _method_with(methods: Methods, policy: str, fusion: str) -> str | None:
+    """Return the first method that has a policy and a fusion, or None."""
+    for name, method in methods.items():
+        if (method["policy"], method.get("fusion", "average")) == (policy, fusion):
+            return name
+    return None
+
+
+def _block_cell(
+    block: Block, method: str, sample: PairedErrors, resampler: Resampler
+) -> dict[str, Any]:
+    """Return the tidy cell of a method's MAE in a block."""
+    run, category = block
+    return (
+        dict.fromkeys(_COLUMNS, np.nan)
+        | {"run": run, "category": category, "method": method, "n_objects": sample.n_objects}
+        | mae_interval(sample, method, resampler).columns("value", "ci")
+    )

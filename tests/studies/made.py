@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from studies.blocks import blocks_of
+from studies.leaderboard import blocks_of
 
 from nbv.experiment.statistics.object_means import OBJECT_COLUMNS
 

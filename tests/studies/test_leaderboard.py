@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
-from studies.blocks import blocks_of
-from studies.leaderboard import leaderboard_table
+from studies.leaderboard import blocks_of, leaderboard_table
 
 from nbv.experiment.statistics.paired import Resampler
 

@@ -4,8 +4,7 @@ from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
-    from studies.blocks import blocks_of
-    from studies.leaderboard import leaderboard_table
+    from studies.leaderboard import blocks_of, leaderboard_table
 
     from nbv.experiment.layout import files_by_run
     from nbv.experiment.report.table import write_table

@@ -4,9 +4,7 @@ from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
-    from studies.blocks import rows_by_category
-    from studies.curves import more_views_figure
-    from studies.more_views_table import more_views_table
+    from studies.curves import more_views_figure, more_views_table, read_rows
 
     from nbv.experiment.report.table import write_table
     from nbv.experiment.statistics.paired import Resampler
@@ -15,7 +13,7 @@ with job(snakemake):
     params, output = snakemake.params, snakemake.output
     files = dict(zip(params.folds, snakemake.input.rows, strict=True))
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
-    table = more_views_table(rows_by_category(files), resampler)
+    table = more_views_table(read_rows(files), resampler)
     paths = {kind: output[kind] for kind in ("csv", "md", "tex")}
     write_table(table, paths, params.caution)
     paths = {kind: output[kind] for kind in ("png", "pdf", "svg")}
