@@ -6,7 +6,7 @@ import functools
 from nbv.experiment.config import load_condition, read_configuration
 from studies.kept_estimates import kept_settings
 
-REPLICATES = [
+TRAININGS = [
     (shuffle, replicate)
     for shuffle, replicates in enumerate(CONFIG["confirmation"]["replicates"])
     for replicate in replicates
@@ -200,7 +200,7 @@ def kept_runs():
     if not CONFIG["confirmation"]["kept"]:
         keys = [
             (shuffle, replicate, *unit)
-            for shuffle, replicate in REPLICATES
+            for shuffle, replicate in TRAININGS
             for unit in LOWEST_UNITS
         ]
         own = KeptRun(None, keys, dataset_name(CONFIG))

@@ -123,7 +123,7 @@ rule keep_estimates:
 rule join_kept_estimates:
     input:
         sources("join_kept_estimates"),
-        kept=paths(LAYOUT.kept_estimates, REPLICATES),
+        kept=paths(LAYOUT.kept_estimates, TRAININGS),
     output:
         LAYOUT.all_kept_estimates,
     log:
