@@ -385,7 +385,6 @@ FOR_MORE_VIEWS = ("information_gain", "expected_dispersion", "bayes_error")
 """Criteria that are defined after any number of views."""
 
 
-
 def cost_unit(criterion: str, settings: Mapping[str, Any]) -> str:
     """Return the unit of a criterion's cost: ``nats``, ``degrees`` or ``1``.
 

@@ -61,12 +61,6 @@ class Posteriors:
         """p(class | image), (n, n_views, k): `LEAST_PROBABILITY` or more, before it sums to 1."""
         return floored(np.exp(self.log_posterior.astype(np.float64)))
 
-    @property
-    def as_trained(self) -> Floats:
-        """The log of the distributions at a temperature of 1, (n, n_views, k)."""
-        logits = self.log_posterior.astype(np.float64) * self.temperature
-        return log_softmax(logits)
-
 
 def posteriors_of(object_ids: Sequence[str], logits: Floats, temperature: float) -> Posteriors:
     """Return the distributions softmax(logits / temperature) of full turns (n, n_views, k)."""
