@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -76,23 +75,6 @@ def choose_hardware(device: str = "auto", precision: str = "auto") -> Hardware:
     return Hardware(torch.device(device), getattr(torch, precision))
 
 
-# Of glibc's malloc.h.
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
-
-
-def _keep_freed_memory() -> None:
-    """Have the C library reuse large blocks instead of handing them back to the system.
-
-    Otherwise every batch gets its activations as fresh pages, which the system first fills with
-    zeros: a quarter of the time of training. Only glibc has these settings; elsewhere nothing
-    happens.
-    """
-    with contextlib.suppress(OSError, AttributeError):
-        adjust = ctypes.CDLL(None).mallopt
-        adjust(_M_MMAP_THRESHOLD, 2**30)
-        adjust(_M_TRIM_THRESHOLD, 2**31 - 1)
-
-
 def use_one_thread() -> None:
     """Make torch compute on one thread and deterministically.
 
@@ -108,7 +90,6 @@ def use_one_thread() -> None:
     torch.set_deterministic_debug_mode("warn")
     # Filling memory that is about to be written finds faults; results are the same without.
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
-    _keep_freed_memory()
 
 
 def to_input(codes: NDArray[np.uint8], hardware: Hardware) -> torch.Tensor:

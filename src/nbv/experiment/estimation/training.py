@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
 import time
 from collections.abc import Mapping, Sequence
@@ -113,7 +112,7 @@ def train_network(
     targets = torch.from_numpy(np.tile(of_one, (n_objects, 1))).to(hardware.device)
     n_images, batch_size, n_epochs = len(images), settings["batch_size"], settings["epochs"]
     batches = max(n_images // batch_size, 1)
-    optimiser = _AdamW(
+    optimiser = torch.optim.AdamW(
         network.parameters(),
         lr=settings["learning_rate"],
         weight_decay=settings["weight_decay"],
@@ -154,16 +153,6 @@ def train_network(
     # The benchmark compares a run with bare steps by this line.
     log.info(STEPS_TAKEN, n_epochs * batches, time.process_time() - computing)
     return network.eval()
-
-
-class _AdamW(torch.optim.AdamW):
-    """AdamW without what torch wraps around these two methods for its compiler.
-
-    The wrappers import the compiler, which nothing here uses: a second of each training.
-    """
-
-    add_param_group = inspect.unwrap(torch.optim.Optimizer.add_param_group)
-    step = torch.no_grad()(inspect.unwrap(torch.optim.AdamW.step))
 
 
 def _set_weights(network: nn.Module, start: nn.Module) -> None:
