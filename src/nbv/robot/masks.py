@@ -61,8 +61,8 @@ def window_of(mask: Mask) -> tuple[Window, tuple[slice, slice]]:
 
 def _span(inside: np.bool_ | Mask) -> slice:
     """Return the slice from the first to the last that is inside (n,)."""
-    places = inside.tobytes()
-    return slice(max(places.find(1), 0), places.rfind(1) + 1)
+    places = np.flatnonzero(inside)
+    return slice(int(places[0]), int(places[-1]) + 1) if places.size else slice(0, 0)
 
 
 def object_mask(
