@@ -291,6 +291,8 @@ def recommend(
         answer = replace(answer, warnings=(*answer.warnings, *rolled))
     targets = target_poses((move.rotation_deg for move in answer.moves), place)
     if plot is not None:
+        # An unknown one ends the import of matplotlib.
+        os.environ.pop("MPLBACKEND", None)
         from nbv.robot.plot import draw_recommendation
 
         draw_recommendation(answer, plot, recommender.bundle.category)

@@ -27,6 +27,8 @@ FOR, OPEN, AGAINST = "#00664a", "#6b5500", "#9c2a00"
 """What a difference says: for, undecided, against."""
 
 RC: Any = {
+    # A matplotlibrc of the user does not matter.
+    **{key: value for key, value in mpl.rcParamsDefault.items() if key != "backend"},
     # The first is matplotlib's own. Verdana is as wide, where an SVG file is read without it.
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"],
