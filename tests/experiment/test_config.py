@@ -235,67 +235,6 @@ def test_a_mistake_is_one_line_with_its_key(override, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("override", "message"),
-    [
-        ("contenders.x={rotation: fixed}", "configuration key 'contenders' is now 'extensions'"),
-        ("beside=[a]", "configuration key 'beside' is now 'compared_runs'"),
-        ("sequence.n_views=3", "configuration key 'sequence' is now 'more_views'"),
-        ("density.reading=given_truth", "'density.reading' is now 'density.pose_likelihood'"),
-        ("methods.proposed.rotation=fixed", "rotation' is now 'methods.proposed.policy'"),
-        ("extensions.x={rotation: fixed}", "'extensions.x.rotation' is now 'extensions.x.policy'"),
-        ("methods.proposed.policy=entropy", "policy 'entropy' is now 'pose_ambiguity'"),
-        ("extensions.x={policy: chosen}", "extensions.x.policy: policy 'chosen' is now 'selected'"),
-        ("extensions.selected.fusion=chosen", "fusion 'chosen' is now 'selected'"),
-    ],
-)
-def test_an_earlier_name_is_one_line_with_the_new_name(override, message):
-    with pytest.raises(UserError) as caught:
-        load_config(CONFIG, [override])
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_file_with_an_earlier_name_is_one_line_with_the_new_name(tmp_path):
-    shutil.copytree(CONFIG, tmp_path / "config")
-    decision = tmp_path / "config/density/decision.yaml"
-    decision.write_text(decision.read_text().replace("pose_likelihood", "reading"))
-    with pytest.raises(UserError, match=r"'density\.reading' is now 'density\.pose_likelihood'"):
-        load_config(tmp_path / "config")
-
-
-EARLIER = """
-n_folds: 5
-methods: {proposed: {rotation: entropy, fusion: average}, rotation: {rotation: none}}
-contenders: {chosen: {rotation: chosen, fusion: chosen}}
-density: {reading: given_truth, spread: entropy}
-sequence: {n_views: 5}
-beside: [entropy]
-elevations_deg: {sequence: [0]}
-estimator: {kind: classifier, n_classes: 120}
-dropped: {key: 1}
-"""
-
-
-def test_a_kept_configuration_is_read_under_the_names_of_today(tmp_path):
-    (tmp_path / "configuration.yaml").write_text(EARLIER)
-    assert read_configuration(tmp_path) == {
-        "n_folds": 5,
-        "methods": {
-            "proposed": {"policy": "pose_ambiguity", "fusion": "average"},
-            "rotation": {"policy": "none"},
-        },
-        "extensions": {"chosen": {"policy": "selected", "fusion": "selected"}},
-        "density": {"pose_likelihood": "given_truth", "spread": "entropy"},
-        "more_views": {"n_views": 5},
-        "compared_runs": ["entropy"],
-        "elevations_deg": {"sequence": [0]},
-        "estimator": {"kind": "classifier", "n_classes": 120},
-        "dropped": {"key": 1},
-        "gives_distributions": True,
-    }
-
-
 def test_a_kept_reference_has_the_settings_of_today():
     kept, ours = read_configuration(ROOT / "docs/reference/paper"), load_config(CONFIG)
     same = ("methods", "density", "more_views", "gives_distributions")

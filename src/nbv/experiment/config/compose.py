@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from nbv.errors import UserError, nearest
-from nbv.experiment.config.keys import one_line, shortened, type_of, with_new_names
+from nbv.experiment.config.keys import one_line, shortened, type_of
 from nbv.experiment.config.schema import Config
 from nbv.files import existing
 
@@ -226,9 +226,8 @@ def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
     """Turn what came with Snakemake's ``--config`` into Hydra overrides.
 
     That is ``key=value`` pairs such as ``experiment=quick`` (`SHORT_NAMES` are known), and
-    ``overrides``, a list (or one
-    string) of Hydra overrides for keys that Snakemake's command line cannot spell. ``verbose`` is
-    no setting of the configuration (`nbv.experiment.jobs.is_verbose`).
+    ``overrides``, a list (or one string) of Hydra overrides for keys that Snakemake's command line
+    cannot spell.
 
     Raises
     ------
@@ -237,7 +236,7 @@ def snakemake_overrides(given: Mapping[str, Any]) -> list[str]:
     """
     overrides = []
     for key, value in given.items():
-        if key in ("overrides", "verbose"):
+        if key == "overrides":
             continue
         if key in SHORT_NAMES:
             items = value if isinstance(value, list) else _items(str(value))
@@ -279,7 +278,7 @@ def _items(text: str) -> list[str]:
 
 
 def read_configuration(root: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
-    """Read ``configuration.yaml`` of a run or reference as plain values, under today's names.
+    """Read ``configuration.yaml`` of a run or reference as plain values.
 
     What it says is checked as of `load_config`. It may lack keys, which are younger than it, and
     may have others.
@@ -297,7 +296,7 @@ def read_configuration(root: Path, needed: Sequence[str] = ()) -> dict[str, Any]
         One line that names the file and what is wrong with it.
     """
     path = existing(root / "configuration.yaml")
-    settings = with_new_names(read_mapping(path))
+    settings = read_mapping(path)
     try:
         for key in ("n_folds", *needed):
             if key not in settings:

@@ -1,4 +1,4 @@
-"""Dotted keys: type, default and new name of each, and the one line that refuses a mistake."""
+"""Type and default of each dotted key, and the one line that refuses a mistake."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from nbv.errors import UserError, nearest
-from nbv.experiment.config.schema import NAME_RULE, RENAMED_KEYS, RENAMED_VALUES, Config
+from nbv.experiment.config.schema import NAME_RULE, Config
 
 _BOUNDS = ("ge", "gt", "le", "lt", "min_length", "max_length")
 _RANGES = {
@@ -42,7 +42,7 @@ def type_of(parts: Sequence[str | int]) -> tuple[Any, list[Any]]:
     Raises
     ------
     UserError
-        For an unknown key: one line with its new name or the nearest key.
+        For an unknown key: one line with the nearest key.
     """
     kind: Any = Config
     marks: list[Any] = []
@@ -83,26 +83,9 @@ def default_of(key: str, otherwise: Any) -> Any:
     return otherwise
 
 
-def with_new_names(settings: Mapping[str, Any], above: Sequence[str] = ()) -> dict[str, Any]:
-    """Return settings, those below a key or all, with earlier keys and values renamed."""
-    fields = fields_of(type_of(above)[0])
-    renamed: dict[str, Any] = {}
-    for key, value in settings.items():
-        new = RENAMED_KEYS[key] if key not in fields and RENAMED_KEYS.get(key) in fields else key
-        if isinstance(value, Mapping) and (new in fields or not fields):
-            renamed[new] = with_new_names(value, (*above, new))
-        elif isinstance(value, str) and new in fields:
-            renamed[new] = RENAMED_VALUES.get(new, {}).get(value, value)
-        else:
-            renamed[new] = value
-    return renamed
-
-
 def _unknown_key(parts: Sequence[str | int], fields: Mapping[str, FieldInfo]) -> str:
-    *above, name = parts
-    written, new = _dotted(parts), RENAMED_KEYS.get(str(name), "")
-    if new in fields:
-        return f"configuration key {written!r} is now {_dotted([*above, new])!r}"
+    *above, _ = parts
+    written = _dotted(parts)
     meant = nearest(written, [_dotted([*above, known]) for known in fields])
     hint = meant if fields else "a value has no keys"
     return f"configuration key {shortened(written)!r} is unknown: {hint}"

@@ -12,7 +12,6 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    ValidationInfo,
     field_validator,
     model_validator,
 )
@@ -50,7 +49,7 @@ def _with_known_home(path: str) -> str:
 
 Whole = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(strict=True)]
-# Far above any use, and small enough for arithmetic; `nbv.experiment.config.memory` refuses what is too much.
+# Far above any use, and small enough for arithmetic.
 Count = Annotated[Whole, Field(ge=1, le=10**12)]
 Epochs = Annotated[Whole, Field(ge=1, le=10**6)]
 LearningRate = Annotated[Number, Field(gt=0, le=10)]
@@ -74,21 +73,6 @@ Framing = Literal["silhouette", "axis"]
 
 FEWEST_PIXELS = 4
 """Of an object's diagonal in an image: fewer show nothing of where it is seen from."""
-
-RENAMED_KEYS = {
-    "contenders": "extensions",
-    "beside": "compared_runs",
-    "sequence": "more_views",
-    "reading": "pose_likelihood",
-    "rotation": "policy",
-}
-"""New names of earlier keys, in sections that have the new key and not the earlier one."""
-
-RENAMED_VALUES = {
-    "policy": {"entropy": "pose_ambiguity", "chosen": "selected"},
-    "fusion": {"chosen": "selected"},
-}
-"""New names of earlier values, by their key."""
 
 
 class Section(BaseModel):
@@ -252,14 +236,6 @@ class Method(Section):
 
     policy: str
     fusion: str = "average"
-
-    @field_validator("policy", "fusion")
-    @classmethod
-    def _check_name_is_new(cls, value: str, info: ValidationInfo) -> str:
-        key = str(info.field_name)
-        if value in RENAMED_VALUES[key]:
-            raise ValueError(f"{key} {value!r} is now {RENAMED_VALUES[key][value]!r}")
-        return value
 
 
 class Confirmation(Section):
