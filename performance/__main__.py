@@ -19,11 +19,9 @@ BENCHMARKS = (
     "training",
     "lookup",
     "evaluation",
-    "recommendation",
     "frames",
     "extensions",
     "workflow",
-    "growth",
 )
 
 

@@ -59,13 +59,6 @@ def take_turns(
     return Turns(np.array(rounds))
 
 
-def growth_exponent(sizes: Sequence[float], turns: Turns) -> float:
-    """Return b of the best time = a · size^b on logarithmic axes: the median over rounds."""
-    x = np.log(np.asarray(sizes, dtype=float))
-    slopes = [float(np.polyfit(x, np.log(row), 1)[0]) for row in turns.rounds]
-    return float(np.median(slopes))
-
-
 @contextmanager
 def on_one_core() -> Iterator[None]:
     """Keep the process, and threads that libraries start meanwhile, on one core where possible."""

@@ -22,7 +22,6 @@ from nbv.experiment.estimation.weights import Estimator, Start
 log = logging.getLogger(__name__)
 
 PROGRESS_SECONDS = 5.0
-STEPS_TAKEN = "%d steps took %.2f s of processor time"
 
 
 @dataclass(frozen=True)
@@ -125,7 +124,6 @@ def train_network(
     log.info("training on %d images of %d objects (%s)", n_images, n_objects, hardware)
     progress = Progress(n_epochs, n_images, time.perf_counter())
     reported = progress.started
-    computing = time.process_time()
     network.train()
     for epoch in range(n_epochs):
         permutation = torch.randperm(n_images, generator=order).to(hardware.device)
@@ -150,8 +148,6 @@ def train_network(
                 reported = now
         _need_finite(network, running, epoch, settings)
         progress.report(epoch, n_images, float(running) / batches)
-    # The benchmark compares a run with bare steps by this line.
-    log.info(STEPS_TAKEN, n_epochs * batches, time.process_time() - computing)
     return network.eval()
 
 
