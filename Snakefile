@@ -20,7 +20,6 @@ report: "workflow/report/run.rst"
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/progress.smk"
 
 
 localrules:
@@ -74,22 +73,15 @@ rule extensions:
 
 
 onstart:
-    lift_rate_limit()
     forget_last_error()
-    follow_run()
     banner(
         f"nbv: experiment {CONFIG['experiment']}, data set {CONFIG['dataset']['source']}, "
         f"{len(UNITS)} units of {CONFIG['n_folds']} folds",
-        *([PROGRESS.first_estimate()] if PROGRESS else []),
         f"results: {LAYOUT.root}/    logs: {LAYOUT.logs}/",
     )
-    if PROGRESS:
-        PROGRESS.begin()
 
 
 onsuccess:
-    if PROGRESS:
-        PROGRESS.end()
     banner(
         "nbv: finished",
         f"results: {LAYOUT.root}/"
@@ -104,8 +96,6 @@ onsuccess:
 
 
 onerror:
-    if PROGRESS:
-        PROGRESS.end()
     banner(
         "nbv: stopped",
         *why_stopped(LAYOUT.logs, STARTED, log),

@@ -14,7 +14,7 @@ import pytest
 
 from nbv.errors import UserError
 from nbv.experiment.checksums import write_checksum
-from nbv.experiment.jobs import NO_SPACE, is_verbose, job, why_stopped
+from nbv.experiment.jobs import NO_SPACE, job, why_stopped
 
 
 @pytest.fixture
@@ -25,7 +25,6 @@ def snakemake(tmp_path):
         log=[str(tmp_path / "logs" / "train" / "mug.log")],
         rule="train",
         wildcards=["mug", "00"],
-        config={},
     )
     root = logging.getLogger()
     for handler in root.handlers[:]:
@@ -94,30 +93,18 @@ def test_a_crash_keeps_its_traceback_in_the_log_alone(snakemake, capsys):
     assert "Traceback" in Path(snakemake.log[0]).read_text()
 
 
-def test_progress_goes_to_the_log_and_with_verbose_to_the_terminal(snakemake, capsys):
+def test_progress_goes_to_the_log_and_once_a_minute_to_the_terminal(snakemake, capsys, monkeypatch):
+    clock_s = [1000.0]
+    monkeypatch.setattr("nbv.experiment.jobs.time.monotonic", lambda: clock_s[0])
     with job(snakemake):
-        logging.getLogger("nbv.experiment.estimation").info("epoch 1")
+        for epoch in range(1, 10):
+            clock_s[0] += 20.0
+            logging.getLogger("nbv.experiment.estimation").info("epoch %d", epoch)
         logging.getLogger("nbv.experiment.estimation").warning("no depth")
         logging.getLogger("nbv.experiment.reference").info("agrees", extra={"for_terminal": True})
-    printed = capsys.readouterr().err
-    assert "epoch 1" not in printed
-    assert "train mug/00] no depth" in printed
-    assert "train mug/00] agrees" in printed
-    logged = Path(snakemake.log[0]).read_text()
-    assert logged.index("epoch 1") < logged.index("no depth") < logged.index("agrees")
-    snakemake.config = {"verbose": True}
-    with job(snakemake):
-        logging.getLogger("nbv.experiment.estimation").info("epoch 1")
-    assert "train mug/00] epoch 1" in capsys.readouterr().err
-
-
-def test_verbose_is_true_or_false():
-    assert not is_verbose({})
-    assert is_verbose({"verbose": True})
-    assert is_verbose({"verbose": "true"})
-    assert not is_verbose({"verbose": "false"})
-    with pytest.raises(UserError, match="--config verbose=maybe: write true or false"):
-        is_verbose({"verbose": "maybe"})
+    shown = [line.partition("] ")[2] for line in capsys.readouterr().err.splitlines()]
+    assert shown == ["epoch 3", "epoch 6", "epoch 9", "no depth", "agrees"]
+    assert Path(snakemake.log[0]).read_text().count("epoch") == 9
 
 
 def test_inputs_are_held_to_their_checksums_and_outputs_get_theirs(

@@ -16,11 +16,7 @@ except ModuleNotFoundError:
 from nbv import provenance
 from nbv.robot.pair_distributions import need_classes
 from nbv.robot.pairs import objects_of_pairs
-from nbv.experiment.config import (
-    load_config,
-    snakemake_overrides,
-)
-from nbv.experiment.config.memory import available_bytes, check_memory
+from nbv.experiment.config import load_config, snakemake_overrides
 from nbv.errors import UserError
 from nbv.experiment.estimation.warm_start import (
     PRETRAINED,
@@ -44,27 +40,13 @@ from nbv.data.sensors import SENSORS, check_sensor, sensor_settings
 
 BASE = Path(workflow.basedir)
 STARTED = time.time()
-# Held until this process ends.
+# Held until this process ends, so it has a name.
 RUN_LOCK = hold_lock(Path(".snakemake"))
 
 
 def stop(message):
     """End with one line: nothing has been started yet."""
     sys.exit(f"nbv: error: {message}")
-
-
-def tell(message):
-    """Print a line, but not once more in each job that parses the workflow again."""
-    if workflow.is_main_process:
-        print(f"nbv: {message}", file=sys.stderr, flush=True)
-
-
-if RUN_LOCK.removed:
-    tell("the run before was killed; its lock is removed")
-if RUN_LOCK.others:
-    tell(
-        "another run is working in this folder; one cannot make the files of the other"
-    )
 
 
 def selected_objects(category):
@@ -101,11 +83,6 @@ try:
     METHODS, EXTENSIONS = CONFIG["methods"], CONFIG["extensions"]
     check_methods(METHODS, EXTENSIONS, CONFIG["gives_distributions"])
     check_sensor(CONFIG["sensor"], CATEGORIES)
-    # Jobs run here unless a number of jobs elsewhere was given, or this is such a job.
-    MEMORY = available_bytes(
-        is_local=workflow.is_main_process and workflow.resource_settings.nodes is None
-    )
-    check_memory(CONFIG, CONFIG["n_objects"] or 0, MEMORY)
     if EXTERNAL:
         need_classes(CONFIG["estimator"]["pairs"], CONFIG["estimator"].get("n_classes"))
     OBJECTS = (
@@ -116,7 +93,6 @@ try:
         if EXTERNAL
         else {category: selected_objects(category) for category in CATEGORIES}
     )
-    check_memory(CONFIG, max(map(len, OBJECTS.values())), MEMORY)
 except UserError as error:
     stop(error)
 except OSError as error:
@@ -434,19 +410,6 @@ def per_attempt(amount):
 def banner(*lines):
     line = "-" * 72
     print("\n".join(["", line, *lines, line]), file=sys.stderr, flush=True)
-
-
-def lift_rate_limit():
-    """Let local jobs start as they can.
-
-    Snakemake 9.27's rate limit starts a timer after each round of scheduling, and each timer
-    starts another round while jobs are ready: 10,153 rounds instead of 303 for 302 jobs, 12.6 s
-    of processor time instead of 6.1 s. No setting avoids it: a larger limit changes little
-    (9,688 rounds), a longer time span delays the end by its length. The limit exists once the
-    run starts.
-    """
-    if workflow.local_exec:
-        workflow.scheduler.job_rate_limiter = None
 
 
 def forget_last_error():

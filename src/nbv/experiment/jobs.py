@@ -12,7 +12,8 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+import time
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,8 +24,7 @@ from nbv.experiment.processes import end_with_snakemake
 
 log = logging.getLogger(__name__)
 
-ERASE_LINE = "\r\x1b[K"
-"""Goes back to the start of a terminal's row and empties it."""
+_SECONDS_BETWEEN_MESSAGES = 60
 _FINISHED, _FAILED, _STOPPED = "processor time", "error: ", "stopped"
 LAST_ERROR = "last_error.txt"
 """In the folder of a run's logs: the line of the job that failed last."""
@@ -42,8 +42,8 @@ _FOR_THE_USER: dict[int | None, str] = {
 def job(snakemake: Any) -> Iterator[None]:
     """Log a job's progress to its log file; end it with one line on an error.
 
-    The terminal, on which `nbv.progress` shows how far the run is, gets warnings, errors and what
-    is marked ``extra={"for_terminal": True}``; with ``--config verbose=true`` everything.
+    The terminal gets warnings, errors, what is marked ``extra={"for_terminal": True}``, and of the
+    progress one message a minute.
 
     The inputs are held to their checksums before, and the outputs get theirs after. A job whose
     Snakemake was killed ends as well.
@@ -62,10 +62,12 @@ def job(snakemake: Any) -> Iterator[None]:
     """
     path = Path(snakemake.log[0])
     label = " ".join([snakemake.rule, "/".join(snakemake.wildcards)]).strip()
-    _log_to(path, label, is_verbose(snakemake.config))
+    _log_to(path, label)
     end_with_snakemake()
     # Imports make 200,000 objects and no garbage: the search for it took an eighth of their time.
     gc.set_threshold(100_000)
+    # Figures need none, and an unknown one ends the import of matplotlib.
+    os.environ.pop("MPLBACKEND", None)
     try:
         for file in snakemake.input:
             checksums.check(file)
@@ -89,21 +91,6 @@ def job(snakemake: Any) -> Iterator[None]:
     else:
         # Snakemake's benchmark only samples it; `nbv.experiment.report.runtime` reads this line.
         log.info(f"{_FINISHED} %.2f s", sum(os.times()[:4]), extra={"log_only": True})
-
-
-def is_verbose(config: Mapping[str, Any]) -> bool:
-    """Say whether ``--config verbose=true`` asked for every message on the terminal.
-
-    Raises
-    ------
-    UserError
-        For a value that is neither true nor false.
-    """
-    # Snakemake's command line hands over "true" as text and "True" as a bool.
-    verbose = str(config.get("verbose", False))
-    if verbose.lower() not in ("true", "false"):
-        raise UserError(f"--config verbose={verbose}: write true or false")
-    return verbose.lower() == "true"
 
 
 def why_stopped(
@@ -156,11 +143,10 @@ def _has_end(path: Path) -> bool:
     return any(end in line for end in ends for line in lines[-1:])
 
 
-def _log_to(path: Path, label: str, verbose: bool) -> None:
+def _log_to(path: Path, label: str) -> None:
     to_terminal = logging.StreamHandler(sys.stderr)
-    to_terminal.addFilter(lambda record: _is_for_terminal(record, verbose))
-    # The run's own line stands there.
-    _add_handler(to_terminal, label, ERASE_LINE if sys.stderr.isatty() else "")
+    to_terminal.addFilter(_ForTerminal())
+    _add_handler(to_terminal, label)
     # A full disk makes every write to the log fail; logging would print a traceback for each.
     logging.raiseExceptions = False
     for noisy in ("matplotlib", "fontTools", "trimesh", "OpenGL"):
@@ -173,15 +159,23 @@ def _log_to(path: Path, label: str, verbose: bool) -> None:
         _fail(f"{path}: {reason}", path)
 
 
-def _is_for_terminal(record: logging.LogRecord, verbose: bool) -> bool:
-    if getattr(record, "log_only", False):
-        return False
-    return verbose or record.levelno >= logging.WARNING or getattr(record, "for_terminal", False)
+class _ForTerminal(logging.Filter):
+    def __init__(self) -> None:
+        super().__init__()
+        self._last_shown_s = time.monotonic()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if getattr(record, "log_only", False):
+            return False
+        is_important = record.levelno >= logging.WARNING or getattr(record, "for_terminal", False)
+        if not is_important and time.monotonic() - self._last_shown_s < _SECONDS_BETWEEN_MESSAGES:
+            return False
+        self._last_shown_s = time.monotonic()
+        return True
 
 
-def _add_handler(handler: logging.Handler, label: str, before: str = "") -> None:
-    line = f"{before}[%(asctime)s {label}] %(message)s"
-    handler.setFormatter(logging.Formatter(line, "%H:%M:%S"))
+def _add_handler(handler: logging.Handler, label: str) -> None:
+    handler.setFormatter(logging.Formatter(f"[%(asctime)s {label}] %(message)s", "%H:%M:%S"))
     logging.getLogger().addHandler(handler)
     logging.getLogger().setLevel(logging.INFO)
 

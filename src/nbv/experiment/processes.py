@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Iterable
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO
 
 import psutil
 
@@ -56,26 +56,7 @@ def _is_alive(process: psutil.Process) -> bool:
         return False
 
 
-class RunLock(NamedTuple):
-    """The lock of a run.
-
-    Attributes
-    ----------
-    held : file or None
-        Held until the file is closed. None where the folder cannot be written or its file system
-        has no such locks; then nothing is removed and nothing is known.
-    removed : bool
-        Whether there were locks of dead runs.
-    others : bool
-        Whether another run is alive in the same folder.
-    """
-
-    held: IO[bytes] | None
-    removed: bool
-    others: bool
-
-
-def hold_lock(folder: Path) -> RunLock:
+def hold_lock(folder: Path) -> IO[bytes] | None:
     """Remove Snakemake's locks where the runs that took them are dead, and mark this one as alive.
 
     Snakemake's lock is a file, which a killed run leaves behind. Every run of this project also
@@ -86,19 +67,21 @@ def hold_lock(folder: Path) -> RunLock:
     ----------
     folder : Path
         ``.snakemake``.
+
+    Returns
+    -------
+    file or None
+        The lock, held until the file is closed. None where the folder cannot be written or its file
+        system has no such locks; then nothing is removed.
     """
-    removed = others = False
     try:
         folder.mkdir(parents=True, exist_ok=True)
         held = (folder / "nbv.lock").open("ab")
-        try:
+        with contextlib.suppress(BlockingIOError):
             fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
             for lock in (folder / "locks").glob("*.lock"):
                 lock.unlink()
-                removed = True
-        except BlockingIOError:
-            others = True
         fcntl.flock(held, fcntl.LOCK_SH)
     except OSError:
-        return RunLock(None, removed, others)
-    return RunLock(held, removed, others)
+        return None
+    return held
