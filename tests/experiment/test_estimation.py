@@ -1,9 +1,5 @@
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 import torch
@@ -36,27 +32,10 @@ def one_thread():
     hw.use_one_thread()
 
 
-def test_a_training_on_one_thread_loads_neither_torchs_compiler_nor_scipy():
-    """They take a second or two of every job, and a tenth of one."""
-    code = (
-        "import sys, torch; from clock_faces import CPU, SETTINGS, clock_faces; "
-        "from nbv.experiment.estimation.hardware import use_one_thread; use_one_thread(); "
-        "from nbv.experiment.estimation.training import train_network; "
-        "train_network(clock_faces(1), SETTINGS | {'epochs': 1}, CPU, 0); "
-        "print(torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), "
-        "torch.is_deterministic_algorithms_warn_only_enabled(), "
-        "*(name in sys.modules "
-        "for name in ('torch._inductor', 'torch._dynamo', 'triton', 'scipy')))"
-    )
-    path = os.pathsep.join(sys.path)
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=os.environ | {"PYTHONPATH": path},
-    )
-    assert done.stdout.split() == ["1", "True", "True", "False", "False", "False", "False"]
+def test_one_thread_computes_and_deterministically():
+    assert torch.get_num_threads() == 1
+    assert torch.are_deterministic_algorithms_enabled()
+    assert torch.is_deterministic_algorithms_warn_only_enabled()
 
 
 def test_a_training_is_torchs_adamw_and_one_cycle_schedule_to_the_last_bit():
