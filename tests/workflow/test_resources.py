@@ -14,9 +14,9 @@ pytestmark = pytest.mark.slow
 
 def asked(project, attempt: int) -> dict[str, tuple[int, int]]:
     """Return the memory in MB and the minutes that each rule asks for at that attempt."""
-    dry = ("--cores", "2", "--dry-run", "--workflow-profile", "none", "--attempt", str(attempt))
     targets = ("report", "leaderboard", "more_views", "travel", "ablation")
-    printed = project.run(*dry, *targets).stdout
+    dry = ("--cores", "2", "--dry-run", "--quiet", "host", "--attempt", str(attempt))
+    printed = project.run(*targets, *dry).stdout
     found = {}
     for rule, line in re.findall(r"^rule (\w+):\n(?: .*\n)*? +resources: (.*)$", printed, re.M):
         resources = dict(re.findall(r"(mem_mb|runtime)=(\d+)", line))

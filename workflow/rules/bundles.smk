@@ -45,7 +45,6 @@ rule render_bundle:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=per_attempt(1000),
         runtime=per_attempt(60),
     params:
         renderer=CONFIG["renderer"],

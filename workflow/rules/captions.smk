@@ -15,25 +15,32 @@ def numbered(table):
     return table.replace("table", "Table ")
 
 
-config["captions"] = {
-    "name": CONFIG["name"],
-    "dataset": CONFIG["dataset"]["source"],
-    "estimator": CONFIG["estimator"]["kind"],
-    "n_folds": CONFIG["n_folds"],
-    "seed": CONFIG["seed"],
-    "objects": {category: len(OBJECTS[category]) for category in CATEGORIES},
-    "elevations_deg": CONFIG["elevations_deg"],
-    "shows": {
-        **{
-            name: f"{numbered(name)}: {shown}, ours next to the published values."
-            for name, shown in TABLES_SHOW.items()
-        },
-        **{name: kind.caption for name, kind in FIGURES.items()},
-        "claims": "The paper's claims: which hold, which do not, which are undecided, and why.",
-        "report": "The page of the run: claims, tables, figures, settings, running time.",
-        "runtime": "What the jobs of each rule cost.",
-    },
+PAGES_SHOW = {
+    "claims": "The paper's claims: which hold, which do not, which are undecided, and why.",
+    "report": "The page of the run: claims, tables, figures, settings, running time.",
+    "runtime": "What the jobs of each rule cost.",
 }
+
+
+def caption_of(shows, units):
+    """What the captions say of a result, as a parameter of its rule."""
+    return {
+        "shows": shows,
+        "objects": {category: len(OBJECTS[category]) for category, _ in units},
+        "n_folds": CONFIG["n_folds"],
+        "seed": CONFIG["seed"],
+    }
+
+
+def caption_of_table(wildcards):
+    name = wildcards.table
+    shows = f"{numbered(name)}: {TABLES_SHOW[name]}, ours next to the published values."
+    return caption_of(shows, units_of(name))
+
+
+def caption_of_figure(wildcards):
+    name = wildcards.figure
+    return caption_of(FIGURES[name].caption, units_of(name))
 
 
 def in_report(path, category, caption, labels):

@@ -14,9 +14,6 @@ rule settings:
     priority: 80
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(5),
     params:
         configuration=CONFIG,
     script:
@@ -60,9 +57,6 @@ rule splits:
     priority: 90
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(5),
     params:
         **({"crossfit_parts": len(PARTS)} if CROSSFIT else {}),
         **(
@@ -93,7 +87,6 @@ rule render:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=per_attempt(1000),
         runtime=per_attempt(30),
     params:
         renderer=CONFIG["renderer"],

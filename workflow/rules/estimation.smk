@@ -124,7 +124,6 @@ else:
             ENVIRONMENT
         resources:
             mem_mb=per_attempt(2000),
-            runtime=per_attempt(10),
         params:
             device=CONFIG["estimator"]["device"],
             precision=CONFIG["estimator"]["precision"],

@@ -14,9 +14,6 @@ rule lookup:
         LAYOUT.benchmark(f"lookup/{fold_folder(*FOLD)}/{{criterion}}")
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(10),
     params:
         density=DECISION,
     script:
@@ -36,9 +33,6 @@ rule evaluate_baselines:
         LAYOUT.benchmark(f"evaluate_baselines/{fold_folder(*FOLD)}")
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(10),
     params:
         methods={name: METHODS[name] for name in BASELINE_METHODS},
         seed=CONFIG["seed"],
@@ -65,9 +59,6 @@ rule evaluate_recommended:
         LAYOUT.benchmark(f"evaluate_recommended/{fold_folder(*FOLD)}/{{method}}")
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(10),
     params:
         method=lambda wildcards: METHODS[wildcards.method],
     script:

@@ -17,9 +17,6 @@ rule compare:
         LAYOUT.log("compare"),
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(5),
     params:
         run=lambda wildcards, input: str(Path(input.report).parent),
     script:
@@ -34,9 +31,6 @@ rule reference:
         LAYOUT.log("reference"),
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(5),
     params:
         run=lambda wildcards, input: str(Path(input.report).parent),
         reference=str(REFERENCES / CONFIG["name"]),

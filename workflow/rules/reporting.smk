@@ -59,13 +59,11 @@ rule table:
         table="|".join(TABLES),
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(5),
     params:
         settings=lambda wildcards: settings_of(RESAMPLED, wildcards.table),
         evaluations=lambda wildcards: evaluations_of(units_of(wildcards.table)),
         caution=CAUTION,
+        caption=caption_of_table,
     script:
         f"{SCRIPTS}/tabulate_paper.py"
 
@@ -91,14 +89,12 @@ rule figure:
         figure="|".join(FIGURES),
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(5),
     params:
         settings=lambda wildcards: settings_of(SHOWN, wildcards.figure),
         evaluations=lambda wildcards: evaluations_of(units_of(wildcards.figure)),
         units=lambda wildcards: units_of(wildcards.figure),
         folds=lambda wildcards: folds_of(units_of(wildcards.figure)),
+        caption=caption_of_figure,
     script:
         f"{SCRIPTS}/plot_paper.py"
 
@@ -118,12 +114,12 @@ rule claims:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(2000),
-        runtime=per_attempt(10),
     params:
         evaluations=evaluations_of(UNITS),
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
         caution=CAUTION,
+        caption=caption_of(PAGES_SHOW["claims"], UNITS),
     script:
         f"{SCRIPTS}/judge_claims.py"
 
@@ -145,11 +141,9 @@ rule runtime:
         LAYOUT.benchmark("runtime")
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(5),
     params:
         rules=[rule for rule, _ in JOBS],
+        caption=caption_of(PAGES_SHOW["runtime"], UNITS),
     script:
         f"{SCRIPTS}/tabulate_runtime.py"
 
@@ -173,14 +167,12 @@ rule report:
         LAYOUT.benchmark("report")
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(10),
     params:
         categories=CATEGORIES,
         tables=list(TABLES),
         figures=SHOWN_FIGURES,
         caution=CAUTION,
+        caption=caption_of(PAGES_SHOW["report"], UNITS),
     script:
         f"{SCRIPTS}/build_report.py"
 

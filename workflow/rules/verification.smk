@@ -7,7 +7,6 @@ rule verify:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=per_attempt(500),
         runtime=per_attempt(30),
     params:
         run=LAYOUT.root,

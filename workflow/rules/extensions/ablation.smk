@@ -28,7 +28,6 @@ rule evaluate_ablation:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(1500),
-        runtime=per_attempt(10),
     params:
         instance=ABLATIONS.instance,
         density=DECISION,
@@ -51,9 +50,6 @@ rule ablation:
         LAYOUT.benchmark("ablation")
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(10),
     params:
         category=FOCUS,
         n_resamples=CONFIG["n_resamples"],

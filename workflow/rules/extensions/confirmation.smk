@@ -112,7 +112,6 @@ rule keep_estimates:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(2000),
-        runtime=per_attempt(10),
     params:
         held_out=held_out_keys(),
         configuration=CONFIG,
@@ -134,7 +133,6 @@ rule join_kept_estimates:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(2000),
-        runtime=per_attempt(10),
     script:
         f"{SCRIPTS}/join_kept_estimates.py"
 
@@ -188,7 +186,6 @@ rule statistics:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(2000),
-        runtime=per_attempt(10),
     params:
         places=lambda wildcards: statistics_places(),
         caution=CAUTION,

@@ -15,9 +15,6 @@ rule leaderboard:
         LAYOUT.benchmark("leaderboard")
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(10),
     params:
         folds=leaderboard_folds,
         methods=METHODS | EXTENSIONS,
@@ -26,3 +23,28 @@ rule leaderboard:
         caution=CAUTION,
     script:
         f"{SCRIPTS}/tabulate_leaderboard.py"
+
+
+rule extension_gains:
+    input:
+        sources("tabulate_extension_gains"),
+        objects=leaderboard_files("objects"),
+        choices=leaderboard_files("choices"),
+    output:
+        csv=LAYOUT.table("extension_gains", "csv"),
+        md=LAYOUT.table("extension_gains", "md"),
+        tex=LAYOUT.table("extension_gains", "tex"),
+    log:
+        LAYOUT.log("extension_gains"),
+    benchmark:
+        LAYOUT.benchmark("extension_gains")
+    conda:
+        ENVIRONMENT
+    params:
+        folds=leaderboard_folds,
+        methods=METHODS | EXTENSIONS,
+        n_resamples=CONFIG["n_resamples"],
+        seed=CONFIG["seed"],
+        caution=CAUTION,
+    script:
+        f"{SCRIPTS}/tabulate_extension_gains.py"

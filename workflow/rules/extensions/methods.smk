@@ -27,7 +27,6 @@ rule evaluate_extensions:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(2000),
-        runtime=per_attempt(10),
     params:
         methods=list(METHODS),
         extensions=EXTENSIONS,

@@ -17,7 +17,6 @@ rule evaluate_more_views:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(2000),
-        runtime=per_attempt(10),
     params:
         density=EXTENSION_DECISION,
         more_views=CONFIG["more_views"],
@@ -43,9 +42,6 @@ rule more_views:
         LAYOUT.benchmark("more_views")
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(10),
     params:
         folds=[(category, fold) for category, _, fold in folds_of(REFERENCE_UNITS)],
         n_resamples=CONFIG["n_resamples"],

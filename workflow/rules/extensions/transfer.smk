@@ -166,7 +166,6 @@ rule transfer_table:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(2000),
-        runtime=per_attempt(10),
     params:
         settings=RESAMPLED,
         conditions=TRANSFER["conditions"],

@@ -31,9 +31,6 @@ rule travel:
         LAYOUT.benchmark("travel")
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(1000),
-        runtime=per_attempt(10),
     params:
         folds=[(category, fold) for category, _, fold in folds_of(REFERENCE_UNITS)],
         methods=TRAVEL_CURVES,
