@@ -76,7 +76,7 @@ mutation: $(AUDIT)
 	$(BIN)/mutmut results
 
 lock: $(AUDIT)
-	$(LOCK) $(UPGRADE) pyproject.toml --extra experiment --extra onnx --group dev --no-emit-package torch --output-file requirements.lock
+	$(LOCK) $(UPGRADE) pyproject.toml --extra experiment --group dev --no-emit-package torch --output-file requirements.lock
 	$(LOCK) $(UPGRADE) --group audit --constraints requirements.lock --output-file requirements-audit.lock
 	$(LOCK) $(UPGRADE) --group docs --constraints requirements.lock --constraints requirements-audit.lock --output-file requirements-docs.lock
 	$(BIN)/python tools/extra.py slurm | $(LOCK) --no-deps --output-file requirements-slurm.lock -

@@ -15,7 +15,7 @@ import torch
 from nbv.experiment.estimation.hardware import use_one_thread
 from nbv.experiment.estimation.networks import build_network
 from nbv.labels import counted
-from nbv.robot.bundle import Bundle, load_bundle
+from nbv.robot.bundle import Bundle
 from nbv.robot.recommender import Recommender, bundle_path
 from nbv.robot.synthetic import Frame, example_frame
 from performance.figures import Figure, Target
@@ -24,9 +24,9 @@ from performance.timing import take_turns
 ONE = Target(1.0, at_most=True)
 # Of the forward pass with torch, over all images of a frame: crop, network, fusion and choice.
 FORWARD = Target(1.5, at_most=True)
-FRAME_MS = {"numpy": 5.0, "onnx": 2.0}
+FRAME_MS = 2.0
 NEW_ROTATION_MS = 5.0
-START_S = {"numpy": 1.0, "onnx": 1.0}
+START_S = 1.0
 HELP_S = 0.3
 IN_A_ROW = 20
 # More than are kept; the first one is always known.
@@ -35,14 +35,14 @@ _ROTATIONS_DEG = [*range(20, 340, 20)]
 _START = """
 import sys, numpy as np
 from nbv.robot.recommender import Recommender
-answer = Recommender.load("mug", sys.argv[1]).recommend(np.load(sys.argv[2]))
+answer = Recommender.load("mug").recommend(np.load(sys.argv[1]))
 assert "torch" not in sys.modules
 """
 
 
 def run(quick: bool) -> list[Figure]:
     use_one_thread()
-    bundle = load_bundle(bundle_path("mug"))
+    bundle = Bundle.load(bundle_path("mug"))
     frame = example_frame()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "frame.npy")
@@ -63,42 +63,32 @@ def _in_memory(bundle: Bundle, frame: Frame, n_rounds: int) -> list[Figure]:
         with torch.inference_mode():
             network(ready)
 
-    def answer(backend: str) -> Callable[[], object]:
-        recommender = Recommender(bundle, backend)
-        return lambda: recommender.recommend(
-            frame.depth_m, mask=frame.mask, intrinsics=frame.intrinsics
-        )
+    recommender = Recommender(bundle)
+
+    def answer() -> None:
+        recommender.recommend(frame.depth_m, mask=frame.mask, intrinsics=frame.intrinsics)
 
     # In turn, they push each other out of the processor's cache.
-    turns = {
-        backend: take_turns([answer(backend), forward], n_rounds, in_a_row=IN_A_ROW)
-        for backend in FRAME_MS
-    }
-    figures = []
-    for backend, bound_ms in FRAME_MS.items():
-        ms, forward_ms = (1e3 * turns[backend].typical(column) for column in (0, 1))
-        detail = f"{n_rounds} times {IN_A_ROW} frames of 640 × 480 in a row, one thread"
-        of_torch = f"{forward_ms:.2f} ms for {counted(n_images, 'image')} with torch"
-        figures += [
-            Figure(
-                f"frame to next view, {backend} / forward pass",
-                turns[backend].ratio(0, 1),
-                FORWARD,
-                f"{ms:.2f} ms against {of_torch}; {detail}",
-            ),
-            Figure(
-                f"frame to next view, {backend} / {bound_ms:g} ms",
-                ms / bound_ms,
-                ONE,
-                f"{ms:.2f} ms; {detail}",
-            ),
-        ]
-    return figures
+    turns = take_turns([answer, forward], n_rounds, in_a_row=IN_A_ROW)
+    ms, forward_ms = (1e3 * turns.typical(column) for column in (0, 1))
+    detail = f"{n_rounds} times {IN_A_ROW} frames of 640 × 480 in a row, one thread"
+    of_torch = f"{forward_ms:.2f} ms for {counted(n_images, 'image')} with torch"
+    return [
+        Figure(
+            "frame to next view / forward pass",
+            turns.ratio(0, 1),
+            FORWARD,
+            f"{ms:.2f} ms against {of_torch}; {detail}",
+        ),
+        Figure(
+            f"frame to next view / {FRAME_MS:g} ms", ms / FRAME_MS, ONE, f"{ms:.2f} ms; {detail}"
+        ),
+    ]
 
 
 def _at_new_rotations(bundle: Bundle, n_rounds: int) -> Figure:
     """Two frames, at a rotation that is not kept, and at one that is."""
-    recommender, first = Recommender(bundle, "onnx"), example_frame()
+    recommender, first = Recommender(bundle), example_frame()
     frames = {turn: example_frame(first.azimuth_deg + turn) for turn in _ROTATIONS_DEG}
     rotations = itertools.cycle(_ROTATIONS_DEG[1:])
 
@@ -116,7 +106,7 @@ def _at_new_rotations(bundle: Bundle, n_rounds: int) -> Figure:
     )
     new_ms, known_ms = (1e3 * turns.typical(column) for column in (0, 1))
     return Figure(
-        f"two frames at a new rotation, onnx / {NEW_ROTATION_MS:g} ms",
+        f"two frames at a new rotation / {NEW_ROTATION_MS:g} ms",
         new_ms / NEW_ROTATION_MS,
         ONE,
         f"{new_ms:.1f} ms, at a known rotation {known_ms:.1f} ms; {n_rounds} in turn, one thread",
@@ -128,10 +118,8 @@ def _starts(frame: Path, n_rounds: int) -> list[Figure]:
         return lambda: subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
 
     help_ = start("-c", "import sys; from nbv.cli import run; sys.argv[1:] = ['--help']; run()")
-    works = [start("-c", _START, backend, str(frame)) for backend in START_S]
-    turns = take_turns([*works, help_], n_rounds)
-    bounds = {f"start to answer, {backend}": bound for backend, bound in START_S.items()}
-    bounds["nbv --help"] = HELP_S
+    turns = take_turns([start("-c", _START, str(frame)), help_], n_rounds)
+    bounds = {"start to answer": START_S, "nbv --help": HELP_S}
     return [
         Figure(
             f"{name} / {bound:g} s",

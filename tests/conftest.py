@@ -16,7 +16,7 @@ import pytest
 import synthetic
 from made_bundles import made_bundle
 from nbv.experiment.results import load_evaluations
-from nbv.robot.bundle import Bundle, save_bundle
+from nbv.robot.bundle import Bundle
 from nbv.robot.recommender import Recommender
 from projects import Project, copy_of_project, finished_project
 
@@ -79,12 +79,12 @@ def bundle() -> Bundle:
 
 @pytest.fixture(scope="session")
 def recommender(bundle: Bundle) -> Recommender:
-    return Recommender(bundle, "numpy")
+    return Recommender(bundle)
 
 
 @pytest.fixture(scope="session")
 def bundle_file(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The bundle as a file. Not to be changed."""
     path = tmp_path_factory.mktemp("bundle") / "made.safetensors"
-    save_bundle(path, bundle)
+    bundle.save(path)
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 from nbv.core.logits import from_logits
 from nbv.data.camera import Camera
 from nbv.experiment.estimation.networks import build_network
-from nbv.robot.bundle import Bundle, PaperTables, as_kept
+from nbv.experiment.estimation.weights import Estimator
+from nbv.experiment.make_bundle import bundled_model
+from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.ood import fit_familiarity
 from nbv.robot.pair_distributions import bin_apart
 from nbv.robot.sweeps import Turn
@@ -42,12 +45,12 @@ def random_codes(rng: np.random.Generator, n: int, side: int = SIDE) -> NDArray[
     return codes
 
 
-def random_weights(
-    estimator: dict, side: int = SIDE, seed: int = 0, sharpness: float = 3.0
-) -> dict[str, NDArray[np.float32]]:
-    """Weights of a network that has seen random crops: its batch norms are not the identity."""
+def random_estimator(
+    chosen: dict, side: int = SIDE, seed: int = 0, sharpness: float = 3.0
+) -> Estimator:
+    """Of a network that has seen random crops: its batch norms are not the identity."""
     torch.manual_seed(seed)
-    network = build_network(estimator, side)
+    network = build_network(chosen, side)
     rng = np.random.default_rng(seed)
     with torch.no_grad():
         for layer in network.modules():
@@ -64,11 +67,12 @@ def random_weights(
         network[-1].bias.zero_()
         seen = network(torch.from_numpy(random_codes(rng, 64, side)[:, None] / np.float32(128)))
         network[-1].bias.copy_(-seen.mean(dim=0))
-    return {
-        name: values.numpy().astype(np.float32)
-        for name, values in network.state_dict().items()
-        if values.is_floating_point()
-    }
+    return Estimator(network, chosen, side, [])
+
+
+@cache
+def random_model(seed: int = 0, plane_deg: float | None = None) -> bytes:
+    return bundled_model(random_estimator(settings(), seed=seed), plane_deg)
 
 
 def soft_turns(
@@ -85,8 +89,6 @@ def soft_turns(
 
 def made_bundle(seed: int = 0, **changes) -> Bundle:
     rng = np.random.default_rng(seed)
-    estimator = settings()
-    weights = as_kept(random_weights(estimator, seed=seed))
     names = ("a", "b", "c")
     elevations = (0.0, 30.0)
     turns, rows = [], []
@@ -99,8 +101,8 @@ def made_bundle(seed: int = 0, **changes) -> Bundle:
             rows.append(bin_apart(azimuth_deg, from_logits(logits, 1.0)))
     values = {
         "category": "mug",
-        "weights": weights,
-        "estimator": estimator,
+        "network": random_model(seed, changes.get("mirror_plane_deg")),
+        "estimator": settings(),
         "camera": CAMERA,
         "diagonal_m": DIAGONAL_M,
         "extent_m": (0.4 * DIAGONAL_M, 1.6 * DIAGONAL_M),

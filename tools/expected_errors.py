@@ -74,7 +74,7 @@ def main() -> None:
     """Print a table of all bundles, elevations given or not, objects and elevations."""
     tables = []
     for training, name in enumerate(sys.argv[1:]):
-        bundle = Recommender.load(name, "numpy").bundle
+        bundle = Recommender.load(name).bundle
         calibrated = after_rotations(bundle.distributions, bundle.object_ids, KEPT)
         for turn, object_id in enumerate(bundle.object_ids):
             for is_given in (False, True):

@@ -220,7 +220,7 @@ def test_a_bundle_is_calibrated_again(bundle):
     wanted = paper_tables(of_table, found.distributions, ONE_DENSITY)
     assert found.paper.elevation_deg.tolist() == bundle.paper.elevation_deg.tolist() == [0.0, 30.0]
     assert np.array_equal(found.paper.rotation_deg, wanted.rotation_deg)
-    assert found.weights is bundle.weights
+    assert found.network is bundle.network
     more = {"calibrated_by": "recording.csv", "turns_made_with": len(bundle.object_ids)}
     assert found.provenance == {**bundle.provenance, **more}
     assert "calibrated_by" not in bundle.provenance
@@ -324,7 +324,7 @@ def test_without_elevations_all_turns_count_alike(bundle):
     found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY)
     found = replace(found, elevation_deg=np.full(len(found.elevation_deg), np.nan, np.float32))
     codes = np.random.default_rng(0).integers(0, 256, (1, 32, 32)).astype(np.uint8)
-    recommender = Recommender(found, "numpy")
+    recommender = Recommender(found)
     one, other = (recommender.recommend_crops(codes, elevation_deg=e) for e in (None, 20.0))
     assert one.move == other.move
 

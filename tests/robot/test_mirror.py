@@ -13,7 +13,7 @@ from nbv.data.depth_codes import encode_depth
 from nbv.data.normalisation import normalise
 from nbv.data.procedural import generate
 from nbv.data.renderers import open_renderer
-from nbv.robot.mirror import find_mirror_plane, mirror_averaged, mirrored_classes
+from nbv.robot.mirror import find_mirror_plane, mirrored_classes
 from nbv.robot.sweeps import Turn
 
 CAMERA = Camera(image_side=32)
@@ -80,20 +80,3 @@ def test_objects_that_are_not_their_own_mirror_image_have_no_plane():
     both = trimesh.util.concatenate([mug, lump])
     network = network_of_templates(both)
     assert find_mirror_plane(network, turns_of(network, [both])) is None
-
-
-def test_the_average_of_an_image_and_its_mirror_image_by_hand(rng):
-    weights = rng.normal(0, 1, (16, 12)).astype(np.float32)
-
-    def network(codes):
-        return codes.reshape(len(codes), 16).astype(np.float32) @ weights
-
-    codes = rng.integers(0, 256, (5, 4, 4)).astype(np.uint8)
-    found = mirror_averaged(network, 45.0)(codes)
-    for image, logits in zip(codes, found, strict=True):
-        other = np.array([[row[3], row[2], row[1], row[0]] for row in image])
-        for c in range(12):
-            # 30 c degrees; mirrored at 45 degrees: 90 - 30 c.
-            own, mirrored = network(image[None])[0, c], network(other[None])[0, (3 - c) % 12]
-            assert logits[c] == pytest.approx((own + mirrored) / 2, rel=1e-5)
-    assert mirror_averaged(network, None) is network

@@ -35,7 +35,7 @@ def never(path, error):
 
 @pytest.fixture(scope="module")
 def turns():
-    recommender = Recommender.load("mug", "numpy")
+    recommender = Recommender.load("mug")
     recordings = read_manifest(FRAMES / "manifest.csv")
     return {one.sequence: see(recommender, one, None, None, never) for one in recordings}
 
@@ -47,7 +47,7 @@ def evaluated(bundle, turns, n_views):
 
 @pytest.fixture(scope="module")
 def found(turns):
-    return evaluated(Recommender.load("mug", "numpy").bundle, list(turns.values()), (2, 3))
+    return evaluated(Recommender.load("mug").bundle, list(turns.values()), (2, 3))
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_calibrated_by_the_other_recording_the_recommended_view_has_the_least_er
 ):
     # The paper's tables, which are of no interest here, are made soon with one density.
     density = {**DENSITY, "bandwidths_deg": [8], "pseudo_observations": [10]}
-    bundle = Recommender.load("mug", "numpy").bundle
+    bundle = Recommender.load("mug").bundle
     calibrated = recalibrated(bundle, [turns[calibrating]], "the other recording", density)
     found = evaluated(calibrated, [turns[other]], (2,)).loc[other]
     for errors in (found["mae_deg"], found["mae_without_offset_deg"]):

@@ -19,13 +19,14 @@ from made_bundles import (
     WIDTH,
     frame,
     random_codes,
-    random_weights,
+    random_estimator,
 )
 from made_bundles import settings as made_settings
 from nbv.core.angles import circular_distance_deg, travel_deg
 from nbv.core.distributions import direction_and_spread_deg, mean_direction_deg
 from nbv.core.logits import from_logits
 from nbv.errors import UserError
+from nbv.experiment.make_bundle import bundled_model
 from nbv.robot.crop import crop_frame
 from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
@@ -49,7 +50,7 @@ def codes_of(seed: int, n: int) -> np.ndarray:
 
 def telling(bundle, sureness: float = 8.0) -> Recommender:
     """A recommender whose network reads the azimuth's class off the first pixel of a crop."""
-    made = Recommender(bundle, "numpy")
+    made = Recommender(bundle)
 
     def network(codes):
         classes = codes[:, 0, 0].astype(int)
@@ -307,7 +308,7 @@ def test_what_the_choice_of_the_last_view_adds_is_expected_once_it_is_taken(
 
 def test_views_that_no_calibration_view_is_like_contradict_each_other():
     frames = [example_frame(azimuth_deg) for azimuth_deg in (270.0, 15.0, 330.0, 240.0)]
-    found = Recommender.load("mug", "numpy").recommend(
+    found = Recommender.load("mug").recommend(
         [frame.depth_m for frame in frames],
         rotations_deg=[0.0, 315.0, 345.0, 60.0],
         mask=[frame.mask for frame in frames],
@@ -329,8 +330,8 @@ def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):
             turn_weight=bundle.turn_weight[of_it],
             object_ids=tuple(bundle.object_ids[place] for place in of_it),
         )
-        wanted = Recommender(only, "numpy").recommend_crops(codes)
-        found = Recommender(bundle, "numpy").recommend_crops(codes, elevation_deg=elevation)
+        wanted = Recommender(only).recommend_crops(codes)
+        found = Recommender(bundle).recommend_crops(codes, elevation_deg=elevation)
         assert found.error_after_deg == pytest.approx(wanted.error_after_deg, rel=1e-4)
         assert found.expected_error_deg == pytest.approx(wanted.expected_error_deg, rel=1e-4)
         assert found.belief == pytest.approx(wanted.belief)
@@ -389,13 +390,13 @@ def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
     rough = replace(
         bundle,
         estimator=estimator,
-        weights=random_weights(estimator),
+        network=bundled_model(random_estimator(estimator)),
         distributions=rng.dirichlet(np.full(120, 0.3), (2, 120)).astype(np.float32) + 1e-6,
         elevation_deg=np.zeros(2, np.float32),
         turn_weight=np.ones(2, np.float32),
         object_ids=("a", "b"),
     )
-    recommender = Recommender(rough, "numpy")
+    recommender = Recommender(rough)
     # What is added, by hand, of two rotations that may be chosen.
     (belief,) = recommender.distributions(codes_of(0, 1))
     alike = after_rotations(rough.distributions, rough.object_ids)(())
@@ -659,7 +660,7 @@ def test_what_no_calibration_image_resembles_is_less_familiar(bundle, recommende
         codes = random_codes(np.random.default_rng(ord(name)), BINS)
         logits = recommender.network(codes)
         turns.append(Turn(name, "1", 0.0, azimuth_deg, logits, codes))
-    made = Recommender(replace(bundle, familiarity=fit_familiarity(turns)), "numpy")
+    made = Recommender(replace(bundle, familiarity=fit_familiarity(turns)))
     strange = np.full((1, 32, 32), 255, dtype=np.uint8)
     known, other = (made.recommend_crops(codes) for codes in (codes_of(12, 1), strange))
     assert not known.is_unfamiliar
@@ -723,7 +724,7 @@ def test_frames_are_not_changed(recommender):
 
 def test_the_same_frame_gives_the_same_answer(bundle, recommender):
     same(recommender.recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
-    same(Recommender(bundle, "numpy").recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
+    same(Recommender(bundle).recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
 
 
 def test_a_mask_takes_the_object_from_its_surroundings(recommender):
@@ -758,10 +759,10 @@ def test_only_the_part_of_a_frame_around_the_mask_is_looked_at(recommender, seed
 
 def test_a_repeated_sequence_of_rotations_has_the_same_answer(bundle):
     """What calibration turns make of rotations is kept: no answer depends on those before it."""
-    kept = Recommender(bundle, "numpy")
+    kept = Recommender(bundle)
     for rotations in ([0.0], [0.0, 60.0], [0.0, 90.0], [0.0, 60.0, 120.0], [0.0], [0.0, 60.0]):
         codes = codes_of(len(rotations), len(rotations))
-        fresh = Recommender(bundle, "numpy").recommend_crops(codes, rotations)
+        fresh = Recommender(bundle).recommend_crops(codes, rotations)
         found = kept.recommend_crops(codes, rotations)
         assert np.array_equal(found.error_after_deg, fresh.error_after_deg)
         same(found, fresh)
@@ -900,8 +901,6 @@ def test_a_recommender_is_of_a_bundle(bundle):
             Recommender.load(name)
     with pytest.raises(UserError, match="'mug' is no bundle; give its name or file to Recommen"):
         Recommender("mug")
-    with pytest.raises(UserError, match="backend 3: choose from: numpy, onnx"):
-        Recommender(bundle, 3)
 
 
 def test_crops_are_bytes(recommender):
@@ -974,21 +973,7 @@ def test_the_unit_and_the_size_of_the_object_go_together(bundle, recommender):
         diagonal_m=2 * DIAGONAL_M,
         extent_m=(2 * bundle.extent_m[0], 2 * bundle.extent_m[1]),
     )
-    same(Recommender(large, "numpy").recommend(2 * FRAMES[0]), recommender.recommend(FRAMES[0]))
-
-
-def test_both_backends_give_the_same_answer(bundle, recommender):
-    pytest.importorskip("onnx")
-    pytest.importorskip("onnxruntime")
-    other = Recommender(bundle, "onnx")
-    for rotations in ([0.0], [0.0, 45.0, -120.0]):
-        frames = FRAMES[: len(rotations)]
-        one = recommender.recommend(frames, rotations_deg=rotations)
-        two = other.recommend(frames, rotations_deg=rotations)
-        assert circular_distance_deg(one.azimuth_deg, two.azimuth_deg) < 0.01
-        assert one.belief == pytest.approx(two.belief, abs=1e-4)
-        assert one.error_after_deg == pytest.approx(two.error_after_deg, rel=1e-3)
-        assert one.unfamiliarity == pytest.approx(two.unfamiliarity, rel=1e-3)
+    same(Recommender(large).recommend(2 * FRAMES[0]), recommender.recommend(FRAMES[0]))
 
 
 def test_distributions_are_those_of_the_logits(recommender):

@@ -212,7 +212,7 @@ def test_random_views_end_where_there_is_no_room():
 def test_recommended_views_are_those_that_the_recommender_names(bundle, elevation, n_views):
     """Frame after frame: the recommender is shown all frames so far and asked where to go."""
     turn = recording(2, elevation=elevation)
-    recommender = Recommender(bundle, "numpy")
+    recommender = Recommender(bundle)
     recommender.network = lambda codes: turn.logits[codes[:, 0, 0].astype(int)]
     known = None if np.isnan(elevation) else elevation
     wanted = []

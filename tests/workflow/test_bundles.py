@@ -13,7 +13,7 @@ from safetensors import safe_open
 from nbv.cli import main
 from nbv.data.meshes import load_meshes
 from nbv.data.procedural import generate
-from nbv.robot.bundle import load_bundle
+from nbv.robot.bundle import Bundle
 from nbv.robot.depth_files import write_depth
 from nbv.robot.evaluation import evaluate
 from nbv.robot.recommender import Recommender
@@ -99,24 +99,24 @@ def test_a_bundle_is_calibrated_by_objects_that_it_was_not_trained_on(made: Proj
     with safe_open(made.results / "bundles/estimators/mug.safetensors", "np") as stored:
         seen = set(json.loads(stored.metadata()["nbv"])["trained_on"])
     assert {name.split("/")[0] for name in seen} == of_role["train"]
-    bundle = load_bundle(made.results / "bundles/mug.safetensors")
+    bundle = Bundle.load(made.results / "bundles/mug.safetensors")
     assert set(bundle.object_ids) == of_role["calibration"]
     assert set(pd.read_csv(made.results / "bundles/mug.csv")["object_id"]) == of_role["test"]
 
 
 def test_a_bundle_has_turns_at_every_elevation(made: Project) -> None:
-    bundle = load_bundle(made.results / "bundles/mug.safetensors")
+    bundle = Bundle.load(made.results / "bundles/mug.safetensors")
     assert sorted(set(bundle.elevation_deg.tolist())) == [0.0, 30.0]
     assert bundle.distributions.sum(axis=-1) == pytest.approx(1.0, abs=1e-5)
 
 
 def test_calibration_distributions_are_those_of_the_network(made: Project) -> None:
-    bundle = load_bundle(made.results / "bundles/mug.safetensors")
+    bundle = Bundle.load(made.results / "bundles/mug.safetensors")
     images = np.load(made.results / "bundles/depth/mug/el30.npy", mmap_mode="r")
     names = json.loads((made.results / "bundles/depth/mug/el30_objects.json").read_text())
     place = int(np.flatnonzero(bundle.elevation_deg == 30.0)[0])
     codes = images[names.index(bundle.object_ids[place]), ::15]
-    found = Recommender(bundle, "numpy").distributions(np.asarray(codes))
+    found = Recommender(bundle).distributions(np.asarray(codes))
     assert bundle.distributions[place] == pytest.approx(found, rel=0.06, abs=1e-6)
 
 
@@ -126,7 +126,7 @@ def test_a_bundle_is_tested_on_a_view_every_15_degrees(made: Project) -> None:
 
 def assert_tested_with_all(made: Project, folder: Path) -> None:
     """A bundle's errors of one view are those on the images of the bundle with all ingredients."""
-    recommender = Recommender.load(folder / "mug.safetensors", "numpy")
+    recommender = Recommender.load(folder / "mug.safetensors")
     found = pd.read_csv(folder / "mug.csv", dtype={"sequence": str})
     single = found[found["choice"] == "single"].set_index(["sequence", "object_id"])["mae_deg"]
     azimuth_deg = np.arange(24) * 15.0
@@ -174,7 +174,7 @@ def test_ingredients_are_left_out_of_training_and_not_of_the_test(made: Project)
     (recording,) = read_manifest(manifest)
     single = []
     for folder in folders[0]:
-        bundle = Recommender.load(folder / "mug.safetensors", "numpy")
+        bundle = Recommender.load(folder / "mug.safetensors")
         seen = see(bundle, recording, None, None, lambda path, error: None)
         errors = evaluate(bundle.bundle, [seen], n_views=(2,)).set_index("choice")
         single.append(errors["mae_deg"]["single"])
@@ -223,7 +223,7 @@ def test_a_folder_of_meshes_becomes_a_bundle_that_answers(tmp_path, capsys, monk
     )
     project.run("--cores", "2", "bundles", overrides=chosen)
     made = project.results / "bundles/jug.safetensors"
-    bundle = load_bundle(made)
+    bundle = Bundle.load(made)
     assert bundle.category == "jug"
     assert set(bundle.object_ids) <= {f"jug-{number}" for number in range(8)}
     monkeypatch.chdir(tmp_path)

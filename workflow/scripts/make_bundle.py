@@ -11,12 +11,11 @@ with job(snakemake):
     from nbv.data.depth_images import open_depth
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
     from nbv.experiment.estimation.weights import load_estimator
-    from nbv.experiment.make_bundle import kept_network, make_bundle, turns_of
+    from nbv.experiment.make_bundle import bundled_network, make_bundle, turns_of
     from nbv.experiment.splits import objects_with_role, read_splits
     from nbv.files import write_csv
-    from nbv.robot.bundle import save_bundle
     from nbv.robot.evaluation import evaluate
-    from nbv.robot.mirror import find_mirror_plane, mirror_averaged
+    from nbv.robot.mirror import find_mirror_plane
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     use_one_thread()
@@ -33,14 +32,14 @@ with job(snakemake):
     calibration, test = (
         objects_with_role(splits, params.fold, role) for role in ("calibration", "test")
     )
-    network = kept_network(estimator)
+    network = bundled_network(estimator)
     # Of 360 views one every 15 degrees, as on a turntable.
     of_turntable = 15
     plain, *_ = turns_of(network, images, params.elevations, calibration, of_turntable)
     plane_deg = find_mirror_plane(network, plain)
     where = "none" if plane_deg is None else f"at an azimuth of {plane_deg:g}°"
     logging.getLogger("nbv").info("mirror plane of the objects: %s", where)
-    network = mirror_averaged(network, plane_deg)
+    network = bundled_network(estimator, plane_deg)
     turns, *extent_px = turns_of(network, images, params.elevations, calibration)
     bundle = make_bundle(
         wildcards.category,
@@ -54,6 +53,6 @@ with job(snakemake):
         provenance=json.loads(Path(given.provenance).read_text(encoding="utf-8"))
         | {"settings": params.settings},
     )
-    save_bundle(snakemake.output.bundle, bundle)
+    bundle.save(snakemake.output.bundle)
     tested, *_ = turns_of(network, test_images, params.elevations, test, of_turntable)
     write_csv(snakemake.output.evaluation, evaluate(bundle, tested, n_views=(2, 3)))

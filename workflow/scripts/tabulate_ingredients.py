@@ -10,7 +10,6 @@ with job(snakemake):
 
     from nbv.experiment.report.table import write_table
     from nbv.files import read_csv
-    from nbv.robot.bundle import load_bundle
     from nbv.robot.errors import FrameError
     from nbv.robot.evaluation import evaluate
     from nbv.robot.recommender import Recommender
@@ -30,7 +29,7 @@ with job(snakemake):
     if given.frames:
         recordings = read_manifest(given.frames[0])
         for key, path in zip(keys, given.bundles, strict=True):
-            recommender = Recommender(load_bundle(path), "numpy")
+            recommender = Recommender.load(path)
             turns = [see(recommender, one, None, None, left_out) for one in recordings]
             real.setdefault(key, []).append(evaluate(recommender.bundle, turns, n_views=(2,)))
     table = ingredient_table(rendered, real)

@@ -373,7 +373,6 @@ def calibrate(
     need_writable("--output", output, [".safetensors"])
     from nbv.core.distributions import mean_direction_deg
     from nbv.core.logits import from_logits
-    from nbv.robot.bundle import save_bundle
     from nbv.robot.calibration import recalibrated
 
     seen = _seen_frames(bundle, source, intrinsics, depth_scale, near, far, as_json=json)
@@ -393,7 +392,7 @@ def calibrate(
             name = f"{one['object_id']}, sequence {one['sequence']}"
             say_offset(name, counted(one["n_frames"], "frame"), one)
         sys.stdout.flush()
-    save_bundle(output, recalibrated(held, turns, str(source)))
+    recalibrated(held, turns, str(source)).save(output)
     if json:
         say_json(
             {
@@ -581,15 +580,15 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
     json
         Print JSON.
     """
-    from nbv.robot.bundle import format_of, load_bundle
+    from nbv.robot.bundle import FORMAT, Bundle
     from nbv.robot.recommender import bundle_path
 
     path = bundle_path(bundle)
-    held = load_bundle(path)
+    held = Bundle.load(path)
     about: dict[str, Any] = {
         "file": str(path),
         "bytes": path.stat().st_size,
-        "format": format_of(path),
+        "format": FORMAT,
         "category": held.category,
         "diagonal_m": held.diagonal_m,
         "extent_m": list(held.extent_m),
@@ -617,7 +616,7 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
 @app.command
 @as_paragraphs
 def export(bundle: str = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
-    """Write a bundle's network as ONNX: from crops to logits.
+    """Write a bundle's network, an ONNX model from crops to logits.
 
     Example: nbv export mug --onnx mug.onnx
 
@@ -632,24 +631,22 @@ def export(bundle: str = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
     """
     need_writable("--onnx", onnx, [".onnx"])
     from nbv.files import replacing
-    from nbv.robot.bundle import load_bundle
-    from nbv.robot.onnx_graph import onnx_model
+    from nbv.robot.bundle import Bundle
+    from nbv.robot.network import open_session
     from nbv.robot.recommender import bundle_path
 
-    model = onnx_model(load_bundle(bundle_path(bundle)))
+    model = Bundle.load(bundle_path(bundle)).network
+    session = open_session(model)
     with replacing(onnx) as temporary:
-        temporary.write_bytes(model.SerializeToString())
+        temporary.write_bytes(model)
     if json:
-        ends = {"input": model.graph.input[0], "output": model.graph.output[0]}
-        say_json({"file": str(onnx)} | {end: _tensor(value) for end, value in ends.items()})
+        about: dict[str, Any] = {"file": str(onnx)}
+        for end in (*session.get_inputs(), *session.get_outputs()):
+            # n is any number.
+            about[end.name] = end.shape
+        say_json(about)
         return
-    say(f"{onnx}: codes (n, 1, side, side) to logits")
-
-
-def _tensor(value: Any) -> dict[str, Any]:
-    """Return the name and the shape of an ONNX graph's input or output; n is any number."""
-    sides = value.type.tensor_type.shape.dim
-    return {"name": value.name, "shape": [side.dim_param or side.dim_value for side in sides]}
+    say(f"{onnx}: codes (n, 1, side, side) to logits (n, classes) and hidden layer")
 
 
 @dataclass(frozen=True)

@@ -350,7 +350,7 @@ class LookAlikes:
         belief : ndarray (B,)
             Of an object at hand that was turned alike, in the frame of its first view.
         power, pseudo_observations : float
-            See `nbv.core.criteria.expected_error`.
+            See `nbv.core.criteria`.
         share : ndarray (S,), optional
             How much each turn counts; 1 without it.
         """

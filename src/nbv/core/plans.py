@@ -179,7 +179,7 @@ def excess_of_plans(belief: Belief, evidence: Evidence, errors: Table, caution: 
     """Return what each plan is expected to err more than the first one.
 
     A regression on the first view's distribution as of
-    `nbv.core.criteria.expected_error`, of the difference between a plan's
+    `nbv.core.criteria`, of the difference between a plan's
     errors and those of the first plan. `caution` standard errors over calibration objects are
     added: few objects hold few of the rare large errors, so the least of many means is too
     hopeful. With one object alone nothing but the first plan is trusted.

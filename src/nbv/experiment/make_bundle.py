@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from nbv.core.logits import from_logits
 from nbv.data.camera import Camera
 from nbv.data.depth_images import DepthImages
-from nbv.experiment.estimation.weights import Estimator, weights_of
-from nbv.robot.bundle import Bundle, as_kept
+from nbv.experiment.estimation.export import onnx_model
+from nbv.experiment.estimation.weights import Estimator
+from nbv.robot.bundle import Bundle
 from nbv.robot.calibration import paper_tables, temperature_of
 from nbv.robot.crop import pixel_step
-from nbv.robot.mirror import Network
-from nbv.robot.numpy_network import numpy_network
+from nbv.robot.mirror import mirrored_classes
+from nbv.robot.network import Network, open_network
 from nbv.robot.ood import fit_familiarity
 from nbv.robot.pair_distributions import bin_apart
 from nbv.robot.sweeps import Turn
@@ -28,9 +29,26 @@ DEFAULT_FOCAL_PX = 600.0
 _MARGINS = (0.6, 1.5)
 
 
-def kept_network(estimator: Estimator) -> Network:
-    """Return the network of an estimator with the weights that a bundle keeps."""
-    return numpy_network(as_kept(weights_of(estimator)), estimator.settings)
+def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -> bytes:
+    """Return a classifier as a bundle holds it: averaged over mirror images if there is a plane.
+
+    Parameters
+    ----------
+    estimator : Estimator
+    mirror_plane_deg : float, optional
+        From `nbv.robot.mirror.find_mirror_plane`.
+    """
+    if mirror_plane_deg is None:
+        return onnx_model(estimator)
+    return onnx_model(
+        estimator, mirrored_classes(estimator.settings["n_classes"], mirror_plane_deg)
+    )
+
+
+def bundled_network(estimator: Estimator, mirror_plane_deg: float | None = None) -> Network:
+    """Return the network of `bundled_model`, as a robot will run it."""
+    model = bundled_model(estimator, mirror_plane_deg)
+    return open_network(model, estimator.image_side, estimator.settings["n_classes"])
 
 
 def turns_of(
@@ -97,8 +115,8 @@ def make_bundle(
     estimator : Estimator
         A classifier, trained on ``<object id>/<elevation>``.
     turns : sequence of Turn
-        Of calibration objects, which the estimator has not seen, by the network that is averaged
-        over mirror images where there is a plane.
+        Of calibration objects, which the estimator has not seen, by its `bundled_network` with
+        the plane.
     extent_px : (float, float)
         From `turns_of`.
     mirror_plane_deg : float or None
@@ -123,7 +141,7 @@ def make_bundle(
     low, high = (share * side * length_m for share, side in zip(_MARGINS, extent_px, strict=True))
     return Bundle(
         category=category,
-        weights=as_kept(weights_of(estimator)),
+        network=bundled_model(estimator, mirror_plane_deg),
         estimator=estimator.settings,
         camera=camera,
         diagonal_m=diagonal_m,

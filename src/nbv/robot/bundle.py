@@ -1,7 +1,7 @@
 """A bundle: a trained network with what its errors on held-out objects taught, in one file.
 
-The file is of the safetensors format: arrays, and metadata as JSON. It holds no code. Calibration
-distributions are kept as logs, one byte each, see `PROBABILITY_STEP`; weights as of `as_kept`.
+The file is of the safetensors format: arrays, and metadata as JSON. It holds no code. The network
+is an ONNX model. Calibration distributions are kept as logs, one byte each, see `PROBABILITY_STEP`.
 """
 
 from __future__ import annotations
@@ -23,19 +23,13 @@ from nbv.core.angles import nearest_bin
 from nbv.data.camera import Camera
 from nbv.errors import NamedError
 from nbv.files import missing, replacing
-from nbv.robot.folding import network_shapes
 from nbv.robot.ood import Familiarity
 
-FORMAT = 3
-"""Raised when an older program cannot read a newer file.
-
-2: weights in half precision. 3: a mirror plane.
-"""
+FORMAT = 4
+"""Raised when the file changes; a program reads its own format alone."""
 
 PROBABILITY_STEP = 0.054
 """Between kept logs of probabilities, in nats: 256 of them reach down to 1e-6."""
-
-_NETWORK = "network."
 
 
 @dataclass(frozen=True)
@@ -70,8 +64,8 @@ class Bundle:
     Attributes
     ----------
     category : str
-    weights : mapping of str to ndarray
-        The network's, by the names of `nbv.experiment.estimation.networks.build_network`, as of `as_kept`.
+    network : bytes
+        From `nbv.experiment.estimation.export.onnx_model`.
     estimator : mapping
         Its settings.
     camera : Camera
@@ -84,7 +78,7 @@ class Bundle:
         Of the sensor that training simulated: what is assumed where a camera is not known.
     mirror_plane_deg : float or None
         The azimuth of the plane about which objects are symmetric, degrees in [0, 180); see
-        `nbv.robot.mirror`. None where there is none, as in files of format 1 and 2.
+        `nbv.robot.mirror`. None where there is none.
     temperature : float
         What logits are divided by.
     object_ids : tuple of str
@@ -104,7 +98,7 @@ class Bundle:
     """
 
     category: str
-    weights: Mapping[str, NDArray[np.float32]]
+    network: bytes
     estimator: Mapping[str, Any]
     camera: Camera
     diagonal_m: float
@@ -126,6 +120,76 @@ class Bundle:
         """B, the number of classes."""
         return int(self.distributions.shape[-1])
 
+    def save(self, path: str | Path) -> None:
+        """Write a bundle: the same bundle gives the same bytes."""
+        about = {
+            "format": FORMAT,
+            "category": self.category,
+            "estimator": dict(self.estimator),
+            "camera": asdict(self.camera),
+            "diagonal_m": self.diagonal_m,
+            "extent_m": list(self.extent_m),
+            "focal_px": self.focal_px,
+            "mirror_plane_deg": self.mirror_plane_deg,
+            "temperature": self.temperature,
+            "object_ids": list(self.object_ids),
+            "affinity": dict(self.affinity),
+            "familiar_within": self.familiarity.threshold,
+            "provenance": dict(self.provenance),
+        }
+        arrays: dict[str, NDArray[Any]] = {
+            "network": np.frombuffer(self.network, dtype=np.uint8),
+            "calibration.elevation_deg": self.elevation_deg.astype(np.float32),
+            "calibration.weight": self.turn_weight.astype(np.float32),
+            "calibration.distributions": as_steps(self.distributions),
+            "familiarity.mean": self.familiarity.mean,
+            "familiarity.basis": self.familiarity.basis.astype(np.float16),
+            "familiarity.references": self.familiarity.references.astype(np.float16),
+            "familiarity.scales": self.familiarity.scales,
+            "paper.elevation_deg": self.paper.elevation_deg,
+            "paper.rotation_deg": self.paper.rotation_deg,
+        }
+        # safetensors writes the memory of an array as it lies, whatever its order.
+        arrays = {name: np.asarray(array, order="C") for name, array in arrays.items()}
+        # As it is read again. The metadata has one entry: safetensors orders several at random.
+        about = json.loads(json.dumps(about))
+        about["sha256"] = _digest(about, arrays)
+        metadata = {"nbv": json.dumps(about, sort_keys=True)}
+        with replacing(path) as temporary:
+            temporary.write_bytes(safetensors.numpy.save(arrays, metadata=metadata))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Bundle:
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        BundleError
+            ``no-bundle`` where the file is missing or another one, ``damaged-bundle`` also where
+            it is cut short, ``older-bundle`` and ``newer-bundle`` where it is of another format.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise BundleError(
+                "no-bundle", f"{path} {missing(path)}; name a bundle of this package, or a file"
+            )
+        try:
+            about, arrays = _read(path)
+            _check_format(path, about["format"])
+            if about.pop("sha256") != _digest(about, arrays):
+                raise ValueError("not the bytes that were written")
+            bundle = _of_parts(about, arrays)
+            _need_sound(bundle)
+        except BundleError:
+            raise
+        # No list of what a reader may raise on arbitrary bytes is complete.
+        except Exception as error:
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise BundleError(
+                "damaged-bundle", f"{path} is no sound bundle ({reason}); get it again"
+            ) from error
+        return bundle
+
 
 def as_steps(distributions: NDArray[np.floating]) -> NDArray[np.uint8]:
     """Return distributions as whole steps of -log p, 0 to 255."""
@@ -139,62 +203,8 @@ def from_steps(steps: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.asarray(kept / kept.sum(axis=-1, keepdims=True))
 
 
-def as_kept(weights: Mapping[str, NDArray[np.floating]]) -> dict[str, NDArray[np.float32]]:
-    """Return a network's weights, rounded as a bundle keeps them: all matrices in half precision.
-
-    What calibrates a bundle has to see the weights that a robot will have.
-    """
-    return {name: _kept(array).astype(np.float32) for name, array in weights.items()}
-
-
-def _kept(array: NDArray[np.floating]) -> NDArray[np.floating]:
-    # Offsets and normalisation take no space.
-    return array.astype(np.float16) if array.ndim > 1 else array
-
-
-def save_bundle(path: str | Path, bundle: Bundle) -> None:
-    """Write a bundle."""
-    about = {
-        "format": FORMAT,
-        "category": bundle.category,
-        "estimator": dict(bundle.estimator),
-        "camera": asdict(bundle.camera),
-        "diagonal_m": bundle.diagonal_m,
-        "extent_m": list(bundle.extent_m),
-        "focal_px": bundle.focal_px,
-        "mirror_plane_deg": bundle.mirror_plane_deg,
-        "temperature": bundle.temperature,
-        "object_ids": list(bundle.object_ids),
-        "affinity": dict(bundle.affinity),
-        "familiar_within": bundle.familiarity.threshold,
-        "provenance": dict(bundle.provenance),
-    }
-    arrays: dict[str, NDArray[Any]] = {
-        _NETWORK + name: _kept(array) for name, array in bundle.weights.items()
-    }
-    arrays |= {
-        "calibration.elevation_deg": bundle.elevation_deg.astype(np.float32),
-        "calibration.weight": bundle.turn_weight.astype(np.float32),
-        "calibration.distributions": as_steps(bundle.distributions),
-        "familiarity.mean": bundle.familiarity.mean,
-        "familiarity.basis": bundle.familiarity.basis.astype(np.float16),
-        "familiarity.references": bundle.familiarity.references.astype(np.float16),
-        "familiarity.scales": bundle.familiarity.scales,
-        "paper.elevation_deg": bundle.paper.elevation_deg,
-        "paper.rotation_deg": bundle.paper.rotation_deg,
-    }
-    # safetensors writes the memory of an array as it lies, whatever its order.
-    arrays = {name: np.asarray(array, order="C") for name, array in arrays.items()}
-    # As it is read again. It has one entry in the metadata: safetensors orders several at random.
-    about = json.loads(json.dumps(about))
-    about["sha256"] = _digest(about, arrays)
-    metadata = {"nbv": json.dumps(about, sort_keys=True)}
-    with replacing(path) as temporary:
-        temporary.write_bytes(safetensors.numpy.save(arrays, metadata=metadata))
-
-
 def _digest(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
-    """Return the SHA-256 of all that a bundle holds: a damaged weight shows nowhere else."""
+    """Return the SHA-256 of all that a bundle holds: a damaged number shows nowhere else."""
     found = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
     for name, array in sorted(arrays.items()):
         found.update(f"{name} {array.dtype} {array.shape}".encode())
@@ -216,56 +226,19 @@ class BundleError(NamedError):
     """
 
 
-def load_bundle(path: str | Path) -> Bundle:
-    """Read what `save_bundle` wrote.
-
-    Raises
-    ------
-    BundleError
-        ``no-bundle`` where the file is missing or another one, ``damaged-bundle`` also where it is
-        cut short, ``newer-bundle`` where it is of a newer format, ``older-calibration`` where a
-        camera calibrated it before `nbv.robot.calibration.recalibrated` weighed turns as it does.
-    """
-    path = Path(path)
-    if not path.is_file():
+def _check_format(path: Path, version: int) -> None:
+    if version > FORMAT:
         raise BundleError(
-            "no-bundle", f"{path} {missing(path)}; name a bundle of this package, or a file"
+            "newer-bundle",
+            f"{path} is a bundle of format {version}, this program reads format {FORMAT}: "
+            "install a newer nbv",
         )
-    try:
-        about, arrays = _read(path)
-        version = about["format"]
-        if version > FORMAT:
-            raise BundleError(
-                "newer-bundle",
-                f"{path} is a bundle of format {version}, this program reads up to {FORMAT}: "
-                "install a newer nbv",
-            )
-        if about.pop("sha256") != _digest(about, arrays):
-            raise ValueError("not the bytes that were written")
-        bundle = _of_parts(about, arrays)
-        _need_sound(bundle)
-        origin = bundle.provenance.get("calibrated_by")
-        if origin is not None and "turns_made_with" not in bundle.provenance:
-            raise BundleError(
-                "older-calibration",
-                f"{path} was calibrated with {origin} by an earlier nbv, which gave turns too "
-                "little weight: calibrate again, from the bundle that it was made of",
-            )
-    except BundleError:
-        raise
-    # No list of what a reader may raise on arbitrary bytes is complete.
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
+    if version < FORMAT:
         raise BundleError(
-            "damaged-bundle", f"{path} is no sound bundle ({reason}); get it again"
-        ) from error
-    return bundle
-
-
-def format_of(path: Path) -> int:
-    """Return the format of a sound bundle's file."""
-    about, _ = _read(path)
-    return int(about["format"])
+            "older-bundle",
+            f"{path} is a bundle of format {version}, this program reads format {FORMAT}: make it "
+            "again with snakemake bundles, or from a bundle of this nbv with nbv calibrate",
+        )
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
@@ -285,19 +258,13 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
     low, high = about["extent_m"]
     return Bundle(
         category=about["category"],
-        weights=as_kept(
-            {
-                name.removeprefix(_NETWORK): array
-                for name, array in arrays.items()
-                if name.startswith(_NETWORK)
-            }
-        ),
+        network=arrays["network"].tobytes(),
         estimator=about["estimator"],
         camera=Camera(**about["camera"]),
         diagonal_m=about["diagonal_m"],
         extent_m=(low, high),
         focal_px=about["focal_px"],
-        mirror_plane_deg=about["mirror_plane_deg"] if about["format"] > 2 else None,
+        mirror_plane_deg=about["mirror_plane_deg"],
         temperature=about["temperature"],
         object_ids=tuple(about["object_ids"]),
         elevation_deg=arrays["calibration.elevation_deg"],
@@ -316,15 +283,7 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
     )
 
 
-def weights_fit(bundle: Bundle) -> bool:
-    """Return whether the weights are those of a network with the bundle's settings."""
-    shapes = {name: array.shape for name, array in bundle.weights.items()}
-    return shapes == network_shapes(bundle.estimator, bundle.camera.image_side)
-
-
 def _need_sound(bundle: Bundle) -> None:
-    if not weights_fit(bundle):
-        raise ValueError("the weights do not fit the network's settings")
     n_turns, n_bins = len(bundle.object_ids), bundle.n_bins
     if bundle.distributions.shape != (n_turns, n_bins, n_bins) or not n_turns:
         raise ValueError(f"calibration of {bundle.distributions.shape} for {n_turns} turns")
@@ -343,7 +302,7 @@ def _need_sound(bundle: Bundle) -> None:
     numbers = [bundle.diagonal_m, bundle.focal_px, bundle.temperature, bundle.familiarity.threshold]
     if not all(math.isfinite(number) and number > 0 for number in numbers):
         raise ValueError("a size, focal length, temperature or threshold is not above 0")
-    arrays = [*bundle.weights.values(), bundle.turn_weight, bundle.paper.elevation_deg]
+    arrays = [bundle.turn_weight, bundle.paper.elevation_deg]
     known = bundle.familiarity
     arrays += [known.mean, known.basis, known.references, known.scales]
     if (

@@ -2,21 +2,20 @@
 
 Take objects with a vertical plane of symmetry at the azimuth m. What a camera sees of them from the
 azimuth a is the mirror image of what it sees from 2 m - a. A trained network does not know this
-exactly. The mean of its logits for an image and for the mirror image, read backwards, does.
+exactly. The mean of its logits for an image and for the mirror image, read backwards, does: that is
+what `nbv.experiment.estimation.export.onnx_model` writes where there is a plane.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.logits import fit_temperature, mean_log_likelihood
+from nbv.robot.network import Network
 from nbv.robot.sweeps import Turn
-
-Network = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
-"""From codes (n, side, side) to logits (n, B)."""
 
 
 def mirrored_classes(n_classes: int, plane_deg: float) -> NDArray[np.intp]:
@@ -28,25 +27,6 @@ def mirrored_classes(n_classes: int, plane_deg: float) -> NDArray[np.intp]:
     [2, 1, 0, 3]
     """
     return (round(2 * plane_deg * n_classes / 360) - np.arange(n_classes)) % n_classes
-
-
-def mirror_averaged(network: Network, plane_deg: float | None) -> Network:
-    """Return the network whose logits are the mean of those for an image and its mirror image.
-
-    Parameters
-    ----------
-    network : callable
-    plane_deg : float, optional
-        The azimuth of the mirror plane, degrees in [0, 180); None gives the network itself.
-    """
-    if plane_deg is None:
-        return network
-
-    def averaged(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
-        own, mirrored = np.split(network(np.concatenate([codes, codes[:, :, ::-1]])), 2)
-        return (own + mirrored[:, mirrored_classes(own.shape[1], plane_deg)]) / np.float32(2)
-
-    return averaged
 
 
 def find_mirror_plane(network: Network, turns: Sequence[Turn]) -> float | None:

@@ -1,74 +1,74 @@
-"""A bundle's network at work: with onnxruntime where it is installed, else with numpy."""
+"""A bundle's network at work, with onnxruntime."""
 
 from __future__ import annotations
 
-from importlib.util import find_spec
+from collections.abc import Callable
 
 import numpy as np
+import onnxruntime
 from numpy.typing import NDArray
 
-from nbv.errors import UserError, nearest
-from nbv.robot.bundle import Bundle, weights_fit
-from nbv.robot.mirror import Network, mirror_averaged
-from nbv.robot.numpy_network import numpy_network
+from nbv.errors import UserError
+from nbv.robot.bundle import BundleError
 
-BACKENDS = ("onnx", "numpy")
+Network = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
+"""From codes (n, side, side) to logits (n, B)."""
+
+_FATAL = 4
 
 
-def open_network(bundle: Bundle, backend: str | None = None) -> Network:
-    """Return a bundle's network, on one core of the processor.
-
-    It is that of `nbv.robot.mirror.mirror_averaged` where the bundle has a mirror plane.
-
-    Parameters
-    ----------
-    bundle : Bundle
-    backend : {"onnx", "numpy"}, optional
-        None: ``onnx`` where both of its packages are installed, else ``numpy``.
+def open_session(model: bytes) -> onnxruntime.InferenceSession:
+    """Return an ONNX model ready to run, on one core of the processor.
 
     Raises
     ------
-    UserError
-        For another backend, where its packages are missing, or where the weights do not fit the
-        estimator's settings; by the network, where crops have another shape.
+    BundleError
+        ``damaged-bundle`` where onnxruntime cannot run it.
     """
-    if backend is None:
-        has_onnx = all(find_spec(name) is not None for name in ("onnx", "onnxruntime"))
-        backend = "onnx" if has_onnx else "numpy"
-    if backend not in BACKENDS:
-        raise UserError(f"backend {backend!r}: {nearest(str(backend), BACKENDS)}")
-    if not weights_fit(bundle):
-        raise UserError("the weights do not fit the network's settings")
-    network = _onnx_network(bundle) if backend == "onnx" else _numpy_network(bundle)
-    side = bundle.camera.image_side
-
-    def of_crops(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
-        if codes.ndim != 3 or codes.shape[1:] != (side, side):
-            raise UserError(f"crops of shape {codes.shape}: give (n, {side}, {side})")
-        return network(codes)
-
-    return of_crops
-
-
-def _numpy_network(bundle: Bundle) -> Network:
-    network = numpy_network(bundle.weights, bundle.estimator)
-    return mirror_averaged(network, bundle.mirror_plane_deg)
-
-
-def _onnx_network(bundle: Bundle) -> Network:
-    from nbv.robot.onnx_graph import onnx_model
-
-    try:
-        import onnxruntime
-    except ImportError as error:
-        raise UserError(f"ONNX needs the packages of nbv[onnx] ({error}); install them") from error
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
-    session = onnxruntime.InferenceSession(
-        onnx_model(bundle).SerializeToString(), options, providers=["CPUExecutionProvider"]
-    )
+    # Errors are raised too.
+    options.log_severity_level = _FATAL
+    try:
+        return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    # onnxruntime's exceptions have no common class but this one.
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise BundleError(
+            "damaged-bundle", f"the bundle's network cannot be run ({reason}); get it again"
+        ) from error
+
+
+def open_network(model: bytes, image_side: int, n_classes: int) -> Network:
+    """Return the network of an ONNX model of `nbv.experiment.estimation.export.onnx_model`.
+
+    Parameters
+    ----------
+    model : bytes
+    image_side : int
+        Of its crops, pixels.
+    n_classes : int
+        How many logits it gives.
+
+    Raises
+    ------
+    BundleError
+        ``damaged-bundle`` where onnxruntime cannot run it, or it has other inputs and outputs.
+    UserError
+        By the network, where crops have another shape.
+    """
+    session = open_session(model)
+    ends = {end.name: end.shape for end in (*session.get_inputs(), *session.get_outputs())}
+    wanted = {"codes": ["n", 1, image_side, image_side], "logits": ["n", n_classes]}
+    if {name: ends.get(name) for name in wanted} != wanted:
+        raise BundleError(
+            "damaged-bundle",
+            f"the bundle's network has {ends}, its settings say {wanted}; get it again",
+        )
 
     def network(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
+        if codes.ndim != 3 or codes.shape[1:] != (image_side, image_side):
+            raise UserError(f"crops of shape {codes.shape}: give (n, {image_side}, {image_side})")
         (logits,) = session.run(["logits"], {"codes": codes[:, None].astype(np.float32)})
         return np.asarray(logits)
 

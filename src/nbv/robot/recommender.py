@@ -16,14 +16,13 @@ from nbv.core.logits import from_logits
 from nbv.errors import UserError, nearest, need_number
 from nbv.files import as_path
 from nbv.labels import counted
-from nbv.robot.bundle import Bundle, BundleError, load_bundle
+from nbv.robot.bundle import Bundle, BundleError
 from nbv.robot.crop import Crop, crop_frame, need_metres, need_plausible_nearest
 from nbv.robot.depth_files import DepthImage, is_in_mask, to_metres
 from nbv.robot.intrinsics import Intrinsics, as_intrinsics
 from nbv.robot.masks import Window, object_mask, window_of
-from nbv.robot.mirror import Network
 from nbv.robot.moves import elevation_from_gravity, roll_warnings
-from nbv.robot.network import open_network
+from nbv.robot.network import Network, open_network
 from nbv.robot.next_view import (
     AfterRotations,
     Recommendation,
@@ -73,8 +72,6 @@ class Recommender:
     Parameters
     ----------
     bundle : Bundle
-    backend : {"onnx", "numpy"}, optional
-        See `nbv.robot.network.open_network`.
 
     Examples
     --------
@@ -84,14 +81,16 @@ class Recommender:
     'mug'
     """
 
-    def __init__(self, bundle: Bundle, backend: str | None = None) -> None:
+    def __init__(self, bundle: Bundle) -> None:
         if not isinstance(bundle, Bundle):
             raise UserError(f"{bundle!r} is no bundle; give its name or file to Recommender.load")
         self.bundle = bundle
-        self.network: Network = open_network(bundle, backend)
+        self.network: Network = open_network(
+            bundle.network, bundle.camera.image_side, bundle.n_bins
+        )
 
     @classmethod
-    def load(cls, name: str | Path, backend: str | None = None) -> Recommender:
+    def load(cls, name: str | Path) -> Recommender:
         """Return the recommender of a bundle: the name of a shipped one, or a file.
 
         Raises
@@ -105,7 +104,7 @@ class Recommender:
         >>> nbv.Recommender.load("mug").bundle.category
         'mug'
         """
-        return cls(load_bundle(bundle_path(name)), backend)
+        return cls(Bundle.load(bundle_path(name)))
 
     @cached_property
     def _calibrated(self) -> AfterRotations:

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import safetensors
 import safetensors.torch
-from numpy.typing import NDArray
 from torch import nn
 
 from nbv.experiment.estimation.hardware import Hardware
@@ -139,15 +137,6 @@ def read_start(
         raise damaged(path, f"it has seen other objects of {category} than what starts from it")
     relative = os.path.relpath(path, Path(output).parent)
     return Start(stored.network, {"path": relative, "sha256": sha256_of(path)})
-
-
-def weights_of(estimator: Estimator) -> dict[str, NDArray[np.float32]]:
-    """Return the weights of an estimator by their names, single precision."""
-    return {
-        name: tensor.detach().cpu().contiguous().numpy().astype(np.float32)
-        for name, tensor in estimator.network.state_dict().items()
-        if tensor.is_floating_point()
-    }
 
 
 def with_category(category: str, object_ids: Sequence[str]) -> list[str]:
