@@ -371,7 +371,7 @@ def test_a_wrong_unit_is_named(unit):
     cropped(depth, extent_m=EXTENT_M)
     message = refused("implausible-distance", depth * unit, extent_m=EXTENT_M)
     assert (
-        f"depths {1 / unit:g} times as large would fit: multiply depths or --depth-scale" in message
+        f"depths {1 / unit:g} times as large would fit: multiply depths or `depth_scale`" in message
     )
 
 
@@ -412,7 +412,7 @@ def test_an_object_of_another_size_is_refused():
     for extent_m in ((1.3 * DIAGONAL_M, 2 * DIAGONAL_M), (0.1 * DIAGONAL_M, 0.5 * DIAGONAL_M)):
         message = refused("implausible-size", depth, extent_m=extent_m)
         assert "mask the object alone" in message
-        assert "--depth-scale" not in message
+        assert "`depth_scale`" not in message
 
 
 def test_a_mask_of_the_whole_table_is_refused():

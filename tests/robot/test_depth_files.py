@@ -70,7 +70,7 @@ def test_whole_numbers_are_millimetres(tmp_path, dtype):
 
 @pytest.mark.parametrize("scale", [0.0, -0.001, float("nan"), float("inf"), 1000.0])
 def test_a_depth_scale_is_metres_per_unit(scale):
-    with pytest.raises(UserError, match=f"--depth-scale={scale:g}: give metres per unit"):
+    with pytest.raises(UserError, match=f"`depth_scale`={scale:g}: give metres per unit"):
         to_metres(MILLIMETRES, depth_scale=scale)
 
 
@@ -166,7 +166,7 @@ def test_whole_numbers_are_multiplied_by_the_scale(scale, values):
 
 @pytest.mark.parametrize("scale", [0.0, -0.001, float("nan"), float("inf")])
 def test_a_scale_is_above_0(scale):
-    with pytest.raises(UserError, match="--depth-scale"):
+    with pytest.raises(UserError, match="`depth_scale`"):
         to_metres(MILLIMETRES, scale)
 
 

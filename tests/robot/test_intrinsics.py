@@ -179,7 +179,7 @@ def test_nothing_is_known_of_a_camera_that_is_not_given():
 @pytest.mark.parametrize("text", ["no.json", "no/camera", "camera.yaml"])
 def test_a_missing_camera_file_is_said_to_be_missing(tmp_path, monkeypatch, text):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(UserError, match=f"--intrinsics={text}: the file does not exist"):
+    with pytest.raises(UserError, match=f"`intrinsics`={text}: the file does not exist"):
         camera_of(text)
 
 

@@ -22,7 +22,7 @@ from nbv.errors import UserError, need_number
 from nbv.robot.depth_files import DepthImage
 from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
-from nbv.robot.masks import NEAREST_SHARE, Mask, Window, window_of
+from nbv.robot.masks import NEAREST_SHARE, Mask, window_of
 
 BEHIND_SURFACE = 0.15
 """How far an object's origin lies behind the median of what is visible of it, in diagonals."""
@@ -81,14 +81,13 @@ def crop_frame(
     camera: Camera,
     diagonal_m: float,
     extent_m: tuple[float, float] = (0.0, math.inf),
-    window: Window | None = None,
 ) -> Crop:
     """Return the crop of one object.
 
     Parameters
     ----------
     depth_m : (rows, columns) float32
-        Metres; of the whole frame, or of a window of it that holds the mask.
+        Metres.
     mask : (rows, columns) bool
         See `nbv.robot.masks.object_mask`.
     intrinsics : Intrinsics
@@ -98,8 +97,6 @@ def crop_frame(
         Of the object's bounding box, metres; that of a usual object of the category.
     extent_m : (float, float)
         Between which the object's extent in the image is plausible, metres.
-    window : Window, optional
-        Where `depth_m` and `mask` lie in the frame; without it they are the frame.
 
     Raises
     ------
@@ -108,18 +105,17 @@ def crop_frame(
         ``implausible-size``.
     """
     rows, columns = depth_m.shape
-    window = window or Window(0, 0, (rows, columns))
-    intrinsics.need_resolution(*window.frame_shape)
-    seen, (of_rows, of_columns) = window_of(mask)
+    intrinsics.need_resolution(rows, columns)
+    of_rows, of_columns = window = window_of(mask)
     if not of_rows.stop:
         raise FrameError("empty-mask", "the mask has no pixel")
-    top, bottom = window.top + seen.top, window.top + of_rows.stop - 1
-    left, right = window.left + seen.left, window.left + of_columns.stop - 1
-    _need_inside(top, bottom, left, right, window.frame_shape, intrinsics)
+    top, bottom = of_rows.start, of_rows.stop - 1
+    left, right = of_columns.start, of_columns.stop - 1
+    _need_inside(top, bottom, left, right, (rows, columns), intrinsics)
     middle = (left + right + 1) / 2, (top + bottom + 1) / 2
     axes, principal = _facing(intrinsics, *middle)
     towards = axes[2]
-    distance_m = float(median_depth(depth_m[mask])) / towards[2]
+    distance_m = float(median_depth(depth_m[window][mask[window]])) / towards[2]
     width_m = (right - left + 1) * distance_m / intrinsics.fx
     height_m = (bottom - top + 1) * distance_m / intrinsics.fy
     extent = math.hypot(width_m, height_m)
@@ -127,23 +123,22 @@ def crop_frame(
     # A pixel covers the same length on the object's middle as in training.
     away_m = distance_m + BEHIND_SURFACE * diagonal_m
     step = pixel_step(camera) * diagonal_m / away_m
-    # From the pixels of a camera that is directed at the object to those of the window, which has a
+    # From the pixels of a camera that is directed at the object to those of the frame, which has a
     # border of one pixel, in homogeneous coordinates: each of its axes becomes a column.
-    column, row = principal[0] - window.left + 1.0, principal[1] - window.top + 1.0
+    column, row = principal[0] + 1.0, principal[1] + 1.0
     to_pixels = [
         (intrinsics.fx * x + column * z, intrinsics.fy * y + row * z, z) for x, y, z in axes
     ]
     homography = np.array(to_pixels).T * (step, step, 1.0)
     pixels = homography @ _middles(camera.image_side)
     # What lies outside the window has no depth, as its border here.
-    measured = np.zeros((rows + 2, columns + 2), dtype=np.float32)
-    np.copyto(measured[1:-1, 1:-1], depth_m, where=mask)
-    depth = measured.take(_places(pixels, rows, columns)) / (diagonal_m * pixels[2])
+    measured = np.pad(np.where(mask[window], depth_m[window], np.float32(0)), 1)
+    depth = measured.take(_places(pixels, of_rows, of_columns)) / (diagonal_m * pixels[2])
     images = depth.astype(np.float32).reshape(1, camera.image_side, camera.image_side)
     codes = encode_depth(images, camera)[0]
     right_m, down_m, ahead_m = (away_m * part for part in towards)
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
-    return Crop(codes, distance_m, extent, centre_m, intrinsics.doubts(*window.frame_shape))
+    return Crop(codes, distance_m, extent, centre_m, intrinsics.doubts(rows, columns))
 
 
 @cache
@@ -158,16 +153,22 @@ def _middles(side: int) -> NDArray[np.float64]:
     return middles
 
 
-def _places(pixels: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.intp]:
-    """Return the places (n,), row by row, of homogeneous coordinates (3, n) in a bordered window.
+def _places(pixels: NDArray[np.float64], rows: slice, columns: slice) -> NDArray[np.intp]:
+    """Return indices (n,) into a bordered window, row by row.
 
-    What lies beyond the border is on it: column 0 or columns + 1, row 0 or rows + 1.
+    Parameters
+    ----------
+    pixels : ndarray (3, n)
+        Homogeneous coordinates in the frame, which has a border of one pixel.
+    rows, columns : slice
+        The window. What lies outside is in its border.
     """
     positions = pixels[:2] / pixels[2]
-    np.maximum(positions, 0.0, out=positions)
-    np.minimum(positions, [[columns + 1.0], [rows + 1.0]], out=positions)
+    np.maximum(positions, [[columns.start], [rows.start]], out=positions)
+    np.minimum(positions, [[columns.stop + 1], [rows.stop + 1]], out=positions)
     column, row = positions.astype(np.intp)
-    return np.asarray(row * (columns + 2) + column)
+    width = columns.stop - columns.start + 2
+    return np.asarray((row - rows.start) * width + column - columns.start)
 
 
 def _facing(
@@ -211,7 +212,7 @@ def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) ->
         Where one is negative or no number, and where the object would lie beyond all plausible
         distances, or might lie anywhere.
     """
-    limits = (("--near", near_m, FARTHEST), ("--far", far_m, _NO_LIMIT))
+    limits = (("`near_m`", near_m, FARTHEST), ("`far_m`", far_m, _NO_LIMIT))
     for name, limit_m, most in limits:
         if limit_m is not None:
             need_number(name, limit_m)
@@ -274,7 +275,7 @@ def _help(unit: float | None) -> str:
             "mask the object alone; are the intrinsics those of this resolution, and is it of this "
             "category and size?"
         )
-    return f"depths {unit:g} times as large would fit: multiply depths or --depth-scale by it"
+    return f"depths {unit:g} times as large would fit: multiply depths or `depth_scale` by it"
 
 
 def _need_inside(

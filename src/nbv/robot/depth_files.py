@@ -1,7 +1,7 @@
 """Depth images from files, in metres.
 
-Numbers with a decimal point are metres, NaN or 0 where nothing was measured; whole numbers are
-multiples of a scale, 0 where nothing was measured (ROS REP 118: 32FC1 and 16UC1).
+Floating-point depth is in metres, NaN or 0 where nothing was measured; integer depth is in
+millimetres or in a scale's units, 0 where nothing was measured (ROS REP 118: 32FC1 and 16UC1).
 """
 
 from __future__ import annotations
@@ -126,7 +126,8 @@ def to_metres(
 ) -> DepthImage:
     """Return a depth image in metres, 0 where nothing was measured; see `read_depth`.
 
-    Of a masked array, what is masked was not measured.
+    What is masked in a masked array was not measured. An image that is in metres already is
+    returned as it is.
     """
     values = np.asarray(np.ma.filled(values, 0))
     if values.dtype.kind not in "iuf":
@@ -141,7 +142,7 @@ def to_metres(
         )
     if depth_scale is not None and not 0 < depth_scale <= _LARGEST_SCALE:
         raise UserError(
-            f"--depth-scale={depth_scale:g}: give metres per unit, above 0 and at most "
+            f"`depth_scale`={depth_scale:g}: give metres per unit, above 0 and at most "
             f"{_LARGEST_SCALE:g}; of millimetres 0.001"
         )
     if values.dtype.kind == "f":
@@ -152,13 +153,12 @@ def to_metres(
         scale = unit_m if depth_scale is None else depth_scale
     # What overflows is as far away as what is infinite: nothing was measured.
     with np.errstate(invalid="ignore", over="ignore"):
-        metres = values.astype(np.float32)
+        metres = values.astype(np.float32, copy=False)
         if scale != 1.0:
-            metres *= np.float32(scale)
-        # Of a number and NaN it is the number.
-        np.fmax(metres, np.float32(0), out=metres)
-    metres[metres == np.inf] = 0
-    return metres
+            metres = metres * np.float32(scale)
+        if metres.min(initial=0.0) >= 0 and metres.max(initial=0.0) < np.inf:
+            return metres
+        return np.where((metres >= 0) & (metres < np.inf), metres, np.float32(0))
 
 
 def _read_array(path: Path, name: str) -> NDArray[Any]:
@@ -183,7 +183,7 @@ def _read_array(path: Path, name: str) -> NDArray[Any]:
 def _read_numpy(path: Path, name: str) -> NDArray[Any]:
     stored = np.load(path, mmap_mode="r", allow_pickle=False)
     if isinstance(stored, np.ndarray):
-        return np.asarray(stored)
+        return np.array(stored)
     with stored:
         if not stored.files:
             raise UserError(f"{path} holds no array")

@@ -225,7 +225,7 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     path = Path(text)
     try:
         if not path.is_file():
-            raise UserError(f"--intrinsics={text}: {_what_is_missing(path)}")
+            raise UserError(f"`intrinsics`={text}: {_what_is_missing(path)}")
         values = _read_mapping(path)
         return _of_mapping(_of_image(values, path, Path(frame)), path)
     except UserError:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
@@ -34,35 +32,12 @@ _LEAST_PIXELS = 30
 _EIGHT = np.ones((3, 3), dtype=bool)
 
 
-@dataclass(frozen=True)
-class Window:
-    """A part of a frame.
-
-    Attributes
-    ----------
-    top, left : int
-        Of its first pixel in the frame.
-    frame_shape : (int, int)
-        Rows and columns of the whole frame.
-    """
-
-    top: int
-    left: int
-    frame_shape: tuple[int, int]
-
-
-def window_of(mask: Mask) -> tuple[Window, tuple[slice, slice]]:
-    """Return the smallest window around a mask, and its slices of the frame; empty ones of none."""
-    of_rows = _span(mask.any(axis=1))
-    of_columns = _span(mask[of_rows].any(axis=0))
-    window = Window(of_rows.start, of_columns.start, (mask.shape[0], mask.shape[1]))
-    return window, (of_rows, of_columns)
-
-
-def _span(inside: np.bool_ | Mask) -> slice:
-    """Return the slice from the first to the last that is inside (n,)."""
-    places = np.flatnonzero(inside)
-    return slice(int(places[0]), int(places[-1]) + 1) if places.size else slice(0, 0)
+def window_of(mask: Mask) -> tuple[slice, slice]:
+    """Return the rows and columns of the smallest window around a mask; empty without a pixel."""
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    if not rows.size:
+        return slice(0, 0), slice(0, 0)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
 def object_mask(
@@ -130,7 +105,7 @@ def object_mask(
     near = 0.0 if near_m is None else near_m
     far = np.inf if far_m is None else far_m
     if not 0 <= near < far:
-        raise UserError(f"--near={near:g} and --far={far:g}: 0 ≤ near < far (metres)")
+        raise UserError(f"`near_m`={near:g} and `far_m`={far:g}: 0 ≤ near < far (metres)")
     if near_m is not None or far_m is not None:
         inside &= (depth_m >= near) & (depth_m <= far)
     if mask is None and far_m is None and inside.any():
@@ -141,13 +116,10 @@ def object_mask(
             "empty-mask",
             f"{np.count_nonzero(inside)} pixels of the object have a depth{limits}; need 30",
         )
-    if mask is not None:
-        return _without_islands(inside)
-    # Most of a frame is not the object. (Where there is a mask, the caller has cut out its window.)
-    _, place = window_of(inside)
-    found = np.zeros_like(inside)
-    found[place] = _without_islands(inside[place])
-    return found
+    # Most of a frame is not the object.
+    window = window_of(inside)
+    inside[window] = _without_islands(inside[window])
+    return inside
 
 
 def _without_islands(inside: Mask) -> Mask:
@@ -169,8 +141,8 @@ def _without_islands(inside: Mask) -> Mask:
 def _limits(depth_m: DepthImage, near: float, far: float) -> str:
     seen = depth_m[depth_m > 0]
     return (
-        f" between --near={near:g} and --far={far:g}, of {seen.min():.2f} to {seen.max():.2f} m in "
-        "the frame"
+        f" between `near_m`={near:g} and `far_m`={far:g}, of {seen.min():.2f} to "
+        f"{seen.max():.2f} m in the frame"
     )
 
 

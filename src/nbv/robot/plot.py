@@ -49,7 +49,7 @@ def draw_recommendation(answer: Recommendation, path: str | Path, category: str 
     path = Path(path)
     kind = path.suffix.lower().removeprefix(".")
     if kind not in KINDS:
-        raise UserError(f"--plot={path}: give a name that ends in .png, .pdf or .svg")
+        raise UserError(f"`path`={path}: give a name that ends in .png, .pdf or .svg")
     crops = answer.crops[-_MOST_CROPS:]
     with mpl.rc_context(RC):
         circles = 1 if answer.move is None else 2

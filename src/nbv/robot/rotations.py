@@ -147,8 +147,8 @@ def ranked_rotations(
     is_allowed = (travel > width) & (travel <= max_travel_deg)
     if not is_allowed.any():
         raise UserError(
-            "no rotation is allowed: widen --allowed or --max-travel; a turn is more than "
-            f"{width:g}°"
+            "no admissible rotation; relax `allowed_deg` or `max_travel_deg`: a rotation is more "
+            f"than {width:g}°"
         )
     rotation_deg = rotation_deg[is_allowed]
     near = are_neighbours(rotation_deg, width)
