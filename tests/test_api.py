@@ -56,7 +56,7 @@ def test_another_name_is_an_attribute_error():
     ("use", "absent"),
     [
         ("", ("numpy", "pandas", "torch", "matplotlib")),
-        ("nbv.load_lookup, nbv.average, nbv.posterior", ("pandas", "torch", "matplotlib")),
+        ("nbv.LookupTable, nbv.average, nbv.posterior", ("pandas", "torch", "matplotlib")),
     ],
 )
 def test_what_a_robot_imports_stays_light(use, absent):
@@ -67,8 +67,8 @@ def test_what_a_robot_imports_stays_light(use, absent):
 
 def test_the_public_api_goes_from_calibration_to_a_fused_pose(tmp_path):
     made = nbv.build_lookup(evidence(), "pose_ambiguity")
-    nbv.save_lookup(tmp_path / "table.npz", made)
-    table = nbv.load_lookup(tmp_path / "table.npz")
+    made.save(tmp_path / "table.npz")
+    table = nbv.LookupTable.load(tmp_path / "table.npz")
     np.testing.assert_array_equal(table.cost, made.cost)
     # The estimate 0° may be the front or the back; a view from the side tells them apart.
     delta_deg = table.recommend(0.0)

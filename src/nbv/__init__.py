@@ -11,7 +11,7 @@ frame to the next view::
 
 With an estimator of one's own, by the lookup table of its errors::
 
-    table = nbv.load_lookup("results/paper/lookup/mug/el00/fold1/pose_ambiguity.npz")
+    table = nbv.LookupTable.load("results/paper/lookup/mug/el00/fold1/pose_ambiguity.npz")
     delta_deg = table.recommend(first_deg)  # turn the camera, estimate again: second_deg
     pose_deg = nbv.average(first_deg, second_deg, delta_deg)
 
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from nbv.core.fusion import posterior as posterior
     from nbv.core.lookup import LookupTable as LookupTable
     from nbv.core.lookup import build_lookup as build_lookup
-    from nbv.core.lookup import load_lookup as load_lookup
-    from nbv.core.lookup import save_lookup as save_lookup
     from nbv.errors import UserError as UserError
     from nbv.robot.bundle import BundleError as BundleError
     from nbv.robot.depth_files import read_depth as read_depth
@@ -70,8 +68,6 @@ _MODULES = {
     "posterior": "nbv.core.fusion",
     "LookupTable": "nbv.core.lookup",
     "build_lookup": "nbv.core.lookup",
-    "load_lookup": "nbv.core.lookup",
-    "save_lookup": "nbv.core.lookup",
 }
 
 __all__ = list(_MODULES)

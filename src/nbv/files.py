@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import io
 import json
 import secrets
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
@@ -26,6 +27,9 @@ RUN_AGAIN = "delete the file and run the same command again"
 
 CALIBRATE_AGAIN = f"make it again with nbv calibrate, or where it is of a run, {RUN_AGAIN}"
 """What mends a table that either made."""
+
+
+_COMPRESSED = (".gz", ".bz2", ".xz", ".zip")
 
 
 @contextmanager
@@ -185,6 +189,45 @@ def read_text(path: Path) -> str:
         line = content.count(b"\n", 0, error.start) + 1
         what = "this is not UTF-8; save the file as UTF-8"
         raise UserError(f"{path}, line {line}: {what}") from error
+
+
+def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.DataFrame:
+    """Read a user's CSV file as text: an object may be called NA.
+
+    Parameters
+    ----------
+    path : path
+    needed : sequence of str
+        Columns that it must have.
+    frames_hint : str
+        What the message adds where one is missing, and a column ``file`` names frames.
+
+    Raises
+    ------
+    UserError
+        Where it cannot be read, a column of `needed` is missing, or it has no rows.
+    """
+    import pandas as pd  # here, so that loading a lookup table costs no import of pandas
+
+    if not path.is_file():
+        raise UserError(f"{path} {missing(path)}; name a file with {', '.join(needed)}")
+    try:
+        source: Path | io.StringIO = path
+        if path.suffix not in _COMPRESSED:
+            if not (text := read_text(path)).strip():
+                raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
+            source = io.StringIO(text)
+        table = pd.read_csv(source, dtype=str, keep_default_na=False)
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
+    for name in needed:
+        if name not in table:
+            hint = "; commas stand between columns" if table.shape[1] == 1 else ""
+            hint = frames_hint if "file" in table else hint
+            raise UserError(f"{path}: no column {name!r}; it needs {', '.join(needed)}{hint}")
+    if table.empty:
+        raise UserError(f"{path} has no rows")
+    return table
 
 
 def read_numbers(path: Path) -> NDArray[Any]:

@@ -20,7 +20,7 @@ from nbv.core.density import Conditionals
 from nbv.core.distributions import mean_direction_deg
 from nbv.core.estimates import posteriors_of
 from nbv.core.evidence import Evidence
-from nbv.core.lookup import load_lookup
+from nbv.core.lookup import LookupTable
 from nbv.core.next_views import bisecting_next, recommended_next
 from nbv.experiment.estimates import write_posteriors
 from nbv.experiment.explorer import ExplorerInputs, build_explorer
@@ -289,7 +289,7 @@ def test_five_views_are_those_of_the_packages_own_functions(
         first = rows.loc[(state["azimuth"], state["method"])]
         unit = (*place, int(first["fold"]))
         if unit not in known:
-            known[unit] = page_evidence(load_lookup(layout.lookup(*unit, "pose_ambiguity")))
+            known[unit] = page_evidence(LookupTable.load(layout.lookup(*unit, "pose_ambiguity")))
         evidence, coarse = known[unit]
         shown = page.evaluate(
             "(({turns, beliefs}) => [turns, beliefs.map(b => [...b])])(explorer.followed())"

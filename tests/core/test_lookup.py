@@ -28,8 +28,8 @@ def test_a_cost_that_is_not_a_number_is_never_the_least(travel_cost):
 
 def test_a_stored_table_comes_back_whole(tmp_path):
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
-    lookup.save_lookup(tmp_path / "pose_ambiguity.npz", table)
-    read = lookup.load_lookup(tmp_path / "pose_ambiguity.npz")
+    table.save(tmp_path / "pose_ambiguity.npz")
+    read = lookup.LookupTable.load(tmp_path / "pose_ambiguity.npz")
     for name, value in vars(table).items():
         np.testing.assert_array_equal(getattr(read, name), value)
     assert read.cost.dtype == np.float32
@@ -142,12 +142,12 @@ def without_an_array(arrays):
 def test_a_table_that_cannot_be_is_refused(tmp_path, damage):
     path = tmp_path / "pose_ambiguity.npz"
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
-    lookup.save_lookup(path, table)
+    table.save(path)
     arrays = read_arrays(path)
     damage(arrays)
     write_arrays(path, arrays)
     with pytest.raises(UserError, match=r"pose_ambiguity\.npz: .*; make it again with nbv calib"):
-        lookup.load_lookup(path)
+        lookup.LookupTable.load(path)
 
 
 @pytest.mark.parametrize(
@@ -162,5 +162,5 @@ def test_a_file_that_is_no_table_is_to_be_made_with_the_program(tmp_path, name, 
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(UserError, match="nbv calibrate") as error:
-        lookup.load_lookup(tmp_path / name)
+        lookup.LookupTable.load(tmp_path / name)
     assert message in str(error.value)

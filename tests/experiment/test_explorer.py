@@ -17,7 +17,7 @@ from PIL import Image
 
 import synthetic
 from conftest import N_FOLDS, UNITS
-from nbv.core.lookup import load_lookup
+from nbv.core.lookup import LookupTable
 from nbv.errors import UserError
 from nbv.experiment.explorer import ExplorerInputs, build_explorer, coarse_bins
 from nbv.experiment.explorer.images import (
@@ -133,7 +133,7 @@ def test_outcomes_are_the_rows_of_the_files(evaluations):
 
 
 def test_tables_are_off_by_no_more_than_the_page_says(tree):
-    table = load_lookup(Layout(str(tree)).lookup("mug", 0, 1, "pose_ambiguity"))
+    table = LookupTable.load(Layout(str(tree)).lookup("mug", 0, 1, "pose_ambiguity"))
     stored = page_table(table)
     for found, exact in (
         (stored.viewpoint_likelihood, table.viewpoint_likelihood),

@@ -14,7 +14,7 @@ import synthetic
 from conftest import N_FOLDS, UNITS
 from nbv.core.angles import circular_distance_deg
 from nbv.core.evidence import gather_evidence
-from nbv.core.lookup import build_lookup, load_lookup, save_lookup
+from nbv.core.lookup import LookupTable, build_lookup
 from nbv.errors import UserError
 from nbv.experiment.report.figures import FIGURES, FigureInputs, build_figure, steps
 from nbv.experiment.report.figures.inputs import example_view
@@ -42,7 +42,7 @@ def drawn_from(inputs, evaluations, tmp_path):
 
     def made(table):
         path = tmp_path / f"{table.criterion}.npz"
-        save_lookup(path, table)
+        table.save(path)
         return replace(
             inputs,
             evaluations={("mug", 0): evaluations["mug", 0]},
@@ -53,7 +53,7 @@ def drawn_from(inputs, evaluations, tmp_path):
 
 
 def stored(inputs):
-    return load_lookup(inputs.lookups["mug", 0, FOLD])
+    return LookupTable.load(inputs.lookups["mug", 0, FOLD])
 
 
 def errors_of(evaluations, unit, method):

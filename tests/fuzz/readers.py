@@ -232,19 +232,17 @@ def densities(n_bins: int) -> np.ndarray:
 
 
 def make_lookup(path: Path) -> None:
-    from nbv.core.lookup import LookupTable, save_lookup
+    from nbv.core.lookup import LookupTable
 
     table, delta = densities(36).astype(np.float32), np.arange(0, 360, 10, dtype=np.int64)
-    save_lookup(
-        path,
-        LookupTable(table, table, table, delta, 8.0, 10.0, "mixture", "entropy", "pose_ambiguity"),
-    )
+    settings = 8.0, 10.0, "mixture", "entropy", "pose_ambiguity"
+    LookupTable(table, table, table, delta, *settings).save(path)
 
 
 def read_lookup(path: Path) -> Any:
-    from nbv.core.lookup import load_lookup
+    from nbv.core.lookup import LookupTable
 
-    return load_lookup(path)
+    return LookupTable.load(path)
 
 
 def lookup_problem(table: Any) -> str:

@@ -16,7 +16,8 @@ from nbv.errors import UserError
 from nbv.experiment.config import load_config
 from nbv.experiment.estimates import write_estimates
 from nbv.robot.calibration import DENSITY
-from nbv.robot.pairs import N_VIEWS, WIDEST_GAP_DEG, objects_of_pairs, read_pairs
+from nbv.robot.pair_distributions import WIDEST_GAP_DEG
+from nbv.robot.pairs import N_VIEWS, PairTable
 
 CONFIG = Path(__file__).parents[2] / "config"
 
@@ -39,7 +40,7 @@ def estimates_of(seed: int, azimuths) -> np.ndarray:
 
 def refused(path: Path) -> str:
     with pytest.raises(UserError, match=path.name) as error:
-        read_pairs(path)
+        assert PairTable.load(path).estimates
     assert "\n" not in str(error.value)
     return str(error.value)
 
@@ -53,7 +54,7 @@ def test_views_a_degree_apart_come_back_as_they_are(tmp_path):
     views = np.arange(360)
     wanted = np.stack([estimates_of(seed, views) for seed in range(3)])
     path = written(tmp_path / "p.csv", {f"o{i}": (views, row) for i, row in enumerate(wanted)})
-    found = read_pairs(path).estimate_deg
+    found = PairTable.load(path).estimates.estimate_deg
     assert found.shape == (3, N_VIEWS)
     assert np.array_equal(found, wanted)
 
@@ -61,7 +62,7 @@ def test_views_a_degree_apart_come_back_as_they_are(tmp_path):
 def test_estimates_of_the_experiments_are_pairs(tmp_path):
     wanted = np.stack([estimates_of(seed, np.arange(360)) for seed in range(2)]).round(4) % 360
     write_estimates(tmp_path / "e.csv", Estimates(("a", "b"), wanted))
-    assert np.array_equal(read_pairs(tmp_path / "e.csv").estimate_deg, wanted)
+    assert np.array_equal(PairTable.load(tmp_path / "e.csv").estimates.estimate_deg, wanted)
 
 
 @settings(max_examples=20)
@@ -70,10 +71,10 @@ def test_the_order_of_rows_does_not_matter(tmp_path_factory, seed):
     folder, rng = tmp_path_factory.mktemp("pairs"), np.random.default_rng(seed)
     views = np.arange(0, 360, 5)
     objects = {name: (views, estimates_of(i, views)) for i, name in enumerate("ab")}
-    wanted = read_pairs(written(folder / "p.csv", objects)).estimate_deg
+    wanted = PairTable.load(written(folder / "p.csv", objects)).estimates.estimate_deg
     table = pd.read_csv(folder / "p.csv")
     table.iloc[rng.permutation(len(table))].to_csv(folder / "q.csv", index=False)
-    found = read_pairs(folder / "q.csv").estimate_deg
+    found = PairTable.load(folder / "q.csv").estimates.estimate_deg
     # Objects come in the order of the file.
     first = pd.read_csv(folder / "q.csv")["object_id"][0]
     assert np.array_equal(found, wanted if first == "a" else wanted[::-1])
@@ -84,7 +85,9 @@ def test_the_order_of_rows_does_not_matter(tmp_path_factory, seed):
 def test_views_farther_apart_keep_their_errors(tmp_path, step, offset):
     views = np.arange(0, 360, step) + offset
     estimates = estimates_of(1, views)
-    found = read_pairs(written(tmp_path / "p.csv", {"a": (views, estimates)})).estimate_deg[0]
+    found = PairTable.load(
+        written(tmp_path / "p.csv", {"a": (views, estimates)})
+    ).estimates.estimate_deg[0]
     errors = (estimates - views + 180) % 360 - 180
     assert ((found >= 0) & (found < 360)).all()
     for azimuth, estimate in enumerate(found):
@@ -99,21 +102,27 @@ def test_whole_turns_do_not_matter(tmp_path_factory, base, shift):
     folder = tmp_path_factory.mktemp("pairs")
     views = np.arange(0, 360, 10)
     estimates = estimates_of(2, views)
-    one = read_pairs(written(folder / "p.csv", {"a": (views, estimates)})).estimate_deg
+    one = PairTable.load(
+        written(folder / "p.csv", {"a": (views, estimates)})
+    ).estimates.estimate_deg
     moved = {"a": (views + 360 * (base // 360), estimates + 360 * (shift // 360))}
-    assert read_pairs(written(folder / "q.csv", moved)).estimate_deg == pytest.approx(one, abs=1e-6)
+    assert PairTable.load(written(folder / "q.csv", moved)).estimates.estimate_deg == pytest.approx(
+        one, abs=1e-6
+    )
 
 
 def test_a_perfect_estimator_stays_perfect(tmp_path):
     views = np.arange(0, 360, 12) + 0.25
-    found = read_pairs(written(tmp_path / "p.csv", {"a": (views, views)})).estimate_deg
+    found = PairTable.load(
+        written(tmp_path / "p.csv", {"a": (views, views)})
+    ).estimates.estimate_deg
     assert circular_distance_deg(found[0], np.arange(360)).max() < 1e-9
 
 
 def test_objects_may_have_other_views_and_any_names(tmp_path):
     views = np.arange(0, 360, 15), np.arange(0, 360, 4)
     objects = {"NA": (views[0], views[0] + 5.0), "007": (views[1], views[1] - 3.0)}
-    found = read_pairs(written(tmp_path / "p.csv", objects)).estimate_deg
+    found = PairTable.load(written(tmp_path / "p.csv", objects)).estimates.estimate_deg
     errors = (found - np.arange(360) + 180) % 360 - 180
     assert errors[0] == pytest.approx(5.0)
     assert errors[1] == pytest.approx(-3.0)
@@ -122,9 +131,9 @@ def test_objects_may_have_other_views_and_any_names(tmp_path):
 def test_further_columns_are_ignored(tmp_path):
     views = np.arange(0, 360, 15)
     path = written(tmp_path / "p.csv", {"a": (views, views)})
-    wanted = read_pairs(path).estimate_deg
+    wanted = PairTable.load(path).estimates.estimate_deg
     pd.read_csv(path).assign(note="", score=np.nan).to_csv(path, index=False)
-    assert np.array_equal(read_pairs(path).estimate_deg, wanted)
+    assert np.array_equal(PairTable.load(path).estimates.estimate_deg, wanted)
 
 
 # What is refused
@@ -224,7 +233,7 @@ def units(tmp_path, rows=()) -> Path:
 @pytest.mark.parametrize(("category", "shift"), [("mug", 0), ("cup", 1)])
 @pytest.mark.parametrize("elevation", [0, 15])
 def test_rows_of_one_category_and_elevation_are_read(tmp_path, category, shift, elevation):
-    found = read_pairs(units(tmp_path), category, elevation)
+    found = PairTable.load(units(tmp_path)).of_unit(category, elevation).estimates
     assert found.object_ids == ("a",)
     wanted = (np.arange(360) + 10 * elevation + shift) % 360
     assert np.array_equal(found.estimate_deg[0], wanted)
@@ -234,15 +243,15 @@ def test_the_objects_of_each_category_are_those_of_all_its_elevations(tmp_path):
     views = np.arange(0, 360, 10)
     more = [("mug", elevation, "b", view, view) for elevation in (0, 15) for view in views]
     path = units(tmp_path, more)
-    found = objects_of_pairs(path, {"mug": [0, 15], "cup": [0]})
+    found = PairTable.load(path).objects({"mug": [0, 15], "cup": [0]})
     assert found == {"mug": ["a", "b"], "cup": ["a"]}
 
 
 def test_an_object_that_is_missing_at_an_elevation_is_one_line(tmp_path):
     more = [("mug", 0, "b", view, view) for view in np.arange(0, 360, 10)]
     with pytest.raises(UserError, match="object 'b' has no pairs at some elevation of mug"):
-        objects_of_pairs(units(tmp_path, more), {"mug": [0, 15]})
-    assert objects_of_pairs(units(tmp_path, more), {"mug": [0]}) == {"mug": ["a", "b"]}
+        PairTable.load(units(tmp_path, more)).objects({"mug": [0, 15]})
+    assert PairTable.load(units(tmp_path, more)).objects({"mug": [0]}) == {"mug": ["a", "b"]}
 
 
 @pytest.mark.parametrize("absent", ["category", "elevation_deg"])
@@ -250,14 +259,14 @@ def test_units_that_nothing_tells_apart_are_one_line(tmp_path, absent):
     path = units(tmp_path)
     pd.read_csv(path).drop(columns=absent).drop_duplicates("azimuth_deg").to_csv(path, index=False)
     with pytest.raises(UserError, match=f"no column '{absent}', and the run has 2"):
-        objects_of_pairs(path, {"mug": [0, 15], "cup": [0]})
+        PairTable.load(path).objects({"mug": [0, 15], "cup": [0]})
     if absent == "category":
-        assert objects_of_pairs(path, {"mug": [0]}) == {"mug": ["a"]}
+        assert PairTable.load(path).objects({"mug": [0]}) == {"mug": ["a"]}
 
 
 def test_a_category_without_rows_is_one_line(tmp_path):
     with pytest.raises(UserError, match="no rows with category=chair"):
-        read_pairs(units(tmp_path), "chair")
+        PairTable.load(units(tmp_path)).of_unit("chair", 0)
 
 
 def test_a_compressed_file_is_read_as_the_file_itself(tmp_path):
@@ -265,5 +274,5 @@ def test_a_compressed_file_is_read_as_the_file_itself(tmp_path):
     table["estimate_deg"] = table["azimuth_deg"] + 1.0
     for name in ("p.csv", "p.csv.gz"):
         table.to_csv(tmp_path / name, index=False)
-    plain, packed = (read_pairs(tmp_path / name) for name in ("p.csv", "p.csv.gz"))
+    plain, packed = (PairTable.load(tmp_path / name).estimates for name in ("p.csv", "p.csv.gz"))
     assert np.array_equal(plain.estimate_deg, packed.estimate_deg)

@@ -15,7 +15,7 @@ from nbv.core.density import conditionals
 from nbv.core.distributions import mean_direction_deg
 from nbv.core.fusion import product
 from nbv.core.logits import fit_temperature
-from nbv.core.lookup import load_lookup
+from nbv.core.lookup import LookupTable
 from nbv.robot.calibration import DENSITY
 from projects import TINY, Project, copy_of_project
 
@@ -83,7 +83,7 @@ def test_all_objects_that_are_not_tested_calibrate(foreign) -> None:
     splits = pd.read_csv(project.results / "splits/mug.csv", dtype={"object_id": str})
     assert set(splits["role"]) == {"calibration", "test"}
     of_fold = splits[splits["fold"] == 1].groupby("role")["object_id"].agg(set)
-    table = load_lookup(project.results / "lookup/mug/el00/fold1/pose_ambiguity.npz")
+    table = LookupTable.load(project.results / "lookup/mug/el00/fold1/pose_ambiguity.npz")
     rows = pd.read_csv(pairs, dtype={"object_id": str})
     rows = rows[(rows["category"] == "mug") & rows["object_id"].isin(of_fold["calibration"])]
     wanted = conditionals(

@@ -13,9 +13,8 @@ except ModuleNotFoundError:
         "nbv: error: the package is not installed here: run make, or pip install --editable .[experiment]"
     )
 
-from nbv import provenance
-from nbv.robot.pair_distributions import need_classes
-from nbv.robot.pairs import objects_of_pairs
+from nbv.experiment import provenance
+from nbv.robot.pairs import PairTable
 from nbv.experiment.config import load_config, snakemake_overrides
 from nbv.errors import UserError
 from nbv.experiment.estimation.warm_start import (
@@ -84,15 +83,13 @@ try:
     check_methods(METHODS, EXTENSIONS, CONFIG["gives_distributions"])
     check_sensor(CONFIG["sensor"], CATEGORIES)
     if EXTERNAL:
-        need_classes(CONFIG["estimator"]["pairs"], CONFIG["estimator"].get("n_classes"))
-    OBJECTS = (
-        objects_of_pairs(
-            CONFIG["estimator"]["pairs"],
-            {category: CONFIG["elevations_deg"][category] for category in CATEGORIES},
+        pairs = PairTable.load(CONFIG["estimator"]["pairs"])
+        pairs.check_classes(CONFIG["estimator"].get("n_classes"))
+        OBJECTS = pairs.objects(
+            {name: CONFIG["elevations_deg"][name] for name in CATEGORIES}
         )
-        if EXTERNAL
-        else {category: selected_objects(category) for category in CATEGORIES}
-    )
+    else:
+        OBJECTS = {category: selected_objects(category) for category in CATEGORIES}
 except UserError as error:
     stop(error)
 except OSError as error:

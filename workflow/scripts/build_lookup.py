@@ -3,7 +3,6 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.core.lookup import save_lookup
     from nbv.core.selection import chosen_lookup
     from nbv.experiment.estimates import read_estimates
     from nbv.experiment.splits import need_role, read_splits
@@ -14,4 +13,4 @@ with job(snakemake):
     table = chosen_lookup(
         calibration.estimate_deg, snakemake.wildcards.criterion, snakemake.params.density
     )
-    save_lookup(snakemake.output[0], table)
+    table.save(snakemake.output[0])

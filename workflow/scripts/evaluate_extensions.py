@@ -5,7 +5,6 @@ from nbv.experiment.jobs import job
 with job(snakemake):
     from studies.extensions import evaluate_extensions
 
-    from nbv.core.lookup import save_lookup
     from nbv.core.seeds import rng_for
     from nbv.experiment.estimates import read_estimates, read_posteriors
     from nbv.experiment.splits import need_role, read_splits
@@ -31,7 +30,7 @@ with job(snakemake):
     for name, path in zip(params.extensions, output.evaluations, strict=True):
         write_csv(path, made.frames[name])
     for name, path in zip(params.lookups, output.lookups, strict=True):
-        save_lookup(path, made.lookups[name])
+        made.lookups[name].save(path)
     write_csv(output.choices, made.choices)
     methods = dict(zip(params.methods, map(read_csv, given.methods), strict=True))
     write_csv(output.objects, object_means(methods | made.frames))

@@ -3,7 +3,7 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.core.lookup import load_lookup
+    from nbv.core.lookup import LookupTable
     from nbv.experiment.estimates import read_estimates
     from nbv.experiment.results import evaluate_method
     from nbv.experiment.splits import need_role, read_splits
@@ -12,5 +12,5 @@ with job(snakemake):
     test = read_estimates(snakemake.input.test)
     splits = read_splits(snakemake.input.splits)
     need_role(splits, int(snakemake.wildcards.fold), "test", test.object_ids)
-    lookup = load_lookup(snakemake.input.lookup)
+    lookup = LookupTable.load(snakemake.input.lookup)
     write_csv(snakemake.output[0], evaluate_method(snakemake.params.method, test, lookup=lookup))

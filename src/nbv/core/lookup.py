@@ -69,6 +69,66 @@ class LookupTable:
     spread: str
     criterion: str
 
+    @classmethod
+    def load(cls, path: str | Path) -> LookupTable:
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        UserError
+            Where the file cannot be read, V or L is no conditional density, a cost is not finite,
+            or a recommended rotation is no whole number of degrees in [0, 360).
+
+        Examples
+        --------
+        >>> import nbv
+        >>> try:
+        ...     nbv.LookupTable.load("table.npz")
+        ... except nbv.UserError as error:
+        ...     print(error)
+        table.npz does not exist; name the file that nbv calibrate wrote
+        """
+        names = [item.name for item in fields(cls)]
+        stored = read_arrays(calibrated_file(path), names, CALIBRATE_AGAIN)
+        with readable(path, CALIBRATE_AGAIN):
+            # An array without axes holds a number or a text.
+            values: dict[str, Any] = {
+                name: stored[name] if stored[name].ndim else stored[name].item() for name in names
+            }
+            table = cls(**values)
+            n_bins = len(table.cost)
+            for density in (table.viewpoint_likelihood, table.estimate_likelihood):
+                need_distributions(path, density, (n_bins, n_bins), CALIBRATE_AGAIN)
+            if table.cost.shape != (n_bins, n_bins) or not np.isfinite(table.cost).all():
+                raise damaged(path, "a cost is not finite", CALIBRATE_AGAIN)
+            delta_deg = table.recommended_delta_deg
+            if delta_deg.shape != (n_bins,) or not np.issubdtype(delta_deg.dtype, np.integer):
+                raise damaged(
+                    path, "the recommended rotations are no whole degrees", CALIBRATE_AGAIN
+                )
+            if ((delta_deg < 0) | (delta_deg >= 360)).any():
+                raise damaged(path, "a recommended rotation is not in [0, 360)", CALIBRATE_AGAIN)
+        return table
+
+    def save(self, path: str | Path, further: Mapping[str, NDArray[Any]] | None = None) -> None:
+        """Write the table as ``.npz``, an array for each attribute, and `further` arrays.
+
+        Examples
+        --------
+        >>> import tempfile, numpy as np, nbv
+        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
+        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
+        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+        >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     table.save(f"{folder}/table.npz")
+        ...     nbv.LookupTable.load(f"{folder}/table.npz").criterion
+        'pose_ambiguity'
+        """
+        arrays = {item.name: np.asarray(getattr(self, item.name)) for item in fields(self)}
+        write_arrays(path, arrays | dict(further or {}))
+
     def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
         """Return the rotation to the next view for each estimate, degrees in [0, 360).
 
@@ -210,71 +270,3 @@ def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") ->
         spread=evidence.settings["spread"],
         criterion=criterion,
     )
-
-
-def save_lookup(
-    path: str | Path, table: LookupTable, further: Mapping[str, NDArray[Any]] | None = None
-) -> None:
-    """Write a table as `.npz`, one array for each of its attributes; see `load_lookup`.
-
-    ``further`` arrays are kept in the same file.
-
-    Examples
-    --------
-    >>> import numpy as np, nbv
-    >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-    >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-    >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-    >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     nbv.save_lookup(f'{folder}/table.npz', table)
-    ...     nbv.load_lookup(f'{folder}/table.npz').criterion
-    'pose_ambiguity'
-    """
-    arrays = {item.name: np.asarray(getattr(table, item.name)) for item in fields(table)}
-    write_arrays(path, arrays | dict(further or {}))
-
-
-def load_lookup(path: str | Path) -> LookupTable:
-    """Read what `save_lookup` wrote.
-
-    Raises
-    ------
-    UserError
-        Where the file cannot be read, V or L is no conditional density, a cost is not finite, or a
-        recommended rotation is no whole number of degrees in [0, 360).
-
-    Examples
-    --------
-    >>> import tempfile, numpy as np, nbv
-    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-    >>> evidence = nbv.gather_evidence(
-    ...     np.arange(360.0)[None], density, bandwidth_deg=8, pseudo_observations=3, n_bins=120
-    ... )
-    >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     nbv.save_lookup(f"{folder}/table.npz", table)
-    ...     nbv.load_lookup(f"{folder}/table.npz").criterion
-    'pose_ambiguity'
-    """
-    names = [item.name for item in fields(LookupTable)]
-    stored = read_arrays(calibrated_file(path), names, CALIBRATE_AGAIN)
-    with readable(path, CALIBRATE_AGAIN):
-        # An array without axes holds a number or a text.
-        values: dict[str, Any] = {
-            name: stored[name] if stored[name].ndim else stored[name].item() for name in names
-        }
-        table = LookupTable(**values)
-        n_bins = len(table.cost)
-        for density in (table.viewpoint_likelihood, table.estimate_likelihood):
-            need_distributions(path, density, (n_bins, n_bins), CALIBRATE_AGAIN)
-        if table.cost.shape != (n_bins, n_bins) or not np.isfinite(table.cost).all():
-            raise damaged(path, "a cost is not finite", CALIBRATE_AGAIN)
-        delta_deg = table.recommended_delta_deg
-        if delta_deg.shape != (n_bins,) or not np.issubdtype(delta_deg.dtype, np.integer):
-            raise damaged(path, "the recommended rotations are no whole degrees", CALIBRATE_AGAIN)
-        if ((delta_deg < 0) | (delta_deg >= 360)).any():
-            raise damaged(path, "a recommended rotation is not in [0, 360)", CALIBRATE_AGAIN)
-    return table

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -18,6 +20,30 @@ FOR_FRAMES = (
 
 _LEAST_AGREEMENT = 0.5
 """Length of the mean of unit vectors; that of uniformly random differences is near 0."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """The offset that estimates have in common.
+
+    Attributes
+    ----------
+    offset_deg : float
+        In [-180, 180].
+    warning : str or None
+        See `offset_warning`.
+    """
+
+    offset_deg: float
+    warning: str | None
+
+    @classmethod
+    def of(
+        cls, azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64], what_to_do: str
+    ) -> Offset:
+        """Return the offset between estimates (n,) and azimuths (n,); see `offset_warning`."""
+        warning = offset_warning(azimuth_deg, estimate_deg, what_to_do)
+        return cls(constant_offset_deg(estimate_deg - azimuth_deg), warning or None)
 
 
 def constant_offset_deg(error_deg: ArrayLike) -> float:
@@ -48,8 +74,8 @@ def frame_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.flo
     estimates_agree = _agreement(estimate_deg - azimuth_deg)
     if _agreement(estimate_deg + azimuth_deg) > max(_LEAST_AGREEMENT, estimates_agree):
         return (
-            "estimates fall where azimuths grow: both count counter-clockwise seen from above; "
-            "turn the sign of one of them"
+            "estimates run opposite to azimuths (sign flipped?): both count counter-clockwise seen "
+            "from above"
         )
     if estimates_agree > _LEAST_AGREEMENT:
         return ""
@@ -78,7 +104,7 @@ def offset_warning(
         return warning
     offset = constant_offset_deg(estimate_deg - azimuth_deg)
     if abs(offset) > LARGE_OFFSET_DEG:
-        return f"an offset of {offset:+.1f}° is another zero rather than an error: {what_to_do}"
+        return f"offset {offset:+.1f}°: azimuth origins probably differ; {what_to_do}"
     return ""
 
 

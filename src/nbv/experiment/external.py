@@ -12,7 +12,8 @@ from nbv.core.estimates import Estimates, Posteriors, posteriors_of
 from nbv.core.logits import fit_temperature
 from nbv.experiment.held_out import FoldEstimates
 from nbv.experiment.splits import need_objects, objects_with_role
-from nbv.robot.pair_distributions import Turns, evenly_apart
+from nbv.robot.pair_distributions import evenly_apart
+from nbv.robot.pairs import Turns
 
 
 def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -> FoldEstimates:

@@ -9,24 +9,19 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.angles import signed_difference_deg
+from nbv.core.angles import signed_difference_deg, wrap_deg
 from nbv.core.distributions import rotated
-from nbv.core.estimates import COLUMNS
 from nbv.core.logits import LEAST_PROBABILITY
 from nbv.errors import UserError
-from nbv.files import read_numbers
-from nbv.robot.pairs import (
-    WIDEST_GAP_DEG,
-    radians_hint,
-    read_pair_rows,
-    read_rows,
-    widest_gap_deg,
-)
+from nbv.files import read_numbers, read_rows
 
 FEWEST_CLASSES = 8
 
 SUM_TOLERANCE = 0.05
 """How far a row's sum may be from 1: rounded probabilities are normalised again."""
+
+WIDEST_GAP_DEG = 15.0
+"""Between neighbouring views of a calibration turn."""
 
 
 def as_distributions(
@@ -83,6 +78,23 @@ def as_distributions(
     return np.asarray(rows / rows.sum(axis=1, keepdims=True))
 
 
+def widest_gap_deg(azimuth_deg: NDArray[np.float64]) -> float:
+    """Return the widest gap between neighbouring views (n,) on a turn, degrees."""
+    ordered = np.sort(wrap_deg(azimuth_deg))
+    return float(np.diff(ordered, append=ordered[0] + 360.0).max())
+
+
+def radians_hint(azimuth_deg: NDArray[np.float64]) -> str:
+    """Return the end of a sentence that refuses a gap; empty where azimuths (n,) are degrees.
+
+    In radians they are within a turn and leave no gap that is much wider.
+    """
+    is_small = np.abs(azimuth_deg).max() <= 2 * np.pi
+    if is_small and widest_gap_deg(np.degrees(azimuth_deg)) <= 2 * WIDEST_GAP_DEG:
+        return "; these azimuths seem to be radians: multiply them by 180/π"
+    return ""
+
+
 def evenly_apart(
     azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64], n_views: int
 ) -> NDArray[np.float64]:
@@ -113,67 +125,6 @@ def bin_apart(azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64]) -> ND
     return evenly_apart(azimuth_deg, rows, rows.shape[1]).astype(np.float32)
 
 
-Turns = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
-"""Of each object the azimuths (n,) of its views, and their distributions (n, B)."""
-
-
-def read_pair_distributions(
-    path: str | Path, category: str | None = None, elevation_deg: float | None = None
-) -> Turns:
-    """Read the distributions of a file of calibration pairs: columns ``p0, p1, …, p<B-1>``.
-
-    ``p<k>`` is the probability of the azimuth 360 k / B. Parameters are those of
-    `nbv.robot.pairs.read_pairs`.
-
-    Returns
-    -------
-    Turns
-        Empty where the file has no such column.
-
-    Raises
-    ------
-    UserError
-        Of `nbv.robot.pairs.read_pairs`; where a column is missing between others, or a row is
-        no distribution.
-    """
-    path = Path(path)
-    table = read_pair_rows(path, category, elevation_deg)
-    if not _classes(path, table):
-        return {}
-    rows = _rows(path, table)
-    azimuth_deg = table[COLUMNS[1]].to_numpy(dtype=np.float64)
-    objects = table["object_id"].to_numpy()
-    return {
-        str(name): (azimuth_deg[objects == name], rows[objects == name])
-        for name in dict.fromkeys(objects)
-    }
-
-
-def need_classes(path: str | Path, n_classes: int | None) -> None:
-    """Check that a file of pairs has the columns of so many classes; of none without a number.
-
-    Raises
-    ------
-    UserError
-        Where it has others.
-    """
-    path = Path(path)
-    found = len(_classes(path, read_rows(path, COLUMNS, n_rows=1)))
-    if n_classes is None and found:
-        may = found >= FEWEST_CLASSES and 360 % found == 0 and found % 2 == 0
-        choose = f"choose estimator=external_distributions with estimator.n_classes={found}, or "
-        raise UserError(
-            f"{path} has distributions (p0 to p{found - 1}): {choose if may else ''}leave these "
-            "columns out"
-        )
-    if n_classes is not None and found != n_classes:
-        raise UserError(
-            f"{path} has {found} columns of probabilities (p0, p1, …), and "
-            f"estimator.n_classes={n_classes}: "
-            + (f"set it to {found}" if found else "choose estimator=external for estimates alone")
-        )
-
-
 def read_distributions(path: str | Path) -> NDArray[np.float64]:
     """Read distributions (n, B) of n views: CSV with columns ``p0, p1, …``, or a ``.npy`` array.
 
@@ -185,11 +136,17 @@ def read_distributions(path: str | Path) -> NDArray[np.float64]:
     path = Path(path)
     if path.suffix.lower() == ".npy":
         return as_distributions(read_numbers(path), str(path))
-    return _rows(path, read_rows(path, ["p0"]))
+    return distributions_of_rows(path, read_rows(path, ["p0"]))
 
 
-def _classes(path: Path, table: pd.DataFrame) -> list[str]:
-    """Return the names of the columns of probabilities, in their order."""
+def class_columns(path: Path, table: pd.DataFrame) -> list[str]:
+    """Return the names of the columns of probabilities, in their order; none without such.
+
+    Raises
+    ------
+    UserError
+        Where a column is missing between others.
+    """
     given = [str(name) for name in table.columns]
     found = [name for name in given if re.fullmatch(r"\s*[pP][ _]?\d+\s*", name)]
     wanted = [f"p{number}" for number in range(len(found))]
@@ -201,7 +158,8 @@ def _classes(path: Path, table: pd.DataFrame) -> list[str]:
     return wanted
 
 
-def _rows(path: Path, table: pd.DataFrame) -> NDArray[np.float64]:
-    texts = table[_classes(path, table)]
+def distributions_of_rows(path: Path, table: pd.DataFrame) -> NDArray[np.float64]:
+    """Return the distributions (n, B) in the columns ``p0, p1, …`` of a file's rows."""
+    texts = table[class_columns(path, table)]
     numbers = texts.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
     return as_distributions(numbers, str(path), table.index.to_numpy() + 2)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,150 +12,186 @@ from numpy.typing import NDArray
 
 from nbv.core.angles import signed_difference_deg, wrap_deg
 from nbv.core.estimates import COLUMNS, Estimates
-from nbv.errors import UserError, reason_of
-from nbv.files import missing, read_text
+from nbv.core.offset import FOR_PAIRS, Offset
+from nbv.errors import UserError
+from nbv.files import read_rows
+from nbv.robot.pair_distributions import (
+    FEWEST_CLASSES,
+    WIDEST_GAP_DEG,
+    class_columns,
+    distributions_of_rows,
+    radians_hint,
+    widest_gap_deg,
+)
 
 N_VIEWS = 360
 
-_COMPRESSED = (".gz", ".bz2", ".xz", ".zip")
+_OF_FRAMES = "; frames need a `bundle`, such as mug, and an `output` that ends in .safetensors"
 
-WIDEST_GAP_DEG = 15.0
-"""Between neighbouring views of a calibration turn."""
+Turns = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
+"""For each object the azimuths (n,) of its views, and their distributions (n, B)."""
 
 
-def read_pairs(
-    path: str | Path, category: str | None = None, elevation_deg: float | None = None
-) -> Estimates:
-    """Read calibration pairs: CSV with ``object_id, azimuth_deg, estimate_deg``, in any order.
+@dataclass(frozen=True)
+class PairTable:
+    """Calibration pairs: true azimuths, estimates, and perhaps distributions.
 
-    Parameters
+    Attributes
     ----------
-    path : path
-    category : str, optional
-        Of the rows to read, where the file has a column ``category``.
-    elevation_deg : float, optional
-        The same of ``elevation_deg``.
-
-    Returns
-    -------
-    Estimates
-        Of views one degree apart, objects in the order of the file. A view that the file does not
-        have takes the error of the nearest one that it has.
-
-    Raises
-    ------
-    UserError
-        Where a column is missing, a value is no number, no row is left, or views are farther apart
-        than `WIDEST_GAP_DEG`.
+    path : Path
+        The file, for messages.
+    rows : DataFrame
+        Columns ``object_id, azimuth_deg, estimate_deg``, and as text ``p0, p1, …, p<B-1>`` where
+        the file has them: ``p<k>`` is the probability of the azimuth 360 k / B. The index counts
+        the rows of the file from 0.
     """
-    path = Path(path)
-    return _estimates(path, read_pair_rows(path, category, elevation_deg))
 
+    path: Path
+    rows: pd.DataFrame
 
-def _estimates(path: Path, table: pd.DataFrame) -> Estimates:
-    turns = {
-        str(name): _object_turn(path, str(name), rows)
-        for name, rows in table.groupby("object_id", sort=False)
-    }
-    return Estimates(tuple(turns), np.stack(list(turns.values())))
+    @classmethod
+    def load(cls, path: str | Path) -> PairTable:
+        """Read a CSV file of pairs, in any order.
 
+        Raises
+        ------
+        UserError
+            Where the file cannot be read, a column is missing, or a value is no number.
+        """
+        path = Path(path)
+        rows = read_rows(path, COLUMNS, _OF_FRAMES)
+        for name in COLUMNS[1:]:
+            rows[name] = pd.to_numeric(rows[name], errors="coerce")
+            if not (finite := np.isfinite(rows[name].to_numpy(dtype=np.float64))).all():
+                raise UserError(f"{path}, row {int((~finite).argmax()) + 2}: {name} is no number")
+        if "elevation_deg" in rows:
+            rows["elevation_deg"] = pd.to_numeric(rows["elevation_deg"], errors="coerce")
+        return cls(path, rows)
 
-def read_rows(path: Path, needed: Sequence[str], n_rows: int | None = None) -> pd.DataFrame:
-    """Read a user's CSV file, or its first `n_rows`, as text: an object may be called NA.
+    def of_unit(self, category: str, elevation_deg: float) -> PairTable:
+        """Return the rows of a category and an elevation, where columns tell them apart.
 
-    Raises
-    ------
-    UserError
-        Where it cannot be read, a column of `needed` is missing, or it has no rows.
-    """
-    if not path.is_file():
-        raise UserError(f"{path} {missing(path)}; name a file with {', '.join(needed)}")
-    try:
-        source: Path | io.StringIO = path
-        if path.suffix not in _COMPRESSED:
-            if not (text := read_text(path)).strip():
-                raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
-            source = io.StringIO(text)
-        table = pd.read_csv(source, dtype=str, keep_default_na=False, nrows=n_rows)
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
-    for name in needed:
-        if name not in table:
-            hint = "; commas stand between columns" if table.shape[1] == 1 else ""
-            raise UserError(f"{path}: no column {name!r}; it needs {', '.join(needed)}{hint}")
-    if table.empty:
-        raise UserError(f"{path} has no rows")
-    return table
+        Raises
+        ------
+        UserError
+            Where no row is left.
+        """
+        rows = self.rows
+        for name, wanted in (("category", category), ("elevation_deg", elevation_deg)):
+            if name in rows:
+                rows = rows[rows[name] == wanted]
+                if rows.empty:
+                    raise UserError(f"{self.path} has no rows with {name}={wanted}")
+        return replace(self, rows=rows)
 
+    @property
+    def estimates(self) -> Estimates:
+        """Estimates of views one degree apart, objects in the order of the file.
 
-def read_pair_rows(
-    path: Path, category: str | None = None, elevation_deg: float | None = None
-) -> pd.DataFrame:
-    """Read the rows of a file of pairs; parameters and errors as of `read_pairs`.
+        A view that the file does not have takes the error of the nearest one that it has.
 
-    The index is that of the rows in the file, from 0.
-    """
-    table = read_rows(path, COLUMNS)
-    for name in COLUMNS[1:]:
-        table[name] = pd.to_numeric(table[name], errors="coerce")
-        if not (finite := np.isfinite(table[name].to_numpy(dtype=np.float64))).all():
-            raise UserError(f"{path}, row {int((~finite).argmax()) + 2}: {name} is no number")
-    if "elevation_deg" in table:
-        table["elevation_deg"] = pd.to_numeric(table["elevation_deg"], errors="coerce")
-    return _of_unit(path, table, category, elevation_deg)
+        Raises
+        ------
+        UserError
+            Where an object has two views at one azimuth, or views are farther apart than
+            `WIDEST_GAP_DEG`.
+        """
+        turns = {
+            str(name): _object_turn(self.path, str(name), rows)
+            for name, rows in self.rows.groupby("object_id", sort=False)
+        }
+        return Estimates(tuple(turns), np.stack(list(turns.values())))
 
+    @property
+    def distributions(self) -> Turns:
+        """Distributions of each object's views; empty where the file has none.
 
-def _of_unit(
-    path: Path, table: pd.DataFrame, category: str | None, elevation_deg: float | None
-) -> pd.DataFrame:
-    for name, wanted in (("category", category), ("elevation_deg", elevation_deg)):
-        if wanted is not None and name in table:
-            table = table[table[name] == wanted]
-            if table.empty:
-                raise UserError(f"{path} has no rows with {name}={wanted}")
-    return table
+        Raises
+        ------
+        UserError
+            Where a column is missing between others, or a row is no distribution.
+        """
+        if not class_columns(self.path, self.rows):
+            return {}
+        probabilities = distributions_of_rows(self.path, self.rows)
+        azimuth_deg = self.rows["azimuth_deg"].to_numpy(dtype=np.float64)
+        objects = self.rows["object_id"].to_numpy()
+        return {
+            str(name): (azimuth_deg[objects == name], probabilities[objects == name])
+            for name in dict.fromkeys(objects)
+        }
 
+    @property
+    def offset(self) -> Offset:
+        """What all estimates have in common."""
+        azimuth_deg, estimate_deg = (
+            self.rows[name].to_numpy(dtype=np.float64) for name in COLUMNS[1:]
+        )
+        return Offset.of(azimuth_deg, estimate_deg, FOR_PAIRS)
 
-def objects_of_pairs(
-    path: str | Path, elevations_deg: Mapping[str, Sequence[int]]
-) -> dict[str, list[str]]:
-    """Return the ids of the objects that a file has pairs of, by category.
+    def objects(self, elevations_deg: Mapping[str, Sequence[int]]) -> dict[str, list[str]]:
+        """Return the ids of the objects in each category.
 
-    Parameters
-    ----------
-    path : path
-    elevations_deg : mapping of str to sequence of int
-        Categories, and the elevations of each.
+        Parameters
+        ----------
+        elevations_deg : mapping of str to sequence of int
+            The elevations in each category.
 
-    Raises
-    ------
-    UserError
-        Of `read_pairs`; where a column is missing that tells categories or elevations apart; where
-        an object is missing at an elevation.
-    """
-    path = Path(path)
-    table = read_pair_rows(path)
-    several = {
-        "category": ("categories", len(elevations_deg)),
-        "elevation_deg": ("elevations", max(map(len, elevations_deg.values()))),
-    }
-    for name, (what, number) in several.items():
-        if number > 1 and name not in table:
-            raise UserError(
-                f"{path} has no column {name!r}, and the run has {number} {what}: add the column, "
-                "or run one (overrides=[categories=[mug],elevations_deg.mug=[0]])"
+        Raises
+        ------
+        UserError
+            Where a column is missing that tells categories or elevations apart, an object is
+            missing at an elevation, and as in `estimates`.
+        """
+        several = {
+            "category": ("categories", len(elevations_deg)),
+            "elevation_deg": ("elevations", max(map(len, elevations_deg.values()))),
+        }
+        for name, (what, number) in several.items():
+            if number > 1 and name not in self.rows:
+                raise UserError(
+                    f"{self.path} has no column {name!r}, and the run has {number} {what}: add the "
+                    "column, or run one (overrides=[categories=[mug],elevations_deg.mug=[0]])"
+                )
+        found = {}
+        for category, elevations in elevations_deg.items():
+            ids = [self.of_unit(category, one).estimates.object_ids for one in elevations]
+            if missing := set().union(*ids) - set(ids[0]).intersection(*ids):
+                raise UserError(
+                    f"{self.path}: object {min(missing)!r} has no pairs at some elevation of "
+                    f"{category}; give them, or leave the object out"
+                )
+            found[category] = list(ids[0])
+        return found
+
+    def check_classes(self, n_classes: int | None) -> None:
+        """Check that the file has columns of `n_classes` probabilities; none without a number.
+
+        Raises
+        ------
+        UserError
+            Where it has another number of them.
+        """
+        found = len(class_columns(self.path, self.rows))
+        if n_classes is None and found:
+            may = found >= FEWEST_CLASSES and 360 % found == 0 and found % 2 == 0
+            choose = (
+                f"choose estimator=external_distributions with estimator.n_classes={found}, or "
             )
-    found = {}
-    for category, elevations in elevations_deg.items():
-        units = [_of_unit(path, table, category, elevation) for elevation in elevations]
-        ids = [_estimates(path, unit).object_ids for unit in units]
-        if missing := set().union(*ids) - set(ids[0]).intersection(*ids):
             raise UserError(
-                f"{path}: object {min(missing)!r} has no pairs at some elevation of {category}; "
-                "give them, or leave the object out"
+                f"{self.path} has distributions (p0 to p{found - 1}): {choose if may else ''}leave "
+                "these columns out"
             )
-        found[category] = list(ids[0])
-    return found
+        if n_classes is not None and found != n_classes:
+            raise UserError(
+                f"{self.path} has {found} columns of probabilities (p0, p1, …), and "
+                f"estimator.n_classes={n_classes}: "
+                + (
+                    f"set it to {found}"
+                    if found
+                    else "choose estimator=external for estimates alone"
+                )
+            )
 
 
 def _object_turn(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float64]:
@@ -173,23 +209,6 @@ def _object_turn(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float6
             f"view every {WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
         )
     return full_turn(wrap_deg(azimuth_deg), estimate_deg)
-
-
-def widest_gap_deg(azimuth_deg: NDArray[np.float64]) -> float:
-    """Return the widest gap between neighbouring views (n,) on a turn, degrees."""
-    ordered = np.sort(wrap_deg(azimuth_deg))
-    return float(np.diff(ordered, append=ordered[0] + 360.0).max())
-
-
-def radians_hint(azimuth_deg: NDArray[np.float64]) -> str:
-    """Return the end of a sentence that refuses a gap; empty where azimuths (n,) are degrees.
-
-    In radians they are within a turn and leave no gap that is much wider.
-    """
-    is_small = np.abs(azimuth_deg).max() <= 2 * np.pi
-    if is_small and widest_gap_deg(np.degrees(azimuth_deg)) <= 2 * WIDEST_GAP_DEG:
-        return "; these azimuths seem to be radians: multiply them by 180/π"
-    return ""
 
 
 def full_turn(

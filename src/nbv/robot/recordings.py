@@ -12,11 +12,10 @@ import numpy as np
 import pandas as pd
 
 from nbv.errors import UserError
-from nbv.files import missing
+from nbv.files import missing, read_rows
 from nbv.robot.depth_files import read_depth, read_mask
 from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics, camera_of
-from nbv.robot.pairs import read_rows
 from nbv.robot.recommender import Recommender
 from nbv.robot.sweeps import Turn
 
@@ -104,14 +103,6 @@ def read_manifest(path: str | Path) -> list[Recording]:
         )
         for (object_id, sequence), rows in table.groupby(["object_id", "sequence"], sort=True)
     ]
-
-
-def is_manifest(path: str | Path) -> bool:
-    """Return whether a file has the columns of a manifest, and no estimates."""
-    try:
-        return "estimate_deg" not in read_rows(Path(path), NEEDED)
-    except UserError:
-        return False
 
 
 def _refuse(path: Path, place: int, what: str) -> NoReturn:

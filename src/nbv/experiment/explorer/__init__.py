@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from nbv.core.criteria import CRITERIA
-from nbv.core.lookup import load_lookup
+from nbv.core.lookup import LookupTable
 from nbv.data.depth_images import open_depth
 from nbv.errors import UserError
 from nbv.experiment.estimates import read_posteriors
@@ -176,7 +176,7 @@ def _add_tables(
 ) -> list[dict[str, Any]]:
     found = []
     for place, (fold, criterion) in enumerate(_each_table(criteria, outcomes)):
-        table = load_lookup(existing(inputs.lookups[*unit, fold, criterion]))
+        table = LookupTable.load(existing(inputs.lookups[*unit, fold, criterion]))
         stored = page_table(table)
         chunks.add(
             f"table-{index}-{place}",

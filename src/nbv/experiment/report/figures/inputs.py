@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from nbv.core.criteria import cost_unit
-from nbv.core.lookup import LookupTable, load_lookup
+from nbv.core.lookup import LookupTable
 from nbv.data.depth_images import Codes, open_depth
 from nbv.errors import UserError
 from nbv.experiment.report.settings import ReportSettings, focus_unit
@@ -77,7 +77,7 @@ class FigureInputs:
             If the subject follows none, or its file is missing.
         """
         name = f"lookup table of {self.settings.subject}"
-        return load_lookup(existing(_given(self.lookups, (*self.focus, fold), name)))
+        return LookupTable.load(existing(_given(self.lookups, (*self.focus, fold), name)))
 
     def methods(self, unit: Unit) -> tuple[str, ...]:
         """Return the methods to show that were evaluated for a unit, in order."""
