@@ -19,18 +19,19 @@ from made_bundles import BINS, COLUMNS, FOCAL_PX, ROWS, WIDTH, frame
 pytest.importorskip("cyclopts")
 
 from nbv.cli import main
-from nbv.cli.answers import offset_of_frames, say_offset
+from nbv.cli.answers import say_offset
 from nbv.cli.arguments import as_paragraphs
 from nbv.core.angles import signed_difference_deg
 from nbv.core.criteria import CRITERIA
-from nbv.core.lookup import load_lookup, save_lookup
+from nbv.core.lookup import LookupTable
+from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
 from nbv.core.selection import chosen_lookup
 from nbv.robot.bundle import FORMAT, Bundle
 from nbv.robot.calibration import DENSITY, recalibrated
 from nbv.robot.depth_files import read_depth
 from nbv.robot.evaluation import evaluate, familiarity_of
 from nbv.robot.moves import check_axis, elevation_from_gravity, moved_camera
-from nbv.robot.pairs import read_pairs
+from nbv.robot.pairs import PairTable
 from nbv.robot.recommender import Recommender
 from nbv.robot.recordings import read_manifest, see
 
@@ -254,7 +255,7 @@ def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
     )
     lines = out.splitlines()
     assert lines[0] == f"camera     not given: a focal length of {FOCAL_PX:g} px is assumed"
-    assert f"azimuth {answer.azimuth_deg:.1f}° about the mug" in lines[1]
+    assert f"azimuth {answer.azimuth_deg:.1f}° (camera around mug)" in lines[1]
     assert "(1 view)" in lines[1]
     assert f"turn by {answer.move.rotation_deg:+.0f}°" in lines[2]
     assert f"expected error {answer.move.expected_error_deg:.1f}°" in lines[2]
@@ -269,7 +270,23 @@ def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
         *("--bundle", "b.safetensors", "--intrinsics", "150"),
     )
     assert "(2 views)" in two
-    assert "camera" not in two.splitlines()[0]
+    assert two.startswith("pose ")
+
+
+def test_the_choice_of_the_last_view_raises_its_expected_error_unless_it_was_not_followed(
+    here, capsys
+):
+    command = ("recommend", "f0.npy", "f1.npy", "--rotations", "0", "60", "--json")
+    recommender = Recommender.load("b.safetensors")
+    errors = []
+    for flags, followed in ((), True), (["--followed"], True), (["--not-followed"], False):
+        printed = json.loads(run(capsys, *command, "--bundle", "b.safetensors", *flags))
+        answer = recommender.recommend(
+            [frame(0), frame(1)], rotations_deg=[0, 60], followed=followed
+        )
+        same_answer(printed, answer)
+        errors.append(printed["expected_error_deg"])
+    assert errors[0] == errors[1] > errors[2]
 
 
 def test_frames_all_round_have_a_pose_and_no_next_view(manifest, capsys):
@@ -295,7 +312,7 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
     known = replace(bundle.familiarity, threshold=limit, scales=np.array([[0, 1], [-1e3, 1]]))
     replace(bundle, familiarity=known).save("limit.safetensors")
     out = run(capsys, "recommend", "f0.npy", "--bundle", "limit.safetensors")
-    assert ("careful" in out) == is_told
+    assert ("warning:" in out) == is_told
 
 
 @pytest.mark.parametrize(
@@ -311,10 +328,10 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         (["f0.npy", "--rotations="], "give a number"),
         (["--mask", "m.npy", "f0.npy"], "frames stand before --mask"),
         (["f0.npy", "--rotations", "10"], "the first is 10"),
-        (["f0.npy", "--max-travel", "3"], "no rotation is allowed"),
+        (["f0.npy", "--max-travel", "3"], "relax --allowed or --max-travel"),
         (["f0.npy", "--max-travel", "-5"], "a longest travel of -5.0°: give degrees, 0 or more"),
         (["f0.npy", "--max-travel", "nan"], "a longest travel of nan°"),
-        (["f0.npy", "--allowed", "0"], "no rotation is allowed"),
+        (["f0.npy", "--allowed", "0"], "no admissible rotation"),
         (["f0.npy", "--allowed", "left"], "left: give rotations in degrees, or a .npy file"),
         (["f0.npy", "--allowed", "no.npy"], "no.npy does not exist"),
         (["f0.npy", "--allowed", "pose.json"], "pose.json: give rotations in degrees, or a .npy"),
@@ -435,19 +452,21 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
     wanted = {"file": "json.npz", "criterion": criterion, "n_objects": 2, "warning": None}
     assert printed == wanted
     assert Path("json.npz").read_bytes() == Path("t.npz").read_bytes()
-    save_lookup("wanted.npz", chosen_lookup(read_pairs(pairs).estimate_deg, criterion, DENSITY))
+    estimate_deg = PairTable.load(pairs).estimates.estimate_deg
+    chosen_lookup(estimate_deg, criterion, DENSITY).save("wanted.npz")
     assert Path("t.npz").read_bytes() == Path("wanted.npz").read_bytes()
-    table = load_lookup("t.npz")
+    table = LookupTable.load("t.npz")
     for estimate in (0.0, 123.4, -30.0, 719.6):
         options = ("--estimate", estimate, "--table", "t.npz")
         printed = json.loads(run(capsys, "recommend", *options, "--json"))
-        rotation = printed["rotation_deg"]
+        move = printed["move"]
+        rotation = move["rotation_deg"]
         assert rotation % 360 == table.recommend(estimate)
         assert -180 < rotation <= 180
-        assert printed["travel_deg"] == abs(rotation)
+        assert move["travel_deg"] == abs(rotation)
         assert printed["criterion"] == criterion
         cost = table.cost[round(estimate) % 360, int(rotation) % 360]
-        assert printed["cost"] == pytest.approx(float(cost))
+        assert move["cost"] == pytest.approx(float(cost))
         told = run(capsys, "recommend", *options)
         assert told.startswith(f"turn the camera by {rotation:+g}°, travel {abs(rotation):g}°")
 
@@ -512,8 +531,8 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
     assert camera == ASSUMED
     assert re.fullmatch(r"cup, sequence 1: 24 frames; offset -\d+\.\d°", head)
     # A network of random weights has no zero.
-    assert warning.startswith("careful    ")
-    assert tail == "own.safetensors: mug, 1 recording calibrates it"
+    assert warning.startswith("warning: ")
+    assert tail == "own.safetensors: mug, calibrated on 1 recording"
     wanted = recalibrated(Bundle.load("b.safetensors"), turns_of(manifest), "manifest.csv")
     wanted.save("wanted.safetensors")
     assert Path("own.safetensors").read_bytes() == Path("wanted.safetensors").read_bytes()
@@ -529,7 +548,7 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
         "left_out": [],
     }
     assert f"{recording.pop('offset_deg'):+.1f}°" in head
-    assert f"careful    {recording.pop('warning')}" == warning
+    assert f"warning: {recording.pop('warning')}" == warning
     own = {"object_id": "cup", "sequence": "1", "n_frames": 24, "is_added": False}
     assert recording == own
     assert Path("json.safetensors").read_bytes() == Path("wanted.safetensors").read_bytes()
@@ -561,8 +580,7 @@ def test_what_does_not_go_with_frames_is_refused(manifest, capsys):
         capsys, "calibrate", "manifest.csv", "--output", "own.safetensors"
     )
     message = fails(capsys, "calibrate", "manifest.csv", "--output", "own.npz")
-    assert "manifest.csv is a manifest of frames, which need --bundle" in message
-    assert "--bundle mug" in message
+    assert "frames need a --bundle, such as mug, and an --output that ends in .saf" in message
     # Pairs may have the columns of a manifest too.
     pd.read_csv(manifest).assign(estimate_deg="north").to_csv("both.csv")
     message = fails(capsys, "calibrate", "both.csv", "--output", "own.npz")
@@ -612,10 +630,10 @@ def test_near_and_far_hold_for_every_frame_of_a_recording(manifest, capsys, comm
     ("change", "warning"),
     [
         (lambda azimuth, estimate: estimate + 14, None),
-        (lambda azimuth, estimate: estimate - 20, "an offset of -"),
-        (lambda azimuth, estimate: estimate + 180, "another zero"),
-        (lambda azimuth, estimate: -estimate, "estimates fall where azimuths grow"),
-        (lambda azimuth, estimate: 70 - estimate, "estimates fall where azimuths grow"),
+        (lambda azimuth, estimate: estimate - 20, "offset -19.8°: azimuth origins"),
+        (lambda azimuth, estimate: estimate + 180, "origins probably differ"),
+        (lambda azimuth, estimate: -estimate, "estimates run opposite to azimuths"),
+        (lambda azimuth, estimate: 70 - estimate, "estimates run opposite to azimuths"),
         (lambda azimuth, estimate: np.radians(estimate), "estimates are radians"),
         (lambda azimuth, estimate: 7.0 * azimuth, "estimates do not follow azimuths"),
         (lambda azimuth, estimate: 0.0 * azimuth + 80.0, "estimates do not follow azimuths"),
@@ -632,7 +650,7 @@ def test_pairs_in_another_frame_are_told(pairs, capsys, change, warning):
         assert told == []
     else:
         (line,) = told
-        assert line.startswith("careful    ")
+        assert line.startswith("warning: ")
         assert warning in line
 
 
@@ -640,23 +658,25 @@ def test_pairs_in_another_frame_are_told(pairs, capsys, change, warning):
     ("change", "is_added", "warning"),
     [
         (lambda azimuth: azimuth + 14, True, None),
-        (lambda azimuth: azimuth - 90, True, "an offset of -90.0° is another zero"),
+        (lambda azimuth: azimuth - 90, True, "offset -90.0°: azimuth origins probably differ"),
         (lambda azimuth: azimuth + 170 * (azimuth > 80), True, "is each frame's azimuth right?"),
-        (lambda azimuth: -azimuth, False, "estimates fall where azimuths grow"),
+        (lambda azimuth: -azimuth, False, "estimates run opposite to azimuths"),
         (lambda azimuth: np.radians(azimuth), False, "estimates are radians"),
     ],
 )
 def test_an_offset_of_frames_is_added_and_a_large_one_told(capsys, change, is_added, warning):
     azimuth_deg = np.arange(0.0, 360.0, 10.0)
-    found = offset_of_frames(azimuth_deg, change(azimuth_deg) % 360)
-    say_offset("cup", "36 frames", found)
+    estimate_deg = change(azimuth_deg) % 360
+    found = Offset.of(azimuth_deg, estimate_deg, FOR_FRAMES)
+    assert (frame_warning(azimuth_deg, estimate_deg) == "") == is_added
+    say_offset("cup", "36 frames", found, is_added=is_added)
     head, *told = capsys.readouterr().out.splitlines()
-    assert head.endswith(", added to the azimuths") == found["is_added"] == is_added
+    assert head.endswith(", added to the azimuths") == is_added
     if warning is None:
         assert not told
-        assert found["warning"] is None
+        assert found.warning is None
     else:
-        assert told == [f"careful    {found['warning']}"]
+        assert told == [f"warning: {found.warning}"]
         assert warning in told[0]
 
 
@@ -688,12 +708,12 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
     text = run(
         *(capsys, "evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2", "3")
     )
-    camera, head, careful, numbers, *lines = text.splitlines()
+    camera, head, warning, numbers, *lines = text.splitlines()
     assert camera == ASSUMED
     assert head.startswith("cup, sequence 1: 24 frames; offset ")
     # The network of this bundle is random.
-    assert careful == f"careful    {familiar['warning'][0]}"
-    assert "estimates do not follow azimuths" in careful
+    assert warning == f"warning: {familiar['warning'][0]}"
+    assert "estimates do not follow azimuths" in warning
     assert numbers.split()[-3:] == ["1", "2", "3"]
     assert len(lines) == wanted["choice"].nunique()
     for line in lines:
@@ -718,7 +738,7 @@ def test_an_object_that_calibrated_the_bundle_is_named(manifest, capsys):
     options = ("manifest.csv", "--bundle", "b.safetensors")
     run(capsys, "calibrate", *options, "--output", "own.safetensors")
     options = ("evaluate", "manifest.csv", "--views", "2", "--bundle")
-    assert "careful    cup: the bundle was calibrated with" in run(
+    assert "warning: cup: the bundle was calibrated with" in run(
         capsys, *options, "own.safetensors"
     )
     printed = json.loads(run(capsys, *options, "own.safetensors", "--json"))
@@ -736,9 +756,9 @@ def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
     (left_out,) = printed["left_out"]
     assert left_out["file"].endswith("turn/3.npy")
     assert left_out["reason"] == "empty-mask"
-    assert f"3.npy is left out: empty-mask: {left_out['message']}" in err
+    assert f"3.npy: empty-mask: {left_out['message']}" in err
     told = run(capsys, *options)
-    assert "3.npy is left out: empty-mask" in told
+    assert "skipping " in told
     # The frame that is left out needs no camera.
     assert printed["n_frames_without_camera"] == 23
     assert "not given for 23 frames" in told
@@ -769,7 +789,7 @@ def test_what_cannot_be_evaluated_is_one_line(manifest, pairs, capsys, arguments
     assert code == 2
     assert message in err
     assert err.count("\n") == 1
-    assert not out or "left out" in out
+    assert not out or "skipping" in out
 
 
 # Inspect and export
@@ -1150,6 +1170,7 @@ def test_a_robot_needs_no_package_of_the_experiment(manifest, pairs, arguments):
         ("--gravity", "0", "1", "0"),
         ("--bundle", "b.safetensors"),
         ("--rotations", "0"),
+        ("--not-followed",),
     ],
 )
 def test_what_an_estimate_cannot_use_is_refused(pairs, capsys, more):
@@ -1166,15 +1187,16 @@ def test_an_estimate_has_target_poses_where_camera_and_axis_are_known(pairs, cap
     bare = json.loads(run(capsys, *options, "--json"))
     placed = (*options, "--camera-pose", "pose.json", "--axis", "0.1,-0.2,0.3")
     printed = json.loads(run(capsys, *placed, "--json"))
-    moves = [printed, *printed["alternatives"]]
+    moves = [printed["move"], *printed["alternatives"]]
     assert len(moves) > 1
     for move in moves:
         wanted = moved_camera(POSE, (0.1, -0.2, 0.3), (0, 0, 1), move["rotation_deg"])
         assert np.array(move.pop("target_camera_pose")) == pytest.approx(wanted)
+    assert printed.pop("target_camera_pose")
     assert printed == bare
     told = run(capsys, *placed).splitlines()
     assert told[:-5] == run(capsys, *options).splitlines()
-    wanted = moved_camera(POSE, (0.1, -0.2, 0.3), (0, 0, 1), printed["rotation_deg"])
+    wanted = moved_camera(POSE, (0.1, -0.2, 0.3), (0, 0, 1), moves[0]["rotation_deg"])
     rows = [[float(value) for value in line.split()] for line in told[-4:]]
     assert np.array(rows) == pytest.approx(wanted, abs=1e-5)
 
@@ -1194,7 +1216,7 @@ def test_a_rolled_camera_is_told_whatever_the_recommendation_is_of(pairs, capsys
     ):
         printed = json.loads(run(capsys, "recommend", *options, *placed, "--json"))
         assert [line for line in printed["warnings"] if "leans" in line] == [wanted]
-        assert f"careful    {wanted}" in run(capsys, "recommend", *options, *placed).splitlines()
+        assert f"warning: {wanted}" in run(capsys, "recommend", *options, *placed).splitlines()
 
 
 @pytest.mark.parametrize(
@@ -1221,7 +1243,7 @@ def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, crite
     main(["calibrate", "pairs.csv", "--output", "t.npz", "--criterion", criterion])
     capsys.readouterr()
     options = ("recommend", "--estimate", "90", "--table", "t.npz")
-    cost = load_lookup("t.npz").cost[90].astype(float)
+    cost = LookupTable.load("t.npz").cost[90].astype(float)
     turns = np.arange(360)
     travel = np.minimum(turns, 360 - turns)
     for limits, may in (
@@ -1231,8 +1253,8 @@ def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, crite
         (("--allowed", "-100", "20", "--max-travel", "40"), turns == 20),
     ):
         printed = json.loads(run(capsys, *options, *limits, "--json"))
-        moves = [printed, *printed["alternatives"]]
-        assert printed["cost"] == pytest.approx(cost[may].min())
+        moves = [printed["move"], *printed["alternatives"]]
+        assert moves[0]["cost"] == pytest.approx(cost[may].min())
         assert printed["cost_unit"] == unit.strip()
         found = [int(move["rotation_deg"]) % 360 for move in moves]
         assert may[found].all()
@@ -1240,10 +1262,10 @@ def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, crite
         assert cost[found].tolist() == sorted(cost[found])
         assert len(moves) == may.sum() if may.sum() < 5 else len(moves) > 1
         told = run(capsys, *options, *limits).splitlines()
-        assert told[0].endswith(f"({criterion} {printed['cost']:.3f}{unit})")
+        assert told[0].endswith(f"({criterion} {moves[0]['cost']:.3f}{unit})")
         assert told[1:] == [] if len(moves) == 1 else told[1].startswith("or ")
     for limits in (("--allowed", "0", "1", "-1"), ("--max-travel", "1")):
-        assert "no rotation is allowed" in fails(capsys, *options, *limits)
+        assert "no admissible rotation" in fails(capsys, *options, *limits)
 
 
 @pytest.mark.parametrize("name", ["pairs.csv", "f0.npy", "b.safetensors"])

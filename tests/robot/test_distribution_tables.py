@@ -15,13 +15,14 @@ from tests.cli.test_command_line import POSE, fails, run, same_move
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.core.angles import circular_distance_deg
-from nbv.core.lookup import load_lookup
+from nbv.core.lookup import LookupTable
 from nbv.errors import UserError
 from nbv.experiment.config import load_config
 from nbv.robot.distribution_table import AFFINITY, DistributionTable
 from nbv.robot.errors import FrameError
 from nbv.robot.moves import moved_camera
-from nbv.robot.pair_distributions import read_distributions, read_pair_distributions
+from nbv.robot.pair_distributions import read_distributions
+from nbv.robot.pairs import PairTable
 from nbv.robot.recommender import Recommender
 
 AZIMUTHS = np.arange(BINS) * WIDTH
@@ -128,7 +129,7 @@ def test_a_temperature_at_its_limit_is_told(here, capsys):
     assert DistributionTable.of_pairs(turns()).warning == ""
     written(here, certain)
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
-    assert out.splitlines()[-1].startswith("careful    the temperature 0.05 is at its limit")
+    assert out.splitlines()[-1].startswith("warning: the temperature 0.05 is at its limit")
 
 
 @settings(max_examples=20, deadline=None)
@@ -230,7 +231,7 @@ def here(tmp_path, monkeypatch):
 
 
 def test_pairs_with_distributions_come_back_as_they_are(here):
-    found = read_pair_distributions("pairs.csv")
+    found = PairTable.load("pairs.csv").distributions
     for (name, (azimuth, rows)), (own, wanted) in zip(found.items(), turns().items(), strict=True):
         assert name == own
         assert azimuth.tolist() == AZIMUTHS.tolist()
@@ -240,7 +241,7 @@ def test_pairs_with_distributions_come_back_as_they_are(here):
 
 def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
-    wanted = DistributionTable.of_pairs(read_pair_distributions("pairs.csv"))
+    wanted = DistributionTable.of_pairs(PairTable.load("pairs.csv").distributions)
     told = f"distributions: {BINS} classes, temperature {wanted.temperature:.2f}; offset "
     assert out.splitlines()[-1].startswith(told)
     printed = json.loads(run(capsys, "calibrate", "pairs.csv", "--output", "j.npz", "--json"))
@@ -254,7 +255,7 @@ def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
     of_estimates = pd.read_csv("pairs.csv").iloc[:, :3]
     of_estimates.to_csv("plain.csv", index=False)
     run(capsys, "calibrate", "plain.csv", "--output", "plain.npz")
-    same, plain = load_lookup("t.npz"), load_lookup("plain.npz")
+    same, plain = LookupTable.load("t.npz"), LookupTable.load("plain.npz")
     assert np.array_equal(same.cost, plain.cost)
     assert run(capsys, "recommend", "--estimate", "20", "--table", "t.npz") == run(
         capsys, "recommend", "--estimate", "20", "--table", "plain.npz"
@@ -266,8 +267,8 @@ def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        (lambda p: p[:, ::-1], "careful    estimates fall where azimuths grow"),
-        (lambda p: np.roll(p, 6, axis=1), "careful    an offset of +"),
+        (lambda p: p[:, ::-1], "warning: estimates run opposite to azimuths"),
+        (lambda p: np.roll(p, 6, axis=1), "warning: offset +"),
     ],
 )
 def test_distributions_that_count_otherwise_than_azimuths_are_doubted(
@@ -276,7 +277,7 @@ def test_distributions_that_count_otherwise_than_azimuths_are_doubted(
     """The estimates are right, so they raise no doubt."""
     written(here, {name: (a, changed(p)) for name, (a, p) in turns().items()})
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
-    assert out.count("careful") == 1
+    assert out.count("warning:") == 1
     assert message in out.splitlines()[-1]
 
 
@@ -313,7 +314,7 @@ def test_the_command_answers_as_python_does(here, capsys, file):
     assert printed["target_camera_pose"] == pytest.approx(target)
     told = run(capsys, "recommend", *options, "--allowed", "45,120")
     only = table.recommend(read_distributions(file), [0.0, 90.0], allowed_deg=[45, 120])
-    assert f"azimuth {only.azimuth_deg:.1f}° about the object" in told
+    assert f"azimuth {only.azimuth_deg:.1f}° (camera around object)" in told
     assert "(2 views)" in told
     assert f"turn by {only.move.rotation_deg:+g}°" in told
 

@@ -11,7 +11,7 @@ import math
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -19,7 +19,6 @@ from cyclopts import App, CycloptsError, Parameter
 
 from nbv import __version__
 from nbv.cli.answers import (
-    offset_of_frames,
     recommendation_as_json,
     say,
     say_assumed_camera,
@@ -28,6 +27,7 @@ from nbv.cli.answers import (
     say_names,
     say_offset,
     say_recommendation,
+    say_warnings,
     target_poses,
 )
 from nbv.cli.arguments import (
@@ -40,6 +40,7 @@ from nbv.cli.arguments import (
     WholeNumbers,
     allowed_rotations,
     as_paragraphs,
+    in_flags,
     joined_numbers,
     need_writable,
 )
@@ -110,7 +111,7 @@ def _drop_output() -> None:
 
 def _message(error: Exception) -> str:
     if not isinstance(error, OSError):
-        return " ".join(str(error).split())
+        return in_flags(" ".join(str(error).split()))
     reason = error.strerror or str(error)
     # Of a file to write: readers name the file themselves.
     if error.filename:
@@ -159,6 +160,7 @@ def recommend(
     gravity: Numbers = None,
     allowed: Rotations = None,
     max_travel: float = ANY_TRAVEL_DEG,
+    followed: Annotated[bool, Parameter(negative="--not-followed")] = True,
     camera_pose: Path | None = None,
     axis: Numbers = None,
     estimate: float | None = None,
@@ -167,7 +169,7 @@ def recommend(
     plot: Path | None = None,
     json: Json = False,
 ) -> None:
-    """Say where the camera stands about the object, and where it should look next.
+    """Estimate the object's azimuth and recommend the next view.
 
     Rotations are degrees about the object's upright axis, counter-clockwise
     seen from above.
@@ -179,15 +181,15 @@ def recommend(
     Parameters
     ----------
     frames
-        Depth frames of one object: .npy or .npz, or images of 16 bits. Numbers with a decimal point
-        are metres, whole numbers millimetres; see --depth-scale.
+        Depth frames of one object: .npy or .npz, or images of 16 bits. Floating-point depth is in
+        metres, integer depth in millimetres; see --depth-scale.
     bundle
         A bundle that comes with nbv, or a file.
     rotations
         Where each frame was taken, from the first frame's place: 0 90, or 0,90, for two frames.
     depth_scale
-        Metres per unit of a frame's numbers. Without it 1 for numbers with a decimal point, and for
-        whole numbers what the camera file says, or 0.001.
+        Metres per unit of a frame's numbers. Default: 1 for floating-point depth; for integer depth
+        what the camera file says, or 0.001.
     intrinsics
         fx,fy,cx,cy in pixels, the focal length alone, or a camera file (BOP, ROS CameraInfo). The
         focal length alone is for a frame that was cut out of a larger image.
@@ -207,6 +209,10 @@ def recommend(
         or of n booleans, where entry k is the rotation 360 k / n.
     max_travel
         Degrees that the camera may travel.
+    followed
+        Whether a recommendation chose the last of several views. The expected error is then raised,
+        because the same errors chose the view. Give --not-followed for a turntable or fixed
+        cameras.
     camera_pose
         The camera's pose at the last view, and then the target pose is given too: that of the
         optical frame (x right, y down, z forward) in the base frame, metres; the 16 numbers of a
@@ -236,6 +242,7 @@ def recommend(
         of_frames |= {"--elevation": elevation, "--gravity": gravity}
         if distribution is None:
             of_frames["--rotations"] = rotations
+            of_frames["--not-followed"] = None if followed else True
         if ignored := [name for name, value in of_frames.items() if value is not None]:
             own = "--estimate" if distribution is None else "--distribution"
             raise UserError(f"{ignored[0]} does not go with {own} and --table; leave it out")
@@ -246,7 +253,14 @@ def recommend(
         if estimate is not None:
             raise UserError("--estimate and --distribution: give one of them")
         recommend_by_distributions(
-            distribution, table, rotations, allowed, max_travel, place, as_json=json
+            distribution,
+            table,
+            rotations,
+            allowed,
+            max_travel,
+            place,
+            followed=followed,
+            as_json=json,
         )
         return
     if not frames:
@@ -283,12 +297,13 @@ def recommend(
         gravity=gravity,
         allowed_deg=allowed_rotations(allowed),
         max_travel_deg=max_travel,
+        followed=followed,
         names=[str(path) for path in frames],
     )
+    warnings = answer.warnings
     if place is not None:
         diagonal_m = recommender.bundle.diagonal_m
-        rolled = check_axis(*place, answer.object_position_m, diagonal_m)
-        answer = replace(answer, warnings=(*answer.warnings, *rolled))
+        warnings += check_axis(*place, answer.object_position_m, diagonal_m)
     targets = target_poses((move.rotation_deg for move in answer.moves), place)
     if plot is not None:
         # An unknown one ends the import of matplotlib.
@@ -298,11 +313,11 @@ def recommend(
         draw_recommendation(answer, plot, recommender.bundle.category)
     focal_px = recommender.bundle.focal_px if intrinsics is None else None
     if json:
-        say_json(recommendation_as_json(answer, focal_px, targets))
+        say_json(recommendation_as_json(answer, warnings, targets, focal_px))
         return
     if focal_px is not None:
         say_assumed_camera(focal_px)
-    say_recommendation(answer, recommender.bundle.category, targets)
+    say_recommendation(answer, recommender.bundle.category, warnings, targets)
 
 
 @app.command
@@ -320,7 +335,7 @@ def calibrate(
     far: float | None = None,
     json: Json = False,
 ) -> None:
-    """Learn from known azimuths what an estimator's errors are.
+    """Calibrate an estimator's error model from ground-truth azimuths.
 
     From pairs (object_id, azimuth_deg, estimate_deg) of any estimator it makes
     a lookup table for nbv recommend --estimate; with columns p0, p1, ..., the
@@ -346,8 +361,8 @@ def calibrate(
     intrinsics
         Of frames: fx,fy,cx,cy in pixels, the focal length alone, or a camera file.
     depth_scale
-        Metres per unit of a frame's numbers. Without it 1 for numbers with a decimal point, and for
-        whole numbers what the camera file says, or 0.001.
+        Metres per unit of a frame's numbers. Default: 1 for floating-point depth; for integer depth
+        what the camera file says, or 0.001.
     near
         The object lies beyond this, metres.
     far
@@ -373,25 +388,26 @@ def calibrate(
     need_writable("--output", output, [".safetensors"])
     from nbv.core.distributions import mean_direction_deg
     from nbv.core.logits import from_logits
+    from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
     from nbv.robot.calibration import recalibrated
 
     seen = _seen_frames(bundle, source, intrinsics, depth_scale, near, far, as_json=json)
     held, turns = seen.recommender.bundle, seen.turns
+    if seen.n_assumed and not json:
+        say_assumed_camera(held.focal_px, seen.n_assumed)
     recordings: list[dict[str, Any]] = []
     for turn in turns:
         estimate_deg = mean_direction_deg(from_logits(turn.logits, held.temperature))
+        offset = Offset.of(turn.azimuth_deg, estimate_deg, FOR_FRAMES)
+        is_added = not frame_warning(turn.azimuth_deg, estimate_deg)
         about = {"object_id": turn.object_id, "sequence": turn.sequence}
         counts = {"n_frames": len(estimate_deg)}
-        offset = offset_of_frames(turn.azimuth_deg, estimate_deg)
-        recordings.append(about | counts | offset)
-    if not json:
-        # Before the tables are made, which takes up to a minute.
-        if seen.n_assumed:
-            say_assumed_camera(held.focal_px, seen.n_assumed)
-        for one in recordings:
-            name = f"{one['object_id']}, sequence {one['sequence']}"
-            say_offset(name, counted(one["n_frames"], "frame"), one)
-        sys.stdout.flush()
+        recordings.append(about | counts | asdict(offset) | {"is_added": is_added})
+        if not json:
+            # Before the tables are made, which takes up to a minute.
+            name = f"{turn.object_id}, sequence {turn.sequence}"
+            say_offset(name, counted(len(estimate_deg), "frame"), offset, is_added=is_added)
+    sys.stdout.flush()
     recalibrated(held, turns, str(source)).save(output)
     if json:
         say_json(
@@ -404,8 +420,7 @@ def calibrate(
             }
         )
         return
-    calibrate_it = "recording calibrates it" if len(turns) == 1 else "recordings calibrate it"
-    say(f"{output}: {held.category}, {len(turns)} {calibrate_it}")
+    say(f"{output}: {held.category}, calibrated on {counted(len(turns), 'recording')}")
 
 
 @app.command
@@ -439,8 +454,8 @@ def evaluate(
     intrinsics
         fx,fy,cx,cy in pixels, the focal length alone, or a camera file.
     depth_scale
-        Metres per unit of a frame's numbers. Without it 1 for numbers with a decimal point, and for
-        whole numbers what the camera file says, or 0.001.
+        Metres per unit of a frame's numbers. Default: 1 for floating-point depth; for integer depth
+        what the camera file says, or 0.001.
     near
         The object lies beyond this, metres.
     far
@@ -484,9 +499,11 @@ def evaluate(
     if seen.n_assumed:
         say_assumed_camera(held.focal_px, seen.n_assumed)
     if calibrated_by:
-        say(
-            f"careful    {', '.join(calibrated_by)}: the bundle was calibrated with this name; "
-            "errors on what calibrated it are too low, so evaluate other objects"
+        say_warnings(
+            [
+                f"{', '.join(calibrated_by)}: the bundle was calibrated with this name; errors on "
+                "what calibrated it are too low, so evaluate other objects"
+            ]
         )
     say_evaluation(found, familiar)
 
@@ -664,7 +681,7 @@ class SeenFrames:
             "assumed_focal_px": self.recommender.bundle.focal_px if self.n_assumed else None,
             "n_frames_without_camera": self.n_assumed,
             "left_out": [
-                {"file": path, "reason": error.name, "message": error.message}
+                {"file": path, "reason": error.name, "message": in_flags(error.message)}
                 for path, error in self.left_out.items()
             ],
         }
@@ -688,7 +705,7 @@ def _seen_frames(
 
     def tell(path: str, error: FrameError) -> None:
         left_out[path] = error
-        line = f"{path} is left out: {error}"
+        line = f"skipping {path}: {in_flags(str(error))}"
         print(line, file=sys.stderr) if as_json else say(line)  # noqa: T201
 
     recommender, recordings = Recommender.load(bundle), read_manifest(manifest)

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
+    from nbv.core.offset import Offset
     from nbv.robot.next_view import Recommendation
-
 
 Place = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
 """A camera's pose in the base frame, and a point and the direction of the object's axis."""
@@ -62,9 +62,9 @@ def with_targets(
 
 
 def say_warnings(warnings: Iterable[str]) -> None:
-    """Print what to heed, a line each."""
+    """Print warnings, a line each."""
     for warning in warnings:
-        say(f"careful    {warning}")
+        say(f"warning: {warning}")
 
 
 def say_target(targets: Sequence[NDArray[np.float64]] | None) -> None:
@@ -76,52 +76,106 @@ def say_target(targets: Sequence[NDArray[np.float64]] | None) -> None:
         say("  " + " ".join(f"{value:9.5f}" for value in row))
 
 
+_KEYS = (
+    "azimuth_deg",
+    "spread_deg",
+    "expected_error_deg",
+    "move",
+    "alternatives",
+    "unfamiliarity",
+    "bayes_factor",
+    "warnings",
+    "assumed_focal_px",
+    "object_position_m",
+    "belief",
+    "error_after_deg",
+)
+"""What every answer has, in this order; None where it is not known."""
+
+
+def _as_json(
+    known: Mapping[str, Any],
+    moves: Sequence[Mapping[str, Any]],
+    warnings: Iterable[str],
+    targets: Sequence[NDArray[np.float64]] | None,
+) -> dict[str, Any]:
+    """Return an answer for JSON, of what is known of the pose and of moves, best first."""
+    listed = with_targets(moves, targets)
+    best = listed[0] if listed else None
+    told = {"move": best, "alternatives": listed[1:], "warnings": list(warnings)}
+    about = dict.fromkeys(_KEYS) | dict(known) | told
+    if targets is not None:
+        about["target_camera_pose"] = best["target_camera_pose"] if best else None
+    return about
+
+
 def recommendation_as_json(
     answer: Recommendation,
-    assumed_focal_px: float | None,
+    warnings: Iterable[str],
     targets: Sequence[NDArray[np.float64]] | None,
+    assumed_focal_px: float | None = None,
 ) -> dict[str, Any]:
     """Return a recommendation for JSON.
 
     Parameters
     ----------
     answer : Recommendation
-    assumed_focal_px : float or None
-        None where intrinsics were given.
+    warnings : iterable of str
+        Those of the answer, and of the camera's pose.
     targets : sequence of ndarray (4, 4), optional
         The camera's pose after the move and after each alternative.
+    assumed_focal_px : float, optional
+        Pixels; None where intrinsics were given.
     """
-    moves = with_targets([asdict(move) for move in answer.moves], targets)
-    about: dict[str, Any] = {
+    known = {
         "azimuth_deg": answer.azimuth_deg,
         "spread_deg": answer.spread_deg,
         "expected_error_deg": answer.expected_error_deg,
-        "move": moves[0] if moves else None,
-        "alternatives": moves[1:],
         "unfamiliarity": None if math.isnan(answer.unfamiliarity) else answer.unfamiliarity,
         "bayes_factor": answer.bayes_factor,
-        "warnings": list(answer.warnings),
         "assumed_focal_px": assumed_focal_px,
         "object_position_m": answer.object_position_m,
         "belief": answer.belief.tolist(),
         "error_after_deg": [None if e == float("inf") else e for e in answer.error_after_deg],
     }
-    if targets is not None:
-        about["target_camera_pose"] = moves[0]["target_camera_pose"] if moves else None
-    return about
+    return _as_json(known, [asdict(move) for move in answer.moves], warnings, targets)
+
+
+def table_answer_as_json(
+    estimate_deg: float,
+    criterion: str,
+    cost_unit: str,
+    ranked: Iterable[tuple[float, float]],
+    warnings: Iterable[str],
+    targets: Sequence[NDArray[np.float64]] | None,
+) -> dict[str, Any]:
+    """Return a lookup table's rotations and their costs, best first, as `recommendation_as_json`.
+
+    In addition it has the criterion, the unit of its cost, and the cost of each move.
+    """
+    moves = [
+        {"rotation_deg": rotation, "travel_deg": abs(rotation), "expected_error_deg": None}
+        | {"cost": cost}
+        for rotation, cost in ranked
+    ]
+    about = {"criterion": criterion, "cost_unit": cost_unit}
+    return _as_json({"azimuth_deg": estimate_deg % 360.0}, moves, warnings, targets) | about
 
 
 def say_recommendation(
-    answer: Recommendation, thing: str, targets: Sequence[NDArray[np.float64]] | None
+    answer: Recommendation,
+    thing: str,
+    warnings: Iterable[str],
+    targets: Sequence[NDArray[np.float64]] | None,
 ) -> None:
     """Print a recommendation for a thing, such as a mug, in a few lines."""
     say(
-        f"pose       azimuth {answer.azimuth_deg:.1f}° about the {thing}; "
+        f"pose       azimuth {answer.azimuth_deg:.1f}° (camera around {thing}); "
         f"expected error {answer.expected_error_deg:.1f}°, spread {answer.spread_deg:.1f}° "
         f"({counted(answer.n_views, 'view')})"
     )
     if (move := answer.move) is None:
-        say("next view  none: every place is less than 15° from a view so far")
+        say("next view  none: all candidates are within 15° of an existing view")
     else:
         say(
             f"next view  turn by {move.rotation_deg:+g}° (travel {move.travel_deg:g}°): "
@@ -132,46 +186,16 @@ def say_recommendation(
             f"{m.rotation_deg:+g}° ({m.expected_error_deg:.1f}°)" for m in answer.alternatives
         )
         say(f"or         {', '.join(others)}")
-    say_warnings(answer.warnings)
+    say_warnings(warnings)
     say_target(targets)
 
 
-def offset_of_pairs(
-    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
-) -> dict[str, Any]:
-    """Return the offset that estimates have in common, and what is to be said of it."""
-    from nbv.core.offset import FOR_PAIRS
-
-    return _offset_of(azimuth_deg, estimate_deg, FOR_PAIRS)
-
-
-def offset_of_frames(
-    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
-) -> dict[str, Any]:
-    """Return the same of a turn, and whether calibration adds the offset to its azimuths."""
-    from nbv.core.offset import FOR_FRAMES, frame_warning
-
-    found = _offset_of(azimuth_deg, estimate_deg, FOR_FRAMES)
-    return found | {"is_added": not frame_warning(azimuth_deg, estimate_deg)}
-
-
-def _offset_of(
-    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64], what_to_do: str
-) -> dict[str, Any]:
-    from nbv.core.offset import constant_offset_deg, offset_warning
-
-    return {
-        "offset_deg": constant_offset_deg(estimate_deg - azimuth_deg),
-        "warning": offset_warning(azimuth_deg, estimate_deg, what_to_do) or None,
-    }
-
-
-def say_offset(name: str, number: str, offset: Mapping[str, Any]) -> None:
-    """Print `offset_of_pairs` or `offset_of_frames` of some recording or file."""
-    done = ", added to the azimuths" if offset.get("is_added") else ""
-    say(f"{name}: {number}; offset {offset['offset_deg']:+.1f}°{done}")
-    if offset["warning"]:
-        say(f"careful    {offset['warning']}")
+def say_offset(name: str, number: str, offset: Offset, *, is_added: bool = False) -> None:
+    """Print the offset of a recording or a file, and whether calibration adds it to azimuths."""
+    done = ", added to the azimuths" if is_added else ""
+    say(f"{name}: {number}; offset {offset.offset_deg:+.1f}°{done}")
+    if offset.warning:
+        say_warnings([offset.warning])
 
 
 def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
@@ -196,7 +220,7 @@ def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
             f"{about['n_wrong']} wrong by more than 45°, {about['n_wrong_unfamiliar']} both"
         )
         if about["warning"]:
-            say(f"careful    {about['warning']}")
+            say_warnings([about["warning"]])
         numbers = sorted(rows["n_views"].unique())
         say(f"  {'MAE (without offset), degrees':<30}" + "".join(f"{n:>15}" for n in numbers))
         for choice in dict.fromkeys(rows["choice"]):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -61,6 +62,23 @@ Json = Annotated[bool, Parameter(negative=())]
 
 SHIPPED = "mug"
 """The bundle that is taken where none is named."""
+
+
+_FLAGS = {
+    "allowed_deg": "--allowed",
+    "bundle": "--bundle",
+    "depth_scale": "--depth-scale",
+    "far_m": "--far",
+    "intrinsics": "--intrinsics",
+    "max_travel_deg": "--max-travel",
+    "near_m": "--near",
+    "output": "--output",
+}
+
+
+def in_flags(message: str) -> str:
+    """Return a library's message with its `parameters` as the flags of the command line."""
+    return re.sub("`([a-z_]+)`", lambda found: _FLAGS.get(found[1], found[0]), message)
 
 
 def as_paragraphs(command: Command) -> Command:

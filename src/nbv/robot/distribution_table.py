@@ -7,14 +7,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.logits import TEMPERATURES, fit_temperature, from_logits, on_degrees
+from nbv.core.lookup import LookupTable
 from nbv.errors import UserError
-from nbv.files import calibrated_file, damaged, need_distributions, read_arrays, readable
+from nbv.files import (
+    calibrated_file,
+    damaged,
+    need_distributions,
+    read_arrays,
+    readable,
+    write_arrays,
+)
 from nbv.labels import counted
 from nbv.robot.next_view import (
     AfterRotations,
@@ -148,6 +155,7 @@ class DistributionTable:
         *,
         allowed_deg: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
+        followed: bool = True,
     ) -> Recommendation:
         """Return the pose that views show, and the next view.
 
@@ -155,7 +163,7 @@ class DistributionTable:
         ----------
         probabilities : (B,), or (n, B)
             What the estimator gave of each view of the object.
-        rotations_deg, allowed_deg, max_travel_deg
+        rotations_deg, allowed_deg, max_travel_deg, followed
             See `nbv.Recommender.recommend`.
 
         Returns
@@ -193,28 +201,12 @@ class DistributionTable:
             AFFINITY,
             allowed_deg=allowed_deg,
             max_travel_deg=max_travel_deg,
+            followed=followed,
         )
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return what a file keeps of the table, by name; see `load`.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> azimuths = np.arange(24) * 15.0
-        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
-        >>> rows /= rows.sum(axis=1, keepdims=True)
-        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
-        >>> sorted(table.arrays())[-1]
-        'distribution.temperature'
-        """
-        numbers = np.asarray(self.temperature), np.asarray(self.n_classes)
-        kept = np.asarray(self.object_ids), *numbers, self.distributions
-        return dict(zip(_NAMES, kept, strict=True))
 
     @classmethod
     def load(cls, path: str | Path) -> DistributionTable:
-        """Read the table that ``nbv calibrate`` made of pairs with distributions.
+        """Read what `save`, or ``nbv calibrate`` of pairs with distributions, wrote.
 
         Raises
         ------
@@ -223,16 +215,12 @@ class DistributionTable:
 
         Examples
         --------
-        >>> import numpy as np, nbv
-        >>> azimuths = np.arange(24) * 15.0
-        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
-        >>> rows /= rows.sum(axis=1, keepdims=True)
-        >>> import tempfile
-        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     np.savez(f"{folder}/table.npz", **table.arrays())
-        ...     nbv.DistributionTable.load(f"{folder}/table.npz").object_ids
-        ('mug-17',)
+        >>> import nbv
+        >>> try:
+        ...     nbv.DistributionTable.load("table.npz")
+        ... except nbv.UserError as error:
+        ...     print(error)
+        table.npz does not exist; name the file that nbv calibrate wrote
         """
         stored = read_arrays(calibrated_file(path), (), _AGAIN)
         if any(name not in stored for name in _NAMES):
@@ -252,6 +240,29 @@ class DistributionTable:
                 what = "its number of classes does not fit its distributions"
                 raise damaged(path, what, _AGAIN)
             return cls(tuple(map(str, object_ids)), float(temperature), rows, int(n_classes))
+
+    def save(self, path: str | Path, lookup: LookupTable | None = None) -> None:
+        """Write the table as ``.npz``; with a lookup table of the same estimator, both in one file.
+
+        Examples
+        --------
+        >>> import tempfile, numpy as np, nbv
+        >>> azimuths = np.arange(24) * 15.0
+        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
+        >>> rows /= rows.sum(axis=1, keepdims=True)
+        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     table.save(f"{folder}/table.npz")
+        ...     nbv.DistributionTable.load(f"{folder}/table.npz").object_ids
+        ('mug-17',)
+        """
+        numbers = np.asarray(self.temperature), np.asarray(self.n_classes)
+        kept = np.asarray(self.object_ids), *numbers, self.distributions
+        arrays = dict(zip(_NAMES, kept, strict=True))
+        if lookup is None:
+            write_arrays(path, arrays)
+        else:
+            lookup.save(path, arrays)
 
 
 def _n_bins(n_classes: int) -> int:

@@ -84,8 +84,8 @@ class Recommendation:
     spread_deg : float
         Circular standard deviation of the belief.
     expected_error_deg : float
-        Of `azimuth_deg`: what objects that looked alike erred in calibration; more where the last
-        view is the recommended one, because the same errors chose it.
+        Error of `azimuth_deg`: what objects that looked alike erred in calibration; more where the
+        last view was recommended, because the same errors chose it.
     move : Move, or None
         The best next view; None where the views so far are all round, so that each further one
         would be nearer than 15° to one of them.
@@ -188,13 +188,18 @@ def next_view(
     *,
     allowed_deg: ArrayLike | None = None,
     max_travel_deg: float = 180.0,
+    followed: bool = True,
+    unfamiliarity: float = math.nan,
+    warnings: tuple[str, ...] = (),
+    crops: tuple[NDArray[np.uint8], ...] = (),
+    object_position_m: tuple[float, float, float] | None = None,
 ) -> Recommendation:
     """Return the pose that views show, and the next view.
 
     Views are fused by product. The next one has the least error that calibration objects, rotated
     alike, made after it (`nbv.core.look_alikes`). Expected errors after it are raised by
-    what the choice makes them too low. So is the expected error now, where the last view is the one
-    that those before it led to.
+    what the choice makes them too low. So is the expected error now, where the last view was
+    recommended.
 
     Parameters
     ----------
@@ -208,8 +213,10 @@ def next_view(
         ``power`` and ``pseudo_observations``.
     share : ndarray (S,), optional
         How much each calibration turn counts.
-    allowed_deg, max_travel_deg
+    allowed_deg, max_travel_deg, followed
         See `nbv.Recommender.recommend`.
+    unfamiliarity, warnings, crops, object_position_m
+        What the frames of the views show; see `Recommendation`.
 
     Raises
     ------
@@ -232,15 +239,16 @@ def next_view(
     rotation_deg = may.rotation_deg
     if not rotation_deg.size and _allowed_bins(n_bins, n_steps, taken, 180.0).rotation_deg.size:
         raise UserError(
-            "no rotation is allowed: widen --allowed or --max-travel; a view is "
+            "no admissible rotation; relax `allowed_deg` or `max_travel_deg`: a view is "
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
         )
-    chosen_deg = 0.0
-    if len(distributions) > 1:
+    now_deg = expected.now_deg
+    if followed and len(distributions) > 1:
         before = calibrated(tuple(bins[:-1])).expected(
             product_of_views(distributions[:-1], rotations_deg[:-1]), **affinity, share=share
         )
-        chosen_deg = _of_the_choice(before, rotations_deg, n_bins)
+        # The errors that chose the last view also make up its expected error.
+        now_deg += _optimism_deg(before, rotations_deg[:-1], n_bins)
     error = expected.after_deg
     if rotation_deg.size:
         error = error + expected.optimism_deg(may.is_choice)
@@ -261,34 +269,25 @@ def next_view(
     return Recommendation(
         azimuth_deg=float(wrap_deg(direction_deg + last)),
         spread_deg=spread_deg,
-        expected_error_deg=expected.now_deg + chosen_deg,
+        expected_error_deg=now_deg,
         move=moves[0] if moves else None,
         alternatives=tuple(moves[1:]),
         belief=rotated(belief, -last),
         error_after_deg=error_after_deg,
-        unfamiliarity=math.nan,
+        unfamiliarity=unfamiliarity,
         bayes_factor=bayes_factor,
-        warnings=_contradictions(bayes_factor),
+        warnings=(*warnings, *_contradictions(bayes_factor)),
         n_views=len(distributions),
+        crops=crops,
+        object_position_m=object_position_m,
     )
 
 
-def _of_the_choice(before: Expected, rotations_deg: Sequence[float], n_bins: int) -> float:
-    """Return by how much the expected error of views is too low because the last one was chosen.
-
-    It is 0 unless the last view is where those `before` it led, to the nearest rotation or two
-    that are compared. The same calibration errors chose it and are expected of it.
-    """
-    n_steps = len(before.total)
-    *earlier, last = rotations_deg
-    taken = tuple(rotation - earlier[-1] for rotation in earlier)
-    is_choice = _allowed_bins(n_bins, n_steps, taken, 180.0).is_choice
-    if not is_choice.any():
-        return 0.0
-    chosen = np.where(is_choice, before.total, np.inf).argmin() * (360.0 / n_steps)
-    if circular_distance_deg(chosen, last) > 360.0 / n_steps:
-        return 0.0
-    return before.optimism_deg(is_choice)
+def _optimism_deg(before: Expected, rotations_deg: Sequence[float], n_bins: int) -> float:
+    """Return by how much the choice of a view after `rotations_deg` makes its error too low."""
+    taken = tuple(rotation - rotations_deg[-1] for rotation in rotations_deg)
+    is_choice = _allowed_bins(n_bins, len(before.total), taken, 180.0).is_choice
+    return before.optimism_deg(is_choice) if is_choice.any() else 0.0
 
 
 def _contradictions(bayes_factor: float) -> tuple[str, ...]:

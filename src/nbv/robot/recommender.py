@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -18,9 +17,9 @@ from nbv.files import as_path
 from nbv.labels import counted
 from nbv.robot.bundle import Bundle, BundleError
 from nbv.robot.crop import Crop, crop_frame, need_metres, need_plausible_nearest
-from nbv.robot.depth_files import DepthImage, is_in_mask, to_metres
+from nbv.robot.depth_files import to_metres
 from nbv.robot.intrinsics import Intrinsics, as_intrinsics
-from nbv.robot.masks import Window, object_mask, window_of
+from nbv.robot.masks import object_mask
 from nbv.robot.moves import elevation_from_gravity, roll_warnings
 from nbv.robot.network import Network, open_network
 from nbv.robot.next_view import (
@@ -130,16 +129,15 @@ class Recommender:
         ((64, 64), 'uint8')
         """
         bundle = self.bundle
-        depth, given, window = _in_window(np.asanyarray(depth_m), mask)
+        depth = to_metres(np.asanyarray(depth_m))
         camera = bundle.focal_px if intrinsics is None else intrinsics
         known = as_intrinsics([camera] if isinstance(camera, float) else camera)
         reach_m = REACH * bundle.diagonal_m
         need_metres(near_m, far_m, bundle.diagonal_m)
         if mask is None and far_m is None:
             need_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
-        inside = object_mask(depth, reach_m, given, near_m, far_m)
-        sizes = bundle.diagonal_m, bundle.extent_m
-        return crop_frame(depth, inside, known, bundle.camera, *sizes, window)
+        inside = object_mask(depth, reach_m, mask, near_m, far_m)
+        return crop_frame(depth, inside, known, bundle.camera, bundle.diagonal_m, bundle.extent_m)
 
     def distributions(self, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
         """Return p(azimuth | image) (n, B) of crops (n, side, side).
@@ -168,12 +166,13 @@ class Recommender:
         gravity: ArrayLike | None = None,
         allowed_deg: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
+        followed: bool = True,
         names: Sequence[str] | None = None,
     ) -> Recommendation:
         """Return the pose that frames show, and the next view.
 
-        A view from nearly the same place is no second view: what hides the pose there hides it
-        again. So the next view is 15° or more from every view so far.
+        Views closer than 15° add no information: what hides the pose in one hides it in the other.
+        So the next view is 15° or more from every view so far.
 
         Parameters
         ----------
@@ -200,6 +199,11 @@ class Recommender:
             Rotations from the last frame's place that the camera may take; all without it. An
             array of n booleans is a mask over the circle: entry k is the rotation 360 k / n.
         max_travel_deg : float
+        followed : bool
+            Whether a recommendation chose the last of several frames. The calibration errors that
+            chose it also make up its expected error, which is too low by that; True adds the
+            difference. Give False where rotations were fixed beforehand, as with a turntable or
+            several cameras. Of one frame it changes nothing.
         names : sequence of str, optional
             What messages call the frames, such as their files; else one of several is counted.
 
@@ -244,11 +248,12 @@ class Recommender:
             np.array([crop.codes for crop in crops]),
             rotations_deg,
             elevation_deg,
-            allowed_deg,
-            max_travel_deg,
-            crops[-1].centre_m,
-            (*dict.fromkeys(doubts),),
-            rolled,
+            doubts=tuple(dict.fromkeys(doubts)),
+            rolled=rolled,
+            object_position_m=crops[-1].centre_m,
+            allowed_deg=allowed_deg,
+            max_travel_deg=max_travel_deg,
+            followed=followed,
         )
 
     def recommend_crops(
@@ -259,6 +264,7 @@ class Recommender:
         elevation_deg: float | None = None,
         allowed_deg: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
+        followed: bool = True,
     ) -> Recommendation:
         """Return what `recommend` does, of crops (n, side, side) uint8.
 
@@ -278,18 +284,27 @@ class Recommender:
                 "the codes of Recommender.crop"
             )
         rotations_deg = as_rotation_list(rotations_deg, len(codes))
-        return self._of_crops(codes, rotations_deg, elevation_deg, allowed_deg, max_travel_deg)
+        return self._of_crops(
+            codes,
+            rotations_deg,
+            elevation_deg,
+            allowed_deg=allowed_deg,
+            max_travel_deg=max_travel_deg,
+            followed=followed,
+        )
 
     def _of_crops(
         self,
         codes: NDArray[np.uint8],
         rotations_deg: list[float],
         elevation_deg: float | None,
-        allowed_deg: ArrayLike | None,
-        max_travel_deg: float,
-        object_position_m: tuple[float, float, float] | None = None,
+        *,
         doubts: tuple[str, ...] = (),
         rolled: tuple[str, ...] = (),
+        object_position_m: tuple[float, float, float] | None = None,
+        allowed_deg: ArrayLike | None,
+        max_travel_deg: float,
+        followed: bool,
     ) -> Recommendation:
         if elevation_deg is not None:
             need_number("elevation", elevation_deg)
@@ -298,7 +313,8 @@ class Recommender:
                 f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
             )
         logits = self.network(codes)
-        answer = next_view(
+        unfamiliar = float(unfamiliarity(self.bundle.familiarity, codes, logits).max())
+        return next_view(
             from_logits(logits, self.bundle.temperature),
             rotations_deg,
             self._calibrated,
@@ -306,16 +322,12 @@ class Recommender:
             turn_share(self.bundle, elevation_deg),
             allowed_deg=allowed_deg,
             max_travel_deg=max_travel_deg,
-        )
-        unfamiliar = float(unfamiliarity(self.bundle.familiarity, codes, logits).max())
-        return replace(
-            answer,
+            followed=followed,
             unfamiliarity=unfamiliar,
             warnings=(
                 *doubts,
                 *_unfamiliar(unfamiliar),
                 *_other_elevation(self.bundle, elevation_deg),
-                *answer.warnings,
                 *rolled,
             ),
             crops=tuple(codes),
@@ -335,8 +347,8 @@ def _unfamiliar(unfamiliar: float) -> tuple[str, ...]:
     if unfamiliar <= 1.0:
         return ()
     return (
-        f"a frame is like nothing that was calibrated ({unfamiliar:.1f} times the limit): "
-        "check mask, units and category",
+        f"frame looks out of distribution (score {unfamiliar:.1f}, threshold 1): check mask, units "
+        "and category",
     )
 
 
@@ -353,22 +365,6 @@ def _other_elevation(bundle: Bundle, elevation_deg: float | None) -> tuple[str, 
         f"an elevation of {elevation_deg:g}° is unlike those that were calibrated, "
         f"{least:g} to {most:g}°: expected errors may be too low",
     )
-
-
-def _in_window(
-    depth_m: NDArray[Any], mask: ArrayLike | None
-) -> tuple[DepthImage, ArrayLike | None, Window | None]:
-    """Return depth in metres and the mask, in a window around it: most of a frame is not looked at.
-
-    Without a mask that fits, or without depth in it, they are the whole frame's.
-    """
-    given = None if mask is None else is_in_mask(mask)
-    if given is not None and given.shape == depth_m.shape and given.ndim == 2:
-        window, place = window_of(given)
-        part = to_metres(depth_m[place])
-        if part.any():
-            return part, given[place], window
-    return to_metres(depth_m), given, None
 
 
 def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.generic]]:
