@@ -13,9 +13,9 @@ REFERENCE = ROOT / "docs/reference"
 MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 BUNDLE_ROWS = {
-    "round generated mugs": "generated",
-    "square generated mugs": "generated, square",
-    "generated mugs of any reach": "generated, any reach",
+    "round procedural mugs": "generated",
+    "square procedural mugs": "generated, square",
+    "procedural mugs of any reach": "generated, any reach",
     "other people's meshes (ShapeNet)": "shapenet",
     "real mug, nearly level": "real, nearly level",
     "real mug, from above": "real, from above",
@@ -40,9 +40,9 @@ CONFIRMATION_ROWS = {
     "expected error, product": ("expected_error", "product"),
 }
 CONFIRMATION_COLUMNS = {
-    "generated, regressor": "embedded",
+    "procedural, regressor": "embedded",
     "other people's, regressor": "real",
-    "generated, classifier": "embedded-classifier",
+    "procedural, classifier": "embedded-classifier",
     "other people's, classifier": "real-classifier",
 }
 
@@ -92,7 +92,7 @@ def views() -> pd.DataFrame:
     trained = confirmation().loc[["one view", "expected error, product"]].T
     shipped = bundle()[["one", "recommended"]]
     rows = {
-        "rendered, generated objects of all categories": trained.loc["generated, classifier"],
+        "rendered, procedural objects of all categories": trained.loc["procedural, classifier"],
         "rendered, other people's meshes": trained.loc["other people's, classifier"],
         "a real camera and one real mug, nearly level": shipped.loc["real mug, nearly level"],
         "the same mug, from above": shipped.loc["real mug, from above"],
