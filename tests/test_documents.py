@@ -89,7 +89,7 @@ def test_a_name_that_links_to_a_module_is_defined_there(path: Path) -> None:
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_source_files_that_a_document_names_exist(path: Path) -> None:
-    places = r"\b(?:src/nbv|studies|config|tests|tools)/[\w/]+(?:\.\w+)?"
+    places = r"\b(?:src/nbv|config|tests|tools)/[\w/]+(?:\.\w+)?"
     named = re.findall(places, path.read_text("utf-8"))
     assert not [name for name in set(named) if not (ROOT / name).exists()]
 
@@ -129,7 +129,7 @@ def test_everything_that_the_paper_numbers_has_its_place() -> None:
 
 
 def test_every_name_of_the_package_that_a_text_gives_exists() -> None:
-    """`nbv.module.name` in docstrings, comments and documents leads somewhere."""
+    """Every dotted name in code form can be imported, in docstrings, comments and documents."""
     texts = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
     texts += [path for tree in TREES for path in sorted((ROOT / tree).rglob("*"))]
     missing = []
