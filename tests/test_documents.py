@@ -23,7 +23,7 @@ DOCUMENTS = sorted(
 )
 PAGES = [path for path in DOCUMENTS if path.name == "README.md" or "reference" not in path.parts]
 
-TREES = ("src", "studies", "workflow", "config", "docs", "tests", "performance", "profiles", "tools")
+TREES = ("src", "studies", "workflow", "config", "docs", "tests", "performance", "tools")
 SUFFIXES = {".py", ".smk", ".yaml", ".md", ".rst", ".j2", ".css", ".js", ".html"}
 
 
