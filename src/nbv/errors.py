@@ -81,14 +81,7 @@ class UserError(Exception):
         super().__init__("".join(shown))
 
     def about(self, what: str) -> Self:
-        """Return the same mistake with a message that says first what it is about.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> print(nbv.UserError("no pixel").about("frame 2 of 3"))
-        frame 2 of 3: no pixel
-        """
+        """Return the same mistake with a message that says first what it is about."""
         return type(self)(f"{what}: {self}")
 
 
@@ -109,14 +102,7 @@ class NamedError(UserError):
         self.message = message
 
     def about(self, what: str) -> Self:
-        """Return the same mistake; after its name, the message says first what it is about.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> print(nbv.FrameError("empty-mask", "no pixel").about("frame 2 of 3"))
-        empty-mask: frame 2 of 3: no pixel
-        """
+        """Return the same mistake; after its name, the message says first what it is about."""
         return type(self)(self.name, f"{what}: {self.message}")
 
 

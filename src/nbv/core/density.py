@@ -40,16 +40,7 @@ class Conditionals:
 
     @property
     def n_bins(self) -> int:
-        """B, the number of bins round the circle.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> choice = {"bandwidth_deg": 5, "pseudo_observations": 1}
-        >>> pair = nbv.conditionals([0.0, 90.0], [0.0, 100.0], **choice)
-        >>> pair.n_bins
-        360
-        """
+        """B, the number of bins round the circle."""
         return len(self.viewpoint)
 
 

@@ -56,86 +56,30 @@ class Evidence:
     made: dict[Any, Table] = field(default_factory=dict, repr=False, compare=False)
 
     def once(self, key: Any, make: Callable[[], Table]) -> Table:
-        """Return what `make` makes, made at the first call with this key and kept in `made`.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> made = [evidence.once('zeros', lambda: np.zeros(3)) for _ in range(2)]
-        >>> made[0] is made[1]
-        True
-        """
+        """Return what `make` makes, made at the first call with this key and kept in `made`."""
         if key not in self.made:
             self.made[key] = make()
         return self.made[key]
 
     @property
     def n_bins(self) -> int:
-        """B, the number of bins round the circle.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> evidence.n_bins
-        36
-        """
+        """B, the number of bins round the circle."""
         return self.conditionals.n_bins
 
     @property
     def n_views(self) -> int:
-        """Number of views of each calibration object.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> evidence.n_views
-        36
-        """
+        """Number of views of each calibration object."""
         views = self.estimate_deg if self.distributions is None else self.distributions
         return int(views.shape[1])
 
     @cached_property
     def viewpoint(self) -> Table:
-        """V[estimate, viewpoint], (B, B) float32.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> evidence.viewpoint.shape, int(evidence.viewpoint[9].argmax())
-        ((36, 36), 9)
-        """
+        """V[estimate, viewpoint], (B, B) float32."""
         return self.conditionals.viewpoint.astype(np.float32)
 
     @cached_property
     def second(self) -> Table:
-        """L twice over, (2 B, B) float32: its rows delta to delta + B are L[theta + delta].
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> evidence.second.shape
-        (72, 36)
-        """
+        """L twice over, (2 B, B) float32: its rows delta to delta + B are L[theta + delta]."""
         return np.tile(self.conditionals.estimate.astype(np.float32), (2, 1))
 
     @cached_property
@@ -144,16 +88,6 @@ class Evidence:
 
         ``moments[delta, :, e1, e2]``: its direction is the posterior mean pose, its length the
         resultant length times p(e2 | e1, delta).
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> evidence.moments.shape
-        (36, 2, 36, 36)
         """
         return self.first_moments(self.viewpoint, range(self.n_bins))
 
@@ -162,16 +96,6 @@ class Evidence:
 
         The real and the imaginary part of sum_theta b(theta) L[theta + delta, e] exp(i theta), of
         distributions b (n, B) and rotations of the next view in bins.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> evidence.first_moments(evidence.viewpoint[:1], range(0, 36, 9)).shape
-        (4, 2, 1, 36)
         """
         n, n_bins = probabilities.shape
         angles = 2 * np.pi * np.arange(n_bins) / n_bins
@@ -181,19 +105,7 @@ class Evidence:
         return found.reshape(len(deltas), 2, n, n_bins)
 
     def predicted(self, weights: Table, deltas: range) -> Table:
-        """Return sum_theta w(theta) L[theta + delta, e], (n_deltas, n, B), of weights (n, B).
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> (after,) = evidence.predicted(evidence.viewpoint[:1], range(9, 10))
-        >>> int(after.argmax())  # a quarter turn from 0, in bins
-        9
-        """
+        """Return sum_theta w(theta) L[theta + delta, e], (n_deltas, n, B), of weights (n, B)."""
         n, n_bins = weights.shape
         found = np.empty((len(deltas), n, n_bins), dtype=np.float32)
         for place, delta in enumerate(deltas):

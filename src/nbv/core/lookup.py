@@ -78,15 +78,6 @@ class LookupTable:
         UserError
             Where the file cannot be read, V or L is no conditional density, a cost is not finite,
             or a recommended rotation is no whole number of degrees in [0, 360).
-
-        Examples
-        --------
-        >>> import nbv
-        >>> try:
-        ...     nbv.LookupTable.load("table.npz")
-        ... except nbv.UserError as error:
-        ...     print(error)
-        table.npz does not exist; name the file that nbv calibrate wrote
         """
         names = [item.name for item in fields(cls)]
         stored = read_arrays(calibrated_file(path), names, CALIBRATE_AGAIN)
@@ -111,21 +102,7 @@ class LookupTable:
         return table
 
     def save(self, path: str | Path, further: Mapping[str, NDArray[Any]] | None = None) -> None:
-        """Write the table as ``.npz``, an array for each attribute, and `further` arrays.
-
-        Examples
-        --------
-        >>> import tempfile, numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     table.save(f"{folder}/table.npz")
-        ...     nbv.LookupTable.load(f"{folder}/table.npz").criterion
-        'pose_ambiguity'
-        """
+        """Write the table as ``.npz``, an array for each attribute, and `further` arrays."""
         arrays = {item.name: np.asarray(getattr(self, item.name)) for item in fields(self)}
         write_arrays(path, arrays | dict(further or {}))
 
@@ -140,17 +117,6 @@ class LookupTable:
         ------
         UserError
             Where an estimate is no finite number.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
-        >>> table.recommend([0.0, 90.0]).shape
-        (2,)
         """
         return np.asarray(self._next_view_deg[self._bins(estimate_deg)])
 
@@ -161,17 +127,6 @@ class LookupTable:
         ------
         UserError
             Where an estimate is no finite number.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-        >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-        >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-        >>> evidence = nbv.gather_evidence(estimates, density, **choice)
-        >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
-        >>> bool((table.least_cost([0.0]) == table.recommended_delta_deg[0]).all())
-        True
         """
         return np.asarray(self.recommended_delta_deg[self._bins(estimate_deg)])
 
