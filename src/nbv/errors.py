@@ -48,7 +48,7 @@ def reason_of(error: Exception) -> str:
     return reason
 
 
-def need_number(name: str, value: object) -> None:
+def check_number(name: str, value: object) -> None:
     """Raise UserError where a value is no number, such as a text of one."""
     try:
         if not isinstance(value, str | bytes):

@@ -149,7 +149,7 @@ def read_csv(path: str | Path) -> pd.DataFrame:
         return pd.read_csv(path, dtype={"object_id": str}, keep_default_na=False, na_values=empty)
 
 
-def need_columns(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
+def check_columns(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
     """Raise UserError where a column is missing, or there is no row."""
     for name in columns:
         if name not in frame.columns:
@@ -280,7 +280,7 @@ def read_arrays(
     return arrays
 
 
-def need_distributions(
+def check_distributions(
     path: str | Path,
     densities: NDArray[np.floating[Any]],
     shape: tuple[int, ...],

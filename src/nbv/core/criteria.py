@@ -280,7 +280,7 @@ def view_weights(beliefs: Table, views: Table, power: float) -> Table:
     return np.asarray(360.0 / views.shape[1] * affinity(beliefs, views) ** power)
 
 
-def need_first_view(belief: Belief, evidence: Evidence) -> None:
+def check_first_view(belief: Belief, evidence: Evidence) -> None:
     """Raise ValueError unless the belief is of one view by the estimator of the evidence.
 
     Of other beliefs nothing is known about the error of two views.
@@ -303,7 +303,7 @@ def expected_error(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     Parameters as of the module; `belief` is of one view by the estimator of
     `evidence`, or ValueError is raised. A is in degrees.
     """
-    need_first_view(belief, evidence)
+    check_first_view(belief, evidence)
     if fusion in OF_DISTRIBUTIONS:
         return _regression_on_distributions(belief, evidence, fusion)
     if belief.first_bin is None:
@@ -357,7 +357,7 @@ def fixed(belief: Belief, evidence: Evidence, fusion: str) -> Table:
     What `expected_error` tends to with ever more
     pseudo-observations; parameters, errors and unit as there.
     """
-    need_first_view(belief, evidence)
+    check_first_view(belief, evidence)
     errors = calibration_errors_deg(evidence, fusion)
     mean = errors.reshape(evidence.n_bins, -1).mean(axis=1)
     return np.tile(mean, (len(belief.probabilities), 1)).astype(np.float32)

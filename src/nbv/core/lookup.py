@@ -18,8 +18,8 @@ from nbv.errors import UserError
 from nbv.files import (
     CALIBRATE_AGAIN,
     calibrated_file,
+    check_distributions,
     damaged,
-    need_distributions,
     read_arrays,
     readable,
     write_arrays,
@@ -89,7 +89,7 @@ class LookupTable:
             table = cls(**values)
             n_bins = len(table.cost)
             for density in (table.viewpoint_likelihood, table.estimate_likelihood):
-                need_distributions(path, density, (n_bins, n_bins), CALIBRATE_AGAIN)
+                check_distributions(path, density, (n_bins, n_bins), CALIBRATE_AGAIN)
             if table.cost.shape != (n_bins, n_bins) or not np.isfinite(table.cost).all():
                 raise damaged(path, "a cost is not finite", CALIBRATE_AGAIN)
             delta_deg = table.recommended_delta_deg

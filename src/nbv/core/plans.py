@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
-from nbv.core.criteria import BELIEFS_AT_ONCE, need_first_view, view_weights
+from nbv.core.criteria import BELIEFS_AT_ONCE, check_first_view, view_weights
 from nbv.core.distributions import mean_direction_deg
 from nbv.core.evidence import Evidence, Table, evidence_of_distributions
 from nbv.core.fusion import Rotations
@@ -199,7 +199,7 @@ def excess_of_plans(belief: Belief, evidence: Evidence, errors: Table, caution: 
     ndarray (n, P) float32
         Degrees.
     """
-    need_first_view(belief, evidence)
+    check_first_view(belief, evidence)
     n_bins, settings = evidence.n_bins, evidence.settings["affinity"]
     views = _views_a_bin_apart(evidence)
     n_objects = len(views)

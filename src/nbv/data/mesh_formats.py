@@ -74,8 +74,8 @@ def parse_mesh(path: Path) -> trimesh.Trimesh:
     for part in scene.geometry.values():
         if isinstance(part, trimesh.Trimesh):
             # After the parts are joined, such an index would be one of the next part's.
-            _need_indices(part.faces, len(part.vertices))
-            _need_list_lengths(part.metadata.get("_ply_raw", {}))
+            _check_indices(part.faces, len(part.vertices))
+            _check_list_lengths(part.metadata.get("_ply_raw", {}))
     mesh = scene.to_mesh()
     if not isinstance(mesh, trimesh.Trimesh):
         raise ValueError("it holds no mesh; at least 1 triangle expected")
@@ -107,7 +107,7 @@ def _decoded(data: bytes) -> str:
         return data.decode("latin-1")
 
 
-def _need_indices(indices: Any, n_vertices: int) -> None:
+def _check_indices(indices: Any, n_vertices: int) -> None:
     low, high = (int(indices.min()), int(indices.max())) if len(indices) else (0, -1)
     if low < 0 or high >= n_vertices:
         wrong = low if low < 0 else high
@@ -180,7 +180,7 @@ def _check_off(text: str) -> None:
     if kind not in ("", "C", "N", "CN", "ST"):
         raise ValueError(f"{kind[:20]}OFF is not a kind of OFF with three coordinates")
     (n_vertices, n_faces, *_), *body = _tokens(text) or [["0", "0"]]
-    _need_lines(len(body), int(n_vertices), int(n_faces))
+    _check_lines(len(body), int(n_vertices), int(n_faces))
     for row in body[int(n_vertices) :]:
         if int(row[0]) < 3:
             raise ValueError(f"not a face of 3 vertices or more: {' '.join(row)[:60]!r}")
@@ -193,7 +193,7 @@ def _tokens(text: str) -> list[list[str]]:
     return [line for line in lines if line]
 
 
-def _need_lines(found: int, *expected: int) -> None:
+def _check_lines(found: int, *expected: int) -> None:
     """Raise ValueError for text cut short, of which trimesh takes what is left, and for surplus."""
     if min(expected) < 0:
         raise ValueError(f"the header announces {min(expected)} lines")
@@ -214,7 +214,7 @@ def _check_ascii_ply(text: str) -> None:
             case ["property", *words] if elements:
                 elements[-1][2].append(words)
     rows = [line.split() for line in text.partition("\n")[2].rstrip().splitlines()]
-    _need_lines(len(rows), *(count for _, count, _ in elements))
+    _check_lines(len(rows), *(count for _, count, _ in elements))
     n_vertices = sum(count for name, count, _ in elements if name == "vertex")
     start = 0
     for name, count, properties in elements:
@@ -241,7 +241,7 @@ def _fits(row: list[str], properties: list[list[str]], n_vertices: int | None) -
     return at == len(row)
 
 
-def _need_list_lengths(elements: Mapping[str, Any]) -> None:
+def _check_list_lengths(elements: Mapping[str, Any]) -> None:
     """Raise ValueError where the lists of a binary PLY element differ in length.
 
     Trimesh takes the first one's length for all.

@@ -68,10 +68,10 @@ def render_objects(
             raise UserError(f"{object_id}: {error}") from error
         except Exception as error:
             raise RuntimeError(f"{object_id}: {type(error).__name__}: {error}") from error
-        _need_visible(depth, object_id, elevation_deg, azimuths_deg, camera)
+        _check_visible(depth, object_id, elevation_deg, azimuths_deg, camera)
         if measure is not None:
             depth = crop_measured(measure(depth, object_id), camera)
-            _need_measured(depth, object_id, elevation_deg)
+            _check_measured(depth, object_id, elevation_deg)
         yield encode_depth(depth, camera)
 
 
@@ -79,7 +79,7 @@ def _n_blank(depth: Depths) -> int:
     return int(np.count_nonzero(~depth.any(axis=(1, 2))))
 
 
-def _need_visible(
+def _check_visible(
     depth: Depths,
     object_id: str,
     elevation_deg: float,
@@ -96,7 +96,7 @@ def _need_visible(
         )
 
 
-def _need_measured(depth: Depths, object_id: str, elevation_deg: float) -> None:
+def _check_measured(depth: Depths, object_id: str, elevation_deg: float) -> None:
     n_blank = _n_blank(depth)
     if n_blank == len(depth):
         raise UserError(

@@ -11,9 +11,9 @@ import pandas as pd
 from nbv.core.estimates import COLUMNS, Estimates, Posteriors
 from nbv.errors import UserError
 from nbv.files import (
+    check_columns,
+    check_distributions,
     damaged,
-    need_columns,
-    need_distributions,
     read_arrays,
     read_csv,
     readable,
@@ -43,7 +43,7 @@ def read_estimates(path: str | Path) -> Estimates:
         Where columns or views are missing, or an estimate is not in [0, 360).
     """
     frame = read_csv(path)
-    need_columns(path, frame, COLUMNS)
+    check_columns(path, frame, COLUMNS)
     object_ids = objects_of_full_turns(path, frame, "azimuth_deg")
     need_azimuths(path, frame, ("estimate_deg",))
     estimate_deg = frame["estimate_deg"].to_numpy(dtype=np.float64)
@@ -113,7 +113,7 @@ def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
         posteriors = Posteriors(names, stored["log_posterior"], float(stored["temperature"]))
         _, n_views, n_classes = posteriors.log_posterior.shape
         as_kept = np.exp(posteriors.log_posterior.astype(np.float64))
-        need_distributions(path, as_kept, (len(names), n_views, n_classes))
+        check_distributions(path, as_kept, (len(names), n_views, n_classes))
         if not 0.0 < posteriors.temperature < np.inf:
             raise damaged(path, f"the temperature {posteriors.temperature} is not above 0")
     return posteriors

@@ -17,7 +17,7 @@ from nbv.core.policies import Turns, two_views
 from nbv.errors import UserError
 from nbv.experiment.estimates import need_azimuths, objects_of_full_turns, read_estimates
 from nbv.experiment.splits import read_splits
-from nbv.files import damaged, existing, need_columns, read_csv, readable
+from nbv.files import check_columns, damaged, existing, read_csv, readable
 
 COLUMNS = (
     "object_id",
@@ -187,7 +187,7 @@ def load_object_ids(splits: Path) -> tuple[str, ...]:
 def read_evaluation(path: Path) -> pd.DataFrame:
     """Read one method's errors of one fold; errors as of `load_evaluations`."""
     frame = read_csv(path)
-    need_columns(path, frame, COLUMNS)
+    check_columns(path, frame, COLUMNS)
     objects_of_full_turns(path, frame, "initial_deg")
     need_azimuths(path, frame, ("initial_estimate_deg", "pose_estimate_deg"))
     followed = frame.dropna(subset="delta_deg")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import encode_depth, median_depth
-from nbv.errors import UserError, need_number
+from nbv.errors import UserError, check_number
 from nbv.robot.depth_files import DepthImage
 from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
@@ -215,7 +215,7 @@ def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) ->
     limits = (("`near_m`", near_m, FARTHEST), ("`far_m`", far_m, _NO_LIMIT))
     for name, limit_m, most in limits:
         if limit_m is not None:
-            need_number(name, limit_m)
+            check_number(name, limit_m)
         if limit_m is not None and not limit_m >= 0:
             raise UserError(f"{name}={limit_m:g}: give metres, 0 or more")
         if limit_m is not None and most * diagonal_m < limit_m < math.inf:

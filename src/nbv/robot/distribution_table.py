@@ -16,8 +16,8 @@ from nbv.core.lookup import LookupTable
 from nbv.errors import UserError
 from nbv.files import (
     calibrated_file,
+    check_distributions,
     damaged,
-    need_distributions,
     read_arrays,
     readable,
     write_arrays,
@@ -231,7 +231,7 @@ class DistributionTable:
         with readable(path, _AGAIN):
             object_ids, temperature, n_classes, rows = (stored[name] for name in _NAMES)
             n_bins = rows.shape[-1]
-            need_distributions(path, rows, (len(object_ids), n_bins, n_bins), _AGAIN)
+            check_distributions(path, rows, (len(object_ids), n_bins, n_bins), _AGAIN)
             least, most = TEMPERATURES
             if not len(rows) or not (rows > 0).all() or not least <= float(temperature) <= most:
                 what = "its distributions or their temperature are out of range"

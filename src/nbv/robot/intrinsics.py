@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nbv.errors import UserError, need_number, reason_of
+from nbv.errors import UserError, check_number, reason_of
 from nbv.files import read_text
 from nbv.robot.depth_files import MILLIMETRE
 from nbv.robot.errors import FrameError
@@ -57,7 +57,7 @@ class Intrinsics:
     def __post_init__(self) -> None:
         for name in ("fx", "fy", "cx", "cy", "width", "height"):
             if (value := getattr(self, name)) is not None or name in ("fx", "fy"):
-                need_number(f"intrinsics: {name}", value)
+                check_number(f"intrinsics: {name}", value)
         for name in ("fx", "fy"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):

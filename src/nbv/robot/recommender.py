@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.logits import from_logits
-from nbv.errors import UserError, nearest, need_number
+from nbv.errors import UserError, check_number, nearest
 from nbv.files import as_path
 from nbv.labels import counted
 from nbv.robot.bundle import Bundle, BundleError
@@ -307,7 +307,7 @@ class Recommender:
         followed: bool,
     ) -> Recommendation:
         if elevation_deg is not None:
-            need_number("elevation", elevation_deg)
+            check_number("elevation", elevation_deg)
         if elevation_deg is not None and not -90 <= elevation_deg <= 90:
             raise UserError(
                 f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"

@@ -17,7 +17,7 @@ from nbv.data.renderers import open_renderer
 from nbv.data.sensors import Sensor
 from nbv.data.sensors.triangulation import Kinect, Stereo
 from nbv.data.sources.files import EXTENSIONS
-from nbv.errors import UserError, nearest, need_number
+from nbv.errors import UserError, check_number, nearest
 from nbv.robot.crop import FARTHEST, NEAREST
 from nbv.robot.depth_files import DepthImage
 from nbv.robot.intrinsics import Intrinsics
@@ -131,8 +131,8 @@ def draw_frame(
 def _need_view(
     azimuth_deg: float, elevation_deg: float, distance_m: float, diagonal_m: float
 ) -> None:
-    need_number("azimuth", azimuth_deg)
-    need_number("elevation", elevation_deg)
+    check_number("azimuth", azimuth_deg)
+    check_number("elevation", elevation_deg)
     if not math.isfinite(azimuth_deg):
         raise UserError(f"an azimuth of {azimuth_deg:g}°: give a number of degrees")
     if not -90 <= elevation_deg <= 90:

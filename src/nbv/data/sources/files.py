@@ -102,7 +102,7 @@ class FileSource(ABC):
         """Return what `find` returns; search only once."""
         if category not in self._found:
             with readable_places(self.name):
-                self.need_folder(self.root, "the data set (dataset.root)")
+                self.check_folder(self.root, "the data set (dataset.root)")
                 found = self.find(category)
             for object_id, path in found.items():
                 if unsafe := _NOT_IN_IDS.search(object_id):
@@ -119,7 +119,7 @@ class FileSource(ABC):
         label: str = self.settings["categories"].get(category, category)
         return label
 
-    def need_folder(self, folder: Path, meaning: str) -> Path:
+    def check_folder(self, folder: Path, meaning: str) -> Path:
         """Return `folder`; raise UserError where it is not a folder."""
         if not folder.is_dir():
             what = "is not a folder" if folder.exists() else "does not exist"
@@ -192,7 +192,7 @@ class FolderSource(FileSource):
 
     def find(self, category: str) -> dict[str, Path]:
         """Return the mesh files of a category's folder."""
-        folder = self.need_folder(self.root / self.label(category), f"the {category} meshes")
+        folder = self.check_folder(self.root / self.label(category), f"the {category} meshes")
         return self.by_stem(p for p in folder.iterdir() if p.suffix.lower() in EXTENSIONS)
 
     def whereabouts(self, category: str) -> str:
@@ -211,7 +211,7 @@ class ModelNetSource(FileSource):
 
     def find(self, category: str) -> dict[str, Path]:
         """Return the OFF files of a category's parts."""
-        folder = self.need_folder(self.root / self.label(category), f"the {category} meshes")
+        folder = self.check_folder(self.root / self.label(category), f"the {category} meshes")
         parts = [folder / part for part in _PARTS if (folder / part).is_dir()]
         if not parts:
             raise UserError(

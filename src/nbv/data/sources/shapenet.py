@@ -85,7 +85,7 @@ class ShapeNetCoreSource(_ShapeNetSource):
                 "dataset=shapenet: ShapeNetCore has no toilet category; ShapeNetSem "
                 "(dataset.layout=sem) and ModelNet40 (dataset=modelnet) have one"
             )
-        return self.need_folder(folder, f"the {category} models (see dataset.categories)")
+        return self.check_folder(folder, f"the {category} models (see dataset.categories)")
 
 
 class ShapeNetSemSource(_ShapeNetSource):

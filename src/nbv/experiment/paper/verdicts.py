@@ -28,7 +28,7 @@ from nbv.experiment.paper.statements import (
 from nbv.experiment.results import Unit
 from nbv.experiment.statistics import paired
 from nbv.experiment.statistics.paired import Estimate, PairedErrors, Resampler
-from nbv.files import damaged, need_columns, read_csv
+from nbv.files import check_columns, damaged, read_csv
 
 PAPER_VERDICTS: Mapping[Verdict, str] = {
     statements.HOLDS: "bear it out",
@@ -125,7 +125,7 @@ def read_claims(path: str | Path) -> pd.DataFrame:
         Where the file cannot be read, or lacks a column, a claim or one of its comparisons.
     """
     frame = read_csv(path)
-    need_columns(path, frame, (*CLAIM_COLUMNS, *PART_COLUMNS))
+    check_columns(path, frame, (*CLAIM_COLUMNS, *PART_COLUMNS))
     read = set(zip(frame["id"], frame["part"], strict=True))
     planned = {
         (claim.id, part + 1)

@@ -14,7 +14,7 @@ from nbv.experiment.config import default_of, read_configuration
 from nbv.experiment.paper.verdicts import need_verdicts
 from nbv.experiment.provenance import read_provenance
 from nbv.experiment.report.settings import CELL_COLUMNS, TRANSFER
-from nbv.files import existing, need_columns, read_csv, replacing
+from nbv.files import check_columns, existing, read_csv, replacing
 
 log = logging.getLogger(__name__)
 
@@ -183,7 +183,7 @@ def read_verdicts(root: Path) -> dict[str, str]:
     """Read the verdict of each claim of a run or reference."""
     path = root / "claims.csv"
     claims = read_csv(path)
-    need_columns(path, claims, ("id", "verdict"))
+    check_columns(path, claims, ("id", "verdict"))
     need_verdicts(path, claims["verdict"])
     claims = claims.drop_duplicates("id")
     return dict(zip(claims["id"], claims["verdict"], strict=True))
