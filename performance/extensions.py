@@ -6,10 +6,10 @@ import numpy as np
 
 from nbv.core.belief import first_belief, updated
 from nbv.core.criteria import CRITERIA, FOR_MORE_VIEWS
-from nbv.core.evidence import Evidence, gather_evidence
+from nbv.core.evidence import COARSE_BINS, Evidence, gather_evidence
 from nbv.core.fusion import ESTIMATE_FUSIONS
 from nbv.core.lookup import build_lookup
-from nbv.core.next_views import COARSE_BINS, recommended_next
+from nbv.core.simulation import recommended_next
 from performance.figures import Figure, Target
 from performance.lookup import calibration_estimates
 from performance.settings import configuration

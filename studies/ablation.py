@@ -10,8 +10,8 @@ import pandas as pd
 from nbv.core.criteria import CRITERIA
 from nbv.core.estimates import Estimates
 from nbv.core.fusion import ESTIMATE_FUSIONS
-from nbv.core.policies import Turns, two_views
-from nbv.core.selection import Choice, choose_densities, chosen_evidence, most_likely_density
+from nbv.core.policies import TestViews, two_views
+from nbv.core.selection import DensityParams, choose_densities, chosen_evidence, most_likely_density
 
 ALL = 0
 """As a number of calibration objects: as many as there are."""
@@ -85,11 +85,11 @@ def ablate(
     own = dict(settings) | {key: instance[key] for key in ("pose_likelihood", "spread")}
     method = {"policy": instance["criterion"], "fusion": instance["fusion"]}
     if instance["chosen_by"] == "given":
-        choice = Choice(instance["bandwidth_deg"], instance["pseudo_observations"])
+        density = DensityParams(instance["bandwidth_deg"], instance["pseudo_observations"])
     elif instance["chosen_by"] == "likelihood":
-        choice = most_likely_density(estimate_deg, own)
+        density = most_likely_density(estimate_deg, own)
     else:
-        choice = choose_densities(estimate_deg, {"ablated": method}, own)["ablated"]
-    evidence = chosen_evidence(estimate_deg, choice, own, instance["n_bins"])
-    error = two_views(**method, turns=Turns(test.estimate_deg, evidence)).error_deg
+        density = choose_densities(estimate_deg, {"ablated": method}, own)["ablated"]
+    evidence = chosen_evidence(estimate_deg, density, own, instance["n_bins"])
+    error = two_views(**method, views=TestViews(test.estimate_deg, evidence)).error_deg
     return pd.DataFrame({"object_id": test.object_ids, "error_deg": error.mean(axis=1)})

@@ -137,7 +137,7 @@ def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
     return [one for one in found if {one.method, one.other} <= known]
 
 
-def factorial_objects(made: Factorial) -> pd.DataFrame:
+def factorial_objects(made: Factorial, more_views: pd.DataFrame) -> pd.DataFrame:
     """Return the figures of every test object of one fold under every method.
 
     Columns `METHOD`, ``object_id`` and `MEAN_COLUMNS`: means over first views.
@@ -149,18 +149,18 @@ def factorial_objects(made: Factorial) -> pd.DataFrame:
         fusion=means["method"].map(lambda name: names[name][1]),
         n_views=means["method"].map(lambda name: 1 if names[name] == SINGLE else 2),
     )
-    more = _named(made.more_views[made.more_views["n_views"] > 2])
+    more = _named(more_views[more_views["n_views"] > 2])
     columns = [*METHOD, "object_id", *MEAN_COLUMNS]
     return pd.concat([two[columns], more[columns]], ignore_index=True)
 
 
-def factorial_beliefs(made: Factorial) -> pd.DataFrame:
+def factorial_beliefs(more_views: pd.DataFrame) -> pd.DataFrame:
     """Return how well the beliefs of one fold know each test object's pose, after 1 view and more.
 
     Columns `METHOD`, ``object_id`` and `BELIEF_COLUMNS`: means over first views. After one view
     the choice is ``none``.
     """
-    rows = _named(made.more_views)
+    rows = _named(more_views)
     first = (rows["n_views"] == 1) & (rows["choice"] == "evenly_spaced")
     kept = rows[first | (rows["n_views"] > 1)].copy()
     kept.loc[kept["n_views"] == 1, "choice"] = SINGLE[0]

@@ -14,7 +14,13 @@ from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
 from nbv.core.fusion import OF_DISTRIBUTIONS
 from nbv.core.lookup import LookupTable
-from nbv.core.selection import Choice, Methods, SelectedMethod, chosen_evidence, select_methods
+from nbv.core.selection import (
+    DensityParams,
+    Methods,
+    SelectedMethod,
+    chosen_evidence,
+    select_methods,
+)
 from nbv.experiment.results import evaluate_method
 from studies.travel import travel_rows
 
@@ -95,9 +101,9 @@ def choices_frame(selected: Mapping[str, SelectedMethod]) -> pd.DataFrame:
     """
     rows = []
     for name, method in selected.items():
-        choice = method.choice
-        density = choice.bandwidth_deg, choice.pseudo_observations, round(choice.error_deg, 4)
-        rows.append((name, method.policy, method.fusion, *density))
+        density = method.density
+        params = density.bandwidth_deg, density.pseudo_observations, round(density.error_deg, 4)
+        rows.append((name, method.policy, method.fusion, *params))
     return pd.DataFrame(rows, columns=list(CHOICE_COLUMNS))
 
 
@@ -126,7 +132,7 @@ def stored_evidence(
     density = posterior.set_index("policy")[["bandwidth_deg", "pseudo_observations"]]
     makers: dict[str, Callable[[int], Evidence]] = {
         str(policy): cache(
-            partial(chosen_evidence, calibration.estimate_deg, Choice(*chosen), settings)
+            partial(chosen_evidence, calibration.estimate_deg, DensityParams(*chosen), settings)
         )
         for policy, *chosen in density.itertuples()
     }

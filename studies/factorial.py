@@ -1,14 +1,14 @@
 """Every choice of the next view with every fusion, on the same estimates of one fold.
 
-A choice and a fusion are told apart only where both vary: the paper's method differs from Opposite
-in the choice, and from its extensions in both. All choices with one fusion fuse alike. An average
-has no density, so each choice has the one that is best for it. A posterior has, and all choices
-share it; the regression of ``expected_error`` has a kernel of its own.
+Only a factorial design separates the effects of choice and fusion: the paper's method differs from
+Opposite in the choice, but from its extensions in both. The average uses no density, so each choice
+has its own best density. The posterior uses one, which all choices share; the regression of
+``expected_error`` has its own kernel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, Final
@@ -17,18 +17,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.core.estimates import Estimates, Posteriors
-from nbv.core.evidence import Evidence, evidence_of_distributions
+from nbv.core.estimates import Posteriors
+from nbv.core.evidence import COARSE_BINS, Evidence, evidence_of_distributions
 from nbv.core.fusion import ESTIMATE_FUSIONS
-from nbv.core.lookup import build_lookup
+from nbv.core.lookup import LookupTable, build_lookup
 from nbv.core.policies import needs_lookup
 from nbv.core.selection import (
-    COARSE_BINS,
-    Choice,
+    DensityParams,
     choose_densities,
     chosen_evidence,
     most_likely_density,
-    with_kernel,
 )
 from nbv.experiment.results import evaluate_method
 from studies.kept_estimates import HeldOut
@@ -39,7 +37,9 @@ Pair = tuple[str, str]
 
 SINGLE: Final[Pair] = ("none", "none")
 AS_PRINTED: Final[Pair] = ("as_printed", "average")
-"""The paper's method as it reads: T = L, the likeliest smoothing, no pseudo-observations."""
+"""The paper's method as printed: T = L, the likeliest smoothing, no pseudo-observations."""
+RANDOM_POSTERIOR: Final[Pair] = ("random", "posterior")
+"""Its density is shared by all choices with the fusion ``posterior``."""
 
 POLICIES: Final[Mapping[str, str]] = {
     "random": "random",
@@ -54,10 +54,14 @@ POLICIES: Final[Mapping[str, str]] = {
 """The policy of each choice; the pose ambiguity has two interpretations."""
 
 CHOICES_WITH_TABLES = tuple(choice for choice, policy in POLICIES.items() if needs_lookup(policy))
-REGRESSION = "expected_error"
+
+METHODS: Final[Mapping[Pair, str]] = {
+    (choice, fusion): policy for fusion in ESTIMATE_FUSIONS for choice, policy in POLICIES.items()
+} | {AS_PRINTED: "pose_ambiguity"}
+"""The policies of all pairs that fuse estimates."""
 
 OF_IMAGES = ("random", "fixed", "opposite", "information_gain", "expected_error")
-"""Choices that are defined where images give distributions, which are fused by product."""
+"""Choices for the fusion ``product`` of images' distributions."""
 
 MORE_VIEWS: Final[Mapping[str, Pair]] = {
     "random": ("random", "posterior"),
@@ -68,7 +72,7 @@ MORE_VIEWS: Final[Mapping[str, Pair]] = {
     "information_gain_product": ("information_gain", "product"),
     "expected_error_product": ("expected_error", "product"),
 }
-"""Choice and fusion of the policies of `studies.more_views` that are compared."""
+"""Choice and fusion of the policies of `studies.more_views` in the comparison."""
 
 DENSITY_COLUMNS = (
     "choice",
@@ -84,22 +88,21 @@ RngOf = Callable[[str], np.random.Generator]
 
 @dataclass(frozen=True)
 class Factorial:
-    """What became of the test objects of one fold.
+    """Results for the test objects of one fold.
 
     Attributes
     ----------
     frames : dict of (choice, fusion) to DataFrame
-        Two views, and one (`SINGLE`); as of `nbv.experiment.results.evaluate_method`.
-    more_views : DataFrame
-        As of `studies.more_views.more_views_rows`.
+        Rows of `nbv.experiment.results.evaluate_method` for two views, and for one (`SINGLE`).
+    posterior_density : DensityParams
+        The density that choices share with the fusion ``posterior``.
     densities : DataFrame
-        What calibration objects chose for each choice and fusion; `DENSITY_COLUMNS`.
-        ``pairs_percent`` is the mean share of calibration pairs in a row of V, whose other part are
-        uniform pseudo-observations.
+        The density of each choice and fusion, columns `DENSITY_COLUMNS`. ``pairs_percent`` is the
+        mean share of calibration pairs in a row of V; the rest are pseudo-observations.
     """
 
     frames: dict[Pair, pd.DataFrame]
-    more_views: pd.DataFrame
+    posterior_density: DensityParams
     densities: pd.DataFrame
 
 
@@ -107,105 +110,88 @@ def evaluate_factorial(
     calibration: HeldOut,
     test: HeldOut,
     settings: Mapping[str, Any],
-    more_views: Mapping[str, Any],
     rng_of: RngOf,
 ) -> Factorial:
-    """Evaluate every choice with every fusion on the test objects of one fold.
+    """Evaluate every choice of a second view with every fusion on the test objects of one fold.
 
-    Tables that choose have `COARSE_BINS` bins; estimates are fused with 360.
+    Tables have `COARSE_BINS` bins; estimates are fused with 360.
 
     Parameters
     ----------
     calibration, test : HeldOut
-        Where they have distributions, the fusion ``product`` and choices by an image's own
-        distribution are added, from first views that are a class apart.
+        With distributions, the fusion ``product`` and choices by an image's distribution are added,
+        and first views are one class apart.
     settings : mapping
         The configuration's ``density``, ``recommendation`` and ``affinity``.
-    more_views : mapping
-        The configuration's ``more_views``.
     rng_of : callable
-        The generator of a choice, by name: random views are the same under every fusion of
-        estimates.
+        The generator of a choice, by name: random views are the same for all fusions of estimates.
     """
-    known, tested = calibration.estimates.estimate_deg, test.estimates
-    densities: dict[Pair, Choice] = {}
+    estimate_deg, tested = calibration.estimates.estimate_deg, test.estimates
+    densities = _densities(estimate_deg, settings)
+    lookups = _lookups(estimate_deg, densities, settings)
+    shared = densities[RANDOM_POSTERIOR]
+    fine = chosen_evidence(estimate_deg, shared, settings)
     frames = {SINGLE: evaluate_method({"policy": "none", "fusion": "average"}, tested)}
-    for fusion in ESTIMATE_FUSIONS:
-        chosen = _densities(fusion, known, settings)
-        densities |= {(choice, fusion): density for choice, density in chosen.items()}
-        frames |= _estimate_frames(fusion, chosen, known, tested, settings, rng_of)
-    printed = _of_choice("given_truth", settings) | {"pseudo_observations": [0.0]}
-    densities[AS_PRINTED] = most_likely_density(known, printed)
-    coarse = chosen_evidence(known, densities[AS_PRINTED], printed, COARSE_BINS)
-    table = build_lookup(coarse, POLICIES["given_truth"])
-    method = {"policy": POLICIES["given_truth"], "fusion": "average"}
-    frames[AS_PRINTED] = evaluate_method(method, tested, lookup=table)
-    of_images = None
+    for (choice, fusion), policy in METHODS.items():
+        method = {"policy": policy, "fusion": fusion}
+        lookup = lookups.get((choice, fusion))
+        frames[choice, fusion] = evaluate_method(method, tested, rng_of(choice), lookup, fine)
     if calibration.posteriors is not None and test.posteriors is not None:
-        of_images = evidence_of_distributions(calibration.posteriors.distributions, settings)
-        frames |= _product_frames(test, test.posteriors, of_images, rng_of)
+        evidence = evidence_of_distributions(calibration.posteriors.distributions, settings)
+        frames |= _product_frames(test, test.posteriors, evidence, rng_of)
         step = 360 // test.posteriors.distributions.shape[1]
         frames = {
             pair: frame[frame["initial_deg"] % step == 0].reset_index(drop=True)
             for pair, frame in frames.items()
         }
-    shared = densities["random", "posterior"]
-    evidence = cache(partial(chosen_evidence, known, shared, settings))
-    evidences: dict[str, Callable[[int], Evidence]] = dict.fromkeys(
-        ("random", "opposite", "information_gain"), lambda n_bins: evidence(n_bins=n_bins)
-    )
-    rows = more_views_rows(
-        tested, evidences, more_views, rng_of("more_views"), test.posteriors, of_images
-    )
-    return Factorial(frames, rows, _densities_frame(densities, known.size / 360))
+    return Factorial(frames, shared, _densities_frame(densities, estimate_deg.size / 360))
 
 
-def _of_choice(choice: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+def _settings_of(choice: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of a choice: the pose likelihood has two interpretations."""
+    if choice == "as_printed":
+        return dict(settings) | {"pose_likelihood": "given_truth", "pseudo_observations": [0.0]}
     given = "given_truth" if choice == "given_truth" else "given_estimate"
     return dict(settings) | {"pose_likelihood": given}
 
 
 def _densities(
-    fusion: str, estimate_deg: NDArray[np.float64], settings: Mapping[str, Any]
-) -> dict[str, Choice]:
-    """Return the density of each choice that has one of its own, and a fusion's own as random's."""
+    estimate_deg: NDArray[np.float64], settings: Mapping[str, Any]
+) -> dict[Pair, DensityParams]:
+    """Choose the densities: one for each choice with averages, shared ones with posteriors."""
 
-    def best(choices: Sequence[str], shared: Choice | None = None) -> dict[str, Choice]:
-        methods = {one: {"policy": POLICIES[one], "fusion": fusion} for one in choices}
-        own = _of_choice(choices[0], settings)
-        return choose_densities(estimate_deg, methods, own, shared=shared)
+    def best(
+        fusion: str, *choices: str, shared: DensityParams | None = None
+    ) -> dict[Pair, DensityParams]:
+        methods = {choice: {"policy": POLICIES[choice], "fusion": fusion} for choice in choices}
+        own = _settings_of(choices[0], settings)
+        chosen = choose_densities(estimate_deg, methods, own, shared=shared)
+        return {(choice, fusion): density for choice, density in chosen.items()}
 
-    if fusion == "average":
-        others = [choice for choice in CHOICES_WITH_TABLES if choice != "given_truth"]
-        return best(others) | best(["given_truth"])
-    of_fusion = best(["random"])
-    return of_fusion | best([REGRESSION], shared=of_fusion["random"])
+    others = [choice for choice in CHOICES_WITH_TABLES if choice != "given_truth"]
+    average = best("average", *others) | best("average", "given_truth")
+    posterior = best("posterior", "random")
+    kernel = best("posterior", "expected_error", shared=posterior[RANDOM_POSTERIOR])
+    printed = most_likely_density(estimate_deg, _settings_of("as_printed", settings))
+    return average | posterior | kernel | {AS_PRINTED: printed}
 
 
-def _estimate_frames(
-    fusion: str,
-    densities: Mapping[str, Choice],
-    calibration_deg: NDArray[np.float64],
-    test: Estimates,
+def _lookups(
+    estimate_deg: NDArray[np.float64],
+    densities: Mapping[Pair, DensityParams],
     settings: Mapping[str, Any],
-    rng_of: RngOf,
-) -> dict[Pair, pd.DataFrame]:
-    """Return the frame of every choice with one fusion of estimates."""
-    shared = densities.get("random")
-    fine = None if shared is None else chosen_evidence(calibration_deg, shared, settings)
-    frames = {}
-    for choice, policy in POLICIES.items():
-        lookup = None
-        if choice in CHOICES_WITH_TABLES:
-            own = _of_choice(choice, settings)
-            of_table = shared or densities[choice]
-            coarse = chosen_evidence(calibration_deg, of_table, own, COARSE_BINS)
-            kernel = densities.get(choice, of_table)
-            lookup = build_lookup(with_kernel(coarse, kernel), policy, fusion)
-        method = {"policy": policy, "fusion": fusion}
-        frames[choice, fusion] = evaluate_method(method, test, rng_of(choice), lookup, fine)
-    return frames
+) -> dict[Pair, LookupTable]:
+    """Build the coarse tables of all pairs whose policy has one."""
+    lookups = {}
+    for (choice, fusion), policy in METHODS.items():
+        if not needs_lookup(policy):
+            continue
+        density = densities.get(("random", fusion)) or densities[choice, fusion]
+        kernel = densities.get((choice, fusion), density)
+        own = _settings_of(choice, settings)
+        evidence = chosen_evidence(estimate_deg, density, own, COARSE_BINS, kernel)
+        lookups[choice, fusion] = build_lookup(evidence, policy, fusion)
+    return lookups
 
 
 def _product_frames(
@@ -223,10 +209,44 @@ def _product_frames(
     }
 
 
-def _densities_frame(densities: Mapping[Pair, Choice], pairs_of_row: float) -> pd.DataFrame:
+def _densities_frame(densities: Mapping[Pair, DensityParams], pairs_per_row: float) -> pd.DataFrame:
     rows = []
-    for pair, chosen in densities.items():
-        alpha = chosen.pseudo_observations
-        share = 100.0 * pairs_of_row / (pairs_of_row + alpha)
-        rows.append((*pair, chosen.bandwidth_deg, alpha, share, chosen.error_deg))
+    for pair, density in densities.items():
+        alpha = density.pseudo_observations
+        share = 100.0 * pairs_per_row / (pairs_per_row + alpha)
+        rows.append((*pair, density.bandwidth_deg, alpha, share, density.error_deg))
     return pd.DataFrame(rows, columns=list(DENSITY_COLUMNS))
+
+
+def evaluate_more_views(
+    calibration: HeldOut,
+    test: HeldOut,
+    density: DensityParams,
+    settings: Mapping[str, Any],
+    more_views: Mapping[str, Any],
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """Return `studies.more_views.more_views_rows` of the test objects of one fold.
+
+    Parameters
+    ----------
+    calibration, test, settings
+        The arguments of `evaluate_factorial`.
+    density : DensityParams
+        Its `Factorial.posterior_density`.
+    more_views : mapping
+        The configuration's ``more_views``.
+    rng : numpy.random.Generator
+    """
+    evidence = cache(
+        partial(chosen_evidence, calibration.estimates.estimate_deg, density, settings)
+    )
+    evidences: dict[str, Callable[[int], Evidence]] = dict.fromkeys(
+        ("random", "opposite", "information_gain"), evidence
+    )
+    image_evidence = None
+    if calibration.posteriors is not None:
+        image_evidence = evidence_of_distributions(calibration.posteriors.distributions, settings)
+    return more_views_rows(
+        test.estimates, evidences, more_views, rng, test.posteriors, image_evidence
+    )

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.angles import signed_difference_deg
+from nbv.core.distributions import in_object_frame, in_view_frame
 from nbv.core.estimates import Estimates, Posteriors
 from nbv.errors import UserError
 from nbv.experiment.estimates import read_estimates, read_posteriors
@@ -61,8 +62,8 @@ class HeldOut:
         if self.surprisal is None:
             return None
         p = np.exp(-0.1 * self.surprisal)
-        turned = _turned(p / p.sum(axis=-1, keepdims=True), 1)
-        return Posteriors(self.object_ids, np.log(turned), 1.0)
+        rows = in_view_frame(p / p.sum(axis=-1, keepdims=True))
+        return Posteriors(self.object_ids, np.log(rows), 1.0)
 
     @property
     def estimates_of_posteriors(self) -> Estimates:
@@ -85,15 +86,8 @@ def held_out(estimates: Estimates, posteriors: Posteriors | None = None) -> Held
         p = posteriors.distributions
         p = p[:, :: p.shape[1] // p.shape[2]]
         # At most −10 log of the least probability, 138.
-        surprisal = np.rint(-10.0 * np.log(_turned(p, -1))).astype(np.uint8)
+        surprisal = np.rint(-10.0 * np.log(in_object_frame(p))).astype(np.uint8)
     return HeldOut(estimates.object_ids, residual.astype(np.int16), surprisal)
-
-
-def _turned(p: NDArray[np.float64], way: int) -> NDArray[np.float64]:
-    """Turn the distribution of view k by k classes, (n, B, B)."""
-    n_bins = p.shape[2]
-    classes = (np.arange(n_bins) - way * np.arange(n_bins)[:, None]) % n_bins
-    return np.asarray(np.take_along_axis(p, classes[None], axis=2))
 
 
 def read_held_out(estimates: str | Path, posteriors: str | Path | None = None) -> HeldOut:

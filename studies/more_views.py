@@ -12,14 +12,7 @@ from numpy.typing import NDArray
 
 from nbv.core.criteria import FOR_MORE_VIEWS
 from nbv.core.estimates import Estimates, Posteriors
-from nbv.core.evidence import Evidence
-from nbv.core.next_views import (
-    COARSE_BINS,
-    bisecting_next,
-    evenly_spaced_next,
-    random_next,
-    recommended_next,
-)
+from nbv.core.evidence import COARSE_BINS, Evidence
 from nbv.core.plans import (
     at_spacing,
     choose_plan,
@@ -30,8 +23,12 @@ from nbv.core.simulation import (
     DistributionViews,
     EstimatedViews,
     Views,
+    bisecting_next,
+    evenly_spaced_next,
     first_views,
     follow,
+    random_next,
+    recommended_next,
 )
 from nbv.experiment.statistics.metrics import accuracy_area, half_turned
 

@@ -12,7 +12,7 @@ from nbv.core.angles import nearest_bin, travel_deg
 from nbv.core.estimates import Estimates
 from nbv.core.fusion import ESTIMATE_FUSIONS, Rotations, rotation_errors_deg
 from nbv.core.lookup import least_cost_delta
-from nbv.core.policies import Turns, take_second_views
+from nbv.core.policies import TestViews, take_second_views
 from nbv.core.selection import SelectedMethod
 
 # Multiples of the travel cost at which, for the average estimate, staying costs as little as going.
@@ -39,10 +39,10 @@ def travel_rows(selected: Mapping[str, SelectedMethod], test: Estimates) -> pd.D
             by_fusion.setdefault(method.fusion, method)
         if method.lookup is None:
             continue
-        turns = Turns(test.estimate_deg, method.evidence)
+        views = TestViews(test.estimate_deg, method.evidence)
         for rule, setting, by_bin in _restricted(method.lookup.cost):
             delta = by_bin[nearest_bin(test.estimate_deg, len(by_bin))]
-            error = take_second_views(delta, method.fusion, turns).error_deg
+            error = take_second_views(delta, method.fusion, views).error_deg
             rows.append((name, rule, setting, travel_deg(delta).mean(), error.mean(), error.size))
     for fusion, method in by_fusion.items():
         errors = rotation_errors_deg(test.estimate_deg, method.evidence, fusion)

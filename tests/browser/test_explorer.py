@@ -21,7 +21,7 @@ from nbv.core.distributions import mean_direction_deg
 from nbv.core.estimates import posteriors_of
 from nbv.core.evidence import Evidence
 from nbv.core.lookup import LookupTable
-from nbv.core.next_views import bisecting_next, recommended_next
+from nbv.core.simulation import bisecting_next, recommended_next
 from nbv.experiment.estimates import write_posteriors
 from nbv.experiment.explorer import ExplorerInputs, build_explorer
 from nbv.experiment.explorer.tables import page_table

@@ -13,7 +13,8 @@ from tests.core.made import (
 )
 
 from nbv.core.lookup import build_lookup
-from nbv.core.policies import Turns, take_second_views
+from nbv.core.policies import TestViews as Views
+from nbv.core.policies import take_second_views
 from nbv.core.selection import choose_densities, chosen_lookup, most_likely_density
 from nbv.errors import UserError
 
@@ -24,7 +25,7 @@ def choose_density(estimate_deg, **grid):
 
 
 def two_view_error_deg(estimate_deg, delta_deg):
-    return take_second_views(delta_deg, "average", Turns(estimate_deg)).error_deg
+    return take_second_views(delta_deg, "average", Views(estimate_deg)).error_deg
 
 
 def test_the_chosen_density_decides_best_on_objects_it_has_not_seen():
@@ -117,7 +118,7 @@ def test_an_error_that_is_not_a_number_is_never_the_least():
     methods = {"opposite": {"policy": "opposite", "fusion": "average"}}
     with np.errstate(invalid="ignore"), pytest.raises(UserError, match="is nan: the estimates"):
         choose_densities(estimate, methods, SETTINGS | {"n_parts": 5} | grid)
-    with np.errstate(invalid="ignore"), pytest.raises(UserError, match="no finite number"):
+    with np.errstate(invalid="ignore"), pytest.raises(UserError, match="not a finite number"):
         choose_density(estimate, **grid)
 
 

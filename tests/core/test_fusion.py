@@ -9,7 +9,8 @@ from tests.core.made import N_BINS, estimates, evidence_of
 from nbv.core import fusion
 from nbv.core.angles import circular_distance_deg
 from nbv.core.fusion import ESTIMATE_FUSIONS, average, posterior, product
-from nbv.core.policies import Turns, take_second_views
+from nbv.core.policies import TestViews as Views
+from nbv.core.policies import take_second_views
 
 angle = st.integers(0, 3599).map(lambda tenths: tenths / 10)
 turn = st.integers(0, 359)
@@ -91,9 +92,9 @@ def test_posterior_fusion_trusts_the_view_that_can_be_trusted():
     calibration, unseen = estimates(20, 360), estimates(20, 360, seed=1)
     evidence = evidence_of(calibration, bandwidth_deg=6.0, n_bins=120)
     opposite = np.full(unseen.shape, 180)
-    turns = Turns(unseen, evidence)
+    views = Views(unseen, evidence)
     by_average, by_posterior = (
-        take_second_views(opposite, name, turns).error_deg for name in ESTIMATE_FUSIONS
+        take_second_views(opposite, name, views).error_deg for name in ESTIMATE_FUSIONS
     )
     hidden = slice(60, 120)
     assert by_posterior[:, hidden].mean() < 0.6 * by_average[:, hidden].mean()

@@ -8,7 +8,7 @@ from studies.extensions import choices_frame, stored_evidence
 from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 from nbv.core.estimates import Posteriors
-from nbv.core.selection import Choice, check_methods, select_methods, surely_better
+from nbv.core.selection import DensityParams, check_methods, select_methods, surely_better
 from nbv.errors import UserError
 
 METHODS = {
@@ -25,20 +25,20 @@ def selected():
 
 def test_the_pair_selected_is_the_first_that_is_not_surely_worse_than_the_best(selected):
     names = ["opposite_posterior", "gain_posterior", "error_average"]
-    choices = {name: selected[name].choice for name in names}
+    choices = {name: selected[name].density for name in names}
     best = min(choices.values(), key=lambda choice: choice.error_deg)
     first = next(name for name in names if not surely_better(best, choices[name]))
     assert first != "opposite_posterior"
     winner = selected["selected"]
     assert (winner.policy, winner.fusion) == (selected[first].policy, selected[first].fusion)
-    assert winner.choice == choices[first]
+    assert winner.density == choices[first]
     assert selected["opposite_selected"].policy == "opposite"
     assert selected["opposite_selected"].fusion == winner.fusion
 
 
 def choice(*object_error_deg):
     mean = float(np.mean(object_error_deg))
-    return Choice(4, 3, {(4, 3): mean}, object_error_deg)
+    return DensityParams(4, 3, {(4, 3): mean}, object_error_deg)
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_where_no_method_is_surely_better_the_papers_opposite_is_taken():
         ("x", "fixed", "posterio", r"extensions\.x\.fusion=posterio"),
         ("single", "fixed", "average", "name is taken"),
         ("x", "none", "posterior", "takes no second view"),
-        ("x", "selected", "selected", "none to be selected"),
+        ("x", "selected", "selected", "no extension can be selected"),
         ("x", "oracle", "posterior", "no other extension fuses by posterior"),
         ("x", "opposite", "product", "choose estimator=classifier"),
     ],

@@ -19,7 +19,6 @@ from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
 from nbv.core.criteria import CRITERIA, affinity
 from nbv.core.fusion import rotation_errors_deg
-from nbv.core.next_views import evenly_spaced_travel_deg, recommended_next
 from nbv.core.plans import (
     Plans,
     at_spacing,
@@ -31,7 +30,12 @@ from nbv.core.plans import (
     step_by_step,
     step_by_step_errors_deg,
 )
-from nbv.core.simulation import DistributionViews, follow
+from nbv.core.simulation import (
+    DistributionViews,
+    evenly_spaced_travel_deg,
+    follow,
+    recommended_next,
+)
 
 CAUTIOUS = {"caution": 2.0}
 

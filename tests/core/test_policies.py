@@ -11,7 +11,8 @@ from nbv.core.belief import Belief
 from nbv.core.criteria import CRITERIA
 from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS, rotation_errors_deg
 from nbv.core.lookup import build_lookup
-from nbv.core.policies import Turns, needs_lookup, take_second_views, two_views
+from nbv.core.policies import TestViews as Views
+from nbv.core.policies import needs_lookup, take_second_views, two_views
 from nbv.errors import UserError
 
 
@@ -19,7 +20,7 @@ def test_two_view_error_is_that_of_a_plain_loop():
     rng = np.random.default_rng(1)
     estimate = rng.uniform(0, 360, (3, 36))
     delta = rng.integers(0, 36, (3, 36)) * 10
-    made = take_second_views(delta, "average", Turns(estimate))
+    made = take_second_views(delta, "average", Views(estimate))
     for o in range(3):
         for v in range(36):
             second = estimate[o, (v + delta[o, v] // 10) % 36]
@@ -32,26 +33,26 @@ def test_two_view_error_is_that_of_a_plain_loop():
 
 @pytest.mark.parametrize("fusion", ESTIMATE_FUSIONS)
 def test_the_oracle_is_the_least_of_all_rotations(fusion):
-    turns = Turns(estimates(2, seed=6), evidence_of())
-    every = rotation_errors_deg(turns.estimate_deg, turns.evidence, fusion)
-    reached = two_views("oracle", fusion, turns).error_deg
+    views = Views(estimates(2, seed=6), evidence_of())
+    every = rotation_errors_deg(views.estimate_deg, views.evidence, fusion)
+    reached = two_views("oracle", fusion, views).error_deg
     np.testing.assert_allclose(reached, every.min(axis=0), atol=1e-4)
     for index in (0, 5, 23):
-        delta = np.full(turns.estimate_deg.shape, index * 15)
-        error = take_second_views(delta, fusion, turns).error_deg
+        delta = np.full(views.estimate_deg.shape, index * 15)
+        error = take_second_views(delta, fusion, views).error_deg
         np.testing.assert_allclose(every[index], error, atol=1e-3)
 
 
 def test_policies_by_name():
-    turns = Turns(estimates(2, seed=6), evidence_of(), np.random.default_rng(0))
-    assert (two_views("opposite", "average", turns).delta_deg == 180).all()
-    alone = two_views("none", "average", turns)
+    views = Views(estimates(2, seed=6), evidence_of(), np.random.default_rng(0))
+    assert (two_views("opposite", "average", views).delta_deg == 180).all()
+    alone = two_views("none", "average", views)
     assert alone.delta_deg is None
-    np.testing.assert_array_equal(alone.pose_deg, turns.estimate_deg)
-    table = build_lookup(turns.evidence, "information_gain")
-    followed = two_views("information_gain", "average", turns).delta_deg
-    np.testing.assert_array_equal(followed, table.least_cost(turns.estimate_deg))
-    given = two_views("information_gain", "average", Turns(turns.estimate_deg, lookup=table))
+    np.testing.assert_array_equal(alone.pose_deg, views.estimate_deg)
+    table = build_lookup(views.evidence, "information_gain")
+    followed = two_views("information_gain", "average", views).delta_deg
+    np.testing.assert_array_equal(followed, table.least_cost(views.estimate_deg))
+    given = two_views("information_gain", "average", Views(views.estimate_deg, lookup=table))
     np.testing.assert_array_equal(given.delta_deg, followed)
 
 
@@ -59,8 +60,8 @@ def test_a_criterion_goes_by_the_distribution_of_each_image_where_there_is_one()
     rng, evidence = np.random.default_rng(0), evidence_of()
     unseen = estimates(2, seed=6)
     distributions = rng.dirichlet(np.full(24, 0.3), unseen.shape)
-    turns = Turns(unseen, evidence, distributions=distributions)
-    made = two_views("information_gain", "product", turns)
+    views = Views(unseen, evidence, distributions=distributions)
+    made = two_views("information_gain", "product", views)
     belief = Belief(distributions.reshape(-1, 24).astype(np.float32), evidence)
     cost = CRITERIA["information_gain"](belief, evidence, "product").reshape(2, 48, 24)
     assert (
@@ -86,7 +87,7 @@ def test_a_criterion_goes_by_the_distribution_of_each_image_where_there_is_one()
 )
 def test_what_is_missing_is_named(policy, fusion, missing):
     with pytest.raises(ValueError, match=missing):
-        two_views(policy, fusion, Turns(estimates()))
+        two_views(policy, fusion, Views(estimates()))
 
 
 def test_what_needs_a_lookup_table():

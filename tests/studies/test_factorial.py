@@ -13,13 +13,14 @@ from studies.factorial import (
     POLICIES,
     SINGLE,
     evaluate_factorial,
+    evaluate_more_views,
 )
 from studies.kept_estimates import held_out
 
 from nbv.core.angles import circular_distance_deg
+from nbv.core.evidence import COARSE_BINS
 from nbv.core.fusion import ESTIMATE_FUSIONS
 from nbv.core.policies import needs_lookup
-from nbv.core.selection import COARSE_BINS
 from tests.core.made import FEW_DENSITIES
 from tests.experiment.test_two_views import N_CLASSES, hidden_handle, mean_directions
 
@@ -36,10 +37,18 @@ def rng_of(name):
 
 
 @pytest.fixture(scope="module")
-def made():
-    calibration, test = hidden_handle(5, 1), hidden_handle(3, 0)
-    sides = [held_out(mean_directions(one), one) for one in (calibration, test)]
-    return evaluate_factorial(*sides, SETTINGS, MORE_VIEWS, rng_of)
+def sides():
+    return [held_out(mean_directions(p), p) for p in (hidden_handle(5, 1), hidden_handle(3, 0))]
+
+
+@pytest.fixture(scope="module")
+def made(sides):
+    return evaluate_factorial(*sides, SETTINGS, rng_of)
+
+
+def more_views(sides, made):
+    rng = rng_of("more_views")
+    return evaluate_more_views(*sides, made.posterior_density, SETTINGS, MORE_VIEWS, rng)
 
 
 def test_every_choice_meets_every_fusion(made):
@@ -97,19 +106,20 @@ def test_all_methods_start_from_the_same_views(made):
 
 def test_without_distributions_nothing_is_multiplied():
     sides = [held_out(mean_directions(hidden_handle(n, n))) for n in (4, 2)]
-    made = evaluate_factorial(*sides, SETTINGS, MORE_VIEWS, rng_of)
+    made = evaluate_factorial(*sides, SETTINGS, rng_of)
     assert "product" not in {fusion for _, fusion in made.frames}
-    assert not made.more_views["method"].str.endswith("_product").any()
+    assert not more_views(sides, made)["method"].str.endswith("_product").any()
 
 
-def test_beliefs_are_of_one_view_once_and_of_more_by_choice(made):
+def test_beliefs_are_of_one_view_once_and_of_more_by_choice(sides, made):
+    more = more_views(sides, made)
     keys = ["choice", "fusion", "n_views", "object_id"]
-    found = factorial_beliefs(made).set_index(keys).sort_index()
+    found = factorial_beliefs(more).set_index(keys).sort_index()
     assert found.index.is_unique
     one_view = found.xs(1, level="n_views")
     assert set(one_view.index.get_level_values("choice")) == {"none"}
     assert set(one_view.index.get_level_values("fusion")) == {"posterior", "product"}
-    rows = made.more_views.set_index(["method", "n_views", "object_id"]).sort_index()
+    rows = more.set_index(["method", "n_views", "object_id"]).sort_index()
     for n_views in (2, 3):
         mine = found.loc[("evenly_spaced", "product", n_views)]
         same = rows.loc[("evenly_spaced_product", n_views), mine.columns]

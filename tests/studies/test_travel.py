@@ -4,7 +4,8 @@ import pandas as pd
 import pytest
 from studies.travel import pooled_travel, travel_rows
 
-from nbv.core.policies import Turns, two_views
+from nbv.core.policies import TestViews as Views
+from nbv.core.policies import two_views
 from nbv.core.selection import select_methods
 from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
@@ -15,11 +16,11 @@ def test_travel_curves_start_at_the_table_and_end_by_staying():
     gain = rows[(rows["method"] == "gain_posterior") & (rows["rule"] == "cost")]
     first, last = gain.iloc[0], gain.iloc[-1]
     # The first extension with posterior fusion gives the density of the fixed rotations.
-    turns, fixed = (
-        Turns(test.estimate_deg, selected[name].evidence)
+    views, fixed = (
+        Views(test.estimate_deg, selected[name].evidence)
         for name in ("gain_posterior", "random_posterior")
     )
-    error = two_views("information_gain", "posterior", turns).error_deg.mean()
+    error = two_views("information_gain", "posterior", views).error_deg.mean()
     assert first["error_deg"] == pytest.approx(error, abs=1e-3)
     assert last["travel_deg"] < first["travel_deg"]
     assert gain["travel_deg"].is_monotonic_decreasing

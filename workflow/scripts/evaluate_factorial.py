@@ -5,7 +5,7 @@ from nbv.experiment.jobs import job
 with job(snakemake):
     import pandas as pd
     from studies.confirmation import factorial_beliefs, factorial_objects
-    from studies.factorial import evaluate_factorial
+    from studies.factorial import evaluate_factorial, evaluate_more_views
     from studies.kept_estimates import kept_settings, read_kept
 
     from nbv.core.seeds import rng_for
@@ -21,17 +21,24 @@ with job(snakemake):
     )
     held = read_kept(path, [key for key in keys if key[:4] == place])
     decision = settings["density"] | settings["recommendation"]
+    decision |= {"affinity": settings["affinity"]}
     parts = {"objects": [], "beliefs": [], "densities": []}
     for fold in dict.fromkeys(key[4] for key in held):
-        made = evaluate_factorial(
-            held[*place, fold, "calibration"],
-            held[*place, fold, "test"],
-            decision | {"affinity": settings["affinity"]},
+        objects = [held[*place, fold, role] for role in ("calibration", "test")]
+
+        def rng_of(name, fold=fold):
+            return rng_for(settings["seed"], name, *place, fold)
+
+        made = evaluate_factorial(*objects, decision, rng_of)
+        more = evaluate_more_views(
+            *objects,
+            made.posterior_density,
+            decision,
             settings["more_views"],
-            lambda name, fold=fold: rng_for(settings["seed"], name, *place, fold),
+            rng_of("more_views"),
         )
-        parts["objects"].append(factorial_objects(made).assign(fold=fold))
-        parts["beliefs"].append(factorial_beliefs(made).assign(fold=fold))
+        parts["objects"].append(factorial_objects(made, more).assign(fold=fold))
+        parts["beliefs"].append(factorial_beliefs(more).assign(fold=fold))
         parts["densities"].append(made.densities.assign(fold=fold))
     for name, frames in parts.items():
         write_csv(snakemake.output[name], pd.concat(frames, ignore_index=True))

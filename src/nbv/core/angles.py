@@ -11,10 +11,10 @@ Angles = NDArray[np.float64]
 def wrap_deg(angle_deg: ArrayLike) -> Angles:
     """Return the same directions in [0, 360)."""
     if isinstance(angle_deg, float):  # in a tenth of the time
-        one = float(angle_deg) % 360.0
-        return np.asarray(0.0 if one >= 360.0 else one)
+        remainder = float(angle_deg) % 360.0
+        return np.asarray(0.0 if remainder >= 360.0 else remainder)
     angle = np.asarray(angle_deg, dtype=np.float64)
-    # The result of np.mod, bit for bit, in a third of its time.
+    # The result of np.mod, bit for bit, in a third of the time.
     wrapped = angle - 360.0 * np.floor(angle / 360.0)
     # The quotient may round up to the next whole turn.
     wrapped = np.where(wrapped < 0.0, wrapped + 360.0, wrapped)
@@ -23,7 +23,7 @@ def wrap_deg(angle_deg: ArrayLike) -> Angles:
 
 
 def signed_difference_deg(a_deg: ArrayLike, b_deg: ArrayLike) -> Angles:
-    """Return the shorter turn from b to a, in [-180, 180)."""
+    """Return the shorter way from b to a, in [-180, 180)."""
     difference = np.asarray(a_deg, dtype=np.float64) - np.asarray(b_deg, dtype=np.float64)
     return wrap_deg(difference + 180.0) - 180.0
 
@@ -43,9 +43,9 @@ def midpoint_deg(first_deg: ArrayLike, second_deg: ArrayLike) -> Angles:
 
     Opposite directions have no mean; the result is then the first direction.
     """
-    turn = signed_difference_deg(second_deg, first_deg)
-    antipodal = turn == -180.0
-    return wrap_deg(np.asarray(first_deg, dtype=np.float64) + np.where(antipodal, 0.0, turn / 2))
+    difference = signed_difference_deg(second_deg, first_deg)
+    half = np.where(difference == -180.0, 0.0, difference / 2)
+    return wrap_deg(np.asarray(first_deg, dtype=np.float64) + half)
 
 
 def direction_deg(cos: ArrayLike, sin: ArrayLike) -> Angles:

@@ -1,8 +1,8 @@
-"""What is believed of the pose after any number of views.
+"""The belief: a distribution of the pose after any number of views.
 
-A belief b(theta) starts as V[e1], or as what the first image says where an estimator gives
-distributions. Each further view multiplies it by L[theta + delta_t, e_t]; theta always is the pose
-in the first view (docs/method.md).
+A belief b(theta) starts as V[e1], or as the first image's distribution where the estimator gives
+one. Each further view multiplies it by L[theta + delta_t, e_t]; theta is always the pose in the
+first view (docs/method.md).
 """
 
 from __future__ import annotations
@@ -15,28 +15,28 @@ from numpy.typing import NDArray
 
 from nbv.core.angles import nearest_bin
 from nbv.core.distributions import product_of
-from nbv.core.evidence import Evidence, Table
+from nbv.core.evidence import Evidence, Float32Array
 
 Angles = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Belief:
-    """Distributions of n poses in their first views.
+    """Distributions of n poses in the frames of their first views.
 
     Attributes
     ----------
     probabilities : ndarray (n, B) float32
         Rows sum to 1.
     evidence : Evidence
-        Of the estimator that took the first view.
+        The estimator that took the first view.
     first_bin : ndarray (n,) int or None
-        The bin of the first estimate; None where the first image gave a distribution.
+        The bin of the first estimate; None if the first image gave a distribution.
     n_views : int
         Views taken so far.
     """
 
-    probabilities: Table
+    probabilities: Float32Array
     evidence: Evidence
     first_bin: NDArray[np.intp] | None = None
     n_views: int = 1
@@ -56,21 +56,21 @@ def first_belief(estimate_deg: Angles, evidence: Evidence) -> Belief:
 def updated(
     belief: Belief, estimate_deg: Angles, delta_deg: NDArray[np.int64], evidence: Evidence
 ) -> Belief:
-    """Return the belief after another view, by Bayes' rule.
+    """Update a belief by the estimate of another view, by Bayes' rule.
 
-    Views are taken as independent given the pose.
+    Views are assumed to be independent given the pose.
 
     Parameters
     ----------
     belief : Belief
     estimate_deg, delta_deg : ndarray (n,)
-        The estimate from that view, and the rotation from the first view to it, degrees.
+        The estimate of that view, and the rotation from the first view to it, degrees.
     evidence : Evidence
-        Of the estimator that took it; B bins.
+        The estimator that took it, with B bins.
     """
     n_bins = evidence.n_bins
-    turn = nearest_bin(delta_deg, n_bins)[:, None] + np.arange(n_bins)
-    likelihood = evidence.second[turn, nearest_bin(estimate_deg, n_bins)[:, None]]
+    rotated = nearest_bin(delta_deg, n_bins)[:, None] + np.arange(n_bins)
+    likelihood = evidence.second[rotated, nearest_bin(estimate_deg, n_bins)[:, None]]
     product = belief.probabilities * likelihood
     rows = np.asarray(product / product.sum(axis=1, keepdims=True))
     return replace(belief, probabilities=rows, n_views=belief.n_views + 1)
@@ -79,13 +79,13 @@ def updated(
 def multiplied(
     belief: Belief, distributions: NDArray[np.floating[Any]], delta_deg: NDArray[np.int64]
 ) -> Belief:
-    """Return the belief after another view that gave a distribution; see `product_of`.
+    """Update a belief by the distribution of another view; see `product_of`.
 
     Parameters
     ----------
     belief : Belief
     distributions : ndarray (n, B)
-        p(azimuth | image) in the frame of the image's own view.
+        p(azimuth | image) in the frame of that view.
     delta_deg : ndarray (n,)
         The rotation from the first view to it, a multiple of 360 / B.
     """
@@ -95,9 +95,9 @@ def multiplied(
 
 
 def coarser(belief: Belief, evidence: Evidence) -> Belief:
-    """Return the same belief in the bins of evidence of the same estimator.
+    """Return the belief in the wider bins of evidence of the same estimator.
 
-    Their number divides that of the belief with an odd quotient.
+    The quotient of the two numbers of bins must be an odd integer.
     """
     width = belief.probabilities.shape[1] // evidence.n_bins
     centred = np.roll(belief.probabilities, width // 2, axis=1)

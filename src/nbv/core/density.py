@@ -1,4 +1,4 @@
-"""Densities of (estimate, viewpoint) pairs on the torus, and the two conditionals made of them.
+"""The joint density of estimate and viewpoint on the torus, and its two conditionals.
 
 Bins are centred: bin k of B covers [(k - 1/2) 360/B, (k + 1/2) 360/B) degrees.
 """
@@ -40,7 +40,7 @@ class Conditionals:
 
     @property
     def n_bins(self) -> int:
-        """B, the number of bins round the circle."""
+        """B, the number of bins around the circle."""
         return len(self.viewpoint)
 
 
@@ -56,8 +56,8 @@ def von_mises_kernel(n_bins: int, bandwidth_deg: float) -> NDArray[np.float64]:
     """Return a von Mises kernel on the grid of bins, centred on bin 0, summing to 1.
 
     The concentration is 1/bandwidth² (radians), so that narrow kernels are Gaussians of standard
-    deviation `bandwidth_deg`. It is evaluated on the grid, never as a library's density with a
-    location, so that it wraps by construction. A bandwidth of 0 is no smoothing.
+    deviation `bandwidth_deg`. It is evaluated on the grid, so it wraps by construction. A bandwidth
+    of 0 gives a single 1: no smoothing.
     """
     if not 0 <= bandwidth_deg < np.inf:
         raise ValueError(f"bandwidth_deg must be 0 or more and finite, not {bandwidth_deg}")
@@ -72,23 +72,23 @@ def von_mises_kernel(n_bins: int, bandwidth_deg: float) -> NDArray[np.float64]:
 def smooth(counts: Matrix, bandwidth_deg: float) -> Matrix:
     """Smooth counts (B, B) by `von_mises_kernel` along both axes of the torus.
 
-    A product of two circulants, hence a product in the Fourier domain. The sum is kept, and nothing
-    is negative.
+    A product of two circulants, hence a product in the Fourier domain. The sum stays the same, and
+    no entry is negative.
     """
     if bandwidth_deg == 0:
         return counts.copy()
     spectrum = np.fft.fft(von_mises_kernel(len(counts), bandwidth_deg))
     response = np.outer(spectrum, spectrum[: len(counts) // 2 + 1])
     smoothed = np.fft.irfft2(np.fft.rfft2(counts) * response, s=counts.shape)
-    # The transform leaves rounding errors of either sign where the truth is almost 0.
+    # The transform leaves rounding errors of either sign where the density is almost 0.
     return np.maximum(smoothed, 0.0)
 
 
 def conditional(joint: Matrix, pseudo_observations: float) -> Matrix:
     """Return the rows of a joint density (B, B) as distributions.
 
-    `pseudo_observations` (0 or more) uniform observations are added to every row, so that a row
-    that was hardly ever seen is wide and not sharp. A row without any observation is uniform.
+    `pseudo_observations` (0 or more) uniform observations are added to every row, so that rows
+    with few observations are wide rather than sharp. A row without any observation is uniform.
     """
     if not 0 <= pseudo_observations < np.inf:
         raise ValueError(
@@ -110,26 +110,26 @@ def conditionals(
     pseudo_observations: float,
     n_bins: int = 360,
 ) -> Conditionals:
-    """Return V and L of calibration pairs (docs/method.md).
+    """Estimate V and L from calibration pairs (docs/method.md).
 
     Parameters
     ----------
     estimate_deg, azimuth_deg : array-like, same shape
-        The estimate and the truth of every view of objects the estimator was not trained on.
+        Estimate and true azimuth of every view of objects the estimator was not trained on.
     bandwidth_deg : float
         Smoothing along both axes.
     pseudo_observations : float
-        Uniform observations added to each of 360 rows; scaled for another number of bins, whose
-        rows hold more or fewer pairs.
+        Uniform observations added to each row if there are 360 bins; scaled in proportion to the
+        bin width otherwise.
     n_bins : int
-        B.
+        B, the number of bins.
 
     Examples
     --------
     >>> import numpy as np, nbv
     >>> truth = np.arange(360.0)
-    >>> found = nbv.conditionals(truth, truth, bandwidth_deg=8, pseudo_observations=0)
-    >>> int(found.viewpoint[30].argmax())  # an estimate of 30 degrees is right
+    >>> pair = nbv.conditionals(truth, truth, bandwidth_deg=8, pseudo_observations=0)
+    >>> int(pair.viewpoint[30].argmax())  # an estimate of 30 degrees is right
     30
     """
     joint = smooth(pair_counts(estimate_deg, azimuth_deg, n_bins), bandwidth_deg)

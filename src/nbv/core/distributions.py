@@ -1,6 +1,7 @@
 """Distributions on the circle: rotate, multiply and summarise them.
 
-A distribution has B probabilities; bin b is centred on 360 b / B degrees.
+A distribution has B probabilities; bin b is centred on 360 b / B degrees. From logits to
+distributions leads `nbv.core.logits`, which is all that a training needs.
 """
 
 from __future__ import annotations
@@ -18,25 +19,50 @@ from nbv.core.angles import direction_deg, nearest_bin
 
 Floats = NDArray[np.float64]
 
+NEGLIGIBLE_PROBABILITY = 1e-12
+"""Floor before a logarithm: a smaller probability would be lost in rounding."""
 
-def rotated(rows: NDArray[np.floating], turn_deg: ArrayLike) -> NDArray[np.float64]:
-    """Return p(theta + turn) as a function of theta, (..., B), of distributions (..., B).
 
-    Exact for whole bins; linear in between. ``turn_deg`` is one for all, or one for each row. For
-    the number 0.0 the result may be the argument itself.
+def rotated(rows: NDArray[np.floating], rotation_deg: ArrayLike) -> Floats:
+    """Return p(theta + rotation) as a function of theta, (..., B), for distributions (..., B).
+
+    Exact for whole bins, linear in between. `rotation_deg` is a number, or an array with one
+    rotation for each row. For the float 0.0 the result may be the argument itself.
     """
-    if isinstance(turn_deg, float) and turn_deg == 0.0:  # a single frame, mostly
+    if isinstance(rotation_deg, float) and rotation_deg == 0.0:  # the usual case: one frame
         return np.asarray(rows, dtype=np.float64)
     n_bins = rows.shape[-1]
-    place = np.asarray(turn_deg, dtype=np.float64) * (n_bins / 360.0)
-    below = np.floor(place)
-    part = (place - below)[..., None]
-    index = (np.arange(n_bins) + below.astype(np.intp)[..., None]) % n_bins
+    rotation_bins = np.asarray(rotation_deg, dtype=np.float64) * (n_bins / 360.0)
+    whole = np.floor(rotation_bins)
+    part = (rotation_bins - whole)[..., None]
+    index = (np.arange(n_bins) + whole.astype(np.intp)[..., None]) % n_bins
     shape = np.broadcast_shapes(rows.shape, index.shape)
-    own = np.broadcast_to(rows, shape)
-    at = (np.broadcast_to(each, shape) for each in (index, (index + 1) % n_bins))
-    here, next_ = (np.take_along_axis(own, each, axis=-1) for each in at)
-    return np.asarray((1 - part) * here + part * next_, dtype=np.float64)
+    rows = np.broadcast_to(rows, shape)
+    lower, upper = (
+        np.take_along_axis(rows, np.broadcast_to(i, shape), axis=-1)
+        for i in (index, (index + 1) % n_bins)
+    )
+    return np.asarray((1 - part) * lower + part * upper, dtype=np.float64)
+
+
+def in_object_frame(sweep: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return the distributions of a sweep (..., B, B), rotated so that bin 0 is the true pose.
+
+    View k of B has the azimuth 360 k / B.
+    """
+    return _rotated_by_view(sweep, 1)
+
+
+def in_view_frame(sweep: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Undo `in_object_frame`."""
+    return _rotated_by_view(sweep, -1)
+
+
+def _rotated_by_view(sweep: NDArray[np.floating], sign: int) -> NDArray[np.floating]:
+    """Rotate the distribution of view k by k bins."""
+    bins = np.arange(sweep.shape[-1])
+    index = (bins + sign * bins[:, None]) % len(bins)
+    return np.take_along_axis(sweep, np.broadcast_to(index, sweep.shape), axis=-1)
 
 
 def product_of(
@@ -46,22 +72,22 @@ def product_of(
 ) -> NDArray[np.floating[Any]]:
     """Return own(theta) other(theta + delta), (n, B), in the frame of the first view.
 
-    Bayes' rule for images that are independent given the pose, with a uniform prior. Where the two
-    distributions exclude each other it is the own one.
+    This is Bayes' rule for images that are independent given the pose, with a uniform prior. If the
+    two distributions exclude each other, the result is `own`.
     """
     n_bins = own.shape[1]
-    seen = (np.arange(n_bins) + nearest_bin(delta_deg, n_bins).reshape(-1, 1)) % n_bins
-    both = own * np.take_along_axis(other, seen, axis=1)
-    return np.where(both.sum(axis=1, keepdims=True) > 0, both, own)
+    index = (np.arange(n_bins) + nearest_bin(delta_deg, n_bins).reshape(-1, 1)) % n_bins
+    product = own * np.take_along_axis(other, index, axis=1)
+    return np.where(product.sum(axis=1, keepdims=True) > 0, product, own)
 
 
 def product_of_views(
     distributions: NDArray[np.floating], rotations_deg: Sequence[float]
 ) -> NDArray[np.float64]:
-    """Return the product (B,) of the distributions (n, B) of views, in the frame of the first view.
+    """Return the product (B,) of the distributions (n, B) of n views, in the frame of the first.
 
-    Of one view it is the view's own distribution, which must sum to 1. ``rotations_deg`` are those
-    from the first view to each one.
+    `rotations_deg` has the rotation from the first view to each view. The distribution of a single
+    view, which must sum to 1, is only rotated.
     """
     if len(distributions) == 1:
         return rotated(distributions[0], rotations_deg[0])
@@ -71,18 +97,18 @@ def product_of_views(
 
 
 def log_bayes_factor(distributions: NDArray[np.floating], rotations_deg: Sequence[float]) -> float:
-    """Return how much more probable views are of one pose than of unrelated poses.
+    """Return the log Bayes factor of one common pose against unrelated poses of n views, nats.
 
-    The natural logarithm of B^(n - 1) sum_theta prod_i p_i(theta + rotation_i); 0 for one view.
-    Where distributions are calibrated and the rotations right, it is below log t with a probability
-    of t at the most (Markov's inequality).
+    It is log(B^(n - 1) sum_theta prod_i p_i(theta + rotation_i)), 0 for one view. With calibrated
+    distributions and correct rotations it is below log t with a probability of at most t (Markov's
+    inequality).
 
     Parameters
     ----------
-    distributions : (n, B)
+    distributions : ndarray (n, B)
         Above 0.
     rotations_deg : sequence of float
-        From the first view to each one.
+        The rotation from the first view to each view.
     """
     n, n_bins = distributions.shape
     if n == 1:
@@ -93,14 +119,27 @@ def log_bayes_factor(distributions: NDArray[np.floating], rotations_deg: Sequenc
     return most + math.log(evidence) + float(n - 1) * math.log(n_bins)
 
 
-def _log_product(
-    distributions: NDArray[np.floating], rotations_deg: Sequence[float]
-) -> NDArray[np.float64]:
+def _log_product(distributions: NDArray[np.floating], rotations_deg: Sequence[float]) -> Floats:
     return np.asarray(np.log(rotated(distributions, rotations_deg)).sum(axis=0))
 
 
+def products_at_spacing(
+    logs: NDArray[np.float32], n_views: int, spacing_bins: int
+) -> NDArray[np.float32]:
+    """Return the products (n, B, B) of n_views views at one spacing, from every view of n sweeps.
+
+    `logs` (n, B, B) are the logarithms of the sweeps' distributions. Products are in the frames of
+    the first views, and their largest probability is 1.
+    """
+    total = logs.copy()
+    for view in range(1, n_views):
+        shift = -view * spacing_bins
+        total += np.roll(logs, (shift, shift), axis=(1, 2))
+    return np.asarray(np.exp(total - total.max(axis=-1, keepdims=True)))
+
+
 def mean_direction_deg(probabilities: NDArray[np.floating[Any]]) -> Floats:
-    """Return the mean direction of each distribution (n, B), in [0, 360)."""
+    """Return the mean directions (n,) of distributions (n, B), in [0, 360)."""
     angles = 2 * np.pi * np.arange(probabilities.shape[1]) / probabilities.shape[1]
     return direction_deg(probabilities @ np.cos(angles), probabilities @ np.sin(angles))
 
@@ -108,11 +147,12 @@ def mean_direction_deg(probabilities: NDArray[np.floating[Any]]) -> Floats:
 def direction_and_spread_deg(belief: NDArray[np.floating]) -> tuple[float, float]:
     """Return a belief's (B,) mean direction and circular standard deviation, degrees.
 
-    The direction is in [-180, 180]. The standard deviation is sqrt(-2 log R), where R is the
-    resultant length.
+    The direction is in [-180, 180]. The standard deviation is sqrt(-2 log R) with the resultant
+    length R.
     """
     moment = complex(belief @ _unit_vectors(len(belief)))
-    spread = math.sqrt(max(-2.0 * math.log(max(abs(moment), 1e-12)), 0.0))
+    length = max(abs(moment), NEGLIGIBLE_PROBABILITY)
+    spread = math.sqrt(max(-2.0 * math.log(length), 0.0))
     return math.degrees(cmath.phase(moment)), math.degrees(spread)
 
 
@@ -124,38 +164,38 @@ def _unit_vectors(n_bins: int) -> NDArray[np.complex128]:
 def region_coverage(
     probabilities: NDArray[np.floating], bins: NDArray[np.integer], level: float
 ) -> Floats:
-    """Return whether the densest region of a probability holds the truth, (n,) in [0, 1].
+    """Return whether the highest-density region contains the truth, (n,) in [0, 1].
 
-    The region is the smallest set of bins with the probability `level`. It holds a part of the bins
-    that are just dense enough, so that of truths drawn from the distributions themselves exactly
-    the share `level` is inside.
+    The region is the smallest set of bins with the probability `level`. Bins at its threshold
+    belong to it in part, so that truths drawn from the distributions are inside with exactly the
+    probability `level`.
 
     Parameters
     ----------
     probabilities : ndarray (n, B)
     bins : ndarray (n,) int
-        Of the truth.
+        Bins of the truth.
     level : float
         In (0, 1).
     """
     own = np.take_along_axis(probabilities, bins[:, None], axis=1)
     denser = np.where(probabilities > own, probabilities, 0.0).sum(axis=1, dtype=np.float64)
-    alike = np.where(probabilities == own, probabilities, 0.0).sum(axis=1, dtype=np.float64)
+    equal = np.where(probabilities == own, probabilities, 0.0).sum(axis=1, dtype=np.float64)
     share = np.zeros(len(own))
-    np.divide(level - denser, alike, out=share, where=alike > 0)
+    np.divide(level - denser, equal, out=share, where=equal > 0)
     return np.clip(share, 0.0, 1.0)
 
 
 def estimate_likelihood(distributions: NDArray[np.floating]) -> Floats:
-    """Return L[viewpoint, estimate] (k, k) of estimates that are drawn from images' distributions.
+    """Return L[viewpoint, estimate] (k, k) for estimates drawn from the images' distributions.
 
-    The mean of p(class | image) over all images of a viewpoint, which is as smooth as the
-    distributions (n, n_views, k) and has no setting. They are of objects that the network was not
-    trained on, with at least k views each.
+    It is the mean of p(class | image) over all images of a viewpoint, as smooth as the
+    distributions (n, n_views, k) and without a parameter. The n objects must be unknown to the
+    network and have at least k views each.
     """
     _, n_views, n_classes = distributions.shape
-    of_view = distributions.mean(axis=0)
+    view_means = distributions.mean(axis=0)
     viewpoint = nearest_bin(np.arange(n_views) * (360.0 / n_views), n_classes)
     sums = np.zeros((n_classes, n_classes))
-    np.add.at(sums, viewpoint, of_view)
+    np.add.at(sums, viewpoint, view_means)
     return np.asarray(sums / sums.sum(axis=1, keepdims=True))

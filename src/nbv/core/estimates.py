@@ -1,4 +1,4 @@
-"""What an estimator says of full turns of objects: angles, or distributions."""
+"""An estimator's output for full sweeps of objects: azimuths, or distributions."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from nbv.core.logits import floored, log_softmax
 Floats = NDArray[np.float64]
 
 COLUMNS = ("object_id", "azimuth_deg", "estimate_deg")
-"""Of a table of estimates."""
+"""The columns of a table of estimates."""
 
 
 @dataclass(frozen=True)
 class Estimates:
-    """Estimates of full turns of objects.
+    """Azimuth estimates for full sweeps of n objects.
 
     Attributes
     ----------
     object_ids : tuple of str
-        n objects.
     estimate_deg : ndarray (n, n_views) float64
         In [0, 360); view k has the azimuth 360 k / n_views.
     """
@@ -40,16 +39,15 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Posteriors:
-    """Distributions for full turns of objects.
+    """Distributions of the azimuth for full sweeps of n objects.
 
     Attributes
     ----------
     object_ids : tuple of str
-        n objects.
     log_posterior : ndarray (n, n_views, k)
         log p(class | image) at the temperature; view v has the azimuth 360 v / n_views.
     temperature : float
-        What the network's logits were divided by.
+        Divisor of the network's logits.
     """
 
     object_ids: tuple[str, ...]
@@ -58,10 +56,10 @@ class Posteriors:
 
     @property
     def distributions(self) -> Floats:
-        """p(class | image), (n, n_views, k): `LEAST_PROBABILITY` or more, before it sums to 1."""
+        """p(class | image), (n, n_views, k), with the floor `LEAST_PROBABILITY`."""
         return floored(np.exp(self.log_posterior.astype(np.float64)))
 
 
 def posteriors_of(object_ids: Sequence[str], logits: Floats, temperature: float) -> Posteriors:
-    """Return the distributions softmax(logits / temperature) of full turns (n, n_views, k)."""
+    """Return softmax(logits / temperature) for the logits (n, n_views, k) of full sweeps."""
     return Posteriors(tuple(object_ids), log_softmax(logits / temperature), temperature)

@@ -1,4 +1,4 @@
-"""What is known of one estimator: its calibration estimates, and the conditionals made of them."""
+"""Evidence about an estimator: its calibration estimates and their conditionals."""
 
 from __future__ import annotations
 
@@ -13,36 +13,39 @@ from numpy.typing import NDArray
 from nbv.core.density import Conditionals, conditionals
 from nbv.core.distributions import estimate_likelihood
 
-Table = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
+
+COARSE_BINS = 120
+"""Bins of the evidence that chooses views: 27 times faster than 360, and as accurate."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What every criterion and every fusion rule may use.
+    """Calibration data of one estimator, shared by all criteria and fusion rules.
 
     Attributes
     ----------
     estimate_deg : ndarray (n_objects, n_views)
-        Calibration estimates; view k of n has the azimuth 360 k / n. No objects where the
-        conditionals are made of distributions.
+        Calibration estimates; view k of n has the azimuth 360 k / n. Empty if the conditionals are
+        derived from distributions.
     conditionals : Conditionals
-        V and L, B bins; n must be a multiple of B where a criterion rotates views.
+        V and L with B bins; n must be a multiple of B if a criterion rotates views.
     bandwidth_deg, pseudo_observations : float
-        The density's settings.
+        Parameters of the density.
     settings : mapping
-        The configuration's ``density`` and ``affinity``: what a criterion may be set by.
+        The configuration's ``density`` and ``affinity``, from which criteria take parameters.
     distributions : ndarray (n_objects, n_views, B) float32, optional
-        p(azimuth | image) of calibration images, where the conditionals are made of them.
+        p(azimuth | image) of calibration images, if the conditionals are derived from them.
     made : dict
-        What several criteria share, so that it is computed once; see `once`.
+        Cache of `once`.
 
     Examples
     --------
     >>> import numpy as np, nbv
     >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
     >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-    >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-    >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+    >>> params = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+    >>> evidence = nbv.gather_evidence(estimates, density, **params)
     >>> evidence.n_bins, evidence.n_views
     (36, 36)
     """
@@ -53,17 +56,17 @@ class Evidence:
     pseudo_observations: float
     settings: Mapping[str, Any]
     distributions: NDArray[np.float32] | None = None
-    made: dict[Any, Table] = field(default_factory=dict, repr=False, compare=False)
+    made: dict[Any, Float32Array] = field(default_factory=dict, repr=False, compare=False)
 
-    def once(self, key: Any, make: Callable[[], Table]) -> Table:
-        """Return what `make` makes, made at the first call with this key and kept in `made`."""
+    def once(self, key: Any, make: Callable[[], Float32Array]) -> Float32Array:
+        """Return the cached result of `make` for a key, computed by the first call."""
         if key not in self.made:
             self.made[key] = make()
         return self.made[key]
 
     @property
     def n_bins(self) -> int:
-        """B, the number of bins round the circle."""
+        """B, the number of bins around the circle."""
         return self.conditionals.n_bins
 
     @property
@@ -73,44 +76,44 @@ class Evidence:
         return int(views.shape[1])
 
     @cached_property
-    def viewpoint(self) -> Table:
+    def viewpoint(self) -> Float32Array:
         """V[estimate, viewpoint], (B, B) float32."""
         return self.conditionals.viewpoint.astype(np.float32)
 
     @cached_property
-    def second(self) -> Table:
-        """L twice over, (2 B, B) float32: its rows delta to delta + B are L[theta + delta]."""
+    def second(self) -> Float32Array:
+        """L stacked twice, (2 B, B) float32, whose rows delta to delta + B are L[theta + delta]."""
         return np.tile(self.conditionals.estimate.astype(np.float32), (2, 1))
 
     @cached_property
-    def moments(self) -> Table:
-        """`first_moments` of the rows of V after every rotation, (B, 2, B, B) float32.
+    def moments(self) -> Float32Array:
+        """`first_moments` of the rows of V for every rotation, (B, 2, B, B) float32.
 
         ``moments[delta, :, e1, e2]``: its direction is the posterior mean pose, its length the
         resultant length times p(e2 | e1, delta).
         """
         return self.first_moments(self.viewpoint, range(self.n_bins))
 
-    def first_moments(self, probabilities: Table, deltas: range) -> Table:
+    def first_moments(self, probabilities: Float32Array, deltas: range) -> Float32Array:
         """Return the posteriors' first moments after each next estimate, (n_deltas, 2, n, B).
 
-        The real and the imaginary part of sum_theta b(theta) L[theta + delta, e] exp(i theta), of
-        distributions b (n, B) and rotations of the next view in bins.
+        These are the real and the imaginary part of sum_theta b(theta) L[theta + delta, e]
+        exp(i theta) for distributions b (n, B) and rotations delta in bins.
         """
         n, n_bins = probabilities.shape
         angles = 2 * np.pi * np.arange(n_bins) / n_bins
         parts = [probabilities * np.cos(angles), probabilities * np.sin(angles)]
-        # Stacked, one product of matrices serves both parts.
-        found = self.predicted(np.concatenate(parts).astype(np.float32), deltas)
-        return found.reshape(len(deltas), 2, n, n_bins)
+        # Stacked, so that one matrix product serves both parts.
+        moments = self.predicted(np.concatenate(parts).astype(np.float32), deltas)
+        return moments.reshape(len(deltas), 2, n, n_bins)
 
-    def predicted(self, weights: Table, deltas: range) -> Table:
-        """Return sum_theta w(theta) L[theta + delta, e], (n_deltas, n, B), of weights (n, B)."""
+    def predicted(self, weights: Float32Array, deltas: range) -> Float32Array:
+        """Return sum_theta w(theta) L[theta + delta, e], (n_deltas, n, B), for weights (n, B)."""
         n, n_bins = weights.shape
-        found = np.empty((len(deltas), n, n_bins), dtype=np.float32)
-        for place, delta in enumerate(deltas):
-            np.matmul(weights, self.second[delta : delta + n_bins], out=found[place])
-        return found
+        sums = np.empty((len(deltas), n, n_bins), dtype=np.float32)
+        for i, delta in enumerate(deltas):
+            np.matmul(weights, self.second[delta : delta + n_bins], out=sums[i])
+        return sums
 
 
 def gather_evidence(
@@ -121,7 +124,7 @@ def gather_evidence(
     pseudo_observations: float,
     n_bins: int = 360,
 ) -> Evidence:
-    """Make evidence of calibration estimates.
+    """Build evidence from calibration estimates.
 
     Parameters
     ----------
@@ -153,9 +156,9 @@ def gather_evidence(
 def evidence_of_distributions(
     distributions: NDArray[np.floating[Any]], settings: Mapping[str, Any]
 ) -> Evidence:
-    """Make evidence of a classifier's distributions (n_objects, n_views, B) of calibration images.
+    """Build evidence from distributions (n_objects, n_views, B) of calibration images.
 
-    Bins are the classes. Nothing is smoothed, for the distributions are smooth already.
+    Bins are the classifier's classes. The conditionals are not smoothed: distributions are smooth.
     """
     estimates = estimate_likelihood(distributions)
     pair = Conditionals(estimates.T / estimates.sum(axis=0)[:, None], estimates)

@@ -1,4 +1,4 @@
-"""One pose from two views."""
+"""Fusion rules: one pose from two views."""
 
 from __future__ import annotations
 
@@ -15,26 +15,23 @@ from nbv.core.angles import (
     nearest_bin,
     wrap_deg,
 )
-from nbv.core.distributions import mean_direction_deg, product_of
+from nbv.core.distributions import in_object_frame, mean_direction_deg, product_of
 from nbv.core.evidence import Evidence
 
 Angles = NDArray[np.float64]
 Bins = NDArray[np.intp]
 Rotations = NDArray[np.int64]
 
-# Image pairs fused at once, to stay within the processor's cache.
-_CHUNK = 1024
 
-
-def at_second_view(of_views: NDArray[np.float64], delta_deg: Rotations) -> NDArray[np.float64]:
-    """Return what belongs to the view that each rotation leads to.
+def at_second_view(outputs: NDArray[np.float64], delta_deg: Rotations) -> NDArray[np.float64]:
+    """Return the outputs of an estimator at the views that rotations lead to.
 
     Parameters
     ----------
-    of_views : ndarray (n_objects, n_views, ...)
-        An estimate or a distribution of each view; view k of n has the azimuth 360 k / n.
+    outputs : ndarray (n_objects, n_views, ...)
+        The estimate or distribution of each view; view k of n has the azimuth 360 k / n.
     delta_deg : ndarray (n_objects, n_views) int
-        The rotation taken from each view, a multiple of 360 / n.
+        The rotation from each view, a multiple of 360 / n.
 
     Returns
     -------
@@ -42,7 +39,7 @@ def at_second_view(of_views: NDArray[np.float64], delta_deg: Rotations) -> NDArr
     """
     n_objects, n_views = delta_deg.shape
     views = np.arange(n_views) + np.rint(delta_deg * (n_views / 360.0)).astype(np.intp)
-    return np.asarray(of_views[np.arange(n_objects)[:, None], views % n_views])
+    return np.asarray(outputs[np.arange(n_objects)[:, None], views % n_views])
 
 
 def average(
@@ -51,9 +48,9 @@ def average(
     delta_deg: ArrayLike,
     evidence: Evidence | None = None,
 ) -> Angles:
-    """Return the circular mean of the first estimate and the second, turned back (Eq. 7).
+    """Return the circular mean of the first estimate and the second, rotated back (Eq. 7).
 
-    The arithmetic mean that the paper prints breaks where the two lie on either side of 0°.
+    The arithmetic mean that the paper prints fails if the two lie on either side of 0°.
 
     Parameters
     ----------
@@ -65,7 +62,7 @@ def average(
     Returns
     -------
     ndarray
-        In [0, 360), in the frame of the first view; the first estimate where the two are antipodal.
+        In [0, 360), in the frame of the first view; the first estimate if the two are antipodal.
 
     Examples
     --------
@@ -84,13 +81,13 @@ def posterior(
 ) -> Angles:
     """Return the mean direction of the pose given both estimates (docs/method.md).
 
-    The direction of sum_theta V[e1, theta] L[theta + delta, e2] exp(i theta): of all poses the
-    one of least expected 1 - cos(error), where the errors of two views are independent.
+    It is the direction of sum_theta V[e1, theta] L[theta + delta, e2] exp(i theta), which minimises
+    the expected 1 - cos(error) if the errors of the two views are independent.
 
     Parameters
     ----------
     first_deg, second_deg, delta_deg : array-like, broadcasting
-        As in `average`; taken at the nearest of the evidence's B bins.
+        The arguments of `average`, rounded to the nearest of the evidence's B bins.
     evidence : Evidence
         V and L.
 
@@ -108,7 +105,7 @@ def posterior(
     --------
     >>> import numpy as np, nbv
     >>> truth = np.arange(360.0)
-    >>> estimates = np.where(np.abs(truth - 90) < 60, 90.0, truth)  # blind about 90 degrees
+    >>> estimates = np.where(np.abs(truth - 90) < 60, 90.0, truth)  # blind around 90 degrees
     >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
     >>> evidence = nbv.gather_evidence(
     ...     estimates[None], density, bandwidth_deg=8, pseudo_observations=3
@@ -119,27 +116,32 @@ def posterior(
     if evidence is None:
         raise ValueError("posterior fusion needs evidence")
     n_bins = evidence.n_bins
-    first, second, turn = np.broadcast_arrays(
+    first, second, delta = np.broadcast_arrays(
         *(nearest_bin(angle, n_bins) for angle in (first_deg, second_deg, delta_deg))
     )
-    # The moments of all pairs of estimates cost as much as those of 2 B² single ones.
+    # The moments of all pairs of bins cost as much as those of 2 B² single pairs.
     if first.size > 2 * n_bins**2:
         moments = evidence.moments
-        return direction_deg(moments[turn, 0, first, second], moments[turn, 1, first, second])
-    return _posterior_one_by_one(first, second, turn, evidence)
+        return direction_deg(moments[delta, 0, first, second], moments[delta, 1, first, second])
+    return _posterior_of_pairs(first, second, delta, evidence)
 
 
-def _posterior_one_by_one(first: Bins, second: Bins, turn: Bins, evidence: Evidence) -> Angles:
+# Pairs of views fused at once, to stay within the processor's cache.
+_PAIRS_AT_ONCE = 1024
+
+
+def _posterior_of_pairs(first: Bins, second: Bins, delta: Bins, evidence: Evidence) -> Angles:
     n_bins = evidence.n_bins
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
     unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1).astype(np.float32)
     fused = np.empty(first.size)
-    flat = first.ravel(), second.ravel(), turn.ravel()
-    for start in range(0, first.size, _CHUNK):
-        e1, e2, delta = (each[start : start + _CHUNK] for each in flat)
-        seen = evidence.second[delta[:, None] + np.arange(n_bins), e2[:, None]]
-        moment = (evidence.viewpoint[e1] * seen) @ unit
-        fused[start : start + _CHUNK] = direction_deg(moment[:, 0], moment[:, 1])
+    flat = first.ravel(), second.ravel(), delta.ravel()
+    for start in range(0, first.size, _PAIRS_AT_ONCE):
+        end = start + _PAIRS_AT_ONCE
+        e1, e2, d = (bins[start:end] for bins in flat)
+        likelihood = evidence.second[d[:, None] + np.arange(n_bins), e2[:, None]]
+        moment = (evidence.viewpoint[e1] * likelihood) @ unit
+        fused[start:end] = direction_deg(moment[:, 0], moment[:, 1])
     return fused.reshape(first.shape)
 
 
@@ -151,25 +153,25 @@ def product(
 ) -> Angles:
     """Return the mean direction of the pose given the distributions of both images.
 
-    The direction of sum_theta b1(theta) b2(theta + delta) / p0 exp(i theta), the prior p0 of the
-    pose being uniform. Bayes' rule gives this posterior where the two images are independent given
-    the pose. They are not quite: both show the same object, and what is unusual about it misleads
-    both alike, so the product is surer than it should be.
+    It is the direction of sum_theta b1(theta) b2(theta + delta) / p0 exp(i theta) with a uniform
+    prior p0. Bayes' rule gives this posterior if the two images are independent given the pose.
+    They are not quite: both show the same object, whose peculiarities mislead the estimator in both
+    views, so the product is overconfident.
 
     Parameters
     ----------
     first, second : array-like (..., B), rows summing to 1
-        Distributions from each image alone, each in the frame of its own view.
+        The distribution of each image, in the frame of its own view.
     delta_deg : array-like (...)
-        The rotations between them, multiples of 360 / B.
+        The rotations between the views, multiples of 360 / B.
     evidence
         Not used.
 
     Returns
     -------
     ndarray (...)
-        In [0, 360), in the frame of the first view; its own mean direction where the two exclude
-        each other.
+        In [0, 360), in the frame of the first view; the mean direction of `first` if the two
+        distributions exclude each other.
     """
     delta = np.asarray(delta_deg)
     own, other = (
@@ -183,38 +185,38 @@ Fusion = Callable[[ArrayLike, ArrayLike, ArrayLike, Evidence | None], Angles]
 FUSIONS: dict[str, Fusion] = {"average": average, "posterior": posterior, "product": product}
 
 OF_DISTRIBUTIONS = frozenset({"product"})
-"""Fusion rules of two distributions; the others fuse two estimates."""
+"""Fusion rules for two distributions; the others fuse two estimates."""
 
 ESTIMATE_FUSIONS = tuple(name for name in FUSIONS if name not in OF_DISTRIBUTIONS)
 
 
 def calibration_errors_deg(evidence: Evidence, fusion: str) -> NDArray[np.float32]:
-    """Return `rotation_errors_deg` (B, n_objects, B) of calibration views, one for each bin.
+    """Return `rotation_errors_deg` (B, n_objects, B) of calibration views, one view for each bin.
 
     Raises
     ------
     ValueError
-        Where the fusion is of distributions and the evidence has none.
+        If the rule fuses distributions and the evidence has none.
     """
-    of_views = evidence.distributions if fusion in OF_DISTRIBUTIONS else evidence.estimate_deg
-    if of_views is None:
+    outputs = evidence.distributions if fusion in OF_DISTRIBUTIONS else evidence.estimate_deg
+    if outputs is None:
         raise ValueError(f"fusion {fusion!r} needs evidence of distributions")
-    views = of_views[:, :: of_views.shape[1] // evidence.n_bins]
+    views = outputs[:, :: outputs.shape[1] // evidence.n_bins]
     return evidence.once(("errors", fusion), lambda: rotation_errors_deg(views, evidence, fusion))
 
 
 def rotation_errors_deg(
-    of_views: NDArray[np.floating[Any]], evidence: Evidence, fusion: str
+    outputs: NDArray[np.floating[Any]], evidence: Evidence, fusion: str
 ) -> NDArray[np.float32]:
     """Return the error after every rotation from every view.
 
     Parameters
     ----------
-    of_views : ndarray (n_objects, n_views) or (n_objects, n_views, B)
-        What the fusion rule fuses: an estimate in degrees of each view, or a distribution. View k
-        of n has the azimuth 360 k / n; n is a multiple of the evidence's B.
+    outputs : ndarray (n_objects, n_views) or (n_objects, n_views, B)
+        The estimate of each view in degrees, or its distribution. View k of n has the azimuth
+        360 k / n; n is a multiple of the evidence's B.
     evidence : Evidence
-        For the fusion rule.
+        The argument of the fusion rule.
     fusion : str
         A name in `FUSIONS`.
 
@@ -224,44 +226,41 @@ def rotation_errors_deg(
         ``l[delta, object, view] = d(fuse(e(o, phi), e(o, phi + delta), delta), phi)``, degrees.
     """
     if fusion == "product":
-        return _product_errors_deg(of_views)
-    n_bins, n_views = evidence.n_bins, of_views.shape[1]
+        return _product_errors_deg(outputs)
+    n_bins, n_views = evidence.n_bins, outputs.shape[1]
     azimuth_deg = np.arange(n_views) * (360.0 / n_views)
     shifts = np.arange(n_bins) * (n_views // n_bins)
     delta_deg = np.arange(n_bins) * (360.0 / n_bins)
-    twice = np.concatenate([of_views, of_views], axis=1)
+    twice = np.concatenate([outputs, outputs], axis=1)
     second = np.stack([twice[:, shift : shift + n_views] for shift in shifts])
-    fused = FUSIONS[fusion](of_views, second, delta_deg[:, None, None], evidence)
+    fused = FUSIONS[fusion](outputs, second, delta_deg[:, None, None], evidence)
     return circular_distance_deg(fused, azimuth_deg).astype(np.float32)
 
 
 def _product_errors_deg(distributions: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
-    """Return `rotation_errors_deg` of `product`, of distributions (n_objects, n_views, B).
+    """Return `rotation_errors_deg` of `product` for distributions (n_objects, n_views, B).
 
-    Let c be the distribution of a view and c' that of another one, both turned so that the true
-    pose comes first. Their product has the mean direction of ``sum_u c(u) c'(u) exp(i u)`` from
-    there. So one product of matrices serves all pairs of an object's views.
+    In the object frame the product of the distributions c and c' of two views has the mean
+    direction of ``sum_u c(u) c'(u) exp(i u)``. So one matrix product serves all pairs of an
+    object's views.
     """
     n_objects, n_views, n_bins = distributions.shape
-    of_bin = n_views // n_bins
-    # Views that are whole bins apart, one such set after the other.
-    sets = distributions.reshape(n_objects, n_bins, of_bin, n_bins).swapaxes(1, 2)
-    ahead = (np.arange(n_bins)[:, None] + np.arange(n_bins)) % n_bins
+    n_sweeps = n_views // n_bins
+    # Interleaved sweeps of views that are whole bins apart.
+    sweeps = distributions.reshape(n_objects, n_bins, n_sweeps, n_bins).swapaxes(1, 2)
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
     width_deg = 360.0 / n_bins
-    errors = np.empty((n_bins, n_objects, n_bins, of_bin), dtype=np.float32)
-    for (place, first), views in zip(
-        np.ndindex(sets.shape[:2]), sets.reshape(-1, n_bins, n_bins), strict=True
-    ):
-        turned = np.take_along_axis(np.asarray(views, dtype=np.float64), ahead, axis=1)
-        cosine, sine = (turned * part @ turned.T for part in (np.cos(angles), np.sin(angles)))
-        excluded = turned @ turned.T <= 0
+    errors = np.empty((n_bins, n_objects, n_bins, n_sweeps), dtype=np.float32)
+    for i, start in np.ndindex(n_objects, n_sweeps):
+        rows = in_object_frame(np.asarray(sweeps[i, start], dtype=np.float64))
+        cosine, sine = (rows * part @ rows.T for part in (np.cos(angles), np.sin(angles)))
+        excluded = rows @ rows.T <= 0
         if excluded.any():
-            own = turned @ np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            own = rows @ np.stack([np.cos(angles), np.sin(angles)], axis=1)
             cosine, sine = (
                 np.where(excluded, own[:, [axis]], both) for axis, both in enumerate((cosine, sine))
             )
-        pose_deg = np.take_along_axis(direction_deg(cosine, sine), ahead, axis=1)
-        apart = circular_distance_deg(pose_deg, first * width_deg / of_bin)
-        errors[:, place, :, first] = apart.T
+        # From [view, view] to [view, rotation].
+        pose_deg = in_object_frame(direction_deg(cosine, sine))
+        errors[:, i, :, start] = circular_distance_deg(pose_deg, start * width_deg / n_sweeps).T
     return errors.reshape(n_bins, n_objects, n_views)

@@ -1,8 +1,8 @@
-"""From a classifier's logits to distributions over azimuths, and the temperature in between.
+"""From a classifier's logits to distributions of the azimuth, with a temperature.
 
-Class c of k is centred on 360 c / k degrees; between the centres the density is linear. Densities
-are over one-degree bins, so that log-likelihoods, in nats per degree, do not depend on k: the
-uniform density has -log 360 = -5.886.
+Class c of k is centred on 360 c / k degrees; the density is linear between the centres. It is per
+degree, so that log-likelihoods (nats per degree) do not depend on k: the uniform density has
+-log 360 = -5.886.
 """
 
 from __future__ import annotations
@@ -13,42 +13,39 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 LEAST_PROBABILITY = 1e-6
-"""Of a class: no image excludes a pose for good, however sure a network is."""
+"""Floor of a class: no image excludes a pose for good, however sure the network is."""
 
 TEMPERATURES = (0.05, 20.0)
-"""The least and the largest temperature that `fit_temperature` finds."""
+"""Bounds of `fit_temperature`."""
 
 
 def log_softmax(logits: NDArray[np.floating]) -> Floats:
     """Return the logs of softmax(logits) over the last axis."""
-    # Half a second of imports, which only the jobs of a classifier need.
-    from scipy.special import log_softmax as of_scipy
+    # An import of half a second, which only jobs of a classifier need.
+    from scipy import special
 
-    return np.asarray(of_scipy(logits, axis=-1))
+    return np.asarray(special.log_softmax(logits, axis=-1))
 
 
 def softmax(logits: Floats) -> Floats:
-    """Return exp(logits) over its sum, along the last axis."""
+    """Return exp(logits) divided by its sum along the last axis."""
     p = np.exp(logits - logits.max(axis=-1, keepdims=True))
     return np.asarray(p / p.sum(axis=-1, keepdims=True))
 
 
 def from_logits(logits: NDArray[np.floating], temperature: float) -> Floats:
-    """Return softmax(logits / temperature) (..., k), each class at `LEAST_PROBABILITY` or more."""
+    """Return softmax(logits / temperature) (..., k) with the floor `LEAST_PROBABILITY`."""
     return floored(softmax(logits.astype(np.float64) / temperature))
 
 
 def floored(distributions: Floats) -> Floats:
-    """Return distributions (..., B) with each class at `LEAST_PROBABILITY` or more."""
+    """Return distributions (..., B) with the floor `LEAST_PROBABILITY`."""
     p = np.maximum(distributions, LEAST_PROBABILITY)
     return np.asarray(p / p.sum(axis=-1, keepdims=True))
 
 
 def on_degrees(posterior: Floats, n_bins: int = 360) -> Floats:
-    """Return distributions over bins (..., B) from distributions over classes (..., k).
-
-    k divides B; bin b is centred on 360 b / B degrees.
-    """
+    """Resample distributions over classes (..., k) to bins (..., B), where k divides B."""
     n_classes = posterior.shape[-1]
     below, part = _neighbours(np.arange(n_bins) * (360.0 / n_bins), n_classes)
     above = (below + 1) % n_classes
@@ -67,20 +64,20 @@ def log_likelihood(log_posterior: NDArray[np.floating], azimuth_deg: ArrayLike) 
     """
     n_classes = log_posterior.shape[-1]
     below, part = _neighbours(np.broadcast_to(azimuth_deg, log_posterior.shape[:-1]), n_classes)
-    at = [
+    lower, upper = (
         np.take_along_axis(log_posterior, bins[..., None], axis=-1)[..., 0].astype(np.float64)
         for bins in (below, (below + 1) % n_classes)
-    ]
+    )
     with np.errstate(divide="ignore"):
-        mixed = np.logaddexp(at[0] + np.log1p(-part), at[1] + np.log(part))
+        mixed = np.logaddexp(lower + np.log1p(-part), upper + np.log(part))
     return np.asarray(mixed + np.log(n_classes / 360.0))
 
 
 def _neighbours(azimuth_deg: ArrayLike, n_classes: int) -> tuple[NDArray[np.intp], Floats]:
-    """Return the class centre at or below each azimuth, and how far it lies towards the next."""
-    place = np.asarray(azimuth_deg, dtype=np.float64) * (n_classes / 360.0)
-    below = np.floor(place)
-    return below.astype(np.intp) % n_classes, place - below
+    """Return the class centre at or below each azimuth, and the fraction towards the next."""
+    classes = np.asarray(azimuth_deg, dtype=np.float64) * (n_classes / 360.0)
+    below = np.floor(classes)
+    return below.astype(np.intp) % n_classes, classes - below
 
 
 def mean_log_likelihood(
@@ -89,27 +86,27 @@ def mean_log_likelihood(
     temperature: float,
     weight: Floats | None = None,
 ) -> float:
-    """Return the mean log density of softmax(logits / temperature) at azimuths, nats per degree.
+    """Return the mean log density of softmax(logits / temperature) at the true azimuths.
 
-    Parameters and ``weight`` as of `fit_temperature`.
+    In nats per degree; `logits`, `azimuth_deg` and `weight` are those of `fit_temperature`.
     """
     values = log_likelihood(log_softmax(logits / temperature), azimuth_deg)
     return float(values.mean() if weight is None else np.average(values, weights=weight))
 
 
 def fit_temperature(logits: Floats, azimuth_deg: ArrayLike, weight: Floats | None = None) -> float:
-    """Return the T of softmax(logits / T) under which the true azimuths are likeliest.
+    """Fit T of softmax(logits / T) to the true azimuths by maximum likelihood.
 
-    It lies within `TEMPERATURES`; above 1 the network was too sure of itself.
+    T lies within `TEMPERATURES`; above 1 the network is overconfident.
 
     Parameters
     ----------
     logits : ndarray (..., k)
-        Of images that the network was not trained on.
+        Outputs for images that the network was not trained on.
     azimuth_deg : array-like, broadcasting to (...)
-        The truth.
+        True azimuths.
     weight : ndarray (...), optional
-        How much each image counts.
+        Weight of each image.
     """
     from scipy.optimize import minimize_scalar
 

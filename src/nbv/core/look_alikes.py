@@ -15,7 +15,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.evidence import Table
+from nbv.core.evidence import Float32Array as Table
 
 COMPARED_DEG = 6.0
 """Beliefs are compared, and errors found, at most so many degrees apart, if bins are finer.

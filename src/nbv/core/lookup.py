@@ -1,4 +1,4 @@
-"""The lookup table: everything a robot needs once its calibration is done."""
+"""The lookup table: the recommended rotation for each estimate."""
 
 from __future__ import annotations
 
@@ -39,21 +39,21 @@ class LookupTable:
     cost : ndarray (B, B) float32
         A[estimate, delta], in the unit of `nbv.core.criteria.cost_unit`.
     recommended_delta_deg : ndarray (B,) int64
-        The rotation of least cost for each estimate, degrees in [0, 360), travel considered.
+        The rotation of least cost for each estimate, degrees in [0, 360), travel included.
     bandwidth_deg, pseudo_observations : float
-        The density's settings.
+        Parameters of the density.
     criterion : str
         A name in `nbv.core.criteria.CRITERIA`.
     pose_likelihood, spread : str
-        The criterion's settings; see `nbv.core.criteria`.
+        Parameters of the criterion; see `nbv.core.criteria`.
 
     Examples
     --------
     >>> import numpy as np, nbv
     >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
     >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-    >>> choice = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-    >>> evidence = nbv.gather_evidence(estimates, density, **choice)
+    >>> params = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
+    >>> evidence = nbv.gather_evidence(estimates, density, **params)
     >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
     >>> table.criterion, table.cost.shape
     ('pose_ambiguity', (36, 36))
@@ -71,13 +71,13 @@ class LookupTable:
 
     @classmethod
     def load(cls, path: str | Path) -> LookupTable:
-        """Read what `save` wrote.
+        """Read a file of `save`.
 
         Raises
         ------
         UserError
-            Where the file cannot be read, V or L is no conditional density, a cost is not finite,
-            or a recommended rotation is no whole number of degrees in [0, 360).
+            If the file cannot be read, a row of V or L is not a distribution, a cost is not finite,
+            or a recommended rotation is not a whole number of degrees in [0, 360).
         """
         names = [item.name for item in fields(cls)]
         stored = read_arrays(calibrated_file(path), names, CALIBRATE_AGAIN)
@@ -95,45 +95,45 @@ class LookupTable:
             delta_deg = table.recommended_delta_deg
             if delta_deg.shape != (n_bins,) or not np.issubdtype(delta_deg.dtype, np.integer):
                 raise damaged(
-                    path, "the recommended rotations are no whole degrees", CALIBRATE_AGAIN
+                    path, "the recommended rotations are not whole degrees", CALIBRATE_AGAIN
                 )
             if ((delta_deg < 0) | (delta_deg >= 360)).any():
                 raise damaged(path, "a recommended rotation is not in [0, 360)", CALIBRATE_AGAIN)
         return table
 
     def save(self, path: str | Path, further: Mapping[str, NDArray[Any]] | None = None) -> None:
-        """Write the table as ``.npz``, an array for each attribute, and `further` arrays."""
+        """Write the attributes, and `further` arrays, as ``.npz``."""
         arrays = {item.name: np.asarray(getattr(self, item.name)) for item in fields(self)}
         write_arrays(path, arrays | dict(further or {}))
 
     def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
         """Return the rotation to the next view for each estimate, degrees in [0, 360).
 
-        It is that of least cost which travels more than a bin. A view from the same place is no
-        second view: the same image gives the same error again. The cost of a table of few objects
-        may still be least there, because it takes views as independent.
+        It is the rotation of least cost that travels more than a bin: the same view again repeats
+        the same error. With few calibration objects its cost may still be least, because criteria
+        assume that views are independent.
 
         Raises
         ------
         UserError
-            Where an estimate is no finite number.
+            If an estimate is not a finite number.
         """
         return np.asarray(self._next_view_deg[self._bins(estimate_deg)])
 
     def least_cost(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
-        """Return the rotation of least cost for each estimate (Eq. 2), whatever it travels.
+        """Return the rotation of least cost for each estimate (Eq. 2), however short.
 
         Raises
         ------
         UserError
-            Where an estimate is no finite number.
+            If an estimate is not a finite number.
         """
         return np.asarray(self.recommended_delta_deg[self._bins(estimate_deg)])
 
     def _bins(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
-        given = np.asarray(estimate_deg)
-        if given.dtype.kind not in "iuf" or not np.isfinite(given).all():
-            raise UserError("an estimate is no finite number of degrees")
+        values = np.asarray(estimate_deg)
+        if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+            raise UserError("an estimate is not a finite number of degrees")
         return np.asarray(nearest_bin(estimate_deg, len(self.cost)), dtype=np.int64)
 
     @cached_property
@@ -143,9 +143,9 @@ class LookupTable:
         stays = travel_deg(self.recommended_delta_deg) <= width
         is_far = travel_deg(np.arange(n_bins) * width) > width
         moving = np.where(is_far, self.cost[stays], np.inf)
-        found = self.recommended_delta_deg.copy()
-        found[stays] = least_cost_delta(moving)
-        return found
+        delta_deg = self.recommended_delta_deg.copy()
+        delta_deg[stays] = least_cost_delta(moving)
+        return delta_deg
 
 
 def least_cost_delta(
@@ -160,19 +160,19 @@ def least_cost_delta(
     ----------
     cost : ndarray (n, B)
     travel_cost : float, 0 or more
-        Added to A for every degree that the camera travels, in A's own unit.
+        Cost of a degree of travel, in the unit of A.
     max_travel_deg : float in [0, 180]
-        Rotations that travel farther are left out.
+        The longest travel allowed.
 
     Returns
     -------
     ndarray (n,) int64
-        In [0, 360). Of equal minima the one of smallest travel is taken, then the smaller delta.
+        In [0, 360). Among equal minima, the shortest travel wins, then the smaller delta.
 
     Raises
     ------
     UserError
-        Where a cost is NaN, which argmin would take for the least.
+        If a cost is NaN, which argmin would take for the least.
     """
     n_bins = cost.shape[1]
     deltas = np.arange(n_bins) * (360.0 / n_bins)
@@ -192,25 +192,27 @@ def least_cost_delta(
 def recommended_delta(
     cost: NDArray[np.floating[Any]], settings: Mapping[str, Any]
 ) -> NDArray[np.int64]:
-    """Return `least_cost_delta` with the ``travel_cost`` and ``max_travel_deg`` of settings."""
+    """Return `least_cost_delta` with the ``travel_cost`` and ``max_travel_deg`` of `settings`."""
     limits = {key: settings[key] for key in ("travel_cost", "max_travel_deg") if key in settings}
     return least_cost_delta(cost, **limits)
 
 
 def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") -> LookupTable:
-    """Tabulate a criterion; parameters and errors as of `nbv.core.criteria.tabulate`.
+    """Tabulate a criterion and find the rotations of least cost.
+
+    Same parameters and errors as `nbv.core.criteria.tabulate`.
 
     Examples
     --------
     >>> import numpy as np, nbv
     >>> truth = np.arange(360.0)
-    >>> estimates = np.where(np.abs(truth - 90) < 60, 90.0, truth)  # blind about 90 degrees
+    >>> estimates = np.where(np.abs(truth - 90) < 60, 90.0, truth)  # blind around 90 degrees
     >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
     >>> evidence = nbv.gather_evidence(
     ...     estimates[None], density, bandwidth_deg=8, pseudo_observations=3
     ... )
     >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
-    >>> 60 < table.recommend(90.0) < 300  # leave the blind range
+    >>> 60 < table.recommend(90.0) < 300  # it leaves the blind range
     np.True_
     """
     cost = tabulate(criterion, evidence, fusion)

@@ -1,4 +1,4 @@
-"""Whether estimates and azimuths count from the same zero, and the same way round."""
+"""Check that estimates and azimuths share their origin, direction and unit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.core.angles import signed_difference_deg, wrap_deg
 
 LARGE_OFFSET_DEG = 15.0
-"""More than estimators err by on the whole: another zero is likelier."""
+"""Larger than the mean error of any estimator: azimuth origins differ more likely."""
 
 FOR_PAIRS = "subtract it from the estimates, or add it to the azimuths, and calibrate again"
 FOR_FRAMES = (
@@ -19,12 +19,12 @@ FOR_FRAMES = (
 )
 
 _LEAST_AGREEMENT = 0.5
-"""Length of the mean of unit vectors; that of uniformly random differences is near 0."""
+"""Resultant length of differences; near 0 if they are uniformly random."""
 
 
 @dataclass(frozen=True)
 class Offset:
-    """The offset that estimates have in common.
+    """The common offset of estimates.
 
     Attributes
     ----------
@@ -47,29 +47,29 @@ class Offset:
 
 
 def constant_offset_deg(error_deg: ArrayLike) -> float:
-    """Return the circular median of errors (n,), degrees in [-180, 180): what all have in common.
+    """Return the circular median of errors (n,), degrees in [-180, 180).
 
-    Without it the mean absolute error is least. A view whose pose cannot be known moves it no more
-    than another one on the same side; it would move a mean by as much as it errs.
+    Subtracting it minimises the mean absolute error. Unlike a mean, the median is robust to large
+    errors of views whose pose is ambiguous.
     """
     error = np.sort(wrap_deg(error_deg))
     n = len(error)
-    # The least is at one of the errors. From each one, those of the next half turn lie ahead.
+    # The minimum is at one of the errors i; errors i to end are up to half a circle ahead of it.
     twice = np.concatenate([error, error + 360.0])
     sums = np.concatenate([[0.0], np.cumsum(twice)])
-    place, ahead = np.arange(n), np.searchsorted(twice, error + 180.0)
-    in_front = sums[ahead] - sums[place] - (ahead - place) * error
-    behind = (place + n - ahead) * (error + 360.0) - (sums[place + n] - sums[ahead])
-    least = error[np.argmin(in_front + behind)]
-    # Of an even number there may be two: their middle has as little.
+    i, end = np.arange(n), np.searchsorted(twice, error + 180.0)
+    ahead = sums[end] - sums[i] - (end - i) * error
+    behind = (i + n - end) * (error + 360.0) - (sums[i + n] - sums[end])
+    least = error[np.argmin(ahead + behind)]
+    # An even number of errors may have two minima; their middle is as good.
     median = least + np.median(signed_difference_deg(error, least))
     return float(signed_difference_deg(median, 0.0))
 
 
 def frame_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]) -> str:
-    """Return why estimates (n,) do not follow azimuths: radians, another sense, or others' views.
+    """Return why estimates (n,) do not follow azimuths: radians, a flipped sign, or other views.
 
-    Nothing where estimates follow azimuths, whatever constant offset lies between them.
+    The text is empty if estimates follow azimuths up to a constant offset.
     """
     estimates_agree = _agreement(estimate_deg - azimuth_deg)
     if _agreement(estimate_deg + azimuth_deg) > max(_LEAST_AGREEMENT, estimates_agree):
@@ -94,11 +94,10 @@ def frame_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.flo
 def offset_warning(
     azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64], what_to_do: str
 ) -> str:
-    """Return what is wrong with the frame of calibration pairs (n,); nothing where all is well.
+    """Return `frame_warning`, or a warning of a large offset, for calibration pairs (n,).
 
-    What is to be done about a large offset is `FOR_PAIRS` or `FOR_FRAMES`. A lookup table made of
-    pairs whose estimates count from another zero, or the other way round, recommends rotations for
-    poses that the object does not have.
+    `what_to_do` is `FOR_PAIRS` or `FOR_FRAMES`; the text is empty if nothing is wrong. A lookup
+    table from pairs with different origins or directions recommends rotations for wrong poses.
     """
     if warning := frame_warning(azimuth_deg, estimate_deg):
         return warning
@@ -109,5 +108,5 @@ def offset_warning(
 
 
 def _agreement(angle_deg: NDArray[np.float64]) -> float:
-    """Return the length of the mean of unit vectors, in [0, 1]."""
+    """Return the resultant length of angles, in [0, 1]."""
     return float(abs(np.exp(1j * np.radians(angle_deg)).mean()))

@@ -1,4 +1,4 @@
-"""How the second view is chosen, and the one way to choose it, take it and fuse both."""
+"""Policies for the second view, and their simulation on the views of objects."""
 
 from __future__ import annotations
 
@@ -20,12 +20,7 @@ from nbv.core.fusion import (
     at_second_view,
     rotation_errors_deg,
 )
-from nbv.core.lookup import (
-    LookupTable,
-    build_lookup,
-    least_cost_delta,
-    recommended_delta,
-)
+from nbv.core.lookup import LookupTable, build_lookup, least_cost_delta, recommended_delta
 from nbv.errors import UserError, nearest
 
 Angles = NDArray[np.float64]
@@ -35,22 +30,22 @@ ORACLE = "oracle"
 
 
 @dataclass(frozen=True)
-class Turns:
-    """Full turns of objects, and what a method may know when it chooses and fuses views.
+class TestViews:
+    """Estimates for full sweeps of objects, and the data that policies and fusion rules use.
 
     Attributes
     ----------
     estimate_deg : ndarray (n_objects, n_views)
         View k of n has the azimuth 360 k / n; 360 / n is a whole number.
     evidence : Evidence, optional
-        Of calibration objects; needed by criteria without `lookup`, by ``oracle`` and by the
-        fusion ``posterior``.
+        Evidence from calibration objects; required by criteria without `lookup`, by ``oracle`` and
+        by the fusion ``posterior``.
     rng : numpy.random.Generator, optional
-        Needed by ``random``.
+        Required by ``random``.
     lookup : LookupTable, optional
-        The table of the policy, where it is made already.
+        The policy's table, if it exists already.
     distributions : ndarray (n_objects, n_views, B), optional
-        p(azimuth | image) of each view; a criterion then goes by them instead of the estimates.
+        p(azimuth | image) of each view; criteria then use them instead of the estimates.
     """
 
     estimate_deg: Angles
@@ -62,14 +57,14 @@ class Turns:
 
 @dataclass(frozen=True)
 class TwoViews:
-    """What comes of a second view from every first one, (n_objects, n_views) each.
+    """Results of a second view for every first view, (n_objects, n_views) each.
 
     Attributes
     ----------
     delta_deg : ndarray of int64, or None
-        The rotation to the second view; None where none was taken.
+        The rotation to the second view; None without a second view.
     second_deg : ndarray, or None
-        The estimate from there.
+        The estimate of the second view.
     pose_deg : ndarray
         The fused pose in the frame of the first view.
     """
@@ -80,71 +75,71 @@ class TwoViews:
 
     @property
     def error_deg(self) -> Angles:
-        """The distance between fused and true pose, degrees in [0, 180]."""
+        """The distance of the fused pose from the true one, degrees in [0, 180]."""
         n_views = self.pose_deg.shape[1]
         return circular_distance_deg(self.pose_deg, np.arange(n_views) * (360.0 / n_views))
 
 
-def _random(turns: Turns, fusion: str) -> Rotations:
-    """Return a view other than the first, all equally likely; of distributions, whole classes."""
-    if turns.rng is None:
+def _random(views: TestViews, fusion: str) -> Rotations:
+    """Draw any other view, all equally likely; distributions are rotated by whole classes."""
+    if views.rng is None:
         raise ValueError("policy 'random' needs a generator")
-    shape = turns.estimate_deg.shape
+    shape = views.estimate_deg.shape
     n = shape[1]
-    if fusion in OF_DISTRIBUTIONS and turns.distributions is not None:
-        n = turns.distributions.shape[-1]
-    return np.asarray(turns.rng.integers(1, n, shape) * (360 // n))
+    if fusion in OF_DISTRIBUTIONS and views.distributions is not None:
+        n = views.distributions.shape[-1]
+    return np.asarray(views.rng.integers(1, n, shape) * (360 // n))
 
 
-def _opposite(turns: Turns, fusion: str) -> Rotations:
-    return np.full(turns.estimate_deg.shape, 180, dtype=np.int64)
+def _opposite(views: TestViews, fusion: str) -> Rotations:
+    return np.full(views.estimate_deg.shape, 180, dtype=np.int64)
 
 
-def _oracle(turns: Turns, fusion: str) -> Rotations:
-    """Return the rotation of least error from each view, as only the truth can tell.
+def _oracle(views: TestViews, fusion: str) -> Rotations:
+    """Return the rotation of least true error from each view; among equals, the shortest travel.
 
-    The bound of all methods that fuse alike. Of equals the smallest travel.
+    It bounds all methods with the same fusion.
     """
-    if turns.evidence is None:
+    if views.evidence is None:
         raise ValueError("policy 'oracle' needs evidence")
-    of_views = turns.estimate_deg if fusion not in OF_DISTRIBUTIONS else turns.distributions
-    if of_views is None:
+    outputs = views.distributions if fusion in OF_DISTRIBUTIONS else views.estimate_deg
+    if outputs is None:
         raise ValueError(f"fusion {fusion!r} needs distributions")
-    errors = rotation_errors_deg(of_views, turns.evidence, fusion)
+    errors = rotation_errors_deg(outputs, views.evidence, fusion)
     by_view = errors.reshape(len(errors), -1).T
-    return least_cost_delta(by_view).reshape(turns.estimate_deg.shape)
+    return least_cost_delta(by_view).reshape(views.estimate_deg.shape)
 
 
-def _recommended(criterion: str, turns: Turns, fusion: str) -> Rotations:
-    """Return the rotation of least cost at each image's distribution, or at each estimate."""
-    if turns.lookup is not None:
-        return turns.lookup.least_cost(turns.estimate_deg)
-    if turns.evidence is None:
+def _recommended(criterion: str, views: TestViews, fusion: str) -> Rotations:
+    """Return the rotation of least cost for each image's distribution, or for each estimate."""
+    if views.lookup is not None:
+        return views.lookup.least_cost(views.estimate_deg)
+    if views.evidence is None:
         raise ValueError(f"policy {criterion!r} needs a lookup table or evidence")
-    if turns.distributions is None:
-        return build_lookup(turns.evidence, criterion, fusion).least_cost(turns.estimate_deg)
-    rows = turns.distributions.reshape(-1, turns.evidence.n_bins).astype(np.float32)
-    cost = CRITERIA[criterion](Belief(rows, turns.evidence), turns.evidence, fusion)
-    return recommended_delta(cost, turns.evidence.settings).reshape(turns.estimate_deg.shape)
+    if views.distributions is None:
+        return build_lookup(views.evidence, criterion, fusion).least_cost(views.estimate_deg)
+    rows = views.distributions.reshape(-1, views.evidence.n_bins).astype(np.float32)
+    cost = CRITERIA[criterion](Belief(rows, views.evidence), views.evidence, fusion)
+    return recommended_delta(cost, views.evidence.settings).reshape(views.estimate_deg.shape)
 
 
-Policy = Callable[[Turns, str], Rotations]
+Policy = Callable[[TestViews, str], Rotations]
 POLICIES: dict[str, Policy] = {
     "random": _random,
     "opposite": _opposite,
     **{criterion: partial(_recommended, criterion) for criterion in CRITERIA},
     ORACLE: _oracle,
 }
-"""Rotations from every view, given the turns and the name of the fusion rule."""
+"""Rotations from every view: ``policy(views, fusion)``, (n_objects, n_views) degrees."""
 
 
 def needs_lookup(policy: str) -> bool:
-    """Say whether a policy follows a lookup table, where it goes by estimates.
+    """Return whether a policy uses a lookup table, if it uses estimates.
 
     Raises
     ------
     UserError
-        Where there is no such policy.
+        For an unknown policy.
     """
     if policy != SINGLE and policy not in POLICIES:
         known = [SINGLE, *POLICIES]
@@ -152,33 +147,34 @@ def needs_lookup(policy: str) -> bool:
     return policy in CRITERIA
 
 
-def two_views(policy: str, fusion: str, turns: Turns) -> TwoViews:
-    """Choose a second view from every first one, take it, and fuse the two.
+def two_views(policy: str, fusion: str, views: TestViews) -> TwoViews:
+    """Choose a second view for every first view and fuse the two.
 
     Parameters
     ----------
     policy : str
-        ``none`` (one view alone) or a name in `POLICIES`.
+        ``none`` (a single view) or a name in `POLICIES`.
     fusion : str
         A name in `nbv.core.fusion.FUSIONS`.
-    turns : Turns
+    views : TestViews
 
     Raises
     ------
     ValueError
-        Where the policy or the fusion needs what `turns` has not.
+        If `views` lacks data that the policy or the fusion needs.
     """
     if policy == SINGLE:
-        return TwoViews(None, None, turns.estimate_deg)
-    return take_second_views(POLICIES[policy](turns, fusion), fusion, turns)
+        return TwoViews(None, None, views.estimate_deg)
+    return take_second_views(POLICIES[policy](views, fusion), fusion, views)
 
 
-def take_second_views(delta_deg: Rotations, fusion: str, turns: Turns) -> TwoViews:
-    """Take the views that rotations (n_objects, n_views) lead to, and fuse them with the first."""
-    first = turns.estimate_deg
-    second = seen = at_second_view(first, delta_deg)
+def take_second_views(delta_deg: Rotations, fusion: str, views: TestViews) -> TwoViews:
+    """Fuse every first view with the view after its rotation, (n_objects, n_views) degrees."""
+    second_deg = at_second_view(views.estimate_deg, delta_deg)
+    first, second = views.estimate_deg, second_deg
     if fusion in OF_DISTRIBUTIONS:
-        if turns.distributions is None:
+        if views.distributions is None:
             raise ValueError(f"fusion {fusion!r} needs distributions")
-        first, seen = turns.distributions, at_second_view(turns.distributions, delta_deg)
-    return TwoViews(delta_deg, second, FUSIONS[fusion](first, seen, delta_deg, turns.evidence))
+        first, second = views.distributions, at_second_view(views.distributions, delta_deg)
+    pose_deg = FUSIONS[fusion](first, second, delta_deg, views.evidence)
+    return TwoViews(delta_deg, second_deg, pose_deg)

@@ -1,9 +1,8 @@
-"""Choosing the density's smoothing and pseudo-observations by the decisions they lead to.
+"""Selection on calibration objects: the density's parameters, and a policy with its fusion.
 
-The density's own likelihood prefers sharp rows where estimates hardly ever occur, and an argmin
-finds just those. So each candidate is judged by the two-view error of its decisions on
-calibration objects that its tables were not built from; test objects are never seen. What the
-likelihood would have chosen is there for comparison.
+The likelihood prefers densities with sharp rows at rare estimates, which an argmin then picks. So
+densities are cross-validated by the two-view error of their decisions; the maximum likelihood
+serves for comparison. Test objects are never used.
 """
 
 from __future__ import annotations
@@ -21,33 +20,34 @@ from scipy import stats
 from nbv.core.angles import nearest_bin
 from nbv.core.criteria import CRITERIA, FOR_ESTIMATES
 from nbv.core.estimates import Estimates, Posteriors
-from nbv.core.evidence import Evidence, evidence_of_distributions, gather_evidence
+from nbv.core.evidence import (
+    COARSE_BINS,
+    Evidence,
+    evidence_of_distributions,
+    gather_evidence,
+)
 from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
 from nbv.core.lookup import LookupTable, build_lookup
-from nbv.core.policies import ORACLE, POLICIES, SINGLE, Turns, needs_lookup, two_views
+from nbv.core.policies import ORACLE, POLICIES, SINGLE, TestViews, needs_lookup, two_views
 from nbv.errors import UserError, nearest
 
 log = logging.getLogger(__name__)
-
-# Bins of the tables compared. Fewer than of the final ones changes no choice among bandwidths
-# well above 3 degrees, and costs 27 times less.
-COARSE_BINS = 120
 
 Candidate = tuple[float, float]
 """A bandwidth (degrees) and a number of pseudo-observations."""
 
 
 @dataclass(frozen=True)
-class Choice:
-    """The density settings chosen, and the errors that decided.
+class DensityParams:
+    """Parameters of a density, and their cross-validated errors.
 
     Attributes
     ----------
     bandwidth_deg, pseudo_observations : float
     candidate_error_deg : mapping
-        Cross-validated two-view error of each candidate; empty where none was compared.
+        Two-view error of each candidate; empty without a comparison.
     object_error_deg : tuple of float
-        That of the chosen candidate on each calibration object, or empty.
+        Error of the best candidate on each calibration object; empty without a comparison.
     """
 
     bandwidth_deg: float
@@ -57,7 +57,7 @@ class Choice:
 
     @property
     def error_deg(self) -> float:
-        """The cross-validated error of what was chosen, NaN where nothing was compared."""
+        """The cross-validated error, NaN without a comparison."""
         candidate = (self.bandwidth_deg, self.pseudo_observations)
         return self.candidate_error_deg.get(candidate, float("nan"))
 
@@ -72,11 +72,11 @@ def _trials(
     estimate_deg: NDArray[np.float64],
     settings: Mapping[str, Any],
     n_bins: int,
-    shared: Choice | None = None,
+    shared: DensityParams | None = None,
 ) -> Iterator[tuple[Candidate, int, NDArray[np.bool_], Evidence]]:
-    """Yield candidate, part, which objects are of that part, and the evidence of all others.
+    """Yield candidate, part, the mask of its objects, and the evidence of all other objects.
 
-    The widest candidate comes first. One candidate alone, or one object, makes no trial.
+    The widest candidate comes first. Nothing is yielded for a single candidate or object.
     """
     candidates = _candidates(settings)
     n_objects = len(estimate_deg)
@@ -85,10 +85,8 @@ def _trials(
         return
     part_of = np.arange(n_objects) % parts
     for candidate, part in itertools.product(candidates, range(parts)):
-        others, choice = estimate_deg[part_of != part], Choice(*candidate)
-        evidence = chosen_evidence(others, shared or choice, settings, n_bins)
-        if shared is not None:
-            evidence = with_kernel(evidence, choice)
+        others, density = estimate_deg[part_of != part], DensityParams(*candidate)
+        evidence = chosen_evidence(others, shared or density, settings, n_bins, density)
         yield candidate, part, part_of == part, evidence
 
 
@@ -98,51 +96,50 @@ def choose_densities(
     settings: Mapping[str, Any],
     *,
     n_bins: int = COARSE_BINS,
-    shared: Choice | None = None,
-) -> dict[str, Choice]:
-    """Cross-validate the decisions of several methods over calibration objects.
+    shared: DensityParams | None = None,
+) -> dict[str, DensityParams]:
+    """Choose a density for each of several methods, by cross-validation of their decisions.
 
     Parameters
     ----------
     estimate_deg : ndarray (n_objects, n_views)
         Calibration estimates.
     methods : mapping
-        ``policy`` (a name in `nbv.core.policies.POLICIES`) and ``fusion`` by name.
+        ``policy`` (a name in `nbv.core.policies.POLICIES`) and ``fusion`` of each method.
     settings : mapping
         The configuration's ``density``. Candidates are all pairs of its ``bandwidths_deg`` and
-        ``pseudo_observations``; where there is but one, nothing is computed. The objects are
-        divided into ``n_parts`` (every n-th object), fewer where there are fewer objects; one
-        object alone cannot be cross-validated, and the widest candidate is taken.
+        ``pseudo_observations``. The objects are divided into ``n_parts`` (every n-th object), or
+        as many parts as objects.
     n_bins : int
-        Of the tables compared.
-    shared : Choice, optional
-        Of V and L; then candidates differ in the kernel of ``expected_error`` alone.
+        Bins of the tables compared.
+    shared : DensityParams, optional
+        Parameters of V and L; candidates then differ in the kernel of ``expected_error`` alone.
 
     Returns
     -------
-    dict of str to Choice
-        For each method the candidate of least mean error; of equals, the largest bandwidth and
-        then the most pseudo-observations.
+    dict of str to DensityParams
+        For each method the candidate of least mean error; among equals, the largest bandwidth and
+        then the most pseudo-observations. A single object takes the widest candidate.
 
     Raises
     ------
     UserError
-        Where an error is not finite: NaN would be chosen, as nothing is less.
+        If an error is not finite.
     """
     errors: dict[str, dict[Candidate, NDArray[np.float64]]] = {name: {} for name in methods}
     for candidate, part, held_out, evidence in _trials(estimate_deg, settings, n_bins, shared):
         for name, method in methods.items():
-            # The same draws for every candidate.
-            turns = Turns(estimate_deg[held_out], evidence, np.random.default_rng(part))
-            error = two_views(method["policy"], method["fusion"], turns).error_deg
-            of_objects = errors[name].setdefault(candidate, np.empty(len(estimate_deg)))
-            of_objects[held_out] = error.mean(axis=1)
-    widest = Choice(*_candidates(settings)[0])
-    return {name: _best(name, tried) if tried else widest for name, tried in errors.items()}
+            # Every candidate gets the same random numbers.
+            views = TestViews(estimate_deg[held_out], evidence, np.random.default_rng(part))
+            error = two_views(method["policy"], method["fusion"], views).error_deg
+            object_errors = errors[name].setdefault(candidate, np.empty(len(estimate_deg)))
+            object_errors[held_out] = error.mean(axis=1)
+    widest = DensityParams(*_candidates(settings)[0])
+    return {name: _best(name, trials) if trials else widest for name, trials in errors.items()}
 
 
-def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
-    mean = {candidate: float(of_objects.mean()) for candidate, of_objects in errors.items()}
+def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> DensityParams:
+    mean = {candidate: float(values.mean()) for candidate, values in errors.items()}
     for (bandwidth_deg, pseudo_observations), error_deg in mean.items():
         if not np.isfinite(error_deg):
             raise UserError(
@@ -158,112 +155,109 @@ def _best(name: str, errors: Mapping[Candidate, NDArray[np.float64]]) -> Choice:
         mean[best],
         max(mean.values()),
     )
-    return Choice(*best, candidate_error_deg=mean, object_error_deg=tuple(errors[best].tolist()))
+    return DensityParams(
+        *best, candidate_error_deg=mean, object_error_deg=tuple(errors[best].tolist())
+    )
 
 
 def most_likely_density(
     estimate_deg: NDArray[np.float64], settings: Mapping[str, Any], *, n_bins: int = COARSE_BINS
-) -> Choice:
-    """Cross-validate the log-likelihood of V over calibration objects.
+) -> DensityParams:
+    """Choose a density by the cross-validated log-likelihood of viewpoints given estimates.
 
-    Parameters as in `choose_densities`. The choice is the candidate under which held-out viewpoints
-    are likeliest given their estimates, of equals the widest; no two-view error is known of it.
+    Same parameters as `choose_densities`; among equals, the widest candidate wins.
     """
     n_views = estimate_deg.shape[1]
     azimuth = nearest_bin(np.arange(n_views) * (360.0 / n_views), n_bins)
-    found = dict.fromkeys(_candidates(settings), 0.0)
+    likelihood = dict.fromkeys(_candidates(settings), 0.0)
     for candidate, _, held_out, evidence in _trials(estimate_deg, settings, n_bins):
         rows = nearest_bin(estimate_deg[held_out], n_bins)
-        chance = evidence.conditionals.viewpoint[rows, azimuth]
-        found[candidate] += np.log(np.maximum(chance, np.finfo(float).tiny)).sum()
-    return Choice(*max(found, key=found.__getitem__))
+        p = evidence.conditionals.viewpoint[rows, azimuth]
+        likelihood[candidate] += np.log(np.maximum(p, np.finfo(float).tiny)).sum()
+    return DensityParams(*max(likelihood, key=likelihood.__getitem__))
 
 
 def chosen_evidence(
     estimate_deg: NDArray[np.float64],
-    choice: Choice,
+    density: DensityParams,
     settings: Mapping[str, Any],
     n_bins: int = 360,
+    kernel: DensityParams | None = None,
 ) -> Evidence:
-    """Return `gather_evidence` of calibration estimates with the density settings chosen."""
-    return gather_evidence(
+    """Gather evidence with a density's parameters, and `kernel` for ``expected_error`` if given."""
+    evidence = gather_evidence(
         estimate_deg,
         settings,
-        bandwidth_deg=choice.bandwidth_deg,
-        pseudo_observations=choice.pseudo_observations,
+        bandwidth_deg=density.bandwidth_deg,
+        pseudo_observations=density.pseudo_observations,
         n_bins=n_bins,
     )
-
-
-def with_kernel(evidence: Evidence, choice: Choice) -> Evidence:
-    """Return the same V and L with another kernel and shrinkage for ``expected_error``."""
+    if kernel is None:
+        return evidence
     return replace(
         evidence,
-        bandwidth_deg=choice.bandwidth_deg,
-        pseudo_observations=choice.pseudo_observations,
-        made={},
+        bandwidth_deg=kernel.bandwidth_deg,
+        pseudo_observations=kernel.pseudo_observations,
     )
 
 
 def chosen_lookup(
     estimate_deg: NDArray[np.float64], criterion: str, settings: Mapping[str, Any]
 ) -> LookupTable:
-    """Return `build_lookup` with the density settings of `choose_densities`, fused by averages."""
+    """Return `build_lookup` with the best density for fusion by averages."""
     method = {"policy": criterion, "fusion": "average"}
-    choice = choose_densities(estimate_deg, {criterion: method}, settings)[criterion]
-    return build_lookup(chosen_evidence(estimate_deg, choice, settings), criterion)
+    density = choose_densities(estimate_deg, {criterion: method}, settings)[criterion]
+    return build_lookup(chosen_evidence(estimate_deg, density, settings), criterion)
 
 
 SELECTED = "selected"
-"""As a policy and a fusion: those of the pair that calibration objects favour."""
+"""As a policy or a fusion: that of the method selected on calibration objects."""
 
 OPPOSITE = {"policy": "opposite", "fusion": "average"}
-"""The paper's baseline: the most cautious candidate to be selected."""
+"""The paper's baseline: the most cautious candidate."""
 
-NO_DENSITY = Choice(float("nan"), float("nan"))
-"""Of methods that go by distributions of images."""
+NO_DENSITY = DensityParams(float("nan"), float("nan"))
+"""For methods that fuse distributions."""
 
 Methods = Mapping[str, Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
 class SelectedMethod:
-    """One extension in one fold.
+    """An extension, calibrated on one fold.
 
     Attributes
     ----------
     policy, fusion : str
-        What it does; never `SELECTED`, but what was selected.
-    choice : Choice
-        Its density's settings.
+        Resolved names; never `SELECTED`.
+    density : DensityParams
     evidence : Evidence
-        Made with them of all calibration objects.
+        Evidence from all calibration objects with this density.
     lookup : LookupTable or None
-        None for a policy that follows no table.
+        None for a policy without a table.
     """
 
     policy: str
     fusion: str
-    choice: Choice
+    density: DensityParams
     evidence: Evidence
     lookup: LookupTable | None
 
 
 def check_methods(methods: Methods, extensions: Methods, gives_distributions: bool) -> None:
-    """Check what a configuration says about the paper's methods and about extensions.
+    """Check a configuration's methods of the paper and its extensions.
 
     Parameters
     ----------
     methods, extensions : mapping
-        ``policy`` and ``fusion`` by name.
+        ``policy`` and ``fusion`` of each method.
     gives_distributions : bool
         Whether the estimator gives p(azimuth | image).
 
     Raises
     ------
     UserError
-        Where a policy or a fusion is unknown or cannot be had, or where an extension's name stands
-        for something else already.
+        If a policy or a fusion is unknown or not possible, or an extension's name is taken.
     """
     for name, method in methods.items():
         key = f"methods.{name}"
@@ -279,12 +273,12 @@ def check_methods(methods: Methods, extensions: Methods, gives_distributions: bo
         if policy == SINGLE:
             raise UserError(f"{key}.policy={SINGLE}: it takes no second view")
         if SELECTED in (policy, fusion) and not _selectable(extensions):
-            raise UserError(f"{key}: there is none to be selected")
+            raise UserError(f"{key}: no extension can be selected")
         if fusion in OF_DISTRIBUTIONS:
             _check_distributions(key, method, gives_distributions)
         elif policy == ORACLE and fusion == "posterior":
-            alike = {m["policy"] for m in extensions.values() if m["fusion"] == fusion}
-            if alike <= {ORACLE, SELECTED}:
+            policies = {m["policy"] for m in extensions.values() if m["fusion"] == fusion}
+            if policies <= {ORACLE, SELECTED}:
                 raise UserError(f"{key}: no other extension fuses by {fusion}")
 
 
@@ -314,7 +308,7 @@ def _check_distributions(key: str, method: Mapping[str, Any], gives_distribution
 
 
 def _selectable(extensions: Methods) -> list[str]:
-    """Return the extensions that may be selected: Opposite or a criterion, fusing estimates."""
+    """Return the extensions that can be selected: Opposite or a criterion, fusing estimates."""
     return [
         name
         for name, method in extensions.items()
@@ -328,96 +322,96 @@ def select_methods(
     settings: Mapping[str, Any],
     posteriors: Posteriors | None = None,
 ) -> dict[str, SelectedMethod]:
-    """Choose each extension's density, and build its table, from calibration objects alone.
+    """Choose each extension's density and build its table from calibration objects.
 
     Parameters
     ----------
     calibration : Estimates
-        Of objects that the estimator was not trained on.
+        Estimates for objects that the estimator was not trained on.
     extensions : mapping
-        ``policy`` and ``fusion`` by name; either may be `SELECTED`: that of the first candidate
-        whose cross-validated error is not surely above the least. Candidates are the paper's
-        Opposite, then Opposite and criteria in the order of the extensions.
+        ``policy`` and ``fusion`` of each extension; either may be `SELECTED`: that of the first
+        candidate whose cross-validated error is not significantly above the least. Candidates are
+        the paper's Opposite, then Opposite and criteria in the order of the extensions.
     settings : mapping
         The configuration's ``density`` and ``recommendation``.
     posteriors : Posteriors, optional
-        The calibration objects' distributions, where an extension fuses distributions. They are
-        its evidence; it has no density to choose and is no candidate.
+        The calibration objects' distributions: the evidence of extensions that fuse distributions,
+        which have no density and are not candidates.
     """
     estimate_deg = calibration.estimate_deg
-    of_estimates = {n: m for n, m in extensions.items() if m["fusion"] not in OF_DISTRIBUTIONS}
-    resolved, choices = _resolve(estimate_deg, of_estimates, settings)
+    own = {n: m for n, m in extensions.items() if m["fusion"] not in OF_DISTRIBUTIONS}
+    resolved, densities = _resolve(estimate_deg, own, settings)
     made: dict[tuple[float, float], Evidence] = {}
-    of_distributions = None
+    image_evidence = None
     if posteriors is not None:
-        of_distributions = evidence_of_distributions(posteriors.distributions, settings)
+        image_evidence = evidence_of_distributions(posteriors.distributions, settings)
     selected = {}
     for name, method in {**extensions, **resolved}.items():
         policy, fusion, lookup = method["policy"], method["fusion"], None
-        choice, evidence = choices.get(name, NO_DENSITY), of_distributions
+        density, evidence = densities.get(name, NO_DENSITY), image_evidence
         if name in resolved:
-            key = (choice.bandwidth_deg, choice.pseudo_observations)
+            key = (density.bandwidth_deg, density.pseudo_observations)
             if key not in made:
-                made[key] = chosen_evidence(estimate_deg, choice, settings)
+                made[key] = chosen_evidence(estimate_deg, density, settings)
             evidence = made[key]
             lookup = build_lookup(evidence, policy, fusion) if needs_lookup(policy) else None
         if evidence is None:
             raise ValueError(f"extension {name!r} needs posteriors")
-        selected[name] = SelectedMethod(policy, fusion, choice, evidence, lookup)
+        selected[name] = SelectedMethod(policy, fusion, density, evidence, lookup)
     return selected
 
 
 def _resolve(
     estimate_deg: NDArray[np.float64], extensions: Methods, settings: Mapping[str, Any]
-) -> tuple[dict[str, Mapping[str, Any]], dict[str, Choice]]:
-    """Return each extension's policy and fusion, `SELECTED` replaced, and its density."""
-    led = [name for name, method in extensions.items() if SELECTED in method.values()]
-    bounds = [n for n, m in extensions.items() if n not in led and m["policy"] == ORACLE]
-    own = {n: m for n, m in extensions.items() if n not in (*led, *bounds)}
-    if (led or bounds) and OPPOSITE not in own.values():
+) -> tuple[dict[str, Mapping[str, Any]], dict[str, DensityParams]]:
+    """Return each extension's policy and fusion without `SELECTED`, and its density."""
+    open_names = [name for name, method in extensions.items() if SELECTED in method.values()]
+    bounds = [n for n, m in extensions.items() if n not in open_names and m["policy"] == ORACLE]
+    own = {n: m for n, m in extensions.items() if n not in (*open_names, *bounds)}
+    if (open_names or bounds) and OPPOSITE not in own.values():
         own = {"opposite (average)": OPPOSITE} | own
-    choices = choose_densities(estimate_deg, own, settings)
+    densities = choose_densities(estimate_deg, own, settings)
     for name in bounds:
         fusion = extensions[name]["fusion"]
-        alike = [choices[other] for other, method in own.items() if method["fusion"] == fusion]
-        # An oracle chooses no density; it takes that of the best method that fuses alike.
-        choices[name] = min(alike, key=lambda choice: choice.error_deg)
-    if not led:
-        return dict(extensions), choices
-    winner = own[_first_not_surely_worse({name: choices[name] for name in _selectable(own)})]
+        same_fusion = [densities[n] for n, m in own.items() if m["fusion"] == fusion]
+        # An oracle has no density; it takes that of the best method with the same fusion.
+        densities[name] = min(same_fusion, key=lambda density: density.error_deg)
+    if not open_names:
+        return dict(extensions), densities
+    winner = own[_most_cautious({name: densities[name] for name in _selectable(own)})]
     followers = {
         name: {key: winner[key] if value == SELECTED else value for key, value in method.items()}
         for name, method in extensions.items()
-        if name in led
+        if name in open_names
     }
     new = {n: m for n, m in followers.items() if m not in own.values()}
-    choices |= choose_densities(estimate_deg, new, settings) if new else {}
+    densities |= choose_densities(estimate_deg, new, settings) if new else {}
     for name, method in followers.items():
-        same = next(other for other, plain in (own | new).items() if plain == method)
-        choices[name] = choices[same]
-    return {**extensions, **followers}, choices
+        same = next(n for n, m in (own | new).items() if m == method)
+        densities[name] = densities[same]
+    return {**extensions, **followers}, densities
 
 
-def _first_not_surely_worse(choices: Mapping[str, Choice]) -> str:
-    """Return the first candidate, in the order given, that the best is not surely better than.
+def _most_cautious(densities: Mapping[str, DensityParams]) -> str:
+    """Return the first candidate, in the order given, that is not surely worse than the best.
 
-    The rule of one standard error (Breiman et al., 1984): what few calibration objects cannot
-    tell apart is decided by the order of caution in which the configuration lists them.
+    This is the rule of one standard error (Breiman et al., 1984): candidates that few calibration
+    objects cannot distinguish are decided by the order of the configuration.
     """
-    errors = [choice.error_deg for choice in choices.values()]
+    errors = [density.error_deg for density in densities.values()]
     if np.isnan(errors).any():
-        return next(iter(choices))
-    best = list(choices.values())[int(np.argmin(errors))]
-    return next(name for name, choice in choices.items() if not surely_better(best, choice))
+        return next(iter(densities))
+    best = list(densities.values())[int(np.argmin(errors))]
+    return next(n for n, density in densities.items() if not surely_better(best, density))
 
 
-def surely_better(one: Choice, other: Choice) -> bool:
-    """Say whether one choice's validated error is below another's by more than a standard error.
+def surely_better(density: DensityParams, other: DensityParams) -> bool:
+    """Return whether a validated error is below another one by more than a standard error.
 
-    Paired by calibration object; the standard error counts by Student's t for so few objects, at
-    the probability that one standard error has for many. Never with fewer than two objects.
+    Errors are paired by calibration object. The standard error is scaled by Student's t to the
+    probability of one standard error for many objects. False for fewer than two objects.
     """
-    gaps = np.subtract(one.object_error_deg, other.object_error_deg)
+    gaps = np.subtract(density.object_error_deg, other.object_error_deg)
     if gaps.size < 2:
         return False
     quantile = stats.t.ppf(stats.norm.cdf(1.0), gaps.size - 1)

@@ -1,8 +1,9 @@
-"""Following a policy from view to view."""
+"""Simulation of any number of views: policies that choose the next view, and `follow`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,33 +11,147 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.angles import circular_distance_deg, nearest_bin, travel_deg
-from nbv.core.belief import Belief, first_belief, multiplied, updated
-from nbv.core.distributions import mean_direction_deg, region_coverage
+from nbv.core.belief import Belief, coarser, first_belief, multiplied, updated
+from nbv.core.criteria import CRITERIA
+from nbv.core.distributions import NEGLIGIBLE_PROBABILITY, mean_direction_deg, region_coverage
 from nbv.core.evidence import Evidence
-from nbv.core.next_views import NextView
+from nbv.core.fusion import Rotations
+from nbv.core.lookup import least_cost_delta
 
 Floats = NDArray[np.floating]
 Indices = NDArray[np.intp]
 
-FIGURES = (
+# Tolerance for rounding in sums of angles.
+_ROUNDING_DEG = 1e-6
+
+BISECTING_DEG = (180, 90, 270, 45, 225, 135, 315)
+
+NextView = Callable[[Belief, Rotations, np.random.Generator], Rotations]
+"""A policy for any number of views: ``policy(belief, taken_deg, rng)`` is the next rotation (n,).
+
+`belief` is of n poses in the frames of their first views; `taken_deg` (n, t) are the rotations of
+the views so far. All rotations count from the first view, whose rotation is 0.
+"""
+
+
+def recommended_next(
+    criterion: str, coarse: Evidence, min_separation_deg: float, n_views: int | None = None
+) -> NextView:
+    """Return the policy that takes the view of least cost.
+
+    Parameters
+    ----------
+    criterion : str
+        A name in `nbv.core.criteria.FOR_MORE_VIEWS`.
+    coarse : Evidence
+        Evidence with fewer bins than the beliefs; rotations are multiples of its bin.
+    min_separation_deg : float
+        Smallest distance from all previous views: errors of neighbouring views are similar, but
+        criteria assume that views are independent.
+    n_views : int, optional
+        Total number of views. If given, they travel no farther than as many evenly spaced views.
+    """
+
+    def next_view(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
+        cost = CRITERIA[criterion](coarser(belief, coarse), coarse, "posterior")
+        bin_deg = 360.0 / coarse.n_bins
+        rotations = np.arange(coarse.n_bins) * bin_deg
+        apart = circular_distance_deg(taken_deg[:, :, None], rotations).min(axis=1)
+        cost = np.where(apart < min_separation_deg, np.inf, cost)
+        if n_views is None:
+            return least_cost_delta(cost)
+        travel = travel_deg(rotations - taken_deg[:, -1:])
+        travel += travel_deg(np.diff(taken_deg, axis=1)).sum(axis=1, keepdims=True)
+        n_more = n_views - 1 - taken_deg.shape[1]
+        travel += shortest_walk_deg(taken_deg, coarse.n_bins, n_more, min_separation_deg)
+        return least_cost_delta(
+            np.where(travel <= evenly_spaced_travel_deg(n_views) + _ROUNDING_DEG, cost, np.inf)
+        )
+
+    return next_view
+
+
+def shortest_walk_deg(
+    taken_deg: Rotations, n_bins: int, n_more: int, min_separation_deg: float
+) -> NDArray[np.float64]:
+    """Return an upper bound of the travel after each next rotation, (n, B) degrees.
+
+    The remaining views are taken in one direction around the circle, each as soon as it is far
+    enough from all others. The bound is infinite if there is no room for them.
+
+    Parameters
+    ----------
+    taken_deg : ndarray (n, t)
+        Rotations of the views so far.
+    n_bins : int
+        B; rotations are multiples of 360 / B.
+    n_more : int
+        Number of views after the next one.
+    min_separation_deg : float
+        Smallest distance between views.
+    """
+    different, row_of = np.unique(taken_deg, axis=0, return_inverse=True)
+    rotations = np.arange(n_bins) * (360.0 / n_bins)
+    apart = circular_distance_deg(different[:, :, None], rotations).min(axis=1)
+    free, step = apart >= min_separation_deg, math.ceil(min_separation_deg * n_bins / 360.0)
+    walks = []
+    for sign in (1, -1):
+        n_taken, last = np.zeros(free.shape, dtype=int), np.zeros(free.shape, dtype=int)
+        for walked in range(1, n_bins + 1 - step):
+            ahead = np.roll(free, -sign * walked, axis=1)
+            is_taken = ahead & (walked - last >= step) & (n_taken < n_more)
+            n_taken, last = n_taken + is_taken, np.where(is_taken, walked, last)
+        walks.append(np.where(n_taken == n_more, last * (360.0 / n_bins), np.inf))
+    return np.asarray(np.minimum(*walks)[row_of.ravel()])
+
+
+def evenly_spaced_travel_deg(n_views: int) -> float:
+    """Return the travel of n views that are 360 / n degrees apart."""
+    return (n_views - 1) * 360.0 / n_views
+
+
+def random_next(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
+    """Draw a bin without a view so far, all equally likely, and return its centre."""
+    n_bins = belief.probabilities.shape[1]
+    free = np.ones((len(taken_deg), n_bins), dtype=bool)
+    np.put_along_axis(free, nearest_bin(taken_deg, n_bins), values=False, axis=1)
+    drawn = np.where(free, rng.random(free.shape), -1.0)
+    return np.asarray(drawn.argmax(axis=1) * (360 // n_bins), dtype=np.int64)
+
+
+def bisecting_next(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
+    """Take the opposite view, then the quarters, then the eighths of the circle."""
+    n, taken = taken_deg.shape
+    return np.full(n, BISECTING_DEG[taken - 1], dtype=np.int64)
+
+
+def evenly_spaced_next(n_views: int) -> NextView:
+    """Return the policy of `n_views` evenly spaced views, rounded to bins."""
+
+    def next_view(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
+        n, taken = taken_deg.shape
+        n_bins = belief.probabilities.shape[1]
+        return np.full(n, round(taken * n_bins / n_views) * (360 // n_bins), dtype=np.int64)
+
+    return next_view
+
+
+METRICS = (
     "error_deg",
     "travel_deg",
     "log_likelihood",
     "inside_50_percent",
     "inside_90_percent",
 )
-"""What `follow` returns of each view: among others how well the belief knows the truth."""
-
-# Of a belief in the truth; less would be lost in rounding, and one view would rule a mean.
-_LEAST_PROBABILITY = 1e-12
+"""The results of `follow` for each number of views; the last three measure calibration."""
 
 
 class Views(Protocol):
-    """What is seen of n objects from each of their views, and how beliefs come of it."""
+    """An estimator's outputs for sweeps of n objects, and the beliefs after them."""
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of objects and of evenly spaced views, then what else there is."""
+        """Number of objects, number of evenly spaced views, and the shape of an output."""
 
     def first(self, objects: Indices, views: Indices) -> Belief:
         """Return the beliefs after first views."""
@@ -44,12 +159,12 @@ class Views(Protocol):
     def further(
         self, belief: Belief, objects: Indices, views: Indices, delta_deg: NDArray[np.int64]
     ) -> Belief:
-        """Return the beliefs after one view more, `delta_deg` from the first one."""
+        """Return the beliefs after another view, `delta_deg` from the first one."""
 
 
 @dataclass(frozen=True)
 class EstimatedViews:
-    """Estimates (n_objects, n_views) in degrees, fused by posterior with the evidence."""
+    """Estimates (n_objects, n_views) in degrees; beliefs are updated with the evidence."""
 
     estimate_deg: NDArray[np.float64]
     evidence: Evidence
@@ -60,7 +175,7 @@ class EstimatedViews:
         return self.estimate_deg.shape
 
     def first(self, objects: Indices, views: Indices) -> Belief:
-        """Return V[e] of each first estimate."""
+        """Return V[e] for the first estimates."""
         return first_belief(self.estimate_deg[objects, views], self.evidence)
 
     def further(
@@ -72,7 +187,7 @@ class EstimatedViews:
 
 @dataclass(frozen=True)
 class DistributionViews:
-    """Distributions (n_objects, n_views, B), fused by product; n_views is a multiple of B."""
+    """Distributions (n_objects, n_views, B), which are multiplied; n_views is a multiple of B."""
 
     distributions: Floats
     evidence: Evidence
@@ -83,7 +198,7 @@ class DistributionViews:
         return self.distributions.shape
 
     def first(self, objects: Indices, views: Indices) -> Belief:
-        """Return what the first images say."""
+        """Return the distributions of the first images."""
         return Belief(self.distributions[objects, views].astype(np.float32), self.evidence)
 
     def further(
@@ -94,7 +209,7 @@ class DistributionViews:
 
 
 def first_views(views: Views, start_every_deg: int) -> tuple[Indices, NDArray[np.int64], Belief]:
-    """Return object, azimuth in degrees and belief of every first view, object by object."""
+    """Return object, azimuth in degrees and belief of all first views, object by object."""
     n_objects, n_azimuths = views.shape[:2]
     azimuths = np.arange(0, 360, start_every_deg)
     objects = np.repeat(np.arange(n_objects), len(azimuths))
@@ -110,52 +225,49 @@ def follow(
     start_every_deg: int,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Follow a policy from several first views of each object.
+    """Simulate a policy from several first views of each object.
 
     Parameters
     ----------
     policy : callable
-        Chooses every next view.
+        The policy for every next view.
     views : Views
         First views and rotations are multiples of 360 / their number.
     n_views : int
-        Views in all.
+        Total number of views.
     start_every_deg : int
-        Between first views.
+        Distance between first views.
     rng : numpy.random.Generator
-        Where a policy draws.
+        The policy's random numbers.
 
     Returns
     -------
     ndarray (5, n_objects, n_starts, n_views)
-        `FIGURES` after each view: error and total travel in degrees; the log of the belief in the
-        truth, nats per degree; whether the regions of 50 and 90 % hold the truth, percent
+        `METRICS` after each view: error and total travel in degrees; the log density of the true
+        pose, nats per degree; whether the regions of 50 and 90 % contain it, percent
         (`nbv.core.distributions.region_coverage`).
     """
     n_objects, n_azimuths = views.shape[:2]
     objects, starts, belief = first_views(views, start_every_deg)
     taken = np.zeros((len(objects), 1), dtype=np.int64)
     travelled = np.zeros(len(objects))
-    reached = np.empty((len(FIGURES), len(objects), n_views))
+    reached = np.empty((len(METRICS), len(objects), n_views))
     for view in range(n_views):
         if view:
             delta = policy(belief, taken, rng)
-            seen_from = nearest_bin(starts + delta, n_azimuths)
-            belief = views.further(belief, objects, seen_from, delta)
+            view_bins = nearest_bin(starts + delta, n_azimuths)
+            belief = views.further(belief, objects, view_bins, delta)
             travelled = travelled + travel_deg(delta - taken[:, -1])
             taken = np.column_stack([taken, delta])
-        reached[:, :, view] = [_error_deg(belief, starts), travelled, *_knowledge(belief, starts)]
-    return reached.reshape(len(FIGURES), n_objects, -1, n_views)
+        error_deg = circular_distance_deg(mean_direction_deg(belief.probabilities), starts)
+        reached[:, :, view] = [error_deg, travelled, *_calibration(belief, starts)]
+    return reached.reshape(len(METRICS), n_objects, -1, n_views)
 
 
-def _error_deg(belief: Belief, truth_deg: NDArray[np.int64]) -> Floats:
-    return circular_distance_deg(mean_direction_deg(belief.probabilities), truth_deg)
-
-
-def _knowledge(belief: Belief, truth_deg: NDArray[np.int64]) -> Iterator[Floats]:
+def _calibration(belief: Belief, truth_deg: NDArray[np.int64]) -> Iterator[Floats]:
     n_bins = belief.probabilities.shape[1]
     bins = nearest_bin(truth_deg, n_bins)
-    of_truth = np.take_along_axis(belief.probabilities, bins[:, None], axis=1)[:, 0]
-    yield np.log(np.maximum(of_truth, _LEAST_PROBABILITY) * (n_bins / 360.0))
+    p_true = np.take_along_axis(belief.probabilities, bins[:, None], axis=1)[:, 0]
+    yield np.log(np.maximum(p_true, NEGLIGIBLE_PROBABILITY) * (n_bins / 360.0))
     for level in (0.5, 0.9):
         yield 100.0 * region_coverage(belief.probabilities, bins, level)

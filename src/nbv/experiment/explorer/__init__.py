@@ -198,7 +198,7 @@ def _each_table(criteria: list[str], outcomes: Outcomes) -> Iterator[tuple[int, 
 def coarse_bins(n_bins: int, n_views: int) -> int:
     """Return the bins that the page chooses further views by.
 
-    At most 120, as in `nbv.core.next_views`; a rotation by a bin leads from view to view,
+    At most 120, as in `nbv.core.evidence`; a rotation by a bin leads from view to view,
     and each bin is an odd number of the table's, so that the centres agree.
     """
     return max(

@@ -13,7 +13,7 @@ from tests.core.made import evidence_of, objects
 from nbv.core.angles import circular_distance_deg, travel_deg
 from nbv.core.belief import Belief
 from nbv.core.criteria import CRITERIA
-from nbv.core.next_views import (
+from nbv.core.simulation import (
     evenly_spaced_travel_deg,
     random_next,
     recommended_next,
