@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.data.camera import Camera, object_views
 from nbv.data.procedural import CATEGORIES
-from nbv.data.renderers import open_renderer
+from nbv.data.render import open_renderer
 from nbv.errors import UserError
 from performance.figures import Figure, Target
 from performance.solids import object_with_faces

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from nbv.data.normalisation import normalise
+from nbv.data.meshes import normalise
 from nbv.data.procedural import generate
 
 

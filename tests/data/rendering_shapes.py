@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from nbv.data.normalisation import normalise
+from nbv.data.meshes import normalise
 from nbv.data.procedural import generate
 
 

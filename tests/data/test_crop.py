@@ -13,8 +13,7 @@ from sensor_images import CONFIGURED
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import crop_measured, sensor_camera
-from nbv.data.render import render_objects
-from nbv.data.renderers import open_renderer
+from nbv.data.render import open_renderer, render_objects
 from nbv.data.sensors import open_sensor, sensor_settings
 
 SIDE = 9

@@ -10,7 +10,7 @@ import trimesh
 from rendering_shapes import procedural, shape_of, triangle_soup, turned
 
 from nbv.data.camera import Camera, object_views
-from nbv.data.renderers import open_renderer
+from nbv.data.render import open_renderer
 from nbv.errors import UserError
 
 

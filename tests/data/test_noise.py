@@ -20,8 +20,7 @@ from sensor_images import (
 )
 
 from nbv.data.depth_codes import encode_depth
-from nbv.data.render import render_objects
-from nbv.data.renderers import open_renderer
+from nbv.data.render import open_renderer, render_objects
 from nbv.data.sensors import check_sensor, open_sensor, sensor_settings
 from nbv.data.sensors.triangulation import STEP_PER_M
 from nbv.errors import UserError

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from nbv.data.normalisation import AXES, check_mesh, direction, frame_rotation, normalise
+from nbv.data.meshes import AXES, check_mesh, direction, frame_rotation, normalise
 from nbv.errors import UserError
 
 PAIRS = [(up, front) for up, front in itertools.permutations(AXES, 2) if up[1] != front[1]]

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from mesh_files import put, source_of
 
-from nbv.data.meshes import prepare_meshes
+from nbv.data.sources import prepare_meshes
 from nbv.errors import UserError
 
 

@@ -11,7 +11,7 @@ from rendering_shapes import procedural
 from scipy import ndimage
 
 from nbv.data.camera import Camera
-from nbv.data.renderers import open_renderer
+from nbv.data.render import open_renderer
 from nbv.errors import UserError
 
 CATEGORIES = ("airplane", "car", "chair", "mug", "toilet")
@@ -95,7 +95,9 @@ def test_one_renderer_serves_several_sizes_and_objects(pyrender):
 
 
 def test_torchs_compiler_can_be_loaded_after_opengl(pyrender):
-    code = "from nbv.data.renderers import open_renderer; open_renderer('pyrender'); import torch._dynamo"
+    code = (
+        "from nbv.data.render import open_renderer; open_renderer('pyrender'); import torch._dynamo"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
@@ -106,7 +108,7 @@ def run_without_egl(code, **environment):
         f"os.environ.update({environment!r})\n"
         f"{code}\n"
         "from nbv.errors import UserError\n"
-        "from nbv.data.renderers import open_renderer\n"
+        "from nbv.data.render import open_renderer\n"
         "try:\n"
         "    open_renderer('pyrender')\n"
         "except UserError as error:\n"

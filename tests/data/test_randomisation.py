@@ -16,9 +16,9 @@ from nbv.data.randomisation import (
     add_table,
     lose,
     move_edge,
-    randomised_turn,
+    randomised_sweep,
 )
-from nbv.data.renderers import open_renderer
+from nbv.data.render import open_renderer
 
 CAMERA = Camera(fov_deg=25.0, image_side=48)
 AZIMUTHS = np.arange(0.0, 360.0, 45.0)
@@ -51,7 +51,7 @@ def renderer():
 
 def turn_of(mesh, renderer, draw, seed=0, elevation=20.0):
     rng = np.random.default_rng(seed)
-    return randomised_turn(mesh, elevation, AZIMUTHS, CAMERA, renderer, None, 0.17, draw, rng)
+    return randomised_sweep(mesh, elevation, AZIMUTHS, CAMERA, renderer, None, 0.17, draw, rng)
 
 
 def test_where_nothing_varies_it_is_the_rendered_image(mesh, renderer):

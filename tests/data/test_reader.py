@@ -32,7 +32,7 @@ def test_what_is_no_regular_file_is_refused_before_it_is_opened(tmp_path):
     (tmp_path / "link.obj").symlink_to("/dev/zero")
     for name in ("pipe", "folder", "link"):
         path = tmp_path / f"{name}.obj"
-        refused(lambda path=path: READER.read(path), path, "is no regular file")
+        refused(lambda path=path: READER.read(path), path, "is not a regular file")
     refused(lambda: READER.read(tmp_path / "none.obj"), "does not exist")
 
 

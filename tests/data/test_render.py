@@ -9,8 +9,7 @@ from rendering_shapes import procedural, shape_of
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import decode_depth
-from nbv.data.render import render_objects
-from nbv.data.renderers import open_renderer
+from nbv.data.render import open_renderer, render_objects
 from nbv.errors import UserError
 
 CAMERA = Camera(image_side=16)

@@ -11,8 +11,7 @@ import pytest
 import trimesh
 from mesh_files import READER, pointer, put, refused, source_of
 
-from nbv.data.meshes import prepare_meshes
-from nbv.data.sources import select_objects
+from nbv.data.sources import prepare_meshes, select_objects
 from nbv.files import read_csv, write_csv
 
 
@@ -182,7 +181,7 @@ def test_a_pipe_among_the_meshes_is_named_and_not_opened(tmp_path):
     put(tmp_path / "mug" / "one.ply")
     os.mkfifo(tmp_path / "mug" / "pipe.ply")
     source = source_of("folder", root=str(tmp_path))
-    refused(lambda: source.object_ids("mug"), tmp_path / "mug" / "pipe.ply", "no regular file")
+    refused(lambda: source.object_ids("mug"), tmp_path / "mug" / "pipe.ply", "not a regular file")
     listed = tmp_path / "list"
     os.mkfifo(listed)
     refused(lambda: source_of("folder", root=str(tmp_path), exclude_file=str(listed)), listed)
@@ -206,5 +205,5 @@ def test_paths_that_the_system_refuses_are_named(tmp_path, name):
 def test_a_list_of_exclusions_without_an_end_is_not_read(root):
     """A device or a pipe; the empty device stands for those that would fill the memory."""
     refused(
-        lambda: source_of("folder", root=str(root), exclude_file="/dev/null"), "no regular file"
+        lambda: source_of("folder", root=str(root), exclude_file="/dev/null"), "not a regular file"
     )

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from nbv.data.meshes import Mesh, load_meshes, save_meshes, stored_ids
-from nbv.data.normalisation import normalise
+from nbv.data.meshes import Mesh, load_meshes, normalise, save_meshes, stored_ids
 from nbv.errors import UserError
 from nbv.files import read_arrays, write_arrays
 
@@ -72,7 +71,7 @@ def at(place, value):
         (lambda arrays: arrays.pop("faces"), "holds no array 'faces'"),
         (changed("vertices", lambda array: array[:, :2]), "'vertices' has another form"),
         (changed("faces", lambda array: array.astype(float)), "'faces' has another form"),
-        (changed("ids", at(1, "ball")), "an id is there twice"),
+        (changed("ids", at(1, "ball")), "an id is duplicate"),
         (changed("vertices", lambda array: array[:-1]), "'vertex_offsets' does not fit"),
         (changed("face_offsets", at(1, 0)), "'face_offsets' does not fit"),
         (changed("face_offsets", lambda array: array[:-1]), "'face_offsets' does not fit"),

@@ -8,7 +8,7 @@ from pathlib import Path
 from omegaconf import OmegaConf
 
 import nbv
-from nbv.data.renderers import RENDERERS
+from nbv.data.render import RENDERERS
 from nbv.data.sources import SOURCES
 from nbv.experiment import provenance
 

@@ -106,8 +106,7 @@ def meshes_problem(meshes: Mapping[str, Any]) -> str:
 def make_meshes(path: Path) -> None:
     import trimesh
 
-    from nbv.data.meshes import save_meshes
-    from nbv.data.normalisation import normalise
+    from nbv.data.meshes import normalise, save_meshes
 
     box = normalise(trimesh.creation.box((1, 2, 3)), "+z", "+x", 0.0, "box")
     ball = normalise(trimesh.creation.icosphere(subdivisions=1), "+z", "+x", 0.0, "box")

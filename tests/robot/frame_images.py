@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from nbv.data.camera import Camera, viewpoint_frames
 from nbv.data.depth_codes import encode_depth
-from nbv.data.normalisation import normalise
+from nbv.data.meshes import normalise
 from nbv.data.procedural import generate
-from nbv.data.renderers import open_renderer
+from nbv.data.render import open_renderer
 from nbv.robot.crop import pixel_step
 
 TRAINING = Camera()

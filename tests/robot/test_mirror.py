@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import encode_depth
-from nbv.data.normalisation import normalise
+from nbv.data.meshes import normalise
 from nbv.data.procedural import generate
-from nbv.data.renderers import open_renderer
+from nbv.data.render import open_renderer
 from nbv.robot.mirror import find_mirror_plane, mirrored_classes
 from nbv.robot.sweeps import Turn
 

@@ -34,7 +34,7 @@ from nbv.experiment.processes import hold_lock
 from nbv.core.criteria import CRITERIA
 from nbv.core.selection import check_methods
 from nbv.core.policies import needs_lookup
-from nbv.data.renderers import RENDERERS
+from nbv.data.render import RENDERERS
 from nbv.data.sensors import SENSORS, check_sensor, sensor_settings
 
 BASE = Path(workflow.basedir)

@@ -25,17 +25,17 @@ with job(snakemake):
     parts = {"objects": [], "beliefs": [], "densities": []}
     for fold in dict.fromkeys(key[4] for key in held):
         objects = [held[*place, fold, role] for role in ("calibration", "test")]
-
-        def rng_of(name, fold=fold):
-            return rng_for(settings["seed"], name, *place, fold)
-
-        made = evaluate_factorial(*objects, decision, rng_of)
+        made = evaluate_factorial(
+            *objects,
+            decision,
+            lambda name, fold=fold: rng_for(settings["seed"], name, *place, fold),
+        )
         more = evaluate_more_views(
             *objects,
             made.posterior_density,
             decision,
             settings["more_views"],
-            rng_of("more_views"),
+            rng_for(settings["seed"], "more_views", *place, fold),
         )
         parts["objects"].append(factorial_objects(made, more).assign(fold=fold))
         parts["beliefs"].append(factorial_beliefs(more).assign(fold=fold))

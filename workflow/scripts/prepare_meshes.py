@@ -3,8 +3,8 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.data.meshes import prepare_meshes, save_meshes
-    from nbv.data.sources import open_source
+    from nbv.data.meshes import save_meshes
+    from nbv.data.sources import open_source, prepare_meshes
 
     params = snakemake.params
     source = open_source(params.dataset, params.seed)

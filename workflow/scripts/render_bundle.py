@@ -9,9 +9,8 @@ with job(snakemake):
     from nbv.data.camera import Camera
     from nbv.data.depth_images import write_depth
     from nbv.data.meshes import load_meshes
-    from nbv.data.randomisation import Randomisation, randomised_turn
-    from nbv.data.render import N_AZIMUTHS
-    from nbv.data.renderers import open_renderer
+    from nbv.data.randomisation import Randomisation, randomised_sweep
+    from nbv.data.render import N_AZIMUTHS, open_renderer
     from nbv.data.sensors import IDEAL, build_sensor
 
     params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
@@ -21,7 +20,7 @@ with job(snakemake):
     sensor = None if name == IDEAL else build_sensor(name, params.sensor["parameters"])
     meshes = load_meshes(snakemake.input.meshes)
     images = (
-        randomised_turn(
+        randomised_sweep(
             mesh,
             float(wildcards.elevation),
             np.arange(N_AZIMUTHS, dtype=np.float64) * (360.0 / N_AZIMUTHS),

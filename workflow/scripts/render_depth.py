@@ -6,8 +6,7 @@ with job(snakemake):
     from nbv.data.camera import Camera
     from nbv.data.depth_images import write_depth
     from nbv.data.meshes import load_meshes
-    from nbv.data.render import N_AZIMUTHS, render_objects
-    from nbv.data.renderers import open_renderer
+    from nbv.data.render import N_AZIMUTHS, open_renderer, render_objects
     from nbv.data.sensors import open_sensor
 
     params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output

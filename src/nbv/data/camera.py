@@ -1,8 +1,7 @@
-"""The pinhole camera: its place, its direction, and where the object falls in its image.
+"""The pinhole camera: its poses around an object, and the object's outline in its images.
 
 Normalised image coordinates (x, y) are tangents: a point at depth d on the ray (x, y) lies d·x to
-the right of the optical axis and d·y above it. This module computes everything that depends on
-the viewpoint, once, so that all renderers see the same views.
+the right of the optical axis and d·y above it. All renderers share the views of this module.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ Floats = NDArray[np.float64]
 
 FRAMINGS = ("silhouette", "axis")
 
-# For fewer vertices a hull costs more than it saves.
+# For fewer vertices, a convex hull costs more than it saves.
 _FEW_VERTICES = 64
-# How far, in pixels, rounding may push an outline that touches the image's edge.
+# Pixels by which rounding may push an outline beyond the image's edge.
 _EDGE_TOLERANCE = 1e-6
 
 
@@ -35,20 +34,19 @@ class Camera:
     Parameters
     ----------
     distance : float
-        From the camera to the object's origin, in object diagonals.
+        Distance from the object's origin, in object diagonals.
     fov_deg : float
         Full angle of view, in (0, 180).
     image_side : int
         Pixels along each side.
     framing : {"silhouette", "axis"}
-        What lies in the middle of the image: the centre of the bounding box of what is visible, as
-        a detector would crop it, or the origin of the object frame. Framing shifts the principal
-        point; it neither rescales nor turns anything.
+        The middle of the image: the centre of the silhouette's bounding box, as in a detector's
+        crop, or the origin of the object frame. Framing shifts the principal point without scaling
+        or rotation.
     whole_pixels : bool
-        Framing shifts by whole pixels only. The pixels then lie where they lie without framing,
-        as those of a sensor do, which no crop moves.
+        Framing shifts by whole pixels, so that pixels sample the same rays as without framing.
     roll_deg : float
-        How far the camera is turned about its optical axis, clockwise seen from behind it.
+        Rotation about the optical axis, clockwise seen from behind the camera.
     """
 
     distance: float = 2.5
@@ -77,13 +75,13 @@ class Camera:
 
 @dataclass(frozen=True)
 class Views:
-    """The viewpoints of one object: k cameras at one elevation.
+    """Views of an object by k cameras at one elevation.
 
     Attributes
     ----------
     camera : Camera
     position : (k, 3) float
-        Of the pinholes, in the object frame.
+        Positions of the pinholes, in the object frame.
     right, up, forward : (k, 3) float
         The axes of each image, orthonormal: columns grow along `right`, rows opposite to `up`,
         depth along `forward`.
@@ -108,7 +106,7 @@ class Views:
 
     @cached_property
     def principal_px(self) -> Floats:
-        """Column and row of the optical axis, in pixels from the top left corner, (k, 2)."""
+        """Column and row of the optical axis, pixels from the top left corner, (k, 2)."""
         middle, focal = self.camera.image_side / 2.0, self.camera.focal_px
         x, y = self.centre.T
         return np.stack([middle - focal * x, middle + focal * y], axis=1)
@@ -151,16 +149,16 @@ def viewpoint_frames(
 
 
 def hull_vertices(vertices: ArrayLike, faces: ArrayLike) -> Floats:
-    """Return the vertices that an outline depends on, (h, 3): those of the convex hull.
+    """Return the vertices of the convex hull, (h, 3), which determine all outlines.
 
-    Vertices that no face uses are left out. A surface without volume keeps all others.
+    Unused vertices are left out. A flat surface keeps all others.
     """
     points = np.asarray(vertices, dtype=np.float64)
     is_used = np.zeros(len(points), dtype=bool)
     is_used[np.asarray(faces)] = True
     used: Floats = points[is_used]
     if len(used) > _FEW_VERTICES:
-        with contextlib.suppress(QhullError):  # A flat object has no hull in three dimensions.
+        with contextlib.suppress(QhullError):  # A flat surface has no hull.
             used = used[ConvexHull(used).vertices]
     return used
 
@@ -187,9 +185,9 @@ def object_views(
     Raises
     ------
     UserError
-        Where part of the object lies behind the camera or outside the image. The default camera
-        contains every object of unit diagonal that is centred on its bounding box: the sphere
-        around it subtends 23.1° of the 25°.
+        If part of the object lies behind the camera or outside the image. Every object of unit
+        diagonal centred on its bounding box fits the default camera: the sphere around it subtends
+        23.1° of the 25°.
     """
     azimuths = np.atleast_1d(np.asarray(azimuths_deg, dtype=np.float64))
     right, up, forward = viewpoint_frames(elevation_deg, azimuths)

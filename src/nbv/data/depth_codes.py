@@ -1,4 +1,4 @@
-"""Depth images as bytes: one byte a pixel, in steps of 0.5 % of the object's size."""
+"""Depth codes: a byte per pixel, in steps of 0.5 % of the object's diagonal."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from nbv.data.depth_images import Codes
 Depths = NDArray[np.float32]
 
 STEP = 0.005
-"""Depth per code, in object diagonals."""
+"""Depth per code, object diagonals."""
 
 ZERO_CODE = 128
 """The code of the reference depth itself."""
 
 
 def reference_depth(depth: Depths, camera: Camera) -> NDArray[np.float32]:
-    """Return the depth that code 128 stands for, one for each image.
+    """Return the depth of code 128 for each image.
 
-    With ``framing="silhouette"`` it is the median of the visible pixels: a detector's crop knows
-    no more. With ``framing="axis"`` it is the distance of the object's origin, which is then known.
+    With ``framing="silhouette"`` it is the median of the visible pixels, which a detector's crop
+    provides. With ``framing="axis"`` it is the known distance of the object's origin.
 
     Parameters
     ----------
     depth : (k, side, side) float32
-        Object diagonals, 0 where there is nothing.
+        Object diagonals, 0 for background.
     camera : Camera
 
     Returns
@@ -47,22 +47,22 @@ def _reference(visible: Depths, camera: Camera) -> np.float32:
 
 
 def median_depth(visible: Depths) -> np.float32:
-    """Return the median of depths (n,): that of numpy.median, in less than a third of its time."""
+    """Return numpy.median of depths (n,), more than three times as fast."""
     middle = len(visible) // 2
     ordered = visible.copy()
     ordered.partition(middle)
-    # Of an even number there are two in the middle; the lower one is the largest of those before.
+    # For an even number, the lower of the two middle depths is the largest before the middle.
     lower = ordered[middle] if len(visible) % 2 else ordered[:middle].max()
     return np.float32((lower + ordered[middle]) / 2)
 
 
 def encode_depth(depth: Depths, camera: Camera) -> Codes:
-    """Return depth images as bytes: 0 is background, nearer is larger.
+    """Encode depth images: 0 is background, nearer is larger.
 
     Parameters
     ----------
     depth : (k, side, side) float32
-        Object diagonals, 0 where there is nothing.
+        Object diagonals, 0 for background.
     camera : Camera
         Its framing decides the reference depth (see `reference_depth`).
 
@@ -73,7 +73,7 @@ def encode_depth(depth: Depths, camera: Camera) -> Codes:
         and 0.635 diagonals.
     """
     codes = np.zeros(depth.shape, dtype=np.uint8)
-    # One image at a time and in place, so that its pixels stay in the processor's cache.
+    # Image by image and in place, to stay within the processor's cache.
     for image, code in zip(depth, codes, strict=True):
         seen = image > 0
         visible = image[seen]
@@ -92,43 +92,42 @@ def decode_depth(codes: Codes) -> Depths:
     Parameters
     ----------
     codes : (...) uint8
-        As written by `encode_depth`.
+        Codes of `encode_depth`.
 
     Returns
     -------
     (...) float32
-        Object diagonals, positive towards the camera, NaN for background. It differs from what
-        was encoded by at most half a step, unless that saturated.
+        Object diagonals, positive towards the camera, NaN for background. The error is at most half
+        a step, unless the code saturated.
     """
     offsets = (codes.astype(np.float32) - ZERO_CODE) * np.float32(STEP)
     return np.where(codes > 0, offsets, np.float32(np.nan))
 
 
 def sensor_camera(camera: Camera) -> Camera:
-    """Return the camera that draws what a sensor measures before the crop.
+    """Return the camera for images that a sensor measures before the crop.
 
-    Its image holds the whole object, for which it may need half a pixel more room than `camera`.
-    Its pixels lie where they lie without framing, so the true outline does not enter the crop.
+    Its pixels do not depend on the framing, so the true outline does not affect the crop. The whole
+    object may need half a pixel more room than with `camera`.
     """
     return replace(camera, whole_pixels=True)
 
 
 def crop_measured(depth: Depths, camera: Camera) -> Depths:
-    """Return measured images with the measured pixels in the middle.
+    """Centre measured images on their measured pixels.
 
     Parameters
     ----------
     depth : (k, side, side) float32
-        As the sensor measures it; 0 where nothing is measured.
+        Measured depth; 0 without a measurement.
     camera : Camera
         With ``framing="axis"`` the images stay as they are.
 
     Returns
     -------
     (k, side, side) float32
-        The same values. The bounding box of the nonzero pixels lies in the middle, or half a pixel
-        to the left of (above) it where the number of free columns (rows) is odd. An image without
-        a measurement stays empty.
+        The bounding box of the nonzero pixels is in the middle, or half a pixel to the left of
+        (above) it if the number of free columns (rows) is odd.
     """
     if camera.framing == "axis":
         return depth

@@ -1,4 +1,4 @@
-"""The depth images of a unit on disk: one array, and the ids of its objects."""
+"""Files of depth images: one array for all sweeps of a unit, and the ids of its objects."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ Codes = NDArray[np.uint8]
 
 logger = logging.getLogger(__name__)
 
-# Progress is logged at each tenth of the work, but not more often than this.
+# Progress is logged at each tenth of the work, at most this often.
 _SECONDS_BETWEEN_LINES = 5.0
 
 
 class DepthImages(NamedTuple):
-    """Depth images of full turns of objects.
+    """Depth images of full sweeps of n objects.
 
     Attributes
     ----------
     object_ids : tuple of str
-        n objects, all different.
+        All different.
     codes : ndarray (n, n_views, side, side) uint8
-        See `nbv.data.depth_codes.encode_depth`; view k has the azimuth 360 k / n_views.
-        Mapped into memory: the file is read as far as it is indexed.
+        Codes of `nbv.data.depth_codes.encode_depth`, mapped into memory. View k has the azimuth
+        360 k / n_views.
     """
 
     object_ids: tuple[str, ...]
@@ -43,12 +43,12 @@ class DepthImages(NamedTuple):
         Raises
         ------
         UserError
-            Where an object has none.
+            If an object has none.
         """
         rows = {name: row for row, name in enumerate(self.object_ids)}
-        if strangers := [name for name in object_ids if name not in rows]:
+        if unknown := [name for name in object_ids if name not in rows]:
             raise UserError(
-                f"object {strangers[0]!r} has no depth images: splits and depth images are of "
+                f"object {unknown[0]!r} has no depth images: splits and depth images are of "
                 "different runs; render again"
             )
         return np.asarray(self.codes[[rows[name] for name in object_ids]])
@@ -63,16 +63,16 @@ def write_depth(
 ) -> None:
     """Write the images of all objects to one `.npy` file, and the objects' ids to another.
 
-    The images go to disk as they are made; memory holds those of one object. Each file appears
-    under its name only when it is complete.
+    Memory holds the images of one object at a time. Each file appears under its name only when it
+    is complete.
 
     Parameters
     ----------
     path, objects_path : path
-        Of the images and of the ids.
+        Paths of the images and of the ids.
     object_ids : collection of str
     images : iterable of (n_views, side, side) uint8
-        Of each object, such as `nbv.data.render.render_objects`.
+        The sweep of each object, such as from `nbv.data.render.render_objects`.
     shape : tuple of int
         (n_views, side, side).
     """
@@ -82,7 +82,7 @@ def write_depth(
         "shape": (len(object_ids), *shape),
     }
     progress = _Progress(str(path), len(object_ids), shape[0])
-    # Written, not mapped: a full disk then raises an error instead of a fatal signal.
+    # Not memory-mapped: a full disk then raises an error instead of a fatal signal.
     with replacing(path) as temporary, temporary.open("wb") as file:
         np.lib.format.write_array_header_1_0(file, header)
         for index, codes in enumerate(images):
@@ -92,12 +92,12 @@ def write_depth(
 
 
 def open_depth(path: str | Path, objects_path: str | Path) -> DepthImages:
-    """Open what `write_depth` wrote.
+    """Open the files of `write_depth`.
 
     Raises
     ------
     UserError
-        Where a file cannot be read or the two are not about the same number of objects.
+        If a file cannot be read or the two have different numbers of objects.
     """
     codes: Codes = open_array(path)
     if codes.ndim != 4 or codes.dtype != np.uint8 or codes.shape[2] != codes.shape[3]:

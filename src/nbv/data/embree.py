@@ -1,7 +1,7 @@
-"""Depth from one ray through each pixel centre, cast with Embree: no GL, the same on any CPU.
+"""The Embree renderer: a ray through each pixel centre, without OpenGL, the same on any CPU.
 
-We call Embree directly. Trimesh's interface to it shifts and scales vertices, splits rays without
-need, and changes silently to a caster a thousand times slower where Embree is missing.
+Embree is called directly. Trimesh's interface shifts and scales vertices, splits rays needlessly,
+and silently falls back to a caster a thousand times slower if Embree is missing.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.data.camera import Camera, Views, object_views
 from nbv.errors import UserError
 
-# Rays in one call of Embree: enough that the call's own cost vanishes, few enough that they stay in
-# the processor's cache.
+# Rays in a call of Embree: many to amortise the call, few to stay within the processor's cache.
 _RAYS_PER_CALL = 65_536
-# Embree gives a ray that meets nothing at least this length.
+# Embree's length of a ray without a hit is at least this.
 _NOTHING = 1e30
 
 
@@ -25,7 +24,7 @@ class EmbreeRenderer:
     Raises
     ------
     UserError
-        On construction, where embreex is not installed.
+        If embreex is not installed.
     """
 
     def __init__(self) -> None:
@@ -50,12 +49,12 @@ class EmbreeRenderer:
         azimuths_deg: ArrayLike,
         camera: Camera,
     ) -> NDArray[np.float32]:
-        """Return depth images (k, side, side): see `nbv.data.renderers.Renderer.render`.
+        """Return depth images (k, side, side): see `nbv.data.render.Renderer.render`.
 
         Depths are good to 1e-5 object diagonals (single precision).
         """
         views = object_views(vertices, faces, elevation_deg, azimuths_deg, camera)
-        # robust=True: rays that run along an edge shared by two faces meet one of them.
+        # robust=True: a ray along an edge between two faces hits one of them.
         scene = self._scene(self._device, robust=True)
         self._triangles(
             scene,
@@ -78,8 +77,8 @@ Window = tuple[int, int, int, int]
 
 
 def _pixel_windows(views: Views) -> list[Window]:
-    """Return each view's first and last + 1 column and row whose centres the outline can cover."""
-    # Up to one pixel more on each side than the outline covers: never one less by rounding.
+    """Return the columns (first, end) and rows (first, end) of each view's outline."""
+    # Up to a pixel more than the outline on each side, never less due to rounding.
     first = np.floor(views.outline_px[:, 0::2] - 0.5)
     last = np.ceil(views.outline_px[:, 1::2] + 0.5)
     first_last = np.stack([first[:, 0], last[:, 0], first[:, 1], last[:, 1]], axis=1)
@@ -100,7 +99,7 @@ class _RayBuffer:
         self._directions = np.empty((capacity, 3), dtype=np.float32)
         self._used = 0
         self._pending: list[tuple[int, Window]] = []
-        # Origins of a row of pixels: the pinhole's coordinates over and over.
+        # Origins of a row of pixels: repeated coordinates of the pinhole.
         self._position = np.tile(views.position.astype(np.float32), camera.image_side)
         centres = np.arange(camera.image_side) + 0.5
         column, row = views.principal_px.T[:, :, None]
@@ -122,7 +121,7 @@ class _RayBuffer:
         count = columns * rows
         taken = slice(self._used, self._used + count)
         self._origins[taken].reshape(rows, 3 * columns)[:] = self._position[view, : 3 * columns]
-        # Coordinate by coordinate: numpy's inner loop is then a row of pixels, not three numbers.
+        # Coordinate by coordinate, so that numpy's inner loop is a row of pixels.
         grid = np.moveaxis(self._directions[taken].reshape(rows, columns, 3), 2, 0)
         across = self._across[view, :, None, left:right]
         np.add(across, self._down[view, :, top:bottom, None], out=grid)

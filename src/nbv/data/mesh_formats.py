@@ -1,8 +1,8 @@
-"""Mesh files of each format, read with trimesh; what trimesh passes over in silence is refused.
+"""Strict readers of mesh files: trimesh, after checks for damage that it silently ignores.
 
-A file is read into memory and never refers to another: no texture, no buffer beyond the file, no
-address. `nbv.data.mesh_reader` calls this in a process of its own, for a hostile file may take any
-time and any amount of memory.
+A file is read into memory and cannot refer to another file, such as a texture or an external
+buffer. As a program, ``python -m nbv.data.mesh_formats``, it is the process of
+`nbv.data.mesh_reader`, for a hostile file may exhaust time and memory.
 """
 
 from __future__ import annotations
@@ -10,18 +10,20 @@ from __future__ import annotations
 import io
 import json
 import re
+import signal
 import struct
+import sys
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 import trimesh
 
 
 class _OnlyThisFile(trimesh.resolvers.Resolver):
-    """Gives no other file, whatever a mesh file refers to."""
+    """Refuses references to other files."""
 
     def __init__(self) -> None:
         pass
@@ -40,30 +42,30 @@ class _OnlyThisFile(trimesh.resolvers.Resolver):
 
 
 def parse_mesh(path: Path) -> trimesh.Trimesh:
-    """Load a mesh file unchanged: vertices are not merged or reordered, materials are left out.
+    """Load a mesh file without merging or reordering vertices, and without materials.
 
-    The parts of a scene are joined; each is placed by its transform.
+    The parts of a scene are transformed and joined.
 
     Parameters
     ----------
     path : pathlib.Path
-        A regular file; its extension tells the format.
+        A regular file; the extension determines the format.
 
     Returns
     -------
     trimesh.Trimesh
-        Of triangles whose corners are among the vertices, which may still not be finite.
+        Triangles with valid indices; vertices may not be finite.
 
     Raises
     ------
     Exception
-        Of any kind, with the reason, where it is no such file or was damaged.
+        Of any type, with the reason, if the file is damaged or has another format.
     """
     extension = path.suffix.lower()
-    # skip_materials: a texture of a few kilobytes may unfold to gigabytes, for nothing.
+    # skip_materials: a texture of a few kilobytes may decompress to gigabytes.
     options: dict[str, Any] = {"process": False, "skip_materials": True}
     with warnings.catch_warnings():
-        # Before numpy 2.3 text that is no number ended an array with a warning only.
+        # Before numpy 2.3, text that is not a number only raised a warning and ended the array.
         warnings.filterwarnings("error", message="string or file could not be read")
         scene = trimesh.load_scene(
             _checked_file(path.read_bytes(), extension),
@@ -73,7 +75,7 @@ def parse_mesh(path: Path) -> trimesh.Trimesh:
         )
     for part in scene.geometry.values():
         if isinstance(part, trimesh.Trimesh):
-            # After the parts are joined, such an index would be one of the next part's.
+            # After joining, an invalid index would refer to the next part.
             _check_indices(part.faces, len(part.vertices))
             _check_list_lengths(part.metadata.get("_ply_raw", {}))
     mesh = scene.to_mesh()
@@ -83,7 +85,7 @@ def parse_mesh(path: Path) -> trimesh.Trimesh:
 
 
 def _checked_file(data: bytes, extension: str) -> io.StringIO | io.BytesIO:
-    """Return a file's content for trimesh; raise ValueError for what trimesh would accept."""
+    """Return a file's content for trimesh; raise ValueError for damage that trimesh accepts."""
     if not data:
         raise ValueError("the file is empty; at least 1 triangle expected")
     if extension == ".obj":
@@ -100,7 +102,7 @@ def _checked_file(data: bytes, extension: str) -> io.StringIO | io.BytesIO:
 
 
 def _decoded(data: bytes) -> str:
-    """Return text of any encoding without loss, so that damaged numbers are not mended."""
+    """Decode text of any encoding without loss, so that damaged numbers stay invalid."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -115,7 +117,7 @@ def _check_indices(indices: Any, n_vertices: int) -> None:
 
 
 _OBJ_INDEX = r"[ \t]+-?\d+"
-# The corners of a face are all of one form: v, v/t, v//n or v/t/n.
+# All corners of a face have the same form: v, v/t, v//n or v/t/n.
 _OBJ_FACE = re.compile(
     "f(?:"
     + "|".join(
@@ -127,9 +129,9 @@ _OBJ_FIRST_INDEX = re.compile(r"[ \t](-?\d+)")
 
 
 def _checked_obj(text: str) -> str:
-    """Return the text of an OBJ file, its lines of vertices and faces as trimesh finds them."""
+    """Return the text of an OBJ file with lines of vertices and faces that trimesh recognises."""
     text = text.replace("\r\n", "\n").replace("\\\n", "")
-    # Trimesh passes over the lines of vertices and faces that begin otherwise.
+    # Trimesh ignores indented lines of vertices and faces.
     text = re.sub(r"^[ \t]*([vf])[ \t]+", r"\1 ", text, flags=re.MULTILINE)
     n_vertices, n_coordinates, first_coordinates, is_mixed = 0, 0, 0, False
     relative_at, indices = -1, [1]
@@ -146,23 +148,23 @@ def _checked_obj(text: str) -> str:
         elif line.startswith("f "):
             if not _OBJ_FACE.fullmatch(line):
                 raise ValueError(f"line {number}: not a face of 3 vertices or more: {line[:60]!r}")
-            of_face = [int(index) for index in _OBJ_FIRST_INDEX.findall(line)]
-            # Trimesh takes the number of corners from the first of the faces as long as this.
-            values = len(line.replace("/", " ").split())
-            if corners_of.setdefault(values, len(of_face)) != len(of_face):
+            face = [int(index) for index in _OBJ_FIRST_INDEX.findall(line)]
+            # Trimesh takes the number of corners from the first face with as many numbers.
+            n_numbers = len(line.replace("/", " ").split())
+            if corners_of.setdefault(n_numbers, len(face)) != len(face):
                 raise ValueError(f"line {number}: faces of two forms are mixed")
-            if min(of_face) < 1:
-                if 0 in of_face or min(of_face) < -n_vertices:
-                    wrong = 0 if 0 in of_face else min(of_face)
+            if min(face) < 1:
+                if 0 in face or min(face) < -n_vertices:
+                    wrong = 0 if 0 in face else min(face)
                     raise ValueError(
                         f"line {number}: a face refers to vertex {wrong}, of {n_vertices} so far"
                     )
                 relative_at = n_vertices if relative_at < 0 else relative_at
-            indices += (min(of_face), max(of_face))
+            indices += (min(face), max(face))
     if not n_vertices:
         raise ValueError("no line is a vertex, 'v x y z'; is it an OBJ file?")
     if is_mixed and n_coordinates == n_vertices * first_coordinates:
-        # Trimesh would cut the numbers of all vertices into rows as long as the first.
+        # Trimesh would split the numbers of all vertices into rows as long as the first.
         raise ValueError("vertices have different numbers of coordinates")
     if max(indices) > n_vertices:
         raise ValueError(f"a face refers to vertex {max(indices)}, of {n_vertices} vertices")
@@ -193,19 +195,19 @@ def _tokens(text: str) -> list[list[str]]:
     return [line for line in lines if line]
 
 
-def _check_lines(found: int, *expected: int) -> None:
-    """Raise ValueError for text cut short, of which trimesh takes what is left, and for surplus."""
+def _check_lines(n_lines: int, *expected: int) -> None:
+    """Raise ValueError for missing lines, which trimesh ignores, and for surplus lines."""
     if min(expected) < 0:
         raise ValueError(f"the header announces {min(expected)} lines")
-    if found < sum(expected):
-        raise ValueError(f"{found} of {sum(expected)} lines are there: the file was cut short")
-    if found > sum(expected):
-        raise ValueError(f"{found} lines are there, the header announces {sum(expected)}")
+    if n_lines < sum(expected):
+        raise ValueError(f"{n_lines} of {sum(expected)} lines are there: the file was cut short")
+    if n_lines > sum(expected):
+        raise ValueError(f"{n_lines} lines are there, the header announces {sum(expected)}")
 
 
 def _check_ascii_ply(text: str) -> None:
     header, _, text = text.partition("end_header")
-    # Of each element: its name, its number of rows, and its properties.
+    # Name, number of rows and properties of each element.
     elements: list[tuple[str, int, list[list[str]]]] = []
     for line in header.splitlines():
         match line.split():
@@ -225,7 +227,7 @@ def _check_ascii_ply(text: str) -> None:
 
 
 def _fits(row: list[str], properties: list[list[str]], n_vertices: int | None) -> bool:
-    """Return whether a line has as many values as its properties, and indices of vertices."""
+    """Return whether a line has the values that its properties require, with valid indices."""
     at = 0
     for words in properties:
         length = 1
@@ -242,9 +244,9 @@ def _fits(row: list[str], properties: list[list[str]], n_vertices: int | None) -
 
 
 def _check_list_lengths(elements: Mapping[str, Any]) -> None:
-    """Raise ValueError where the lists of a binary PLY element differ in length.
+    """Raise ValueError if the lists of a binary PLY element differ in length.
 
-    Trimesh takes the first one's length for all.
+    Trimesh would apply the first length to all.
     """
     for name, element in elements.items():
         data = element.get("data")
@@ -268,7 +270,7 @@ _STL_SOLIDS = re.compile(r"(?:\s*solid\b[^\n]*\n\s*endsolid\b[^\n]*)+\s*", re.IG
 
 
 def _check_ascii_stl(text: str) -> None:
-    # Trimesh takes any three vertices after one another for a triangle.
+    # Trimesh takes any three consecutive vertices for a triangle.
     if not _STL_SOLIDS.fullmatch(_STL_FACET.sub("\n", text)):
         raise ValueError("neither a binary STL file nor a whole text of facets of three vertices")
 
@@ -280,7 +282,7 @@ def _check_glb(data: bytes) -> None:
     if length != len(data):
         raise ValueError(f"{len(data)} bytes are there, the header announces {length}")
     header = json.loads(data[20 : 20 + header_length])
-    # What trimesh cannot read it leaves out, or fills with zeros.
+    # Trimesh leaves out unsupported content or fills it with zeros.
     for name in header.get("extensionsRequired", []):
         if not name.startswith(("KHR_materials", "KHR_texture", "EXT_texture")):
             raise ValueError(f"the extension {str(name)[:80]} cannot be read")
@@ -291,3 +293,67 @@ def _check_glb(data: bytes) -> None:
     }
     if unknown := modes - {0, 1, 2, 3, 4, 5}:
         raise ValueError(f"primitives of mode {min(unknown)} cannot be read")
+
+
+def main(processor_s: int, clock_s: int, max_bytes: int) -> None:
+    """Read the files named on the standard input until it ends, within limits.
+
+    Each line is a path as JSON. The answer is a line of JSON, with the reason of a refusal or the
+    numbers of vertices and faces, followed by these arrays as raw float64 and int64.
+
+    Parameters
+    ----------
+    processor_s, clock_s : int
+        Seconds for a file.
+    max_bytes : int
+        Limit of memory.
+    """
+    _limit_memory(max_bytes)
+    timers = {signal.ITIMER_PROF: processor_s, signal.ITIMER_REAL: clock_s}
+    # Without a handler, a timer's signal ends the process even within compiled code.
+    for number in (signal.SIGPROF, signal.SIGALRM):
+        signal.signal(number, signal.SIG_DFL)
+    for line in sys.stdin.buffer:
+        for timer, seconds in timers.items():
+            signal.setitimer(timer, seconds)
+        answer, arrays = _answer(Path(json.loads(line)), max_bytes)
+        for timer in timers:
+            signal.setitimer(timer, 0)
+        _send(sys.stdout.buffer, answer, arrays)
+
+
+def _limit_memory(max_bytes: int) -> None:
+    """Limit this process's memory, if the system supports it."""
+    try:
+        import resource
+
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        resource.setrlimit(resource.RLIMIT_AS, (max_bytes, hard))
+    except (ImportError, OSError, ValueError):
+        return
+
+
+def _answer(path: Path, max_bytes: int) -> tuple[dict[str, Any], list[Any]]:
+    try:
+        mesh = parse_mesh(path)
+        arrays = [np.asarray(mesh.vertices, "<f8"), np.asarray(mesh.faces, "<i8")]
+    except MemoryError:
+        return {"refused": f"needs more than {max_bytes / 2**30:g} GiB of memory"}, []
+    # A loader may raise any exception on arbitrary bytes.
+    except Exception as error:
+        # A reason may quote arbitrary content of the file.
+        quoted = "".join(c if c.isprintable() else "?" for c in " ".join(str(error).split()))
+        reason = quoted[:300] or type(error).__name__
+        return {"refused": f"cannot be read as a mesh ({reason})"}, []
+    return {"vertices": len(arrays[0]), "faces": len(arrays[1])}, arrays
+
+
+def _send(stream: BinaryIO, answer: dict[str, Any], arrays: list[Any]) -> None:
+    stream.write(json.dumps(answer).encode() + b"\n")
+    for array in arrays:
+        stream.write(array.tobytes())
+    stream.flush()
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

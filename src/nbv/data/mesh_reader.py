@@ -1,7 +1,6 @@
-"""Mesh files read in a process of their own, with limits of time and memory.
+"""Read mesh files in a separate process, with limits of time and memory.
 
-A file may be hostile, or only damaged in a way that a loader does not expect. It may then take any
-time, any amount of memory, or the process itself; here it takes no more than the limits.
+A hostile or damaged file may exhaust time or memory, or crash its loader.
 """
 
 from __future__ import annotations
@@ -25,27 +24,27 @@ if TYPE_CHECKING:
     import trimesh
 
 PROCESSOR_S = 60
-"""Of processor time for one file. A million faces as text take about ten."""
+"""Limit of processor time for a file. A million faces as text take about 10 s."""
 
 CLOCK_S = 600
-"""For one file on a busy machine or a slow disk, and the end of what waits for something."""
+"""Limit of elapsed time for a file, for busy machines, slow disks and files that block."""
 
 MAX_BYTES = 4 * 2**30
-"""Of memory, libraries included. A million faces as text take less than half of it."""
+"""Limit of memory, libraries included. A million faces as text take less than half of it."""
 
 
 class MeshReader:
     """Reads mesh files, one after the other, in one process.
 
-    The process starts with the first file, and again after a file that ended it. It ends with the
-    object, and with the process that made the object, however that ends.
+    The process starts with the first file, and again after a file that ended it. It ends with this
+    object or with the calling process.
 
     Parameters
     ----------
     processor_s, clock_s : int
-        Seconds for one file.
+        Seconds for a file.
     max_bytes : int
-        Of memory. Where the system refuses such a limit, as macOS does, there is none.
+        Limit of memory; ignored on systems without such limits, such as macOS.
     """
 
     def __init__(
@@ -60,12 +59,12 @@ class MeshReader:
         Raises
         ------
         UserError
-            With the path and the reason, a limit among them.
+            With the path and the reason, such as an exceeded limit.
         """
         import trimesh
 
         if not path.is_file():
-            what = "is no regular file" if path.exists() else "does not exist"
+            what = "is not a regular file" if path.exists() else "does not exist"
             raise UserError(f"{path}: {what}; a mesh file expected")
         process = self._running()
         try:
@@ -81,17 +80,17 @@ class MeshReader:
 
     def _running(self) -> subprocess.Popen[bytes]:
         if self._process is None:
-            # Its import here makes it one of the sources that a result depends on.
-            from nbv.data import mesh_process as reader_process
+            # The import makes it one of the sources that a result depends on.
+            from nbv.data import mesh_formats
 
             self._process = subprocess.Popen(
-                # -P: the current folder may hold anything, and modules are not looked for in it.
-                [sys.executable, "-P", "-m", reader_process.__name__, *map(str, self._limits)],
+                # -P: no module is imported from the current folder.
+                [sys.executable, "-P", "-m", mesh_formats.__name__, *map(str, self._limits)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                # What libraries print about a file is not the one line that the user gets.
+                # The user gets a single line, not the output of libraries.
                 stderr=subprocess.DEVNULL,
-                # A thread more reserves memory, and there is nothing for it to do.
+                # Idle threads would reserve memory.
                 env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
             )
             self._end = weakref.finalize(self, _end, self._process)

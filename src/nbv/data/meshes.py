@@ -1,24 +1,193 @@
-"""Meshes of a run on disk, and how they are made from a source."""
+"""Meshes: the object frame, into which they are normalised, and their file.
+
+The object frame has z up, front +x, and a unit diagonal of the bounding box. Data sets disagree
+about the directions of up and front, so the configuration names both as axes of the file ("+y",
+"-z") or as vectors ("0,0,1"). The rotation that follows from them is proper: no mesh is mirrored.
+"""
 
 from __future__ import annotations
 
-import logging
-import time
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.errors import UserError
+from nbv.errors import UserError, nearest
 from nbv.files import damaged, read_arrays, write_arrays
 
 if TYPE_CHECKING:
-    from nbv.data.sources import MeshSource
+    import trimesh
+
+Centre = Literal["box", "origin"]
+CENTRES = ("box", "origin")
+AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+# Vectors may be rounded; 0.02 is about one degree.
+_PERPENDICULAR_WITHIN = 0.02
+
+# Limits of a mesh's size in units of the file. Beyond them, squares of lengths overflow or vanish
+# in single precision, the precision of most formats, so the file must be damaged.
+_EXTENTS = (1e-18, 1e18)
+# In squares of the object's diagonal: a smaller area is rounding.
+_LEAST_AREA = 1e-12
 
 
-# Of each array in a file: the kind of its numbers, and its shape, None for any length.
+def direction(axis: str, key: str) -> NDArray[np.float64]:
+    """Return the unit vector of an axis of the file.
+
+    Parameters
+    ----------
+    axis : str
+        One of ±x, ±y, ±z (a missing sign is +), or three numbers such as "0,-1,0". Backslashes
+        before the commas, which occur in ShapeNetSem's metadata, are ignored.
+    key : str
+        Name of the setting, for the error.
+
+    Raises
+    ------
+    UserError
+        If the text is neither.
+    """
+    text = axis.strip().replace("\\", "").lower()
+    signed = text if text[:1] in ("+", "-") else f"+{text}"
+    if signed in AXES:
+        vector = np.zeros(3)
+        vector["xyz".index(signed[1])] = 1.0 if signed[0] == "+" else -1.0
+        return vector
+    try:
+        vector = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        vector = np.zeros(0)
+    length = float(np.linalg.norm(vector))
+    if vector.shape != (3,) or not np.isfinite(length) or length == 0:
+        raise UserError(f"{key}={axis}: not an axis; give one of {', '.join(AXES)}, or x,y,z")
+    return vector / length
+
+
+def frame_rotation(up: str, front: str, turn_deg: float) -> NDArray[np.float64]:
+    """Return the rotation from a file's frame into the object frame.
+
+    Parameters
+    ----------
+    up, front : str
+        Axes of the file that become +z and, before the turn, +x; see `direction`.
+    turn_deg : float
+        Counter-clockwise turn about +z: the final azimuth of `front`.
+
+    Returns
+    -------
+    (3, 3) float
+        Proper (determinant 1); it multiplies column vectors.
+
+    Raises
+    ------
+    UserError
+        If up and front are not perpendicular.
+    """
+    z = direction(up, "up")
+    x = direction(front, "front")
+    if abs(float(x @ z)) > _PERPENDICULAR_WITHIN:
+        raise UserError(f"up={up}, front={front}: the two must be perpendicular")
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    turn = np.radians(turn_deg)
+    cos, sin = np.cos(turn), np.sin(turn)
+    about_z = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    rotation: NDArray[np.float64] = about_z @ np.stack([x, np.cross(z, x), z])
+    return rotation
+
+
+def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
+    """Check that a mesh can be rendered.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh
+    origin : str
+        The mesh's source, for the error.
+
+    Raises
+    ------
+    UserError
+        If it has no face, an invalid index, a used vertex that is not finite, an implausible
+        extent, or no area.
+    """
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    if len(faces) == 0:
+        raise UserError(f"{origin}: the mesh has no faces; at least 1 triangle expected")
+    lowest, highest = int(faces.min()), int(faces.max())
+    if lowest < 0 or highest >= len(vertices):
+        wrong = lowest if lowest < 0 else highest
+        raise UserError(f"{origin}: a face refers to vertex {wrong}, of {len(vertices)} vertices")
+    used = np.unique(faces)
+    broken = used[~np.isfinite(vertices[used]).all(axis=1)]
+    if len(broken):
+        raise UserError(
+            f"{origin}: vertex {broken[0]} is not finite, {len(broken)} of {len(used)} in all; "
+            "numbers expected"
+        )
+    low, high = vertices[used].min(axis=0), vertices[used].max(axis=0)
+    # Halved, because the difference of two finite numbers may overflow.
+    extent = 2.0 * math.hypot(*(high / 2.0 - low / 2.0))
+    if extent == 0.0:
+        raise UserError(f"{origin}: all faces lie in one point; a non-zero extent expected")
+    if not _EXTENTS[0] <= extent <= _EXTENTS[1]:
+        farthest = used[np.abs(vertices[used]).max(axis=1).argmax()]
+        raise UserError(
+            f"{origin}: the mesh extends over {extent:.3g}, vertex {farthest} is the farthest; "
+            f"{_EXTENTS[0]:g} to {_EXTENTS[1]:g} expected"
+        )
+    corners = (vertices[faces] - low) / extent
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    if float(np.linalg.norm(normals, axis=1).sum()) / 2.0 < _LEAST_AREA:
+        raise UserError(f"{origin}: the faces have no area; a surface expected")
+
+
+def normalise(
+    mesh: trimesh.Trimesh, up: str, front: str, turn_deg: float, centre: Centre
+) -> trimesh.Trimesh:
+    """Return a mesh in the object frame, with a unit diagonal.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh
+        A mesh that passes `check_mesh`.
+    up, front, turn_deg
+        See `frame_rotation`.
+    centre : {"box", "origin"}
+        The vertical axis x = y = 0 passes through the middle of the bounding box, or through the
+        file's origin. The height is always centred on the box.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        The faces and the vertices that they use, in the same order.
+
+    Raises
+    ------
+    UserError
+        If an axis or `centre` is not valid.
+    """
+    import trimesh
+
+    if centre not in CENTRES:
+        raise UserError(f"centre={centre}: no such centre; {nearest(centre, CENTRES)}")
+    used, faces = np.unique(np.asarray(mesh.faces), return_inverse=True)
+    rotation = frame_rotation(up, front, turn_deg)
+    # Not with BLAS, whose rounding depends on the machine.
+    vertices = np.einsum("nj,ij->ni", np.asarray(mesh.vertices, dtype=np.float64)[used], rotation)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle = (low + high) / 2.0
+    if centre == "origin":
+        middle[:2] = 0.0
+    vertices = (vertices - middle) / math.hypot(*(high - low))
+    return trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False)
+
+
+# The kind and shape of each array in a file; None is any length.
 _FORMS: Mapping[str, tuple[str, tuple[int | None, ...]]] = {
     "ids": ("U", (None,)),
     "vertices": ("f", (None, 3)),
@@ -27,7 +196,7 @@ _FORMS: Mapping[str, tuple[str, tuple[int | None, ...]]] = {
     "face_offsets": ("i", (None,)),
 }
 _ROWS = {"vertex": "vertices", "face": "faces"}
-# Single precision keeps a diagonal of 1 to far less.
+# Far above the rounding of single precision.
 _EXTENT_TOLERANCE = 1e-4
 
 
@@ -44,7 +213,7 @@ class Surface(Protocol):
 
 
 class Mesh(NamedTuple):
-    """A triangle mesh in the types of the file.
+    """A normalised triangle mesh in the types of the file.
 
     Attributes
     ----------
@@ -59,18 +228,18 @@ class Mesh(NamedTuple):
 
 
 def as_mesh(surface: Surface) -> Mesh:
-    """Return a mesh in the types of the file."""
+    """Convert a mesh to the types of the file."""
     vertices = np.ascontiguousarray(surface.vertices, dtype=np.float32).reshape(-1, 3)
     faces = np.ascontiguousarray(surface.faces, dtype=np.int32).reshape(-1, 3)
     return Mesh(vertices, faces)
 
 
 def save_meshes(path: str | Path, meshes: Mapping[str, Surface]) -> None:
-    """Write meshes to an `.npz`; the same meshes make the same bytes.
+    """Write meshes to an `.npz`; the same meshes give the same bytes.
 
-    Its arrays are `ids` (n,) str, `vertices` (sum of n, 3) float32 and `faces` (sum of m, 3) int32
-    one mesh after the other, faces counting from their own mesh's first vertex, and
-    `vertex_offsets`, `face_offsets` (n + 1,) int64: mesh i takes rows offsets[i] to offsets[i + 1].
+    Its arrays are `ids` (n,) str; the concatenated `vertices` float32 and `faces` int32, whose
+    indices are relative to their own mesh; and `vertex_offsets` and `face_offsets` (n + 1,) int64:
+    mesh i has the rows offsets[i] to offsets[i + 1].
     """
     stored = [as_mesh(mesh) for mesh in meshes.values()]
     vertex_counts = [len(mesh.vertices) for mesh in stored]
@@ -86,18 +255,18 @@ def save_meshes(path: str | Path, meshes: Mapping[str, Surface]) -> None:
 
 
 def stored_ids(path: str | Path) -> list[str]:
-    """Return the ids in a file of `save_meshes`, in its order; errors as of `load_meshes`."""
+    """Return the ids in a file of `save_meshes`, with the errors of `load_meshes`."""
     return list(load_meshes(path))
 
 
 def load_meshes(path: str | Path) -> dict[str, Mesh]:
-    """Return the meshes in a file of `save_meshes`, in its order.
+    """Read the meshes of `save_meshes`.
 
     Raises
     ------
     UserError
-        Where the file is damaged: an array is missing or of another form, an id is there twice, or
-        a mesh has no faces, a face beyond its vertices or another size than one diagonal.
+        If the file is damaged: an array is missing or malformed, an id is duplicate, or a mesh has
+        no faces, an invalid index, or a diagonal other than 1.
     """
     arrays = read_arrays(path)
     if wrong := _wrong(arrays):
@@ -113,19 +282,19 @@ def load_meshes(path: str | Path) -> dict[str, Mesh]:
 
 
 def _wrong(arrays: Mapping[str, Any]) -> str:
-    """Return what is wrong with the arrays of a file as a whole, or nothing."""
+    """Return why a file's arrays are invalid, or an empty text."""
     for name, (kind, shape) in _FORMS.items():
         array = arrays.get(name)
         if array is None:
             return f"holds no array {name!r}"
-        # A member whose first bytes are damaged comes as bytes.
+        # numpy returns bytes if the first bytes of a member are damaged.
         if not isinstance(array, np.ndarray):
             return f"array {name!r} is damaged"
         if array.dtype.kind != kind or array.ndim != len(shape) or array.shape[1:] != shape[1:]:
             return f"array {name!r} has another form"
     ids = arrays["ids"]
     if len(np.unique(ids)) != len(ids):
-        return "an id is there twice"
+        return "an id is duplicate"
     for name in ("vertex", "face"):
         offsets, rows = arrays[f"{name}_offsets"], len(arrays[_ROWS[name]])
         ends = (offsets[0], offsets[-1]) if len(offsets) == len(ids) + 1 else None
@@ -138,54 +307,6 @@ def _is_sound(mesh: Mesh) -> bool:
     vertices, faces = mesh
     if not np.isfinite(vertices).all() or faces.min() < 0 or faces.max() >= len(vertices):
         return False
-    # In double precision, for damage may have made a number whose square overflows.
+    # In double precision, because the square of a damaged number may overflow.
     extent = np.ptp(vertices.astype(np.float64), axis=0)
     return abs(float(np.linalg.norm(extent)) - 1.0) < _EXTENT_TOLERANCE
-
-
-logger = logging.getLogger(__name__)
-
-_SECONDS_BETWEEN_LINES = 5.0
-
-
-def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str]) -> dict[str, Mesh]:
-    """Load, check and normalise meshes.
-
-    Parameters
-    ----------
-    source : MeshSource
-    category : str
-    object_ids : sequence of str
-
-    Returns
-    -------
-    dict of str to Mesh
-        In the order of `object_ids`.
-
-    Raises
-    ------
-    UserError
-        After all meshes are tried. It names the first bad one and the number of others; the log
-        has an error for each.
-    """
-    prepared: dict[str, Mesh] = {}
-    bad: list[str] = []
-    start = last = time.monotonic()
-    for done, object_id in enumerate(object_ids, 1):
-        try:
-            prepared[object_id] = as_mesh(source.load(category, object_id))
-        except UserError as error:
-            # The loop goes on, so that one run names every file to mend.
-            logger.error("%s", error)
-            bad.append(str(error))
-        now = time.monotonic()
-        if now - last >= _SECONDS_BETWEEN_LINES:
-            last = now
-            left = (now - start) / done * (len(object_ids) - done)
-            logger.info("%s: mesh %d of %d, %.0f s left", category, done, len(object_ids), left)
-    if bad:
-        more = f" (and {len(bad) - 1} more, logged above)" if len(bad) > 1 else ""
-        raise UserError(f"{bad[0]}{more}: mend the file or list its id in dataset.exclude")
-    seconds = time.monotonic() - start
-    logger.info("%s: %d meshes prepared in %.1f s", category, len(prepared), seconds)
-    return prepared

@@ -1,13 +1,13 @@
-"""Depth through OpenGL with pyrender, on EGL: it runs on a GPU and checks Embree's images.
+"""The pyrender renderer: OpenGL on EGL, for GPUs and to verify Embree's images.
 
-It draws the same views as Embree. Three of pyrender's habits need care:
+It draws the same views as Embree, with three precautions:
 
-- It draws into a multisampled buffer and keeps one sample of each pixel, which the driver places
-  off the pixel's centre. It gets a buffer of one sample, at the centre. To switch multisampling off
-  is not enough: NVIDIA's driver then still takes the depth where the sample lies.
-- It draws the depth of front faces only, whatever the material says. Collected meshes have faces
-  either way round, so it gets each face both ways.
-- Depth passes through a 24-bit buffer, so the near and far planes lie close to the object.
+- pyrender draws into a multisampled buffer and keeps one sample of each pixel, off its centre. It
+  is given a buffer with one sample, at the centre; switching multisampling off is not enough for
+  NVIDIA's driver.
+- It draws the depth of front faces only. Collected meshes have faces of either orientation, so each
+  face is drawn both ways.
+- Depth passes through a 24-bit buffer, so the near and far planes are close to the object.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ _INSTALL = (
 
 @cache
 def _offscreen() -> Any:
-    """Return the process's one OpenGL context: releasing a second would terminate the first."""
-    # Mesa and Triton, which torch's compiler loads, each bring an LLVM. Triton crashes the process
-    # if it comes second.
+    """Return the only OpenGL context: releasing a second one would terminate the first."""
+    # Mesa and Triton, which torch's compiler loads, each include LLVM. Triton crashes the process
+    # if it is loaded second.
     with contextlib.suppress(ImportError):
         import_module("triton")
 
     import pyrender
     from OpenGL import GL
 
-    def of_one_sample(target: int, _: int, kind: int, width: int, height: int) -> None:
+    def single_sample(target: int, _: int, kind: int, width: int, height: int) -> None:
         GL.glRenderbufferStorage(target, kind, width, height)
 
-    pyrender.renderer.glRenderbufferStorageMultisample = of_one_sample
+    pyrender.renderer.glRenderbufferStorageMultisample = single_sample
     return pyrender.OffscreenRenderer(1, 1)
 
 
@@ -55,17 +55,17 @@ class PyrenderRenderer:
     Raises
     ------
     UserError
-        On construction, where pyrender or EGL is missing or does not work.
+        If pyrender or EGL is missing or does not work.
     """
 
     def __init__(self) -> None:
-        # PyOpenGL reads this once, when it is first imported.
+        # PyOpenGL reads this when it is first imported.
         platform = os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
         if platform != "egl":
             raise UserError(
                 f"renderer=pyrender: PYOPENGL_PLATFORM={platform} is set; unset it or set it to egl"
             )
-        # No list of what loaders and drivers may raise is complete.
+        # Loaders and drivers may raise any exception.
         try:
             self._offscreen = _offscreen()
         except Exception as error:
@@ -80,10 +80,10 @@ class PyrenderRenderer:
         azimuths_deg: ArrayLike,
         camera: Camera,
     ) -> NDArray[np.float32]:
-        """Return depth images (k, side, side): see `nbv.data.renderers.Renderer.render`.
+        """Return depth images (k, side, side): see `nbv.data.render.Renderer.render`.
 
-        Depths are good to 1e-5 object diagonals (24-bit depth buffer). On a GPU they are those up
-        to 1/256 of a pixel away, which is 1e-5 at the median.
+        Depths are accurate to 1e-5 object diagonals (24-bit depth buffer). A GPU samples them up to
+        1/256 of a pixel off the centre, a median error of 1e-5.
         """
         import pyrender
 

@@ -1,9 +1,8 @@
-"""What a real camera does that nobody knows beforehand: drawn anew for each turn and each view.
+"""Domain randomisation of depth images, for the unknown properties of real cameras.
 
-Once for a turn: elevation, roll, the object's size and distance, and whether the sensor's noise is
-there at all. For each view: strips of the table that a mask takes along, an edge that is not where
-it seems, thin parts and dark insides without depth, other patches without depth, an occluder, and a
-crop that is off its middle.
+Drawn for each sweep: elevation, roll, the object's size and distance, and whether there is sensor
+noise. Drawn for each view: strips of the table within the mask, displaced edges, thin parts and
+dark insides without depth, other patches without depth, an occluder, and an off-centre crop.
 """
 
 from __future__ import annotations
@@ -19,46 +18,38 @@ from nbv.data.camera import Camera, Views, object_views
 from nbv.data.depth_codes import Depths, encode_depth
 from nbv.data.depth_images import Codes
 from nbv.data.meshes import Surface
-from nbv.data.renderers import Renderer
+from nbv.data.render import Renderer
 from nbv.data.sensors import Sensor
 
 Floats = NDArray[np.float64]
 
 HIGHEST_DEG = 85.0
-
-# A turn is drawn on a larger image, because objects of a random size have to fit.
-_MARGIN = 1.25
-# Of the table's depth from the object's, in diagonals: farther off a mask does not take it along.
-_TABLE_REACH = 0.7
-# Over how many pixels what moves an edge is smoothed.
-_EDGE_SMOOTHNESS = (1.0, 4.0)
-# Pixels; of an ellipse without depth.
-_PATCH_RADII = (0.7, 4.0)
+"""The highest random elevation."""
 
 
 @dataclass(frozen=True)
 class Randomisation:
-    """How much each unknown varies; 0 leaves it out.
+    """Ranges of the randomisation; 0 disables an effect.
 
     Attributes
     ----------
     elevation_deg, roll_deg : float
-        Half the range about the unit's elevation, and about 0.
+        Half the range around the unit's elevation, and around 0.
     size : float
-        Half the range of the object's size, relative to the usual one.
+        Half the range of the object's relative size.
     nearest, farthest : float or None
-        Distance of the camera, in diagonals; None: that of the training camera.
+        Range of the camera's distance, in diagonals; None is the training camera's distance.
     measured : float
-        Share of turns that the sensor measures; the others are free of noise.
+        Fraction of sweeps with sensor noise.
     table, thin, inside, occluded : float
-        Share of views with a strip of the table, without thin parts, without parts of the far
+        Fractions of views with a strip of the table, without thin parts, without parts of the far
         inside, and with an occluder.
     patches : float
         Mean number of patches without depth in a view.
     edge_px : float
-        Largest standard deviation of the place of an object's edge, in pixels of the crop.
+        Largest standard deviation of the position of an object's edge, in pixels of the crop.
     shift_px : float
-        Standard deviation of the crop's middle.
+        Standard deviation of the crop's centre, in pixels.
     """
 
     elevation_deg: float
@@ -76,7 +67,11 @@ class Randomisation:
     shift_px: float
 
 
-def randomised_turn(
+# Objects of a random size need a larger image.
+_MARGIN = 1.25
+
+
+def randomised_sweep(
     mesh: Surface,
     elevation_deg: float,
     azimuths_deg: Floats,
@@ -87,29 +82,29 @@ def randomised_turn(
     randomisation: Randomisation,
     rng: np.random.Generator,
 ) -> Codes:
-    """Return the encoded images of a turn, (k, side, side) uint8.
+    """Return the depth codes of a random sweep, (k, side, side) uint8.
 
     Parameters
     ----------
     mesh : mesh
-        Of unit diagonal.
+        A mesh of unit diagonal.
     elevation_deg : float
-        About which the turn's elevation is drawn, in [0, `HIGHEST_DEG`].
+        Centre of the random elevation, in [0, `HIGHEST_DEG`].
     azimuths_deg : (k,) float
     camera : Camera
-        Its distance and focal length give the size of a pixel on the object, and nothing else.
+        Its distance and focal length define the size of a pixel on the object.
     renderer : Renderer
     sensor : Sensor or None
     diagonal_m : float
         Metres per object diagonal, for the sensor.
     randomisation : Randomisation
     rng : numpy.random.Generator
-        Of this object and elevation alone.
+        A generator for this object and elevation alone.
 
     Raises
     ------
     UserError
-        Where an object does not fit the image.
+        If the object does not fit the image.
     """
     draw = randomisation
     lowest = max(elevation_deg - draw.elevation_deg, 0.0)
@@ -132,7 +127,7 @@ def randomised_turn(
 
 
 def _drawn_camera(camera: Camera, draw: Randomisation, rng: np.random.Generator) -> Camera:
-    """Return a camera elsewhere, whose pixels are as large on the object as before."""
+    """Return a camera at a random distance and roll, with the same pixel size on the object."""
     near, far = draw.nearest or camera.distance, draw.farthest or camera.distance
     distance = rng.uniform(near, far)
     side = math.ceil(camera.image_side * _MARGIN)
@@ -147,10 +142,14 @@ def _drawn_camera(camera: Camera, draw: Randomisation, rng: np.random.Generator)
     )
 
 
+# Largest difference in depth between the object and the table within its mask, in diagonals.
+_TABLE_REACH = 0.7
+
+
 def add_table(
     depth: Depths, views: Views, floor: float, share: float, rng: np.random.Generator
 ) -> None:
-    """Write strips of the plane z = floor at the lower edge of objects into their images."""
+    """Add strips of the plane z = floor at the lower edge of the object to its images."""
     camera, side = views.camera, depth.shape[-1]
     centres = np.arange(side) + 0.5
     for view in np.flatnonzero(rng.random(len(depth)) < share):
@@ -172,12 +171,15 @@ def add_table(
         patch[is_table] = table[is_table]
 
 
-def move_edge(image: Depths, edge_px: float, rng: np.random.Generator) -> None:
-    """Move an object's edge outwards here and inwards there, as masks and depth cameras do.
+# Range of the smoothing of edge displacements, in pixels.
+_EDGE_SMOOTHNESS = (1.0, 4.0)
 
-    What is added has the depth of the nearest pixel. How far the edge moves is a smooth random
-    field, whose standard deviation is drawn from 0 to `edge_px`; inwards by a pixel at most, or
-    handles would be lost, which is `lose`'s part.
+
+def move_edge(image: Depths, edge_px: float, rng: np.random.Generator) -> None:
+    """Displace an object's edge by a smooth random field, as masks and depth cameras do.
+
+    The field's standard deviation is drawn from 0 to `edge_px`. Added pixels have the depth of the
+    nearest pixel. The edge moves inwards by at most a pixel, to keep handles.
     """
     seen = image > 0
     if not seen.any():
@@ -186,10 +188,10 @@ def move_edge(image: Depths, edge_px: float, rng: np.random.Generator) -> None:
         rng.standard_normal(image.shape, dtype=np.float32), rng.uniform(*_EDGE_SMOOTHNESS)
     )
     field *= rng.uniform(0.0, edge_px) / field.std()
-    # No edge moves farther out than this.
+    # The edge stays within this window.
     near = _bounds(seen, math.ceil(max(float(field.max()), 0.0) + 0.5))
     image, seen, field = image[near], seen[near], np.maximum(field[near], -1.0)
-    # The edge is half a pixel from the middles of the pixels along it.
+    # The edge is half a pixel from the centres of the pixels along it.
     row, column = np.nonzero(~seen & (field > 0.5))
     nearest = ndimage.distance_transform_edt(~seen, return_distances=False, return_indices=True)
     nearest = nearest[:, row, column]
@@ -199,9 +201,9 @@ def move_edge(image: Depths, edge_px: float, rng: np.random.Generator) -> None:
 
 
 def _to_background_px(seen: NDArray[np.bool_]) -> Floats:
-    """Return how far each pixel is from one that is not seen: 1, √2, or 2 for all that is more.
+    """Return the distance of each pixel from the background: 1, √2, or 2 for all larger ones.
 
-    What lies outside the image counts as seen. At 2 no edge is moved inwards (`move_edge`).
+    The outside of the image does not count as background. At 2, `move_edge` has no effect.
     """
     padded = np.pad(seen, 1, constant_values=True)
     above, level, below = padded[:-2], padded[1:-1], padded[2:]
@@ -211,13 +213,17 @@ def _to_background_px(seen: NDArray[np.bool_]) -> Floats:
 
 
 def _bounds(seen: NDArray[np.bool_], margin: int = 0) -> tuple[slice, ...]:
-    """Return the smallest window around what is seen, and a margin as far as the image goes."""
+    """Return the bounding box of a mask, with a margin within the image."""
     (box,) = ndimage.find_objects(seen.view(np.uint8))
     return tuple(slice(max(side.start - margin, 0), side.stop + margin) for side in box)
 
 
+# Range of the radii of patches without depth, in pixels.
+_PATCH_RADII = (0.7, 4.0)
+
+
 def lose(image: Depths, draw: Randomisation, rng: np.random.Generator) -> None:
-    """Set pixels of one image to 0 that a camera would not measure."""
+    """Set pixels of an image to 0 that a camera would not measure."""
     if rng.random() < draw.thin:
         _lose_thin_parts(image, rng)
     if rng.random() < draw.inside:
@@ -230,24 +236,22 @@ def lose(image: Depths, draw: Randomisation, rng: np.random.Generator) -> None:
     reach = math.ceil(_PATCH_RADII[1])
     for _ in range(rng.poisson(draw.patches)):
         middle = rng.integers(len(seen))
-        radii, turn = rng.uniform(*_PATCH_RADII, 2), rng.uniform(0.0, math.pi)
+        radii, angle = rng.uniform(*_PATCH_RADII, 2), rng.uniform(0.0, math.pi)
         row, column = int(rows[middle]), int(columns[middle])
-        of_rows, of_columns = (
-            slice(max(place - reach, 0), place + reach + 1) for place in (row, column)
-        )
-        x, y = across[of_columns] - column, down[of_rows] - row
-        along = x * math.cos(turn) + y * math.sin(turn)
-        across_it = y * math.cos(turn) - x * math.sin(turn)
-        image[of_rows, of_columns][(along / radii[0]) ** 2 + (across_it / radii[1]) ** 2 < 1] = 0
+        row_slice, column_slice = (slice(max(i - reach, 0), i + reach + 1) for i in (row, column))
+        x, y = across[column_slice] - column, down[row_slice] - row
+        major = x * math.cos(angle) + y * math.sin(angle)
+        minor = y * math.cos(angle) - x * math.sin(angle)
+        image[row_slice, column_slice][(major / radii[0]) ** 2 + (minor / radii[1]) ** 2 < 1] = 0
     if rng.random() < draw.occluded:
-        turn, share = rng.uniform(0.0, 2 * math.pi), rng.uniform(0.02, 0.25)
-        place = across * math.cos(turn) + down * math.sin(turn)
-        edge = np.quantile(place[rows, columns], share)
-        image[place < edge] = 0
+        angle, share = rng.uniform(0.0, 2 * math.pi), rng.uniform(0.02, 0.25)
+        distance = across * math.cos(angle) + down * math.sin(angle)
+        edge = np.quantile(distance[rows, columns], share)
+        image[distance < edge] = 0
 
 
 def _lose_thin_parts(image: Depths, rng: np.random.Generator) -> None:
-    """Lose all thin parts, or one of them, such as a handle."""
+    """Remove all thin parts, or one of them, such as a handle."""
     seen = image > 0
     bulk = ndimage.binary_opening(seen, iterations=int(rng.integers(1, 4)))
     thin = seen & ~bulk
@@ -261,7 +265,7 @@ def _lose_thin_parts(image: Depths, rng: np.random.Generator) -> None:
 
 
 def _lose_inside(image: Depths, rng: np.random.Generator) -> None:
-    """Lose some of what lies far behind the front, as dark insides are lost."""
+    """Remove patches far behind the front, like dark insides."""
     seen = image > 0
     if not seen.any():
         return
@@ -272,7 +276,7 @@ def _lose_inside(image: Depths, rng: np.random.Generator) -> None:
 
 
 def _cropped(depth: Depths, side: int, shift_px: float, rng: np.random.Generator) -> Depths:
-    """Return images of a side with what is measured near the middle; what lies outside is cut."""
+    """Crop images to a side, with the measured pixels near the middle."""
     cropped = np.zeros((len(depth), side, side), dtype=depth.dtype)
     for image, out in zip(depth, cropped, strict=True):
         seen = image > 0
@@ -281,10 +285,10 @@ def _cropped(depth: Depths, side: int, shift_px: float, rng: np.random.Generator
         shift = np.rint(rng.normal(0.0, shift_px, 2)).astype(int) if shift_px else (0, 0)
         measured = image[_bounds(seen)]
         first = [(side - n) // 2 + int(by) for n, by in zip(measured.shape, shift, strict=True)]
-        kept = tuple(slice(max(-at, 0), max(side - at, 0)) for at in first)
+        kept = tuple(slice(max(-i, 0), max(side - i, 0)) for i in first)
         part = measured[kept]
         rows, columns = (
-            slice(max(at, 0), max(at, 0) + n) for at, n in zip(first, part.shape, strict=True)
+            slice(max(i, 0), max(i, 0) + n) for i, n in zip(first, part.shape, strict=True)
         )
         out[rows, columns] = part
     return cropped

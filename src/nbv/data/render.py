@@ -1,26 +1,89 @@
-"""Depth images of many objects."""
+"""Renderers, and the depth codes of sweeps of objects.
+
+The configuration names a renderer, and only that one is imported, so that its libraries are the
+only ones needed.
+"""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Mapping
-from typing import Any
+from importlib import import_module
+from typing import Any, Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import Depths, crop_measured, encode_depth, sensor_camera
 from nbv.data.depth_images import Codes
 from nbv.data.meshes import Surface
-from nbv.data.renderers import Renderer
 from nbv.data.sensors import Measure
-from nbv.errors import UserError
+from nbv.errors import UserError, nearest
 
 logger = logging.getLogger(__name__)
 
+RENDERERS: Mapping[str, str] = {
+    "embree": "nbv.data.embree:EmbreeRenderer",
+    "pyrender": "nbv.data.pyrender:PyrenderRenderer",
+}
+
+
+class Renderer(Protocol):
+    """The interface of a renderer."""
+
+    def render(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        elevation_deg: float,
+        azimuths_deg: ArrayLike,
+        camera: Camera,
+    ) -> NDArray[np.float32]:
+        """Render the depth images of a mesh.
+
+        Parameters
+        ----------
+        vertices : (n, 3) float
+            Object frame, in object diagonals.
+        faces : (m, 3) int
+            Indices into `vertices`; both sides of a face are visible.
+        elevation_deg : float
+            In [-90, 90].
+        azimuths_deg : (k,) float
+            Azimuths of the images.
+        camera : Camera
+
+        Returns
+        -------
+        (k, side, side) float32
+            Distance along the optical axis, in object diagonals; 0 for background. Pixel [row i,
+            column j] is sampled at its centre (i + 1/2, j + 1/2).
+
+        Raises
+        ------
+        UserError
+            If part of the object lies behind the camera or outside the image.
+        """
+        ...
+
+
+def open_renderer(name: str) -> Renderer:
+    """Return a renderer by name.
+
+    Raises
+    ------
+    UserError
+        For an unknown name, or if the renderer's libraries are missing.
+    """
+    if name not in RENDERERS:
+        raise UserError(f"renderer={name}: no such renderer; {nearest(name, RENDERERS)}")
+    module, _, attribute = RENDERERS[name].partition(":")
+    return cast("Renderer", getattr(import_module(module), attribute)())
+
+
 N_AZIMUTHS = 360
-"""Views of a full turn."""
+"""Views of a full sweep."""
 
 
 def render_objects(
@@ -31,7 +94,7 @@ def render_objects(
     measure: Measure | None = None,
     n_azimuths: int = N_AZIMUTHS,
 ) -> Iterator[Codes]:
-    """Yield the encoded depth images of each object.
+    """Yield the depth codes of each object's sweep.
 
     Parameters
     ----------
@@ -42,8 +105,8 @@ def render_objects(
     camera : Camera
     renderer : Renderer
     measure : callable or None
-        The sensor, from `nbv.data.sensors.open_sensor`. It measures the images, and the crop
-        follows what it measures (`nbv.data.depth_codes`). None keeps the true depth.
+        The sensor, from `nbv.data.sensors.open_sensor`, whose measurements are then cropped. None
+        keeps the true depth.
     n_azimuths : int
         View k is at azimuth 360 k / n_azimuths degrees.
 
@@ -55,9 +118,8 @@ def render_objects(
     Raises
     ------
     UserError
-        Naming the object that does not fit the image, that covers no pixel of a view, or of which
-        the sensor measures nothing in any view. Views in which it measures nothing are logged
-        otherwise.
+        Naming the object that does not fit the image, covers no pixel of a view, or is not measured
+        in any view. Single views without a measurement are logged.
     """
     drawn = camera if measure is None else sensor_camera(camera)
     azimuths_deg = np.arange(n_azimuths) * (360.0 / n_azimuths)

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from nbv.data.camera import Camera
 from nbv.data.mesh_reader import MeshReader
-from nbv.data.meshes import Mesh, as_mesh
-from nbv.data.normalisation import check_mesh, normalise
-from nbv.data.renderers import open_renderer
+from nbv.data.meshes import Mesh, as_mesh, check_mesh, normalise
+from nbv.data.render import open_renderer
 from nbv.data.sensors import Sensor
 from nbv.data.sensors.triangulation import Kinect, Stereo
 from nbv.data.sources.files import EXTENSIONS

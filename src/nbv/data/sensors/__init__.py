@@ -1,14 +1,13 @@
-"""Depth sensors: they turn true depth into measured depth.
+"""Depth sensors, which convert true depth to measured depth.
 
-A sensor is a class in a file of its own. Its fields are its parameters, and an instance maps the
-depth images of one object to what the sensor measures. The configuration names a sensor, and only
-that one is imported: an edit of one sensor renders no image of another again. `IDEAL` is the name
-of no sensor.
+A sensor is a class whose fields are its parameters; an instance maps the depth images of an object
+to measured images. The configuration names a sensor, and only that one is imported. `IDEAL` stands
+for true depth.
 
-A sensor has a size and a resolution, so the object needs a size in metres: `diagonal_m` is the
-diagonal of its bounding box, the unit of all depths. The camera's distance, in diagonals, scales
-with the object. Its image is a part of the sensor's image, resized to the nearest value: an angle
-covers ``camera.focal_px / focal_px of the sensor`` times as many pixels.
+A sensor needs the size of the object in metres: `diagonal_m` is the diagonal of its bounding box,
+the unit of all depths. The camera's distance in diagonals scales with the object. Its image is a
+part of the sensor's image, resized by nearest neighbours: an angle covers ``camera.focal_px /
+sensor.focal_px`` times as many pixels.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ SENSORS: Mapping[str, str] = {
 }
 
 Measure = Callable[[Depths, str], Depths]
-"""From the depth images of one object and its id to the measured images."""
+"""A function from the depth images of an object and its id to the measured images."""
 
 
 class Sensor(Protocol):
@@ -40,36 +39,36 @@ class Sensor(Protocol):
 
     @property
     def nearest_m(self) -> float:
-        """The shortest distance that it can measure, in metres."""
+        """The shortest measurable distance, in metres."""
         ...
 
     def __call__(
         self, depth: Depths, camera: Camera, diagonal_m: float, rng: np.random.Generator
     ) -> Depths:
-        """Return what the sensor measures of one object.
+        """Measure the depth images of an object.
 
         Parameters
         ----------
         depth : (k, side, side) float32
-            Distance along the optical axis, in object diagonals; 0 where there is nothing.
+            Distance along the optical axis, in object diagonals; 0 for background.
         camera : Camera
-            Its ``focal_px`` tells how many of the sensor's pixels one pixel covers. The sensor's
-            optical axis is taken to pass through the middle of the image.
+            Its ``focal_px`` gives the size of a pixel. The sensor's optical axis is assumed to pass
+            through the middle of the image.
         diagonal_m : float
             Metres per object diagonal.
         rng : numpy.random.Generator
-            Of this object alone.
+            A generator for this object alone.
 
         Returns
         -------
         (k, side, side) float32
-            Object diagonals; 0 where nothing is measured, which may be a whole image.
+            Object diagonals; 0 without a measurement.
         """
         ...
 
 
 def sensor_settings(sensor: Mapping[str, Any], category: str, seed: int) -> dict[str, Any]:
-    """Return the settings of ``sensor`` that the images of one category depend on.
+    """Return the settings of ``sensor`` for the images of a category.
 
     Parameters
     ----------
@@ -77,17 +76,17 @@ def sensor_settings(sensor: Mapping[str, Any], category: str, seed: int) -> dict
         ``name, parameters, diagonal_m``, the last with an entry for each category.
     category : str
     seed : int
-        The run's.
+        Seed of the run.
 
     Returns
     -------
     dict
-        The argument of `open_sensor`. Without a sensor neither sizes nor seed matter.
+        The argument of `open_sensor`; for `IDEAL` without size and seed.
 
     Raises
     ------
     UserError
-        Where the category's size is missing and the sensor needs it.
+        If the size of the category is missing and the sensor needs it.
     """
     if sensor["name"] == IDEAL:
         return {"name": IDEAL}
@@ -105,29 +104,29 @@ def sensor_settings(sensor: Mapping[str, Any], category: str, seed: int) -> dict
 
 
 def check_sensor(sensor: Mapping[str, Any], categories: Iterable[str]) -> None:
-    """Raise UserError where the configuration's ``sensor`` cannot be used for some category."""
+    """Raise UserError if the configuration's ``sensor`` cannot be used for a category."""
     for category in categories:
         settings = sensor_settings(sensor, category, 0)
         if settings["name"] != IDEAL:
             build_sensor(settings["name"], settings["parameters"])
 
 
-def open_sensor(settings: Mapping[str, Any], camera: Camera, *place: str | int) -> Measure | None:
-    """Return a sensor for the objects of one category at one elevation, or None for `IDEAL`.
+def open_sensor(settings: Mapping[str, Any], camera: Camera, *labels: str | int) -> Measure | None:
+    """Return a sensor for the objects of a category at an elevation, or None for `IDEAL`.
 
     Parameters
     ----------
     settings : mapping
-        From `sensor_settings`.
+        The settings of `sensor_settings`.
     camera : Camera
-    *place : str or int
-        Category and elevation. Together with the seed and an object's id they determine the
-        object's noise, which depends neither on other objects nor on their order.
+    *labels : str or int
+        Category and elevation. With the seed and an object's id they determine its noise, which
+        does not depend on other objects.
 
     Raises
     ------
     UserError
-        For an unknown sensor or parameter, and where the object is too near to be measured.
+        For an unknown sensor or parameter, or if the object is too near to be measured.
     """
     name = settings["name"]
     if name == IDEAL:
@@ -142,14 +141,14 @@ def open_sensor(settings: Mapping[str, Any], camera: Camera, *place: str | int) 
         )
 
     def measure(depth: Depths, object_id: str) -> Depths:
-        rng = rng_for(settings["seed"], "sensor", *place, object_id)
+        rng = rng_for(settings["seed"], "sensor", *labels, object_id)
         return sensor(depth, camera, diagonal_m, rng)
 
     return measure
 
 
 def build_sensor(name: str, parameters: Mapping[str, float]) -> Sensor:
-    """Return the sensor of a name.
+    """Return a sensor by name.
 
     Raises
     ------

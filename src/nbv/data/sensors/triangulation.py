@@ -1,12 +1,13 @@
-"""Noise, losses and shadows of depth cameras that triangulate: Kinect and stereo alike.
+"""Triangulating depth cameras, the Kinect and active stereo: noise, losses and shadows.
 
-Such a camera takes a small window of its image and finds the same window in the image of a second
-eye: another camera, or the projector's pattern. Three effects follow. Neighbours share noise
-because their windows overlap. Values are lost where the window shows more than one surface. The
-surface has a shadow where the second eye does not see it.
+Such a camera matches a small window of its image with the image of a second eye: another camera, or
+the projector's pattern. This has three effects. Neighbouring pixels share noise, because their
+windows overlap. Values are lost if the window shows more than one surface. Surfaces hidden from the
+second eye have no value.
 
-Throughout, z are depth images (k, rows, columns) float32 in metres, 0 where there is nothing, and
-``focal_px`` is the focal length in pixels of these images.
+Throughout, z are depth images (k, rows, columns) float32 in metres, 0 for background, and
+``focal_px`` is the focal length in pixels of these images. The functions on which both sensors are
+based come first, then `Kinect` with its published noise, then `Stereo`.
 """
 
 from __future__ import annotations
@@ -26,17 +27,17 @@ Metres = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 STEEPEST_DEG = 80.0
-"""Neighbours further apart in depth than on a surface at this incidence lie on two surfaces."""
+"""Neighbours farther apart in depth than on a surface at this incidence are on two surfaces."""
 
 FAINTEST_DEG = 60.0
-"""Up to this incidence no value is lost to incidence; see `is_lost`."""
+"""The largest incidence without losses due to incidence; see `is_lost`."""
 
 
 def incidence_rad(z: Metres, focal_px: float) -> Metres:
     """Return the angle between the surface's normal and the ray, in [0, π/2]; 0 for background.
 
-    A slope is the gentler of the differences to the two neighbours, so that an edge does not make
-    the surface next to it steep.
+    A slope is the smaller of the differences to the two neighbours, so that edges do not steepen
+    adjacent surfaces.
     """
     down, across = _slope(z, -2), _slope(z, -1)
     row, column = (
@@ -61,45 +62,44 @@ def _slope(z: Metres, axis: int) -> Metres:
 
 
 def same_surface(z: Metres, there: Metres, apart_px: float | Metres, focal_px: float) -> Mask:
-    """Say whether two pixels, `apart_px` from each other, show one surface (`STEEPEST_DEG`)."""
+    """Return whether two pixels, `apart_px` apart, show the same surface (`STEEPEST_DEG`)."""
     steepest = np.float32(math.tan(math.radians(STEEPEST_DEG)) / focal_px)
     return np.asarray((there > 0) & (np.abs(there - z) <= steepest * z * apart_px))
 
 
 def window_weights(width_px: float) -> NDArray[np.float64]:
-    """Return the share of each pixel that a window of a width covers, from end to end."""
+    """Return the fraction of each pixel in a row that a centred window covers."""
     reach = max(math.ceil(width_px / 2 - 0.5), 0)
     return np.clip(width_px / 2 + 0.5 - np.abs(np.arange(-reach, reach + 1)), 0, 1)
 
 
 def window_share(z: Metres, width_px: float, focal_px: float) -> Metres:
-    """Return the share of each pixel's window that shows the pixel's own surface, in [0, 1]."""
+    """Return the fraction of each pixel's window on the pixel's own surface, in [0, 1]."""
     weights = window_weights(width_px)
     reach = len(weights) // 2
     padded = np.pad(z, [(0, 0), (reach, reach), (reach, reach)])
-    # Where there is nothing, the window shows nothing.
-    seen, place = z > 0, np.flatnonzero(padded > 0)
-    own, of_own = z[seen], np.zeros(len(place), dtype=np.float32)
-    for down, of_row in enumerate(weights):
-        for across, of_column in enumerate(weights):
+    seen, index = z > 0, np.flatnonzero(padded > 0)
+    own, own_share = z[seen], np.zeros(len(index), dtype=np.float32)
+    for down, row_weight in enumerate(weights):
+        for across, column_weight in enumerate(weights):
             step = (down - reach) * padded.shape[-1] + across - reach
-            there = padded.ravel()[place + step]
+            there = padded.ravel()[index + step]
             apart = math.hypot(down - reach, across - reach)
-            weight = np.float32(of_row * of_column / weights.sum() ** 2)
-            of_own += weight * same_surface(own, there, apart, focal_px)
+            weight = np.float32(row_weight * column_weight / weights.sum() ** 2)
+            own_share += weight * same_surface(own, there, apart, focal_px)
     share = np.zeros_like(z)
-    share[seen] = of_own
+    share[seen] = own_share
     return share
 
 
 def window_noise(
     shape: tuple[int, ...], width_px: float, rng: np.random.Generator
 ) -> NDArray[np.float32]:
-    """Return standard normal noise; neighbours share it as far as their windows overlap."""
+    """Draw standard normal noise, correlated between pixels with overlapping windows."""
     weights = window_weights(width_px)
     weights /= np.sqrt((weights**2).sum())
     noise = rng.standard_normal(shape, dtype=np.float32)
-    # Wrapped, so that the variance is 1 up to the edge of the image.
+    # Wrapped, so that the variance is 1 at the edges of the image too.
     for axis in (-2, -1):
         noise = ndimage.correlate1d(noise, weights, axis=axis, mode="wrap")
     return noise
@@ -108,12 +108,12 @@ def window_noise(
 def is_lost(
     z: Metres, incidence: Metres, width_px: float, focal_px: float, rng: np.random.Generator
 ) -> Mask:
-    """Draw the pixels without a value because their window shows too little of the surface.
+    """Draw the pixels that have no value because their window shows too little of the surface.
 
-    A pixel keeps its value with a probability that is the product of two shares. One is the share
-    of the window that shows the surface: less at silhouettes, least on thin parts. The other is
-    the cosine of the incidence divided by that at `FAINTEST_DEG`, at most 1. Losses come in
-    patches as large as a window. These causes of loss are known; the product is our assumption.
+    The probability of a value is the product of two factors: the fraction of the window on the
+    surface, which is small at silhouettes and on thin parts; and the cosine of the incidence
+    relative to `FAINTEST_DEG`, at most 1. Losses come in patches as large as a window. These causes
+    of loss are known; the product is our assumption.
     """
     breadth = np.cos(incidence) / np.float32(math.cos(math.radians(FAINTEST_DEG)))
     kept = window_share(z, width_px, focal_px) * np.minimum(breadth, 1)
@@ -121,10 +121,10 @@ def is_lost(
 
 
 def is_hidden(z: Metres, focal_px: float, baseline_m: float) -> Mask:
-    """Say which pixels a second eye, `baseline_m` to the right, does not see.
+    """Return which pixels are hidden from a second eye, `baseline_m` to the right.
 
-    A pixel is hidden where another one of its row, nearer by more than one pixel of disparity,
-    falls on the same pixel of the second eye's image. A shadow lies to the left of what casts it.
+    A pixel is hidden if another pixel of its row, nearer by more than one pixel of disparity, falls
+    on the same pixel of the second eye's image. Shadows are on the left of objects.
     """
     seen = np.flatnonzero(z > 0)
     hidden = np.zeros(z.size, dtype=bool)
@@ -133,26 +133,25 @@ def is_hidden(z: Metres, focal_px: float, baseline_m: float) -> Mask:
         row, column = np.divmod(seen, z.shape[-1])
         shift = disparity - disparity.min()
         width = z.shape[-1] + math.ceil(shift.max()) + 1
-        place = row * width + np.rint(column - shift).astype(np.intp) + (width - z.shape[-1])
+        index = row * width + np.rint(column - shift).astype(np.intp) + (width - z.shape[-1])
         nearest = np.zeros(z.size // z.shape[-1] * width, dtype=np.float32)
-        np.maximum.at(nearest, place, disparity)
-        hidden[seen] = nearest[place] > disparity + 1
+        np.maximum.at(nearest, index, disparity)
+        hidden[seen] = nearest[index] > disparity + 1
     return hidden.reshape(z.shape)
 
 
 def displaced(
     measured: Metres, z: Metres, sigma_px: Metres, focal_px: float, rng: np.random.Generator
 ) -> Metres:
-    """Return measured depth with a normal error of position, which shows only at edges.
+    """Return measured depth with a normal error of position at edges.
 
-    Within a surface the published axial noise includes such errors. The place of an edge between
-    two pixel centres is unknown, so displacements are rounded at random, in proportion: on average
-    an edge then moves as far as one that lies anywhere in between.
+    Within a surface the published axial noise includes such errors. The position of an edge between
+    two pixel centres is unknown, so displacements are rounded at random without bias.
 
     Parameters
     ----------
     measured : (k, rows, columns) float32
-        Measured depth of each pixel, 0 for nothing.
+        Measured depth of each pixel, 0 without a measurement.
     z : (k, rows, columns) float32
         True depth.
     sigma_px : (k, rows, columns) float32
@@ -165,7 +164,7 @@ def displaced(
         shift = sigma_px * rng.standard_normal(z.shape, dtype=np.float32)
         shift += rng.random(z.shape, dtype=np.float32)
         shifts.append(np.floor(shift, out=shift).astype(np.int32))
-    # Far from the object, nothing takes the place of nothing.
+    # Displacements far from the object have no effect.
     farthest = max(int(np.abs(shift).max()) for shift in shifts)
     is_near = ndimage.maximum_filter((z > 0).any(axis=0), 2 * farthest + 1)
     moved = np.flatnonzero(((shifts[0] != 0) | (shifts[1] != 0)) & is_near)
@@ -192,8 +191,8 @@ _GRAZING_RAD = math.radians(60.0)
 def axial_m(z: Metres, incidence: Metres) -> Metres:
     """Return the standard deviation of depth, in metres (Nguyen et al.).
 
-    ``0.0012 + 0.0019 (z - 0.4)²``, and from 60° of incidence on ``0.0001 θ² / (√z (π/2 - θ)²)``
-    more. Above `STEEPEST_DEG`, where the sensor hardly measures anything, it is constant.
+    It is ``0.0012 + 0.0019 (z - 0.4)²``, plus ``0.0001 θ² / (√z (π/2 - θ)²)`` for incidences θ
+    above 60°, constant above `STEEPEST_DEG`, where measurements are rare.
     """
     axial: Metres = np.float32(0.0012) + np.float32(0.0019) * np.square(z - np.float32(0.4))
     root: Metres = np.sqrt(z)
@@ -202,7 +201,7 @@ def axial_m(z: Metres, incidence: Metres) -> Metres:
 
 
 def lateral_px(incidence: Metres) -> Metres:
-    """Return the standard deviation of an edge's place, in the sensor's pixels (Nguyen et al.)."""
+    """Return the standard deviation of an edge's position, in sensor pixels (Nguyen et al.)."""
     return np.float32(0.8) + np.float32(0.035) * _slant(incidence)
 
 
@@ -212,12 +211,12 @@ def _slant(incidence: Metres) -> Metres:
 
 
 def step_m(z: Metres) -> Metres:
-    """Return the distance between neighbouring depths that can be measured, in metres."""
+    """Return the distance between neighbouring measurable depths, in metres."""
     return np.float32(STEP_PER_M) * z**2
 
 
 def quantised(z: Metres) -> Metres:
-    """Return the nearest depth that can be measured, in metres; 0 out of range."""
+    """Return the nearest measurable depth, in metres; 0 out of range."""
     level = np.rint((np.float32(NEAREST_PER_M) - 1 / z) / np.float32(STEP_PER_M))
     inverse = np.float32(NEAREST_PER_M) - np.float32(STEP_PER_M) * level
     in_range = (level >= 0) & (inverse > 0)
@@ -232,9 +231,9 @@ class Kinect:
     Attributes
     ----------
     focal_px : float
-        Focal length in the sensor's pixels, the unit of lateral noise and window.
+        Focal length in sensor pixels, the unit of lateral noise and window.
     baseline_m : float
-        From the camera to the projector, which casts shadows.
+        Distance from the camera to the projector.
     window_px : float
         Side of the correlation window.
     """
@@ -245,13 +244,13 @@ class Kinect:
 
     @property
     def nearest_m(self) -> float:
-        """The shortest distance that it can measure, in metres."""
+        """The shortest measurable distance, in metres."""
         return 1 / NEAREST_PER_M
 
     def __call__(
         self, depth: Depths, camera: Camera, diagonal_m: float, rng: np.random.Generator
     ) -> Depths:
-        """Return measured depth: see `nbv.data.sensors.Sensor`."""
+        """Measure depth; see `nbv.data.sensors.Sensor`."""
         z = depth * np.float32(diagonal_m)
         focal = camera.focal_px
         per_pixel = focal / self.focal_px
@@ -259,7 +258,7 @@ class Kinect:
         incidence = incidence_rad(z, focal)
         seen = z > 0
         there = z[seen]
-        # The published noise is that of quantised depth and includes the steps.
+        # The published noise of quantised depth includes the steps.
         variance = np.square(axial_m(there, incidence[seen])) - np.square(step_m(there)) / 12
         sigma: Metres = np.sqrt(variance)
         noise = window_noise(z.shape, window, rng)[seen]
@@ -273,7 +272,7 @@ class Kinect:
 
 STEPS_PER_PX = 32
 LARGEST_PX = 126
-"""The largest disparity that the camera searches."""
+"""The camera's largest disparity."""
 
 
 @dataclass(frozen=True)
@@ -283,11 +282,11 @@ class Stereo:
     Attributes
     ----------
     focal_px : float
-        Focal length in the sensor's pixels, the unit of noise and window.
+        Focal length in sensor pixels, the unit of noise and window.
     baseline_m : float
-        From the left camera, whose image it is, to the right one.
+        Distance from the left camera, which takes the image, to the right one.
     disparity_noise_px : float
-        Standard deviation of a disparity. That of depth is ``z² disparity_noise_px / (focal_px
+        Standard deviation of a disparity; depth has ``z² disparity_noise_px / (focal_px
         baseline_m)``.
     window_px : float
         Side of the correlation window.
@@ -300,13 +299,13 @@ class Stereo:
 
     @property
     def nearest_m(self) -> float:
-        """The shortest distance that it can measure, in metres."""
+        """The shortest measurable distance, in metres."""
         return self.focal_px * self.baseline_m / LARGEST_PX
 
     def __call__(
         self, depth: Depths, camera: Camera, diagonal_m: float, rng: np.random.Generator
     ) -> Depths:
-        """Return measured depth: see `nbv.data.sensors.Sensor`."""
+        """Measure depth; see `nbv.data.sensors.Sensor`."""
         z = depth * np.float32(diagonal_m)
         focal = camera.focal_px
         window = self.window_px * focal / self.focal_px

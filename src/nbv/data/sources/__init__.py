@@ -1,26 +1,31 @@
-"""Sources of meshes: one module for each, named in the configuration.
+"""Sources of meshes, selected by name in the configuration.
 
-Snakemake lists the objects each time it parses the workflow. Listing therefore loads no mesh and
-imports no mesh library.
+Snakemake lists the objects whenever it parses the workflow, so listing neither loads a mesh nor
+imports a mesh library.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import logging
+import time
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from nbv.data.meshes import Mesh, as_mesh
 from nbv.errors import UserError, nearest
 
 if TYPE_CHECKING:
     import trimesh
 
+logger = logging.getLogger(__name__)
+
 SOURCES: Mapping[str, str] = {
     "folder": "nbv.data.sources.files:FolderSource",
     "modelnet": "nbv.data.sources.files:ModelNetSource",
     "procedural": "nbv.data.sources.procedural:ProceduralSource",
-    "shapenet": "nbv.data.sources.shapenet:open_shapenet",
+    "shapenet": "nbv.data.sources.files:open_shapenet",
 }
 
 
@@ -32,9 +37,9 @@ class MeshSource(Protocol):
     name : str
         Its name in the configuration.
     seed : int
-        Decides which objects are selected where there are more than needed.
+        Seed of the selection of objects.
     endless : bool
-        Whether it makes objects on demand; the first N then serve as well as any others.
+        Whether it generates objects on demand, so that the first N are as good as any.
     """
 
     name: str
@@ -42,21 +47,21 @@ class MeshSource(Protocol):
     endless: bool
 
     def object_ids(self, category: str) -> list[str]:
-        """Return the sorted ids of all objects without the excluded ones; load no object.
+        """Return the sorted ids of all objects that are not excluded.
 
         Raises
         ------
         UserError
-            If the configured place lacks the data or the category.
+            If the configured folder lacks the data or the category.
         """
         ...
 
     def whereabouts(self, category: str) -> str:
-        """Return the place of a category's objects, for messages."""
+        """Return the location of a category's objects, for messages."""
         ...
 
     def load(self, category: str, object_id: str) -> trimesh.Trimesh:
-        """Return one object, checked and normalised.
+        """Load an object, check and normalise it.
 
         Raises
         ------
@@ -72,7 +77,7 @@ def open_source(settings: Mapping[str, Any], seed: int) -> MeshSource:
     Parameters
     ----------
     settings : mapping
-        The configuration's group `dataset`.
+        The configuration's group ``dataset``.
     seed : int
         See `MeshSource`.
 
@@ -91,8 +96,8 @@ def open_source(settings: Mapping[str, Any], seed: int) -> MeshSource:
 def select_objects(source: MeshSource, category: str, n_objects: int | None) -> list[str]:
     """Select objects of a category.
 
-    The selection depends only on the seed and the ids. A file added to a folder displaces at most
-    one selected object, whose place it takes.
+    The selection depends only on the seed and the ids. A new file in a folder replaces at most one
+    selected object.
 
     Parameters
     ----------
@@ -104,7 +109,7 @@ def select_objects(source: MeshSource, category: str, n_objects: int | None) -> 
     Returns
     -------
     list of str
-        Ids, sorted.
+        Sorted ids.
 
     Raises
     ------
@@ -130,8 +135,54 @@ def select_objects(source: MeshSource, category: str, n_objects: int | None) -> 
     if source.endless:
         return available[:n_objects]
 
-    def lot(object_id: str) -> bytes:
+    def rank(object_id: str) -> bytes:
         text = f"{source.seed}/{category}/{object_id}"
         return hashlib.blake2b(text.encode(), digest_size=16).digest()
 
-    return sorted(sorted(available, key=lot)[:n_objects])
+    return sorted(sorted(available, key=rank)[:n_objects])
+
+
+_SECONDS_BETWEEN_LINES = 5.0
+
+
+def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str]) -> dict[str, Mesh]:
+    """Load, check and normalise meshes.
+
+    Parameters
+    ----------
+    source : MeshSource
+    category : str
+    object_ids : sequence of str
+
+    Returns
+    -------
+    dict of str to Mesh
+        In the order of `object_ids`.
+
+    Raises
+    ------
+    UserError
+        After all meshes are tried, naming the first bad one and the number of others. The log has
+        an error for each.
+    """
+    prepared: dict[str, Mesh] = {}
+    bad: list[str] = []
+    start = last = time.monotonic()
+    for done, object_id in enumerate(object_ids, 1):
+        try:
+            prepared[object_id] = as_mesh(source.load(category, object_id))
+        except UserError as error:
+            # Continue, so that a single run names every bad file.
+            logger.error("%s", error)
+            bad.append(str(error))
+        now = time.monotonic()
+        if now - last >= _SECONDS_BETWEEN_LINES:
+            last = now
+            left = (now - start) / done * (len(object_ids) - done)
+            logger.info("%s: mesh %d of %d, %.0f s left", category, done, len(object_ids), left)
+    if bad:
+        more = f" (and {len(bad) - 1} more, logged above)" if len(bad) > 1 else ""
+        raise UserError(f"{bad[0]}{more}: mend the file or list its id in dataset.exclude")
+    seconds = time.monotonic() - start
+    logger.info("%s: %d meshes prepared in %.1f s", category, len(prepared), seconds)
+    return prepared

@@ -1,18 +1,18 @@
-"""The generated objects as a source: see `nbv.data.procedural`."""
+"""The source of procedural objects; see `nbv.data.procedural`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from nbv.data.normalisation import check_mesh, normalise
+from nbv.data.meshes import check_mesh, normalise
 from nbv.data.sources.files import exclusions
 from nbv.errors import UserError, nearest
 
 if TYPE_CHECKING:
     import trimesh
 
-# The keys of nbv.data.procedural.CATEGORIES, whose import would import trimesh.
+# The keys of nbv.data.procedural.CATEGORIES, which imports trimesh.
 CATEGORIES = ("airplane", "car", "chair", "mug", "toilet")
 
 # Ids have four digits.
@@ -20,7 +20,7 @@ _N_OBJECTS = 10_000
 
 
 class ProceduralSource:
-    """Objects "mug-0000", "mug-0001", … made from the seed; `dataset.root` does not matter."""
+    """Objects "mug-0000", "mug-0001", … generated from the seed."""
 
     name = "procedural"
     endless = True
@@ -30,7 +30,7 @@ class ProceduralSource:
         self._settings = settings
 
     def object_ids(self, category: str) -> list[str]:
-        """Return all possible ids without the excluded ones."""
+        """Return all ids that are not excluded."""
         if category not in CATEGORIES:
             raise UserError(
                 f"dataset=procedural has no category {category}; {nearest(category, CATEGORIES)}"
@@ -44,7 +44,7 @@ class ProceduralSource:
         return f"the generator of {category} meshes"
 
     def load(self, category: str, object_id: str) -> trimesh.Trimesh:
-        """Make one object of the seed, the category, its number and the settings of mugs."""
+        """Generate an object and normalise it."""
         from nbv.data.procedural import generate
 
         number = object_id.removeprefix(f"{category}-")

@@ -107,7 +107,7 @@ class Dataset(Section):
 
 
 class Renderer(Section):
-    """Which renderer draws depth; see `nbv.data.renderers`."""
+    """Which renderer draws depth; see `nbv.data.render`."""
 
     name: str
 
