@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, and the same content gives the same bytes."""
+"""Files: atomic writers with reproducible bytes, and readers whose errors name the file."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 
 RUN_AGAIN = "delete the file and run the same command again"
-"""What mends a file of a run."""
+"""Remedy for a damaged file of a run."""
 
-CALIBRATE_AGAIN = f"make it again with nbv calibrate, or where it is of a run, {RUN_AGAIN}"
-"""What mends a table that either made."""
+CALIBRATE_AGAIN = f"make it again with nbv calibrate, or for a file of a run, {RUN_AGAIN}"
+"""Remedy for a damaged table of nbv calibrate or of a run."""
 
 
 _COMPRESSED = (".gz", ".bz2", ".xz", ".zip")
@@ -34,12 +34,12 @@ _COMPRESSED = (".gz", ".bz2", ".xz", ".zip")
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path in the folder of `path`; it replaces `path` when the block succeeds.
+    """Yield a temporary path in the folder of `path`; it replaces `path` if the block succeeds.
 
-    The temporary path keeps the suffix, for writers that choose a format by it. An error removes
-    the temporary file and leaves `path` as it was. A name is used once: whoever still writes the
-    same file, such as a job whose run was killed, loses its temporary file here and fails. An
-    OSError of the temporary file, or of no file, such as of a full disk, names `path`.
+    The temporary path keeps the suffix, which some writers use to choose a format. An error removes
+    the temporary file and leaves `path` unchanged. Temporary files of other writers of `path`, such
+    as a job whose run was killed, are removed, so that they fail. An OSError without a file, such
+    as for a full disk, or with the temporary file names `path`.
     """
     target = as_path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -51,13 +51,13 @@ def replacing(path: str | Path) -> Iterator[Path]:
         temporary.replace(target)
     except OSError as error:
         if error.errno is None:
-            # numpy's, of a disk that is full.
+            # numpy raises this for a full disk.
             raise OSError(errno.EIO, f"cannot be written ({error})", str(target)) from error
         if error.filename in (None, temporary, str(temporary)):
             error.filename = str(target)
         raise
     finally:
-        # Where it cannot be removed, what went wrong before says why.
+        # If it cannot be removed, the previous error tells why.
         with suppress(OSError):
             temporary.unlink()
 
@@ -74,25 +74,25 @@ def write_json(path: str | Path, value: Any) -> None:
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
-    """Write a frame without its index; round floats to `decimals`, leave absent values empty."""
+    """Write a frame without its index; floats are rounded, missing values are empty."""
     with replacing(path) as temporary:
         frame.round(decimals).to_csv(temporary, index=False, lineterminator="\n")
 
 
 @contextmanager
 def readable(path: str | Path, remedy: str = RUN_AGAIN) -> Iterator[None]:
-    """Turn whatever a reader raises on a damaged file into one line that names the file.
+    """Convert any error of a reader into a UserError that names the file.
 
     Parameters
     ----------
     path : path
     remedy : str
-        What to do where it is damaged.
+        The remedy for a damaged file.
 
     Raises
     ------
     UserError
-        Where the file is missing, or what the block reads of it cannot be read.
+        If the file is missing, or the block cannot read it.
     """
     try:
         yield
@@ -100,46 +100,42 @@ def readable(path: str | Path, remedy: str = RUN_AGAIN) -> Iterator[None]:
         raise
     except FileNotFoundError as error:
         raise UserError(f"{path} does not exist; finish the run first") from error
-    # No list of what a reader may raise on arbitrary bytes is complete.
+    # A reader may raise any exception on arbitrary bytes.
     except Exception as error:
         raise damaged(path, f"cannot be read ({reason_of(error)})", remedy) from error
 
 
 def missing(path: str | Path) -> str:
-    """Return what is wrong with a path where there is no file."""
+    """Return why a path is not a file."""
     return "is a folder" if Path(path).is_dir() else "does not exist"
 
 
 def damaged(path: str | Path, what: str, remedy: str = RUN_AGAIN) -> UserError:
-    """Return the error of a file that holds what none of the project's writers writes."""
+    """Return the error for a file with content that none of the project's writers produces."""
     return UserError(f"{path}: {what}; {remedy}")
 
 
 def as_path(value: str | Path) -> Path:
-    """Return a path; UserError where it is none."""
+    """Convert a value to a path; raise UserError if it is not a file name."""
     try:
         return Path(value)
     except TypeError:
-        raise UserError(f"{value!r} is no name of a file") from None
+        raise UserError(f"{value!r} is not a file name") from None
 
 
 def calibrated_file(path: str | Path) -> Path:
-    """Return the path of a file that nbv calibrate, or a run, wrote; UserError where none is."""
-    if not (found := as_path(path)).is_file():
+    """Return the path of a file of nbv calibrate or a run; raise UserError if it is missing."""
+    file = as_path(path)
+    if not file.is_file():
         raise UserError(f"{path} {missing(path)}; name the file that nbv calibrate wrote")
-    return found
+    return file
 
 
 def read_csv(path: str | Path) -> pd.DataFrame:
-    """Read what `write_csv` wrote.
+    """Read a file of `write_csv`, with the errors of `readable`.
 
-    Object ids stay text as written (``007``, ``NA``, ``null``). In other columns an empty cell,
-    and nothing else, is an absent value.
-
-    Raises
-    ------
-    UserError
-        As of `readable`.
+    Object ids stay text (``007``, ``NA``, ``null``). In other columns only empty cells are missing
+    values.
     """
     import pandas as pd  # here, so that loading a lookup table costs no import of pandas
 
@@ -150,7 +146,7 @@ def read_csv(path: str | Path) -> pd.DataFrame:
 
 
 def check_columns(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
-    """Raise UserError where a column is missing, or there is no row."""
+    """Raise UserError if a column is missing or there are no rows."""
     for name in columns:
         if name not in frame.columns:
             raise damaged(path, f"no column {name!r}")
@@ -159,14 +155,14 @@ def check_columns(path: str | Path, frame: pd.DataFrame, columns: Iterable[str])
 
 
 def write_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write named arrays as a compressed `.npz` (same bytes: numpy dates its members 1980)."""
-    # An open file, because numpy adds a suffix to names in capitals.
+    """Write named arrays as a compressed `.npz`; its bytes are reproducible."""
+    # An open file, because numpy adds a suffix to upper-case names.
     with replacing(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
 def open_array(path: str | Path) -> NDArray[Any]:
-    """Map an array stored as `.npy` into memory, read-only; errors as of `readable`."""
+    """Map an `.npy` file into memory, read-only, with the errors of `readable`."""
     with readable(path):
         stored = np.load(path, mmap_mode="r", allow_pickle=False)
         if not isinstance(stored, np.ndarray):
@@ -175,12 +171,14 @@ def open_array(path: str | Path) -> NDArray[Any]:
 
 
 def read_text(path: Path) -> str:
-    """Return a text that a user wrote, which may begin with a byte order mark.
+    """Read a user's text, which may begin with a byte order mark.
 
     Raises
     ------
     UserError
-        Where it is not UTF-8; it names the line. What else is wrong with the file is an OSError.
+        If a line is not UTF-8.
+    OSError
+        If the file cannot be read.
     """
     content = path.read_bytes()
     try:
@@ -192,20 +190,20 @@ def read_text(path: Path) -> str:
 
 
 def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.DataFrame:
-    """Read a user's CSV file as text: an object may be called NA.
+    """Read a user's CSV file as text, so that an object may be called NA.
 
     Parameters
     ----------
     path : path
     needed : sequence of str
-        Columns that it must have.
+        Required columns.
     frames_hint : str
-        What the message adds where one is missing, and a column ``file`` names frames.
+        Hint for a missing column if a column ``file`` names frames.
 
     Raises
     ------
     UserError
-        Where it cannot be read, a column of `needed` is missing, or it has no rows.
+        If the file cannot be read, a column is missing, or there are no rows.
     """
     import pandas as pd  # here, so that loading a lookup table costs no import of pandas
 
@@ -222,7 +220,7 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     for name in needed:
         if name not in table:
-            hint = "; commas stand between columns" if table.shape[1] == 1 else ""
+            hint = "; separate columns by commas" if table.shape[1] == 1 else ""
             hint = frames_hint if "file" in table else hint
             raise UserError(f"{path}: no column {name!r}; it needs {', '.join(needed)}{hint}")
     if table.empty:
@@ -231,12 +229,12 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
 
 
 def read_numbers(path: Path) -> NDArray[Any]:
-    """Return the numbers of a file that a user wrote: ``.npy``, ``.json``, or text.
+    """Read the numbers of a user's file: ``.npy``, ``.json``, or text.
 
     Raises
     ------
     UserError
-        Where the file does not exist, or cannot be read.
+        If the file does not exist or cannot be read.
     """
     try:
         if path.suffix.lower() == ".npy":
@@ -249,7 +247,7 @@ def read_numbers(path: Path) -> NDArray[Any]:
         raise
     except FileNotFoundError as error:
         raise UserError(f"{path} does not exist") from error
-    # No list of what a reader may raise on arbitrary bytes is complete.
+    # A reader may raise any exception on arbitrary bytes.
     except Exception as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
 
@@ -257,20 +255,20 @@ def read_numbers(path: Path) -> NDArray[Any]:
 def read_arrays(
     path: str | Path, names: Iterable[str] = (), remedy: str = RUN_AGAIN
 ) -> dict[str, NDArray[Any]]:
-    """Read a whole `.npz` written by `write_arrays`.
+    """Read an `.npz` of `write_arrays`.
 
     Parameters
     ----------
     path : path
     names : iterable of str
-        Arrays that have to be there.
+        Required arrays.
     remedy : str
-        See `readable`.
+        The remedy for a damaged file.
 
     Raises
     ------
     UserError
-        Where one of `names` is missing, and as of `readable`.
+        If an array is missing, and the errors of `readable`.
     """
     with readable(path, remedy), np.load(path, allow_pickle=False) as stored:
         arrays = {name: stored[name] for name in stored.files}
@@ -286,40 +284,34 @@ def check_distributions(
     shape: tuple[int, ...],
     remedy: str = RUN_AGAIN,
 ) -> None:
-    """Raise UserError where the rows of an array of that shape are no distributions.
+    """Raise UserError unless an array has a shape and its rows are distributions.
 
-    They may miss a sum of 1 by what single precision rounds. For the remedy see `readable`.
+    Sums may differ from 1 by the rounding of single precision.
     """
     if densities.shape != shape:
-        what = f"an array has the shape {densities.shape} in place of {shape}"
+        what = f"an array has the shape {densities.shape} instead of {shape}"
         raise damaged(path, what, remedy)
     sums = densities.sum(axis=-1, dtype=np.float64)
-    # Written so that NaN is refused as well.
+    # NaN is refused too.
     if not ((densities >= 0).all() and (np.abs(sums - 1.0) < 1e-3).all()):
-        what = "a row is no distribution: it is negative or does not sum to 1"
+        what = "a row is not a distribution: it is negative or does not sum to 1"
         raise damaged(path, what, remedy)
 
 
 def read_json(path: str | Path) -> Any:
-    """Read what `write_json` wrote; errors as of `readable`."""
+    """Read a file of `write_json`, with the errors of `readable`."""
     with readable(path):
         return json.loads(Path(path).read_text(encoding="utf-8"))
 
 
 def existing(path: str | Path) -> Path:
-    """Return `path`.
-
-    Raises
-    ------
-    UserError
-        If no file is there.
-    """
+    """Return `path`; raise UserError if it is not a file."""
     if not Path(path).is_file():
         raise UserError(f"{path} does not exist; finish the run first, or is it another folder?")
     return Path(path)
 
 
 def sha256_of(path: str) -> str:
-    """Return the SHA-256 of a file, in hexadecimal."""
+    """Return the hexadecimal SHA-256 of a file."""
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

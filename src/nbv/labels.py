@@ -1,4 +1,4 @@
-"""How numbers, intervals, methods and categories are printed, everywhere alike."""
+"""Printed forms of numbers, intervals, methods and categories."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ _METHOD_LABELS: Mapping[str, str] = {
 
 
 def method_label(method: str) -> str:
-    """Return a method's name as tables and figures print it."""
+    """Return a method's name for tables and figures."""
     return _METHOD_LABELS.get(method, method.replace("_", " ").capitalize())
 
 
 def category_label(category: str) -> str:
-    """Return a category's name as tables and figures print it."""
+    """Return a category's name for tables and figures."""
     return category.replace("_", " ").capitalize()
 
 
 def number(value: float, decimals: int = 2) -> str:
-    """Return a number with a true minus sign; an en dash where there is none."""
+    """Return a number with a true minus sign, or an en dash if it is not finite."""
     if not math.isfinite(value):
         return "–"
     text = f"{value:.{decimals}f}"
@@ -40,7 +40,7 @@ def interval_text(value: float, low: float, high: float, decimals: int = 2) -> s
 
 
 def duration(seconds: float) -> str:
-    """Return a span of time such as ``1 h 10 min``, ``3 min 20 s`` or ``48 min``."""
+    """Return a duration such as ``1 h 10 min``, ``3 min 20 s`` or ``48 min``."""
     if seconds >= 3600:
         counts, units = divmod(round(seconds / 60), 60), ("h", "min")
     else:
@@ -50,5 +50,5 @@ def duration(seconds: float) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """Return how many there are of what has a regular plural: ``1 view``, ``2 views``."""
+    """Return a number and a noun with a regular plural: ``1 view``, ``2 views``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -154,7 +154,7 @@ def test_a_table_that_cannot_be_is_refused(tmp_path, damage):
     ("name", "content", "message"),
     [
         ("no.npz", None, "no.npz does not exist; name the file that nbv calibrate wrote"),
-        ("cut.npz", b"PK\x03\x04", "it is no .npz file, or only a part of one"),
+        ("cut.npz", b"PK\x03\x04", "it is not an .npz file, or only a part of one"),
         ("one.npy", b"", "one.npy: cannot be read "),
     ],
 )

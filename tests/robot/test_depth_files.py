@@ -305,7 +305,7 @@ def test_missing_files_and_other_kinds_are_named(tmp_path, read):
         read(tmp_path / "a.jpg")
     with pytest.raises(UserError, match="cannot be read"):
         read(tmp_path / ("x" * 300 + ".npy"))
-    with pytest.raises(UserError, match="3 is no name of a file"):
+    with pytest.raises(UserError, match="3 is not a file name"):
         read(3)
 
 

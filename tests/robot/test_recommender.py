@@ -875,7 +875,7 @@ def test_an_argument_of_another_type_is_one_line(recommender, options, message):
 
 def test_a_recommender_is_of_a_bundle(bundle):
     for name in (3, None):
-        with pytest.raises(UserError, match=f"{name} is no name of a file"):
+        with pytest.raises(UserError, match=f"{name} is not a file name"):
             Recommender.load(name)
     with pytest.raises(UserError, match="'mug' is no bundle; give its name or file to Recommen"):
         Recommender("mug")

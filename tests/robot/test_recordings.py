@@ -150,7 +150,7 @@ def test_a_file_occurs_once_in_a_sequence(folder):
 
 def test_commas_stand_between_columns(folder):
     table().to_csv(folder / "manifest.csv", index=False, sep=";")
-    assert refused(folder / "manifest.csv").endswith("; commas stand between columns")
+    assert refused(folder / "manifest.csv").endswith("; separate columns by commas")
 
 
 @pytest.mark.parametrize("column", ["object_id", "sequence", "file", "azimuth_deg"])
