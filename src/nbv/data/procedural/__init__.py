@@ -1,8 +1,8 @@
-"""Generated objects of five categories: the data set without a download.
+"""Procedural objects of five categories: a data set without a download.
 
-An object is a pure function of (seed, category, index); a mug's handle may have a least reach, and
-a share of mugs a square body. Its frame is the object frame: z up, front +x, turning axis x = y =
-0, a mug's handle at azimuth 270 degrees. Its scale is arbitrary.
+An object is a pure function of seed, category, index and, for mugs, the least reach of handles and
+the share of square bodies. Its frame is the object frame: z up, front +x, vertical axis x = y = 0,
+a mug's handle at azimuth 270 degrees. Its scale is arbitrary.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CATEGORIES: dict[str, Callable[[np.random.Generator], trimesh.Trimesh]] = {
 }
 
 MOST_LEAST_REACH = 0.5
-"""About every eighth mug has a reach of 0.5. Above it, finding one would take many draws."""
+"""About every eighth mug has a reach of 0.5; a larger one would need many draws."""
 
 
 def generate(
@@ -42,12 +42,12 @@ def generate(
     seed : int
         Seed of the whole data set, >= 0.
     index : int
-        Number of the object, >= 0. An object does not depend on other objects or their order.
+        Number of the object, >= 0.
     least_reach : float
         Least reach of a mug's handle, in widths of the body, 0 to 0.5
-        (`nbv.data.procedural.mug.handle_reach`). Other categories do not heed it.
+        (`nbv.data.procedural.mug.handle_reach`); ignored for other categories.
     square_share : float
-        The probability that a mug has a square body, 0 to 1. Other categories do not heed it.
+        The probability that a mug has a square body, 0 to 1; ignored for other categories.
 
     Returns
     -------

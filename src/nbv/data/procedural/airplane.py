@@ -22,146 +22,21 @@ from nbv.data.procedural.solids import (
     loft,
     moved,
     revolve,
+    rotated,
     stack_outlines,
     superellipse,
     tube,
-    turned,
 )
-
-
-def panel(leading: ArrayLike, chords: ArrayLike, thickness: float) -> trimesh.Trimesh:
-    """Return a wing-like panel.
-
-    Parameters
-    ----------
-    leading : array_like
-        (m, 3): points of the leading edge, in one line as seen along x.
-    chords : array_like
-        (m,): from the leading edge towards -x.
-    thickness : float
-        In chords.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        The panel, blunt in front and sharp behind.
-    """
-    edge, chord = np.asarray(leading, dtype=np.float64), np.asarray(chords, dtype=np.float64)
-    across = np.cross((1.0, 0.0, 0.0), edge[-1] - edge[0])
-    across /= math.hypot(*across)
-    angle = 2 * np.pi * np.arange(20) / 20
-    back = 0.5 - 0.5 * np.cos(angle)
-    thick = 0.5 * thickness * np.sin(angle) * (1.25 - 0.75 * back)
-    section = back[:, None] * (-1.0, 0.0, 0.0) + thick[:, None] * across
-    return loft(edge[:, None] + chord[:, None, None] * section)
-
-
-def wing(
-    root: ArrayLike, half_span: float, chord: float, taper: float, sweep: float, rise: float
-) -> trimesh.Trimesh:
-    """Return the panel from `root`, (3,), towards +y; sweep and rise are slopes (tangents)."""
-    span = np.array([0.0, 0.35, 1.0])[:, None] * half_span
-    leading = np.asarray(root, dtype=np.float64) + span * (-sweep, 1.0, rise)
-    return panel(leading, chord * np.array([1.0, 1.0 - 0.55 * (1.0 - taper), taper]), 0.11)
-
-
-def jet_pod(centre: ArrayLike, radius: float, length: float) -> trimesh.Trimesh:
-    """Return an engine with an open intake at its +x end."""
-    barrel = [[0.55, -0.5], [0.9, -0.2], [1.0, 0.1], [0.98, 0.35]]
-    intake = [[0.85, 0.5], [0.68, 0.47], [0.64, 0.25]]
-    profile = np.array(barrel + intake) * (radius, length)
-    return revolve(profile, n=20, axis="x", centre=centre)
-
-
-def hung_jet(rng: np.random.Generator, leading: np.ndarray, radius: float) -> Solids:
-    """Return a jet on a pylon under the leading edge at `leading`, (3,)."""
-    size, length = radius * rng.uniform(0.5, 0.65), rng.uniform(0.09, 0.13)
-    pod = leading + np.array([0.035, 0.0, -1.25 * size])
-    pylon = panel(
-        [pod + np.array([0.01, 0, 0]), leading - np.array([0.015, 0, 0])], [0.08, 0.1], 0.08
-    )
-    return [jet_pod(pod, size, length), pylon]
-
-
-def wing_propeller(rng: np.random.Generator, leading: np.ndarray) -> Solids:
-    """Return a propeller engine in the wing at `leading`, (3,)."""
-    pod = leading - np.array([0.02, 0.0, 0.0])
-    body = [[0.008, -0.13], [0.024, -0.04], [0.026, 0.05], [0.015, 0.09]]
-    hub = pod + np.array([0.09, 0.0, 0.0])
-    return [
-        revolve(body, n=16, axis="x", centre=pod),
-        *propeller(rng, hub, rng.uniform(0.07, 0.1)),
-    ]
-
-
-def propeller(rng: np.random.Generator, hub: ArrayLike, reach: float, way: int = 1) -> Solids:
-    """Return a spinner pointing to `way` x, and two or four blades, mirror-symmetric in y."""
-    x, y, z = np.asarray(hub, dtype=np.float64)
-    spinner = np.array([[0.075, -0.02], [0.075, 0.0], [0.06, 0.17], [0.04, 0.28], [0.01, 0.31]])
-    cone = revolve(spinner * (reach, way * reach), n=16, axis="x", centre=(x, y, z))
-    blade = box((x + 0.01 * way, y, z), (0.012, 0.024, 2 * reach), exponent=3.0, bevel=0.01)
-    if rng.random() < 0.6:
-        return [cone, blade, turned(blade, 90.0, "x", (x, y, z))]
-    return [cone, blade]
-
-
-def store(rng: np.random.Generator, hook: np.ndarray) -> trimesh.Trimesh:
-    """Return a tank or missile hanging from a point, (3,), of a wing."""
-    length, radius = rng.uniform(0.1, 0.24), rng.uniform(0.008, 0.02)
-    shape = np.array([[0.3, -0.5], [1.0, -0.25], [1.0, 0.25], [0.6, 0.42], [0.1, 0.5]])
-    centre = hook - (rng.uniform(0.0, 0.06), 0.0, 1.3 * radius)
-    return revolve(shape * (radius, length), n=16, axis="x", centre=centre)
-
-
-def bubble(centre: ArrayLike, size: ArrayLike) -> trimesh.Trimesh:
-    """Return an ellipsoid, as of a cockpit; `size` holds its semi-axes, (3,)."""
-    angle = np.linspace(0.05, np.pi - 0.05, 13)
-    ball = revolve(np.stack([np.sin(angle), -np.cos(angle)], axis=-1), n=20, axis="x")
-    ball.vertices *= np.asarray(size, dtype=np.float64)
-    return moved(ball, centre)
-
-
-def landing_gear(rng: np.random.Generator, radius: float) -> Solids:
-    """Return two main wheels, and a third at the nose or under the tail, on their struts."""
-    drop, track = rng.uniform(1.6, 2.1) * radius, rng.uniform(0.08, 0.13)
-    size = rng.uniform(0.02, 0.035)
-    third = float(rng.choice([0.33, -0.44]))
-    disc = np.array([[0.6, -0.35], [1.0, -0.2], [1.0, 0.2], [0.6, 0.35]]) * size
-    foot = np.array([0.08, track, -drop])
-    main = [
-        tube(np.array([[0.08, 0.03, -0.5 * radius], foot]), 0.008, n=8),
-        revolve(disc, n=20, axis="y", centre=foot),
-    ]
-    end = (third, 0.0, -drop if third > 0 else -0.9 * radius)
-    return [
-        *both_sides(main),
-        tube([(third, 0.0, 0.0), end], 0.008, n=8),
-        revolve(0.8 * disc, n=20, axis="y", centre=end),
-    ]
-
-
-def floats(rng: np.random.Generator, radius: float) -> Solids:
-    """Return a seaplane's two floats on their struts."""
-    y, z = rng.uniform(0.1, 0.14), -rng.uniform(2.2, 2.8) * radius
-    t = np.linspace(0.0, 1.0, 13)
-    size = 0.032 * np.minimum(1.0, 0.35 + 2.6 * np.minimum(t, 1.0 - t))
-    rings = np.zeros((13, 16, 3))
-    rings[..., 0] = (0.42 - 0.72 * t)[:, None]
-    rings[..., 1:] = size[:, None, None] * superellipse(0.9, 1.0, 3.0, n=16)
-    rings += np.array([0.0, y, z])
-    struts = [tube([(x, 0.02, -0.4 * radius), (x, y, z)], 0.008, n=8) for x in (0.25, -0.02)]
-    return both_sides([loft(rings), *struts])
-
 
 Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """Ranges of a body plan's numbers, and the kinds of its tail and engines.
+    """Ranges of a type's dimensions, and the kinds of its tail and engines.
 
-    `wing_x` is the place where the wing's leading edge leaves the fuselage; `wing_heights` are in
-    fuselage radii. A kind listed twice is twice as likely.
+    `wing_x` is where the wing's leading edge leaves the fuselage; `wing_heights` are in fuselage
+    radii. A kind listed twice is twice as likely.
     """
 
     weight: float
@@ -246,13 +121,13 @@ def airplane(rng: np.random.Generator) -> trimesh.Trimesh:
     elif engines == "rear":
         parts += _rear_jets(rng, radius)
     elif engines == "nose":
-        parts += propeller(rng, (0.496, 0.0, 0.0), rng.uniform(0.11, 0.16))
+        parts += _propeller(rng, (0.496, 0.0, 0.0), rng.uniform(0.11, 0.16))
     elif engines == "pusher":
-        parts += propeller(rng, (-0.496, 0.0, rise * radius), rng.uniform(0.1, 0.15), way=-1)
+        parts += _propeller(rng, (-0.496, 0.0, rise * radius), rng.uniform(0.1, 0.15), sign=-1)
     if name in ("light", "biplane") and rng.random() < 0.2:
-        parts += floats(rng, radius)
+        parts += _floats(rng, radius)
     elif rng.random() < (0.8 if engines == "nose" else 0.15):
-        parts += landing_gear(rng, radius)
+        parts += _landing_gear(rng, radius)
     return centred(join(parts))
 
 
@@ -281,26 +156,26 @@ def _wings(
     z = float(rng.choice(plan.wing_heights)) * radius
     rise = np.tan(np.radians(rng.uniform(1, 8) if z < 0 else rng.uniform(-5, 3)))
     root, slope = np.array([rng.uniform(*plan.wing_x), 0.0, z]), np.array([-sweep, 1.0, rise])
-    parts = [wing(root, half_span, chord, taper, sweep, rise)]
+    parts = [_wing(root, half_span, chord, taper, sweep, rise)]
     tip = root + half_span * slope
     if name == "biplane":
         up = np.array([rng.uniform(0.0, 0.05), 0.0, rng.uniform(2.0, 2.5) * radius])
-        parts += [wing(root + up, half_span, chord, taper, sweep, rise)]
+        parts += [_wing(root + up, half_span, chord, taper, sweep, rise)]
         for y in (0.12, 0.7 * half_span):
             foot = root + y * slope - (0.3 * chord, 0.0, 0.0)
             parts += [tube([foot, foot + up], 0.007, n=8)]
     elif engines[:-1] in ("jet", "prop"):
-        for place in (0.36,) if engines[-1] == "2" else (0.32, 0.62):
-            edge = root + place * half_span * slope
+        for part in (0.36,) if engines[-1] == "2" else (0.32, 0.62):
+            edge = root + part * half_span * slope
             jet = engines.startswith("jet")
-            parts += hung_jet(rng, edge, radius) if jet else wing_propeller(rng, edge)
+            parts += _hung_jet(rng, edge, radius) if jet else _wing_propeller(rng, edge)
     elif name != "flying wing" and rng.random() < 0.3:
         end = np.array([-0.03, 0.005, 0.06])
-        parts += [panel([tip, tip + end], [chord * taper, 0.6 * chord * taper], 0.08)]
+        parts += [_panel([tip, tip + end], [chord * taper, 0.6 * chord * taper], 0.08)]
     if rng.random() < plan.stores:
-        for place in rng.uniform(0.25, 1.0, int(rng.integers(1, 4))):
-            hook = root + place * half_span * slope
-            parts += [store(rng, hook - (0.3 * chord * (1.0 - place), 0.0, 0.0))]
+        for part in rng.uniform(0.25, 1.0, int(rng.integers(1, 4))):
+            hook = root + part * half_span * slope
+            parts += [_store(rng, hook - (0.3 * chord * (1.0 - part), 0.0, 0.0))]
     return both_sides(parts), tip
 
 
@@ -308,8 +183,8 @@ def _rear_jets(rng: np.random.Generator, radius: float) -> Solids:
     size, length = radius * rng.uniform(0.45, 0.6), rng.uniform(0.12, 0.17)
     pod = np.array([-0.24, radius + 0.9 * size, 0.45 * radius])
     edge = pod + np.array([0.04, 0.0, 0.0])
-    pylon = panel([edge * (1.0, 0.0, 1.0), edge], [0.09, 0.09], 0.12)
-    return both_sides([jet_pod(pod, size, length), pylon])
+    pylon = _panel([edge * (1.0, 0.0, 1.0), edge], [0.09, 0.09], 0.12)
+    return both_sides([_jet_pod(pod, size, length), pylon])
 
 
 def _tail(
@@ -329,10 +204,10 @@ def _tail(
 
     def fin(foot: ArrayLike, lean: float, size: float) -> trimesh.Trimesh:
         head = np.asarray(foot) + size * np.array([-sweep, lean, 1.0])
-        return panel(np.stack([foot, head]), [chord, taper * chord], 0.09)
+        return _panel(np.stack([foot, head]), [chord, taper * chord], 0.09)
 
     def plane(root: ArrayLike, size: float = 1.0) -> Solids:
-        return both_sides([wing(root, size * span, plane_chord, taper, 0.75 * sweep, rise)])
+        return both_sides([_wing(root, size * span, plane_chord, taper, 0.75 * sweep, rise)])
 
     ahead = plane((rng.uniform(0.3, 0.4), 0.0, 0.3 * radius), rng.uniform(0.9, 1.2))
     if kind == "v":
@@ -347,8 +222,8 @@ def _tail(
         booms = [tube([(0.08, y, 0.3 * radius), (end, y, 0.3 * radius)], 0.025, taper=0.6),
                  fin((end + chord, y, 0.3 * radius), 0.0, height)]  # fmt: skip
         level = 0.3 * radius + rng.choice([0.0, 0.95]) * height
-        across = panel([(end + 0.9 * plane_chord, 0.0, level), (end + 0.9 * plane_chord, y, level)],
-                       [plane_chord, plane_chord], 0.1)  # fmt: skip
+        edge = end + 0.9 * plane_chord
+        across = _panel([(edge, 0.0, level), (edge, y, level)], [plane_chord, plane_chord], 0.1)
         return both_sides([*booms, across])
     if kind.startswith("tips"):
         fins = both_sides([fin(0.97 * wing_tip, rng.uniform(0.0, 0.3), 0.8 * height)])
@@ -369,4 +244,128 @@ def _cockpit(rng: np.random.Generator, name: str, radius: float) -> Solids:
         return []
     x, length = 0.5 - rng.uniform(0.22, 0.33), rng.uniform(0.09, 0.16)
     size = (length, 0.6 * radius, rng.uniform(0.4, 0.75) * radius)
-    return [bubble((x, 0.0, 0.8 * radius), size)]
+    return [_bubble((x, 0.0, 0.8 * radius), size)]
+
+
+def _panel(leading: ArrayLike, chords: ArrayLike, thickness: float) -> trimesh.Trimesh:
+    """Return a wing-like panel.
+
+    Parameters
+    ----------
+    leading : array_like
+        (m, 3): points of the leading edge, in one line as seen along x.
+    chords : array_like
+        (m,): from the leading edge towards -x.
+    thickness : float
+        In chords.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        The panel, blunt in front and sharp behind.
+    """
+    edge, chord = np.asarray(leading, dtype=np.float64), np.asarray(chords, dtype=np.float64)
+    across = np.cross((1.0, 0.0, 0.0), edge[-1] - edge[0])
+    across /= math.hypot(*across)
+    angle = 2 * np.pi * np.arange(20) / 20
+    back = 0.5 - 0.5 * np.cos(angle)
+    thick = 0.5 * thickness * np.sin(angle) * (1.25 - 0.75 * back)
+    section = back[:, None] * (-1.0, 0.0, 0.0) + thick[:, None] * across
+    return loft(edge[:, None] + chord[:, None, None] * section)
+
+
+def _wing(
+    root: ArrayLike, half_span: float, chord: float, taper: float, sweep: float, rise: float
+) -> trimesh.Trimesh:
+    """Return the panel from `root`, (3,), towards +y; sweep and rise are slopes (tangents)."""
+    span = np.array([0.0, 0.35, 1.0])[:, None] * half_span
+    leading = np.asarray(root, dtype=np.float64) + span * (-sweep, 1.0, rise)
+    return _panel(leading, chord * np.array([1.0, 1.0 - 0.55 * (1.0 - taper), taper]), 0.11)
+
+
+def _jet_pod(centre: ArrayLike, radius: float, length: float) -> trimesh.Trimesh:
+    """Return an engine with an open intake at its +x end."""
+    barrel = [[0.55, -0.5], [0.9, -0.2], [1.0, 0.1], [0.98, 0.35]]
+    intake = [[0.85, 0.5], [0.68, 0.47], [0.64, 0.25]]
+    profile = np.array(barrel + intake) * (radius, length)
+    return revolve(profile, n=20, axis="x", centre=centre)
+
+
+def _hung_jet(rng: np.random.Generator, leading: np.ndarray, radius: float) -> Solids:
+    """Return a jet on a pylon under the leading edge at `leading`, (3,)."""
+    size, length = radius * rng.uniform(0.5, 0.65), rng.uniform(0.09, 0.13)
+    pod = leading + np.array([0.035, 0.0, -1.25 * size])
+    pylon = _panel(
+        [pod + np.array([0.01, 0, 0]), leading - np.array([0.015, 0, 0])], [0.08, 0.1], 0.08
+    )
+    return [_jet_pod(pod, size, length), pylon]
+
+
+def _wing_propeller(rng: np.random.Generator, leading: np.ndarray) -> Solids:
+    """Return a propeller engine in the wing at `leading`, (3,)."""
+    pod = leading - np.array([0.02, 0.0, 0.0])
+    body = [[0.008, -0.13], [0.024, -0.04], [0.026, 0.05], [0.015, 0.09]]
+    hub = pod + np.array([0.09, 0.0, 0.0])
+    return [
+        revolve(body, n=16, axis="x", centre=pod),
+        *_propeller(rng, hub, rng.uniform(0.07, 0.1)),
+    ]
+
+
+def _propeller(rng: np.random.Generator, hub: ArrayLike, reach: float, sign: int = 1) -> Solids:
+    """Return a spinner towards `sign` x, and two or four blades, mirror-symmetric in y."""
+    x, y, z = np.asarray(hub, dtype=np.float64)
+    spinner = np.array([[0.075, -0.02], [0.075, 0.0], [0.06, 0.17], [0.04, 0.28], [0.01, 0.31]])
+    cone = revolve(spinner * (reach, sign * reach), n=16, axis="x", centre=(x, y, z))
+    blade = box((x + 0.01 * sign, y, z), (0.012, 0.024, 2 * reach), exponent=3.0, bevel=0.01)
+    if rng.random() < 0.6:
+        return [cone, blade, rotated(blade, 90.0, "x", (x, y, z))]
+    return [cone, blade]
+
+
+def _store(rng: np.random.Generator, hook: np.ndarray) -> trimesh.Trimesh:
+    """Return a tank or missile hanging from a point, (3,), of a wing."""
+    length, radius = rng.uniform(0.1, 0.24), rng.uniform(0.008, 0.02)
+    shape = np.array([[0.3, -0.5], [1.0, -0.25], [1.0, 0.25], [0.6, 0.42], [0.1, 0.5]])
+    centre = hook - (rng.uniform(0.0, 0.06), 0.0, 1.3 * radius)
+    return revolve(shape * (radius, length), n=16, axis="x", centre=centre)
+
+
+def _bubble(centre: ArrayLike, size: ArrayLike) -> trimesh.Trimesh:
+    """Return an ellipsoid, such as a cockpit, with the semi-axes `size`, (3,)."""
+    angle = np.linspace(0.05, np.pi - 0.05, 13)
+    ball = revolve(np.stack([np.sin(angle), -np.cos(angle)], axis=-1), n=20, axis="x")
+    ball.vertices *= np.asarray(size, dtype=np.float64)
+    return moved(ball, centre)
+
+
+def _landing_gear(rng: np.random.Generator, radius: float) -> Solids:
+    """Return two main wheels, and a third at the nose or under the tail, on their struts."""
+    drop, track = rng.uniform(1.6, 2.1) * radius, rng.uniform(0.08, 0.13)
+    size = rng.uniform(0.02, 0.035)
+    third = float(rng.choice([0.33, -0.44]))
+    disc = np.array([[0.6, -0.35], [1.0, -0.2], [1.0, 0.2], [0.6, 0.35]]) * size
+    foot = np.array([0.08, track, -drop])
+    main = [
+        tube(np.array([[0.08, 0.03, -0.5 * radius], foot]), 0.008, n=8),
+        revolve(disc, n=20, axis="y", centre=foot),
+    ]
+    end = (third, 0.0, -drop if third > 0 else -0.9 * radius)
+    return [
+        *both_sides(main),
+        tube([(third, 0.0, 0.0), end], 0.008, n=8),
+        revolve(0.8 * disc, n=20, axis="y", centre=end),
+    ]
+
+
+def _floats(rng: np.random.Generator, radius: float) -> Solids:
+    """Return a seaplane's two floats on their struts."""
+    y, z = rng.uniform(0.1, 0.14), -rng.uniform(2.2, 2.8) * radius
+    t = np.linspace(0.0, 1.0, 13)
+    size = 0.032 * np.minimum(1.0, 0.35 + 2.6 * np.minimum(t, 1.0 - t))
+    rings = np.zeros((13, 16, 3))
+    rings[..., 0] = (0.42 - 0.72 * t)[:, None]
+    rings[..., 1:] = size[:, None, None] * superellipse(0.9, 1.0, 3.0, n=16)
+    rings += np.array([0.0, y, z])
+    struts = [tube([(x, 0.02, -0.4 * radius), (x, y, z)], 0.008, n=8) for x in (0.25, -0.02)]
+    return both_sides([loft(rings), *struts])

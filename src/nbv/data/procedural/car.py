@@ -19,221 +19,17 @@ from nbv.data.procedural.solids import (
     join,
     loft,
     revolve,
+    rotated,
     stack_outlines,
     superellipse,
-    turned,
 )
 
 Range = tuple[float, float]
 
 
-def hull(
-    rng: np.random.Generator,
-    line: ArrayLike,
-    half_width: float,
-    clearance: float,
-    axles: tuple[float, ...],
-    wheel: float,
-) -> trimesh.Trimesh:
-    """Return the body below the windows, cut away over the wheels.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        For the roundness of the ends.
-    line : array_like
-        (m, 2) of (x, height) along the upper edge, from the rear end at -x to the front at x.
-    half_width, clearance : float
-        Half the body's width, and its height above the road.
-    axles : tuple of float
-        Places of the wheels along x.
-    wheel : float
-        Radius of the wheels.
-    """
-    edge = np.asarray(line, dtype=np.float64)
-    front = edge[-1, 0]
-    # Sections crowd towards the ends, which are round.
-    x = front * np.sin(np.linspace(-np.pi / 2, np.pi / 2, 61))
-    top = np.interp(x, edge[:, 0], edge[:, 1])
-    arch = sum(np.sqrt(np.clip((1.14 * wheel) ** 2 - (x - axle) ** 2, 0.0, None)) for axle in axles)
-    bottom = np.maximum(clearance, np.where(arch > 0.0, wheel + arch, 0.0))
-    bottom = np.minimum(bottom, top - 0.08)
-    end = np.abs(x) / front
-    width = half_width * (1.0 - rng.uniform(0.04, 0.2) * end ** rng.uniform(5.0, 12.0))
-    draw = rng.uniform(0.1, 0.3, 2)[(x > 0).astype(int)] * end ** rng.uniform(14.0, 40.0)
-    middle, half = (top + bottom) / 2, (top - bottom) / 2 * (1.0 - draw)
-    oval = superellipse(1.0, 1.0, rng.uniform(4.0, 8.0), n=28)
-    across = width[:, None] * oval[:, 0]
-    up = middle[:, None] + half[:, None] * oval[:, 1]
-    return stack_outlines(np.stack([across, up], axis=-1), x, axis="x")
-
-
-def cabin(
-    rng: np.random.Generator, feet: Range, tops: Range, heights: Range, half_width: float
-) -> trimesh.Trimesh:
-    """Return the part with the windows, from the belt line to the roof.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        For the lean of the walls and the roundness of the edges.
-    feet, tops : (float, float)
-        Rear and front end along x, at the belt line and at the roof.
-    heights : (float, float)
-        Heights of belt line and roof.
-    half_width : float
-        Half the body's width.
-    """
-    level = np.array([-0.12, 0.0, 0.5, 0.86, 0.96, 1.0])
-    lean = np.clip(level, 0.0, None)
-    run = np.asarray(tops) - np.asarray(feet)
-    ends = np.asarray(feet) + run * lean[:, None] ** rng.uniform(1.0, 1.35)
-    inset = np.array([0.0, 0.0, 0.0, 0.0, 0.03, 0.12]) * rng.uniform(0.5, 1.5)
-    ends += inset[:, None] * (1.0, -1.0)
-    width = half_width * (0.97 - rng.uniform(0.08, 0.24) * lean) - inset
-    unit = superellipse(1.0, 1.0, rng.uniform(4.0, 9.0), n=32)
-    plan = unit * np.stack([(ends[:, 1] - ends[:, 0]) / 2, width], axis=-1)[:, None]
-    plan[..., 0] += ends.mean(axis=1)[:, None]
-    return stack_outlines(plan, heights[0] + (heights[1] - heights[0]) * level)
-
-
-def wheels(axles: tuple[float, ...], wheel: float, side: float) -> Solids:
-    """Return wheels with dished rims, their outer faces at y = ±`side`."""
-    tread = 0.62 * wheel
-    profile = np.array([
-        [0.5 * wheel, -tread], [0.94 * wheel, -tread], [wheel, -0.85 * tread],
-        [wheel, -0.15 * tread], [0.94 * wheel, 0.0], [0.66 * wheel, 0.0],
-        [0.6 * wheel, -0.1 * tread], [0.25 * wheel, -0.06 * tread],
-    ])  # fmt: skip
-    return both_sides(
-        revolve(profile, n=28, axis="y", centre=(axle, side, wheel)) for axle in axles
-    )
-
-
-def mirrors(rng: np.random.Generator, x: float, half_width: float, z: float) -> Solids:
-    """Return the pair of wing mirrors."""
-    size = rng.uniform(0.6, 1.2)
-    centre = (x, half_width + 0.04, z)
-    extents = (0.12 * size, 0.2 * size + 0.06, 0.14 * size)
-    return both_sides([box(centre, extents, exponent=4.0, bevel=0.03)])
-
-
-def bumper(rng: np.random.Generator, x: float, half_width: float, clearance: float) -> Solids:
-    """Return a bar across one end."""
-    bar = rng.uniform(0.14, 0.26)
-    z = clearance + rng.uniform(0.1, 0.2) + bar / 2
-    extents = (0.2, 1.75 * half_width, bar)
-    return [box((0.985 * x, 0.0, z), extents, exponent=4.0, bevel=0.04)]
-
-
-def spare_wheel(rng: np.random.Generator, x: float, z: float) -> trimesh.Trimesh:
-    """Return a wheel facing along x."""
-    size = rng.uniform(0.3, 0.38)
-    profile = np.array([[0.6, -0.3], [1.0, -0.25], [1.0, 0.25], [0.6, 0.3]]) * size
-    return revolve(profile, n=28, axis="x", centre=(x, 0.0, z))
-
-
-def spoiler(x: float, z: float, half_width: float) -> Solids:
-    """Return a wing across the car on two posts."""
-    wing = box((x, 0.0, z), (0.26, 1.6 * half_width, 0.05), bevel=0.015)
-    post = box((x, 0.5 * half_width, z - 0.15), (0.12, 0.06, 0.3), bevel=0.01)
-    return [turned(wing, 6.0, "y", (x, 0.0, z)), *both_sides([post])]
-
-
-def bed_walls(back: float, front: float, half_width: float, heights: Range) -> Solids:
-    """Return the two sides and the tailgate of an open bed."""
-    low, high = heights
-    middle, level = (back + front) / 2, (low + high) / 2
-    extents = (front - back, 0.08, high - low)
-    side = box((middle, 0.93 * half_width, level), extents, bevel=0.02)
-    gate = box((back + 0.06, 0.0, level), (0.08, 1.85 * half_width, high - low))
-    return [*both_sides([side]), gate]
-
-
-def lorry(rng: np.random.Generator) -> Solids:
-    """Return a cab on a chassis with a box, a tank or an open bed behind it."""
-    length, half_width = rng.uniform(5.2, 8.0), rng.uniform(1.0, 1.2)
-    wheel, height = rng.uniform(0.4, 0.5), rng.uniform(2.1, 2.9)
-    front, floor = length / 2, 1.5 * wheel
-    bonnet = rng.choice([0.0, rng.uniform(0.6, 1.2)], p=[0.65, 0.35])
-    face = front - bonnet
-    back = face - rng.uniform(1.4, 2.0)
-    belt = floor + rng.uniform(0.4, 0.5) * (height - floor)
-    nose = (back + front) / 2, front - back
-    base = 0.8 * wheel
-    parts = [
-        cabin(rng, (back, face), (back + 0.05, face - rng.uniform(0.02, 0.4)), (belt, height),
-              half_width),
-        box((nose[0], 0.0, (base + belt) / 2 + 0.02), (nose[1], 1.94 * half_width, belt - base),
-            exponent=9.0, bevel=0.06),
-        box((0.0, 0.0, 1.3 * wheel), (0.97 * length, 1.1 * half_width, 0.3), bevel=0.04),
-    ]  # fmt: skip
-    if rng.random() < 0.6:
-        parts += mirrors(rng, face - 0.15, half_width, belt + 0.3)
-    parts += _load(rng, front, back - rng.uniform(0.08, 0.3), half_width, floor, height)
-    rear = -front + rng.uniform(0.16, 0.24) * length
-    axles: tuple[float, ...] = (front - rng.uniform(0.6, 0.9) - 0.3 * bonnet, rear)
-    if length > 6.6 and rng.random() < 0.5:
-        axles = (*axles, rear + 2.3 * wheel)
-    return parts + wheels(axles, wheel, 0.97 * half_width)
-
-
-def _load(
-    rng: np.random.Generator,
-    front: float,
-    start: float,
-    half_width: float,
-    floor: float,
-    cab: float,
-) -> Solids:
-    """Return the lorry's load, from the rear end to `start` behind the cab."""
-    run, middle, low = start + front, (start - front) / 2, floor + 0.1
-    kind = rng.choice(["box", "tank", "bed"], p=[0.6, 0.15, 0.25])
-    if kind == "box":
-        top = cab + rng.uniform(0.0, 0.9)
-        centre, extents = (middle, 0.0, (low + top) / 2), (run, 2.04 * half_width, top - low)
-        return [box(centre, extents, exponent=20.0, bevel=0.03)]
-    if kind == "tank":
-        radius = 0.9 * half_width
-        bulge = [[0.4, 0.0], [0.85, 0.04], [1.0, 0.12], [1.0, 0.88], [0.85, 0.96], [0.4, 1.0]]
-        profile = np.array(bulge) * (radius, run)
-        return [revolve(profile, axis="x", centre=(-front, 0.0, low + radius))]
-    wall = low + rng.uniform(0.4, 1.0)
-    bed = box((middle, 0.0, low), (run, 2.04 * half_width, 0.24), exponent=20.0)
-    return [bed, *bed_walls(-front, start, 1.09 * half_width, (low, wall))]
-
-
-def bus(rng: np.random.Generator) -> Solids:
-    """Return a bus or coach: one box, whose ends differ only in rake and fittings."""
-    length, half_width = rng.uniform(6.0, 9.5), rng.uniform(1.05, 1.2)
-    height, clearance, wheel = rng.uniform(2.6, 3.3), rng.uniform(0.25, 0.4), rng.uniform(0.42, 0.5)
-    front, belt = length / 2, rng.uniform(0.42, 0.52) * height
-    axles = (front - rng.uniform(0.12, 0.24) * length, -front + rng.uniform(0.2, 0.3) * length)
-    line = np.array([[-front, belt], [front, belt]])
-    rake, back = rng.uniform(0.2, 0.6), rng.uniform(0.0, 0.15)
-    parts = [
-        hull(rng, line, half_width, clearance, axles, wheel),
-        cabin(rng, (-front + 0.02, front - 0.02), (-front + back, front - rake), (belt, height),
-              half_width),
-        box((0.0, 0.0, (clearance + 2.3 * wheel) / 2),
-            (0.9 * length, 1.3 * half_width, 2.3 * wheel - clearance), bevel=0.05),
-        *wheels(axles, wheel, 0.97 * half_width),
-    ]  # fmt: skip
-    if rng.random() < 0.6:
-        parts += mirrors(rng, front - 0.1, half_width, 0.7 * height)
-    if rng.random() < 0.5:
-        unit = (rng.uniform(1.0, 2.4), 1.3 * half_width, 0.22)
-        x = rng.uniform(-0.3, 0.2) * length
-        parts += [box((x, 0.0, height + 0.08), unit, exponent=5.0, bevel=0.06)]
-    if rng.random() < 0.4:
-        vent = box((-front + 0.6, half_width, belt * 0.7), (0.7, 0.06, 0.35), bevel=0.02)
-        parts += both_sides([vent])
-    return parts + bumper(rng, front, half_width, clearance)
-
-
 @dataclass(frozen=True)
 class _Plan:
-    """Ranges of a body plan's numbers; lengths along x are in car lengths.
+    """Ranges of a type's dimensions; lengths along x are in car lengths.
 
     From the front: bonnet, windscreen seen from the side, roof, rear window seen from the side,
     boot.
@@ -279,8 +75,8 @@ def car(rng: np.random.Generator) -> trimesh.Trimesh:
     weights = np.array([plan.weight for plan in _PLANS.values()] + [_LORRIES, _BUSES])
     name = str(rng.choice([*_PLANS, "lorry", "bus"], p=weights / weights.sum()))
     if name == "lorry":
-        return centred(join(lorry(rng)))
-    return centred(join(bus(rng) if name == "bus" else _motor_car(rng, name, _PLANS[name])))
+        return centred(join(_lorry(rng)))
+    return centred(join(_bus(rng) if name == "bus" else _motor_car(rng, name, _PLANS[name])))
 
 
 def _motor_car(rng: np.random.Generator, name: str, plan: _Plan) -> Solids:
@@ -293,27 +89,27 @@ def _motor_car(rng: np.random.Generator, name: str, plan: _Plan) -> Solids:
     rear_foot = -front + rng.uniform(*plan.boot) * length
     rear_top = min(rear_foot + rng.uniform(*plan.rear_glass) * length, top - 0.16 * length)
     axles = (front - rng.uniform(0.15, 0.21) * length, -front + rng.uniform(0.15, 0.22) * length)
-    # The ranges overlap: no single number tells front from back.
+    # The ranges overlap, so that no single number distinguishes front and back.
     nose, back, deck = belt * rng.uniform((0.74, 0.82, 0.93), (0.97, 1.0, 1.03))
     if name == "pick-up":
         back = deck = belt * rng.uniform(0.62, 0.72)
     line = [[-front, back], [rear_foot - 0.05, deck], [rear_foot + 0.05, belt], [foot, belt]]
     body = 0.8 * half_width if name == "veteran" else half_width
-    parts = [hull(rng, [*line, [front, nose]], body, clearance, axles, wheel)]
+    parts = [_hull(rng, [*line, [front, nose]], body, clearance, axles, wheel)]
     if name == "roadster":
         parts += _open_top(rng, (rear_foot, foot), (belt, height), half_width)
     else:
-        parts += [cabin(rng, (rear_foot, foot), (rear_top, top), (belt, height), body)]
+        parts += [_cabin(rng, (rear_foot, foot), (rear_top, top), (belt, height), body)]
     # Between the wheels, where the hull is cut away.
     filling = (0.9 * length, 1.3 * body, 2.3 * wheel - clearance)
     parts += [box((0.0, 0.0, clearance / 2 + 1.15 * wheel), filling, bevel=0.05)]
-    parts += wheels(axles, wheel, 0.97 * half_width)
+    parts += _wheels(axles, wheel, 0.97 * half_width)
     if name == "pick-up":
-        parts += bed_walls(-front, rear_foot, half_width, (deck - 0.15, belt))
+        parts += _bed_walls(-front, rear_foot, half_width, (deck - 0.15, belt))
     if name == "veteran":
         parts += _mudguards(axles, wheel, half_width, clearance)
     elif rng.random() < 0.65:
-        parts += mirrors(rng, foot - 0.25, half_width, belt + 0.06)
+        parts += _mirrors(rng, foot - 0.25, half_width, belt + 0.06)
     return parts + _fittings(rng, name, (-front, rear_top, foot, front), (clearance, belt, height),
                              half_width)  # fmt: skip
 
@@ -327,7 +123,7 @@ def _open_top(rng: np.random.Generator, ends: Range, heights: Range, half_width:
     seat_x = ends[0] + 0.25 * (ends[1] - ends[0])
     seat = box((seat_x, 0.42 * half_width, belt), (0.16, 0.5, 0.5 * (height - belt) + 0.3),
                exponent=4.0, bevel=0.04)  # fmt: skip
-    parts = [turned(glass, tilt, "y", (x, 0.0, belt)), *both_sides([seat])]
+    parts = [rotated(glass, tilt, "y", (x, 0.0, belt)), *both_sides([seat])]
     if rng.random() < 0.4:
         bar = box((ends[0] + 0.1, 0.0, belt + 0.12), (0.1, 1.4 * half_width, 0.35), bevel=0.03)
         parts += [bar]
@@ -356,21 +152,21 @@ def _mudguards(
 def _fittings(
     rng: np.random.Generator,
     name: str,
-    places: tuple[float, float, float, float],
+    ends: tuple[float, float, float, float],
     levels: tuple[float, float, float],
     half_width: float,
 ) -> Solids:
     """Return bumpers, and sometimes a rack, a spoiler or a spare wheel.
 
-    `places` along x: rear end, rear end of the roof, foot of the windscreen, front end;
-    `levels`: underside, belt line, roof.
+    `ends` are positions along x: rear end, rear end of the roof, foot of the windscreen, front end;
+    `levels` are the heights of underside, belt line and roof.
     """
-    rear, rear_top, foot, front = places
+    rear, rear_top, foot, front = ends
     clearance, belt, height = levels
     parts: Solids = []
     for end in (rear, front):
         if rng.random() < 0.7:
-            parts += bumper(rng, end, half_width, clearance)
+            parts += _bumper(rng, end, half_width, clearance)
     if name in ("off-roader", "van", "estate") and rng.random() < 0.3:
         back, ahead = rear_top + 0.1, foot - 0.9
         centre, extents = (
@@ -379,7 +175,211 @@ def _fittings(
         )
         parts += both_sides([box(centre, extents, bevel=0.02)])
     if name in ("off-roader", "veteran") and rng.random() < 0.35:
-        parts += [spare_wheel(rng, rear - 0.04, belt - 0.05)]
+        parts += [_spare_wheel(rng, rear - 0.04, belt - 0.05)]
     if name == "coupé" and rng.random() < 0.3:
-        parts += spoiler(rear + 0.16, belt + rng.uniform(0.08, 0.22), half_width)
+        parts += _spoiler(rear + 0.16, belt + rng.uniform(0.08, 0.22), half_width)
     return parts
+
+
+def _lorry(rng: np.random.Generator) -> Solids:
+    """Return a cab on a chassis with a box, a tank or an open bed behind it."""
+    length, half_width = rng.uniform(5.2, 8.0), rng.uniform(1.0, 1.2)
+    wheel, height = rng.uniform(0.4, 0.5), rng.uniform(2.1, 2.9)
+    front, floor = length / 2, 1.5 * wheel
+    bonnet = rng.choice([0.0, rng.uniform(0.6, 1.2)], p=[0.65, 0.35])
+    face = front - bonnet
+    back = face - rng.uniform(1.4, 2.0)
+    belt = floor + rng.uniform(0.4, 0.5) * (height - floor)
+    nose = (back + front) / 2, front - back
+    base = 0.8 * wheel
+    parts = [
+        _cabin(rng, (back, face), (back + 0.05, face - rng.uniform(0.02, 0.4)), (belt, height),
+              half_width),
+        box((nose[0], 0.0, (base + belt) / 2 + 0.02), (nose[1], 1.94 * half_width, belt - base),
+            exponent=9.0, bevel=0.06),
+        box((0.0, 0.0, 1.3 * wheel), (0.97 * length, 1.1 * half_width, 0.3), bevel=0.04),
+    ]  # fmt: skip
+    if rng.random() < 0.6:
+        parts += _mirrors(rng, face - 0.15, half_width, belt + 0.3)
+    parts += _load(rng, front, back - rng.uniform(0.08, 0.3), half_width, floor, height)
+    rear = -front + rng.uniform(0.16, 0.24) * length
+    axles: tuple[float, ...] = (front - rng.uniform(0.6, 0.9) - 0.3 * bonnet, rear)
+    if length > 6.6 and rng.random() < 0.5:
+        axles = (*axles, rear + 2.3 * wheel)
+    return parts + _wheels(axles, wheel, 0.97 * half_width)
+
+
+def _load(
+    rng: np.random.Generator,
+    front: float,
+    start: float,
+    half_width: float,
+    floor: float,
+    cab: float,
+) -> Solids:
+    """Return the lorry's load, from the rear end to `start` behind the cab."""
+    run, middle, low = start + front, (start - front) / 2, floor + 0.1
+    kind = rng.choice(["box", "tank", "bed"], p=[0.6, 0.15, 0.25])
+    if kind == "box":
+        top = cab + rng.uniform(0.0, 0.9)
+        centre, extents = (middle, 0.0, (low + top) / 2), (run, 2.04 * half_width, top - low)
+        return [box(centre, extents, exponent=20.0, bevel=0.03)]
+    if kind == "tank":
+        radius = 0.9 * half_width
+        bulge = [[0.4, 0.0], [0.85, 0.04], [1.0, 0.12], [1.0, 0.88], [0.85, 0.96], [0.4, 1.0]]
+        profile = np.array(bulge) * (radius, run)
+        return [revolve(profile, axis="x", centre=(-front, 0.0, low + radius))]
+    wall = low + rng.uniform(0.4, 1.0)
+    bed = box((middle, 0.0, low), (run, 2.04 * half_width, 0.24), exponent=20.0)
+    return [bed, *_bed_walls(-front, start, 1.09 * half_width, (low, wall))]
+
+
+def _bus(rng: np.random.Generator) -> Solids:
+    """Return a bus or coach: one box, whose ends differ only in rake and fittings."""
+    length, half_width = rng.uniform(6.0, 9.5), rng.uniform(1.05, 1.2)
+    height, clearance, wheel = rng.uniform(2.6, 3.3), rng.uniform(0.25, 0.4), rng.uniform(0.42, 0.5)
+    front, belt = length / 2, rng.uniform(0.42, 0.52) * height
+    axles = (front - rng.uniform(0.12, 0.24) * length, -front + rng.uniform(0.2, 0.3) * length)
+    line = np.array([[-front, belt], [front, belt]])
+    rake, back = rng.uniform(0.2, 0.6), rng.uniform(0.0, 0.15)
+    parts = [
+        _hull(rng, line, half_width, clearance, axles, wheel),
+        _cabin(rng, (-front + 0.02, front - 0.02), (-front + back, front - rake), (belt, height),
+              half_width),
+        box((0.0, 0.0, (clearance + 2.3 * wheel) / 2),
+            (0.9 * length, 1.3 * half_width, 2.3 * wheel - clearance), bevel=0.05),
+        *_wheels(axles, wheel, 0.97 * half_width),
+    ]  # fmt: skip
+    if rng.random() < 0.6:
+        parts += _mirrors(rng, front - 0.1, half_width, 0.7 * height)
+    if rng.random() < 0.5:
+        unit = (rng.uniform(1.0, 2.4), 1.3 * half_width, 0.22)
+        x = rng.uniform(-0.3, 0.2) * length
+        parts += [box((x, 0.0, height + 0.08), unit, exponent=5.0, bevel=0.06)]
+    if rng.random() < 0.4:
+        vent = box((-front + 0.6, half_width, belt * 0.7), (0.7, 0.06, 0.35), bevel=0.02)
+        parts += both_sides([vent])
+    return parts + _bumper(rng, front, half_width, clearance)
+
+
+def _hull(
+    rng: np.random.Generator,
+    line: ArrayLike,
+    half_width: float,
+    clearance: float,
+    axles: tuple[float, ...],
+    wheel: float,
+) -> trimesh.Trimesh:
+    """Return the body below the windows, cut away over the wheels.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        For the roundness of the ends.
+    line : array_like
+        (m, 2) of (x, height) along the upper edge, from the rear end at -x to the front at x.
+    half_width, clearance : float
+        Half the body's width, and its height above the road.
+    axles : tuple of float
+        Positions of the wheels along x.
+    wheel : float
+        Radius of the wheels.
+    """
+    edge = np.asarray(line, dtype=np.float64)
+    front = edge[-1, 0]
+    # Sections crowd towards the ends, which are round.
+    x = front * np.sin(np.linspace(-np.pi / 2, np.pi / 2, 61))
+    top = np.interp(x, edge[:, 0], edge[:, 1])
+    arch = sum(np.sqrt(np.clip((1.14 * wheel) ** 2 - (x - axle) ** 2, 0.0, None)) for axle in axles)
+    bottom = np.maximum(clearance, np.where(arch > 0.0, wheel + arch, 0.0))
+    bottom = np.minimum(bottom, top - 0.08)
+    end = np.abs(x) / front
+    width = half_width * (1.0 - rng.uniform(0.04, 0.2) * end ** rng.uniform(5.0, 12.0))
+    draw = rng.uniform(0.1, 0.3, 2)[(x > 0).astype(int)] * end ** rng.uniform(14.0, 40.0)
+    middle, half = (top + bottom) / 2, (top - bottom) / 2 * (1.0 - draw)
+    oval = superellipse(1.0, 1.0, rng.uniform(4.0, 8.0), n=28)
+    across = width[:, None] * oval[:, 0]
+    up = middle[:, None] + half[:, None] * oval[:, 1]
+    return stack_outlines(np.stack([across, up], axis=-1), x, axis="x")
+
+
+def _cabin(
+    rng: np.random.Generator, feet: Range, tops: Range, heights: Range, half_width: float
+) -> trimesh.Trimesh:
+    """Return the part with the windows, from the belt line to the roof.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        For the lean of the walls and the roundness of the edges.
+    feet, tops : (float, float)
+        Rear and front end along x, at the belt line and at the roof.
+    heights : (float, float)
+        Heights of belt line and roof.
+    half_width : float
+        Half the body's width.
+    """
+    level = np.array([-0.12, 0.0, 0.5, 0.86, 0.96, 1.0])
+    lean = np.clip(level, 0.0, None)
+    run = np.asarray(tops) - np.asarray(feet)
+    ends = np.asarray(feet) + run * lean[:, None] ** rng.uniform(1.0, 1.35)
+    inset = np.array([0.0, 0.0, 0.0, 0.0, 0.03, 0.12]) * rng.uniform(0.5, 1.5)
+    ends += inset[:, None] * (1.0, -1.0)
+    width = half_width * (0.97 - rng.uniform(0.08, 0.24) * lean) - inset
+    unit = superellipse(1.0, 1.0, rng.uniform(4.0, 9.0), n=32)
+    plan = unit * np.stack([(ends[:, 1] - ends[:, 0]) / 2, width], axis=-1)[:, None]
+    plan[..., 0] += ends.mean(axis=1)[:, None]
+    return stack_outlines(plan, heights[0] + (heights[1] - heights[0]) * level)
+
+
+def _wheels(axles: tuple[float, ...], wheel: float, side: float) -> Solids:
+    """Return wheels with dished rims, their outer faces at y = ±`side`."""
+    tread = 0.62 * wheel
+    profile = np.array([
+        [0.5 * wheel, -tread], [0.94 * wheel, -tread], [wheel, -0.85 * tread],
+        [wheel, -0.15 * tread], [0.94 * wheel, 0.0], [0.66 * wheel, 0.0],
+        [0.6 * wheel, -0.1 * tread], [0.25 * wheel, -0.06 * tread],
+    ])  # fmt: skip
+    return both_sides(
+        revolve(profile, n=28, axis="y", centre=(axle, side, wheel)) for axle in axles
+    )
+
+
+def _mirrors(rng: np.random.Generator, x: float, half_width: float, z: float) -> Solids:
+    """Return the pair of wing mirrors."""
+    size = rng.uniform(0.6, 1.2)
+    centre = (x, half_width + 0.04, z)
+    extents = (0.12 * size, 0.2 * size + 0.06, 0.14 * size)
+    return both_sides([box(centre, extents, exponent=4.0, bevel=0.03)])
+
+
+def _bumper(rng: np.random.Generator, x: float, half_width: float, clearance: float) -> Solids:
+    """Return a bar across one end."""
+    bar = rng.uniform(0.14, 0.26)
+    z = clearance + rng.uniform(0.1, 0.2) + bar / 2
+    extents = (0.2, 1.75 * half_width, bar)
+    return [box((0.985 * x, 0.0, z), extents, exponent=4.0, bevel=0.04)]
+
+
+def _spare_wheel(rng: np.random.Generator, x: float, z: float) -> trimesh.Trimesh:
+    """Return a wheel facing along x."""
+    size = rng.uniform(0.3, 0.38)
+    profile = np.array([[0.6, -0.3], [1.0, -0.25], [1.0, 0.25], [0.6, 0.3]]) * size
+    return revolve(profile, n=28, axis="x", centre=(x, 0.0, z))
+
+
+def _spoiler(x: float, z: float, half_width: float) -> Solids:
+    """Return a wing across the car on two posts."""
+    wing = box((x, 0.0, z), (0.26, 1.6 * half_width, 0.05), bevel=0.015)
+    post = box((x, 0.5 * half_width, z - 0.15), (0.12, 0.06, 0.3), bevel=0.01)
+    return [rotated(wing, 6.0, "y", (x, 0.0, z)), *both_sides([post])]
+
+
+def _bed_walls(back: float, front: float, half_width: float, heights: Range) -> Solids:
+    """Return the two sides and the tailgate of an open bed."""
+    low, high = heights
+    middle, level = (back + front) / 2, (low + high) / 2
+    extents = (front - back, 0.08, high - low)
+    side = box((middle, 0.93 * half_width, level), extents, bevel=0.02)
+    gate = box((back + 0.06, 0.0, level), (0.08, 1.85 * half_width, high - low))
+    return [*both_sides([side]), gate]

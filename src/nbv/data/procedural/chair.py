@@ -21,16 +21,19 @@ from nbv.data.procedural.solids import (
     loft,
     mirrored,
     revolve,
+    rotated,
     slab,
     superellipse,
     sweep,
     tube,
-    turned,
 )
+
+_KINDS = {"dining": 0.38, "office": 0.12, "armchair": 0.18, "stool": 0.12, "tube": 0.1,
+          "shell": 0.1}  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Seat:
+class _Seat:
     """Half extents of the seat, the height of its upper face, and its thickness."""
 
     half_depth: float
@@ -44,7 +47,51 @@ class Seat:
         return self.top - self.thick
 
 
-def base(rng: np.random.Generator, kind: str, seat: Seat) -> Solids:
+def chair(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a chair, its back towards -x; only a rare writing tablet breaks the symmetry in y."""
+    kind = str(rng.choice(list(_KINDS), p=list(_KINDS.values())))
+    if kind == "armchair":
+        return centred(join(_armchair(rng)))
+    stool = kind == "stool"
+    small = 0.85 if stool else 1.0
+    seat = _Seat(
+        small * rng.uniform(0.17, 0.29),
+        small * rng.uniform(0.17, 0.32),
+        rng.uniform(0.36, 0.5) * (rng.uniform(1.0, 1.6) if stool else 1.0),
+        float(rng.choice([rng.uniform(0.025, 0.04), rng.uniform(0.06, 0.13)])),
+    )
+    if kind == "shell":
+        return centred(join([_shell(rng, seat), *_base(rng, kind, seat)]))
+    parts = [_seat(rng, seat, disc=stool and rng.random() < 0.6), *_base(rng, kind, seat)]
+    parts += _back(rng, seat, kind)
+    if not stool and rng.random() < (0.6 if kind == "office" else 0.33):
+        parts += _arms(rng, seat)
+    return centred(join(parts))
+
+
+def _seat(rng: np.random.Generator, seat: _Seat, *, disc: bool) -> trimesh.Trimesh:
+    exponent = 2.0 if disc else rng.uniform(2.6, 9.0)
+    outline = superellipse(seat.half_depth, seat.half_width, exponent, n=40)
+    outline[:, 1] *= 1.0 + rng.uniform(-0.05, 0.2) * (outline[:, 0] / seat.half_depth - 1.0) / 2
+    return slab(outline, seat.under, seat.top, bevel=0.3 * seat.thick)
+
+
+def _shell(rng: np.random.Generator, seat: _Seat) -> trimesh.Trimesh:
+    """Return seat and back bent from one piece."""
+    thick, height = rng.uniform(0.012, 0.04), rng.uniform(0.25, 0.7)
+    back = -seat.half_depth - height * np.tan(np.radians(rng.uniform(2.0, 35.0)))
+    z = seat.under + thick / 2
+    corners = [
+        (seat.half_depth, 0.0, z),
+        (-seat.half_depth, 0.0, z - 0.01),
+        (back, 0.0, z + height),
+    ]
+    path = fillet(corners, rng.uniform(0.08, 0.2), n=23)
+    outline = superellipse(seat.half_width, thick / 2, 5.0, n=32)
+    return sweep(path, outline, (0.0, 1.0, 0.0), scale=np.linspace(1.0, rng.uniform(0.6, 1.1), 25))
+
+
+def _base(rng: np.random.Generator, kind: str, seat: _Seat) -> Solids:
     """Return the base of a chair of a kind."""
     if kind == "office":
         return _star(rng, seat)
@@ -58,7 +105,7 @@ def base(rng: np.random.Generator, kind: str, seat: Seat) -> Solids:
     return _panels(rng, seat) if form == "panels" else _legs(rng, seat)
 
 
-def _legs(rng: np.random.Generator, seat: Seat) -> Solids:
+def _legs(rng: np.random.Generator, seat: _Seat) -> Solids:
     """Return four straight legs and, often, stretchers or rockers between them."""
     thick = rng.uniform(0.011, 0.03)
     outline = superellipse(thick, thick, float(rng.choice([2.0, 8.0])), n=12)
@@ -90,7 +137,7 @@ def _legs(rng: np.random.Generator, seat: Seat) -> Solids:
     return both_sides(parts)
 
 
-def _crossed_legs(rng: np.random.Generator, seat: Seat) -> Solids:
+def _crossed_legs(rng: np.random.Generator, seat: _Seat) -> Solids:
     """Return a folding chair's two crossed pairs, one slightly inside the other."""
     radius, lean = rng.uniform(0.01, 0.016), rng.uniform(0.85, 1.15) * seat.half_depth
     y = 0.92 * seat.half_width
@@ -101,14 +148,14 @@ def _crossed_legs(rng: np.random.Generator, seat: Seat) -> Solids:
     return both_sides([outer, inner, bar])
 
 
-def _panels(rng: np.random.Generator, seat: Seat) -> Solids:
+def _panels(rng: np.random.Generator, seat: _Seat) -> Solids:
     """Return solid sides."""
     thick, depth = rng.uniform(0.02, 0.05), rng.uniform(1.4, 2.1) * seat.half_depth
     centre = (0.0, 0.95 * seat.half_width - thick / 2, seat.under / 2 + 0.002)
     return both_sides([box(centre, (depth, thick, seat.under), exponent=20.0)])
 
 
-def _star(rng: np.random.Generator, seat: Seat) -> Solids:
+def _star(rng: np.random.Generator, seat: _Seat) -> Solids:
     """Return a column on a star with castors, one point of it straight ahead or behind."""
     reach, hub = rng.uniform(0.22, 0.34), rng.uniform(0.09, 0.13)
     points, start = int(rng.choice([4, 5, 5])), float(rng.choice([0.0, 180.0]))
@@ -117,7 +164,7 @@ def _star(rng: np.random.Generator, seat: Seat) -> Solids:
     wheel = revolve(disc, n=16, axis="y", centre=(reach, 0.0, 0.03))
     fork = tube([(reach, 0.0, 0.03), (reach, 0.0, 0.085)], 0.012, n=8)
     star = [
-        turned(part, start + 360.0 / points * k, "z")
+        rotated(part, start + 360.0 / points * k, "z")
         for k in range(points)
         for part in (arm, wheel, fork)
     ]
@@ -126,7 +173,7 @@ def _star(rng: np.random.Generator, seat: Seat) -> Solids:
     return [*star, revolve(column, n=16), box((0.0, 0.0, seat.under - 0.02), plate)]
 
 
-def _pedestal(rng: np.random.Generator, seat: Seat) -> Solids:
+def _pedestal(rng: np.random.Generator, seat: _Seat) -> Solids:
     """Return a round foot and a column."""
     foot, column = rng.uniform(0.16, 0.24), rng.uniform(0.02, 0.05)
     profile = [[foot, 0.0], [foot, 0.015], [1.5 * column, 0.05], [column, 0.12],
@@ -134,7 +181,7 @@ def _pedestal(rng: np.random.Generator, seat: Seat) -> Solids:
     return [revolve(profile, n=32)]
 
 
-def _bent_tube(rng: np.random.Generator, seat: Seat) -> Solids:
+def _bent_tube(rng: np.random.Generator, seat: _Seat) -> Solids:
     """Return a sled or a cantilever frame."""
     radius, y = rng.uniform(0.009, 0.016), 0.9 * seat.half_width
     front, back = 0.95 * seat.half_depth, -seat.half_depth * rng.uniform(0.8, 1.2)
@@ -148,54 +195,6 @@ def _bent_tube(rng: np.random.Generator, seat: Seat) -> Solids:
     return [side, mirrored(side), bar]
 
 
-_KINDS = {"dining": 0.38, "office": 0.12, "armchair": 0.18, "stool": 0.12, "tube": 0.1,
-          "shell": 0.1}  # fmt: skip
-
-
-def chair(rng: np.random.Generator) -> trimesh.Trimesh:
-    """Return a chair, its back towards -x; only a rare writing tablet breaks the symmetry in y."""
-    kind = str(rng.choice(list(_KINDS), p=list(_KINDS.values())))
-    if kind == "armchair":
-        return centred(join(_armchair(rng)))
-    stool = kind == "stool"
-    small = 0.85 if stool else 1.0
-    seat = Seat(
-        small * rng.uniform(0.17, 0.29),
-        small * rng.uniform(0.17, 0.32),
-        rng.uniform(0.36, 0.5) * (rng.uniform(1.0, 1.6) if stool else 1.0),
-        float(rng.choice([rng.uniform(0.025, 0.04), rng.uniform(0.06, 0.13)])),
-    )
-    if kind == "shell":
-        return centred(join([_shell(rng, seat), *base(rng, kind, seat)]))
-    parts = [_seat(rng, seat, disc=stool and rng.random() < 0.6), *base(rng, kind, seat)]
-    parts += _back(rng, seat, kind)
-    if not stool and rng.random() < (0.6 if kind == "office" else 0.33):
-        parts += _arms(rng, seat)
-    return centred(join(parts))
-
-
-def _seat(rng: np.random.Generator, seat: Seat, *, disc: bool) -> trimesh.Trimesh:
-    exponent = 2.0 if disc else rng.uniform(2.6, 9.0)
-    outline = superellipse(seat.half_depth, seat.half_width, exponent, n=40)
-    outline[:, 1] *= 1.0 + rng.uniform(-0.05, 0.2) * (outline[:, 0] / seat.half_depth - 1.0) / 2
-    return slab(outline, seat.under, seat.top, bevel=0.3 * seat.thick)
-
-
-def _shell(rng: np.random.Generator, seat: Seat) -> trimesh.Trimesh:
-    """Return seat and back bent from one piece."""
-    thick, height = rng.uniform(0.012, 0.04), rng.uniform(0.25, 0.7)
-    back = -seat.half_depth - height * np.tan(np.radians(rng.uniform(2.0, 35.0)))
-    z = seat.under + thick / 2
-    corners = [
-        (seat.half_depth, 0.0, z),
-        (-seat.half_depth, 0.0, z - 0.01),
-        (back, 0.0, z + height),
-    ]
-    path = fillet(corners, rng.uniform(0.08, 0.2), n=23)
-    outline = superellipse(seat.half_width, thick / 2, 5.0, n=32)
-    return sweep(path, outline, (0.0, 1.0, 0.0), scale=np.linspace(1.0, rng.uniform(0.6, 1.1), 25))
-
-
 def _arc(half_width: float, bulge: float, x: float, z: float) -> Points:
     """Return a level path from +y to -y whose middle lies `bulge` further back than its ends."""
     y = np.linspace(half_width, -half_width, 13)
@@ -207,7 +206,7 @@ def _rail(path: Points, height: float, thick: float, exponent: float = 6.0) -> t
     return sweep(path, superellipse(height / 2, thick / 2, exponent, n=16), (0.0, 0.0, 1.0))
 
 
-def _back(rng: np.random.Generator, seat: Seat, kind: str) -> Solids:
+def _back(rng: np.random.Generator, seat: _Seat, kind: str) -> Solids:
     """Return the back, reclined about the seat's rear edge."""
     x, half = -seat.half_depth + 0.01, seat.half_width * rng.uniform(0.7, 1.05)
     height = rng.uniform(0.08, 0.28) if kind == "stool" else rng.uniform(0.2, 0.72)
@@ -233,8 +232,8 @@ def _back(rng: np.random.Generator, seat: Seat, kind: str) -> Solids:
         y, foot = 0.9 * half, seat.top - 0.01
         corners = [(x, y, foot), (x, half, high), (x, -half, high), (x, -y, foot)]
         parts = [tube(fillet(corners, 0.2, n=9), post * 1.2)]
-        places = np.linspace(-0.6, 0.6, int(rng.integers(3, 8))) * half
-        parts += [tube([(x, y, foot), (x, y, high - 0.02)], 0.6 * post, n=8) for y in places]
+        spindles = np.linspace(-0.6, 0.6, int(rng.integers(3, 8))) * half
+        parts += [tube([(x, y, foot), (x, y, high - 0.02)], 0.6 * post, n=8) for y in spindles]
     else:
         size, foot = min(rng.uniform(0.04, 0.1), 0.3 * height), seat.top + gap
         parts = [_rail(_arc(0.95 * half, bulge, x, high - size / 2), size, thick), *posts,
@@ -245,10 +244,10 @@ def _back(rng: np.random.Generator, seat: Seat, kind: str) -> Solids:
         parts += [box((x - bulge / 2, 0.0, high + 0.1), rest, exponent=4.0, bevel=0.02)]
         parts += [tube([(x - bulge / 2, 0.0, high - 0.04), (x - bulge / 2, 0.0, high + 0.1)], post)]
     recline = -rng.uniform(0.0, 22.0)
-    return [turned(part, recline, "y", (x, 0.0, seat.under + seat.thick / 2)) for part in parts]
+    return [rotated(part, recline, "y", (x, 0.0, seat.under + seat.thick / 2)) for part in parts]
 
 
-def _spine(x: float, bulge: float, seat: Seat, high: float) -> Solids:
+def _spine(x: float, bulge: float, seat: _Seat, high: float) -> Solids:
     """Return the bracket that holds an office chair's back."""
     run = high - 0.16 - seat.under
     spine = box((x - bulge, 0.0, seat.under + run / 2), (0.03, 0.08, run), exponent=4.0)
@@ -270,13 +269,13 @@ def _filling(
         return both_sides([tube([(depth, 0.9 * half, high), (depth, -0.9 * half, low)],
                                 0.8 * post, n=8)])  # fmt: skip
     flat = superellipse(rng.uniform(0.007, 0.025), 0.008, 4.0, n=12)
-    places = np.linspace(-0.8, 0.8, int(rng.integers(3, 8))) * half
-    depths = x - bulge * (1 - (places / (0.95 * half)) ** 2)
+    slats = np.linspace(-0.8, 0.8, int(rng.integers(3, 8))) * half
+    depths = x - bulge * (1 - (slats / (0.95 * half)) ** 2)
     return [sweep([(depth, y, low), (depth, y, high + 0.01)], flat, (0.0, 1.0, 0.0))
-            for depth, y in zip(depths, places, strict=True)]  # fmt: skip
+            for depth, y in zip(depths, slats, strict=True)]  # fmt: skip
 
 
-def _arms(rng: np.random.Generator, seat: Seat) -> Solids:
+def _arms(rng: np.random.Generator, seat: _Seat) -> Solids:
     """Return arm rests on one post each or on a loop of tube, sometimes with a tablet."""
     z, y = seat.top + rng.uniform(0.15, 0.27), seat.half_width + rng.uniform(0.0, 0.05)
     front, back = seat.half_depth * rng.uniform(0.3, 1.1), -seat.half_depth * rng.uniform(0.7, 1.1)
@@ -314,7 +313,7 @@ def _armchair(rng: np.random.Generator) -> Solids:
         width = 2 * half_width - rng.uniform(0.0, 0.8) * thick
         rest = box((-half_depth + thick / 2, 0.0, (foot + back) / 2),
                    (1.3 * thick, width, back - foot), bevel=bevel)  # fmt: skip
-        parts += [turned(rest, -rng.uniform(0.0, 16.0), "y", (-half_depth, 0.0, foot))]
+        parts += [rotated(rest, -rng.uniform(0.0, 16.0), "y", (-half_depth, 0.0, foot))]
         if rng.random() < 0.6:
             parts += [box((0.06, 0.0, seat + 0.04), (1.7 * half_depth, 1.55 * half_width, 0.12),
                           exponent=5.0, bevel=0.035)]  # fmt: skip

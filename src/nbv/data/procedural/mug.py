@@ -7,7 +7,7 @@ import trimesh
 
 from nbv.data.procedural.solids import Points, fillet, join, revolve, superellipse, sweep
 
-# So many that the facets of the body do not reveal the viewpoint.
+# Enough facets that the body does not reveal the viewpoint.
 _AROUND = 96
 # Distance of a handle's centre line from the wall, in heights of the mug: small, usual, large.
 _DISTANCES = ((0.08, 0.15), (0.16, 0.3), (0.3, 0.52))
@@ -20,24 +20,23 @@ def mug(
 ) -> trimesh.Trimesh:
     """Return a mug of height 1 on z = 0, its handle towards -y.
 
-    Mugs are drawn until the handle's reach is at least `least_reach`. A mug whose first draw has
-    it is the same as with 0. With the probability `square_share` it has a square body, the handle
-    on one of its sides; otherwise it is the same as with 0.
+    Mugs are drawn until the handle's reach is at least `least_reach`. With the probability
+    `square_share` the body is square, with the handle on one of its sides. Neither changes mugs
+    that are round or whose first draw has the reach.
     """
-    # A stream of its own: it takes nothing from that of the round mugs.
-    (of_section,) = rng.spawn(1)
-    is_square = of_section.random() < square_share
-    corner = float(of_section.uniform(*_CORNERS)) if is_square else 1.0
+    # A separate stream, so that round mugs stay the same.
+    (section_rng,) = rng.spawn(1)
+    is_square = section_rng.random() < square_share
+    corner = float(section_rng.uniform(*_CORNERS)) if is_square else 1.0
     while handle_reach(drawn := _any_mug(rng, corner)) < least_reach:
         pass
     return drawn
 
 
 def handle_reach(mesh: trimesh.Trimesh) -> float:
-    """Return what the handle adds to the body's width, in widths of the body.
+    """Return the handle's reach beyond the body, in widths of the body.
 
-    It is the difference of the two horizontal sides of the mug's box, over the shorter one, along
-    x. A handle that the body swallows has 0.
+    It is the difference of the bounding box's sides along y and x, divided by the side along x.
     """
     across, along, _ = np.ptp(mesh.vertices, axis=0)
     return float(along / across - 1.0)
@@ -105,7 +104,7 @@ def _squared(body: trimesh.Trimesh, corner: float) -> trimesh.Trimesh:
 
 def _handle(rng: np.random.Generator, outer: Points, wall: float) -> trimesh.Trimesh:
     """Return the handle, its ends buried in the wall; a hook has its lower end free."""
-    # From a finger ring to a tankard's: only this sets the range of azimuths that the body hides.
+    # From a finger ring to a tankard's handle; it determines the azimuths at which it is hidden.
     low, high = _DISTANCES[rng.choice(3, p=[0.15, 0.45, 0.4])]
     distance = rng.uniform(low, high)
     span = float(np.clip(rng.uniform(1.2, 2.6) * distance + rng.uniform(0.0, 0.2), 0.24, 0.76))

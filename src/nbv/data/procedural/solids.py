@@ -1,8 +1,7 @@
-"""Closed solids from rings of points, and how they are moved and joined.
+"""Closed solids from rings of points, and their transforms and unions.
 
-Every solid is one watertight :class:`trimesh.Trimesh` whose faces point outwards. Each comes from
-:func:`loft`, which joins a stack of rings of equally many points. No function changes its
-arguments.
+Every solid is a watertight :class:`trimesh.Trimesh` with outward faces, made by :func:`loft`, which
+joins a stack of rings with equal numbers of points. No function changes its arguments.
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ def loft(rings: ArrayLike, *, closed: bool = False) -> trimesh.Trimesh:
 
 
 def _outward(vertices: Points, faces: NDArray[np.intp]) -> trimesh.Trimesh:
-    """Turn every face over if the enclosed volume is negative."""
+    """Flip all faces if the enclosed volume is negative."""
     corners = vertices[faces]
     six_volumes = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
     return trimesh.Trimesh(vertices, faces if six_volumes > 0 else faces[:, ::-1], process=False)
@@ -183,7 +182,7 @@ def revolve(
     axis : {"x", "y", "z"}
         Direction of the axis of revolution.
     centre : array_like
-        (3,): place of height 0 on the axis.
+        (3,): point of height 0 on the axis.
 
     Returns
     -------
@@ -312,10 +311,10 @@ def moved(solid: trimesh.Trimesh, offset: ArrayLike) -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices, solid.faces, process=False)
 
 
-def turned(
+def rotated(
     solid: trimesh.Trimesh, angle_deg: float, axis: Axis, centre: ArrayLike = (0.0, 0.0, 0.0)
 ) -> trimesh.Trimesh:
-    """Return the solid turned about an axis through `centre`, counter-clockwise."""
+    """Return the solid rotated about an axis through `centre`, counter-clockwise."""
     c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
     about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     rotation = about_z[np.ix_(FROM_Z[axis], FROM_Z[axis])]

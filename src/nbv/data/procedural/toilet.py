@@ -20,11 +20,11 @@ from nbv.data.procedural.solids import (
     join,
     loft,
     revolve,
+    rotated,
     slab,
     stack_outlines,
     superellipse,
     tube,
-    turned,
 )
 
 _POINTS = 56
@@ -129,9 +129,9 @@ def _seat(rng: np.random.Generator, bowl: _Bowl, *, has_cistern: bool) -> Solids
     if state == "none":
         return [seat, *pins]
     if state == "both up":
-        seat = turned(seat, up + 3.0, "y", pivot)
+        seat = rotated(seat, up + 3.0, "y", pivot)
     if state != "down":
-        lid = turned(lid, up, "y", pivot)
+        lid = rotated(lid, up, "y", pivot)
     return [seat, lid, *pins]
 
 
