@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from nbv.core.angles import circular_distance_deg
@@ -47,6 +49,23 @@ def evidence_of(estimate_deg=None, bandwidth_deg=12.0, pseudo_observations=2.0, 
         pseudo_observations=pseudo_observations,
         n_bins=n_bins,
     )
+
+
+def product_by_loops(rows, rotations):
+    """The unnormalised product of views: prod_i p_i(theta + rotation_i), rotations in bins."""
+    n_bins = len(rows[0])
+    return np.array(
+        [
+            math.prod(p[(theta + k) % n_bins] for p, k in zip(rows, rotations, strict=True))
+            for theta in range(n_bins)
+        ]
+    )
+
+
+def direction_by_loops(row):
+    """The direction of a distribution's first moment, degrees."""
+    moment = sum(p * np.exp(2j * np.pi * theta / len(row)) for theta, p in enumerate(row))
+    return float(np.degrees(np.angle(moment)))
 
 
 def hidden_range_estimates(n_objects: int, seed: int = 0) -> np.ndarray:

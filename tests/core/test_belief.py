@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from tests.core.made import N_BINS, estimates, evidence_of
+from tests.core.made import (
+    N_BINS,
+    direction_by_loops,
+    estimates,
+    evidence_of,
+    product_by_loops,
+)
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief, coarser, every_belief, first_belief, updated
@@ -15,15 +21,14 @@ def test_beliefs_follow_bayes_rule_view_by_view():
     V, L = evidence.conditionals.viewpoint, evidence.conditionals.estimate
     views = [(90, 100.0), (240, 300.0), (15, 61.0)]
     belief = first_belief(np.array([40.0]), evidence)
-    expected = V[int(40.0 / 15 + 0.5)].copy()
+    rows = [V[int(40.0 / 15 + 0.5)]]
     for delta, seen in views:
         belief = updated(belief, np.array([seen]), np.array([delta]), evidence)
-        for theta in range(N_BINS):
-            expected[theta] *= L[(theta + delta // 15) % N_BINS, int(seen / 15 + 0.5) % N_BINS]
+        rows.append(L[:, int(seen / 15 + 0.5) % N_BINS])
+    expected = product_by_loops(rows, [0, *(delta // 15 for delta, _ in views)])
     np.testing.assert_allclose(belief.probabilities[0], expected / expected.sum(), rtol=1e-4)
     assert belief.n_views == 4
-    angles = np.radians(np.arange(N_BINS) * 15.0)
-    direction = np.degrees(np.angle(np.sum(expected * np.exp(1j * angles))))
+    direction = direction_by_loops(expected)
     assert circular_distance_deg(mean_direction_deg(belief.probabilities)[0], direction) < 0.01
 
 

@@ -11,14 +11,19 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.special import softmax as softmax_of_scipy
 from scipy.stats import circstd
+from tests.core.made import product_by_loops
 
+from nbv.core import look_alikes
 from nbv.core.angles import circular_distance_deg
 from nbv.core.distributions import (
     direction_and_spread_deg,
+    in_object_frame,
+    in_view_frame,
     log_bayes_factor,
     mean_direction_deg,
     product_of,
     product_of_views,
+    products_at_spacing,
     rotated,
 )
 from nbv.core.estimates import posteriors_of
@@ -122,18 +127,33 @@ def test_the_mean_direction_turns_along(seed, bins):
     assert apart == pytest.approx(0.0, abs=1e-5)
 
 
+def test_the_object_frame_rotates_each_view_by_its_azimuth():
+    sweeps = np.random.default_rng(0).dirichlet(np.ones(BINS), (2, BINS))
+    found = in_object_frame(sweeps)
+    for i, view in np.ndindex(2, BINS):
+        assert np.array_equal(found[i, view], rotated(sweeps[i, view], view * WIDTH))
+    assert np.array_equal(in_view_frame(found), sweeps)
+    assert np.array_equal(found, look_alikes.in_object_frame(sweeps))
+
+
 # Fused
+
+
+@pytest.mark.parametrize(("n_views", "spacing"), [(2, 5), (3, -2), (4, 1)])
+def test_products_at_a_spacing_are_those_of_each_first_view(n_views, spacing):
+    sweep = np.random.default_rng(1).dirichlet(np.ones(BINS), BINS)
+    (found,) = products_at_spacing(np.log(sweep)[None].astype(np.float32), n_views, spacing)
+    rotations = spacing * np.arange(n_views)
+    for start in range(BINS):
+        wanted = product_by_loops(sweep[(start + rotations) % BINS], rotations)
+        assert found[start] == pytest.approx(wanted / wanted.max(), rel=1e-4)
 
 
 @given(seed=st.integers(0, 10**6), bins=st.lists(whole, min_size=2, max_size=2))
 def test_a_fused_belief_is_the_product_of_all_views(seed, bins):
-    """p(theta) of the first view, times p_i(theta + rotation_i) of every other one, by loops."""
     rows = beliefs(seed)
     rotations = [0, *bins]
-    wanted = np.ones(BINS)
-    for theta in range(BINS):
-        for row, turn in zip(rows, rotations, strict=True):
-            wanted[theta] *= row[(theta + turn) % BINS]
+    wanted = product_by_loops(rows, rotations)
     wanted /= wanted.sum()
     found = product_of_views(rows, [turn * WIDTH for turn in rotations])
     assert found == pytest.approx(wanted, rel=1e-6, abs=1e-12)
@@ -283,13 +303,9 @@ def test_what_has_no_known_elevation_counts_whole():
 @given(st.integers(0, 99), st.lists(whole, min_size=2, max_size=2))
 def test_the_bayes_factor_is_a_sum_over_poses(seed, bins):
     rows = beliefs(seed)
-    places = [0, *bins]
-    products = [
-        math.prod(row[(pose + place) % BINS] for row, place in zip(rows, places, strict=True))
-        for pose in range(BINS)
-    ]
-    found = math.exp(log_bayes_factor(rows, [WIDTH * place for place in places]))
-    assert found == pytest.approx(BINS**2 * sum(products), rel=1e-9)
+    rotations = [0, *bins]
+    found = math.exp(log_bayes_factor(rows, [WIDTH * k for k in rotations]))
+    assert found == pytest.approx(BINS**2 * product_by_loops(rows, rotations).sum(), rel=1e-9)
 
 
 @given(st.integers(0, 99), st.integers(-20, 20))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.core.made import N_BINS, estimates, evidence_of
+from tests.core.made import N_BINS, direction_by_loops, estimates, evidence_of, product_by_loops
 
 from nbv.core import fusion
 from nbv.core.angles import circular_distance_deg
@@ -121,9 +121,8 @@ def random_rows(seed, n):
 def test_the_product_multiplies_in_the_frame_of_the_first_view(seed, delta, k):
     first, second = random_rows(seed, 1), random_rows(seed + 1, 1)
     found = product(first, second, np.array([delta * 30]))
-    terms = [first[0, t] * second[0, (t + delta) % 12] for t in range(12)]
-    mean = sum(p * np.exp(2j * np.pi * t / 12) for t, p in enumerate(terms))
-    assert circular_distance_deg(found[0], np.degrees(np.angle(mean))) < 1e-6
+    wanted = direction_by_loops(product_by_loops([first[0], second[0]], [0, delta]))
+    assert circular_distance_deg(found[0], wanted) < 1e-6
     turned = product(np.roll(first, k, axis=1), np.roll(second, k, axis=1), np.array([delta * 30]))
     assert circular_distance_deg(turned[0], found[0] + 30 * k) < 1e-6
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.core.made import product_by_loops
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
@@ -53,9 +54,8 @@ def test_after_one_view_it_is_the_criterion(rng: np.random.Generator, n_turns: i
 def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Generator) -> None:
     distributions, bins, first = turns(rng), 24, 5
     alike = LookAlikes.of_views(distributions).after(3).after(10)
-    own = distributions[1, first]
-    for turn in (3, 10):
-        own = own * np.roll(distributions[1, (first + turn) % bins], -turn)
+    rotations = np.array([0, 3, 10])
+    own = product_by_loops(distributions[1, (first + rotations) % bins], rotations)
     own /= own.sum()
     assert alike.seen[1, first] == pytest.approx(own, rel=1e-4)
     for turn in range(bins):
@@ -220,7 +220,7 @@ def test_what_is_left_out_hardly_counts(rng: np.random.Generator, sharpness: flo
     distributions = sharp_turns(rng, 20, sharpness)
     alike = LookAlikes.of_views(distributions).after(5)
     share = rng.uniform(0.1, 1, 20)
-    belief = distributions[3, 7] * np.roll(distributions[3, 12], -5)
+    belief = product_by_loops(distributions[3, [7, 12]], [0, 5])
     belief /= belief.sum()
     weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 16.0 * share[:, None]
     errors = alike.errors_deg

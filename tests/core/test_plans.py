@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.core.made import direction_by_loops, product_by_loops
 from tests.core.test_errors_given_distributions import (
     N_BINS,
     N_VIEWS,
@@ -56,15 +57,11 @@ def test_errors_are_those_of_multiplying_the_views_one_by_one(n_views):
     views, spacings = distributions(0)[:, ::2], np.array([3, -2, 1])
     found = spaced_errors_deg(views, n_views, spacings)
     assert found.shape == (3, 3, N_BINS)
-    unit = np.exp(2j * np.pi * np.arange(N_BINS) / N_BINS)
-    for place, one, start in np.ndindex(found.shape):
-        total = np.ones(N_BINS)
-        for view in range(n_views):
-            turn = view * spacings[place]
-            total = total * np.roll(views[one, (start + turn) % N_BINS], -turn)
-        pose_deg = np.degrees(np.angle(total @ unit))
-        expected = circular_distance_deg(pose_deg, start * 360 / N_BINS)
-        assert found[place, one, start] == pytest.approx(float(expected), abs=0.01)
+    for i, o, start in np.ndindex(found.shape):
+        rotations = spacings[i] * np.arange(n_views)
+        product = product_by_loops(views[o, (start + rotations) % N_BINS], rotations)
+        expected = circular_distance_deg(direction_by_loops(product), start * 360 / N_BINS)
+        assert found[i, o, start] == pytest.approx(float(expected), abs=0.01)
 
 
 def test_two_views_have_the_errors_of_the_product_after_each_rotation():
@@ -96,17 +93,17 @@ def test_caution_adds_standard_errors_over_objects():
     errors = spaced_errors_deg(views, 3, spacings)
     weights = 360 / N_BINS * affinity(belief.probabilities, views.reshape(-1, N_BINS)) ** 4
     plain, cautious = (excess_of_plans(belief, evidence, errors, c) for c in (0.0, 2.0))
-    for row, place in np.ndindex(plain.shape):
-        difference = errors[place] - errors[0]
+    for row, i in np.ndindex(plain.shape):
+        difference = errors[i] - errors[0]
         counts, sums = np.empty(5), np.empty(5)
-        for o, of_view in enumerate(weights[row].reshape(5, N_BINS)):
-            counts[o] = of_view.sum() + 1
-            sums[o] = of_view @ difference[o] + difference[o].mean()
+        for o, own in enumerate(weights[row].reshape(5, N_BINS)):
+            counts[o] = own.sum() + 1
+            sums[o] = own @ difference[o] + difference[o].mean()
         mean = sums.sum() / counts.sum()
         left = sums - mean * counts
         error = np.sqrt(np.sum(left**2) * 5 / 4) / counts.sum()
-        assert plain[row, place] == pytest.approx(mean, rel=1e-3, abs=1e-3)
-        assert cautious[row, place] == pytest.approx(mean + 2 * error, rel=1e-3, abs=1e-3)
+        assert plain[row, i] == pytest.approx(mean, rel=1e-3, abs=1e-3)
+        assert cautious[row, i] == pytest.approx(mean + 2 * error, rel=1e-3, abs=1e-3)
     assert (cautious[:, 0] == 0).all()
 
 
