@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nbv.core.criteria import POSE_LIKELIHOODS, SPREADS
 from nbv.data.camera import FRAMINGS
-from nbv.data.sources import shapenet
+from nbv.data.sources.files import open_shapenet
 from nbv.errors import UserError
 from nbv.experiment.config import (
     default_of,
@@ -74,7 +74,7 @@ def test_names_are_those_that_the_code_knows(key, names):
 def test_every_layout_in_the_schema_is_one_of_shapenet(tmp_path):
     settings = load_config(CONFIG, ["dataset=shapenet", f"dataset.root={tmp_path}"])["dataset"]
     for layout in get_args(Dataset.model_fields["layout"].annotation):
-        assert shapenet.open_shapenet(settings | {"layout": layout}, 0).root == tmp_path
+        assert open_shapenet(settings | {"layout": layout}, 0).root == tmp_path
 
 
 def test_every_kind_of_estimator_has_its_file():

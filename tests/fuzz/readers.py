@@ -174,7 +174,7 @@ def make_estimates(path: Path) -> None:
 
 
 def read_estimates(path: Path) -> Any:
-    from nbv.core import estimates
+    from nbv.experiment import estimates
 
     return estimates.read_estimates(path)
 
@@ -266,9 +266,9 @@ def make_posteriors(path: Path) -> None:
 
 
 def read_posteriors(path: Path) -> Any:
-    from nbv.core import posteriors
+    from nbv.experiment import estimates
 
-    return posteriors.read_posteriors(path, IDS)
+    return estimates.read_posteriors(path, IDS)
 
 
 def posteriors_problem(posteriors: Any) -> str:
