@@ -1,7 +1,7 @@
 """Distributions on the circle: rotate, multiply and summarise them.
 
-A distribution has B probabilities; bin b is centred on 360 b / B degrees. From logits to
-distributions leads `nbv.core.logits`, which is all that a training needs.
+A distribution has B probabilities; bin b is centred on 360 b / B degrees. `nbv.core.logits`, the
+only part that trainings need, makes distributions from logits.
 """
 
 from __future__ import annotations

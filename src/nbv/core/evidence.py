@@ -36,7 +36,7 @@ class Evidence:
         The configuration's ``density`` and ``affinity``, from which criteria take parameters.
     distributions : ndarray (n_objects, n_views, B) float32, optional
         p(azimuth | image) of calibration images, if the conditionals are derived from them.
-    made : dict
+    cache : dict
         Cache of `once`.
 
     Examples
@@ -56,13 +56,13 @@ class Evidence:
     pseudo_observations: float
     settings: Mapping[str, Any]
     distributions: NDArray[np.float32] | None = None
-    made: dict[Any, Float32Array] = field(default_factory=dict, repr=False, compare=False)
+    cache: dict[Any, Float32Array] = field(default_factory=dict, repr=False, compare=False)
 
     def once(self, key: Any, make: Callable[[], Float32Array]) -> Float32Array:
         """Return the cached result of `make` for a key, computed by the first call."""
-        if key not in self.made:
-            self.made[key] = make()
-        return self.made[key]
+        if key not in self.cache:
+            self.cache[key] = make()
+        return self.cache[key]
 
     @property
     def n_bins(self) -> int:

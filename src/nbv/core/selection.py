@@ -341,7 +341,7 @@ def select_methods(
     estimate_deg = calibration.estimate_deg
     own = {n: m for n, m in extensions.items() if m["fusion"] not in OF_DISTRIBUTIONS}
     resolved, densities = _resolve(estimate_deg, own, settings)
-    made: dict[tuple[float, float], Evidence] = {}
+    evidences: dict[tuple[float, float], Evidence] = {}
     image_evidence = None
     if posteriors is not None:
         image_evidence = evidence_of_distributions(posteriors.distributions, settings)
@@ -351,9 +351,9 @@ def select_methods(
         density, evidence = densities.get(name, NO_DENSITY), image_evidence
         if name in resolved:
             key = (density.bandwidth_deg, density.pseudo_observations)
-            if key not in made:
-                made[key] = chosen_evidence(estimate_deg, density, settings)
-            evidence = made[key]
+            if key not in evidences:
+                evidences[key] = chosen_evidence(estimate_deg, density, settings)
+            evidence = evidences[key]
             lookup = build_lookup(evidence, policy, fusion) if needs_lookup(policy) else None
         if evidence is None:
             raise ValueError(f"extension {name!r} needs posteriors")
