@@ -35,7 +35,7 @@ WIDTH = 360.0 / BINS
 
 logits = arrays(np.float64, (3, BINS), elements=st.floats(-20, 20))
 whole = st.integers(-60, 60)
-any_turn = st.floats(-800, 800)
+any_rotation = st.floats(-800, 800)
 uniform = np.full(BINS, 1 / BINS)
 
 
@@ -71,47 +71,47 @@ def test_large_logits_do_not_overflow():
     assert found[0] == pytest.approx([1.0, LEAST_PROBABILITY, LEAST_PROBABILITY], rel=1e-5)
 
 
-# Turned
+# Rotated
 
 
 @given(values=logits, bins=whole)
-def test_a_turn_by_whole_bins_is_a_roll(values, bins):
+def test_a_rotation_by_whole_bins_is_a_roll(values, bins):
     rows = softmax_of_scipy(values, axis=1)
     assert np.array_equal(rotated(rows, bins * WIDTH), np.roll(rows, -bins, axis=1))
 
 
-@given(seed=st.integers(0, 10**6), turn=any_turn)
-def test_a_turn_keeps_the_total(seed, turn):
-    found = rotated(beliefs(seed), turn)
+@given(seed=st.integers(0, 10**6), rotation=any_rotation)
+def test_a_rotation_keeps_the_total(seed, rotation):
+    found = rotated(beliefs(seed), rotation)
     assert found.sum(axis=1) == pytest.approx(1.0)
     assert (found >= 0).all()
 
 
-@given(seed=st.integers(0, 10**6), turn=any_turn, bins=whole)
-def test_turns_add_up(seed, turn, bins):
+@given(seed=st.integers(0, 10**6), rotation=any_rotation, bins=whole)
+def test_rotations_add_up(seed, rotation, bins):
     rows = beliefs(seed)
-    both = rotated(rows, turn + bins * WIDTH)
-    assert rotated(rotated(rows, turn), bins * WIDTH) == pytest.approx(both, abs=1e-9)
-    assert rotated(rotated(rows, bins * WIDTH), turn) == pytest.approx(both, abs=1e-9)
+    both = rotated(rows, rotation + bins * WIDTH)
+    assert rotated(rotated(rows, rotation), bins * WIDTH) == pytest.approx(both, abs=1e-9)
+    assert rotated(rotated(rows, bins * WIDTH), rotation) == pytest.approx(both, abs=1e-9)
 
 
-@given(seed=st.integers(0, 10**6), turn=any_turn)
-def test_a_turn_and_the_whole_circle_are_the_turn(seed, turn):
+@given(seed=st.integers(0, 10**6), rotation=any_rotation)
+def test_a_rotation_and_the_whole_circle_are_the_rotation(seed, rotation):
     rows = beliefs(seed)
-    assert rotated(rows, turn + 360.0) == pytest.approx(rotated(rows, turn), abs=1e-9)
+    assert rotated(rows, rotation + 360.0) == pytest.approx(rotated(rows, rotation), abs=1e-9)
 
 
-@given(seed=st.integers(0, 10**6), turn=any_turn)
-def test_it_is_the_density_between_the_bins(seed, turn):
-    """numpy's periodic interpolation of p at theta + turn."""
+@given(seed=st.integers(0, 10**6), rotation=any_rotation)
+def test_it_is_the_density_between_the_bins(seed, rotation):
+    """numpy's periodic interpolation of p at theta + rotation."""
     rows, centres = beliefs(seed), np.arange(BINS) * WIDTH
-    for row, found in zip(rows, rotated(rows, turn), strict=True):
-        wanted = np.interp(centres + turn, centres, row, period=360.0)
+    for row, found in zip(rows, rotated(rows, rotation), strict=True):
+        wanted = np.interp(centres + rotation, centres, row, period=360.0)
         assert found == pytest.approx(wanted, abs=1e-9)
 
 
 @given(seed=st.integers(0, 10**6), degrees=st.integers(-400, 400))
-def test_a_turn_on_a_finer_grid_is_a_roll_too(seed, degrees):
+def test_a_rotation_on_a_finer_grid_is_a_roll_too(seed, degrees):
     """The density between bins is that of `nbv.core.logits.on_degrees`."""
     rows = beliefs(seed)
     fine = on_degrees(rotated(rows, float(degrees)))[:, :: int(WIDTH)]
@@ -120,7 +120,7 @@ def test_a_turn_on_a_finer_grid_is_a_roll_too(seed, degrees):
 
 
 @given(seed=st.integers(0, 10**6), bins=whole)
-def test_the_mean_direction_turns_along(seed, bins):
+def test_the_mean_direction_rotates_along(seed, bins):
     rows = beliefs(seed)
     moved = mean_direction_deg(rotated(rows, bins * WIDTH)) + bins * WIDTH
     apart = (moved - mean_direction_deg(rows) + 180) % 360 - 180
@@ -155,7 +155,7 @@ def test_a_fused_belief_is_the_product_of_all_views(seed, bins):
     rotations = [0, *bins]
     wanted = product_by_loops(rows, rotations)
     wanted /= wanted.sum()
-    found = product_of_views(rows, [turn * WIDTH for turn in rotations])
+    found = product_of_views(rows, [rotation * WIDTH for rotation in rotations])
     assert found == pytest.approx(wanted, rel=1e-6, abs=1e-12)
 
 
@@ -170,7 +170,7 @@ def test_two_views_are_the_product_of_the_experiments(seed, bins):
 @given(
     seed=st.integers(0, 10**6),
     order=st.permutations(range(4)),
-    rotations=st.lists(any_turn, min_size=4, max_size=4),
+    rotations=st.lists(any_rotation, min_size=4, max_size=4),
 )
 def test_the_order_of_views_does_not_matter(seed, order, rotations):
     rows = beliefs(seed, 4)
@@ -178,12 +178,12 @@ def test_the_order_of_views_does_not_matter(seed, order, rotations):
     assert found == pytest.approx(product_of_views(rows, rotations), rel=1e-6, abs=1e-12)
 
 
-@given(seed=st.integers(0, 10**6), turn=any_turn)
-def test_a_uniform_view_is_neutral(seed, turn):
+@given(seed=st.integers(0, 10**6), rotation=any_rotation)
+def test_a_uniform_view_is_neutral(seed, rotation):
     row = beliefs(seed, 1)[0]
-    assert product_of_views(np.stack([row, uniform]), [0.0, turn]) == pytest.approx(row)
-    assert product_of_views(np.stack([uniform, row]), [0.0, turn]) == pytest.approx(
-        rotated(row, turn)
+    assert product_of_views(np.stack([row, uniform]), [0.0, rotation]) == pytest.approx(row)
+    assert product_of_views(np.stack([uniform, row]), [0.0, rotation]) == pytest.approx(
+        rotated(row, rotation)
     )
 
 
@@ -194,10 +194,10 @@ def test_one_view_is_itself(seed):
 
 
 @given(seed=st.integers(0, 10**6), base=whole, bins=st.lists(whole, min_size=3, max_size=3))
-def test_rotations_from_elsewhere_turn_the_result(seed, base, bins):
+def test_rotations_from_elsewhere_rotate_the_result(seed, base, bins):
     rows = beliefs(seed)
-    found = product_of_views(rows, [(turn + base) * WIDTH for turn in bins])
-    wanted = rotated(product_of_views(rows, [turn * WIDTH for turn in bins]), base * WIDTH)
+    found = product_of_views(rows, [(rotation + base) * WIDTH for rotation in bins])
+    wanted = rotated(product_of_views(rows, [rotation * WIDTH for rotation in bins]), base * WIDTH)
     assert found == pytest.approx(wanted, rel=1e-6, abs=1e-12)
 
 
@@ -245,7 +245,7 @@ def test_the_spread_is_the_circular_standard_deviation(counts):
 
 
 @given(seed=st.integers(0, 10**6), bins=whole)
-def test_the_spread_does_not_turn(seed, bins):
+def test_the_spread_does_not_depend_on_the_rotation(seed, bins):
     row = beliefs(seed, 1)[0]
     assert spread_deg(rotated(row, bins * WIDTH)) == pytest.approx(spread_deg(row), rel=1e-6)
 
