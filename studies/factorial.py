@@ -60,7 +60,7 @@ METHODS: Final[Mapping[Pair, str]] = {
 } | {AS_PRINTED: "pose_ambiguity"}
 """The policies of all pairs that fuse estimates."""
 
-OF_IMAGES = ("random", "fixed", "opposite", "information_gain", "expected_error")
+PRODUCT_CHOICES = ("random", "fixed", "opposite", "information_gain", "expected_error")
 """Choices for the fusion ``product`` of images' distributions."""
 
 MORE_VIEWS: Final[Mapping[str, Pair]] = {
@@ -205,7 +205,7 @@ def _product_frames(
             evidence=evidence,
             posteriors=posteriors,
         )
-        for choice in OF_IMAGES
+        for choice in PRODUCT_CHOICES
     }
 
 
