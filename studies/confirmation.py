@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.experiment.statistics.object_means import MEAN_COLUMNS, object_means
+from nbv.experiment.statistics.paired import MEAN_COLUMNS, object_means
 from studies.factorial import MORE_VIEWS, SINGLE, Factorial
 from studies.trainings import (
     Mean,

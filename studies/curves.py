@@ -1,22 +1,241 @@
-"""Tables and curves of error against the number of views, and against travel."""
+"""Errors and travel: against the number of views, and against each other; rows, tables, curves."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from nbv.core.angles import nearest_bin, travel_deg
+from nbv.core.criteria import FOR_MORE_VIEWS
+from nbv.core.estimates import Estimates, Posteriors
+from nbv.core.evidence import Evidence
+from nbv.core.fusion import ESTIMATE_FUSIONS, Rotations, rotation_errors_deg
+from nbv.core.lookup import least_cost_delta
+from nbv.core.next_views import (
+    COARSE_BINS,
+    bisecting_next,
+    evenly_spaced_next,
+    random_next,
+    recommended_next,
+)
+from nbv.core.plans import (
+    at_spacing,
+    choose_plan,
+    plans_of,
+    step_by_step,
+)
+from nbv.core.policies import Turns, take_second_views
+from nbv.core.selection import SelectedMethod
+from nbv.core.simulation import (
+    DistributionViews,
+    EstimatedViews,
+    Views,
+    first_views,
+    follow,
+)
 from nbv.experiment.report.table import DECIDED, Cell, Table, difference_cell
-from nbv.experiment.statistics.object_means import mae_difference, mae_interval, paired_objects
-from nbv.experiment.statistics.paired import Resampler
+from nbv.experiment.statistics.metrics import accuracy_area, half_turned
+from nbv.experiment.statistics.paired import Resampler, mae_difference, mae_interval, paired_objects
 from nbv.files import existing, read_csv
 from nbv.labels import category_label, method_label, number
 from nbv.robot.style import RC, Panels, method_style, panel_grid
-from studies.travel import ANY_DIRECTION, pooled_travel
+
+Floats = NDArray[np.float64]
+Run = Callable[..., Floats]
+Reached = tuple[str, Sequence[int], Floats]
+
+VIEWS_COLUMNS = (
+    "method",
+    "n_views",
+    "object_id",
+    "error_deg",
+    "pauc_percent",
+    "above_90_percent",
+    "travel_deg",
+    "log_likelihood",
+    "inside_50_percent",
+    "inside_90_percent",
+)
+
+
+def more_views_rows(
+    test: Estimates,
+    evidences: Mapping[str, Callable[[int], Evidence]],
+    settings: Mapping[str, Any],
+    rng: np.random.Generator,
+    posteriors: Posteriors | None = None,
+    of_distributions: Evidence | None = None,
+) -> pd.DataFrame:
+    """Return what every policy has reached after each number of views, object by object.
+
+    Parameters
+    ----------
+    test : Estimates
+        Test objects, 360 views each.
+    evidences : mapping of str to callable
+        For ``random``, ``opposite`` and each criterion: its evidence for a number of bins. The
+        pose ambiguity, which is defined for two views alone, is left out.
+    settings : mapping
+        The configuration's ``more_views``: ``n_views, start_every_deg, min_separation_deg``.
+    rng : numpy.random.Generator
+    posteriors, of_distributions : optional
+        The test objects' distributions, and evidence of those of calibration objects: policies with
+        the fusion ``product`` are added.
+
+    Returns
+    -------
+    DataFrame
+        Columns `VIEWS_COLUMNS`: means over first views. Travel goes from view to view, the shorter
+        way. The last three describe the belief after all views; see
+        `nbv.core.simulation.follow`.
+    """
+    run = partial(follow, start_every_deg=settings["start_every_deg"], rng=rng)
+    reached = list(_by_posterior(test, evidences, settings, run))
+    if posteriors is not None and of_distributions is not None:
+        reached += _by_product(posteriors, of_distributions, settings, run)
+    rows = [
+        _row(test.object_ids, method, n, of_views[:, :, :, n - 1])
+        for method, numbers, of_views in reached
+        for n in numbers
+    ]
+    return pd.concat(rows, ignore_index=True)
+
+
+def _row(object_ids: tuple[str, ...], method: str, n_views: int, reached: Floats) -> pd.DataFrame:
+    """Return the rows of one policy and number of views; `reached` is of `follow`."""
+    errors, *others = reached
+    figures = (errors, accuracy_area(errors), half_turned(errors), *others)
+    means = (figure.mean(axis=1) for figure in figures)
+    values = (method, n_views, object_ids, *means)
+    return pd.DataFrame(dict(zip(VIEWS_COLUMNS, values, strict=True)))
+
+
+def _by_posterior(
+    test: Estimates,
+    evidences: Mapping[str, Callable[[int], Evidence]],
+    settings: Mapping[str, Any],
+    run: Run,
+) -> Iterator[Reached]:
+    """Yield policy, numbers of views and what was reached, fused by posterior."""
+    every = range(1, settings["n_views"] + 1)
+
+    def of(name: str) -> Views:
+        return EstimatedViews(test.estimate_deg, evidences[name](test.estimate_deg.shape[1]))
+
+    yield "random", every, run(random_next, of("random"), n_views=every[-1])
+    yield "bisecting", every, run(bisecting_next, of("opposite"), n_views=every[-1])
+    for n in every:
+        yield "evenly_spaced", [n], run(evenly_spaced_next(n), of("opposite"), n_views=n)
+    for criterion in FOR_MORE_VIEWS:
+        if criterion in evidences:
+            coarse = evidences[criterion](COARSE_BINS)
+            policy = recommended_next(criterion, coarse, settings["min_separation_deg"])
+            yield criterion, every, run(policy, of(criterion), n_views=every[-1])
+
+
+def _by_product(
+    posteriors: Posteriors, evidence: Evidence, settings: Mapping[str, Any], run: Run
+) -> Iterator[Reached]:
+    """Yield the same fused by product; from two views on the first one chooses a plan."""
+    every, apart_deg = range(1, settings["n_views"] + 1), settings["min_separation_deg"]
+    seen = DistributionViews(posteriors.distributions, evidence)
+    yield "random_product", every, run(random_next, seen, n_views=every[-1])
+    for n in every:
+        yield "evenly_spaced_product", [n], run(evenly_spaced_next(n), seen, n_views=n)
+    by_gain = recommended_next("information_gain", evidence, apart_deg)
+    yield "information_gain_product", every, run(by_gain, seen, n_views=every[-1])
+    belief = first_views(seen, settings["start_every_deg"])[2]
+    yield "expected_error_product", [1], run(random_next, seen, n_views=1)
+    for n in every[1:]:
+        plans = plans_of(evidence, n, apart_deg)
+        chosen = choose_plan(belief, evidence, plans)
+        steps_deg = np.append(plans.spacing_deg, 0)[chosen]
+        spaced = run(at_spacing(steps_deg), seen, n_views=n)
+        stepped = run(step_by_step(evidence, apart_deg, n), seen, n_views=n)
+        goes_on = (chosen == len(plans.spacing_deg)).reshape(spaced.shape[1:3])
+        planned = np.where(goes_on[None, :, :, None], stepped, spaced)
+        yield "expected_error_product", [n], planned
+
+
+# Multiples of the travel cost at which, for the average estimate, staying costs as little as going.
+RELATIVE_COSTS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0)
+LIMITS_DEG = (15, 30, 45, 60, 90, 120, 150, 180)
+ANY_DIRECTION = "either_way"
+
+TRAVEL_COLUMNS = ("method", "rule", "setting", "travel_deg", "error_deg", "n_images")
+
+
+def travel_rows(selected: Mapping[str, SelectedMethod], test: Estimates) -> pd.DataFrame:
+    """Return error against travel for every extension of a fold that follows a table.
+
+    Columns are `TRAVEL_COLUMNS`, means over test images. Rule ``cost``: `setting` is the cost in
+    the criterion's unit per degree, at each of `RELATIVE_COSTS` times the table's mean range over
+    180 degrees. Rule ``limit``: `setting` is the longest travel allowed, degrees. Under the name
+    `ANY_DIRECTION` with its fusion, rule ``fixed``: travel by `setting` degrees one way or the
+    other, whatever the estimate.
+    """
+    rows = []
+    by_fusion: dict[str, SelectedMethod] = {}
+    for name, method in selected.items():
+        if method.fusion in ESTIMATE_FUSIONS:
+            by_fusion.setdefault(method.fusion, method)
+        if method.lookup is None:
+            continue
+        turns = Turns(test.estimate_deg, method.evidence)
+        for rule, setting, by_bin in _restricted(method.lookup.cost):
+            delta = by_bin[nearest_bin(test.estimate_deg, len(by_bin))]
+            error = take_second_views(delta, method.fusion, turns).error_deg
+            rows.append((name, rule, setting, travel_deg(delta).mean(), error.mean(), error.size))
+    for fusion, method in by_fusion.items():
+        errors = rotation_errors_deg(test.estimate_deg, method.evidence, fusion)
+        by_delta = errors.reshape(len(errors), -1).mean(axis=1)
+        for limit in (0, *LIMITS_DEG):
+            either = (by_delta[limit] + by_delta[-limit % len(by_delta)]) / 2
+            name = f"{ANY_DIRECTION}_{fusion}"
+            rows.append((name, "fixed", limit, limit, either, errors[0].size))
+    return pd.DataFrame(rows, columns=list(TRAVEL_COLUMNS))
+
+
+def _restricted(cost: NDArray[np.float32]) -> Iterator[tuple[str, float, Rotations]]:
+    """Yield a rule, its setting and the rotation for each estimate under it."""
+    per_degree = float(np.ptp(cost, axis=1).mean()) / 180.0
+    for relative in RELATIVE_COSTS:
+        travel_cost = relative * per_degree
+        yield "cost", travel_cost, least_cost_delta(cost, travel_cost=travel_cost)
+    for limit in LIMITS_DEG:
+        yield "limit", limit, least_cost_delta(cost, max_travel_deg=limit)
+
+
+def pooled_travel(frames: Mapping[int, pd.DataFrame]) -> pd.DataFrame:
+    """Return the curves of several folds as one, weighted by their images.
+
+    The k-th cost of one fold is averaged with the k-th of the others: costs are relative to
+    each fold's own table.
+    """
+    parts = []
+    for fold, frame in frames.items():
+        place = frame.groupby(["method", "rule"], sort=False).cumcount()
+        parts.append(frame.assign(fold=fold, place=place))
+    everything = pd.concat(parts, ignore_index=True)
+    weighted = ["setting", "travel_deg", "error_deg"]
+    for column in weighted:
+        everything[column] *= everything["n_images"]
+    sums = everything.groupby(["method", "rule", "place"], sort=False)[
+        [*weighted, "n_images"]
+    ].sum()
+    for column in weighted:
+        sums[column] /= sums["n_images"]
+    return sums.reset_index().drop(columns="place")[list(TRAVEL_COLUMNS)]
+
 
 _PRODUCT = "_product"
 _PANEL_IN = (3.4, 2.9)
@@ -33,7 +252,7 @@ def read_rows(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFrame]:
 def more_views_table(rows_by_category: Mapping[str, pd.DataFrame], resampler: Resampler) -> Table:
     """Return error and travel against the number of views, by category and policy.
 
-    The rows have `studies.more_views.COLUMNS` and ``fold``. The last column compares a
+    The rows have `VIEWS_COLUMNS` and ``fold``. The last column compares a
     policy's three views with four at random.
     """
     cells, printed = [], []
@@ -101,7 +320,7 @@ def more_views_figure(cells: pd.DataFrame) -> Figure:
 def travel_curves(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFrame]:
     """Return error against travel by category, all folds pooled.
 
-    The files, by category and fold, hold rows of `studies.travel.travel_rows`.
+    The files, by category and fold, hold rows of `travel_rows`.
     """
     return {
         category: pooled_travel({int(str(fold)): part for fold, part in rows.groupby("fold")})

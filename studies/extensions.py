@@ -16,7 +16,7 @@ from nbv.core.fusion import OF_DISTRIBUTIONS
 from nbv.core.lookup import LookupTable
 from nbv.core.selection import Choice, Methods, SelectedMethod, chosen_evidence, select_methods
 from nbv.experiment.results import evaluate_method
-from studies.travel import travel_rows
+from studies.curves import travel_rows
 
 CHOICE_COLUMNS = (
     "method",
@@ -37,7 +37,7 @@ class ExtensionEvaluations:
     frames, lookups : dict
         By extension: of `evaluate_method`, and the table of those that follow one.
     choices, travel : DataFrame
-        Of `choices_frame` and of `studies.travel.travel_rows`.
+        Of `choices_frame` and of `studies.curves.travel_rows`.
     """
 
     frames: dict[str, pd.DataFrame]

@@ -31,8 +31,8 @@ from nbv.core.selection import (
     with_kernel,
 )
 from nbv.experiment.results import evaluate_method
+from studies.curves import more_views_rows
 from studies.kept_estimates import HeldOut
-from studies.more_views import more_views_rows
 
 Pair = tuple[str, str]
 """A choice of the next view and a fusion."""
@@ -68,7 +68,7 @@ MORE_VIEWS: Final[Mapping[str, Pair]] = {
     "information_gain_product": ("information_gain", "product"),
     "expected_error_product": ("expected_error", "product"),
 }
-"""Choice and fusion of the policies of `studies.more_views` that are compared."""
+"""Choice and fusion of the policies of `studies.curves` that are compared."""
 
 DENSITY_COLUMNS = (
     "choice",
@@ -91,7 +91,7 @@ class Factorial:
     frames : dict of (choice, fusion) to DataFrame
         Two views, and one (`SINGLE`); as of `nbv.experiment.results.evaluate_method`.
     more_views : DataFrame
-        As of `studies.more_views.more_views_rows`.
+        As of `studies.curves.more_views_rows`.
     densities : DataFrame
         What calibration objects chose for each choice and fusion; `DENSITY_COLUMNS`.
         ``pairs_percent`` is the mean share of calibration pairs in a row of V, whose other part are

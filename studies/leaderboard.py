@@ -16,13 +16,14 @@ from scipy import stats
 
 from nbv.experiment.report.table import Cell, Table
 from nbv.experiment.statistics.metrics import Floats
-from nbv.experiment.statistics.object_means import (
+from nbv.experiment.statistics.paired import (
+    PairedErrors,
+    Resampler,
     indistinct_from_best,
     mae_difference,
     mae_interval,
     paired_objects,
 )
-from nbv.experiment.statistics.paired import PairedErrors, Resampler
 from nbv.labels import category_label, number
 
 Block = tuple[str, str]
@@ -57,7 +58,7 @@ def blocks_of(
     """Return the objects' errors of each run and category at its reference elevation.
 
     Where a category was not run at it, its lowest one is taken. ``runs`` has by a run's name what
-    `nbv.experiment.statistics.object_means.load_folds` read of ``objects.csv``.
+    `nbv.experiment.statistics.paired.load_folds` read of ``objects.csv``.
     """
     blocks = {}
     for run, means in runs.items():

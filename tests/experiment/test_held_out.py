@@ -11,10 +11,14 @@ from nbv.core.logits import fit_temperature
 from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.experiment.estimation.hardware import Hardware
-from nbv.experiment.estimation.inference import decode, estimate_azimuth, network_outputs
+from nbv.experiment.estimation.inference import (
+    decode,
+    estimate_azimuth,
+    estimate_fold,
+    network_outputs,
+)
 from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.estimation.weights import Estimator
-from nbv.experiment.held_out import estimate_fold
 
 CPU = Hardware(torch.device("cpu"), torch.float32)
 NETWORK = {"kind": "regressor", "channels": [4, 8], "hidden": 8}

@@ -8,7 +8,7 @@ with job(snakemake):
     from nbv.core.seeds import rng_for
     from nbv.experiment.estimates import read_estimates, read_posteriors
     from nbv.experiment.splits import need_role, read_splits
-    from nbv.experiment.statistics.object_means import object_means
+    from nbv.experiment.statistics.paired import object_means
     from nbv.files import read_csv, write_csv
 
     given, output = snakemake.input, snakemake.output

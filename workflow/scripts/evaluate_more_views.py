@@ -3,8 +3,8 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
+    from studies.curves import more_views_rows
     from studies.extensions import stored_evidence
-    from studies.more_views import more_views_rows
 
     from nbv.core.evidence import evidence_of_distributions
     from nbv.core.seeds import rng_for

@@ -10,9 +10,9 @@ with job(snakemake):
     from nbv.core.seeds import seed_for
     from nbv.data.depth_images import open_depth
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.experiment.estimation.inference import estimate_fold, write_fold
     from nbv.experiment.estimation.training import train_estimator
     from nbv.experiment.estimation.weights import load_estimator, read_start, save_estimator
-    from nbv.experiment.held_out import estimate_fold, write_fold
     from nbv.experiment.splits import need_objects, objects_with_role, read_splits, training_roles
 
     params, wildcards = snakemake.params, snakemake.wildcards

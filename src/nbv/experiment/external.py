@@ -10,7 +10,7 @@ import pandas as pd
 
 from nbv.core.estimates import Estimates, Posteriors, posteriors_of
 from nbv.core.logits import fit_temperature
-from nbv.experiment.held_out import FoldEstimates
+from nbv.experiment.estimation.inference import FoldEstimates
 from nbv.experiment.splits import need_objects, objects_with_role
 from nbv.robot.pair_distributions import evenly_apart
 from nbv.robot.pairs import Turns

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from conftest import N_FOLDS
 from nbv.errors import UserError
-from nbv.experiment.reference.compare import (
+from nbv.experiment.compare import (
     IDENTICAL,
     OUTSIDE,
     UNJUDGED,
@@ -20,7 +20,7 @@ from nbv.experiment.reference.compare import (
     judge_cell,
     sigma_ratio,
 )
-from nbv.experiment.reference.store import (
+from nbv.experiment.reference import (
     UNSET,
     read_cells,
 )

@@ -142,14 +142,14 @@ class Sensor(Section):
 
 
 class Schedule(Section):
-    """How long and at which peak rate a stage trains; see `nbv.experiment.estimation.warm_start`."""
+    """Epochs and peak rate of a stage of `nbv.experiment.estimation.warm_start`."""
 
     epochs: Epochs
     learning_rate: LearningRate
 
 
 class Estimator(Section):
-    """The single-view estimator; see `nbv.experiment.estimation`. A kind omits what it does not have."""
+    """The single-view estimator; each kind has only the keys that it uses."""
 
     kind: str
     channels: Annotated[list[Count], AtLeastOne]
@@ -224,7 +224,7 @@ class Recommendation(Section):
 
 
 class MoreViews(Section):
-    """More than two views; see `studies.more_views`."""
+    """More than two views; see `studies.curves`."""
 
     n_views: Annotated[Whole, Field(ge=2, le=8)]
     start_every_deg: Annotated[Whole, Field(ge=1, le=180)]

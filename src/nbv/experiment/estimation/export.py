@@ -65,7 +65,7 @@ class _AsSingle(nn.Module):
 
 
 class _OnCodes(nn.Module):
-    """A network of `nbv.experiment.estimation.networks` with the input and the outputs of `onnx_model`."""
+    """A network of `build_network` with the input and the outputs of `onnx_model`."""
 
     def __init__(
         self, network: nn.Sequential, image_side: int, mirrored_classes: NDArray[np.intp] | None

@@ -18,22 +18,21 @@ from nbv.core.lookup import LookupTable
 from nbv.data.depth_images import open_depth
 from nbv.errors import UserError
 from nbv.experiment.estimates import read_posteriors
-from nbv.experiment.explorer.images import COLUMNS, ring_of
-from nbv.experiment.explorer.outcomes import (
+from nbv.experiment.explorer.data import (
+    COLUMNS,
     Outcomes,
+    cost_error,
     methods_of,
     outcomes_of,
     outcomes_text,
-    unit_facts,
-)
-from nbv.experiment.explorer.tables import (
-    cost_error,
     own_distributions_text,
     own_error,
     page_table,
     probability_error,
+    ring_of,
+    unit_facts,
 )
-from nbv.experiment.report.templating import HTML
+from nbv.experiment.report.table import HTML
 from nbv.experiment.results import EvaluationFile, Unit, load_evaluations
 from nbv.files import existing
 from nbv.labels import category_label, method_label

@@ -102,8 +102,8 @@ def pauc(errors_deg: ArrayLike) -> float:
     Exactly ``100 - mean(min(error, 100))``: integrating the step of one image from 0 to 100
     leaves the part of the range above its error. It is thus an MAE that counts no error above
     100 degrees, and says little that the MAE does not unless half-turns are common. Higher is
-    better. Many published values are lower than this can be (`nbv.experiment.paper.published`). Takes and
-    raises what `mae_deg` does.
+    better. Many published values are lower than this can be; see
+    `nbv.experiment.paper.published`. Same parameters and errors as `mae_deg`.
     """
     return float(np.mean(accuracy_area(_non_empty(errors_deg))))
 

@@ -14,8 +14,14 @@ from nbv.core.criteria import cost_unit
 from nbv.core.lookup import LookupTable
 from nbv.data.depth_images import Codes, open_depth
 from nbv.errors import UserError
-from nbv.experiment.report.settings import ReportSettings, focus_unit
-from nbv.experiment.report.tables import Example, choose_example, example_row, hardest_azimuth_deg
+from nbv.experiment.report.settings import (
+    Example,
+    ReportSettings,
+    choose_example,
+    example_row,
+    focus_unit,
+    hardest_azimuth_deg,
+)
 from nbv.experiment.results import Unit
 from nbv.files import existing
 from nbv.robot.style import MethodStyle, method_style

@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.errors import UserError
-from nbv.experiment.config import read_configuration
-from nbv.experiment.reference.compare import (
+from nbv.experiment.compare import (
     compare_runs,
 )
-from nbv.experiment.reference.store import (
+from nbv.experiment.config import read_configuration
+from nbv.experiment.reference import (
     UNSET,
     collect_reference,
     differing_settings,

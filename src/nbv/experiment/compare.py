@@ -34,7 +34,7 @@ from scipy import stats
 from nbv.experiment.config import read_configuration
 from nbv.experiment.paper.published import SIGMA_ROW
 from nbv.experiment.paper.statements import FAILS, HOLDS
-from nbv.experiment.reference.store import (
+from nbv.experiment.reference import (
     CELL_KEY,
     Cell,
     SettingDifference,
@@ -45,8 +45,8 @@ from nbv.experiment.reference.store import (
     read_verdicts,
     table_files,
 )
-from nbv.experiment.report.layout import HALF_TURNS
 from nbv.experiment.report.settings import CELL_COLUMNS, TRANSFER
+from nbv.experiment.report.tables import HALF_TURNS
 from nbv.labels import method_label, number
 
 IDENTICAL, WITHIN, OUTSIDE, UNJUDGED = "identical", "within", "outside", "not judged"
