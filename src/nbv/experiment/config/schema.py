@@ -1,4 +1,4 @@
-"""What a configuration may hold: every key, type, range and choice, and what names must agree."""
+"""The schema of a configuration: keys, types, ranges, choices, and constraints between keys."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from nbv.experiment.splits import enough_objects
 T = TypeVar("T")
 
 NAME_RULE = "use letters, digits, '.', '_' and '-', a letter or digit first, 100 at most"
-"""What a name has to be that becomes a part of a path or a wildcard of Snakemake."""
+"""The rule for names that become a part of a path or a wildcard of Snakemake."""
 
 
 def _distinct(values: list[T]) -> list[T]:
     for index, value in enumerate(values):
         if value in values[:index]:
-            raise ValueError(f"{value} is there twice")
+            raise ValueError(f"{value} occurs twice")
     return values
 
 
@@ -43,7 +43,7 @@ def _with_known_home(path: str) -> str:
     try:
         Path(path).expanduser()
     except RuntimeError:
-        raise ValueError(f"{path!r}: there is no such user") from None
+        raise ValueError(f"{path!r}: unknown user") from None
     return path
 
 
@@ -72,11 +72,11 @@ AtLeastOne = Field(min_length=1, max_length=100)
 Framing = Literal["silhouette", "axis"]
 
 FEWEST_PIXELS = 4
-"""Of an object's diagonal in an image: fewer show nothing of where it is seen from."""
+"""The least diagonal of an object in an image; fewer pixels do not show the viewpoint."""
 
 
 class Section(BaseModel):
-    """Keys that belong together. Another key is a mistake."""
+    """Keys that belong together. Any other key is an error."""
 
     # So that a name of digits needs no quotes.
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, coerce_numbers_to_str=True)
@@ -99,8 +99,8 @@ class Dataset(Section):
     exclude_file: DataPath | None = None
 
     @model_validator(mode="after")
-    def _of_generated_mugs_alone(self) -> Self:
-        # An experiment sets it whatever its data set: what a run says of itself must be true.
+    def _clear_settings_of_procedural_mugs(self) -> Self:
+        # An experiment sets them for any data set, but a run must record what applies to it.
         if self.source != "procedural":
             self.handle_reach = self.square_share = 0.0
         return self
@@ -121,7 +121,7 @@ class Camera(Section):
     framing: Framing
 
     @model_validator(mode="after")
-    def _check_object_is_seen(self) -> Self:
+    def _check_object_size(self) -> Self:
         width = 2 * self.distance * math.tan(math.radians(self.fov_deg) / 2)
         if self.image_side / width < FEWEST_PIXELS:
             raise UserError(
@@ -190,7 +190,7 @@ class Estimator(Section):
                 "estimator has either: choose estimator=classifier"
             )
         if self.n_classes is not None and 360 % self.n_classes:
-            raise UserError(f"estimator.n_classes={self.n_classes} is no divisor of 360")
+            raise UserError(f"estimator.n_classes={self.n_classes} is not a divisor of 360")
         if self.n_classes is not None and self.n_classes % 2:
             raise UserError(
                 f"estimator.n_classes={self.n_classes} is odd: the opposite view needs a class"
@@ -209,7 +209,7 @@ class Density(Section):
 
 
 class Affinity(Section):
-    """How like distributions count; see `nbv.core.criteria`."""
+    """How alike two distributions must be to count; see `nbv.core.criteria`."""
 
     power: Annotated[Number, Field(gt=0, le=10**4)]
     pseudo_observations: PseudoObservations
@@ -217,7 +217,7 @@ class Affinity(Section):
 
 
 class Recommendation(Section):
-    """What travel costs; see `nbv.core.lookup.least_cost_delta`."""
+    """The cost of travel; see `nbv.core.lookup.least_cost_delta`."""
 
     travel_cost: Annotated[Number, Field(ge=0, le=10**6), "in the criterion's unit per degree"]
     max_travel_deg: Annotated[Number, Field(ge=0, le=180)]
@@ -247,21 +247,21 @@ class Confirmation(Section):
 
     @field_validator("replicates")
     @classmethod
-    def _check_there_is_one(cls, value: list[list[int]]) -> list[list[int]]:
+    def _check_not_empty(cls, value: list[list[int]]) -> list[list[int]]:
         if not any(value):
-            raise ValueError("there is no replicate under any shuffle")
+            raise ValueError("no replicate under any shuffle")
         return value
 
 
 class Condition(Section):
-    """What sees the objects, and how they are framed."""
+    """The sensor that sees the objects, and their framing."""
 
     sensor: str
     framing: Framing
 
 
 class Randomisation(Section):
-    """What a camera does that is not known; see `nbv.data.randomisation`."""
+    """Ranges of unknown camera conditions; see `nbv.data.randomisation`."""
 
     elevation_deg: Annotated[Number, Field(ge=0, le=85)] = 0.0
     roll_deg: Annotated[Number, Field(ge=0, le=180)] = 0.0
@@ -289,7 +289,7 @@ class Randomisation(Section):
 
 
 class Bundles(Section):
-    """What bundles are compared without, and on which frames; see workflow/rules/bundles.smk."""
+    """Ingredients that bundles are compared without, and the frames for it."""
 
     ingredients: dict[Name, dict[Name, Number | None]] = {}
     replicates: Annotated[list[Replicate], Field(min_length=1), Distinct] = [0]
@@ -308,7 +308,7 @@ class Bundles(Section):
 
 
 class Transfer(Section):
-    """Conditions to train under and to test under; see `studies.transfer`."""
+    """Conditions for training and testing; see `studies.transfer`."""
 
     category: Name | None
     elevation_deg: Elevation
@@ -362,16 +362,16 @@ class Config(Section):
         focus = {"focus_category": self.focus_category, "transfer.category": self.transfer.category}
         for key, named in focus.items():
             if named is not None and named not in ours:
-                raise UserError(f"{key}={named} is no category of this run: {nearest(named, ours)}")
-        of_categories: dict[str, Collection[str]] = {
+                raise UserError(f"{key}={named} is not a category of this run: {nearest(named, ours)}")
+        by_category: dict[str, Collection[str]] = {
             "dataset.turn_deg": self.dataset.turn_deg,
             "dataset.categories": self.dataset.categories,
             "sensor.diagonal_m": self.sensor.diagonal_m,
         }
-        for key, values in of_categories.items():
+        for key, values in by_category.items():
             for named in values:
                 if named not in known:
-                    raise UserError(f"{key}.{named}: no such category; {nearest(named, known)}")
+                    raise UserError(f"{key}.{named}: unknown category; {nearest(named, known)}")
         return self
 
     @model_validator(mode="after")
