@@ -17,7 +17,7 @@ from nbv.experiment.statistics.paired import Resampler, mae_difference, mae_inte
 from nbv.labels import number
 
 ALL = 0
-"""As a number of calibration objects: as many as there are."""
+"""Stands for all calibration objects."""
 
 PAPER: Mapping[str, Any] = {
     "criterion": "pose_ambiguity",
@@ -30,14 +30,14 @@ PAPER: Mapping[str, Any] = {
     "n_bins": 360,
     "n_calibration": ALL,
 }
-"""The paper's method as it is run; bandwidth and pseudo-observations are chosen, not given."""
+"""The paper's method; bandwidth and pseudo-observations are chosen by calibration objects."""
 
 
 def ablation_space() -> pd.DataFrame:
-    """Return the settings tried, one row each; the first is the paper's method.
+    """Return the settings of the ablation, one row each; the first is the paper's method.
 
-    ``varied`` names what a row changes. Where ``chosen_by`` is ``given`` the density is the row's
-    ``bandwidth_deg`` and ``pseudo_observations``.
+    ``varied`` names the setting that a row changes. Where ``chosen_by`` is ``given`` the density
+    has the row's ``bandwidth_deg`` and ``pseudo_observations``.
     """
     rows = [{"varied": "nothing", **PAPER}]
     rows += [{"varied": varied, **PAPER, **change} for varied, change in _changes()]
@@ -60,7 +60,7 @@ def _changes() -> Iterator[tuple[str, dict[str, Any]]]:
     for n_calibration in (2, 5, 10, 15):
         yield "calibration_objects", {"n_calibration": n_calibration}
     for criterion in CRITERIA:
-        # The Bayes expectation takes long to tabulate; it is there to choose more views by.
+        # The Bayes expectation takes long to tabulate; it serves to choose more than two views.
         for fusion in ESTIMATE_FUSIONS if criterion != "bayes_error" else ():
             if (criterion, fusion) != (PAPER["criterion"], PAPER["fusion"]):
                 yield "criterion_and_fusion", {"criterion": criterion, "fusion": fusion}
@@ -77,7 +77,7 @@ def ablate(
     Parameters
     ----------
     calibration, test : Estimates
-        Of one fold.
+        The estimates of one fold.
     instance : mapping
         A row of `ablation_space`.
     settings : mapping
@@ -99,14 +99,14 @@ def ablate(
 
 
 def ablation_table(
-    space: pd.DataFrame, found: Mapping[int, pd.DataFrame], category: str, resampler: Resampler
+    space: pd.DataFrame, errors: Mapping[int, pd.DataFrame], category: str, resampler: Resampler
 ) -> Table:
-    """Return the table of all rows of the space, each compared with the first.
+    """Return the table of the ablation, every row compared with the first.
 
-    ``space`` is of `studies.ablation.ablation_space`; ``found`` has by its rows the
-    ``fold, object_id, error_deg`` of all folds.
+    ``space`` is that of `ablation_space`; ``errors`` maps the index of a row to the ``fold,
+    object_id, error_deg`` of all folds.
     """
-    named = [frame.assign(method=str(row)) for row, frame in found.items()]
+    named = [frame.assign(method=str(row)) for row, frame in errors.items()]
     sample = paired_objects(pd.concat(named), category)
     cells, printed = [], []
     for row, instance in enumerate(space.to_dict("records")):

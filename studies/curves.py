@@ -73,23 +73,23 @@ def more_views_rows(
     settings: Mapping[str, Any],
     rng: np.random.Generator,
     posteriors: Posteriors | None = None,
-    of_distributions: Evidence | None = None,
+    distribution_evidence: Evidence | None = None,
 ) -> pd.DataFrame:
-    """Return what every policy has reached after each number of views, object by object.
+    """Return the errors of every policy after each number of views, by object.
 
     Parameters
     ----------
     test : Estimates
         Test objects, 360 views each.
     evidences : mapping of str to callable
-        For ``random``, ``opposite`` and each criterion: its evidence for a number of bins. The
-        pose ambiguity, which is defined for two views alone, is left out.
+        The evidence for ``random``, ``opposite`` and every criterion, as a function of the number
+        of bins. The pose ambiguity, which is defined for two views only, is absent.
     settings : mapping
         The configuration's ``more_views``: ``n_views, start_every_deg, min_separation_deg``.
     rng : numpy.random.Generator
     posteriors, of_distributions : optional
-        The test objects' distributions, and evidence of those of calibration objects: policies with
-        the fusion ``product`` are added.
+        The test objects' distributions, and evidence from those of calibration objects; they add
+        policies with the fusion ``product``.
 
     Returns
     -------
@@ -100,18 +100,18 @@ def more_views_rows(
     """
     run = partial(follow, start_every_deg=settings["start_every_deg"], rng=rng)
     reached = list(_by_posterior(test, evidences, settings, run))
-    if posteriors is not None and of_distributions is not None:
-        reached += _by_product(posteriors, of_distributions, settings, run)
+    if posteriors is not None and distribution_evidence is not None:
+        reached += _by_product(posteriors, distribution_evidence, settings, run)
     rows = [
-        _row(test.object_ids, method, n, of_views[:, :, :, n - 1])
-        for method, numbers, of_views in reached
+        _row(test.object_ids, method, n, outcomes[:, :, :, n - 1])
+        for method, numbers, outcomes in reached
         for n in numbers
     ]
     return pd.concat(rows, ignore_index=True)
 
 
 def _row(object_ids: tuple[str, ...], method: str, n_views: int, reached: Floats) -> pd.DataFrame:
-    """Return the rows of one policy and number of views; `reached` is of `follow`."""
+    """Return the rows of one policy and number of views; `reached` comes from `follow`."""
     errors, *others = reached
     figures = (errors, accuracy_area(errors), half_turned(errors), *others)
     means = (figure.mean(axis=1) for figure in figures)
@@ -125,7 +125,7 @@ def _by_posterior(
     settings: Mapping[str, Any],
     run: Run,
 ) -> Iterator[Reached]:
-    """Yield policy, numbers of views and what was reached, fused by posterior."""
+    """Yield policy, numbers of views and the results of `follow`, fused by posterior."""
     every = range(1, settings["n_views"] + 1)
 
     def of(name: str) -> Views:
@@ -145,7 +145,7 @@ def _by_posterior(
 def _by_product(
     posteriors: Posteriors, evidence: Evidence, settings: Mapping[str, Any], run: Run
 ) -> Iterator[Reached]:
-    """Yield the same fused by product; from two views on the first one chooses a plan."""
+    """Yield the same, fused by product; with two views and more the first one chooses a plan."""
     every, apart_deg = range(1, settings["n_views"] + 1), settings["min_separation_deg"]
     seen = DistributionViews(posteriors.distributions, evidence)
     yield "random_product", every, run(random_next, seen, n_views=every[-1])
@@ -166,7 +166,7 @@ def _by_product(
         yield "expected_error_product", [n], planned
 
 
-# Multiples of the travel cost at which, for the average estimate, staying costs as little as going.
+# Multiples of the travel cost at which staying costs as much as moving for the mean estimate.
 RELATIVE_COSTS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0)
 LIMITS_DEG = (15, 30, 45, 60, 90, 120, 150, 180)
 ANY_DIRECTION = "either_way"
@@ -175,7 +175,7 @@ TRAVEL_COLUMNS = ("method", "rule", "setting", "travel_deg", "error_deg", "n_ima
 
 
 def travel_rows(selected: Mapping[str, SelectedMethod], test: Estimates) -> pd.DataFrame:
-    """Return error against travel for every extension of a fold that follows a table.
+    """Return error against travel for every extension that follows a table, in one fold.
 
     Columns are `TRAVEL_COLUMNS`, means over test images. Rule ``cost``: `setting` is the cost in
     the criterion's unit per degree, at each of `RELATIVE_COSTS` times the table's mean range over
@@ -206,7 +206,7 @@ def travel_rows(selected: Mapping[str, SelectedMethod], test: Estimates) -> pd.D
 
 
 def _restricted(cost: NDArray[np.float32]) -> Iterator[tuple[str, float, Rotations]]:
-    """Yield a rule, its setting and the rotation for each estimate under it."""
+    """Yield the rule, its setting and the resulting rotation by estimate."""
     per_degree = float(np.ptp(cost, axis=1).mean()) / 180.0
     for relative in RELATIVE_COSTS:
         travel_cost = relative * per_degree
@@ -218,23 +218,20 @@ def _restricted(cost: NDArray[np.float32]) -> Iterator[tuple[str, float, Rotatio
 def pooled_travel(frames: Mapping[int, pd.DataFrame]) -> pd.DataFrame:
     """Return the curves of several folds as one, weighted by their images.
 
-    The k-th cost of one fold is averaged with the k-th of the others: costs are relative to
-    each fold's own table.
+    The k-th costs of all folds are averaged, because costs are relative to the table of a fold.
     """
     parts = []
     for fold, frame in frames.items():
-        place = frame.groupby(["method", "rule"], sort=False).cumcount()
-        parts.append(frame.assign(fold=fold, place=place))
+        i = frame.groupby(["method", "rule"], sort=False).cumcount()
+        parts.append(frame.assign(fold=fold, i=i))
     everything = pd.concat(parts, ignore_index=True)
     weighted = ["setting", "travel_deg", "error_deg"]
     for column in weighted:
         everything[column] *= everything["n_images"]
-    sums = everything.groupby(["method", "rule", "place"], sort=False)[
-        [*weighted, "n_images"]
-    ].sum()
+    sums = everything.groupby(["method", "rule", "i"], sort=False)[[*weighted, "n_images"]].sum()
     for column in weighted:
         sums[column] /= sums["n_images"]
-    return sums.reset_index().drop(columns="place")[list(TRAVEL_COLUMNS)]
+    return sums.reset_index().drop(columns="i")[list(TRAVEL_COLUMNS)]
 
 
 _PRODUCT = "_product"
@@ -242,11 +239,11 @@ _PANEL_IN = (3.4, 2.9)
 
 
 def read_rows(files: Mapping[tuple[str, int], Path]) -> dict[str, pd.DataFrame]:
-    """Read rows by category and fold; return each category's, with their ``fold``."""
+    """Read rows by category and fold; return them by category with a column ``fold``."""
     parts: dict[str, list[pd.DataFrame]] = {}
     for (category, fold), path in files.items():
         parts.setdefault(category, []).append(read_csv(existing(path)).assign(fold=fold))
-    return {category: pd.concat(found) for category, found in parts.items()}
+    return {category: pd.concat(frames) for category, frames in parts.items()}
 
 
 def more_views_table(rows_by_category: Mapping[str, pd.DataFrame], resampler: Resampler) -> Table:
@@ -268,15 +265,15 @@ def more_views_table(rows_by_category: Mapping[str, pd.DataFrame], resampler: Re
                 if name not in sample.errors_deg:
                     row.append(Cell("–"))
                     continue
-                found = mae_interval(sample, name, resampler)
+                mae = mae_interval(sample, name, resampler)
                 made = {"category": category, "method": method, "n_views": n_views}
-                made |= found.columns("value", "ci") | {"travel_deg": travel[name]}
+                made |= mae.columns("value", "ci") | {"travel_deg": travel[name]}
                 if n_views == 3 and method != "random" and "random@4" in sample.errors_deg:
                     less = mae_difference(sample, name, "random@4", resampler)
                     made |= less.columns("to_random_4")
                     last = difference_cell(less.value, less.low, less.high)
                 cells.append(made)
-                row.append(Cell(number(found.value), after=f"[{travel[name]:.0f}°]"))
+                row.append(Cell(number(mae.value), after=f"[{travel[name]:.0f}°]"))
             printed.append((*row, last))
     header = ("Policy", *(f"{n} view{'s' if n > 1 else ''}" for n in views), "3 views − Random's 4")
     notes = (
@@ -349,7 +346,7 @@ def travel_figure(curves: Mapping[str, pd.DataFrame], methods: tuple[str, ...]) 
 
 
 def travel_table(curves: Mapping[str, pd.DataFrame]) -> Table:
-    """Return `travel_curves` as a table that has a CSV file only."""
+    """Return `travel_curves` as a table for a CSV file."""
     cells = pd.concat([curve.assign(category=category) for category, curve in curves.items()])
     title = "Error against travel"
     return Table("travel", title, title, cells, header=(), rows=(), decimals=6)

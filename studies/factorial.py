@@ -1,9 +1,9 @@
 """Every choice of the next view with every fusion, on the same estimates of one fold.
 
-A choice and a fusion are told apart only where both vary: the paper's method differs from Opposite
-in the choice, and from its extensions in both. All choices with one fusion fuse alike. An average
-has no density, so each choice has the one that is best for it. A posterior has, and all choices
-share it; the regression of ``expected_error`` has a kernel of its own.
+The effects of choice and fusion separate only where both vary: the paper's method differs from
+Opposite in the choice, and from its extensions in both. All choices with the same fusion fuse alike.
+An average needs no density, so each choice has the density that is best for it. A posterior needs
+one, which all choices share; the regression of ``expected_error`` has its own kernel.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Pair = tuple[str, str]
 
 SINGLE: Final[Pair] = ("none", "none")
 AS_PRINTED: Final[Pair] = ("as_printed", "average")
-"""The paper's method as it reads: T = L, the likeliest smoothing, no pseudo-observations."""
+"""The paper's method as printed: T = L, smoothing by likelihood, no pseudo-observations."""
 
 POLICIES: Final[Mapping[str, str]] = {
     "random": "random",
@@ -51,13 +51,13 @@ POLICIES: Final[Mapping[str, str]] = {
     "expected_dispersion": "expected_dispersion",
     "expected_error": "expected_error",
 }
-"""The policy of each choice; the pose ambiguity has two interpretations."""
+"""The policies by choice; the pose ambiguity has two interpretations."""
 
 CHOICES_WITH_TABLES = tuple(choice for choice, policy in POLICIES.items() if needs_lookup(policy))
 REGRESSION = "expected_error"
 
-OF_IMAGES = ("random", "fixed", "opposite", "information_gain", "expected_error")
-"""Choices that are defined where images give distributions, which are fused by product."""
+PRODUCT_CHOICES = ("random", "fixed", "opposite", "information_gain", "expected_error")
+"""The choices for distributions of images, which are fused by product."""
 
 MORE_VIEWS: Final[Mapping[str, Pair]] = {
     "random": ("random", "posterior"),
@@ -68,7 +68,7 @@ MORE_VIEWS: Final[Mapping[str, Pair]] = {
     "information_gain_product": ("information_gain", "product"),
     "expected_error_product": ("expected_error", "product"),
 }
-"""Choice and fusion of the policies of `studies.curves` that are compared."""
+"""Choice and fusion of the compared policies of `studies.curves`."""
 
 DENSITY_COLUMNS = (
     "choice",
@@ -84,18 +84,17 @@ RngOf = Callable[[str], np.random.Generator]
 
 @dataclass(frozen=True)
 class Factorial:
-    """What became of the test objects of one fold.
+    """The results on the test objects of one fold.
 
     Attributes
     ----------
     frames : dict of (choice, fusion) to DataFrame
-        Two views, and one (`SINGLE`); as of `nbv.experiment.results.evaluate_method`.
+        Frames of `nbv.experiment.results.evaluate_method`: two views, and one (`SINGLE`).
     more_views : DataFrame
-        As of `studies.curves.more_views_rows`.
+        Rows of `studies.curves.more_views_rows`.
     densities : DataFrame
-        What calibration objects chose for each choice and fusion; `DENSITY_COLUMNS`.
-        ``pairs_percent`` is the mean share of calibration pairs in a row of V, whose other part are
-        uniform pseudo-observations.
+        The selected densities by choice and fusion; `DENSITY_COLUMNS`. ``pairs_percent`` is the
+        mean share of calibration pairs in a row of V; the rest are uniform pseudo-observations.
     """
 
     frames: dict[Pair, pd.DataFrame]
@@ -112,19 +111,19 @@ def evaluate_factorial(
 ) -> Factorial:
     """Evaluate every choice with every fusion on the test objects of one fold.
 
-    Tables that choose have `COARSE_BINS` bins; estimates are fused with 360.
+    Lookup tables have `COARSE_BINS` bins; estimates are fused with 360.
 
     Parameters
     ----------
     calibration, test : HeldOut
-        Where they have distributions, the fusion ``product`` and choices by an image's own
-        distribution are added, from first views that are a class apart.
+        If they have distributions, the fusion ``product`` and choices by an image's distribution
+        are added, for first views that are a class apart.
     settings : mapping
         The configuration's ``density``, ``recommendation`` and ``affinity``.
     more_views : mapping
         The configuration's ``more_views``.
     rng_of : callable
-        The generator of a choice, by name: random views are the same under every fusion of
+        Returns the generator of a choice, by name: random views are the same for every fusion of
         estimates.
     """
     known, tested = calibration.estimates.estimate_deg, test.estimates
@@ -134,16 +133,16 @@ def evaluate_factorial(
         chosen = _densities(fusion, known, settings)
         densities |= {(choice, fusion): density for choice, density in chosen.items()}
         frames |= _estimate_frames(fusion, chosen, known, tested, settings, rng_of)
-    printed = _of_choice("given_truth", settings) | {"pseudo_observations": [0.0]}
+    printed = _choice_settings("given_truth", settings) | {"pseudo_observations": [0.0]}
     densities[AS_PRINTED] = most_likely_density(known, printed)
     coarse = chosen_evidence(known, densities[AS_PRINTED], printed, COARSE_BINS)
     table = build_lookup(coarse, POLICIES["given_truth"])
     method = {"policy": POLICIES["given_truth"], "fusion": "average"}
     frames[AS_PRINTED] = evaluate_method(method, tested, lookup=table)
-    of_images = None
+    image_evidence = None
     if calibration.posteriors is not None and test.posteriors is not None:
-        of_images = evidence_of_distributions(calibration.posteriors.distributions, settings)
-        frames |= _product_frames(test, test.posteriors, of_images, rng_of)
+        image_evidence = evidence_of_distributions(calibration.posteriors.distributions, settings)
+        frames |= _product_frames(test, test.posteriors, image_evidence, rng_of)
         step = 360 // test.posteriors.distributions.shape[1]
         frames = {
             pair: frame[frame["initial_deg"] % step == 0].reset_index(drop=True)
@@ -155,13 +154,13 @@ def evaluate_factorial(
         ("random", "opposite", "information_gain"), lambda n_bins: evidence(n_bins=n_bins)
     )
     rows = more_views_rows(
-        tested, evidences, more_views, rng_of("more_views"), test.posteriors, of_images
+        tested, evidences, more_views, rng_of("more_views"), test.posteriors, image_evidence
     )
     return Factorial(frames, rows, _densities_frame(densities, known.size / 360))
 
 
-def _of_choice(choice: str, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a choice: the pose likelihood has two interpretations."""
+def _choice_settings(choice: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of a choice, with its interpretation of the pose likelihood."""
     given = "given_truth" if choice == "given_truth" else "given_estimate"
     return dict(settings) | {"pose_likelihood": given}
 
@@ -169,18 +168,18 @@ def _of_choice(choice: str, settings: Mapping[str, Any]) -> dict[str, Any]:
 def _densities(
     fusion: str, estimate_deg: NDArray[np.float64], settings: Mapping[str, Any]
 ) -> dict[str, Choice]:
-    """Return the density of each choice that has one of its own, and a fusion's own as random's."""
+    """Return the densities by choice; the density of the fusion itself is that of ``random``."""
 
     def best(choices: Sequence[str], shared: Choice | None = None) -> dict[str, Choice]:
-        methods = {one: {"policy": POLICIES[one], "fusion": fusion} for one in choices}
-        own = _of_choice(choices[0], settings)
+        methods = {choice: {"policy": POLICIES[choice], "fusion": fusion} for choice in choices}
+        own = _choice_settings(choices[0], settings)
         return choose_densities(estimate_deg, methods, own, shared=shared)
 
     if fusion == "average":
         others = [choice for choice in CHOICES_WITH_TABLES if choice != "given_truth"]
         return best(others) | best(["given_truth"])
-    of_fusion = best(["random"])
-    return of_fusion | best([REGRESSION], shared=of_fusion["random"])
+    shared_density = best(["random"])
+    return shared_density | best([REGRESSION], shared=shared_density["random"])
 
 
 def _estimate_frames(
@@ -191,17 +190,17 @@ def _estimate_frames(
     settings: Mapping[str, Any],
     rng_of: RngOf,
 ) -> dict[Pair, pd.DataFrame]:
-    """Return the frame of every choice with one fusion of estimates."""
+    """Return the frames of all choices with one fusion of estimates."""
     shared = densities.get("random")
     fine = None if shared is None else chosen_evidence(calibration_deg, shared, settings)
     frames = {}
     for choice, policy in POLICIES.items():
         lookup = None
         if choice in CHOICES_WITH_TABLES:
-            own = _of_choice(choice, settings)
-            of_table = shared or densities[choice]
-            coarse = chosen_evidence(calibration_deg, of_table, own, COARSE_BINS)
-            kernel = densities.get(choice, of_table)
+            own = _choice_settings(choice, settings)
+            density = shared or densities[choice]
+            coarse = chosen_evidence(calibration_deg, density, own, COARSE_BINS)
+            kernel = densities.get(choice, density)
             lookup = build_lookup(with_kernel(coarse, kernel), policy, fusion)
         method = {"policy": policy, "fusion": fusion}
         frames[choice, fusion] = evaluate_method(method, test, rng_of(choice), lookup, fine)
@@ -219,7 +218,7 @@ def _product_frames(
             evidence=evidence,
             posteriors=posteriors,
         )
-        for choice in OF_IMAGES
+        for choice in PRODUCT_CHOICES
     }
 
 

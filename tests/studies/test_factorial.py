@@ -9,8 +9,8 @@ import pytest
 from studies.confirmation import factorial_beliefs
 from studies.factorial import (
     AS_PRINTED,
-    OF_IMAGES,
     POLICIES,
+    PRODUCT_CHOICES,
     SINGLE,
     evaluate_factorial,
 )
@@ -44,7 +44,7 @@ def made():
 
 def test_every_choice_meets_every_fusion(made):
     expected = set(itertools.product(POLICIES, ESTIMATE_FUSIONS))
-    expected |= {(choice, "product") for choice in OF_IMAGES} | {SINGLE, AS_PRINTED}
+    expected |= {(choice, "product") for choice in PRODUCT_CHOICES} | {SINGLE, AS_PRINTED}
     assert set(made.frames) == expected
     assert {len(frame) for frame in made.frames.values()} == {3 * N_CLASSES}
     for frame in made.frames.values():

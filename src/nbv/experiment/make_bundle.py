@@ -1,4 +1,4 @@
-"""A bundle from a trained network and held-out turns."""
+"""Bundles made from a trained network and its outputs for held-out objects."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from nbv.robot.pair_distributions import bin_apart
 from nbv.robot.sweeps import Turn
 
 DEFAULT_FOCAL_PX = 600.0
-"""Of a bundle whose training simulated no sensor."""
+"""The focal length of a bundle whose training simulated no sensor."""
 
-# Beyond the extents of calibration images: other objects, tilt and tables.
+# Factors beyond the extents of calibration images, for other objects, tilt and tables.
 _MARGINS = (0.6, 1.5)
 
 
 def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -> bytes:
-    """Return a classifier as a bundle holds it: averaged over mirror images if there is a plane.
+    """Return the ONNX model of a bundle, averaged over mirror images if there is a mirror plane.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -
 
 
 def bundled_network(estimator: Estimator, mirror_plane_deg: float | None = None) -> Network:
-    """Return the network of `bundled_model`, as a robot will run it."""
+    """Return the network of `bundled_model` as a robot runs it."""
     model = bundled_model(estimator, mirror_plane_deg)
     return open_network(model, estimator.image_side, estimator.settings["n_classes"])
 
@@ -58,20 +58,19 @@ def turns_of(
     object_ids: Sequence[str],
     step: int = 1,
 ) -> tuple[list[Turn], float, float]:
-    """Return the turns of some objects at every elevation, and the extent of what they show.
+    """Return the turns of objects at every elevation, and their extent in the images.
 
-    Of each turn, every `step`-th view from the first on; the network sees no others.
+    A turn has every `step`-th view, from the first on.
 
     Returns
     -------
     list of Turn
     float, float
-        The least and the largest diagonal of an object's box in an image, pixels, of 98 % of
-        these images.
+        The 1 % and 99 % quantiles of the diagonal of an object's box in an image, pixels.
     """
     turns, extents = [], []
-    for elevation, of_elevation in zip(elevations_deg, images, strict=True):
-        for object_id, whole in zip(object_ids, of_elevation.of(object_ids), strict=True):
+    for elevation, elevation_images in zip(elevations_deg, images, strict=True):
+        for object_id, whole in zip(object_ids, elevation_images.of(object_ids), strict=True):
             codes = whole[::step]
             logits = network(codes)
             azimuth_deg = np.arange(0, len(whole), step, dtype=np.float64) * (360.0 / len(whole))
@@ -84,15 +83,15 @@ def turns_of(
 
 
 def _extents(codes: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Return the diagonal of the box around what each image shows, pixels, (n,)."""
+    """Return the diagonal of the object's box in each image, pixels, (n,)."""
     height, width = (_length(np.asarray((codes > 0).any(axis=axis))) for axis in (2, 1))
     return np.hypot(height, width)
 
 
-def _length(seen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return from the first to the last true value of each row, both included, (n,)."""
-    first, last = seen.argmax(axis=1), seen.shape[1] - seen[:, ::-1].argmax(axis=1)
-    return np.where(seen.any(axis=1), last - first, 0).astype(np.float64)
+def _length(visible: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the length from the first to the last true value of each row, inclusive, (n,)."""
+    first, last = visible.argmax(axis=1), visible.shape[1] - visible[:, ::-1].argmax(axis=1)
+    return np.where(visible.any(axis=1), last - first, 0).astype(np.float64)
 
 
 def make_bundle(
@@ -107,7 +106,7 @@ def make_bundle(
     affinity: Mapping[str, float],
     provenance: Mapping[str, Any],
 ) -> Bundle:
-    """Return a bundle.
+    """Return the bundle of a category.
 
     Parameters
     ----------
@@ -115,14 +114,14 @@ def make_bundle(
     estimator : Estimator
         A classifier, trained on ``<object id>/<elevation>``.
     turns : sequence of Turn
-        Of calibration objects, which the estimator has not seen, by its `bundled_network` with
-        the plane.
+        Turns of calibration objects, which the estimator has not seen, by its `bundled_network`
+        with the mirror plane.
     extent_px : (float, float)
         From `turns_of`.
     mirror_plane_deg : float or None
         From `nbv.robot.mirror.find_mirror_plane`.
     camera : Camera
-        That of the training.
+        The camera of the training images.
     sensor : mapping
         The configuration's ``sensor``.
     affinity : mapping
@@ -130,7 +129,7 @@ def make_bundle(
     provenance : mapping
     """
     temperature = temperature_of(turns)
-    # An object counts once; the estimator has it once for each elevation.
+    # The estimator lists each object once for every elevation.
     n_objects = len({name.rpartition("/")[0] for name in estimator.trained_on})
     elevation_deg = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
     distributions = np.stack(

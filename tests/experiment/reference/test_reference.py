@@ -75,10 +75,10 @@ def test_an_unfinished_run_leaves_the_reference_as_it_was(run, finished, tmp_pat
 
 
 def test_a_name_without_a_reference_is_told_those_there_are(finished, tmp_path):
-    with pytest.raises(UserError, match="there is none yet"):
+    with pytest.raises(UserError, match="no reference exists yet"):
         find_reference(tmp_path / "reference", {"name": "quick"})
     collect_reference(finished, tmp_path / "reference" / "paper")
-    with pytest.raises(UserError, match=r"'quick' cannot be compared \(there are: paper\)"):
+    with pytest.raises(UserError, match=r"'quick' cannot be compared \(references: paper\)"):
         find_reference(tmp_path / "reference", {"name": "quick"})
 
 

@@ -362,7 +362,9 @@ class Config(Section):
         focus = {"focus_category": self.focus_category, "transfer.category": self.transfer.category}
         for key, named in focus.items():
             if named is not None and named not in ours:
-                raise UserError(f"{key}={named} is not a category of this run: {nearest(named, ours)}")
+                raise UserError(
+                    f"{key}={named} is not a category of this run: {nearest(named, ours)}"
+                )
         by_category: dict[str, Collection[str]] = {
             "dataset.turn_deg": self.dataset.turn_deg,
             "dataset.categories": self.dataset.categories,

@@ -42,7 +42,7 @@ def onnx_model(estimator: Estimator, mirrored_classes: NDArray[np.intp] | None =
             parametrize.register_parametrization(layer, "weight", _AsSingle(), unsafe=True)
     side, written = estimator.image_side, io.BytesIO()
     with warnings.catch_warnings():
-        # The exporter that is to replace this one writes the folder's path into the model.
+        # The exporter that replaces this one writes the folder's path into the model.
         warnings.simplefilter("ignore", DeprecationWarning)
         torch.onnx.export(
             _OnCodes(network, side, mirrored_classes).eval(),

@@ -1,8 +1,7 @@
 """What the explorer's page holds, as compact text: images, lookup tables and outcomes.
 
-The outcomes are those of the evaluation files, in hundredths of a degree. The page works out the
-fused pose from a method's two estimates and adds the stored difference to the pose in the file, so
-that it shows the file's pose.
+The outcomes are those of the evaluation files, in hundredths of a degree. The page averages a
+method's two estimates itself and adds the stored difference between that and the file's pose.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ Hundredths = NDArray[np.int64]
 TURN = 36000
 """A full turn, in hundredths of a degree."""
 
-# Of a table's largest value; a code for less would make all others coarser.
+# Relative to a table's largest value; codes for smaller values would make all others coarser.
 _LEAST_PART = 1e-9
 
 
@@ -43,27 +42,27 @@ def hundredths(angle_deg: NDArray[np.floating[Any]]) -> Hundredths:
 
 
 def half_turn(difference: Hundredths) -> Hundredths:
-    """Return differences of angles as the shorter turn, in [-18000, 18000)."""
+    """Wrap differences of angles to [-18000, 18000)."""
     return np.asarray((difference + TURN // 2) % TURN - TURN // 2)
 
 
 def byte_planes(values: Hundredths) -> bytes:
     """Return integers in [-32768, 32767] as bytes: all high ones, then all low ones.
 
-    Those near 0 of either sign have a high byte of 0, which deflates to next to nothing.
+    Values near 0 of either sign have a high byte of 0, which compresses well.
     """
     folded = np.where(values >= 0, 2 * values, -2 * values - 1).astype(np.uint16).ravel()
     return (folded >> 8).astype(np.uint8).tobytes() + (folded & 0xFF).astype(np.uint8).tobytes()
 
 
 def rows_differenced(codes: Codes) -> bytes:
-    """Return codes (B, B) as differences along both axes, modulo 256, which deflate well."""
+    """Return codes (B, B) as differences along both axes, modulo 256, which compress well."""
     down = np.diff(codes, axis=0, prepend=np.zeros((1, codes.shape[1]), np.uint8))
     return np.diff(down, axis=1, prepend=np.zeros((len(codes), 1), np.uint8)).tobytes()
 
 
 def as_text(*parts: bytes) -> str:
-    """Return bytes, deflated together, in base64."""
+    """Compress bytes together and return them in base64."""
     return base64.b64encode(zlib.compress(b"".join(parts), 9)).decode("ascii")
 
 
@@ -75,7 +74,7 @@ class Quantised:
     ----------
     codes : ndarray uint8
     low, high : float
-        What the codes 0 and 255 stand for.
+        The values of the codes 0 and 255.
     """
 
     codes: Codes
@@ -84,12 +83,12 @@ class Quantised:
 
     @property
     def restored(self) -> NDArray[np.float64]:
-        """The table as the page has it."""
+        """The table as the page decodes it."""
         return self.low + self.codes.astype(np.float64) * ((self.high - self.low) / 255.0)
 
 
 def quantised(table: NDArray[np.floating[Any]]) -> Quantised:
-    """Return a table in equal steps from its least to its largest value."""
+    """Quantise a table in equal steps from its least to its largest value."""
     values = np.asarray(table, dtype=np.float64)
     low, high = float(values.min()), float(values.max())
     steps = (values - low) * (255.0 / (high - low)) if high > low else np.zeros_like(values)
@@ -97,16 +96,16 @@ def quantised(table: NDArray[np.floating[Any]]) -> Quantised:
 
 
 def quantised_logs(probabilities: NDArray[np.floating[Any]]) -> Quantised:
-    """Return the logs of probabilities in equal steps: each is as exact as any other.
+    """Quantise the logs of probabilities in equal steps, for equal relative precision.
 
-    What is below a billionth of the largest counts as that.
+    Probabilities are at least a billionth of the largest.
     """
     values = np.asarray(probabilities, dtype=np.float64)
     return quantised(np.log(np.maximum(values, _LEAST_PART * values.max())))
 
 
 N_SHOWN = 36
-"""Images round an object; fewer where it has fewer views."""
+"""Images around an object; fewer where it has fewer views."""
 
 COLUMNS = 6
 """Images in a row of the picture."""
@@ -117,16 +116,16 @@ _QUALITY = 30
 
 @dataclass(frozen=True)
 class Ring:
-    """Depth images of one object all round, in one picture of `COLUMNS` images a row.
+    """Depth images around one object, in one picture with `COLUMNS` images per row.
 
     Attributes
     ----------
     data : str
         A WebP picture in base64.
     n_images, side : int
-        How many images, evenly spaced from azimuth 0 on, and their pixels a side.
+        Number of images, evenly spaced from azimuth 0 on, and their side in pixels.
     grey_error : float
-        The mean difference of its grey levels to those of the figures, of 255.
+        The mean difference to the grey levels of the figures, in [0, 255].
     """
 
     data: str
@@ -157,24 +156,24 @@ def ring_of(codes: Codes) -> Ring:
     return Ring(data, n_images, side, float(np.abs(seen - picture).mean()))
 
 
-Table = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class PageTable:
-    """A lookup table as the page has it.
+    """A lookup table as the page stores it.
 
-    Calibration sees every viewpoint alike often, so V[e] is L[., e] made to sum to 1: the page
-    keeps L alone.
+    Calibration sees every viewpoint equally often, so V[e] is L[., e] normalised to sum 1, and the
+    page stores L alone.
 
     Attributes
     ----------
     logs : Quantised
-        Of L[viewpoint, estimate].
+        Logs of L[viewpoint, estimate].
     cost : Quantised
         A[estimate, delta].
     unit : str
-        Of the cost.
+        Unit of the cost.
     """
 
     logs: Quantised
@@ -182,20 +181,20 @@ class PageTable:
     unit: str
 
     @property
-    def estimate_likelihood(self) -> Table:
+    def estimate_likelihood(self) -> Floats:
         """L[viewpoint, estimate]."""
         weights = np.exp(self.logs.restored)
         return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
     @property
-    def viewpoint_likelihood(self) -> Table:
+    def viewpoint_likelihood(self) -> Floats:
         """V[estimate, viewpoint]."""
         weights = self.estimate_likelihood.T
         return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What the page has to know before it decodes `text`."""
+        """What the page needs in order to decode `text`."""
         return {
             "bins": len(self.logs.codes),
             "low": self.logs.low,
@@ -212,7 +211,7 @@ class PageTable:
 
 
 def page_table(table: LookupTable) -> PageTable:
-    """Return a lookup table as the page has it."""
+    """Return a lookup table as the page stores it."""
     return PageTable(
         quantised_logs(table.estimate_likelihood),
         quantised(table.cost),
@@ -221,9 +220,9 @@ def page_table(table: LookupTable) -> PageTable:
 
 
 def probability_error(stored: PageTable, table: LookupTable) -> float:
-    """Return how far the page's probabilities p(viewpoint | estimate) are off, at the most.
+    """Return the largest error of the page's probabilities p(viewpoint | estimate).
 
-    As a part of the largest probability of the same row.
+    Relative to the largest probability of the same row.
     """
     exact = table.viewpoint_likelihood.astype(np.float64)
     off = np.abs(stored.viewpoint_likelihood - exact)
@@ -231,14 +230,14 @@ def probability_error(stored: PageTable, table: LookupTable) -> float:
 
 
 def cost_error(stored: PageTable, table: LookupTable) -> float:
-    """Return how far the page's costs are off, at the most, in the cost's unit."""
+    """Return the largest error of the page's costs, in the cost's unit."""
     return float(np.abs(stored.cost.restored - table.cost).max())
 
 
 def own_distributions_text(posteriors: Posteriors) -> str:
-    """Return the distributions of the images of every class's azimuth, as text.
+    """Return the distributions of the images at the azimuths of the classes, as text.
 
-    Square roots in 256 steps, of the largest of each distribution; (n_objects, k, k) bytes.
+    Square roots in 256 steps, relative to the largest of the distribution; (n_objects, k, k) bytes.
     """
     return as_text(own_codes(posteriors).tobytes())
 
@@ -253,7 +252,7 @@ def own_codes(posteriors: Posteriors) -> NDArray[np.uint8]:
 
 
 def own_error(posteriors: Posteriors) -> float:
-    """Return how far they are off, at the most, as a part of each distribution's largest."""
+    """Return the largest error of the stored distributions, relative to each one's largest."""
     rows = posteriors.distributions
     shown = rows[:, :: rows.shape[1] // rows.shape[2]]
     kept = own_codes(posteriors).astype(np.float64) ** 2
@@ -273,16 +272,16 @@ class Outcomes:
     n_views : int
         First views of each object, evenly spaced.
     estimate : ndarray (n_objects, n_views) int64
-        From the first view alone, hundredths of a degree.
+        The estimate from the first view alone, hundredths of a degree.
     turn : dict of str to ndarray (n_objects, n_views) int64
-        By method: the rotation to the second view, in steps of 360° / n_views. Methods that take
-        no second view have none.
+        By method: the rotation to the second view, in steps of 360° / n_views; absent for methods
+        without a second view.
     pose : dict of str to ndarray (n_objects, n_views) int64
         By method: the fused pose, hundredths of a degree.
     means : dict of str to list
-        By method: the mean error of each object, degrees to two decimals.
+        By method: mean errors by object, degrees to two decimals.
     overall : dict of str to dict
-        By method, over all first views: the mean error, what errors above 90° add to it (both in
+        By method, over all first views: the mean error, the part of errors above 90° in it (both in
         degrees), and their share in percent.
     """
 
@@ -302,8 +301,7 @@ def outcomes_of(unit: Unit, frame: pd.DataFrame) -> Outcomes:
     Raises
     ------
     UserError
-        Where methods disagree about the estimates: of a first view, or of the view that a rotation
-        leads to.
+        Where methods have different estimates for the same view.
     """
     by_method = {str(name): part for name, part in frame.groupby("method", observed=True)}
     first = next(iter(by_method.values())).drop_duplicates("object_id")
@@ -315,7 +313,7 @@ def outcomes_of(unit: Unit, frame: pd.DataFrame) -> Outcomes:
     means: dict[str, list[float]] = {}
     for method, part in by_method.items():
         own = part.set_index("object_id").loc[list(object_ids)]
-        _need_same(unit, method, _table(own, "initial_estimate_deg", shape), estimate_deg)
+        _check_same(unit, method, _table(own, "initial_estimate_deg", shape), estimate_deg)
         pose[method] = hundredths(_table(own, "pose_estimate_deg", shape))
         if own["delta_deg"].notna().all():
             delta_deg = _table(own, "delta_deg", shape)
@@ -323,7 +321,7 @@ def outcomes_of(unit: Unit, frame: pd.DataFrame) -> Outcomes:
             seen = np.take_along_axis(
                 estimate_deg, (np.arange(n_views) + turn[method]) % n_views, axis=1
             )
-            _need_same(unit, method, _table(own, "next_estimate_deg", shape), seen)
+            _check_same(unit, method, _table(own, "next_estimate_deg", shape), seen)
         means[method] = _rounded(_table(own, "error_deg", shape).mean(axis=1))
     return Outcomes(
         object_ids,
@@ -340,8 +338,8 @@ def outcomes_of(unit: Unit, frame: pd.DataFrame) -> Outcomes:
 def expected_pose(estimate: Hundredths, turn: Hundredths | None) -> Hundredths:
     """Return the pose halfway between the first estimate and the second one, turned back (Eq. 7).
 
-    In whole hundredths of a degree, (n_objects, n_views), exactly as the page does it; the first
-    estimate where no second view is taken.
+    In whole hundredths of a degree, (n_objects, n_views), exactly as on the page; the first
+    estimate without a second view.
     """
     if turn is None:
         return estimate
@@ -354,8 +352,8 @@ def expected_pose(estimate: Hundredths, turn: Hundredths | None) -> Hundredths:
 def outcomes_text(outcomes: Outcomes) -> str:
     """Return the outcomes as text: estimates, then for each method rotations and poses.
 
-    An estimate is kept as its difference to the true azimuth, less that of the view before. A
-    pose is kept as its difference to `expected_pose`.
+    An estimate is stored as its error less that of the view before, a pose as its difference to
+    `expected_pose`.
     """
     n_views = outcomes.n_views
     off = half_turn(outcomes.estimate - np.arange(n_views) * (36000 // n_views))
@@ -369,7 +367,7 @@ def outcomes_text(outcomes: Outcomes) -> str:
 
 
 def unit_facts(outcomes: Outcomes) -> dict[str, Any]:
-    """Return what the page has to know of a unit's outcomes before it decodes them."""
+    """Return what the page needs in order to decode a unit's outcomes."""
     return {
         "objects": outcomes.object_ids,
         "folds": outcomes.folds,
@@ -384,8 +382,8 @@ def _table(frame: pd.DataFrame, column: str, shape: tuple[int, int]) -> np.ndarr
     return frame[column].to_numpy(dtype=np.float64).reshape(shape)
 
 
-def _need_same(unit: Unit, method: str, found: np.ndarray, expected: np.ndarray) -> None:
-    if not np.array_equal(found, expected):
+def _check_same(unit: Unit, method: str, values: np.ndarray, expected: np.ndarray) -> None:
+    if not np.array_equal(values, expected):
         raise UserError(
             f"evaluation of {unit[0]} at {unit[1]}°: {method} has other estimates than the other "
             "methods; delete the evaluations and run the same command again"
@@ -394,10 +392,10 @@ def _need_same(unit: Unit, method: str, found: np.ndarray, expected: np.ndarray)
 
 def _overall(error_deg: pd.Series) -> dict[str, float]:
     above = error_deg > HALF_TURN_DEG
-    mean, of_above, share = _rounded(
+    mean, part_above, share = _rounded(
         [error_deg.mean(), error_deg.where(above, 0.0).mean(), 100.0 * above.mean()]
     )
-    return {"mean": mean, "above": of_above, "share": share}
+    return {"mean": mean, "above": part_above, "share": share}
 
 
 def _rounded(values: Iterable[float]) -> list[float]:
@@ -406,4 +404,6 @@ def _rounded(values: Iterable[float]) -> list[float]:
 
 def methods_of(frames: Mapping[Unit, pd.DataFrame]) -> tuple[str, ...]:
     """Return the methods of all units, in their order."""
-    return tuple(dict.fromkeys(str(m) for one in frames.values() for m in one["method"].unique()))
+    return tuple(
+        dict.fromkeys(str(m) for frame in frames.values() for m in frame["method"].unique())
+    )

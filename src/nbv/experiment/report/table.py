@@ -47,12 +47,12 @@ _LATEX_CHARACTERS: Mapping[str, str] = {
 
 
 def escape_latex(text: str) -> str:
-    """Return the text with LaTeX's special characters, degree signs and Greek made safe."""
+    """Escape LaTeX's special characters, degree signs and Greek letters."""
     return "".join(_LATEX_CHARACTERS.get(character, character) for character in text)
 
 
 def escape_markdown(text: str) -> str:
-    """Return the text with its bars escaped, so that it stays within its cell."""
+    """Escape the bars of a text, so that it stays within its cell."""
     return text.replace("|", "\\|")
 
 
@@ -97,7 +97,7 @@ class Cell:
 Row = tuple[Cell, ...]
 
 DECIDED = "*: the interval excludes 0, before rounding."
-"""The note of a table that has differences."""
+"""The note of tables with differences."""
 
 
 def difference_cell(value: float, low: float, high: float) -> Cell:
@@ -107,7 +107,7 @@ def difference_cell(value: float, low: float, high: float) -> Cell:
 
 @dataclass(frozen=True)
 class Part:
-    """Rows under a heading of their own; without a heading they follow the table's."""
+    """Rows under a heading; without one they follow the table's header."""
 
     rows: tuple[Row, ...]
     heading: str = ""
@@ -115,7 +115,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Table:
-    """One table.
+    """A printed table.
 
     Attributes
     ----------
@@ -128,19 +128,19 @@ class Table:
     header : tuple of str
         A title for each column.
     rows : tuple of tuple of Cell, or tuple of Part
-        Rows as long as the header; the first cell of a row names it. Without any row the notes
-        are all there is to show.
+        Rows as long as the header; the first cell of a row names it. A table without rows shows
+        its notes only.
     notes : tuple of str
-        What to bear in mind.
+        Remarks below the table.
     decimals : int
         Decimals of the floats in the CSV file.
     n_text_columns : int
-        So many columns hold words and are aligned left; the others hold figures.
+        The number of columns of text, aligned left; the others hold numbers.
 
     Raises
     ------
     ValueError
-        If a row is not as long as the header.
+        If a row and the header differ in length.
     """
 
     name: str
@@ -172,14 +172,14 @@ class Table:
 
 
 def write_table(table: Table, paths: Mapping[str, Path], caution: Sequence[str] = ()) -> None:
-    """Write a table in each of the formats that have a path: ``csv``, ``md``, ``tex``, ``html``.
+    """Write a table in the formats that have a path: ``csv``, ``md``, ``tex``, ``html``.
 
-    The first notes are what a reader has to know before any number, the `caution`.
+    The warnings of `caution` precede its notes.
 
     Raises
     ------
     KeyError
-        If a format is none of these.
+        If the format is unknown.
     """
     cautious = replace(table, notes=(*caution, *table.notes))
     for kind, path in paths.items():
@@ -192,7 +192,7 @@ def table_markdown(table: Table) -> str:
 
 
 def table_latex(table: Table) -> str:
-    r"""Return a ``table`` environment, shrunk to the line where it is wider.
+    r"""Return a ``table`` environment, scaled down to the line width where it is wider.
 
     Needs ``\usepackage{booktabs,graphicx}``.
     """

@@ -47,7 +47,7 @@ HALF_TURNS = "above_90_percent"
 
 
 def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
-    """Rows by methods, then the difference of the subject to the reference (Tables 1 to 5)."""
+    """Return rows by methods, then the difference of subject and reference (Tables 1 to 5)."""
     methods = _methods(cells)
     differs = _shows_difference(cells, settings)
     rows = []
@@ -65,12 +65,12 @@ def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
 
 
 def fold_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
-    """Folds by methods and, for each, MAE and pAUC (Table 7)."""
+    """Return folds by methods, with MAE and pAUC for each method (Table 7)."""
     methods = _methods(cells)
     rows = []
     for label, part in cells.groupby("row_label", sort=False):
-        of_metric = [part[part["metric"] == metric] for metric in METRIC_TITLES]
-        columns = [_values(found, methods) for found in of_metric]
+        by_metric = [part[part["metric"] == metric] for metric in METRIC_TITLES]
+        columns = [_values(part, methods) for part in by_metric]
         pairs = zip(*columns, strict=True)
         rows.append((Cell(str(label)), *(cell for pair in pairs for cell in pair)))
     titles = METRIC_TITLES.values()
@@ -78,22 +78,22 @@ def fold_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
 
 
 def example_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
-    """Ours and the published example in pairs of rows: they are different objects (Table 6)."""
+    """Return our and the published example, different objects, in pairs of rows (Table 6)."""
     methods = _methods(cells)
     rows: list[Row] = []
     for label, part in cells.groupby("row_label", sort=False):
         errors = part[part["metric"] == "error"].set_index("method")
         estimates = part[part["metric"] == "estimate"].set_index("method")
         for column, suffix in (("value", ""), ("published", ", published")):
-            found = errors[column].reindex(methods)
-            if found.notna().any():
-                shown = _example_cells(estimates[column].reindex(methods), found)
+            present = errors[column].reindex(methods)
+            if present.notna().any():
+                shown = _example_cells(estimates[column].reindex(methods), present)
                 rows.append((Cell(f"{label}{suffix}"), *shown))
     return [method_label(method) for method in methods], rows
 
 
 def comparison_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
-    """Say what is shown, how many objects it rests on, and what the difference is."""
+    """Yield notes on the cells, the number of objects, and the difference."""
     yield _legend(cells)
     objects = cells.groupby("row_label", sort=False)["n_objects"].max()
     if objects.min() == objects.max():
@@ -108,14 +108,14 @@ def comparison_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[
 
 
 def fold_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
-    """Say what is shown, and how many objects all folds together rest on."""
+    """Yield notes on the cells and the number of objects in all folds."""
     yield _legend(cells)
     yield f"{_counts(cells)}."
     yield "The average is over the pooled images of all folds."
 
 
 def published_notes(name: str, cells: pd.DataFrame) -> list[str]:
-    """Return what is to be known about the published figures that a table shows."""
+    """Return the notes on the published numbers that a table shows."""
     return [note.text for note in PUBLISHED[name].notes if _explains(note, cells)]
 
 
@@ -124,7 +124,7 @@ def _methods(cells: pd.DataFrame) -> list[str]:
 
 
 def _values(row: pd.DataFrame, methods: list[str]) -> list[Cell]:
-    """Return ``ours [published]`` per method; the best of the row, as printed, is bold."""
+    """Return ``ours [published]`` per method; the best of the row, as rounded, is bold."""
     by_method = row.set_index("method").reindex(methods)
     values = by_method["value"].round(2)
     (metric,) = row["metric"].unique()
@@ -142,7 +142,7 @@ def _values(row: pd.DataFrame, methods: list[str]) -> list[Cell]:
 
 
 def _example_cells(estimates: pd.Series, errors: pd.Series) -> Iterator[Cell]:
-    """Yield ``estimate (error)`` per method; the least error, as printed, is bold."""
+    """Yield ``estimate (error)`` per method; the least error, as rounded, is bold."""
     least = errors.round(1).min()
     for estimate, error in zip(estimates, errors, strict=True):
         if np.isfinite(error):
@@ -172,7 +172,7 @@ def _counts(cells: pd.DataFrame) -> str:
 
 
 def _explains(note: Note, cells: pd.DataFrame) -> bool:
-    """Say whether a figure that the note explains is among the cells."""
+    """Return whether the note explains a number among the cells."""
     explained = pd.Series(True, index=cells.index) if note.ours else cells["published"].notna()
     if note.metric:
         explained &= cells["metric"] == note.metric
@@ -184,10 +184,10 @@ def _explains(note: Note, cells: pd.DataFrame) -> bool:
 
 
 def claims_table(claims: pd.DataFrame) -> Table:
-    """Return one row per claim: sentence, verdicts, our figures, and the paper's own.
+    """Return one row per claim: sentence, verdicts, our numbers, and the paper's own.
 
-    Those that were not run come last, under a heading of their own. The CSV file is what
-    `nbv.experiment.paper.verdicts.evaluate_claims` returned: a row for each comparison.
+    Claims that were not run come last, under a heading. The CSV file has a row for each comparison,
+    from `nbv.experiment.paper.verdicts.evaluate_claims`.
     """
     header = (
         "Section",
@@ -226,12 +226,12 @@ Evaluations = Mapping[Unit, pd.DataFrame]
 def build_table(
     name: str, evaluations: Evaluations, settings: ReportSettings | None = None
 ) -> Table:
-    """Build one of `TABLES` from whatever of it was run; the default settings are the paper's.
+    """Build one of `TABLES` from the units that were run; the default settings are the paper's.
 
     Raises
     ------
     UserError
-        If there is no such table, or nothing was evaluated.
+        If the table is unknown, or nothing was evaluated.
     """
     if name not in _KINDS:
         raise UserError(f"no table {name!r}; {nearest(name, _KINDS)}")
@@ -254,7 +254,7 @@ def build_table(
 
 @dataclass(frozen=True)
 class _Measured:
-    """The figures of a table, and the words that depend on what was evaluated."""
+    """The cells of a table, and the texts that depend on them."""
 
     title: str
     row_title: str
@@ -264,7 +264,7 @@ class _Measured:
 
 @dataclass(frozen=True)
 class _Kind:
-    """How a table is measured and laid out."""
+    """The functions that measure and lay out a table."""
 
     measure: Callable[[str, Evaluations, ReportSettings], _Measured]
     body: Callable[[pd.DataFrame, ReportSettings], Body] = comparison_body
@@ -292,7 +292,7 @@ def _by_elevation(name: str, evaluations: Evaluations, settings: ReportSettings)
     category = focus_category(evaluations, settings)
     resampler = shared_resampler(settings)
     cells = []
-    for elevation in sorted(degrees for one, degrees in evaluations if one == category):
+    for elevation in sorted(degrees for other, degrees in evaluations if other == category):
         sample = pair_methods(evaluations[category, elevation], category)
         row = str(elevation), f"{elevation}°"
         for shown in (metric, HALF_TURNS):
@@ -315,8 +315,8 @@ def _by_group(name: str, evaluations: Evaluations, settings: ReportSettings) -> 
             row = str(group), f"{group} ({span})"
             for shown in ("mae", HALF_TURNS):
                 cells += method_cells(name, *row, shown, sample, resampler, settings)
-    title = f"MAE of {_of_focus(unit, 'by viewpoint group')}"
-    return _Measured(title, "Viewpoint group", _published_of_focus(unit, cells))
+    title = f"MAE of {_focus_title(unit, 'by viewpoint group')}"
+    return _Measured(title, "Viewpoint group", _with_published_focus(unit, cells))
 
 
 def _by_fold(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
@@ -333,9 +333,9 @@ def _by_fold(name: str, evaluations: Evaluations, settings: ReportSettings) -> _
             cells += method_cells(name, row, label, metric, sample, resampler, settings)
         over_folds = name, published.SIGMA_ROW, "σ", f"{metric}_sigma"
         made = method_cells(*over_folds, everything, resampler, settings)
-        cells += [found | {"metric": metric} for found in made]
-    title = f"MAE and pAUC of {_of_focus(unit, 'by fold')}"
-    return _Measured(title, "Fold", _published_of_focus(unit, cells))
+        cells += [record | {"metric": metric} for record in made]
+    title = f"MAE and pAUC of {_focus_title(unit, 'by fold')}"
+    return _Measured(title, "Fold", _with_published_focus(unit, cells))
 
 
 def _examples(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
@@ -345,16 +345,16 @@ def _examples(name: str, evaluations: Evaluations, settings: ReportSettings) -> 
     cells = []
     for azimuth in settings.example_initial_deg:
         for method in settings.methods:
-            found = example_row(frame, example, method, azimuth)
-            if found is None:
+            outcome = example_row(frame, example, method, azimuth)
+            if outcome is None:
                 continue
             shared = {"method": method, "n_objects": 1, "n_images": 1}
             for metric, column in (("estimate", "pose_estimate_deg"), ("error", "error_deg")):
-                figure = {"metric": metric, "value": float(found[column])}
+                figure = {"metric": metric, "value": float(outcome[column])}
                 cells.append(cell(name, str(azimuth), f"{azimuth}°", **shared, **figure))
-    title = f"Examples of estimates (and errors) for {_of_focus(unit)}"
+    title = f"Examples of estimates (and errors) for {_focus_title(unit)}"
     note = f"Object {example.object_id} of fold {example.fold}: {example.reason}."
-    return _Measured(title, "Initial azimuth", _published_of_focus(unit, cells), (note,))
+    return _Measured(title, "Initial azimuth", _with_published_focus(unit, cells), (note,))
 
 
 def _focus_sample(evaluations: Evaluations, settings: ReportSettings) -> tuple[Unit, PairedErrors]:
@@ -362,21 +362,21 @@ def _focus_sample(evaluations: Evaluations, settings: ReportSettings) -> tuple[U
     return unit, pair_methods(evaluations[unit], unit[0])
 
 
-def _of_focus(unit: Unit, by: str = "") -> str:
+def _focus_title(unit: Unit, by: str = "") -> str:
     return f"{category_label(unit[0])} {by}".rstrip() + f" at elevation {unit[1]}°"
 
 
-def _published_of_focus(unit: Unit, cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Add what the paper prints, which is about one category at elevation 0° alone."""
+def _with_published_focus(unit: Unit, cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Add the published values, which exist for one category at elevation 0° only."""
     return _with_published(cells) if unit == (published.FOCUS_CATEGORY, 0) else cells
 
 
 def _with_published(cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return cells with what the paper prints in the same place."""
-    place = ("table", "metric", "row", "method")
+    """Return cells with the published values of the same cells."""
+    key = ("table", "metric", "row", "method")
     return [
-        one | {"published": published.published_value(*(one[key] for key in place))}
-        for one in cells
+        record | {"published": published.published_value(*(record[column] for column in key))}
+        for record in cells
     ]
 
 
@@ -391,4 +391,4 @@ _KINDS: Mapping[str, _Kind] = {
 }
 
 TABLES = tuple(_KINDS)
-"""Names of the tables that `build_table` knows."""
+"""The names of the tables of `build_table`."""

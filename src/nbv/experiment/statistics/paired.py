@@ -28,11 +28,11 @@ VIEWPOINT_GROUPS: Mapping[int, tuple[int, int]] = {
     3: (135, 225),
     4: (225, 315),
 }
-"""Fig. 8: each group's first azimuth in degrees, and the first one after it."""
+"""The first azimuth of each group in degrees, and the first after the group (Fig. 8)."""
 
 
 def viewpoint_group(azimuth_deg: NDArray[np.float64]) -> Ints:
-    """Return the group, 1 to 4, of each azimuth in [0, 360) (Fig. 8: quarters centred on 0)."""
+    """Return the groups, 1 to 4, of azimuths in [0, 360) (Fig. 8: quarters centred on 0)."""
     return (np.floor(np.mod(azimuth_deg + 45.0, 360.0) / 90.0)).astype(np.int64) + 1
 
 
@@ -45,7 +45,7 @@ class PairedErrors:
     errors_deg : mapping of str to (n_images,) float
         One array per method, all in the same order of images.
     objects : (n_images,) int
-        Which object an image shows, in [0, n_objects).
+        The object in each image, in [0, n_objects).
     folds : (n_images,) int
         The fold in which it was tested, from 1.
     initial_deg : (n_images,) float
@@ -61,7 +61,7 @@ class PairedErrors:
     category_of: tuple[str, ...]
 
     def select(self, mask: NDArray[np.bool_]) -> PairedErrors:
-        """Keep the images of `mask`; objects keep their numbers."""
+        """Return the errors on the images of `mask`; objects keep their indices."""
         return PairedErrors(
             {method: errors[mask] for method, errors in self.errors_deg.items()},
             self.objects[mask],
@@ -72,7 +72,7 @@ class PairedErrors:
 
     @property
     def n_objects(self) -> int:
-        """Number of objects that still have an image."""
+        """Number of objects with at least one image."""
         return int(np.unique(self.objects).size)
 
     @property
@@ -115,7 +115,7 @@ def pair_methods(frame: pd.DataFrame, category: str) -> PairedErrors:
 
 
 def pool(parts: Sequence[PairedErrors]) -> PairedErrors:
-    """Join the images of several categories; the methods are those that all of them have."""
+    """Join the images of several categories; the methods are those that all categories have."""
     shared = [m for m in parts[0].errors_deg if all(m in part.errors_deg for part in parts)]
     offsets = np.cumsum([0, *(len(part.category_of) for part in parts)])
     return PairedErrors(
@@ -128,12 +128,12 @@ def pool(parts: Sequence[PairedErrors]) -> PairedErrors:
 
 
 def fewest_resampled(statistic: str, sample: PairedErrors) -> int:
-    """Return the smallest number of objects that `estimate` resamples together.
+    """Return the size of the smallest stratum that `estimate` resamples.
 
     Objects are resampled within their category, and for σ within their fold as well.
     """
     objects, images = np.unique(sample.objects, return_index=True)
-    strata = [sample.category_of[one] for one in objects]
+    strata = [sample.category_of[i] for i in objects]
     if statistic.endswith("_sigma"):
         strata = [f"{fold} {name}" for fold, name in zip(sample.folds[images], strata, strict=True)]
     return int(np.unique(strata, return_counts=True)[1].min(initial=objects.size))
@@ -141,10 +141,10 @@ def fewest_resampled(statistic: str, sample: PairedErrors) -> int:
 
 @dataclass
 class Resampler:
-    """Object resamples, drawn once per category, so that all comparisons share them.
+    """Object resamples, drawn once per category and shared by all comparisons.
 
-    A category's draws depend on the seed and its name alone, not on what else is asked, so a
-    table and a claim about the same unit give the same interval.
+    The draws depend on the seed and the category's name alone, so a table and a claim about the
+    same unit give the same interval.
     """
 
     seed: int
@@ -164,7 +164,7 @@ class Resampler:
     def multiplicities_by_fold(self, sample: PairedErrors) -> Ints:
         """Return (n_resamples, n_objects) draws, resampling within each fold's test objects.
 
-        For figures that compare folds: no resample may lose a fold.
+        For statistics that compare folds: no resample may lose a fold.
         """
         drawn = np.zeros((self.n_resamples, len(sample.category_of)), dtype=np.int64)
         for fold in np.unique(sample.folds):
@@ -182,7 +182,7 @@ class Resampler:
 
 
 STATISTICS = ("mae", "pauc", "above_90_percent", "median", "mae_sigma", "pauc_sigma")
-"""The statistics that `estimate` knows."""
+"""The statistics of `estimate`."""
 
 LOWER_IS_BETTER: Mapping[str, bool] = {name: name != "pauc" for name in STATISTICS}
 UNIT_OF: Mapping[str, str] = {
@@ -214,12 +214,12 @@ def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resam
     ----------
     statistic : str
         ``mae`` or ``median`` (degrees), ``pauc`` or ``above_90_percent`` (percent), or
-        ``mae_sigma`` and ``pauc_sigma``: the standard deviation over folds of the figure per fold.
+        ``mae_sigma`` and ``pauc_sigma``: the standard deviation over folds.
 
     Raises
     ------
     ValueError
-        If there is no image.
+        If there are no images.
     """
     errors, pooled = sample.errors_deg[method], statistic.removesuffix("_sigma")
     if pooled != statistic:
@@ -249,7 +249,7 @@ def _estimate_sigma(
 
 
 def _per_image(statistic: str, errors_deg: Floats) -> Floats:
-    """Return what each image adds to a statistic that is a mean over images."""
+    """Return the contribution of each image to a statistic that is a mean over images."""
     if statistic == "above_90_percent":
         return half_turned(errors_deg)
     return accuracy_area(errors_deg) if statistic == "pauc" else errors_deg
@@ -264,7 +264,7 @@ _METRICS: Mapping[str, Callable[[Floats], float]] = {
 
 
 FoldFile = tuple[str, int, int]
-"""What a file is about: category, elevation in degrees and fold (from 1)."""
+"""The key of a file: category, elevation in degrees and fold (from 1)."""
 
 MEAN_COLUMNS = ("error_deg", "pauc_percent", "above_90_percent", "travel_deg")
 OBJECT_COLUMNS = ("method", "object_id", "n_images", *MEAN_COLUMNS)
@@ -298,7 +298,7 @@ def object_means(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 
 
 def load_folds(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
-    """Read one CSV file for each unit and fold into one frame, such as `object_means` of each.
+    """Read a CSV file for each unit and fold into one frame, such as files of `object_means`.
 
     Returns
     -------
@@ -306,10 +306,10 @@ def load_folds(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
         ``category, elevation_deg, fold`` and the columns of the files.
     """
     parts = []
-    for place, path in files.items():
+    for key, path in files.items():
         rows = read_csv(existing(path))
-        for index, name in enumerate(("category", "elevation_deg", "fold")):
-            rows.insert(index, name, place[index])
+        for i, name in enumerate(("category", "elevation_deg", "fold")):
+            rows.insert(i, name, key[i])
         parts.append(rows)
     return pd.concat(parts, ignore_index=True)
 
@@ -317,8 +317,8 @@ def load_folds(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
 def paired_objects(means: pd.DataFrame, category: str) -> PairedErrors:
     """Line up the methods of one category and elevation object by object.
 
-    Every object counts as one image with its mean error: a mean over objects that were all seen
-    from equally many viewpoints is the mean over images.
+    Each object counts as one image with its mean error: with equally many viewpoints per object,
+    the mean over objects is the mean over images.
     """
     indexed = means.set_index(["object_id", "fold", "method"])["error_deg"]
     wide = indexed.unstack("method")  # noqa: PD010 - nothing to aggregate
@@ -347,14 +347,14 @@ def mae_difference(sample: PairedErrors, method: str, other: str, resampler: Res
 def indistinct_from_best(
     sample: PairedErrors, methods: Sequence[str], resampler: Resampler
 ) -> list[str]:
-    """Return the method of least MAE, and those whose difference to it may be 0 (95 %)."""
-    found = {method: estimate("mae", sample, method, resampler) for method in methods}
-    for method, mae in found.items():
+    """Return the method of least MAE, then those whose 95 % interval to it includes 0."""
+    estimates = {method: estimate("mae", sample, method, resampler) for method in methods}
+    for method, mae in estimates.items():
         if not math.isfinite(mae.value):
             raise UserError(f"{method}: the MAE is {mae.value}: its errors are damaged")
-    best = min(methods, key=lambda method: found[method].value)
+    best = min(methods, key=lambda method: estimates[method].value)
     return [best] + [
         method
         for method in methods
-        if method != best and found[method].minus(found[best]).low <= 0.0
+        if method != best and estimates[method].minus(estimates[best]).low <= 0.0
     ]

@@ -1,4 +1,4 @@
-"""How a next viewpoint is selected: its cost (Fig. 2), the idea (3), each method's own (7)."""
+"""Figures of the selection of the next viewpoint: costs (2), the idea (3), all methods (7)."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def two_view_belief(lookup: LookupTable, first: int, second: int, delta: int) ->
     Parameters
     ----------
     lookup : LookupTable
-        Whose likelihoods.
+        The table with the likelihoods.
     first, second : int
         Bins of the two estimates.
     delta : int
@@ -156,21 +156,21 @@ def two_view_belief(lookup: LookupTable, first: int, second: int, delta: int) ->
     """
     one, estimates = lookup.viewpoint_likelihood[first], lookup.estimate_likelihood
     belief = one * np.roll(estimates[:, second], -delta)
-    # As before the second view: two estimates that exclude each other say nothing.
+    # Two estimates that exclude each other carry no information.
     belief = belief if belief.any() else np.ones_like(one)
     return np.asarray(belief / belief.sum())
 
 
 def _label_curve(axes: Axes, label: str, line: int, color: str, dashes: str) -> None:
-    """Name a curve at the right, one line below the other, with a piece of it before the name."""
+    """Write the label of a curve at the right, with a sample of its line."""
     height = 0.9 - 0.13 * line
-    place: Any = {"transform": axes.transAxes}
-    axes.plot([0.62, 0.67], [height] * 2, color=color, linestyle=dashes, linewidth=1.8, **place)
-    axes.text(0.685, height, label, va="center", fontsize=8, **place)
+    in_axes: Any = {"transform": axes.transAxes}
+    axes.plot([0.62, 0.67], [height] * 2, color=color, linestyle=dashes, linewidth=1.8, **in_axes)
+    axes.text(0.685, height, label, va="center", fontsize=8, **in_axes)
 
 
 def picks(inputs: FigureInputs) -> Figure:
-    """Fig. 7: the next view that each method takes for one initial image, and what it gains."""
+    """Fig. 7: the next view of each method for one initial image, and the resulting error."""
     shown = example_view(inputs)
     methods = [m for m, row in shown.outcomes.items() if np.isfinite(_delta(shown, m))]
     single = [m for m in shown.outcomes if m not in methods]
