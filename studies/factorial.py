@@ -1,9 +1,9 @@
 """Every choice of the next view with every fusion, on the same estimates of one fold.
 
 The effects of choice and fusion separate only where both vary: the paper's method differs from
-Opposite in the choice, and from its extensions in both. All choices with the same fusion fuse alike.
-An average needs no density, so each choice has the density that is best for it. A posterior needs
-one, which all choices share; the regression of ``expected_error`` has its own kernel.
+Opposite in the choice, and from its extensions in both. All choices with the same fusion fuse
+alike. An average needs no density, so each choice has the density that is best for it. A posterior
+needs one, which all choices share; the regression of ``expected_error`` has its own kernel.
 """
 
 from __future__ import annotations

@@ -13,22 +13,13 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from nbv.errors import UserError, nearest
-from nbv.experiment.config.schema import NAME_RULE, Config
+from nbv.experiment.config.schema import Config
 from nbv.files import existing
 
 GROUPS = ("experiment", "dataset", "renderer", "sensor", "randomisation", "estimator", "density")
 # The key of a group that names one of its files.
 _FILE_NAMES = {"dataset": "source", "renderer": "name", "sensor": "name", "estimator": "kind"}
 
-_BOUNDS = ("ge", "gt", "le", "lt", "min_length", "max_length")
-_RANGES = {
-    ("ge", "le"): "{ge} to {le}",
-    ("gt", "le"): "above {gt}, {le} at most",
-    ("gt", "lt"): "between {gt} and {lt}",
-    ("min_length",): "one or more",
-    ("min_length", "max_length"): "one or more, {max_length} at most",
-}
-_TYPES = {int: "a whole number", float: "a number", str: "text", list: "a list"}
 _LONGEST = 80
 """Characters of a value that a message repeats."""
 
@@ -133,7 +124,7 @@ def _checked(folder: Path, override: str) -> str:
     if bare in GROUPS:
         _check_choice(folder, bare, value, bare)
         return override
-    kind, _ = type_of(bare.split("."))
+    kind = type_of(bare.split("."))
     if value.replace(" ", "") == "{}":
         # Hydra merges mappings.
         raise UserError(f"{key}={{}} changes nothing; ~{bare}.<key> leaves a key out")
@@ -300,8 +291,8 @@ def _fields_of(kind: Any) -> dict[str, FieldInfo]:
     return kind.model_fields if isinstance(kind, type) and issubclass(kind, BaseModel) else {}
 
 
-def type_of(parts: Sequence[str | int]) -> tuple[Any, list[Any]]:
-    """Return the type of a key, and the annotations that give its range.
+def type_of(parts: Sequence[str | int]) -> Any:
+    """Return the type of a key, without annotations and None.
 
     Parameters
     ----------
@@ -314,30 +305,25 @@ def type_of(parts: Sequence[str | int]) -> tuple[Any, list[Any]]:
         For an unknown key: one line with the nearest key.
     """
     kind: Any = Config
-    marks: list[Any] = []
     for depth, part in enumerate(parts):
         fields = _fields_of(kind)
         if part in fields:
-            kind, marks = _unwrap(fields[str(part)].annotation, fields[str(part)].metadata)
+            kind = _unwrap(fields[str(part)].annotation)
         elif get_origin(kind) in (dict, list):
-            kind, marks = _unwrap(get_args(kind)[-1], [])
+            kind = _unwrap(get_args(kind)[-1])
         else:
             written = _dotted(parts[: depth + 1])
             known = [_dotted([*parts[:depth], name]) for name in fields]
             hint = nearest(written, known) if fields else "a value has no keys"
             raise UserError(f"configuration key {shortened(written)!r} is unknown: {hint}")
-    return kind, marks
+    return kind
 
 
-def _unwrap(kind: Any, marks: Sequence[Any]) -> tuple[Any, list[Any]]:
-    """Separate a type from its annotations, and from a union with None."""
-    if get_origin(kind) is Annotated:
-        inner, *more = get_args(kind)
-        inside = [each for mark in more for each in getattr(mark, "metadata", [mark])]
-        return _unwrap(inner, [*marks, *inside])
-    if type(None) in get_args(kind):
-        return _unwrap(get_args(kind)[0], marks)
-    return kind, list(marks)
+def _unwrap(kind: Any) -> Any:
+    """Return a type without its annotations and without None."""
+    if get_origin(kind) is Annotated or type(None) in get_args(kind):
+        return _unwrap(get_args(kind)[0])
+    return kind
 
 
 def _dotted(parts: Sequence[str | int]) -> str:
@@ -348,7 +334,7 @@ def default_of(key: str, otherwise: Any) -> Any:
     """Return the default of a dotted key, or `otherwise` where it has none."""
     *above, last = key.split(".")
     with contextlib.suppress(UserError, KeyError):
-        field = _fields_of(type_of(above)[0])[last]
+        field = _fields_of(type_of(above))[last]
         if not field.is_required():
             default = field.get_default(call_default_factory=True)
             return default.model_dump() if isinstance(default, BaseModel) else default
@@ -371,36 +357,15 @@ def one_line(mistakes: Sequence[ErrorDetails]) -> str:
     """
     # An unknown key first: the key that it was meant for is then missing, too.
     mistake = min(mistakes, key=lambda each: each["type"] != "extra_forbidden")
-    parts = list(mistake["loc"])
-    if parts[-1:] == ["[key]"]:
-        return f"{shortened(_dotted(parts[:-1]))}: {NAME_RULE}"
-    kind, marks = type_of(parts)
-    key, context = shortened(_dotted(parts)), mistake.get("ctx", {})
+    parts = [part for part in mistake["loc"] if part != "[key]"]
+    kind, key = type_of(parts), shortened(_dotted(parts))
     given = f"{key}={shortened(mistake['input'])}"
     match mistake["type"]:
         case "missing":
             return f"{key} is missing"
         case "value_error":
-            return f"{key}: {context['error']}"
-        case "string_pattern_mismatch":
-            return f"{given}: {_notes(marks)}"
+            return f"{given}: {mistake['ctx']['error']}"
         case "literal_error":
             return f"{given} is unknown: {nearest(str(mistake['input']), get_args(kind))}"
-        case "finite_number":
-            return f"{given} is out of range: a finite number"
-    if any(bound in context for bound in _BOUNDS):
-        return f"{given} is out of range: {_range_text(marks)}"
-    return f"{given} is not {_TYPES.get(get_origin(kind) or kind, 'a mapping')}"
-
-
-def _range_text(marks: Sequence[Any]) -> str:
-    bounds = {
-        name: getattr(mark, name) for name in _BOUNDS for mark in marks if hasattr(mark, name)
-    }
-    return ", ".join(
-        text for text in (_RANGES[tuple(bounds)].format(**bounds), _notes(marks)) if text
-    )
-
-
-def _notes(marks: Sequence[Any]) -> str:
-    return ", ".join(mark for mark in marks if isinstance(mark, str))
+    message = mistake["msg"]
+    return f"{given}: {message[0].lower()}{message[1:]}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, Self, TypeVar
@@ -35,7 +36,7 @@ def _distinct(values: list[T]) -> list[T]:
 def _below_root(folder: str) -> str:
     path = PurePosixPath(folder)
     if path.is_absolute() or ".." in path.parts:
-        raise ValueError(f"{folder!r} is not below dataset.root")
+        raise ValueError("not below dataset.root")
     return folder
 
 
@@ -43,8 +44,17 @@ def _with_known_home(path: str) -> str:
     try:
         Path(path).expanduser()
     except RuntimeError:
-        raise ValueError(f"{path!r}: unknown user") from None
+        raise ValueError("unknown user") from None
     return path
+
+
+def _matches(pattern: str, rule: str) -> AfterValidator:
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text):
+            raise ValueError(rule)
+        return text
+
+    return AfterValidator(check)
 
 
 Whole = Annotated[int, Field(strict=True)]
@@ -57,15 +67,19 @@ Angle = Annotated[Number, Field(ge=-360, le=360)]
 Bandwidth = Annotated[Number, Field(ge=0, le=180)]
 PseudoObservations = Annotated[Number, Field(ge=0, le=10**9)]
 Share = Annotated[Number, Field(ge=0, le=1)]
+Diagonals = Annotated[Number, Field(gt=1, le=1000)]
+"""A distance in object diagonals."""
 Replicate = Annotated[Whole, Field(ge=0, le=999)]
 Elevation = Annotated[Whole, Field(ge=0, le=89)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"), NAME_RULE]
-Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{1,4096}$"), "one line of text"]
+Name = Annotated[str, _matches(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}", NAME_RULE)]
+Text = Annotated[str, _matches(r"[^\x00-\x1f\x7f]{1,4096}", "use one line of text")]
 DataPath = Annotated[Text, AfterValidator(_with_known_home)]
 Axis = Annotated[
     str,
-    Field(pattern=r"^(auto|[+-]?[xyzXYZ]|[^,\s]+(,[^,\s]+){2})$"),
-    "an axis such as +y, a vector such as 0,0,1, or auto",
+    _matches(
+        r"auto|[+-]?[xyzXYZ]|[^,\s]+(,[^,\s]+){2}",
+        "use an axis such as +y, a vector such as 0,0,1, or auto",
+    ),
 ]
 Distinct = AfterValidator(_distinct)
 AtLeastOne = Field(min_length=1, max_length=100)
@@ -93,8 +107,8 @@ class Dataset(Section):
     front: Axis = "+x"
     turn_deg: dict[Name, Angle] = {}
     centre: Literal["box", "origin"] = "box"
-    handle_reach: Annotated[Number, Field(ge=0, le=0.5), "in widths of a mug's body"] = 0.0
-    square_share: Annotated[Number, Field(ge=0, le=1), "share of mugs"] = 0.0
+    handle_reach: Annotated[Number, Field(ge=0, le=0.5)] = 0.0  # widths of a mug's body
+    square_share: Share = 0.0
     exclude: list[Text] = []
     exclude_file: DataPath | None = None
 
@@ -115,7 +129,7 @@ class Renderer(Section):
 class Camera(Section):
     """The depth camera; see `nbv.data.camera`."""
 
-    distance: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"]
+    distance: Diagonals
     fov_deg: Annotated[Number, Field(ge=0.05, le=160)]
     image_side: Annotated[Whole, Field(ge=8, le=10**6)]
     framing: Framing
@@ -164,7 +178,7 @@ class Estimator(Section):
     pretraining: Schedule = Schedule(epochs=2, learning_rate=9e-3)
     fine_tuning: Schedule = Schedule(epochs=5, learning_rate=4e-3)
     next_elevation: Schedule = Schedule(epochs=4, learning_rate=4e-3)
-    n_classes: Annotated[Whole, Field(ge=8, le=360), "a divisor of 360"] | None = None
+    n_classes: Annotated[Whole, Field(ge=8, le=360)] | None = None
     target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
     pairs: str | None = None
 
@@ -213,13 +227,13 @@ class Affinity(Section):
 
     power: Annotated[Number, Field(gt=0, le=10**4)]
     pseudo_observations: PseudoObservations
-    caution: Annotated[Number, Field(ge=0, le=100), "in standard errors"] = 2.0
+    caution: Annotated[Number, Field(ge=0, le=100)] = 2.0  # standard errors
 
 
 class Recommendation(Section):
     """The cost of travel; see `nbv.core.lookup.least_cost_delta`."""
 
-    travel_cost: Annotated[Number, Field(ge=0, le=10**6), "in the criterion's unit per degree"]
+    travel_cost: Annotated[Number, Field(ge=0, le=10**6)]  # the criterion's unit per degree
     max_travel_deg: Annotated[Number, Field(ge=0, le=180)]
 
 
@@ -266,8 +280,8 @@ class Randomisation(Section):
     elevation_deg: Annotated[Number, Field(ge=0, le=85)] = 0.0
     roll_deg: Annotated[Number, Field(ge=0, le=180)] = 0.0
     size: Annotated[Number, Field(ge=0, le=0.9)] = 0.0
-    nearest: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"] | None = None
-    farthest: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"] | None = None
+    nearest: Diagonals | None = None
+    farthest: Diagonals | None = None
     measured: Share = 1.0
     table: Share = 0.0
     thin: Share = 0.0
