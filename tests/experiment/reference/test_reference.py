@@ -58,7 +58,7 @@ def test_a_reference_made_again_loses_what_the_run_has_not(run, tmp_path, caplog
     kept = files(reference)
     assert not any("table7" in name or "figure7" in name for name in kept)
     assert {"README.md", "tables/table1.csv"} <= set(kept)
-    assert "not made at a clean commit but at 0123-dirty" in caplog.text
+    assert "made at 0123-dirty, not at a clean commit" in caplog.text
 
 
 @pytest.mark.parametrize("name", ["claims.md", "tables/runtime.csv", "figures/*.png"])
@@ -87,7 +87,7 @@ def test_other_settings_are_told_before_a_run_is_made(finished, tmp_path):
     collect_reference(finished, reference)
     configuration = read_configuration(finished)
     assert find_reference(tmp_path, configuration) == reference
-    with pytest.raises(UserError, match=r"other settings than .*: seed=3 \(reference: not set\)$"):
+    with pytest.raises(UserError, match=r"settings differ from .*: seed=3 \(reference: not set\)$"):
         find_reference(tmp_path, configuration | {"seed": 3})
 
 

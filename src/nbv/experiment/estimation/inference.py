@@ -116,13 +116,6 @@ def decode(estimator: Estimator, outputs: Outputs, temperature: float = 1.0) -> 
     return kind_of(estimator.settings).decode(outputs / temperature)
 
 
-def estimate_azimuth(
-    estimator: Estimator, codes: NDArray[np.uint8], hardware: Hardware
-) -> NDArray[np.float64]:
-    """Estimate the azimuth of each image: `network_outputs`, then `decode`."""
-    return decode(estimator, network_outputs(estimator, codes, hardware))
-
-
 FoldEstimates = dict[str, tuple[Estimates, Posteriors | None]]
 """Estimates by role, ``calibration`` and ``test``; posteriors only where outputs are logits."""
 

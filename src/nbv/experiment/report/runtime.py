@@ -103,13 +103,6 @@ def summarise_jobs(jobs: pd.DataFrame) -> pd.DataFrame:
     return summary.astype({"side_by_side": "Int64"})
 
 
-def load_measured(path: Path) -> dict[str, tuple[int, float]]:
-    """Read jobs and wall-clock seconds by rule from the ``runtime.csv`` of a run."""
-    with readable(path):
-        table = pd.read_csv(path).set_index("rule")
-    return {str(rule): (int(row.jobs), float(row.wall_s)) for rule, row in table.iterrows()}
-
-
 def runtime_table(jobs: pd.DataFrame) -> Table:
     """Return the table of the jobs of `load_jobs` by rule."""
     runtime = summarise_jobs(jobs)
