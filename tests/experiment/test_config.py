@@ -23,7 +23,7 @@ from nbv.experiment.config import (
     snakemake_overrides,
 )
 from nbv.experiment.config.schema import NAME_RULE, Dataset
-from nbv.experiment.estimation import hardware, networks
+from nbv.experiment.estimation import networks
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "config"
@@ -60,8 +60,8 @@ def test_the_default_is_the_paper():
         ("camera.framing", FRAMINGS),
         ("density.pose_likelihood", POSE_LIKELIHOODS),
         ("density.spread", SPREADS),
-        ("estimator.device", hardware.DEVICES),
-        ("estimator.precision", hardware.PRECISIONS),
+        ("estimator.device", ("auto", "cpu", "cuda", "mps")),
+        ("estimator.precision", ("auto", "bfloat16", "float32")),
     ],
 )
 def test_names_are_those_that_the_code_knows(key, names):

@@ -95,12 +95,12 @@ def idea(inputs: FigureInputs) -> Figure:
     best = round(int(lookup.recommended_delta_deg[first]) / step)
     worst = int(np.argmax(lookup.cost[first]))
     given = viewpoint if lookup.pose_likelihood == "given_estimate" else estimates
-    one = method_style("single", ()).color
-    two = inputs.style(inputs.settings.subject).color
+    one_view_color = method_style("single", ()).color
+    two_view_color = inputs.style(inputs.settings.subject).color
     curves: list[list[tuple[Likelihood, str, str, str]]] = [
-        [(viewpoint[first], "p(φ | e)", one, "solid")],
+        [(viewpoint[first], "p(φ | e)", one_view_color, "solid")],
         [
-            (two_view_poses(viewpoint, given, best)[first], "recommended", two, "solid"),
+            (two_view_poses(viewpoint, given, best)[first], "recommended", two_view_color, "solid"),
             (two_view_poses(viewpoint, given, worst)[first], "worst", MUTED, "dashed"),
         ],
     ]
@@ -112,7 +112,7 @@ def idea(inputs: FigureInputs) -> Figure:
         delta = round(float(seen["delta_deg"]) / step)
         second = int(nearest_bin(float(seen["next_estimate_deg"]), n_bins))
         belief = two_view_belief(lookup, first, second, delta)
-        curves.append([(belief, "p(θ | e₁, e₂, δ)", two, "solid")])
+        curves.append([(belief, "p(θ | e₁, e₂, δ)", two_view_color, "solid")])
         titles.append(f"After the second view at δ = {delta * step:.0f}°")
     figure = new_figure(7.6, 2.1 * len(curves) + 0.4)
     grid = figure.add_gridspec(len(curves), 2, width_ratios=(1, 2.9))
@@ -154,10 +154,10 @@ def two_view_belief(lookup: LookupTable, first: int, second: int, delta: int) ->
     delta : int
         Bins from the first view to the second.
     """
-    one, estimates = lookup.viewpoint_likelihood[first], lookup.estimate_likelihood
-    belief = one * np.roll(estimates[:, second], -delta)
+    first_belief, estimates = lookup.viewpoint_likelihood[first], lookup.estimate_likelihood
+    belief = first_belief * np.roll(estimates[:, second], -delta)
     # Two estimates that exclude each other carry no information.
-    belief = belief if belief.any() else np.ones_like(one)
+    belief = belief if belief.any() else np.ones_like(first_belief)
     return np.asarray(belief / belief.sum())
 
 

@@ -129,8 +129,8 @@ def animation_frames(inputs: FigureInputs) -> Iterator[tuple[Figure, int]]:
     top = _top([scene.one_view, *(scene.two_views(int(delta)) for delta in turned)])
     estimate = round(scene.shown.estimate_deg) % 360
     delta = round(scene.best * scene.step_deg)
-    one = f"1  One view, estimate {estimate}°: many poses fit it"
-    yield _frame(scene, one, 0, None, top), _READ_MS
+    start = f"1  One view, estimate {estimate}°: many poses fit it"
+    yield _frame(scene, start, 0, None, top), _READ_MS
     look = f"2  The lookup table's row for {estimate}°: what does a turn cost?"
     for delta_bin in looked:
         yield _frame(scene, look, 0, int(delta_bin), top), _STEP_MS
@@ -139,8 +139,8 @@ def animation_frames(inputs: FigureInputs) -> Iterator[tuple[Figure, int]]:
     turning = "3  The camera turns, the shorter way"
     for delta_bin in turned[1:-1]:
         yield _frame(scene, turning, int(delta_bin), scene.best, top), _STEP_MS
-    two = f"3  Two views, δ = {delta}°: few poses fit both"
-    yield _frame(scene, two, best, scene.best, top), 2 * _READ_MS
+    end = f"3  Two views, δ = {delta}°: few poses fit both"
+    yield _frame(scene, end, best, scene.best, top), 2 * _READ_MS
 
 
 @mpl.rc_context(RC)
