@@ -3,16 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from studies.curves import (
+from studies.curve_tables import (
     more_views_figure,
-    more_views_rows,
     more_views_table,
-    pooled_travel,
     travel_curves,
     travel_figure,
-    travel_rows,
     travel_table,
 )
+from studies.curves import more_views_rows, pooled_travel, travel_rows
 from studies.extensions import choices_frame, stored_evidence
 
 from nbv.core.angles import circular_distance_deg
