@@ -1,1 +1,1 @@
-"""Studies beyond the paper; README.md says which question each one answers."""
+"""Studies beyond the paper; README.md lists their questions."""

@@ -1,4 +1,4 @@
-"""What all trainings together say: means of methods, and differences between them."""
+"""Means of methods, and differences between methods, over all trainings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.experiment.statistics.object_means import MEAN_COLUMNS, object_means
+from nbv.experiment.statistics.paired import MEAN_COLUMNS, object_means
 from studies.factorial import MORE_VIEWS, SINGLE, Factorial
 from studies.trainings import (
     Mean,
@@ -20,15 +20,15 @@ from studies.trainings import (
 )
 
 ALL = "all"
-"""In place of a category: the objects of all categories."""
+"""Stands for all categories together."""
 
-PLACE = ("dataset", "category")
+GROUP = ("dataset", "category")
 TRAINING = ("shuffle", "replicate")
 METHOD = ("choice", "fusion", "n_views")
-OBJECTS_COLUMNS = (*PLACE, *TRAINING, "fold", *METHOD, "object_id", *MEAN_COLUMNS)
+OBJECTS_COLUMNS = (*GROUP, *TRAINING, "fold", *METHOD, "object_id", *MEAN_COLUMNS)
 
 METHODS_COLUMNS = (
-    *PLACE,
+    *GROUP,
     *METHOD,
     "mae_deg",
     "low",
@@ -40,7 +40,7 @@ METHODS_COLUMNS = (
     "n_trainings",
 )
 CONTRASTS_COLUMNS = (
-    *PLACE,
+    *GROUP,
     "contrast",
     "fusion",
     "question",
@@ -53,10 +53,10 @@ CONTRASTS_COLUMNS = (
 )
 
 BELIEF_COLUMNS = ("log_likelihood", "inside_50_percent", "inside_90_percent")
-"""How well beliefs know the pose; see `nbv.core.simulation.follow`."""
+"""The quality of beliefs; see `nbv.core.simulation.follow`."""
 
 BELIEFS_COLUMNS = (
-    *PLACE,
+    *GROUP,
     *METHOD,
     "log_likelihood",
     "low",
@@ -66,7 +66,7 @@ BELIEFS_COLUMNS = (
     "n_trainings",
 )
 TRAININGS_COLUMNS = (
-    *PLACE,
+    *GROUP,
     "contrast",
     "fusion",
     *TRAINING,
@@ -88,7 +88,7 @@ class Contrast:
     method, other : (str, str, int)
         Choice of views, fusion, number of views.
     question : int
-        Of docs/protocol.md, which this contrast answers; 0: none.
+        The question of docs/protocol.md that this contrast answers; 0 for none.
     """
 
     method: Method
@@ -97,29 +97,29 @@ class Contrast:
 
     @property
     def name(self) -> str:
-        """Such as ``expected_error - fixed``; views and another fusion are named where they are."""
+        """Such as ``expected_error - fixed``, with more than two views and a differing fusion."""
         views = f", {self.method[2]} views" if self.method[2] != 2 else ""
         fusion = f" ({self.other[1]})" if self.other[1] != self.method[1] else ""
         return f"{self.method[0]} - {self.other[0]}{fusion}{views}"
 
 
 def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
-    """Return the contrasts of docs/protocol.md that some methods allow."""
-    found = []
-    # A classifier's own question is the product; the paper's method is that of a regressor.
+    """Return the contrasts of docs/protocol.md between the given methods."""
+    contrasts = []
+    # Questions about a classifier are answered by the product, those of a regressor by averages.
     has_product = any(fusion == "product" for _, fusion, _ in methods)
     for fusion in dict.fromkeys(fusion for _, fusion, _ in methods):
         adaptive, paper = (("expected_error", fusion, 2), ("given_estimate", fusion, 2))
         opposite = ("opposite", fusion, 2)
         best_fixed = ("fixed", fusion, 2)
         answers = has_product == (fusion == "product")
-        found.append(Contrast(adaptive, best_fixed, question=1 if answers else 0))
-        found += [Contrast(adaptive, (other, fusion, 2)) for other in ("opposite", "random")]
+        contrasts.append(Contrast(adaptive, best_fixed, question=1 if answers else 0))
+        contrasts += [Contrast(adaptive, (other, fusion, 2)) for other in ("opposite", "random")]
         answers = fusion == "average" and not has_product
-        found.append(Contrast(paper, opposite, question=2 if answers else 0))
-        found.append(Contrast(paper, ("fixed", fusion, 2)))
+        contrasts.append(Contrast(paper, opposite, question=2 if answers else 0))
+        contrasts.append(Contrast(paper, ("fixed", fusion, 2)))
     paper = ("given_estimate", "average", 2)
-    found += [
+    contrasts += [
         Contrast(paper, ("none", "none", 1)),
         Contrast(("as_printed", "average", 2), paper, question=0 if has_product else 3),
         Contrast(("expected_error", "product", 2), paper, question=4),
@@ -132,13 +132,13 @@ def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
         ):
             even = ("evenly_spaced", fusion, n_views)
             question = 5 if choice == "expected_error" else 0
-            found.append(Contrast((choice, fusion, n_views), even, question))
+            contrasts.append(Contrast((choice, fusion, n_views), even, question))
     known = set(methods)
-    return [one for one in found if {one.method, one.other} <= known]
+    return [contrast for contrast in contrasts if {contrast.method, contrast.other} <= known]
 
 
 def factorial_objects(made: Factorial, more_views: pd.DataFrame) -> pd.DataFrame:
-    """Return the figures of every test object of one fold under every method.
+    """Return the mean errors of every test object of one fold under every method.
 
     Columns `METHOD`, ``object_id`` and `MEAN_COLUMNS`: means over first views.
     """
@@ -155,7 +155,7 @@ def factorial_objects(made: Factorial, more_views: pd.DataFrame) -> pd.DataFrame
 
 
 def factorial_beliefs(more_views: pd.DataFrame) -> pd.DataFrame:
-    """Return how well the beliefs of one fold know each test object's pose, after 1 view and more.
+    """Return the quality of beliefs for every test object of one fold, after one view and more.
 
     Columns `METHOD`, ``object_id`` and `BELIEF_COLUMNS`: means over first views. After one view
     the choice is ``none``.
@@ -168,7 +168,7 @@ def factorial_beliefs(more_views: pd.DataFrame) -> pd.DataFrame:
 
 
 def _named(more_views: pd.DataFrame) -> pd.DataFrame:
-    """Return rows of more views with their choice and fusion; those that are compared."""
+    """Return the rows of the compared policies, with their choice and fusion."""
     rows = more_views[more_views["method"].isin(MORE_VIEWS)]
     return rows.assign(
         choice=lambda frame: frame["method"].map(lambda name: MORE_VIEWS[name][0]),
@@ -177,9 +177,9 @@ def _named(more_views: pd.DataFrame) -> pd.DataFrame:
 
 
 def belief_means(beliefs: pd.DataFrame) -> pd.DataFrame:
-    """Return how well beliefs know the pose over objects and trainings, columns `BELIEFS_COLUMNS`.
+    """Return the mean quality of beliefs over objects and trainings, columns `BELIEFS_COLUMNS`.
 
-    Parameters and errors as of `method_means`, with `BELIEF_COLUMNS` in place of `MEAN_COLUMNS`.
+    Same parameters and errors as `method_means`, with `BELIEF_COLUMNS` instead of `MEAN_COLUMNS`.
     """
     return _means(beliefs, BELIEF_COLUMNS, BELIEFS_COLUMNS)
 
@@ -190,7 +190,7 @@ def method_means(objects: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     objects : DataFrame
-        Columns `OBJECTS_COLUMNS`: one row for each object under each training and method.
+        Columns `OBJECTS_COLUMNS`: one row per object, training and method.
 
     Raises
     ------
@@ -201,41 +201,45 @@ def method_means(objects: pd.DataFrame) -> pd.DataFrame:
 
 
 def _means(objects: pd.DataFrame, names: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:
-    """Return the means of all figures named, with an interval of the first one."""
+    """Return the means of the named columns, with an interval for the first one."""
     rows = []
-    for place, tables in _tables(objects, names):
-        for method, of_figures in tables.items():
-            first, *others = (crossed_mean(*of_figures[name]) for name in names)
+    for group, tables in _tables(objects, names):
+        for method, tables_by_name in tables.items():
+            first, *others = (crossed_mean(*tables_by_name[name]) for name in names)
             interval = first.interval()
             means = (first.value, interval.low, interval.high, *(other.value for other in others))
-            rows.append((*place, *method, *means, first.n_objects, first.n_trainings))
+            rows.append((*group, *method, *means, first.n_objects, first.n_trainings))
     return pd.DataFrame(rows, columns=list(columns))
 
 
 def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
     """Return differences of MAE between methods, columns `CONTRASTS_COLUMNS`.
 
-    Paired by object and training. Parameters and errors as of `method_means`. Primary contrasts
-    over all categories keep their p-values. Those of all others are adjusted by Holm's method
-    within a data set and category.
+    Paired by object and training. Same parameters and errors as `method_means`. Primary contrasts
+    over all categories keep their p-values. All others are adjusted by Holm's method within a data
+    set and category.
     """
     rows = []
-    for place, tables in _tables(objects):
-        found: dict[Contrast, Mean] = {}
+    for group, tables in _tables(objects):
+        means: dict[Contrast, Mean] = {}
         for contrast in contrasts_of(list(tables)):
-            mine, other = (tables[one]["error_deg"] for one in (contrast.method, contrast.other))
-            found[contrast] = crossed_mean(*(a - b for a, b in zip(mine, other, strict=True)))
-        over_all = place[1] == ALL
+            mine, other = (
+                tables[method]["error_deg"] for method in (contrast.method, contrast.other)
+            )
+            means[contrast] = crossed_mean(*(a - b for a, b in zip(mine, other, strict=True)))
+        over_all = group[1] == ALL
         secondary = {
-            one.name + one.method[1]: one for one in found if not (one.question and over_all)
+            contrast.name + contrast.method[1]: contrast
+            for contrast in means
+            if not (contrast.question and over_all)
         }
-        adjusted = holm({name: found[one].p_value for name, one in secondary.items()})
-        for contrast, mean in found.items():
+        adjusted = holm({name: means[contrast].p_value for name, contrast in secondary.items()})
+        for contrast, mean in means.items():
             interval = mean.interval()
             p_value = adjusted.get(contrast.name + contrast.method[1], mean.p_value)
             rows.append(
                 (
-                    *place,
+                    *group,
                     contrast.name,
                     contrast.method[1],
                     contrast.question,
@@ -247,11 +251,11 @@ def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
 
 
 def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
-    """Return what each training alone shows, columns `TRAININGS_COLUMNS`.
+    """Return the contrasts of single trainings, columns `TRAININGS_COLUMNS`.
 
-    ``low`` and ``high`` are what the other trainings predict for it
-    (`studies.trainings.predicted_by_others`). Parameters and errors as of `method_means`.
-    Places without three trainings have no rows.
+    ``low`` and ``high`` are the prediction of the other trainings
+    (`studies.trainings.predicted_by_others`). Same parameters and errors as `method_means`.
+    Categories with fewer than three trainings have no rows.
     """
     rows = []
     for (dataset, category), tables in _tables(objects):
@@ -259,33 +263,35 @@ def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
         own = own if category == ALL else own[own["category"] == category]
         trainings = [key for key, _ in own.groupby(list(TRAINING))]
         for contrast in contrasts_of(list(tables)):
-            mine, other = (tables[one]["error_deg"] for one in (contrast.method, contrast.other))
+            mine, other = (
+                tables[method]["error_deg"] for method in (contrast.method, contrast.other)
+            )
             shown = predicted_by_others([a - b for a, b in zip(mine, other, strict=True)])
             names = (dataset, category, contrast.name, contrast.method[1])
             rows += [
-                (*names, *training, one.value, one.low, one.high)
-                for training, one in zip(trainings, shown, strict=bool(shown))
+                (*names, *training, own_mean.value, own_mean.low, own_mean.high)
+                for training, own_mean in zip(trainings, shown, strict=bool(shown))
             ]
     return pd.DataFrame(rows, columns=list(TRAININGS_COLUMNS))
 
 
 Figures = Mapping[str, Sequence[NDArray[np.float64]]]
-"""By figure of merit, a table (n_trainings, n_objects) of each category."""
+"""By metric: tables (n_trainings, n_objects), one per category."""
 
 
 def _tables(
     objects: pd.DataFrame, names: Sequence[str] = ("error_deg",)
 ) -> Iterator[tuple[tuple[str, str], dict[Method, Figures]]]:
-    """Yield the tables of each data set and category, then of its categories together.
+    """Yield the tables of a data set by category, then of its categories together.
 
-    Categories are together only where all have the same trainings.
+    Categories are joined only if all have the same trainings.
     """
     for dataset, rows in objects.groupby("dataset", sort=False):
-        of_categories = {
-            str(category): _of_category(part, f"{dataset}, {category}", names)
+        by_category = {
+            str(category): _category_tables(part, f"{dataset}, {category}", names)
             for category, part in rows.groupby("category", sort=False)
         }
-        for category, tables in of_categories.items():
+        for category, tables in by_category.items():
             yield (
                 (str(dataset), category),
                 {
@@ -297,14 +303,14 @@ def _tables(
             frozenset(zip(*(part[name] for name in TRAINING), strict=True))
             for _, part in rows.groupby("category")
         }
-        if len(of_categories) > 1 and len(trainings) == 1:
-            first, *rest = of_categories.values()
+        if len(by_category) > 1 and len(trainings) == 1:
+            first, *rest = by_category.values()
             shared = [method for method in first if all(method in other for other in rest)]
             yield (
                 (str(dataset), ALL),
                 {
                     method: {
-                        name: [tables[method][name] for tables in of_categories.values()]
+                        name: [tables[method][name] for tables in by_category.values()]
                         for name in names
                     }
                     for method in shared
@@ -312,7 +318,7 @@ def _tables(
             )
 
 
-def _of_category(
+def _category_tables(
     rows: pd.DataFrame, where: str, names: Sequence[str]
 ) -> dict[Method, dict[str, NDArray[np.float64]]]:
     tables: dict[Method, dict[str, NDArray[np.float64]]] = {}

@@ -1,4 +1,4 @@
-"""Tables over all trainings: means of methods, and contrasts between them."""
+"""Tables and plots of the means of methods and their contrasts over all trainings."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ _DIFFERENCE = "Difference of MAE (degrees), below 0 is better"
 _ROW_IN = 0.15
 _PANEL_IN = 0.75
 _BETTER, _UNDECIDED, _WORSE = "better", "undecided", "worse"
-# Colour and marker: told apart in grey and by those who see no colours.
+# Colour and marker, so that verdicts are distinct in grey and for colour-blind readers.
 _VERDICTS = {_BETTER: (FOR, "o"), _UNDECIDED: (OPEN, "s"), _WORSE: (AGAINST, "X")}
 
 
 def methods_table(means: pd.DataFrame) -> Table:
     """Return the means of `studies.confirmation.method_means` as a table.
 
-    A row for each choice and number of views, a column for each fusion.
+    One row per choice and number of views, one column per fusion.
     """
     fusions = [fusion for fusion in dict.fromkeys(means["fusion"]) if fusion != "none"]
     parts = []
     for (dataset, category), part in means.groupby(["dataset", "category"], sort=False):
         rows = []
-        for (n_views, choice), of_choice in part.groupby(["n_views", "choice"], sort=False):
-            by_fusion = {str(row["fusion"]): _mean(row) for _, row in of_choice.iterrows()}
+        for (n_views, choice), same_choice in part.groupby(["n_views", "choice"], sort=False):
+            by_fusion = {str(row["fusion"]): _mean(row) for _, row in same_choice.iterrows()}
             shown = [by_fusion.get(fusion, "–") for fusion in fusions]
             if "none" in by_fusion:
                 shown = [by_fusion["none"]] * len(fusions)
@@ -75,13 +75,13 @@ def beliefs_table(means: pd.DataFrame) -> Table:
 
 
 def densities_table(densities: pd.DataFrame) -> Table:
-    """Return which densities calibration objects chose, and how often, as a table.
+    """Return the table of the densities that calibration objects chose, with counts.
 
     Parameters
     ----------
     densities : DataFrame
         ``dataset, category, shuffle, replicate, fold`` and
-        `studies.factorial.DENSITY_COLUMNS`: a row for each fold of each training.
+        `studies.factorial.DENSITY_COLUMNS`: one row per training and fold.
     """
     parts = []
     for (dataset, category), part in densities.groupby(["dataset", "category"], sort=False):
@@ -117,10 +117,10 @@ def _counts(values: pd.Series, unit: str = "") -> str:
     return ", ".join(f"{value:g}{unit} ({n})" for value, n in counts.items())
 
 
-def contrasts_table(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Table:
+def contrasts_table(contrasts: pd.DataFrame, single_trainings: pd.DataFrame) -> Table:
     """Return the contrasts of `studies.confirmation.method_contrasts` as a table.
 
-    A note says how well single trainings agree (`training_contrasts` of the same module).
+    A note gives the agreement of single trainings (`studies.confirmation.training_contrasts`).
     """
     parts = []
     for (dataset, category), part in contrasts.groupby(["dataset", "category"], sort=False):
@@ -144,20 +144,20 @@ def contrasts_table(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Tabl
         _INTERVALS,
         "p: of the primary contrasts (docs/protocol.md) over all categories as they are; of all "
         "others adjusted by Holm's method within their data set and category.",
-        *_agreement(contrasts, of_trainings),
+        *_agreement(contrasts, single_trainings),
     )
     return Table(
         "contrasts", title, title, contrasts, header, tuple(parts), notes, n_text_columns=2
     )
 
 
-def _agreement(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Iterator[str]:
-    if of_trainings.empty:
+def _agreement(contrasts: pd.DataFrame, single_trainings: pd.DataFrame) -> Iterator[str]:
+    if single_trainings.empty:
         return
-    each = of_trainings["difference_deg"]
-    predicted = each.between(of_trainings["low"], of_trainings["high"])
-    place = ["dataset", "category", "contrast", "fusion"]
-    ends = of_trainings[place].merge(contrasts[[*place, "low", "high"]], on=place, how="left")
+    each = single_trainings["difference_deg"]
+    predicted = each.between(single_trainings["low"], single_trainings["high"])
+    key = ["dataset", "category", "contrast", "fusion"]
+    ends = single_trainings[key].merge(contrasts[[*key, "low", "high"]], on=key, how="left")
     overall = each.between(ends["low"], ends["high"])
     yield (
         f"Single trainings: of {len(each)} differences, {number(100 * predicted.mean(), 0)} % lie "
@@ -170,17 +170,17 @@ def _agreement(contrasts: pd.DataFrame, of_trainings: pd.DataFrame) -> Iterator[
 def answers_figure(contrasts: pd.DataFrame) -> Figure:
     """Draw the answers over all categories to the questions of docs/protocol.md.
 
-    A heading for each question and fusion, a row below it for each data set.
+    A heading per question and fusion, and below it a row per data set.
 
     Parameters
     ----------
     contrasts : DataFrame
-        Of `studies.confirmation.method_contrasts`.
+        From `studies.confirmation.method_contrasts`.
 
     Raises
     ------
     ValueError
-        Where none of them answers a question.
+        Where no contrast answers a question.
     """
     answers = _answers(contrasts)
     # A data set of one category has no rows over all.
@@ -216,18 +216,17 @@ def answers_figure(contrasts: pd.DataFrame) -> Figure:
 def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     """Draw, by category, the contrasts that answer the questions of docs/protocol.md.
 
-    A row for each contrast and fusion, in the order of the questions; a panel in it for each data
-    set.
+    A row per contrast and fusion, in the order of the questions, with a panel per data set.
 
     Parameters
     ----------
     contrasts : DataFrame
-        Of `studies.confirmation.method_contrasts`.
+        From `studies.confirmation.method_contrasts`.
 
     Raises
     ------
     ValueError
-        Where none of them answers a question.
+        Where no contrast answers a question.
     """
     answers = _answers(contrasts)
     rows = [
@@ -240,12 +239,12 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     cells = figure.subplots(
         len(rows), n_columns, squeeze=False, height_ratios=heights, sharex="row"
     )
-    for of_row, ((question, contrast, fusion), panels) in zip(cells, rows, strict=True):
-        for place, (axes, part) in enumerate(zip(of_row, panels, strict=False)):
+    for panel_row, ((question, contrast, fusion), panels) in zip(cells, rows, strict=True):
+        for i, (axes, part) in enumerate(zip(panel_row, panels, strict=False)):
             _forest(axes, part)
-            asked = "" if place else f"{question}. {_contrast(str(contrast))}, {fusion}"
+            asked = "" if i else f"{question}. {_contrast(str(contrast))}, {fusion}"
             axes.set_title(f"{asked}\n{part['dataset'].iloc[0]} (degrees)", loc="left")
-        for spare in of_row[len(panels) :]:
+        for spare in panel_row[len(panels) :]:
             spare.remove()
     for axes in cells[-1][: len(rows[-1][1])]:
         axes.set_xlabel(_DIFFERENCE)
@@ -263,24 +262,24 @@ def _answers(contrasts: pd.DataFrame) -> pd.DataFrame:
 
 
 def _verdict_key(figure: Figure, contrasts: pd.DataFrame) -> None:
-    found = {_verdict(row) for _, row in contrasts.iterrows()}
+    verdicts = {_verdict(row) for _, row in contrasts.iterrows()}
     handles = [
         Line2D([], [], color=colour, marker=marker, linestyle="none", label=verdict)
         for verdict, (colour, marker) in _VERDICTS.items()
-        if verdict in found
+        if verdict in verdicts
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
 
 
-def _draw_difference(axes: Axes, row: pd.Series, place: int) -> None:
+def _draw_difference(axes: Axes, row: pd.Series, y: int) -> None:
     colour, marker = _VERDICTS[_verdict(row)]
-    axes.plot([row["low"], row["high"]], [place, place], color=colour, linewidth=1.4)
-    axes.plot(row["difference_deg"], place, color=colour, marker=marker, markersize=5)
+    axes.plot([row["low"], row["high"]], [y, y], color=colour, linewidth=1.4)
+    axes.plot(row["difference_deg"], y, color=colour, marker=marker, markersize=5)
 
 
 def _forest(axes: Axes, contrasts: pd.DataFrame) -> None:
-    for place, (_, row) in enumerate(contrasts.iterrows()):
-        _draw_difference(axes, row, place)
+    for y, (_, row) in enumerate(contrasts.iterrows()):
+        _draw_difference(axes, row, y)
     axes.axvline(0.0, color=INK, linewidth=0.8)
     labels = [category_label(str(category)) for category in contrasts["category"]]
     axes.set_yticks(range(len(labels)), labels)

@@ -1,4 +1,4 @@
-"""Extensions on the test objects of one fold."""
+"""Evaluation of the extensions on the test objects of one fold."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from nbv.core.selection import (
     select_methods,
 )
 from nbv.experiment.results import evaluate_method
-from studies.travel import travel_rows
+from studies.curves import travel_rows
 
 CHOICE_COLUMNS = (
     "method",
@@ -36,14 +36,14 @@ CHOICE_COLUMNS = (
 
 @dataclass(frozen=True)
 class ExtensionEvaluations:
-    """What extensions make of the test objects of one fold.
+    """The results of the extensions on the test objects of one fold.
 
     Attributes
     ----------
     frames, lookups : dict
-        By extension: of `evaluate_method`, and the table of those that follow one.
+        By extension: frames of `evaluate_method`, and lookup tables of extensions that follow one.
     choices, travel : DataFrame
-        Of `choices_frame` and of `studies.travel.travel_rows`.
+        From `choices_frame` and `studies.curves.travel_rows`.
     """
 
     frames: dict[str, pd.DataFrame]
@@ -61,43 +61,43 @@ def evaluate_extensions(
     calibration_posteriors: Posteriors | None = None,
     test_posteriors: Posteriors | None = None,
 ) -> ExtensionEvaluations:
-    """Choose what each extension needs by calibration objects, and evaluate it on test objects.
+    """Select each extension's density on calibration objects, and evaluate it on test objects.
 
     Parameters
     ----------
     calibration, test : Estimates
-        Of one fold.
+        The estimates of one fold.
     extensions, settings : mapping
         See `nbv.core.selection.select_methods`.
     rng_of : callable
-        The generator of an extension, by name.
+        Returns the generator of an extension, by name.
     calibration_posteriors, test_posteriors : Posteriors, optional
-        Of the same objects, where an extension fuses distributions.
+        The distributions of the same objects, where an extension fuses them.
     """
     selected = select_methods(calibration, extensions, settings, calibration_posteriors)
     frames = {
         name: evaluate_method(
-            {"policy": one.policy, "fusion": one.fusion},
+            {"policy": method.policy, "fusion": method.fusion},
             test,
             rng_of(name),
-            one.lookup,
-            one.evidence,
-            test_posteriors if one.fusion in OF_DISTRIBUTIONS else None,
+            method.lookup,
+            method.evidence,
+            test_posteriors if method.fusion in OF_DISTRIBUTIONS else None,
         )
-        for name, one in selected.items()
+        for name, method in selected.items()
     }
     return ExtensionEvaluations(
         frames,
-        {name: one.lookup for name, one in selected.items() if one.lookup is not None},
+        {name: method.lookup for name, method in selected.items() if method.lookup is not None},
         choices_frame(selected),
         travel_rows(selected, test),
     )
 
 
 def choices_frame(selected: Mapping[str, SelectedMethod]) -> pd.DataFrame:
-    """Return what was chosen for each extension, columns `CHOICE_COLUMNS`.
+    """Return the selected density of each extension, columns `CHOICE_COLUMNS`.
 
-    The density's columns are empty for methods that go by distributions of images.
+    The density's columns are empty for methods that use distributions of images.
     """
     rows = []
     for name, method in selected.items():
@@ -110,12 +110,12 @@ def choices_frame(selected: Mapping[str, SelectedMethod]) -> pd.DataFrame:
 def stored_evidence(
     calibration: Estimates, choices: pd.DataFrame, settings: Mapping[str, Any]
 ) -> dict[str, Callable[[int], Evidence]]:
-    """Return the evidence that each policy with posterior fusion was found to need.
+    """Return the evidence of the policies with posterior fusion, from the selected densities.
 
     Parameters
     ----------
     calibration : Estimates
-        The objects that the choices were made with.
+        The objects of the selection.
     choices : DataFrame
         Columns `CHOICE_COLUMNS`.
     settings : mapping
@@ -124,8 +124,8 @@ def stored_evidence(
     Returns
     -------
     dict of str to callable
-        By policy; called with a number of bins. The same call returns the same object. Where no
-        extension chooses by ``bayes_error`` it takes the density of ``expected_error``: both are
+        By policy; called with a number of bins. The same call returns the same object. Without an
+        extension for ``bayes_error`` that policy uses the density of ``expected_error``: both are
         errors after posterior fusion.
     """
     posterior = choices[choices["fusion"] == "posterior"].drop_duplicates("policy")

@@ -29,8 +29,8 @@ from nbv.core.selection import (
     most_likely_density,
 )
 from nbv.experiment.results import evaluate_method
+from studies.curves import more_views_rows
 from studies.kept_estimates import HeldOut
-from studies.more_views import more_views_rows
 
 Pair = tuple[str, str]
 """A choice of the next view and a fusion."""

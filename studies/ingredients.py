@@ -1,4 +1,4 @@
-"""What each ingredient of the randomisation brings: bundles that were trained without it."""
+"""The effect of each ingredient of the randomisation: bundles trained without it."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from nbv.robot.evaluation import RECOMMENDED, SINGLE
 from studies.trainings import crossed_mean
 
 ALL = ""
-"""In the place of what is left out: nothing."""
+"""Stands for "nothing is left out"."""
 
 _SHOWN = ((SINGLE, 1, "one view"), (RECOMMENDED, 2, "two views"))
 
 Key = tuple[str, str]
-"""Category, and what the trainings are without."""
+"""Category and left-out ingredient."""
 Replicates = Sequence[pd.DataFrame]
-"""What `nbv.robot.evaluation.evaluate` returns of each training, of equally many for each key."""
+"""Results of `nbv.robot.evaluation.evaluate` by training; every key has equally many."""
 
 
 def ingredient_table(rendered: Mapping[Key, Replicates], real: Mapping[Key, Replicates]) -> Table:
-    """Return the errors of bundles that lack an ingredient, less those of the ones with all.
+    """Return the errors of bundles without an ingredient, less those of bundles with all.
 
     Parameters
     ----------
     rendered : mapping of (str, str) to sequence of DataFrame
-        By category and what is left out, `ALL` first: on test objects, with all that is random.
+        By category and left-out ingredient, `ALL` first: results on randomised test objects.
     real : mapping
-        The same on recordings of a real camera, or empty.
+        Results on recordings of a real camera, or empty.
     """
     cells, rows = [], []
     for category, without in rendered:
@@ -40,26 +40,26 @@ def ingredient_table(rendered: Mapping[Key, Replicates], real: Mapping[Key, Repl
         row = [Cell(f"{category_label(category)}, {named}")]
         made: dict[str, float | str] = {"category": category, "without": without or "nothing"}
         for choice, n_views, label in _SHOWN:
-            errors = _of_objects(rendered[category, without], choice, n_views)
+            errors = _object_errors(rendered[category, without], choice, n_views)
             key = label.replace(" ", "_")
             if without == ALL:
                 value = float(errors.mean())
                 made |= {key: value, f"{key}_low": np.nan, f"{key}_high": np.nan}
                 row.append(Cell(f"{number(value)}°"))
             else:
-                with_all = _of_objects(rendered[category, ALL], choice, n_views)
-                found = crossed_mean(errors - with_all).interval()
-                made |= found.columns(key)
-                row.append(difference_cell(found.value, found.low, found.high))
+                with_all = _object_errors(rendered[category, ALL], choice, n_views)
+                difference = crossed_mean(errors - with_all).interval()
+                made |= difference.columns(key)
+                row.append(difference_cell(difference.value, difference.low, difference.high))
         for choice, n_views, label in _SHOWN if real else ():
-            of_training = _of_objects(real[category, without], choice, n_views).mean(axis=1)
+            by_training = _object_errors(real[category, without], choice, n_views).mean(axis=1)
             key = f"{label.replace(' ', '_')}_real"
             made |= {
-                key: float(of_training.mean()),
-                f"{key}_least": float(of_training.min()),
-                f"{key}_greatest": float(of_training.max()),
+                key: float(by_training.mean()),
+                f"{key}_least": float(by_training.min()),
+                f"{key}_greatest": float(by_training.max()),
             }
-            row.append(Cell(_spread(of_training)))
+            row.append(Cell(_spread(by_training)))
         cells.append(made)
         rows.append(tuple(row))
     n_trainings = len(next(iter(rendered.values())))
@@ -96,17 +96,17 @@ def _titles(what: str) -> Iterator[str]:
     return (f"{label}, {what}" for _, _, label in _SHOWN)
 
 
-def _spread(of_training: NDArray[np.float64]) -> str:
-    mean = f"{number(of_training.mean())}°"
-    if len(of_training) == 1:
+def _spread(by_training: NDArray[np.float64]) -> str:
+    mean = f"{number(by_training.mean())}°"
+    if len(by_training) == 1:
         return mean
-    return f"{mean} ({number(of_training.min())} to {number(of_training.max())})"
+    return f"{mean} ({number(by_training.min())} to {number(by_training.max())})"
 
 
-def _of_objects(trainings: Replicates, choice: str, n_views: int) -> NDArray[np.float64]:
-    """Return the mean error of each object over its recordings, (n_trainings, n_objects)."""
-    of_training = []
-    for found in trainings:
-        rows = found[(found["choice"] == choice) & (found["n_views"] == n_views)]
-        of_training.append(rows.groupby("object_id")["mae_deg"].mean())
-    return pd.concat(of_training, axis=1).to_numpy(dtype=np.float64).T
+def _object_errors(trainings: Replicates, choice: str, n_views: int) -> NDArray[np.float64]:
+    """Return mean errors over the recordings of an object, (n_trainings, n_objects)."""
+    means = []
+    for rows in trainings:
+        chosen = rows[(rows["choice"] == choice) & (rows["n_views"] == n_views)]
+        means.append(chosen.groupby("object_id")["mae_deg"].mean())
+    return pd.concat(means, axis=1).to_numpy(dtype=np.float64).T

@@ -1,8 +1,8 @@
-"""Held-out estimates of many trainings in one compact file, enough to redo the statistics.
+"""Held-out estimates of many trainings in one compact file, sufficient for the statistics.
 
-Estimates are kept as hundredths of a degree from the truth. Distributions are kept for every view
-that is a class apart, in the frame of the truth, as whole tenths of -log p. What is
-read from estimates or from such a file is the same, so both give the same tables.
+Estimates are stored as errors in hundredths of a degree. Distributions are stored for views one
+class apart, relative to the true azimuth, as whole tenths of -log p. Estimates are rounded in the
+same way when they are read from a run, so both sources give the same tables.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ KeptKey = tuple[int, int, str, int, int, str]
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What an estimator says of objects that it was not trained on, as precisely as it is kept.
+    """The estimates of an estimator for held-out objects, at the precision of the file.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class HeldOut:
         Estimate less truth, hundredths of a degree; view k of n_views has the azimuth
         360 k / n_views.
     surprisal : ndarray (n, B, B) uint8, optional
-        −10 log p(azimuth | image), by view and by distance from the truth in classes.
+        −10 log p(azimuth | image), by view and by offset from the true azimuth in classes.
     """
 
     object_ids: tuple[str, ...]
@@ -58,7 +58,7 @@ class HeldOut:
 
     @property
     def posteriors(self) -> Posteriors | None:
-        """The distributions of views one class apart, or None where there are none."""
+        """The distributions of views one class apart, or None without distributions."""
         if self.surprisal is None:
             return None
         p = np.exp(-0.1 * self.surprisal)
@@ -67,19 +67,19 @@ class HeldOut:
 
     @property
     def estimates_of_posteriors(self) -> Estimates:
-        """The estimates of the views that `posteriors` has."""
+        """The estimates of the views in `posteriors`."""
         n_views = self.residual.shape[1]
         step = 1 if self.surprisal is None else n_views // self.surprisal.shape[1]
         return Estimates(self.object_ids, self.estimates.estimate_deg[:, ::step])
 
 
 def held_out(estimates: Estimates, posteriors: Posteriors | None = None) -> HeldOut:
-    """Return estimates, and the distributions of the same images, as precisely as they are kept.
+    """Round estimates, and distributions of the same images, to the precision of the file.
 
-    The number of views has to be a multiple of the number of classes.
+    The number of views must be a multiple of the number of classes.
     """
     away = signed_difference_deg(estimates.estimate_deg, estimates.azimuth_deg)
-    # Half a turn is kept as -18000 whether it was reached one way or the other.
+    # Half a turn is stored as -18000 in either direction.
     residual = (np.rint(away * 100.0) + 18000) % 36000 - 18000
     surprisal = None
     if posteriors is not None:
@@ -91,39 +91,39 @@ def held_out(estimates: Estimates, posteriors: Posteriors | None = None) -> Held
 
 
 def read_held_out(estimates: str | Path, posteriors: str | Path | None = None) -> HeldOut:
-    """Read a fold's estimates, and its distributions where there are any.
+    """Read the estimates of a fold, and its distributions if `posteriors` is given.
 
-    Errors as of `nbv.experiment.estimates.read_estimates` and
+    Same errors as `nbv.experiment.estimates.read_estimates` and
     `nbv.experiment.estimates.read_posteriors`.
     """
-    found = read_estimates(estimates)
-    return held_out(found, read_posteriors(posteriors, found.object_ids) if posteriors else None)
+    read = read_estimates(estimates)
+    return held_out(read, read_posteriors(posteriors, read.object_ids) if posteriors else None)
 
 
 def keep_estimates(
     path: str | Path, held: Mapping[KeptKey, HeldOut], settings: Mapping[str, Any]
 ) -> None:
-    """Write everything that the statistics need; `settings` are the run's configuration."""
+    """Write estimates with the run's configuration, `settings`."""
     arrays: dict[str, NDArray[Any]] = {
         "format": np.asarray(FORMAT),
         _SETTINGS: np.asarray(json.dumps(settings, sort_keys=True)),
     }
-    for key, one in held.items():
+    for key, estimates in held.items():
         name = _name(key)
-        arrays[f"{name}/objects"] = np.asarray(one.object_ids, dtype=np.str_)
-        arrays[f"{name}/residual"] = one.residual
-        if one.surprisal is not None:
-            arrays[f"{name}/surprisal"] = one.surprisal
+        arrays[f"{name}/objects"] = np.asarray(estimates.object_ids, dtype=np.str_)
+        arrays[f"{name}/residual"] = estimates.residual
+        if estimates.surprisal is not None:
+            arrays[f"{name}/surprisal"] = estimates.surprisal
     write_arrays(path, arrays)
 
 
 def kept_settings(path: str | Path) -> tuple[dict[str, Any], list[KeptKey]]:
-    """Return the configuration that a file was kept with, and the keys of what it holds.
+    """Return the configuration in a file, and the keys of its estimates.
 
     Raises
     ------
     UserError
-        Where it is no such file, or of another format.
+        Where the file does not hold kept estimates of this format.
     """
     with readable(path), np.load(path, allow_pickle=False) as stored:
         if "format" not in stored.files or int(stored["format"]) != FORMAT:
@@ -135,38 +135,38 @@ def kept_settings(path: str | Path) -> tuple[dict[str, Any], list[KeptKey]]:
 
 
 def read_kept(path: str | Path, keys: Iterable[KeptKey] | None = None) -> dict[KeptKey, HeldOut]:
-    """Read what `keep_estimates` wrote, all of it or some keys.
+    """Read a file of `keep_estimates`, by default all keys.
 
     Raises
     ------
     UserError
-        As of `kept_settings`, and where there is no such key.
+        As `kept_settings` raises, and for an unknown key.
     """
     _, held = kept_settings(path)
     wanted = held if keys is None else list(keys)
     for key in wanted:
         if key not in held:
             raise UserError(f"{path}: holds no estimates of {_name(key)}; keep them again")
-    found = {}
+    kept = {}
     with readable(path), np.load(path, allow_pickle=False) as stored:
         for key in wanted:
             name = _name(key)
             surprisal = f"{name}/surprisal"
-            found[key] = HeldOut(
-                tuple(str(one) for one in stored[f"{name}/objects"]),
+            kept[key] = HeldOut(
+                tuple(str(object_id) for object_id in stored[f"{name}/objects"]),
                 stored[f"{name}/residual"],
                 stored[surprisal] if surprisal in stored.files else None,
             )
-    return found
+    return kept
 
 
 def join_kept(path: str | Path, parts: Iterable[str | Path]) -> None:
-    """Write what several files of the same settings keep as one file.
+    """Join several files with the same settings into one.
 
     Raises
     ------
     UserError
-        As of `kept_settings`, and where two files were kept with other settings.
+        As `kept_settings` raises, and where the settings of two files differ.
     """
     held: dict[KeptKey, HeldOut] = {}
     first: dict[str, Any] | None = None

@@ -1,8 +1,8 @@
-"""All methods on all data sets.
+"""The leaderboard: all methods on all data sets.
 
 Methods are compared within a block: the objects' errors of one run and category. The
-configuration's methods and extensions come as one mapping of a name to its ``policy`` and its
-``fusion``, which is the average where it is not given. Names say nothing.
+configuration's methods and extensions come as one mapping of a name to its ``policy`` and
+``fusion``, by default the average.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from scipy import stats
 
 from nbv.experiment.report.table import Cell, Table
 from nbv.experiment.statistics.metrics import Floats
-from nbv.experiment.statistics.object_means import (
+from nbv.experiment.statistics.paired import (
+    PairedErrors,
+    Resampler,
     indistinct_from_best,
     mae_difference,
     mae_interval,
     paired_objects,
 )
-from nbv.experiment.statistics.paired import PairedErrors, Resampler
 from nbv.labels import category_label, number
 
 Block = tuple[str, str]
@@ -54,10 +55,10 @@ _COLUMNS = (
 def blocks_of(
     runs: Mapping[str, pd.DataFrame], elevation_deg: int = 0
 ) -> dict[Block, PairedErrors]:
-    """Return the objects' errors of each run and category at its reference elevation.
+    """Return the objects' errors by run and category at the reference elevation.
 
-    Where a category was not run at it, its lowest one is taken. ``runs`` has by a run's name what
-    `nbv.experiment.statistics.object_means.load_folds` read of ``objects.csv``.
+    A category that was not run there is taken at its lowest elevation. ``runs`` maps the name of a
+    run to its ``objects.csv`` files, read by `nbv.experiment.statistics.paired.load_folds`.
     """
     blocks = {}
     for run, means in runs.items():
@@ -72,8 +73,8 @@ def blocks_of(
 def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) -> Table:
     """Return the MAE of every method in every block, with mean ranks and a rank test.
 
-    Bold is the lowest of a column. An asterisk marks what is above it with the whole interval of
-    the difference. Oracles are bounds and are not ranked.
+    The lowest of a column is bold. An asterisk marks values whose interval of the difference to it
+    lies above 0. Oracles are bounds and are not ranked.
     """
     shown = _shared_methods(blocks, methods)
     ranked = [method for method in shown if methods[method]["policy"] != _ORACLE]
@@ -85,8 +86,8 @@ def leaderboard_table(blocks: Blocks, methods: Methods, resampler: Resampler) ->
             made = _block_cell(block, method, sample, resampler) | {"among_best": method in best}
             versus = opposite if method != opposite else _SUBJECT
             if versus in shown:
-                found = mae_difference(sample, method, versus, resampler)
-                made |= {"versus": versus, **found.columns("difference")}
+                difference = mae_difference(sample, method, versus, resampler)
+                made |= {"versus": versus, **difference.columns("difference")}
             cells.append(made)
             above = method in ranked and method not in best
             lowest = method == best[0]
@@ -131,7 +132,7 @@ def _rank_notes(methods: Methods, mae: Mapping[str, Floats], ranks: Floats) -> I
 def _shared_methods(blocks: Blocks, methods: Methods) -> list[str]:
     """Return the methods of the configuration that every block has.
 
-    Of several with the same policy and fusion, only the first is ranked: they are one method.
+    Of several methods with the same policy and fusion, only the first is ranked.
     """
     first = next(iter(blocks.values()))
     everywhere = [m for m in first.errors_deg if all(m in s.errors_deg for s in blocks.values())]

@@ -1,8 +1,8 @@
-"""Several runs side by side: the errors of one view and of each method.
+"""Several runs side by side: the errors of one view and of all methods.
 
-Columns of the tidy table are `cells.CELL_COLUMNS`: ``method`` is the run, ``row`` is
-``<place> <method> <role>`` with a place such as ``mug/el00``, ``mug`` (all its elevations) or
-``all`` (all categories), and ``difference*`` compares with the first run.
+The columns of the tidy table are `CELL_COLUMNS`: ``method`` is the run, ``row`` is ``<scope>
+<method> <role>`` with a scope such as ``mug/el00``, ``mug`` (all its elevations) or ``all`` (all
+categories), and ``difference*`` compares with the first run.
 """
 
 from __future__ import annotations
@@ -51,15 +51,15 @@ def runs_table(estimates: RunErrors, evaluations: RunErrors, settings: ReportSet
         Errors of one view from `nbv.experiment.results.load_estimate_errors`. All runs have the
         same units and roles.
     evaluations : mapping of str to mapping of (category, elevation_deg) to DataFrame
-        Errors of two views from `nbv.experiment.results.load_evaluations`. A run may lack methods
-        that another one has.
+        Errors of two views from `nbv.experiment.results.load_evaluations`. Runs may have different
+        methods.
     settings : ReportSettings
         The reference elevation and the resamples.
 
     Raises
     ------
     UserError
-        Where runs have errors of different images.
+        Where runs have errors on different images.
     """
     runs = list(estimates)
     units = list(estimates[runs[0]])
@@ -67,11 +67,11 @@ def runs_table(estimates: RunErrors, evaluations: RunErrors, settings: ReportSet
     resampler = shared_resampler(settings)
     lines = _lines(estimates, evaluations)
     cells = []
-    for place, place_label, categories in _places(units, common_elevation_deg(units, settings)):
+    for scope, scope_label, categories in _scopes(units, common_elevation_deg(units, settings)):
         for (method, role), errors in lines.items():
             sample = pool([_paired(errors, *category) for category in categories.items()])
-            row = f"{place} {method} {role}"
-            label = f"{place_label}: {method_label(method)}, {role} objects"
+            row = f"{scope} {method} {role}"
+            label = f"{scope_label}: {method_label(method)}, {role} objects"
             cells += method_cells(_NAME, row, label, "mae", sample, resampler, shown)
     frame = pd.DataFrame(cells, columns=list(CELL_COLUMNS))
     by_label = frame.groupby("row_label", sort=False)
@@ -84,23 +84,23 @@ def runs_table(estimates: RunErrors, evaluations: RunErrors, settings: ReportSet
 def _lines(
     estimates: RunErrors, evaluations: RunErrors
 ) -> dict[tuple[str, str], dict[tuple[str, Unit], pd.DataFrame]]:
-    """Return by method and role the errors of each run and unit."""
+    """Return the errors by method and role, then by run and unit."""
     lines: dict[tuple[str, str], dict[tuple[str, Unit], pd.DataFrame]] = {}
-    for run, of_units in estimates.items():
-        for unit, errors in of_units.items():
+    for run, by_unit in estimates.items():
+        for unit, errors in by_unit.items():
             for role, part in errors.groupby("method", sort=False):
                 lines.setdefault((_SINGLE, str(role)), {})[run, unit] = part
-    for run, of_units in evaluations.items():
-        for unit, errors in of_units.items():
+    for run, by_unit in evaluations.items():
+        for unit, errors in by_unit.items():
             for method, part in errors.groupby("method", observed=True, sort=False):
                 lines.setdefault((str(method), "test"), {})[run, unit] = part
     return lines
 
 
-def _places(
+def _scopes(
     units: list[Unit], common_deg: int
 ) -> Iterator[tuple[str, str, Mapping[str, list[Unit]]]]:
-    """Yield the name, the label and the units by category of everything that has rows."""
+    """Yield the name, label and units by category of all scopes."""
     by_category: dict[str, list[Unit]] = {}
     for unit in units:
         by_category.setdefault(unit[0], []).append(unit)
@@ -128,12 +128,12 @@ def _paired(
 
 
 def _row(label: str, part: pd.DataFrame, runs: list[str]) -> Row:
-    """Return the errors run by run, then the differences; a dash where a run has none."""
-    found = {cell["method"]: cell for cell in part.to_dict("records")}
-    values = [Cell(f"{number(found[run]['value'])}°" if run in found else "–") for run in runs]
+    """Return the errors by run, then the differences; a dash where a run has none."""
+    by_run = {cell["method"]: cell for cell in part.to_dict("records")}
+    values = [Cell(f"{number(by_run[run]['value'])}°" if run in by_run else "–") for run in runs]
     differences = [Cell("–")] * (len(runs) - 1)
     for index, run in enumerate(runs[1:]):
-        if run in found and np.isfinite(found[run]["difference"]):
-            ends = found[run]["difference_low"], found[run]["difference_high"]
-            differences[index] = difference_cell(found[run]["difference"], *ends)
+        if run in by_run and np.isfinite(by_run[run]["difference"]):
+            ends = by_run[run]["difference_low"], by_run[run]["difference_high"]
+            differences[index] = difference_cell(by_run[run]["difference"], *ends)
     return (Cell(label), *values, *differences)

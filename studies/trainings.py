@@ -1,4 +1,4 @@
-"""Intervals that contain what varies: objects, and trainings of the same objects.
+"""Intervals for the variation of both objects and trainings.
 
 Every training meets every object (as a test object of one of its folds), so objects and trainings
 are crossed, and an error is ``mean + object + training + remainder``. The variance of the mean
@@ -23,15 +23,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mean:
-    """A mean over objects and trainings, and how well it is known.
+    """A mean over objects and trainings, with its uncertainty.
 
     Attributes
     ----------
     value : float
     variance : float
-        Of the value, over other objects and other trainings; NaN for a single object.
+        Variance of the value over other objects and trainings; NaN for a single object.
     degrees_of_freedom : float
-        Of the variance.
+        Degrees of freedom of the variance.
     n_objects, n_trainings : int
     """
 
@@ -49,7 +49,7 @@ class Mean:
 
     @property
     def p_value(self) -> float:
-        """Of a mean of 0, two-sided; 1 where nothing varies about 0."""
+        """The two-sided p-value of a mean of 0; 1 where all values are 0."""
         if self.variance == 0.0:
             return float(self.value == 0.0)
         t = abs(self.value) / np.sqrt(self.variance)
@@ -57,68 +57,68 @@ class Mean:
 
 
 def crossed_mean(*tables: ArrayLike) -> Mean:
-    """Return the mean of one figure of each object under each training.
+    """Return the mean of one quantity over crossed objects and trainings.
 
     Parameters
     ----------
     *tables : array-like (n_trainings, n_objects)
-        An object's mean error under a training, or the difference between two methods' errors. Of
-        several categories under the same trainings, a table of each: objects vary within their
-        category, and categories may share what varies between trainings.
+        An object's mean error under a training, or the difference between two methods' errors. One
+        table per category, all with the same trainings: objects vary within their category, and
+        categories may share the variation between trainings.
 
     Returns
     -------
     Mean
-        Over all objects alike. With one training, its variance is over objects alone.
+        All objects have equal weight. With one training, the variance is over objects only.
 
     Raises
     ------
     ValueError
-        Where a table is no finite matrix of one row and one column at least, or tables have other
-        numbers of trainings.
+        Where a table is not a finite, non-empty matrix, or tables have different numbers of
+        trainings.
     """
-    found = [np.asarray(table, dtype=np.float64) for table in tables]
-    for table in found:
+    arrays = [np.asarray(table, dtype=np.float64) for table in tables]
+    for table in arrays:
         if table.ndim != 2 or not table.size or not np.isfinite(table).all():
             raise ValueError("crossed_mean needs a finite value for each training and object")
-    of_training = training_means(found)
-    n_trainings, n_objects = len(of_training), sum(table.shape[1] for table in found)
-    mean = float(of_training.mean())
-    if min(table.shape[1] for table in found) == 1:
+    by_training = training_means(arrays)
+    n_trainings, n_objects = len(by_training), sum(table.shape[1] for table in arrays)
+    mean = float(by_training.mean())
+    if min(table.shape[1] for table in arrays) == 1:
         nan = float("nan")
         return Mean(mean, nan, nan, n_objects, n_trainings)
-    trainings = _spread(of_training) / n_trainings
-    # Of each category: what a mean square adds to the variance of the mean, and its freedom.
+    trainings = _spread(by_training) / n_trainings
+    # By category: contributions of mean squares to the variance of the mean, and their freedom.
     objects, remainders = [], []
-    for table in found:
+    for table in arrays:
         n = table.shape[1]
         share = (n / n_objects) ** 2
-        of_objects = table.mean(axis=0)
-        objects.append((share * _spread(of_objects) / n, n - 1))
-        left = table - of_objects - table.mean(axis=1, keepdims=True) + table.mean()
+        object_means = table.mean(axis=0)
+        objects.append((share * _spread(object_means) / n, n - 1))
+        left = table - object_means - table.mean(axis=1, keepdims=True) + table.mean()
         cells = (n_trainings - 1) * (n - 1)
         square = float((left**2).sum() / cells) if cells else 0.0
         remainders.append((share * square / table.size, cells))
-    of_objects_all, of_rest = (sum(term for term, _ in terms) for terms in (objects, remainders))
+    object_variance, remainder = (sum(term for term, _ in terms) for terms in (objects, remainders))
     if n_trainings == 1:
-        freedom = _freedom(of_objects_all, objects)
-        return Mean(mean, of_objects_all, freedom, n_objects, 1)
-    variance = max(of_objects_all + trainings - of_rest, of_objects_all, trainings)
+        freedom = _freedom(object_variance, objects)
+        return Mean(mean, object_variance, freedom, n_objects, 1)
+    variance = max(object_variance + trainings - remainder, object_variance, trainings)
     freedom = _freedom(variance, [*objects, (trainings, n_trainings - 1), *remainders])
-    # The remainder is taken away, so the rule can fall below what the scarcer factor has alone.
-    least = min(n_trainings, *(table.shape[1] for table in found)) - 1.0
+    # The remainder is subtracted, so the rule can fall below the freedom of the scarcer factor.
+    least = min(n_trainings, *(table.shape[1] for table in arrays)) - 1.0
     return Mean(mean, variance, max(freedom, least), n_objects, n_trainings)
 
 
 def training_means(tables: Sequence[Floats]) -> Floats:
-    """Return each training's mean over the objects of all tables, as of `crossed_mean`, (n,)."""
+    """Return the mean of each training over all objects, (n_trainings,); see `crossed_mean`."""
     if len({len(table) for table in tables}) > 1:
         raise ValueError("all categories need the same trainings")
     return np.asarray(np.concatenate(tables, axis=1).mean(axis=1))
 
 
 def predicted_by_others(tables: Sequence[Floats]) -> list[Interval]:
-    """Return, for each training, its mean and the 95 % interval that the others predict for it.
+    """Return the mean of each training with the 95 % interval predicted by the others.
 
     The prediction interval of one more training of the same objects: the mean of the others, and
     Student's t of their spread times sqrt(1 + 1 / their number). If trainings vary normally, 95 %
@@ -127,7 +127,7 @@ def predicted_by_others(tables: Sequence[Floats]) -> list[Interval]:
     Parameters
     ----------
     tables : sequence of ndarray (n_trainings, n_objects)
-        As of `crossed_mean`.
+        See `crossed_mean`.
 
     Returns
     -------
@@ -135,28 +135,28 @@ def predicted_by_others(tables: Sequence[Floats]) -> list[Interval]:
         Empty with fewer than three trainings.
     """
     means = training_means(tables)
-    found = []
+    predictions = []
     for own in range(len(means) if len(means) > 2 else 0):
         others = np.delete(means, own)
         half = stats.t.ppf(0.975, len(others) - 1) * others.std(ddof=1)
         half *= np.sqrt(1 + 1 / len(others))
         centre = others.mean()
-        found.append(Interval(float(means[own]), float(centre - half), float(centre + half)))
-    return found
+        predictions.append(Interval(float(means[own]), float(centre - half), float(centre + half)))
+    return predictions
 
 
 def holm(p_values: Mapping[str, float]) -> dict[str, float]:
     """Return p-values adjusted for their number (Holm, 1979): each that is below 0.05 still counts.
 
-    The k-th least of n is multiplied by n - k + 1, and none is less than the one before it. What
-    is NaN stays it and does not count.
+    The k-th least of n is multiplied by n - k + 1, and none is less than the one before it. NaN
+    stays NaN and does not count.
     """
     known = [name for name, p in p_values.items() if not np.isnan(p)]
     ordered = sorted(known, key=lambda name: p_values[name])
     adjusted: dict[str, float] = {}
     highest = 0.0
-    for place, name in enumerate(ordered):
-        highest = max(highest, min((len(ordered) - place) * p_values[name], 1.0))
+    for rank, name in enumerate(ordered):
+        highest = max(highest, min((len(ordered) - rank) * p_values[name], 1.0))
         adjusted[name] = highest
     return {name: adjusted.get(name, float("nan")) for name in p_values}
 
@@ -166,6 +166,6 @@ def _spread(means: Floats) -> float:
 
 
 def _freedom(variance: float, terms: Sequence[tuple[float, float]]) -> float:
-    """Return Satterthwaite's degrees of freedom of a sum of variances with their own."""
-    of_terms = sum(term**2 / freedom for term, freedom in terms if term)
-    return variance**2 / of_terms if of_terms else 1.0
+    """Return Satterthwaite's degrees of freedom for a sum of (variance, freedom) terms."""
+    total = sum(term**2 / freedom for term, freedom in terms if term)
+    return variance**2 / total if total else 1.0

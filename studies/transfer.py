@@ -1,8 +1,8 @@
-"""Trained on × tested on: what an estimator brings in conditions that it was not trained for.
+"""Transfer between conditions: trained on × tested on.
 
 A condition is a sensor and a framing. Each estimator calibrates and tests on the same objects
 under every condition, so that a column of the table compares estimators on the same images, and
-what a mismatch costs is a paired difference.
+the cost of a mismatch is a paired difference.
 """
 
 from __future__ import annotations
@@ -16,15 +16,14 @@ import pandas as pd
 from nbv.experiment.report.settings import ReportSettings, cell, shared_resampler
 from nbv.experiment.report.table import Cell, Row, Table
 from nbv.experiment.results import Unit, load_evaluations
-from nbv.experiment.statistics.object_means import mae_difference, mae_interval
-from nbv.experiment.statistics.paired import fold_sigma, pair_methods
+from nbv.experiment.statistics.paired import fold_sigma, mae_difference, mae_interval, pair_methods
 from nbv.labels import category_label, method_label, number
 
 Pair = tuple[str, str]
 """The condition trained on and the one tested on."""
 
 TransferFile = tuple[str, str, int, str]
-"""What a file of errors is about: trained on, tested on, fold (from 1) and method."""
+"""The key of a file of errors: trained on, tested on, fold (from 1) and method."""
 
 _NAME = "transfer"
 
@@ -37,10 +36,10 @@ def load_transfer(files: Mapping[TransferFile, Path], unit: Unit) -> dict[Pair, 
     UserError
         If a file is missing, empty, or lacks a column.
     """
-    of_pair: dict[Pair, dict[tuple[str, int, int, str], Path]] = {}
+    by_pair: dict[Pair, dict[tuple[str, int, int, str], Path]] = {}
     for (trained, tested, fold, method), path in files.items():
-        of_pair.setdefault((trained, tested), {})[*unit, fold, method] = path
-    return {pair: load_evaluations(of_unit)[unit] for pair, of_unit in of_pair.items()}
+        by_pair.setdefault((trained, tested), {})[*unit, fold, method] = path
+    return {pair: load_evaluations(by_file)[unit] for pair, by_file in by_pair.items()}
 
 
 def transfer_table(
@@ -49,11 +48,11 @@ def transfer_table(
     unit: Unit,
     settings: ReportSettings,
 ) -> Table:
-    """Return the table of MAEs, one cell for each of the settings' methods and pair of conditions.
+    """Return the table of MAEs by method and pair of conditions.
 
-    ``evaluations`` are of `load_transfer`; ``conditions`` have a ``sensor`` and a ``framing``. The
-    cells have `cells.CELL_COLUMNS`, ``trained_on`` and ``tested_on``; ``difference*`` is the paired
-    difference to the estimator that was trained on what is tested.
+    ``evaluations`` come from `load_transfer`; ``conditions`` have a ``sensor`` and a ``framing``.
+    The cells have `CELL_COLUMNS`, ``trained_on`` and ``tested_on``; ``difference*`` is the paired
+    difference to the estimator that was trained on the tested condition.
     """
     category, elevation = unit
     resampler = shared_resampler(settings)
@@ -84,15 +83,15 @@ def transfer_table(
 
 
 def _rows(cells: pd.DataFrame) -> tuple[Row, ...]:
-    """Return methods and conditions trained on by conditions tested on; the best of each column."""
+    """Return methods and training conditions by test conditions, the best of a column bold."""
     lowest = cells.groupby(["method", "tested_on"])["value"].min().round(2).to_dict()
     rows = []
     for (method, trained), part in cells.groupby(["method", "trained_on"], sort=False):
         row = [Cell(method_label(str(method))), Cell(str(trained))]
-        for found in part.to_dict("records"):
-            value = round(found["value"], 2)
-            interval = f"({number(found['ci_low'])} to {number(found['ci_high'])})"
-            is_best = bool(value == lowest[method, found["tested_on"]])
+        for record in part.to_dict("records"):
+            value = round(record["value"], 2)
+            interval = f"({number(record['ci_low'])} to {number(record['ci_high'])})"
+            is_best = bool(value == lowest[method, record["tested_on"]])
             row.append(Cell(f"{number(value)}°", is_best, interval))
         rows.append(tuple(row))
     return tuple(rows)
@@ -102,8 +101,8 @@ def _notes(
     cells: pd.DataFrame, conditions: Mapping[str, Mapping[str, str]], settings: ReportSettings
 ) -> tuple[str, ...]:
     named = "; ".join(
-        f"{name}: sensor {one['sensor']}, framing {one['framing']}"
-        for name, one in conditions.items()
+        f"{name}: sensor {condition['sensor']}, framing {condition['framing']}"
+        for name, condition in conditions.items()
     )
     return (
         "The best of each column in bold, for each method.",

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from nbv.core.logits import from_logits
 from nbv.data.camera import Camera
+from nbv.experiment.estimation.make_bundle import bundled_model
 from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.estimation.weights import Estimator
-from nbv.experiment.make_bundle import bundled_model
 from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.ood import fit_familiarity
 from nbv.robot.pair_distributions import bin_apart

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from nbv.experiment.config.compose import load_config
+from nbv.experiment.config import load_config
 
 ROOT = Path(__file__).parents[1]
 

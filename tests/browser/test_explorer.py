@@ -24,7 +24,7 @@ from nbv.core.lookup import LookupTable
 from nbv.core.simulation import bisecting_next, recommended_next
 from nbv.experiment.estimates import write_posteriors
 from nbv.experiment.explorer import ExplorerInputs, build_explorer
-from nbv.experiment.explorer.tables import page_table
+from nbv.experiment.explorer.data import page_table
 from nbv.experiment.layout import Layout
 
 METHODS = synthetic.METHODS

@@ -83,7 +83,7 @@ def test_posteriors_come_back_with_their_temperature(tmp_path):
     read = read_posteriors(tmp_path / "p.npz", ["007", "NA"])
     assert (read.object_ids, read.temperature) == (("007", "NA"), 1.7)
     np.testing.assert_allclose(read.log_posterior, log_softmax(logits / 1.7, axis=-1), atol=1e-5)
-    with pytest.raises(UserError, match=r"p\.npz: not of the objects"):
+    with pytest.raises(UserError, match=r"p\.npz: its objects differ"):
         read_posteriors(tmp_path / "p.npz", ["NA", "007"])
 
 

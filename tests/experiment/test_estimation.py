@@ -13,7 +13,6 @@ from nbv.experiment.estimation import hardware as hw
 from nbv.experiment.estimation.hardware import to_input
 from nbv.experiment.estimation.inference import (
     decode,
-    estimate_azimuth,
     network_outputs,
     outputs_of_parts,
 )
@@ -25,6 +24,10 @@ from nbv.experiment.estimation.networks import (
 )
 from nbv.experiment.estimation.training import train_estimator, train_network
 from nbv.experiment.estimation.weights import Estimator, load_estimator, save_estimator
+
+
+def azimuth_of(estimator, codes, hardware):
+    return decode(estimator, network_outputs(estimator, codes, hardware))
 
 
 @pytest.fixture(autouse=True)
@@ -65,7 +68,7 @@ def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():
     first, again, other = (
         train_network(faces[:10], SETTINGS | {"epochs": 12}, CPU, seed) for seed in (1, 1, 2)
     )
-    estimate = estimate_azimuth(Estimator(first, SETTINGS, 16, []), faces[10:], CPU)
+    estimate = azimuth_of(Estimator(first, SETTINGS, 16, []), faces[10:], CPU)
     truth = np.arange(72) * 5.0
     assert circular_distance_deg(estimate, truth).mean() < 6
     states = [network.state_dict() for network in (first, again, other)]
@@ -77,7 +80,7 @@ def test_a_classifier_learns_to_read_a_clock():
     faces = clock_faces(12)
     settings = CLASSES | {"epochs": 12}
     trained = train_estimator(named(faces), NAMES[:10], settings, CPU, 1)
-    estimate = estimate_azimuth(trained, faces[10:], CPU)
+    estimate = azimuth_of(trained, faces[10:], CPU)
     assert circular_distance_deg(estimate, np.arange(72) * 5.0).mean() < 6
 
 
@@ -132,7 +135,7 @@ def test_each_part_is_asked_of_its_own_estimator():
 
 def test_objects_that_were_trained_on_are_refused():
     estimators = [untrained(seen=("a", "b")), untrained(seen=("c",))]
-    with pytest.raises(UserError, match="'c' was trained on"):
+    with pytest.raises(UserError, match="'c' is a training object"):
         outputs_of_parts(estimators, named(clock_faces(3, 8)), [["c"], ["b", "c"]], CPU)
 
 
@@ -209,28 +212,15 @@ def test_any_image_side_fits_the_network(side):
 def test_bfloat16_and_float32_answer_alike():
     faces = clock_faces(8)
     trained = train_estimator(named(faces), NAMES[:7], SETTINGS, CPU, 0)
-    full = estimate_azimuth(trained, faces[7:], CPU)
-    half = estimate_azimuth(trained, faces[7:], hw.Hardware(torch.device("cpu"), torch.bfloat16))
+    full = azimuth_of(trained, faces[7:], CPU)
+    half = azimuth_of(trained, faces[7:], hw.Hardware(torch.device("cpu"), torch.bfloat16))
     assert np.median(circular_distance_deg(full, half)) < 1.0
-
-
-@pytest.mark.parametrize(
-    ("device", "precision", "message"),
-    [
-        ("cdua", "auto", "did you mean 'cuda'"),
-        ("cpu", "bfloat61", "did you mean 'bfloat16'"),
-        ("cpu", "int8", "choose from: auto, bfloat16, float32"),
-    ],
-)
-def test_unknown_hardware(device, precision, message):
-    with pytest.raises(UserError, match=message):
-        hw.choose_hardware(device, precision)
 
 
 def test_a_device_that_is_not_there_is_refused():
     if torch.cuda.is_available():
         pytest.skip("this machine has CUDA")
-    with pytest.raises(UserError, match="device=cuda: this machine has none"):
+    with pytest.raises(UserError, match="device=cuda: not available"):
         hw.choose_hardware("cuda")
 
 

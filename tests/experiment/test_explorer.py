@@ -20,18 +20,21 @@ from conftest import N_FOLDS, UNITS
 from nbv.core.lookup import LookupTable
 from nbv.errors import UserError
 from nbv.experiment.explorer import ExplorerInputs, build_explorer, coarse_bins
-from nbv.experiment.explorer.images import (
+from nbv.experiment.explorer.data import (
     COLUMNS,
     byte_planes,
+    cost_error,
+    expected_pose,
     half_turn,
     hundredths,
+    outcomes_of,
+    page_table,
+    probability_error,
     quantised,
     quantised_logs,
     ring_of,
     rows_differenced,
 )
-from nbv.experiment.explorer.outcomes import expected_pose, outcomes_of
-from nbv.experiment.explorer.tables import cost_error, page_table, probability_error
 from nbv.experiment.layout import Layout
 from nbv.experiment.report.figures.views import depth_limits, shade
 

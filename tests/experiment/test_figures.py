@@ -19,8 +19,7 @@ from nbv.errors import UserError
 from nbv.experiment.report.figures import FIGURES, FigureInputs, build_figure, steps
 from nbv.experiment.report.figures.inputs import example_view
 from nbv.experiment.report.figures.views import depth_limits, shade
-from nbv.experiment.report.settings import ReportSettings
-from nbv.experiment.report.tables import hardest_azimuth_deg
+from nbv.experiment.report.settings import ReportSettings, hardest_azimuth_deg
 from nbv.robot.style import save_figure
 
 FOLD = 2  # of the examples

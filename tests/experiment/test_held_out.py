@@ -11,10 +11,18 @@ from nbv.core.logits import fit_temperature
 from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.experiment.estimation.hardware import Hardware
-from nbv.experiment.estimation.inference import decode, estimate_azimuth, network_outputs
+from nbv.experiment.estimation.inference import (
+    decode,
+    estimate_fold,
+    network_outputs,
+)
 from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.estimation.weights import Estimator
-from nbv.experiment.held_out import estimate_fold
+
+
+def azimuth_of(estimator, codes, hardware):
+    return decode(estimator, network_outputs(estimator, codes, hardware))
+
 
 CPU = Hardware(torch.device("cpu"), torch.float32)
 NETWORK = {"kind": "regressor", "channels": [4, 8], "hidden": 8}
@@ -45,7 +53,7 @@ def test_objects_are_calibrated_and_tested_by_the_estimator_that_saw_neither(ima
         estimates, posteriors = found[role]
         assert estimates.object_ids == names
         assert posteriors is None
-        expected = estimate_azimuth(tested, images.of(names), CPU)
+        expected = azimuth_of(tested, images.of(names), CPU)
         np.testing.assert_allclose(estimates.estimate_deg, expected, atol=1e-3)
 
 
@@ -58,8 +66,8 @@ def test_each_part_is_calibrated_by_the_estimator_of_the_others(images):
     calibration, _ = found["calibration"]
     assert calibration.object_ids == ("b", "c", "d", "e")
     by_part = [
-        estimate_azimuth(first, images.of("bc"), CPU),
-        estimate_azimuth(second, images.of("de"), CPU),
+        azimuth_of(first, images.of("bc"), CPU),
+        azimuth_of(second, images.of("de"), CPU),
     ]
     np.testing.assert_allclose(calibration.estimate_deg, np.concatenate(by_part), atol=1e-3)
 
@@ -82,5 +90,5 @@ def test_calibration_objects_alone_choose_the_temperature_of_all(images):
 
 def test_an_estimator_that_has_seen_a_test_object_is_refused(images):
     roles = splits("test", "train", "calibration", "train", "calibration")
-    with pytest.raises(UserError, match="'a' was trained on"):
+    with pytest.raises(UserError, match="'a' is a training object"):
         estimate_fold(images, roles, 1, estimator(("a",)), [], CPU, distributions=False)

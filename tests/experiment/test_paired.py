@@ -8,6 +8,18 @@ import pytest
 
 from nbv.errors import UserError
 from nbv.experiment.statistics import metrics, paired
+from nbv.experiment.statistics.paired import (
+    OBJECT_COLUMNS,
+    PairedErrors,
+    Resampler,
+    indistinct_from_best,
+    load_folds,
+    mae_difference,
+    mae_interval,
+    object_means,
+    paired_objects,
+)
+from nbv.files import write_csv
 
 METHODS = ("single", "random", "opposite", "proposed")
 
@@ -31,7 +43,7 @@ def evaluated(seed: int, n_objects: int = 9, n_folds: int = 3) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def evaluations() -> dict[tuple[str, int], pd.DataFrame]:
+def unit_frames() -> dict[tuple[str, int], pd.DataFrame]:
     return {("mug", 0): evaluated(0), ("chair", 0): evaluated(1)}
 
 
@@ -44,8 +56,8 @@ def test_groups_are_the_papers_quarters():
     assert np.bincount(paired.viewpoint_group(azimuths))[1:].tolist() == [90] * 4
 
 
-def test_methods_are_lined_up_image_by_image(evaluations, rng):
-    frame = evaluations["mug", 0]
+def test_methods_are_lined_up_image_by_image(unit_frames, rng):
+    frame = unit_frames["mug", 0]
     straight = paired.pair_methods(frame, "mug")
     shuffled = paired.pair_methods(frame.sample(frac=1.0, random_state=3), "mug")
     for method, errors in straight.errors_deg.items():
@@ -55,16 +67,16 @@ def test_methods_are_lined_up_image_by_image(evaluations, rng):
     np.testing.assert_allclose(opposite[:, :180], opposite[:, 180:], atol=1e-3)
 
 
-def test_methods_on_different_images_are_refused(evaluations):
-    frame = evaluations["mug", 0]
+def test_methods_on_different_images_are_refused(unit_frames):
+    frame = unit_frames["mug", 0]
     fewer = frame.drop(frame.index[(frame["method"] == "random")][:1])
     message = "^mug: random was evaluated on other images than single; evaluate both again$"
     with pytest.raises(UserError, match=message):
         paired.pair_methods(fewer, "mug")
 
 
-def test_pooled_images_keep_their_objects_apart(evaluations):
-    parts = [paired.pair_methods(evaluations[unit], unit[0]) for unit in (("mug", 0), ("chair", 0))]
+def test_pooled_images_keep_their_objects_apart(unit_frames):
+    parts = [paired.pair_methods(unit_frames[unit], unit[0]) for unit in (("mug", 0), ("chair", 0))]
     both = paired.pool(parts)
     assert both.n_objects == 18
     assert both.n_images == sum(part.n_images for part in parts)
@@ -79,39 +91,39 @@ def test_pooled_images_keep_their_objects_apart(evaluations):
     assert both.category_of == ("mug",) * 9 + ("chair",) * 9
 
 
-def test_pooled_methods_are_those_that_all_categories_have(evaluations):
-    first = paired.pair_methods(evaluations["mug", 0], "mug")
-    rest = evaluations["chair", 0]
+def test_pooled_methods_are_those_that_all_categories_have(unit_frames):
+    first = paired.pair_methods(unit_frames["mug", 0], "mug")
+    rest = unit_frames["chair", 0]
     second = paired.pair_methods(rest[rest["method"] != "random"], "chair")
     for parts in ([first, second], [second, first]):
         assert list(paired.pool(parts).errors_deg) == ["single", "opposite", "proposed"]
     assert list(paired.pool([first]).errors_deg) == list(METHODS)
 
 
-def test_methods_keep_the_order_in_which_they_appear(evaluations):
+def test_methods_keep_the_order_in_which_they_appear(unit_frames):
     """Also as categories, of which some are not used."""
-    frame = evaluations["mug", 0]
+    frame = unit_frames["mug", 0]
     some = frame[frame["method"] != "opposite"]
     names = pd.CategoricalDtype(sorted(METHODS))
     found = paired.pair_methods(some.assign(method=some["method"].astype(names)), "mug")
     assert list(found.errors_deg) == ["single", "random", "proposed"]
 
 
-def test_objects_are_numbered_by_their_names(evaluations):
-    frame = evaluations["mug", 0]
+def test_objects_are_numbered_by_their_names(unit_frames):
+    frame = unit_frames["mug", 0]
     found = paired.pair_methods(frame.assign(object_id=frame["object_id"].astype(int) + 5), "mug")
     # 5 to 13 in the order of text: 10, 11, 12, 13, 5, ... In fold 1 are 5, 8 and 11.
     assert found.objects[: 3 * 360 : 360].tolist() == [4, 7, 1]
 
 
-def test_no_method_at_all_is_refused(evaluations):
-    frame = evaluations["mug", 0]
+def test_no_method_at_all_is_refused(unit_frames):
+    frame = unit_frames["mug", 0]
     with pytest.raises(UserError, match="mug: no evaluated method; evaluate one first"):
         paired.pair_methods(frame[:0], "mug")
 
 
-def test_selected_images_keep_everything_that_belongs_to_them(evaluations):
-    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+def test_selected_images_keep_everything_that_belongs_to_them(unit_frames):
+    sample = paired.pair_methods(unit_frames["mug", 0], "mug")
     mask = sample.initial_deg < 90
     kept = sample.select(mask)
     assert (kept.n_images, kept.n_objects) == (9 * 90, 9)
@@ -123,8 +135,8 @@ def test_selected_images_keep_everything_that_belongs_to_them(evaluations):
         np.testing.assert_array_equal(kept.errors_deg[method], sample.errors_deg[method][mask])
 
 
-def test_images_are_ordered_by_fold_object_and_azimuth(evaluations):
-    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+def test_images_are_ordered_by_fold_object_and_azimuth(unit_frames):
+    sample = paired.pair_methods(unit_frames["mug", 0], "mug")
     np.testing.assert_array_equal(sample.folds, np.repeat([1, 2, 3], 3 * 360))
     np.testing.assert_array_equal(sample.objects[::360], [0, 3, 6, 1, 4, 7, 2, 5, 8])
     np.testing.assert_array_equal(sample.initial_deg, np.tile(np.arange(360.0), 9))
@@ -139,18 +151,18 @@ def test_a_resampler_takes_one_seed_from_the_generator_and_two_thousand_resample
     assert paired.Resampler(0).n_resamples == 2000
 
 
-def test_draws_do_not_depend_on_what_was_asked_before(evaluations):
-    mug = paired.pair_methods(evaluations["mug", 0], "mug")
-    chair = paired.pair_methods(evaluations["chair", 0], "chair")
+def test_draws_do_not_depend_on_what_was_asked_before(unit_frames):
+    mug = paired.pair_methods(unit_frames["mug", 0], "mug")
+    chair = paired.pair_methods(unit_frames["chair", 0], "chair")
     one, other = paired.Resampler(3, 20), paired.Resampler(3, 20)
     one.multiplicities(chair)
     np.testing.assert_array_equal(one.multiplicities(mug), other.multiplicities(mug))
     assert (one.multiplicities(mug) != one.multiplicities(chair)).any()
 
 
-def test_draws_are_those_of_the_seed_the_category_and_the_fold(evaluations):
+def test_draws_are_those_of_the_seed_the_category_and_the_fold(unit_frames):
     """Published intervals depend on it: 0 stands for all folds."""
-    mug = paired.pair_methods(evaluations["mug", 0], "mug")
+    mug = paired.pair_methods(unit_frames["mug", 0], "mug")
     seeds = ([3, zlib.crc32(b"mug"), fold] for fold in range(4))
     together, *by_fold = (np.random.default_rng(seed) for seed in seeds)
     found = paired.Resampler(3, 20)
@@ -161,16 +173,16 @@ def test_draws_are_those_of_the_seed_the_category_and_the_fold(evaluations):
         np.testing.assert_array_equal(drawn[:, first::3], metrics.resample_objects(3, rng, 20))
 
 
-def test_columns_of_other_widths_are_paired_alike(evaluations):
-    frame = evaluations["mug", 0]
+def test_columns_of_other_widths_are_paired_alike(unit_frames):
+    frame = unit_frames["mug", 0]
     narrow = frame.astype({"fold": np.int8, "initial_deg": np.int16, "error_deg": np.float32})
     sample = paired.pair_methods(narrow, "mug")
     assert sample.folds.dtype == np.int64
     assert sample.initial_deg.dtype == sample.errors_deg["single"].dtype == np.float64
 
 
-def test_draws_by_fold_keep_each_folds_size(evaluations):
-    mug = paired.pair_methods(evaluations["mug", 0], "mug")
+def test_draws_by_fold_keep_each_folds_size(unit_frames):
+    mug = paired.pair_methods(unit_frames["mug", 0], "mug")
     drawn = paired.Resampler(3, 20).multiplicities_by_fold(mug)
     assert drawn.dtype == np.int64
     for fold in (1, 2, 3):
@@ -193,8 +205,8 @@ def test_a_fold_of_one_object_always_draws_it():
         ("pauc", lambda e: 100 - np.mean(np.minimum(e, 100))),
     ],
 )
-def test_statistics_of_pooled_images(evaluations, statistic, expected):
-    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+def test_statistics_of_pooled_images(unit_frames, statistic, expected):
+    sample = paired.pair_methods(unit_frames["mug", 0], "mug")
     found = paired.estimate(statistic, sample, "random", paired.Resampler(0, 200))
     errors = sample.errors_deg["random"]
     assert found.value == pytest.approx(expected(errors))
@@ -205,15 +217,15 @@ def test_statistics_of_pooled_images(evaluations, statistic, expected):
 
 
 @pytest.mark.parametrize("statistic", ["mae", "median", "pauc"])
-def test_no_images_have_no_statistic(evaluations, statistic):
-    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+def test_no_images_have_no_statistic(unit_frames, statistic):
+    sample = paired.pair_methods(unit_frames["mug", 0], "mug")
     nothing = sample.select(sample.folds == 9)
     with pytest.raises(ValueError, match="no errors"):
         paired.estimate(statistic, nothing, "single", paired.Resampler(0, 10))
 
 
-def test_sigma_is_over_fold_means(evaluations):
-    frame = evaluations["mug", 0]
+def test_sigma_is_over_fold_means(unit_frames):
+    frame = unit_frames["mug", 0]
     means = frame[frame["method"] == "proposed"].groupby("fold")["error_deg"].mean()
     sample = paired.pair_methods(frame, "mug")
     found = paired.estimate("mae_sigma", sample, "proposed", paired.Resampler(0, 200))
@@ -237,8 +249,8 @@ def test_sigma_is_resampled_within_each_fold(n_folds, statistic):
         assert sigma == pytest.approx(np.std([metric(each) for each in repeated], ddof=1))
 
 
-def test_one_fold_has_no_sigma(evaluations):
-    sample = paired.pair_methods(evaluations["mug", 0], "mug")
+def test_one_fold_has_no_sigma(unit_frames):
+    sample = paired.pair_methods(unit_frames["mug", 0], "mug")
     found = paired.estimate(
         "mae_sigma", sample.select(sample.folds == 1), "single", paired.Resampler(0, 10)
     )
@@ -314,3 +326,96 @@ def test_objects_that_are_resampled_together_are_counted():
     assert paired.fewest_resampled("mae_sigma", sample) == 2
     assert paired.fewest_resampled("mae", sample.select(objects != 11)) == 5
     assert paired.fewest_resampled("mae", sample.select(objects < 0)) == 0
+
+
+@pytest.fixture(scope="module")
+def frames(evaluations):
+    mug = evaluations["mug", 0]
+    return {str(name): part for name, part in mug.groupby("method", observed=True)}
+
+
+@pytest.fixture(scope="module")
+def sample():
+    """Thirty objects; `close` differs from `best` by chance, `worse` by two degrees."""
+    rng = np.random.default_rng(0)
+    shared = rng.normal(10, 3, 30)
+    rows = [
+        (method, f"{k:02d}", 1 + k % 5, shared[k] + shift + rng.normal(0, 0.5))
+        for method, shift in (("best", 0.0), ("close", 0.05), ("worse", 2.0))
+        for k in range(30)
+    ]
+    columns = ["method", "object_id", "fold", "error_deg"]
+    return paired_objects(pd.DataFrame(rows, columns=columns), "mug")
+
+
+def test_object_means_are_plain_means(frames):
+    means = object_means(frames)
+    assert tuple(means.columns) == OBJECT_COLUMNS
+    indexed = means.set_index(["method", "object_id"])
+    for method in ("single", "proposed"):
+        of_method = frames[method]
+        mine = of_method[of_method["object_id"] == "0004"]
+        found = indexed.loc[(method, "0004")]
+        assert found["error_deg"] == pytest.approx(np.mean(mine["error_deg"]))
+        assert found["pauc_percent"] == pytest.approx(metrics.pauc(mine["error_deg"]))
+        turned = np.mean(mine["error_deg"] > 90)
+        assert found["above_90_percent"] == pytest.approx(100 * turned)
+        delta = [0.0 if np.isnan(d) else float(d) for d in mine["delta_deg"]]
+        shorter = [min(d % 360, -d % 360) for d in delta]
+        assert found["travel_deg"] == pytest.approx(np.mean(shorter))
+        assert found["n_images"] == len(mine) == 360
+
+
+def test_places_are_told_and_not_read_from_paths(frames, tmp_path):
+    means = object_means(frames)
+    write_csv(tmp_path / "a.csv", means, 12)
+    write_csv(tmp_path / "b.csv", means.iloc[::-1], 12)
+    files = {("mug", 0, 1): tmp_path / "a.csv", ("car", 15, 4): tmp_path / "b.csv"}
+    found = load_folds(files)
+    assert list(found.columns) == ["category", "elevation_deg", "fold", *OBJECT_COLUMNS]
+    places = found[["category", "elevation_deg", "fold"]].drop_duplicates()
+    assert [tuple(row) for row in places.to_numpy().tolist()] == list(files)
+    pd.testing.assert_frame_equal(
+        found.loc[: len(means) - 1, list(OBJECT_COLUMNS)], means, check_dtype=False
+    )
+    with pytest.raises(UserError, match=r"c\.csv does not exist"):
+        load_folds({("mug", 0, 2): tmp_path / "c.csv"})
+
+
+def test_differences_are_paired_by_object(sample):
+    resampler = Resampler(0, 500)
+    alone = mae_interval(sample, "worse", resampler)
+    assert alone.value == pytest.approx(np.mean(sample.errors_deg["worse"]))
+    found = mae_difference(sample, "worse", "best", resampler)
+    assert found.value == pytest.approx(2.0, abs=0.3)
+    assert found.low < found.value < found.high
+    # What objects do to both methods alike is out of the difference.
+    assert found.high - found.low < (alone.high - alone.low) / 3
+    back = mae_difference(sample, "best", "worse", resampler)
+    assert (back.value, back.low, back.high) == pytest.approx(
+        (-found.value, -found.high, -found.low)
+    )
+
+
+def test_what_cannot_be_told_from_the_best(sample):
+    resampler = Resampler(0, 500)
+    names = indistinct_from_best(sample, ["worse", "close", "best"], resampler)
+    assert set(names) == {"best", "close"}
+    assert names[0] == min(("best", "close"), key=lambda m: sample.errors_deg[m].mean())
+    assert indistinct_from_best(sample, ["worse"], resampler) == ["worse"]
+
+
+def test_methods_that_an_object_lacks_are_left_out():
+    rows = [("all", "a", 1, 1.0), ("all", "b", 1, 2.0), ("some", "a", 1, 3.0)]
+    means = pd.DataFrame(rows, columns=["method", "object_id", "fold", "error_deg"])
+    sample = paired_objects(means, "mug")
+    assert list(sample.errors_deg) == ["all"]
+    assert sample.n_objects == 2
+
+
+def test_an_error_that_is_not_a_number_is_never_the_best():
+    rng = np.random.default_rng(0)
+    errors = {"good": rng.random(8), "damaged": np.full(8, np.nan)}
+    sample = PairedErrors(errors, np.arange(8), np.ones(8, int), np.zeros(8), ("mug",) * 8)
+    with pytest.raises(UserError, match="damaged: the MAE is nan"):
+        indistinct_from_best(sample, list(errors), Resampler(0, 100))

@@ -13,12 +13,12 @@ from nbv.experiment.report.table import (
     Cell,
     Part,
     Table,
+    escape_latex,
     table_html,
     table_latex,
     table_markdown,
     write_table,
 )
-from nbv.experiment.report.templating import escape_latex
 from nbv.labels import number
 
 TABLE = Table(

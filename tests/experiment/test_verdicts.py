@@ -178,5 +178,5 @@ def test_claims_come_back_and_half_a_file_is_refused(evaluations, rng, tmp_path)
         with pytest.raises(UserError, match=r"claims\.csv: .*; delete the file"):
             read_claims(path)
     path.write_text("".join(lines).replace(UNDECIDED, "perhaps"))
-    with pytest.raises(UserError, match="'perhaps' is no verdict"):
+    with pytest.raises(UserError, match="'perhaps' is not a verdict"):
         read_claims(path)

@@ -212,7 +212,7 @@ def make_claims(path: Path) -> None:
 
 
 def read_claims(path: Path) -> Any:
-    from nbv.experiment.reference.store import read_verdicts
+    from nbv.experiment.reference import read_verdicts
 
     return read_verdicts(path.parent)
 

@@ -17,9 +17,9 @@ from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.experiment.estimation.hardware import choose_hardware
 from nbv.experiment.estimation.inference import network_outputs
+from nbv.experiment.estimation.make_bundle import bundled_model, bundled_network, turns_of
 from nbv.experiment.estimation.networks import decode_classes
 from nbv.experiment.estimation.weights import Estimator, save_estimator
-from nbv.experiment.make_bundle import bundled_model, bundled_network, turns_of
 from nbv.robot.bundle import BundleError
 from nbv.robot.network import open_network, open_session
 
@@ -99,7 +99,7 @@ def test_the_same_weights_give_the_same_bytes_in_any_folder_and_process(tmp_path
     estimator = estimator_of("small", is_rounded=False)
     wanted = bundled_model(estimator, plane_deg)
     script = (
-        "import sys; from nbv.experiment.make_bundle import bundled_model\n"
+        "import sys; from nbv.experiment.estimation.make_bundle import bundled_model\n"
         "from nbv.experiment.estimation.hardware import choose_hardware\n"
         "from nbv.experiment.estimation.weights import load_estimator\n"
         "estimator = load_estimator('e.safetensors', choose_hardware('cpu', 'float32'))\n"

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from studies.leaderboard import blocks_of
 
-from nbv.experiment.statistics.object_means import OBJECT_COLUMNS
+from nbv.experiment.statistics.paired import OBJECT_COLUMNS
 
 METHODS = {
     "single": {"policy": "none"},

@@ -37,8 +37,11 @@ def write_meshes(folder, n: int) -> None:
         ("renderer=foo", "renderer=foo is unknown: choose from: embree, pyrender"),
         ("categories=[mgu]", "did you mean 'mug'?"),
         ("methods.proposed.policy=pose_ambigity", "methods.proposed: policy 'pose_ambigity' is"),
-        ("estimator.epochs=three", "estimator.epochs=three is not a whole number"),
-        ("density.bandwidths_deg=[8,nan]", "density.bandwidths_deg[1]=nan is out of range"),
+        ("estimator.epochs=three", "estimator.epochs=three: input should be a valid integer"),
+        (
+            "density.bandwidths_deg=[8,nan]",
+            "density.bandwidths_deg[1]=nan: input should be a finite",
+        ),
         ("categories=[mug/../../../../x]", "categories[0]=mug/../../../../x: use letters"),
     ],
 )
@@ -72,7 +75,7 @@ def test_overrides_that_are_no_list(fresh):
 @pytest.mark.parametrize(
     ("target", "key", "content", "message"),
     [
-        ("runs", "compared_runs", b"\x89PNG\r\n\x1a\n", "it is not UTF-8 text"),
+        ("runs", "compared_runs", b"\x89PNG\r\n\x1a\n", "cannot be read as YAML"),
         ("leaderboard", "leaderboard_runs", b"n_folds: 5\n", "categories is missing"),
     ],
 )

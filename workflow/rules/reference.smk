@@ -3,7 +3,7 @@
 
 import os
 
-from nbv.experiment.reference.store import find_reference
+from nbv.experiment.reference import find_reference
 
 REFERENCES = Path(os.path.relpath(BASE / "docs/reference"))
 

@@ -5,11 +5,11 @@ from nbv.experiment.jobs import job
 with job(snakemake):
     from nbv.core.selection import chosen_lookup
     from nbv.experiment.estimates import read_estimates
-    from nbv.experiment.splits import need_role, read_splits
+    from nbv.experiment.splits import check_role, read_splits
 
     calibration = read_estimates(snakemake.input.calibration)
     splits = read_splits(snakemake.input.splits)
-    need_role(splits, int(snakemake.wildcards.fold), "calibration", calibration.object_ids)
+    check_role(splits, int(snakemake.wildcards.fold), "calibration", calibration.object_ids)
     table = chosen_lookup(
         calibration.estimate_deg, snakemake.wildcards.criterion, snakemake.params.density
     )

@@ -8,7 +8,7 @@ from nbv.experiment.jobs import job
 with job(snakemake):
     from nbv.errors import UserError
     from nbv.experiment.checksums import need_intact
-    from nbv.experiment.reference.compare import compare_runs
+    from nbv.experiment.compare import compare_runs
 
     reference, run = Path(snakemake.input.reference).parent, Path(snakemake.params.run)
     need_intact(snakemake.params.run)

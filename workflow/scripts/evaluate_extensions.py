@@ -7,8 +7,8 @@ with job(snakemake):
 
     from nbv.core.seeds import rng_for
     from nbv.experiment.estimates import read_estimates, read_posteriors
-    from nbv.experiment.splits import need_role, read_splits
-    from nbv.experiment.statistics.object_means import object_means
+    from nbv.experiment.splits import check_role, read_splits
+    from nbv.experiment.statistics.paired import object_means
     from nbv.files import read_csv, write_csv
 
     given, output = snakemake.input, snakemake.output
@@ -16,7 +16,7 @@ with job(snakemake):
     splits, posteriors = read_splits(given.splits), {}
     estimates = {role: read_estimates(given[role]) for role in ("calibration", "test")}
     for role, found in estimates.items():
-        need_role(splits, int(wildcards.fold), role, found.object_ids)
+        check_role(splits, int(wildcards.fold), role, found.object_ids)
         if path := given.get(f"{role}_posteriors"):
             posteriors[f"{role}_posteriors"] = read_posteriors(path, found.object_ids)
     made = evaluate_extensions(

@@ -3,20 +3,20 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
+    from studies.curves import more_views_rows
     from studies.extensions import stored_evidence
-    from studies.more_views import more_views_rows
 
     from nbv.core.evidence import evidence_of_distributions
     from nbv.core.seeds import rng_for
     from nbv.experiment.estimates import read_estimates, read_posteriors
-    from nbv.experiment.splits import need_role, read_splits
+    from nbv.experiment.splits import check_role, read_splits
     from nbv.files import read_csv, write_csv
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     splits, products = read_splits(given.splits), {}
     calibration, test = (read_estimates(given[role]) for role in ("calibration", "test"))
-    need_role(splits, int(wildcards.fold), "calibration", calibration.object_ids)
-    need_role(splits, int(wildcards.fold), "test", test.object_ids)
+    check_role(splits, int(wildcards.fold), "calibration", calibration.object_ids)
+    check_role(splits, int(wildcards.fold), "test", test.object_ids)
     choices = read_csv(given.choices)
     evidences = stored_evidence(calibration, choices, params.density)
     # The label decides the draws of random views: it stays as it was.

@@ -6,11 +6,11 @@ with job(snakemake):
     from nbv.core.lookup import LookupTable
     from nbv.experiment.estimates import read_estimates
     from nbv.experiment.results import evaluate_method
-    from nbv.experiment.splits import need_role, read_splits
+    from nbv.experiment.splits import check_role, read_splits
     from nbv.files import write_csv
 
     test = read_estimates(snakemake.input.test)
     splits = read_splits(snakemake.input.splits)
-    need_role(splits, int(snakemake.wildcards.fold), "test", test.object_ids)
+    check_role(splits, int(snakemake.wildcards.fold), "test", test.object_ids)
     lookup = LookupTable.load(snakemake.input.lookup)
     write_csv(snakemake.output[0], evaluate_method(snakemake.params.method, test, lookup=lookup))

@@ -6,7 +6,7 @@ from nbv.experiment.jobs import job
 
 with job(snakemake):
     from nbv.experiment.checksums import need_intact
-    from nbv.experiment.reference.store import collect_reference
+    from nbv.experiment.reference import collect_reference
 
     need_intact(snakemake.params.run)
     collect_reference(Path(snakemake.params.run), Path(snakemake.params.reference))

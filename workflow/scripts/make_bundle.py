@@ -10,8 +10,8 @@ with job(snakemake):
     from nbv.data.camera import Camera
     from nbv.data.depth_images import open_depth
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.experiment.estimation.make_bundle import bundled_network, make_bundle, turns_of
     from nbv.experiment.estimation.weights import load_estimator
-    from nbv.experiment.make_bundle import bundled_network, make_bundle, turns_of
     from nbv.experiment.splits import objects_with_role, read_splits
     from nbv.files import write_csv
     from nbv.robot.evaluation import evaluate

@@ -10,7 +10,7 @@ with job(snakemake):
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
     from nbv.experiment.estimation.training import train_estimator
     from nbv.experiment.estimation.weights import save_estimator, with_category
-    from nbv.experiment.splits import need_objects, objects_with_role, read_splits, training_roles
+    from nbv.experiment.splits import check_objects, objects_with_role, read_splits, training_roles
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     use_one_thread()
@@ -21,7 +21,7 @@ with job(snakemake):
         params.categories, given.splits, given.depth, given.objects, strict=True
     ):
         splits, images = read_splits(splits_path), open_depth(*depth_paths)
-        need_objects(splits, images.object_ids)
+        check_objects(splits, images.object_ids)
         roles = training_roles(splits, without=None if part is None else int(part))
         object_ids = objects_with_role(splits, int(wildcards.fold), *roles)
         names += with_category(category, object_ids)

@@ -4,8 +4,7 @@ from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
-    from studies.ablation import ablation_space
-    from studies.ablation_table import ablation_table
+    from studies.ablation import ablation_space, ablation_table
 
     from nbv.experiment.report.table import write_table
     from nbv.experiment.statistics.paired import Resampler

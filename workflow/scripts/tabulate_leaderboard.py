@@ -8,8 +8,7 @@ with job(snakemake):
 
     from nbv.experiment.layout import files_by_run
     from nbv.experiment.report.table import write_table
-    from nbv.experiment.statistics.object_means import load_folds
-    from nbv.experiment.statistics.paired import Resampler
+    from nbv.experiment.statistics.paired import Resampler, load_folds
 
     params = snakemake.params
     files = files_by_run(params.folds, snakemake.input.objects)

@@ -4,7 +4,7 @@ from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
-    from studies.curves import more_views_figure, more_views_table, read_rows
+    from studies.curve_tables import more_views_figure, more_views_table, read_rows
 
     from nbv.experiment.report.table import write_table
     from nbv.experiment.statistics.paired import Resampler

@@ -3,7 +3,7 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from studies.curves import travel_curves, travel_figure, travel_table
+    from studies.curve_tables import travel_curves, travel_figure, travel_table
 
     from nbv.experiment.report.table import write_table
     from nbv.robot.style import save_figure

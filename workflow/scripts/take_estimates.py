@@ -3,8 +3,8 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
+    from nbv.experiment.estimation.inference import write_fold
     from nbv.experiment.external import take_fold
-    from nbv.experiment.held_out import write_fold
     from nbv.experiment.splits import read_splits
     from nbv.robot.pairs import PairTable
 

@@ -10,16 +10,16 @@ with job(snakemake):
     from nbv.core.seeds import seed_for
     from nbv.data.depth_images import open_depth
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
+    from nbv.experiment.estimation.inference import estimate_fold, write_fold
     from nbv.experiment.estimation.training import train_estimator
     from nbv.experiment.estimation.weights import load_estimator, read_start, save_estimator
-    from nbv.experiment.held_out import estimate_fold, write_fold
-    from nbv.experiment.splits import need_objects, objects_with_role, read_splits, training_roles
+    from nbv.experiment.splits import check_objects, objects_with_role, read_splits, training_roles
 
     params, wildcards = snakemake.params, snakemake.wildcards
     given, output = snakemake.input, snakemake.output
     use_one_thread()
     splits, images = read_splits(given.splits), open_depth(given.depth, given.objects)
-    need_objects(splits, images.object_ids)
+    check_objects(splits, images.object_ids)
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
     fold, part = int(wildcards.fold), wildcards.get("part")
     roles = training_roles(splits, without=None if part is None else int(part))

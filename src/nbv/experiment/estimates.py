@@ -1,4 +1,4 @@
-"""Estimates and distributions of full turns of objects on disk."""
+"""Files of estimates and distributions for full turns of objects."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def write_estimates(path: str | Path, estimates: Estimates) -> None:
 
 
 def read_estimates(path: str | Path) -> Estimates:
-    """Read what `write_estimates` wrote; further columns, as older files have, are ignored.
+    """Read a file of `write_estimates`; additional columns are ignored.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def read_estimates(path: str | Path) -> Estimates:
     frame = read_csv(path)
     check_columns(path, frame, COLUMNS)
     object_ids = objects_of_full_turns(path, frame, "azimuth_deg")
-    need_azimuths(path, frame, ("estimate_deg",))
+    check_azimuths(path, frame, ("estimate_deg",))
     estimate_deg = frame["estimate_deg"].to_numpy(dtype=np.float64)
     return Estimates(object_ids, estimate_deg.reshape(len(object_ids), -1))
 
@@ -53,7 +53,7 @@ def read_estimates(path: str | Path) -> Estimates:
 def objects_of_full_turns(
     path: str | Path, frame: pd.DataFrame, azimuth_column: str
 ) -> tuple[str, ...]:
-    """Return the objects of a table that has a row for each view of a full turn of each object.
+    """Return the objects of a table with one row for every view of a full turn.
 
     Raises
     ------
@@ -69,12 +69,12 @@ def objects_of_full_turns(
         or not np.array_equal(frame[azimuth_column].to_numpy(), azimuth_deg)
         or not np.array_equal(frame["object_id"], np.repeat(object_ids, n_views))
     ):
-        raise damaged(path, "not a full turn of equally spaced views of each object")
+        raise damaged(path, "an object has no full turn of equally spaced views")
     return object_ids
 
 
-def need_azimuths(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
-    """Raise UserError where a column holds anything but numbers in [0, 360)."""
+def check_azimuths(path: str | Path, frame: pd.DataFrame, columns: Iterable[str]) -> None:
+    """Raise UserError where a column holds values other than numbers in [0, 360)."""
     for name in columns:
         with readable(path):
             values = frame[name].to_numpy(dtype=np.float64)
@@ -86,7 +86,7 @@ def need_azimuths(path: str | Path, frame: pd.DataFrame, columns: Iterable[str])
 
 
 def write_posteriors(path: str | Path, posteriors: Posteriors) -> None:
-    """Write distributions, their logs as float32."""
+    """Write distributions, with their logs as float32."""
     write_arrays(
         path,
         {
@@ -98,22 +98,22 @@ def write_posteriors(path: str | Path, posteriors: Posteriors) -> None:
 
 
 def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
-    """Read what `write_posteriors` wrote.
+    """Read a file of `write_posteriors`.
 
     Raises
     ------
     UserError
-        Where it is about other objects than those given, or in another order, or is damaged.
+        Where the file is damaged, or its objects or their order differ from those given.
     """
     stored = read_arrays(path, ("object_ids", "log_posterior", "temperature"))
     names = tuple(str(name) for name in stored["object_ids"])
     if names != tuple(object_ids):
-        raise UserError(f"{path}: not of the objects that the estimates are of; make both again")
+        raise UserError(f"{path}: its objects differ from those of the estimates; make both again")
     with readable(path):
         posteriors = Posteriors(names, stored["log_posterior"], float(stored["temperature"]))
         _, n_views, n_classes = posteriors.log_posterior.shape
-        as_kept = np.exp(posteriors.log_posterior.astype(np.float64))
-        check_distributions(path, as_kept, (len(names), n_views, n_classes))
+        stored_p = np.exp(posteriors.log_posterior.astype(np.float64))
+        check_distributions(path, stored_p, (len(names), n_views, n_classes))
         if not 0.0 < posteriors.temperature < np.inf:
-            raise damaged(path, f"the temperature {posteriors.temperature} is not above 0")
+            raise damaged(path, f"the temperature {posteriors.temperature} is not positive")
     return posteriors

@@ -1,6 +1,7 @@
-"""Estimates of a fold's objects that another program made.
+"""Estimates of another program for the objects of a fold.
 
-Apart from `held_out`, which trainings depend on: an edit of what reads pairs trains nothing again.
+Trainings depend on `estimation.inference` but not on this module, so that an edit here retrains
+nothing.
 """
 
 from __future__ import annotations
@@ -10,22 +11,22 @@ import pandas as pd
 
 from nbv.core.estimates import Estimates, Posteriors, posteriors_of
 from nbv.core.logits import fit_temperature
-from nbv.experiment.held_out import FoldEstimates
-from nbv.experiment.splits import need_objects, objects_with_role
+from nbv.experiment.estimation.inference import FoldEstimates
+from nbv.experiment.splits import check_objects, objects_with_role
 from nbv.robot.pair_distributions import evenly_apart
 from nbv.robot.pairs import Turns
 
 
-def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -> FoldEstimates:
-    """Return what another program found of a fold's calibration and test objects.
+def take_fold(estimates: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -> FoldEstimates:
+    """Return the estimates of another program for a fold's calibration and test objects.
 
     Parameters
     ----------
-    found : Estimates
-        Of all objects.
+    estimates : Estimates
+        The estimates for all objects.
     turns : Turns
-        What distributions it gave, of the same objects; empty where it gave none. Calibration
-        objects choose one temperature.
+        The distributions for the same objects; empty if the program gives none. Calibration objects
+        choose one temperature.
     splits : DataFrame
         From `nbv.experiment.splits.read_splits`.
     fold : int
@@ -33,10 +34,10 @@ def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -
     Raises
     ------
     UserError
-        As of `nbv.experiment.splits.need_objects` and
-        `nbv.robot.pair_distributions.evenly_apart`.
+        Where the objects differ from those in the splits, or the azimuths do not allow evenly
+        spaced views (`nbv.robot.pair_distributions.evenly_apart`).
     """
-    need_objects(splits, found.object_ids)
+    check_objects(splits, estimates.object_ids)
     names = {role: objects_with_role(splits, fold, role) for role in ("calibration", "test")}
     temperature = 1.0
     if turns:
@@ -44,14 +45,16 @@ def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -
         temperature = fit_temperature(np.log(np.concatenate(given)), np.concatenate(azimuths))
     taken: FoldEstimates = {}
     for role, object_ids in names.items():
-        estimate_deg = found.estimate_deg[[found.object_ids.index(name) for name in object_ids]]
+        estimate_deg = estimates.estimate_deg[
+            [estimates.object_ids.index(name) for name in object_ids]
+        ]
         posteriors = None
         if turns:
             n_views = estimate_deg.shape[1]
             whole = []
             for name in object_ids:
                 azimuth_deg, rows = turns[name]
-                # The temperature first: it was fitted to distributions as given, not turned ones.
+                # The temperature was fitted to the distributions before they are rotated.
                 own = posteriors_of((name,), np.log(rows)[None], temperature).distributions[0]
                 whole.append(evenly_apart(azimuth_deg, own, n_views))
             posteriors = Posteriors(tuple(object_ids), np.log(np.stack(whole)), temperature)

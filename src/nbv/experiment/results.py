@@ -1,4 +1,4 @@
-"""What methods achieve with two views: a row for each test image, written and read."""
+"""Errors of methods with two views, one row for each test image."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nbv.core.evidence import Evidence
 from nbv.core.lookup import LookupTable
 from nbv.core.policies import TestViews, two_views
 from nbv.errors import UserError
-from nbv.experiment.estimates import need_azimuths, objects_of_full_turns, read_estimates
+from nbv.experiment.estimates import check_azimuths, objects_of_full_turns, read_estimates
 from nbv.experiment.splits import read_splits
 from nbv.files import check_columns, damaged, existing, read_csv, readable
 
@@ -47,9 +47,9 @@ def evaluate_method(
     test : Estimates
         360 / n_views must be a whole number of degrees.
     rng, lookup, evidence : optional
-        What the policy or the fusion needs; see `nbv.core.policies.TestViews`.
+        Inputs of the policy or the fusion; see `nbv.core.policies.TestViews`.
     posteriors : Posteriors, optional
-        Of the test objects, where the fusion is of distributions.
+        The distributions of the test objects, where the fusion needs them.
 
     Returns
     -------
@@ -81,18 +81,17 @@ Unit = tuple[str, int]
 """A category and an elevation in degrees."""
 
 EvaluationFile = tuple[str, int, int, str]
-"""What a file of errors is about: category, elevation in degrees, fold (from 1) and method."""
-
+"""The key of a file of errors: category, elevation in degrees, fold (from 1) and method."""
 
 EstimatesFile = tuple[str, int, int, str]
-"""What a file of estimates is about: category, elevation in degrees, fold (from 1) and role."""
+"""The key of a file of estimates: category, elevation in degrees, fold (from 1) and role."""
 
 ESTIMATED_ROLES = ("calibration", "test")
 """The roles of objects that have estimates."""
 
 
 def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.DataFrame]:
-    """Read the errors of each unit.
+    """Read the errors of methods by unit.
 
     Parameters
     ----------
@@ -102,15 +101,15 @@ def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.Data
     -------
     dict of (category, elevation_deg) to pandas.DataFrame
         Units in the order of their first file. Columns are ``method, fold`` and
-        `two_views.COLUMNS`, with one row for each method, test object and initial viewpoint.
+        `COLUMNS`, with one row for each method, test object and initial viewpoint.
         Methods come in the order of their first file, which is the order of the categories of
         ``method`` as well.
 
     Raises
     ------
     UserError
-        Where a file is missing or damaged, where the methods of a fold are not about the same
-        objects, or where two folds test the same one.
+        Where a file is missing or damaged, where the methods of a fold were evaluated on different
+        objects, or where two folds test the same object.
     """
     parts: dict[Unit, dict[str, list[pd.DataFrame]]] = {}
     for (category, elevation_deg, fold, method), path in files.items():
@@ -120,11 +119,11 @@ def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.Data
 
 
 def _join(name: Unit, by_method: Mapping[str, list[pd.DataFrame]]) -> pd.DataFrame:
-    frames = [frame for of_method in by_method.values() for frame in of_method]
+    frames = [frame for parts in by_method.values() for frame in parts]
     unit = pd.concat(frames, ignore_index=True)
     tested = unit[["method", "fold", "object_id"]].drop_duplicates()
     n_methods = tested.groupby(["fold", "object_id"])["method"].nunique()
-    of_objects = tested.groupby("object_id")["fold"].nunique()
+    n_folds = tested.groupby("object_id")["fold"].nunique()
     where = f"{name[0]} at {name[1]}°"
     if (n_methods != len(by_method)).any():
         fold, object_id = n_methods.index[n_methods != len(by_method)][0]
@@ -132,9 +131,9 @@ def _join(name: Unit, by_method: Mapping[str, list[pd.DataFrame]]) -> pd.DataFra
             f"evaluation of {where}, fold {fold}: object {object_id!r} is not evaluated by every "
             "method; delete the fold's files and run the same command again"
         )
-    if (of_objects > 1).any():
+    if (n_folds > 1).any():
         raise UserError(
-            f"evaluation of {where}: object {of_objects.index[of_objects > 1][0]!r} is tested in "
+            f"evaluation of {where}: object {n_folds.index[n_folds > 1][0]!r} is tested in "
             "more than one fold; delete the evaluations and run the same command again"
         )
     unit["method"] = pd.Categorical(unit["method"], categories=list(by_method), ordered=True)
@@ -147,13 +146,13 @@ def load_estimate_errors(files: Mapping[EstimatesFile, Path]) -> dict[Unit, pd.D
     Parameters
     ----------
     files : mapping of (category, elevation_deg, fold, role) to path
-        Of `nbv.experiment.estimates.write_estimates`; a role of `ESTIMATED_ROLES`.
+        Files of `nbv.experiment.estimates.write_estimates`, with a role of `ESTIMATED_ROLES`.
 
     Returns
     -------
     dict of (category, elevation_deg) to pandas.DataFrame
-        As of `load_evaluations`, with the role as ``method`` and the columns ``method, fold,
-        object_id, initial_deg, error_deg``. An object calibrates in several folds.
+        Frames with the columns ``method, fold, object_id, initial_deg, error_deg``; ``method`` is
+        the role. An object calibrates in several folds.
 
     Raises
     ------
@@ -179,21 +178,21 @@ def load_estimate_errors(files: Mapping[EstimatesFile, Path]) -> dict[Unit, pd.D
 
 
 def load_object_ids(splits: Path) -> tuple[str, ...]:
-    """Return a category's objects, from its splits."""
+    """Return the objects of a category from its splits."""
     read = read_splits(existing(splits))
     return tuple(read.loc[read["fold"] == read["fold"].min(), "object_id"])
 
 
 def read_evaluation(path: Path) -> pd.DataFrame:
-    """Read one method's errors of one fold; errors as of `load_evaluations`."""
+    """Read the errors of one method in one fold; same errors as `load_evaluations`."""
     frame = read_csv(path)
     check_columns(path, frame, COLUMNS)
     objects_of_full_turns(path, frame, "initial_deg")
-    need_azimuths(path, frame, ("initial_estimate_deg", "pose_estimate_deg"))
+    check_azimuths(path, frame, ("initial_estimate_deg", "pose_estimate_deg"))
     followed = frame.dropna(subset="delta_deg")
     if len(followed) not in (0, len(frame)):
         raise damaged(path, "delta_deg is missing in some rows")
-    need_azimuths(path, followed, ("delta_deg", "next_estimate_deg"))
+    check_azimuths(path, followed, ("delta_deg", "next_estimate_deg"))
     with readable(path):
         error_deg = frame["error_deg"].to_numpy(dtype=np.float64)
     # Written so that NaN is refused as well.

@@ -1,7 +1,8 @@
-"""Which object is trained on, calibrated with and tested on, in each fold.
+"""The folds of cross-validation: which objects train, calibrate and test.
 
-Held out: the roles are train, calibration and test. Cross-fitted: part1, part2, … and test. Each
-part is calibrated by an estimator of the other parts; the one for test objects trains on them all.
+With held-out calibration the roles are train, calibration and test. With cross-fitting they are
+part1, part2, … and test: each part is calibrated by an estimator of the other parts, and test
+objects are estimated by one that is trained on all parts.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def make_splits(
 
     Of a fold's remaining objects, `calibration_fraction` (at least one, and at least one is left
     to train on) calibrate and the others train; or they are divided into parts. A fraction of 1
-    leaves none to train on. Which objects a fold tests does not depend on that.
+    leaves none to train on. The test objects of a fold do not depend on this.
 
     Parameters
     ----------
@@ -40,7 +41,7 @@ def make_splits(
     calibration_fraction : float in (0, 1]
     rng : numpy.random.Generator
     crossfit_parts : int, 2 or more, optional
-        Parts of equal size (to within one object) for cross-fitting; none where held out.
+        Parts of equal size (to within one object) for cross-fitting; None for held-out calibration.
 
     Returns
     -------
@@ -51,7 +52,7 @@ def make_splits(
     Raises
     ------
     UserError
-        Where there are too few objects for that many folds.
+        Where the number of objects is too small for the folds.
     """
     n_objects = len(object_ids)
     if not enough_objects(n_objects, n_folds):
@@ -86,8 +87,8 @@ def read_splits(path: str | Path) -> pd.DataFrame:
     Raises
     ------
     UserError
-        Where the file cannot be read, or is not one of `make_splits`: folds from 1, each with
-        every object once and in a known role, and each object tested in one fold.
+        Where the file cannot be read or does not hold splits of `make_splits`: folds from 1, each
+        with every object once and in a known role, and each object tested in one fold.
     """
     splits = read_csv(path)
     if list(splits.columns) != ["object_id", "fold", "role"]:
@@ -109,9 +110,10 @@ def read_splits(path: str | Path) -> pd.DataFrame:
 
 
 def calibration_roles(splits: pd.DataFrame) -> tuple[str, ...]:
-    """Return the roles that are calibrated with, each by an estimator that has not seen it.
+    """Return the roles of calibration objects.
 
-    One where held out, calibrated by the estimator that is tested; else every part in order.
+    ``calibration`` for held-out calibration, else every part in order. Each is estimated by an
+    estimator that has not seen it.
     """
     parts = {role for role in splits["role"] if _PART.fullmatch(role)}
     return tuple(sorted(parts, key=lambda role: int(role[4:]))) or ("calibration",)
@@ -120,7 +122,7 @@ def calibration_roles(splits: pd.DataFrame) -> tuple[str, ...]:
 def training_roles(splits: pd.DataFrame, without: int | None = None) -> tuple[str, ...]:
     """Return the roles that an estimator trains on.
 
-    `without` is the part that it is to calibrate; None for the estimator that test objects meet.
+    `without` is the part that it calibrates; None for the estimator of test objects.
     """
     roles = calibration_roles(splits)
     if roles == ("calibration",):
@@ -129,49 +131,48 @@ def training_roles(splits: pd.DataFrame, without: int | None = None) -> tuple[st
 
 
 def objects_with_role(splits: pd.DataFrame, fold: int, *roles: str) -> list[str]:
-    """Return the ids of the objects of some roles in one fold, in the order of the splits.
+    """Return the ids of the objects with some roles in one fold, in the order of the splits.
 
     Raises
     ------
     UserError
         Where the fold is absent or an object has more than one role in it.
     """
-    of_fold = splits[splits["fold"] == fold]
-    if of_fold.empty:
+    in_fold = splits[splits["fold"] == fold]
+    if in_fold.empty:
         raise UserError(f"fold {fold} is not in the splits: they have {splits['fold'].nunique()}")
-    repeated = of_fold.loc[of_fold["object_id"].duplicated(), "object_id"]
+    repeated = in_fold.loc[in_fold["object_id"].duplicated(), "object_id"]
     if len(repeated):
         raise UserError(f"fold {fold} gives object {repeated.iloc[0]!r} more than one role")
-    return [str(name) for name in of_fold.loc[of_fold["role"].isin(roles), "object_id"]]
+    return [str(name) for name in in_fold.loc[in_fold["role"].isin(roles), "object_id"]]
 
 
-def need_objects(splits: pd.DataFrame, object_ids: Iterable[str]) -> None:
-    """Raise UserError where objects with images are others than those in the splits, naming one."""
+def check_objects(splits: pd.DataFrame, object_ids: Iterable[str]) -> None:
+    """Raise UserError with an object that only the images or only the splits have."""
     if different := sorted(set(object_ids) ^ set(splits["object_id"])):
         raise UserError(
             f"object {different[0]!r} is not both in the splits and among the depth images: they "
-            "are of different runs; make both again"
+            "come from different runs; make both again"
         )
 
 
-def need_role(splits: pd.DataFrame, fold: int, role: str, object_ids: Iterable[str]) -> None:
-    """Raise UserError where objects that were read are not those with a role in a fold.
+def check_role(splits: pd.DataFrame, fold: int, role: str, object_ids: Iterable[str]) -> None:
+    """Raise UserError where the objects in a file are not those with a role in a fold.
 
-    This holds what is read to the splits: no object may be trained on and calibrated or tested
-    with, and none may be missing, wherever the file came from. ``calibration`` stands for all
-    `calibration_roles`.
+    No object may train and also calibrate or test, and none may be missing, wherever the file comes
+    from. ``calibration`` stands for all `calibration_roles`.
     """
     roles = calibration_roles(splits) if role == "calibration" else (role,)
     read, planned = set(object_ids), set(objects_with_role(splits, fold, *roles))
     if different := sorted(read - planned) or sorted(planned - read):
-        what = "is no" if different[0] in read else "is missing, a"
+        mistake = "does not belong to" if different[0] in read else "is missing from"
         raise UserError(
-            f"object {different[0]!r} {what} {role} object of fold {fold}: estimates and splits "
-            "are of different runs; make the estimates again"
+            f"object {different[0]!r} {mistake} the {role} objects of fold {fold}: estimates and "
+            "splits come from different runs; make the estimates again"
         )
 
 
 def enough_objects(n_objects: int, n_folds: int) -> bool:
-    """Say whether each fold can test one object and has two more, to train and to calibrate."""
+    """Return whether each fold can test one object and has two more to train and calibrate."""
     largest = -(-n_objects // n_folds)
     return n_objects >= n_folds and n_objects - largest >= 2

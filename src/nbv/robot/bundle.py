@@ -65,7 +65,7 @@ class Bundle:
     ----------
     category : str
     network : bytes
-        From `nbv.experiment.estimation.export.onnx_model`.
+        From `nbv.experiment.estimation.make_bundle.onnx_model`.
     estimator : mapping
         Its settings.
     camera : Camera

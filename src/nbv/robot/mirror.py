@@ -3,7 +3,7 @@
 Take objects with a vertical plane of symmetry at the azimuth m. What a camera sees of them from the
 azimuth a is the mirror image of what it sees from 2 m - a. A trained network does not know this
 exactly. The mean of its logits for an image and for the mirror image, read backwards, does: that is
-what `nbv.experiment.estimation.export.onnx_model` writes where there is a plane.
+what `nbv.experiment.estimation.make_bundle.onnx_model` writes where there is a plane.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ def open_session(model: bytes) -> onnxruntime.InferenceSession:
 
 
 def open_network(model: bytes, image_side: int, n_classes: int) -> Network:
-    """Return the network of an ONNX model of `nbv.experiment.estimation.export.onnx_model`.
+    """Return the network of an ONNX model of `nbv.experiment.estimation.make_bundle.onnx_model`.
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
-"""What a configuration may hold: every key, type, range and choice, and what names must agree."""
+"""The schema of a configuration: keys, types, ranges, choices, and constraints between keys."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, Self, TypeVar
@@ -22,20 +23,20 @@ from nbv.experiment.splits import enough_objects
 T = TypeVar("T")
 
 NAME_RULE = "use letters, digits, '.', '_' and '-', a letter or digit first, 100 at most"
-"""What a name has to be that becomes a part of a path or a wildcard of Snakemake."""
+"""The rule for names that become a part of a path or a wildcard of Snakemake."""
 
 
 def _distinct(values: list[T]) -> list[T]:
     for index, value in enumerate(values):
         if value in values[:index]:
-            raise ValueError(f"{value} is there twice")
+            raise ValueError(f"{value} occurs twice")
     return values
 
 
 def _below_root(folder: str) -> str:
     path = PurePosixPath(folder)
     if path.is_absolute() or ".." in path.parts:
-        raise ValueError(f"{folder!r} is not below dataset.root")
+        raise ValueError("not below dataset.root")
     return folder
 
 
@@ -43,8 +44,17 @@ def _with_known_home(path: str) -> str:
     try:
         Path(path).expanduser()
     except RuntimeError:
-        raise ValueError(f"{path!r}: there is no such user") from None
+        raise ValueError("unknown user") from None
     return path
+
+
+def _matches(pattern: str, rule: str) -> AfterValidator:
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text):
+            raise ValueError(rule)
+        return text
+
+    return AfterValidator(check)
 
 
 Whole = Annotated[int, Field(strict=True)]
@@ -57,26 +67,30 @@ Angle = Annotated[Number, Field(ge=-360, le=360)]
 Bandwidth = Annotated[Number, Field(ge=0, le=180)]
 PseudoObservations = Annotated[Number, Field(ge=0, le=10**9)]
 Share = Annotated[Number, Field(ge=0, le=1)]
+Diagonals = Annotated[Number, Field(gt=1, le=1000)]
+"""A distance in object diagonals."""
 Replicate = Annotated[Whole, Field(ge=0, le=999)]
 Elevation = Annotated[Whole, Field(ge=0, le=89)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"), NAME_RULE]
-Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]{1,4096}$"), "one line of text"]
+Name = Annotated[str, _matches(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}", NAME_RULE)]
+Text = Annotated[str, _matches(r"[^\x00-\x1f\x7f]{1,4096}", "use one line of text")]
 DataPath = Annotated[Text, AfterValidator(_with_known_home)]
 Axis = Annotated[
     str,
-    Field(pattern=r"^(auto|[+-]?[xyzXYZ]|[^,\s]+(,[^,\s]+){2})$"),
-    "an axis such as +y, a vector such as 0,0,1, or auto",
+    _matches(
+        r"auto|[+-]?[xyzXYZ]|[^,\s]+(,[^,\s]+){2}",
+        "use an axis such as +y, a vector such as 0,0,1, or auto",
+    ),
 ]
 Distinct = AfterValidator(_distinct)
 AtLeastOne = Field(min_length=1, max_length=100)
 Framing = Literal["silhouette", "axis"]
 
 FEWEST_PIXELS = 4
-"""Of an object's diagonal in an image: fewer show nothing of where it is seen from."""
+"""The least diagonal of an object in an image; fewer pixels do not show the viewpoint."""
 
 
 class Section(BaseModel):
-    """Keys that belong together. Another key is a mistake."""
+    """Keys that belong together. Any other key is an error."""
 
     # So that a name of digits needs no quotes.
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, coerce_numbers_to_str=True)
@@ -93,14 +107,14 @@ class Dataset(Section):
     front: Axis = "+x"
     turn_deg: dict[Name, Angle] = {}
     centre: Literal["box", "origin"] = "box"
-    handle_reach: Annotated[Number, Field(ge=0, le=0.5), "in widths of a mug's body"] = 0.0
-    square_share: Annotated[Number, Field(ge=0, le=1), "share of mugs"] = 0.0
+    handle_reach: Annotated[Number, Field(ge=0, le=0.5)] = 0.0  # widths of a mug's body
+    square_share: Share = 0.0
     exclude: list[Text] = []
     exclude_file: DataPath | None = None
 
     @model_validator(mode="after")
-    def _of_generated_mugs_alone(self) -> Self:
-        # An experiment sets it whatever its data set: what a run says of itself must be true.
+    def _clear_settings_of_procedural_mugs(self) -> Self:
+        # An experiment sets them for any data set, but a run must record what applies to it.
         if self.source != "procedural":
             self.handle_reach = self.square_share = 0.0
         return self
@@ -115,13 +129,13 @@ class Renderer(Section):
 class Camera(Section):
     """The depth camera; see `nbv.data.camera`."""
 
-    distance: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"]
+    distance: Diagonals
     fov_deg: Annotated[Number, Field(ge=0.05, le=160)]
     image_side: Annotated[Whole, Field(ge=8, le=10**6)]
     framing: Framing
 
     @model_validator(mode="after")
-    def _check_object_is_seen(self) -> Self:
+    def _check_object_size(self) -> Self:
         width = 2 * self.distance * math.tan(math.radians(self.fov_deg) / 2)
         if self.image_side / width < FEWEST_PIXELS:
             raise UserError(
@@ -142,14 +156,14 @@ class Sensor(Section):
 
 
 class Schedule(Section):
-    """How long and at which peak rate a stage trains; see `nbv.experiment.estimation.warm_start`."""
+    """Epochs and peak rate of a stage of `nbv.experiment.estimation.warm_start`."""
 
     epochs: Epochs
     learning_rate: LearningRate
 
 
 class Estimator(Section):
-    """The single-view estimator; see `nbv.experiment.estimation`. A kind omits what it does not have."""
+    """The single-view estimator; each kind has only the keys that it uses."""
 
     kind: str
     channels: Annotated[list[Count], AtLeastOne]
@@ -164,7 +178,7 @@ class Estimator(Section):
     pretraining: Schedule = Schedule(epochs=2, learning_rate=9e-3)
     fine_tuning: Schedule = Schedule(epochs=5, learning_rate=4e-3)
     next_elevation: Schedule = Schedule(epochs=4, learning_rate=4e-3)
-    n_classes: Annotated[Whole, Field(ge=8, le=360), "a divisor of 360"] | None = None
+    n_classes: Annotated[Whole, Field(ge=8, le=360)] | None = None
     target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
     pairs: str | None = None
 
@@ -190,7 +204,7 @@ class Estimator(Section):
                 "estimator has either: choose estimator=classifier"
             )
         if self.n_classes is not None and 360 % self.n_classes:
-            raise UserError(f"estimator.n_classes={self.n_classes} is no divisor of 360")
+            raise UserError(f"estimator.n_classes={self.n_classes} is not a divisor of 360")
         if self.n_classes is not None and self.n_classes % 2:
             raise UserError(
                 f"estimator.n_classes={self.n_classes} is odd: the opposite view needs a class"
@@ -209,22 +223,22 @@ class Density(Section):
 
 
 class Affinity(Section):
-    """How like distributions count; see `nbv.core.criteria`."""
+    """How alike two distributions must be to count; see `nbv.core.criteria`."""
 
     power: Annotated[Number, Field(gt=0, le=10**4)]
     pseudo_observations: PseudoObservations
-    caution: Annotated[Number, Field(ge=0, le=100), "in standard errors"] = 2.0
+    caution: Annotated[Number, Field(ge=0, le=100)] = 2.0  # standard errors
 
 
 class Recommendation(Section):
-    """What travel costs; see `nbv.core.lookup.least_cost_delta`."""
+    """The cost of travel; see `nbv.core.lookup.least_cost_delta`."""
 
-    travel_cost: Annotated[Number, Field(ge=0, le=10**6), "in the criterion's unit per degree"]
+    travel_cost: Annotated[Number, Field(ge=0, le=10**6)]  # the criterion's unit per degree
     max_travel_deg: Annotated[Number, Field(ge=0, le=180)]
 
 
 class MoreViews(Section):
-    """More than two views; see `studies.more_views`."""
+    """More than two views; see `studies.curves`."""
 
     n_views: Annotated[Whole, Field(ge=2, le=8)]
     start_every_deg: Annotated[Whole, Field(ge=1, le=180)]
@@ -247,27 +261,27 @@ class Confirmation(Section):
 
     @field_validator("replicates")
     @classmethod
-    def _check_there_is_one(cls, value: list[list[int]]) -> list[list[int]]:
+    def _check_not_empty(cls, value: list[list[int]]) -> list[list[int]]:
         if not any(value):
-            raise ValueError("there is no replicate under any shuffle")
+            raise ValueError("no replicate under any shuffle")
         return value
 
 
 class Condition(Section):
-    """What sees the objects, and how they are framed."""
+    """The sensor that sees the objects, and their framing."""
 
     sensor: str
     framing: Framing
 
 
 class Randomisation(Section):
-    """What a camera does that is not known; see `nbv.data.randomisation`."""
+    """Ranges of unknown camera conditions; see `nbv.data.randomisation`."""
 
     elevation_deg: Annotated[Number, Field(ge=0, le=85)] = 0.0
     roll_deg: Annotated[Number, Field(ge=0, le=180)] = 0.0
     size: Annotated[Number, Field(ge=0, le=0.9)] = 0.0
-    nearest: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"] | None = None
-    farthest: Annotated[Number, Field(gt=1, le=1000), "in object diagonals"] | None = None
+    nearest: Diagonals | None = None
+    farthest: Diagonals | None = None
     measured: Share = 1.0
     table: Share = 0.0
     thin: Share = 0.0
@@ -289,7 +303,7 @@ class Randomisation(Section):
 
 
 class Bundles(Section):
-    """What bundles are compared without, and on which frames; see workflow/rules/bundles.smk."""
+    """Ingredients that bundles are compared without, and the frames for it."""
 
     ingredients: dict[Name, dict[Name, Number | None]] = {}
     replicates: Annotated[list[Replicate], Field(min_length=1), Distinct] = [0]
@@ -308,7 +322,7 @@ class Bundles(Section):
 
 
 class Transfer(Section):
-    """Conditions to train under and to test under; see `studies.transfer`."""
+    """Conditions for training and testing; see `studies.transfer`."""
 
     category: Name | None
     elevation_deg: Elevation
@@ -362,16 +376,18 @@ class Config(Section):
         focus = {"focus_category": self.focus_category, "transfer.category": self.transfer.category}
         for key, named in focus.items():
             if named is not None and named not in ours:
-                raise UserError(f"{key}={named} is no category of this run: {nearest(named, ours)}")
-        of_categories: dict[str, Collection[str]] = {
+                raise UserError(
+                    f"{key}={named} is not a category of this run: {nearest(named, ours)}"
+                )
+        by_category: dict[str, Collection[str]] = {
             "dataset.turn_deg": self.dataset.turn_deg,
             "dataset.categories": self.dataset.categories,
             "sensor.diagonal_m": self.sensor.diagonal_m,
         }
-        for key, values in of_categories.items():
+        for key, values in by_category.items():
             for named in values:
                 if named not in known:
-                    raise UserError(f"{key}.{named}: no such category; {nearest(named, known)}")
+                    raise UserError(f"{key}.{named}: unknown category; {nearest(named, known)}")
         return self
 
     @model_validator(mode="after")

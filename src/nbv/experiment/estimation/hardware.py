@@ -1,4 +1,4 @@
-"""Which device computes, in which precision, on how many threads."""
+"""Device, precision and threads of torch."""
 
 from __future__ import annotations
 
@@ -12,15 +12,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from nbv.errors import UserError, nearest
-
-DEVICES = ("auto", "cpu", "cuda", "mps")
-PRECISIONS = ("auto", "bfloat16", "float32")
+from nbv.errors import UserError
 
 
 @dataclass(frozen=True)
 class Hardware:
-    """Where and how a network runs."""
+    """The device and the precision of a network."""
 
     device: torch.device
     dtype: torch.dtype
@@ -49,27 +46,23 @@ def _bfloat16_is_native(device: str) -> bool:
 def choose_hardware(device: str = "auto", precision: str = "auto") -> Hardware:
     """Resolve the settings ``estimator.device`` and ``estimator.precision``.
 
-    ``auto`` takes CUDA, then Apple's MPS, then the CPU; and bfloat16 only where the chosen device
-    has it natively (elsewhere it is emulated and slower than float32).
+    ``auto`` chooses CUDA, then Apple's MPS, then the CPU; and bfloat16 only where the device
+    supports it natively (elsewhere it is emulated and slower than float32).
 
     Raises
     ------
     UserError
-        For an unknown name or a device that this machine lacks.
+        For a device that this machine lacks.
     """
-    if device not in DEVICES:
-        raise UserError(f"estimator.device={device}: {nearest(device, DEVICES)}")
-    if precision not in PRECISIONS:
-        raise UserError(f"estimator.precision={precision}: {nearest(precision, PRECISIONS)}")
     present = {
         "cuda": torch.cuda.is_available(),
         "mps": torch.backends.mps.is_available(),
         "cpu": True,
     }
     if device == "auto":
-        device = next(name for name, there in present.items() if there)
+        device = next(name for name, is_present in present.items() if is_present)
     elif not present[device]:
-        raise UserError(f"estimator.device={device}: this machine has none; use device=auto")
+        raise UserError(f"estimator.device={device}: not available on this machine; use auto")
     if precision == "auto":
         precision = "bfloat16" if _bfloat16_is_native(device) else "float32"
     return Hardware(torch.device(device), getattr(torch, precision))
@@ -88,7 +81,7 @@ def use_one_thread() -> None:
     # The same switch as use_deterministic_algorithms(True, warn_only=True), which also imports
     # torch's compiler: two seconds a job.
     torch.set_deterministic_debug_mode("warn")
-    # Filling memory that is about to be written finds faults; results are the same without.
+    # Filling memory that is about to be written only helps to find faults.
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
 
 

@@ -1,21 +1,26 @@
-"""The outputs of a trained network for images, and the azimuth that they give."""
+"""Outputs of trained networks, and the estimates of a fold's held-out objects from them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pandas as pd
 import torch
 from numpy.typing import NDArray
 
+from nbv.core.estimates import Estimates, Posteriors, posteriors_of
+from nbv.core.logits import fit_temperature
 from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
+from nbv.experiment.estimates import write_estimates, write_posteriors
 from nbv.experiment.estimation.hardware import Hardware, to_input
 from nbv.experiment.estimation.networks import Outputs, kind_of
 from nbv.experiment.estimation.weights import Estimator
+from nbv.experiment.splits import calibration_roles, check_objects, objects_with_role
 
 INFERENCE_BATCH = 256
-"""Images that a network estimates at once: more take longer, and more memory."""
+"""Images per batch of inference: larger batches take longer and more memory."""
 
 
 def outputs_of_parts(
@@ -24,16 +29,16 @@ def outputs_of_parts(
     parts: Sequence[Sequence[str]],
     hardware: Hardware,
 ) -> tuple[list[str], Outputs]:
-    """Return the outputs for some objects, divided among estimators.
+    """Return the outputs for objects that are divided among estimators.
 
     Parameters
     ----------
     estimators : sequence of Estimator
-        One for each part: the whole is one part, or each is asked about what it has not seen.
+        One for each part.
     images : DepthImages
         All objects of a category.
     parts : sequence of sequence of str
-        The objects of each part.
+        Object ids by part.
     hardware : Hardware
 
     Returns
@@ -45,15 +50,15 @@ def outputs_of_parts(
     Raises
     ------
     UserError
-        Where an estimator has seen one of its objects, or images of another size, or its outputs
-        are not finite.
+        Where an estimator was trained on one of its objects, or on images of another size, or its
+        outputs are not finite.
     """
     names: list[str] = []
     outputs = []
     for estimator, object_ids in zip(estimators, parts, strict=True):
         if seen := sorted(set(object_ids) & set(estimator.trained_on)):
             raise UserError(
-                f"object {seen[0]!r} was trained on: its estimates say nothing; train again"
+                f"object {seen[0]!r} is a training object of its estimator; train again"
             )
         names += object_ids
         outputs.append(network_outputs(estimator, images.of(object_ids), hardware))
@@ -97,22 +102,94 @@ def network_outputs(
         for start in range(0, len(flat), batch_size):
             output = estimator.network(to_input(flat[start : start + batch_size], hardware))
             outputs.append(output.float().cpu().numpy().astype(np.float64))
-    found = np.concatenate(outputs).reshape(*codes.shape[:-2], -1)
-    if not np.isfinite(found).all():
+    joined = np.concatenate(outputs).reshape(*codes.shape[:-2], -1)
+    if not np.isfinite(joined).all():
         raise UserError("the estimator's outputs are not finite; train it again")
-    return found
+    return joined
 
 
 def decode(estimator: Estimator, outputs: Outputs, temperature: float = 1.0) -> NDArray[np.float64]:
-    """Return the azimuths that an estimator's outputs (..., k) tell, in [0, 360) (Eq. 4).
+    """Decode an estimator's outputs (..., k) to azimuths in [0, 360) (Eq. 4).
 
     `temperature` divides the outputs; a regressor's angle does not depend on it.
     """
     return kind_of(estimator.settings).decode(outputs / temperature)
 
 
-def estimate_azimuth(
-    estimator: Estimator, codes: NDArray[np.uint8], hardware: Hardware
-) -> NDArray[np.float64]:
-    """Estimate the azimuth that each image was taken from: `network_outputs`, then `decode`."""
-    return decode(estimator, network_outputs(estimator, codes, hardware))
+FoldEstimates = dict[str, tuple[Estimates, Posteriors | None]]
+"""Estimates by role, ``calibration`` and ``test``; posteriors only where outputs are logits."""
+
+
+def estimate_fold(
+    images: DepthImages,
+    splits: pd.DataFrame,
+    fold: int,
+    tested: Estimator,
+    part_estimators: Sequence[Estimator],
+    hardware: Hardware,
+    *,
+    distributions: bool,
+) -> FoldEstimates:
+    """Estimate every view of a fold's calibration and test objects.
+
+    Parameters
+    ----------
+    images : DepthImages
+        All objects of a category.
+    splits : DataFrame
+        From `nbv.experiment.splits.read_splits`.
+    fold : int
+    tested : Estimator
+        The estimator of test objects.
+    part_estimators : sequence of Estimator
+        For cross-fitted calibration: the estimators that have not seen each part.
+    hardware : Hardware
+    distributions : bool
+        Whether outputs are logits of distributions. Calibration objects then choose one
+        temperature (`nbv.core.logits.fit_temperature`).
+
+    Returns
+    -------
+    FoldEstimates
+
+    Raises
+    ------
+    UserError
+        Where the objects differ from those in the splits, or as `outputs_of_parts` raises.
+    """
+    check_objects(splits, images.object_ids)
+    parts = [objects_with_role(splits, fold, role) for role in calibration_roles(splits)]
+    test = [objects_with_role(splits, fold, "test")]
+    outputs = {
+        "calibration": outputs_of_parts(part_estimators or [tested], images, parts, hardware),
+        "test": outputs_of_parts([tested], images, test, hardware),
+    }
+    temperature, posteriors = 1.0, None
+    if distributions:
+        azimuth_deg = np.linspace(0, 360, images.codes.shape[1], endpoint=False)
+        temperature = fit_temperature(outputs["calibration"][1], azimuth_deg)
+    estimates = {}
+    for role, (object_ids, output) in outputs.items():
+        if distributions:
+            posteriors = posteriors_of(object_ids, output, temperature)
+        estimates[role] = (
+            Estimates(tuple(object_ids), decode(tested, output, temperature)),
+            posteriors,
+        )
+    return estimates
+
+
+def write_fold(paths: Mapping[str, str], fold_estimates: FoldEstimates) -> None:
+    """Write a fold's estimates.
+
+    Parameters
+    ----------
+    paths : mapping
+        The files of ``calibration`` and ``test``, and where there are posteriors those of
+        ``calibration_posteriors`` and ``test_posteriors``.
+    fold_estimates : FoldEstimates
+    """
+    for role, (estimates, posteriors) in fold_estimates.items():
+        write_estimates(paths[role], estimates)
+        if posteriors is not None:
+            write_posteriors(paths[f"{role}_posteriors"], posteriors)

@@ -1,4 +1,4 @@
-"""The kinds of estimators: networks, what they are trained towards, and the angles they tell.
+"""The kinds of estimators: networks, training targets and the decoding of outputs to angles.
 
 A network maps images (n, 1, side, side) to outputs (n, k). View k of n has the azimuth 360 k / n.
 """
@@ -33,9 +33,9 @@ def direction_targets(settings: Settings, n_views: int) -> Targets:
 def class_targets(settings: Settings, n_views: int) -> Targets:
     """Return a distribution over classes for every view, (n_views, n_classes), rows summing to 1.
 
-    Class c of k is centred on 360 c / k degrees. Instead of all its mass on the class that holds
-    the azimuth, a view's target is a von Mises density about the azimuth itself, so that nearby
-    classes are nearly right and nothing ends at 0°.
+    Class c of k is centred on 360 c / k degrees. The target is a von Mises density about the
+    azimuth instead of a single class, so that nearby classes are nearly right and the circle has
+    no seam.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def decode_directions(outputs: Outputs) -> Outputs:
 def decode_classes(outputs: Outputs) -> Outputs:
     """Return the mean direction of the softmax of logits (..., k), degrees in [0, 360).
 
-    It is the direction of the mean of exp(i theta): the estimate of least expected 1 - cos(error).
+    It is the direction of the mean of exp(i theta), which minimises the expected 1 - cos(error).
     """
     n_classes = outputs.shape[-1]
     angles = 2 * np.pi * np.arange(n_classes) / n_classes
@@ -68,8 +68,8 @@ def decode_classes(outputs: Outputs) -> Outputs:
 
 def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.Module:
     channels = settings["channels"]
-    # The first layer's maps are the largest: normalising them too took a sixth of the time of
-    # training, and estimates were no better for it.
+    # The first layer's maps are the largest: normalising them took a sixth of the training time and
+    # did not improve estimates.
     layers = [nn.Conv2d(1, channels[0], 5, stride=2, padding=2), nn.ReLU(inplace=True)]
     for before, after in pairwise(channels):
         layers += [
@@ -92,9 +92,9 @@ def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.
 def regressor(settings: Settings, image_side: int) -> nn.Module:
     """Return a network in the spirit of Pose-CyclicR-Net with the outputs (cos, sin).
 
-    Strided convolutions, from the second on with batch normalisation, one hidden layer, two linear
+    Strided convolutions, with batch normalisation from the second on, one hidden layer, two linear
     outputs (paper, Sec. 3.2.1). The outputs are not normalised: trained on squared error they tend
-    to the mean direction, whose length says how sure the network is.
+    to the mean direction, whose length measures the network's certainty.
 
     Parameters
     ----------
@@ -120,11 +120,11 @@ class Kind:
     network : callable
         ``network(settings, image_side)``, untrained.
     targets : callable
-        ``targets(settings, n_views)``: what is wanted of each view of a turn, (n_views, k).
+        ``targets(settings, n_views)``: the targets of the views of a full turn, (n_views, k).
     loss : callable
         ``loss(outputs, targets)``, a scalar tensor.
     decode : callable
-        ``decode(outputs)``: the angle of outputs (..., k), degrees in [0, 360).
+        ``decode(outputs)``: the angles of outputs (..., k), degrees in [0, 360).
     """
 
     network: Callable[[Settings, int], nn.Module]

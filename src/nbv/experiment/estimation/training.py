@@ -1,4 +1,4 @@
-"""Training one estimator."""
+"""Training of an estimator."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PROGRESS_SECONDS = 5.0
 
 @dataclass(frozen=True)
 class Progress:
-    """Says how far a training has come, every few seconds."""
+    """Logs the progress of a training every few seconds."""
 
     n_epochs: int
     n_images: int
@@ -59,7 +59,8 @@ def train_estimator(
 ) -> Estimator:
     """Train an estimator on some objects, whose ids are kept with the weights.
 
-    Parameters and errors as of `train_network` and of `nbv.data.depth_images.DepthImages.of`.
+    Same parameters and errors as `train_network`; also raises as
+    `nbv.data.depth_images.DepthImages.of` does.
     """
     weights, origin = (start.network, start.origin) if start else (None, None)
     network = train_network(images.of(object_ids), settings, hardware, seed, weights)
@@ -80,15 +81,15 @@ def train_network(
     codes : ndarray (n_objects, n_views, side, side) uint8
         Training images; view k of n has the azimuth 360 k / n.
     settings : mapping
-        ``kind, channels, hidden, epochs, batch_size, learning_rate, weight_decay``, and what the
-        kind also needs.
+        ``kind, channels, hidden, epochs, batch_size, learning_rate, weight_decay``, and further
+        settings of the kind.
     hardware : Hardware
     seed : int
-        Of the weights and of the order of the images: the same seed on the same machine gives the
+        Seeds the weights and the order of the images: the same seed on the same machine gives the
         same bits.
     start : torch.nn.Module, optional
-        A network of the same kind and size. Its weights are those to start from, and it stays as
-        it is; random weights without it.
+        A network of the same kind and size whose weights the training starts from. By default it
+        starts from random weights.
 
     Returns
     -------
@@ -98,7 +99,7 @@ def train_network(
     Raises
     ------
     UserError
-        Where the loss or a weight is no finite number any more, or the start is of another size.
+        Where the loss or a weight becomes non-finite, or the start has another size.
     """
     n_objects, n_views, side, _ = codes.shape
     kind = kind_of(settings)
@@ -107,8 +108,8 @@ def train_network(
     if start is not None:
         _set_weights(network, start)
     images = to_input(codes, hardware)
-    of_one = kind.targets(settings, n_views)
-    targets = torch.from_numpy(np.tile(of_one, (n_objects, 1))).to(hardware.device)
+    view_targets = kind.targets(settings, n_views)
+    targets = torch.from_numpy(np.tile(view_targets, (n_objects, 1))).to(hardware.device)
     n_images, batch_size, n_epochs = len(images), settings["batch_size"], settings["epochs"]
     batches = max(n_images // batch_size, 1)
     optimiser = torch.optim.AdamW(
@@ -132,7 +133,7 @@ def train_network(
             chosen = permutation[batch * batch_size : (batch + 1) * batch_size]
             network.zero_grad(set_to_none=True)
             with hardware.autocast():
-                # Takes half the time of images[chosen], and gives the same.
+                # Same as images[chosen], in half the time.
                 output = network(images.index_select(0, chosen))
             loss = kind.loss(output.float(), targets[chosen])
             loss.backward()  # type: ignore[no-untyped-call]
@@ -141,12 +142,12 @@ def train_network(
             running += loss.detach()
             now = time.perf_counter()
             if now - reported > PROGRESS_SECONDS:
-                _need_finite(network, running, epoch, settings)
+                _check_finite(network, running, epoch, settings)
                 progress.report(
                     epoch, len(chosen) + batch * batch_size, float(running) / (batch + 1)
                 )
                 reported = now
-        _need_finite(network, running, epoch, settings)
+        _check_finite(network, running, epoch, settings)
         progress.report(epoch, n_images, float(running) / batches)
     return network.eval()
 
@@ -156,12 +157,12 @@ def _set_weights(network: nn.Module, start: nn.Module) -> None:
         network.load_state_dict(start.state_dict())
     except RuntimeError as error:
         raise UserError(
-            "training: it starts from a network of another size: train that one again with the "
+            "training: the network to start from has another size: train it again with the "
             "same estimator.kind, channels, hidden, n_classes and camera.image_side"
         ) from error
 
 
-def _need_finite(
+def _check_finite(
     network: nn.Module, loss: torch.Tensor, epoch: int, settings: Mapping[str, Any]
 ) -> None:
     if all(bool(torch.isfinite(values).all()) for values in (loss, *network.parameters())):

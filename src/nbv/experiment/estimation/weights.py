@@ -1,4 +1,4 @@
-"""Estimators on disk: safetensors, never pickle, with what they were trained on."""
+"""Files of estimators: safetensors, never pickle, with the training history."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from nbv.files import damaged, readable, replacing, sha256_of
 
 @dataclass(frozen=True)
 class Estimator:
-    """A trained network and its history.
+    """A trained network and its training history.
 
     Attributes
     ----------
     network : torch.nn.Module
         In evaluation mode.
     settings : mapping
-        The estimator's settings as it was trained with them.
+        The estimator's settings at training.
     image_side : int
         Pixels.
     trained_on : sequence of str
-        The objects it has seen; ``<category>/<object>`` where objects of all categories meet.
+        Its training objects; ``<category>/<object>`` where it was trained on all categories.
     started_from : mapping, optional
-        ``path`` (from the estimator's own folder) and ``sha256`` of the estimator whose weights it
-        started from.
+        ``path`` (relative to the estimator's folder) and ``sha256`` of the estimator whose weights
+        it started from.
     """
 
     network: nn.Module
@@ -60,7 +60,7 @@ class Start:
 
 
 def save_estimator(path: str | Path, estimator: Estimator, hardware: Hardware) -> None:
-    """Write weights and history to a `.safetensors` file."""
+    """Write weights and training history to a `.safetensors` file."""
     history = {
         "settings": dict(estimator.settings),
         "image_side": estimator.image_side,
@@ -75,17 +75,17 @@ def save_estimator(path: str | Path, estimator: Estimator, hardware: Hardware) -
     }
     metadata = {"nbv": json.dumps(history, sort_keys=True)}
     with replacing(path) as temporary:
-        # Not save_file: its error on a full disk is not the system's.
+        # save_file would hide the system's error on a full disk.
         temporary.write_bytes(safetensors.torch.save(tensors, metadata=metadata))
 
 
 def load_estimator(path: str | Path, hardware: Hardware) -> Estimator:
-    """Read what `save_estimator` wrote.
+    """Read a file of `save_estimator`.
 
     Raises
     ------
     UserError
-        Where the file is no estimator of this project.
+        Where the file does not hold an estimator of this project.
     """
     with readable(path):
         with safetensors.safe_open(path, framework="pt") as stored:
@@ -111,34 +111,34 @@ def load_estimator(path: str | Path, hardware: Hardware) -> Estimator:
 def read_start(
     path: str, category: str, object_ids: Sequence[str], output: str, hardware: Hardware
 ) -> Start:
-    """Read what a training is to start from.
+    """Read the weights that a training starts from.
 
     Parameters
     ----------
     path : str
-        An estimator of the same category, or a network that all categories were pretrained with.
+        An estimator of the same category, or a network that was pretrained on all categories.
     category : str
     object_ids : sequence of str
-        The objects to train on.
+        The training objects.
     output : str
-        Where the new estimator is to lie.
+        The path of the new estimator.
     hardware : Hardware
 
     Raises
     ------
     UserError
-        Where it has seen other objects of the category: one of them may be there to calibrate or
-        to test with. Also as of `load_estimator`.
+        Where it was trained on other objects of the category, which may be calibration or test
+        objects. Also as `load_estimator` raises.
     """
     stored = load_estimator(path, hardware)
     seen, own = set(stored.trained_on), set(object_ids)
     qualified = set(with_category(category, object_ids))
     if seen != own and {name for name in seen if name.startswith(f"{category}/")} != qualified:
-        raise damaged(path, f"it has seen other objects of {category} than what starts from it")
+        raise damaged(path, f"it was trained on other objects of {category}")
     relative = os.path.relpath(path, Path(output).parent)
     return Start(stored.network, {"path": relative, "sha256": sha256_of(path)})
 
 
 def with_category(category: str, object_ids: Sequence[str]) -> list[str]:
-    """Return ``<category>/<object>``: an id of its own where objects of all categories meet."""
+    """Return ids ``<category>/<object>``, unique over all categories."""
     return [f"{category}/{object_id}" for object_id in object_ids]

@@ -1,7 +1,7 @@
-"""One HTML page to play with: turn the camera round an object and see what each method makes of it.
+"""The explorer: an interactive HTML page with the estimates and next views of every method.
 
-It needs nothing but itself: no network, no server. The errors are those of the evaluation files;
-what a page works out by itself are beliefs after several views (``explorer_beliefs.js``).
+It is self-contained: no network, no server. Errors are those of the evaluation files; the page
+computes only the beliefs after several views (``explorer_beliefs.js``).
 """
 
 from __future__ import annotations
@@ -18,56 +18,55 @@ from nbv.core.lookup import LookupTable
 from nbv.data.depth_images import open_depth
 from nbv.errors import UserError
 from nbv.experiment.estimates import read_posteriors
-from nbv.experiment.explorer.images import COLUMNS, ring_of
-from nbv.experiment.explorer.outcomes import (
+from nbv.experiment.explorer.data import (
+    COLUMNS,
     Outcomes,
+    cost_error,
     methods_of,
     outcomes_of,
     outcomes_text,
-    unit_facts,
-)
-from nbv.experiment.explorer.tables import (
-    cost_error,
     own_distributions_text,
     own_error,
     page_table,
     probability_error,
+    ring_of,
+    unit_facts,
 )
-from nbv.experiment.report.templating import HTML
+from nbv.experiment.report.table import HTML
 from nbv.experiment.results import EvaluationFile, Unit, load_evaluations
 from nbv.files import existing
 from nbv.labels import category_label, method_label
 from nbv.robot.style import method_style
 
 LookupFile = tuple[str, int, int, str]
-"""What a lookup table is of: category, elevation in degrees, fold and criterion."""
+"""The key of a lookup table: category, elevation in degrees, fold and criterion."""
 
 _MOST_COARSE_BINS = 120
 
 
 @dataclass(frozen=True)
 class ExplorerInputs:
-    """The files and settings that the page is made of.
+    """The files and settings of the page.
 
     Attributes
     ----------
     name : str
-        Of the run.
+        The name of the run.
     policies : mapping of str to str
-        By method: its policy.
+        The policy by method.
     evaluations : mapping of (category, elevation_deg, fold, method) to Path
     lookups : mapping of (category, elevation_deg, fold, criterion) to Path
-        Of every fold the same criteria.
+        Every fold has the same criteria.
     min_separation_deg : float
-        Of views that the information gain chooses.
+        Least separation of views chosen by the information gain.
     n_views : int
-        The most views.
+        The largest number of views.
     depth, objects : mapping of (category, elevation_deg) to Path
-        Depth images and the ids of their objects; none where the estimates are of another program.
+        Depth images and the ids of their objects; empty for estimates of another program.
     posteriors : mapping of (category, elevation_deg, fold) to Path
-        Distributions of test images, where the estimator gives them.
+        Distributions of test images, if the estimator gives them.
     caution : sequence of str
-        What a reader has to know before any number; see `nbv.experiment.run_size`.
+        Warnings that precede all numbers; see `nbv.experiment.run_size`.
     """
 
     name: str
@@ -83,7 +82,7 @@ class ExplorerInputs:
 
 
 class _Chunks:
-    """The texts of a page by name, and how far the worst of each kind is off."""
+    """The texts of a page by name, and their quantisation errors by kind."""
 
     def __init__(self) -> None:
         self.texts: dict[str, str] = {}
@@ -101,8 +100,8 @@ def build_explorer(inputs: ExplorerInputs) -> str:
     Raises
     ------
     UserError
-        If a file is missing or damaged, files are not about the same objects, or no method follows
-        a lookup table.
+        If a file is missing or damaged, the objects of files differ, or no method follows a lookup
+        table.
     """
     if not inputs.lookups:
         raise UserError("the explorer shows lookup tables, and no method of this run follows one")
@@ -146,12 +145,12 @@ def build_explorer(inputs: ExplorerInputs) -> str:
         n_first_views=sum(len(unit["objects"]) * unit["views"] for unit in units),
         most_views=inputs.n_views,
         chunks=chunks.texts,
-        errors={kind: _of_kind(kind, found) for kind, found in chunks.errors.items()},
+        errors={kind: _worst_error(kind, errors) for kind, errors in chunks.errors.items()},
         cost_units=sorted({unit["tables"][0]["unit"] for unit in units}),
     )
 
 
-def _of_kind(kind: str, errors: Iterable[float]) -> float:
+def _worst_error(kind: str, errors: Iterable[float]) -> float:
     """Return the mean of image errors, and the largest of all others."""
     return float(np.mean(list(errors))) if kind == "grey" else max(errors)
 
@@ -174,19 +173,19 @@ def _add_tables(
     unit: Unit,
     outcomes: Outcomes,
 ) -> list[dict[str, Any]]:
-    found = []
-    for place, (fold, criterion) in enumerate(_each_table(criteria, outcomes)):
+    facts = []
+    for i, (fold, criterion) in enumerate(_each_table(criteria, outcomes)):
         table = LookupTable.load(existing(inputs.lookups[*unit, fold, criterion]))
         stored = page_table(table)
         chunks.add(
-            f"table-{index}-{place}",
+            f"table-{index}-{i}",
             stored.text,
             probability=probability_error(stored, table),
             cost=cost_error(stored, table),
         )
         coarse = coarse_bins(len(table.cost), outcomes.n_views)
-        found.append({"fold": fold, "criterion": criterion, "coarse": coarse, **stored.facts})
-    return found
+        facts.append({"fold": fold, "criterion": criterion, "coarse": coarse, **stored.facts})
+    return facts
 
 
 def _each_table(criteria: list[str], outcomes: Outcomes) -> Iterator[tuple[int, str]]:
@@ -196,7 +195,7 @@ def _each_table(criteria: list[str], outcomes: Outcomes) -> Iterator[tuple[int, 
 
 
 def coarse_bins(n_bins: int, n_views: int) -> int:
-    """Return the bins that the page chooses further views by.
+    """Return the number of bins that the page uses to choose further views.
 
     At most 120, as in `nbv.core.evidence`; a rotation by a bin leads from view to view,
     and each bin is an odd number of the table's, so that the centres agree.
@@ -214,9 +213,9 @@ def _add_images(
     if not inputs.depth:
         return None
     images = open_depth(existing(inputs.depth[unit]), existing(inputs.objects[unit]))
-    for place, object_id in enumerate(outcomes.object_ids):
+    for i, object_id in enumerate(outcomes.object_ids):
         ring = ring_of(images.of([object_id])[0])
-        chunks.add(f"ring-{index}-{place}", ring.data, grey=ring.grey_error)
+        chunks.add(f"ring-{index}-{i}", ring.data, grey=ring.grey_error)
     return {"count": ring.n_images, "side": ring.side, "columns": COLUMNS}
 
 
@@ -227,7 +226,7 @@ def _add_own(
         return None
     for fold in sorted(set(outcomes.folds)):
         tested = zip(outcomes.object_ids, outcomes.folds, strict=True)
-        ids = [name for name, of in tested if of == fold]
+        ids = [name for name, tested_in in tested if tested_in == fold]
         posteriors = read_posteriors(existing(inputs.posteriors[*unit, fold]), ids)
         text = own_distributions_text(posteriors)
         chunks.add(f"own-{index}-{fold}", text, own=own_error(posteriors))

@@ -1,1 +1,1 @@
-"""What the paper says: its printed values, its claims, and whether they hold."""
+"""The paper's printed values and claims, and their verdicts on our results."""

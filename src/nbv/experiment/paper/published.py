@@ -1,4 +1,4 @@
-"""The paper's Tables 1 to 7 as printed, with what to bear in mind.
+"""The paper's Tables 1 to 7 as printed, with remarks.
 
 MAE in degrees, pAUC in percent. Columns are single, random, opposite, proposed throughout.
 """
@@ -19,15 +19,15 @@ FOLD_ROWS = ("1", "2", "3", "4", "5")
 AVERAGE_ROW = "average"
 SIGMA_ROW = "sigma"
 
-Row = tuple[float, ...]
+PublishedRow = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Note:
-    """A remark, and the published figures that it explains: it is out of place without them.
+    """A remark on some published numbers, shown only with them.
 
-    Empty fields stand for any figure. With `ours` it explains our figures as well, so that it is
-    shown where none is published too.
+    Empty fields stand for any number. With `ours` it explains our numbers as well, and is shown
+    even where none is published.
     """
 
     text: str
@@ -39,10 +39,10 @@ class Note:
 
 @dataclass(frozen=True)
 class PublishedTable:
-    """One table: its title, ``values[metric][row]`` in the order of `METHODS`, and known slips."""
+    """A table: its title, ``values[metric][row]`` in the order of `METHODS`, and remarks."""
 
     title: str
-    values: Mapping[str, Mapping[str, Row]]
+    values: Mapping[str, Mapping[str, PublishedRow]]
     notes: tuple[Note, ...] = ()
 
 
@@ -220,7 +220,7 @@ PUBLISHED: Mapping[str, PublishedTable] = {
 
 
 def published_value(table: str, metric: str, row: str, method: str) -> float:
-    """Return one published figure as printed, or NaN where the paper prints none.
+    """Return one published value as printed, or NaN where the paper prints none.
 
     Parameters
     ----------

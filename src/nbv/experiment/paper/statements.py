@@ -1,4 +1,4 @@
-"""Statements about results, and when they hold.
+"""Statements about results, and the rules for their verdicts.
 
 A statement is one comparison or a compound of statements. Each gets one of four verdicts:
 
@@ -11,12 +11,12 @@ A statement is one comparison or a compound of statements. Each gets one of four
     The interval excludes zero on the other side; it lies outside ±margin altogether; there is
     an outlier; so many parts do not hold that k cannot be reached.
 ``undecided``
-    Neither: the interval includes zero, or reaches over the margin. And wherever fewer than
+    Neither: the interval includes zero, or extends over the margin. Also wherever fewer than
     `FEWEST_OBJECTS` test objects are resampled together (those of a category; for σ over folds,
-    those of a fold): an interval over so few means nothing.
+    those of a fold), because an interval over so few is meaningless.
 ``not run``
-    What it speaks of was not evaluated. A compound is ``not run`` where its verdict depends on
-    parts that were not.
+    Its subject was not evaluated. A compound is ``not run`` where its verdict depends on parts that
+    were not run.
 
 Intervals are not corrected for the number of comparisons.
 """
@@ -43,7 +43,7 @@ VERDICTS: tuple[Verdict, ...] = (HOLDS, FAILS, UNDECIDED, NOT_RUN)
 
 TUKEY_FACTOR = 1.5
 FEWEST_OBJECTS = 5
-"""Test objects that an interval over objects, and so a verdict, needs."""
+"""The least number of test objects for a decided verdict."""
 
 
 @dataclass(frozen=True)
@@ -101,9 +101,9 @@ Statement = Comparison | AtLeast
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper, what it compares in words, and the same to be evaluated.
+    """A sentence of the paper, with the comparison in words and as a statement.
 
-    The title names it where there is no room for the sentence.
+    The title is short, for plots.
     """
 
     id: str
@@ -116,7 +116,7 @@ class Claim:
 
 
 def all_of(parts: Sequence[Statement], label: str = "") -> AtLeast:
-    """Return the compound that holds where every part does."""
+    """Return the compound that holds if every part holds."""
     return AtLeast(len(parts), tuple(parts), label)
 
 
@@ -128,7 +128,7 @@ def leaves(statement: Statement) -> list[Comparison]:
 
 
 def if_enough(verdict: Verdict, n_objects: int) -> Verdict:
-    """Return a verdict, or that it is open where too few objects are resampled together."""
+    """Return a verdict, but undecided where too few objects are resampled together."""
     return UNDECIDED if verdict != NOT_RUN and n_objects < FEWEST_OBJECTS else verdict
 
 
@@ -152,7 +152,7 @@ def comparable_verdict(low: float, high: float, margin: float) -> Verdict:
 
 
 def combine(count: int, verdicts: Sequence[Verdict]) -> Verdict:
-    """Return the verdict of *AtLeast*: decided only where no open part could change it."""
+    """Return the verdict of *AtLeast*: decided only where no undecided part could change it."""
     holding = sum(verdict == HOLDS for verdict in verdicts)
     possible = sum(verdict != FAILS for verdict in verdicts)
     if holding >= count:
@@ -163,12 +163,12 @@ def combine(count: int, verdicts: Sequence[Verdict]) -> Verdict:
 
 
 def in_favour(part: Better | Comparable, value: float, low: float, high: float) -> Interval:
-    """Return by how much a difference a - b, with its interval, favours a comparison.
+    """Return how far a difference a - b, with its interval, favours a comparison.
 
     Parameters
     ----------
     part : Better or Comparable
-        What is compared.
+        The comparison.
     value, low, high : float
         The difference and its 95 % interval, in the statistic's unit.
 
@@ -176,8 +176,7 @@ def in_favour(part: Better | Comparable, value: float, low: float, high: float) 
     -------
     tuple of float
         Value, low and high, in the same unit. The comparison holds where low is above 0 and does
-        not hold where high is below 0. Of *Comparable*, it is how far the difference is inside
-        the margin.
+        not hold where high is below 0. For *Comparable* it is the distance inside the margin.
     """
     if isinstance(part, Comparable):
         inside = min(abs(low), abs(high)) if low * high > 0 else 0.0
@@ -194,19 +193,19 @@ def deciding(
     verdicts: Mapping[Comparison, Verdict],
     favours: Mapping[Comparison, float],
 ) -> Comparison:
-    """Return the comparison that a statement stands or falls with: its verdict is the statement's.
+    """Return the comparison that decides a statement; its verdict is the statement's.
 
-    Of *AtLeast(k, parts)* it is that of the k-th best part: by verdict, and within a verdict by
-    how much the difference favours it.
+    For *AtLeast(k, parts)* it is that of the k-th best part: by verdict, and within a verdict by
+    how far the difference favours it.
 
     Parameters
     ----------
     statement : Statement
-        What was judged, decided or not; not one that was not run.
+        A statement with a verdict other than ``not run``.
     verdicts : mapping of Comparison to str
-        Of each of its comparisons.
+        The verdicts of its comparisons.
     favours : mapping of Comparison to float
-        By how much each is favoured; see `in_favour`.
+        How far each is favoured; see `in_favour`.
     """
     if not isinstance(statement, AtLeast):
         return statement
@@ -248,11 +247,11 @@ VERDICT_RULES = (
     "Our figures: each competitor with the paired difference to the claim's subject and its "
     "interval; of compound claims, the closest competitor of each part.",
 )
-"""How verdicts are reached, for readers."""
+"""The rules for verdicts, for readers of tables."""
 
 
 def by_run(claims: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return one row per claim: those that were run, decided or not, and those that were not."""
+    """Return one row per claim: the claims that were run, and those that were not."""
     each = claims.drop_duplicates("id")
     absent = each["verdict"] == NOT_RUN
     return each[~absent], each[absent]
@@ -260,11 +259,11 @@ def by_run(claims: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def term_text(term: Term) -> str:
     """Name a method and the images it is judged on."""
-    return f"{method_label(term.method)} ({place_text(term)})"
+    return f"{method_label(term.method)} ({images_text(term)})"
 
 
 def summarise(statement: Statement, measured: Measured) -> str:
-    """Return the figures a reader needs: every competitor, or the closest one of each part."""
+    """Return the key numbers: every competitor, or the closest competitor in each part."""
     if isinstance(statement, AtLeast) and any(
         isinstance(part, AtLeast) and part.label for part in statement.parts
     ):
@@ -273,20 +272,20 @@ def summarise(statement: Statement, measured: Measured) -> str:
         for part in statement.parts:
             label = part.label if isinstance(part, AtLeast) else ""
             verdict = combine_statement(part, verdicts)
-            found = [leaf for leaf in leaves(part) if "value" in measured[leaf]]
-            closest = _competition([_closest(found, measured)], measured, False) if found else ""
+            run = [leaf for leaf in leaves(part) if "value" in measured[leaf]]
+            closest = _competition([_closest(run, measured)], measured, False) if run else ""
             texts.append(f"{label}: {verdict}" + (f" ({closest})" if closest else ""))
         return "; ".join(texts)
     return _competition(leaves(statement), measured)
 
 
-def _competition(leaves: Sequence[Comparison], measured: Measured, place: bool = True) -> str:
-    """Return each subject's figure, with its competitors and their paired differences."""
+def _competition(leaves: Sequence[Comparison], measured: Measured, with_images: bool = True) -> str:
+    """Return the value of each subject, with its competitors and their paired differences."""
     rivals: dict[str, list[str]] = {}
-    told: set[tuple[str, frozenset[Term]]] = set()
+    seen: set[tuple[str, frozenset[Term]]] = set()
     for leaf in leaves:
         row = measured[leaf]
-        name = term_text(leaf.a) if place else method_label(leaf.a.method)
+        name = term_text(leaf.a) if with_images else method_label(leaf.a.method)
         if "value" not in row:
             rivals[f"{name}: not run"] = []
             continue
@@ -295,12 +294,12 @@ def _competition(leaves: Sequence[Comparison], measured: Measured, place: bool =
             rivals[f"{category_label(leaf.a.units[0][0])}: {share} % above {fence}°"] = []
             continue
         pair = leaf.statistic, frozenset((leaf.a, leaf.b))
-        if pair in told:
+        if pair in seen:
             continue
-        told.add(pair)
+        seen.add(pair)
         unit = UNIT_OF[leaf.statistic]
         subject = f"{name}, {STATISTIC_LABELS[leaf.statistic]} {number(row['value'])}{unit}"
-        same_images = place_text(leaf.a) == place_text(leaf.b)
+        same_images = images_text(leaf.a) == images_text(leaf.b)
         rival = method_label(leaf.b.method) if same_images else term_text(leaf.b)
         difference = interval_text(row["difference"], row["ci_low"], row["ci_high"])
         rivals.setdefault(subject, []).append(
@@ -320,7 +319,7 @@ STATISTIC_LABELS: Mapping[str, str] = {
     "mae_sigma": "σ of MAE",
     "pauc_sigma": "σ of pAUC",
 }
-"""How statistics are named."""
+"""Labels of the statistics."""
 
 
 def _closest(leaves: Sequence[Comparison], measured: Measured) -> Comparison:
@@ -334,7 +333,7 @@ def _closest(leaves: Sequence[Comparison], measured: Measured) -> Comparison:
     return min(leaves, key=advantage)
 
 
-def place_text(term: Term) -> str:
+def images_text(term: Term) -> str:
     """Name the images that a term is judged on."""
     if len(term.units) > 1:
         where = f"{len(term.units)} categories pooled"

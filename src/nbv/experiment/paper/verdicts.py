@@ -1,4 +1,4 @@
-"""Evaluating the paper's claims on our results, and on the paper's own printed figures."""
+"""Verdicts on the paper's claims, on our results and on the paper's own printed numbers."""
 
 from __future__ import annotations
 
@@ -71,25 +71,25 @@ def evaluate_claims(
     n_resamples: int = 2000,
     claims: Sequence[Claim] = CLAIMS,
 ) -> pd.DataFrame:
-    """Evaluate every claim; see `nbv.experiment.paper.statements` for when one holds.
+    """Evaluate every claim; see `nbv.experiment.paper.statements` for the rules.
 
     Parameters
     ----------
     evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
-        Frames of `results.load_evaluations`; what is absent is reported as ``not run``.
+        Frames of `results.load_evaluations`; claims on absent units are ``not run``.
     rng : numpy.random.Generator
         Seeds the object resamples, which all comparisons share. ``default_rng(seed)`` gives the
         same intervals as the tables of ``ReportSettings(seed=seed)``.
     n_resamples : int
         Number of resamples.
     claims : sequence of Claim
-        The paper's, unless others are given.
+        By default the paper's claims.
 
     Returns
     -------
     pandas.DataFrame
         Tidy: one row per comparison, `CLAIM_COLUMNS` (the same for all parts of a claim) and
-        `PART_COLUMNS`. ``point_verdict`` judges our figures without their intervals, as the paper
+        `PART_COLUMNS`. ``point_verdict`` judges our values without their intervals, as the paper
         judges its own. ``difference`` is subject minus versus, in degrees or percent,
         with its 95 % interval over objects, whatever direction the claim asks for.
     """
@@ -117,7 +117,7 @@ def evaluate_claims(
 
 
 def read_claims(path: str | Path) -> pd.DataFrame:
-    """Read `evaluate_claims` of the paper's claims from a CSV file.
+    """Read a CSV file of `evaluate_claims` for the paper's claims.
 
     Raises
     ------
@@ -134,18 +134,18 @@ def read_claims(path: str | Path) -> pd.DataFrame:
     }
     if absent := sorted(planned - read):
         raise damaged(path, f"comparison {absent[0][1]} of claim {absent[0][0]!r} is missing")
-    need_verdicts(path, [*frame["verdict"], *frame["point_verdict"]])
+    check_verdicts(path, [*frame["verdict"], *frame["point_verdict"]])
     return frame
 
 
-def need_verdicts(path: str | Path, values: Iterable[str]) -> None:
-    """Raise UserError where a value is none of the verdicts."""
+def check_verdicts(path: str | Path, values: Iterable[str]) -> None:
+    """Raise UserError where a value is not a verdict."""
     if unknown := sorted(set(values) - set(VERDICTS), key=str):
-        raise damaged(path, f"{str(unknown[0])[:40]!r} is no verdict")
+        raise damaged(path, f"{str(unknown[0])[:40]!r} is not a verdict")
 
 
 class _Evaluator:
-    """Measures comparisons, keeping what several of them need."""
+    """Measures comparisons, with a cache of samples and estimates."""
 
     def __init__(self, evaluations: Mapping[Unit, pd.DataFrame], resampler: Resampler) -> None:
         self._evaluations = evaluations
@@ -154,7 +154,7 @@ class _Evaluator:
         self._estimates: dict[tuple[str, Term], Estimate | None] = {}
 
     def measure(self, part: Comparison) -> dict[str, Any]:
-        """Return the columns of `PART_COLUMNS` that one comparison has figures for."""
+        """Return the values of one comparison by `PART_COLUMNS`."""
         if isinstance(part, FreeOfOutliers):
             return self._measure_outliers(part)
         a, b = self._estimate(part.statistic, part.a), self._estimate(part.statistic, part.b)
@@ -168,14 +168,14 @@ class _Evaluator:
         }
         if a is None or b is None:
             return row
-        found = a.minus(b)
+        difference = a.minus(b)
         samples = self._sample(part.a), self._sample(part.b)
         fewest = min(paired.fewest_resampled(part.statistic, sample) for sample in samples)
-        verdict = _interval_verdict(part, found.low, found.high)
+        verdict = _interval_verdict(part, difference.low, difference.high)
         return row | {
             "value": a.value,
             "versus_value": b.value,
-            **found.columns("difference", "ci"),
+            **difference.columns("difference", "ci"),
             "part_verdict": statements.if_enough(verdict, fewest),
             "n_objects": samples[0].n_objects,
         }
@@ -238,7 +238,7 @@ class _Evaluator:
 
 
 def _published(statistic: str, term: Term) -> float:
-    """Return what the paper prints for a term: pooled categories as the mean of their rows."""
+    """Return the published value of a term; pooled categories are the mean of their rows."""
     return float(np.mean([_published_unit(statistic, term, unit) for unit in term.units]))
 
 

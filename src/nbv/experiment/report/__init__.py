@@ -1,1 +1,1 @@
-"""Tables, figures and the report: they show what others computed, with intervals."""
+"""Tables, figures and the report of a run."""

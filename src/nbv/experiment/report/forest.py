@@ -1,4 +1,4 @@
-"""The paper's claims as pictures: all in one, and each with its comparisons."""
+"""Forest plots of the paper's claims: all in one plot, and a plot for each claim."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from nbv.experiment.paper.statements import (
     Statement,
     Term,
     Verdict,
-    place_text,
+    images_text,
     term_text,
 )
 from nbv.experiment.statistics.paired import LOWER_IS_BETTER, UNIT_OF
@@ -45,7 +45,8 @@ from nbv.robot.style import (
     new_figure,
 )
 
-Row = Mapping[Hashable, Any]
+ClaimRow = Mapping[Hashable, Any]
+"""A row of the claims' table by column."""
 
 WIDTH_IN = 3.9
 _ROW_IN = 0.185
@@ -58,9 +59,9 @@ _VERDICTS: Mapping[Verdict, tuple[str, str, str]] = {
 
 @dataclass(frozen=True)
 class _Decided:
-    """A claim with its verdict, and by how much the comparison that decides it favours it.
+    """A claim with its verdict, and how far its deciding comparison favours it.
 
-    Without an interval, `text` says what was found.
+    `text` states the result where there is no interval.
     """
 
     title: str
@@ -71,81 +72,81 @@ class _Decided:
 
 @mpl.rc_context(RC)
 def claims_forest(judged: pd.DataFrame) -> Figure:
-    """Draw every claim that was run: by how much it is favoured, with its interval and verdict.
+    """Draw all claims that were run: how far each is favoured, with interval and verdict.
 
     Parameters
     ----------
     judged : DataFrame
-        Of `nbv.experiment.paper.verdicts.read_claims`.
+        From `nbv.experiment.paper.verdicts.read_claims`.
     """
     claims = [_decided(claim, rows) for claim, rows in _rows_of(judged)]
     groups = {
-        verdict: [one for one in claims if one.verdict == verdict]
+        verdict: [claim for claim in claims if claim.verdict == verdict]
         for verdict in _VERDICTS
-        if any(one.verdict == verdict for one in claims)
+        if any(claim.verdict == verdict for claim in claims)
     }
     n_rows = len(claims) + len(groups)
     figure = new_figure(WIDTH_IN, _ROW_IN * n_rows + 0.6)
     axes = figure.subplots()
     labels: list[str] = []
     headings = []
-    for verdict, found in groups.items():
+    for verdict, members in groups.items():
         words, color, marker = _VERDICTS[verdict]
         headings.append(len(labels))
-        labels.append(f"{words}: {len(found)}")
+        labels.append(f"{words}: {len(members)}")
         axes.plot(0, len(labels) - 1, linestyle="none")
-        for one in found:
-            _draw_decided(axes, one, len(labels), color, marker)
-            labels.append(one.title)
+        for claim in members:
+            _draw_decided(axes, claim, len(labels), color, marker)
+            labels.append(claim.title)
     axes.axvline(0, color=INK, linewidth=0.9)
     label_rows(axes, labels, headings)
-    for place, (_, color, _) in zip(headings, map(_VERDICTS.__getitem__, groups), strict=True):
-        axes.get_yticklabels()[place].set_color(color)
+    for row, (_, color, _) in zip(headings, map(_VERDICTS.__getitem__, groups), strict=True):
+        axes.get_yticklabels()[row].set_color(color)
     axes.set_xlabel(f"{MINUS} against the claim     for it +\n(degrees, or points of pAUC)")
     return figure
 
 
-def _draw_decided(axes: Axes, one: _Decided, place: int, color: str, marker: str) -> None:
-    if one.favour is None:
+def _draw_decided(axes: Axes, claim: _Decided, row: int, color: str, marker: str) -> None:
+    if claim.favour is None:
         axes.annotate(
-            one.text, (0, place), (5, 0), textcoords="offset points", va="center", fontsize=8
+            claim.text, (0, row), (5, 0), textcoords="offset points", va="center", fontsize=8
         )
-        axes.plot(0, place, marker=marker, color=color, markersize=5.5)
+        axes.plot(0, row, marker=marker, color=color, markersize=5.5)
         return
-    value, low, high = one.favour
-    axes.plot([low, high], [place, place], color=color, linewidth=1.6)
-    axes.plot(value, place, marker=marker, color=color, markersize=5.5)
+    value, low, high = claim.favour
+    axes.plot([low, high], [row, row], color=color, linewidth=1.6)
+    axes.plot(value, row, marker=marker, color=color, markersize=5.5)
 
 
 @mpl.rc_context(RC)
-def claim_figure(claim: Claim, rows: Mapping[Comparison, Row]) -> Figure:
+def claim_figure(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> Figure:
     """Draw the comparisons of one claim: our differences with their intervals, and the paper's.
 
     Parameters
     ----------
     claim : Claim
     rows : mapping of Comparison to row
-        Of `comparisons_of`.
+        From `comparisons_of`.
     """
     drawn = list(_differences(claim, rows))
-    groups = list(dict.fromkeys(one.group for one in drawn))
-    series = {one.name: one for one in drawn}
+    groups = list(dict.fromkeys(difference.group for difference in drawn))
+    series = {difference.name: difference for difference in drawn}
     single_group = len(groups) == 1
     labels = list(series) if single_group else groups
     per_row = 1 if single_group else len(series)
     key = per_row > 1
     height = _ROW_IN * len(labels) * max(1.0, 0.6 * per_row)
-    margin = max(one.margin for one in drawn)
+    margin = max(difference.margin for difference in drawn)
     further_in = (0.22 if key else 0.0) + (0.16 if margin else 0.0)
     figure = new_figure(WIDTH_IN, height + 0.8 + further_in)
     axes = figure.subplots()
     if margin:
         axes.axvspan(-margin, margin, color=SHADE, linewidth=0)
-    for one in drawn:
-        row = labels.index(one.name if single_group else one.group)
-        offset = 0.0 if single_group else _offset(list(series).index(one.name), per_row)
-        style = method_style(one.method, METHODS)
-        draw_estimate(axes, row + offset, style, one.ours, one.published)
+    for difference in drawn:
+        row = labels.index(difference.name if single_group else difference.group)
+        offset = 0.0 if single_group else _offset(list(series).index(difference.name), per_row)
+        style = method_style(difference.method, METHODS)
+        draw_estimate(axes, row + offset, style, difference.ours, difference.published)
     axes.axvline(0, color=INK, linewidth=0.9)
     label_rows(axes, labels, [])
     subject = "" if single_group else f"{_subject(list(series))}: "
@@ -153,7 +154,7 @@ def claim_figure(claim: Claim, rows: Mapping[Comparison, Row]) -> Figure:
     axes.set_xlabel(f"{subject}{drawn[0].quantity}\n{drawn[0].direction}{comparable}")
     if key:
         figure.legend(
-            handles=[_key(one) for one in series.values()],
+            handles=[_key(difference) for difference in series.values()],
             loc="outside lower center",
             ncols=min(len(series), 4),
             fontsize=8,
@@ -163,21 +164,21 @@ def claim_figure(claim: Claim, rows: Mapping[Comparison, Row]) -> Figure:
 
 
 def _subject(names: list[str]) -> str:
-    """Say once what several names share: a difference of which methods."""
+    """Return the common form of several differences, such as ``each method − Single``."""
     ends = [name.split(f" {MINUS} ") for name in names]
     if any(len(pair) != 2 for pair in ends):
         return names[0]
-    first, second = ({pair[place] for pair in ends} for place in (0, 1))
+    first, second = ({pair[i] for pair in ends} for i in (0, 1))
     shared = (part.pop() if len(part) == 1 else "each method" for part in (first, second))
     return f" {MINUS} ".join(shared)
 
 
-def comparisons_of(judged: pd.DataFrame) -> dict[str, dict[Comparison, Row]]:
-    """Return the rows of every claim that was run, by its id and comparison."""
+def comparisons_of(judged: pd.DataFrame) -> dict[str, dict[Comparison, ClaimRow]]:
+    """Return the rows of the claims that were run, by claim id and comparison."""
     return {claim.id: rows for claim, rows in _rows_of(judged)}
 
 
-def _rows_of(judged: pd.DataFrame) -> Iterator[tuple[Claim, dict[Comparison, Row]]]:
+def _rows_of(judged: pd.DataFrame) -> Iterator[tuple[Claim, dict[Comparison, ClaimRow]]]:
     by_claim = {str(name): part for name, part in judged.groupby("id", sort=False)}
     for claim in CLAIMS:
         parts = by_claim[claim.id].sort_values("part").to_dict("records")
@@ -185,28 +186,28 @@ def _rows_of(judged: pd.DataFrame) -> Iterator[tuple[Claim, dict[Comparison, Row
             yield claim, dict(zip(statements.leaves(claim.statement), parts, strict=True))
 
 
-def deciding_comparison(claim: Claim, rows: Mapping[Comparison, Row]) -> Comparison:
-    """Return the comparison that a claim stands or falls with.
+def deciding_comparison(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> Comparison:
+    """Return the comparison that decides a claim.
 
     Parameters
     ----------
     claim : Claim
     rows : mapping of Comparison to row
-        Of `comparisons_of`.
+        From `comparisons_of`.
     """
     verdicts = {part: row["part_verdict"] for part, row in rows.items()}
     values = {part: _favour(part, row)[0] for part, row in rows.items()}
     return statements.deciding(claim.statement, verdicts, values)
 
 
-def _favour(part: Comparison, row: Row) -> Interval:
+def _favour(part: Comparison, row: ClaimRow) -> Interval:
     if isinstance(part, FreeOfOutliers):
         return (-float(row["value"]),) * 3
     value, low, high = (float(row[name]) for name in ("difference", "ci_low", "ci_high"))
     return statements.in_favour(part, value, low, high)
 
 
-def _decided(claim: Claim, rows: Mapping[Comparison, Row]) -> _Decided:
+def _decided(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> _Decided:
     part = deciding_comparison(claim, rows)
     verdict = rows[part]["verdict"]
     if isinstance(part, FreeOfOutliers):
@@ -217,7 +218,7 @@ def _decided(claim: Claim, rows: Mapping[Comparison, Row]) -> _Decided:
 
 @dataclass(frozen=True)
 class _Difference:
-    """One mark: where, of which series, and what it shows."""
+    """One mark of a plot: its row, series, value and interval."""
 
     group: str
     name: str
@@ -229,20 +230,20 @@ class _Difference:
     margin: float
 
 
-def _differences(claim: Claim, rows: Mapping[Comparison, Row]) -> Iterator[_Difference]:
+def _differences(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> Iterator[_Difference]:
     labels = dict(_labels(claim.statement))
     several = len({part.statistic for part in rows if not isinstance(part, FreeOfOutliers)}) > 1
     pairs = {part: _pair(part) for part in rows if not isinstance(part, FreeOfOutliers)}
-    # A difference has its rival's colour, unless what differs is compared with one rival.
+    # A mark has the colour of the other method, unless several methods are compared with one.
     several_methods = len({a.method for a, _ in pairs.values()}) > 1
-    told: set[tuple[str, Term, Term]] = set()
+    drawn: set[tuple[str, Term, Term]] = set()
     for part, row in rows.items():
         if row["part_verdict"] == statements.NOT_RUN:
             continue
         if isinstance(part, FreeOfOutliers):
             value = float(row["value"])
             yield _Difference(
-                group=place_text(part.a),
+                group=images_text(part.a),
                 name=method_label(part.a.method),
                 method=part.a.method,
                 quantity="errors above the fence (%)",
@@ -253,16 +254,16 @@ def _differences(claim: Claim, rows: Mapping[Comparison, Row]) -> Iterator[_Diff
             )
             continue
         a, b = pairs[part]
-        if (part.statistic, a, b) in told:
+        if (part.statistic, a, b) in drawn:
             continue
-        told.add((part.statistic, a, b))
+        drawn.add((part.statistic, a, b))
         sign = 1.0 if a == part.a else -1.0
         ends = sorted(sign * float(row[name]) for name in ("ci_low", "ci_high"))
         published = float(row["published_value"]) - float(row["published_versus_value"])
         statistic = STATISTIC_LABELS[part.statistic]
         side = "below" if LOWER_IS_BETTER[part.statistic] else "above"
         unit = "degrees" if UNIT_OF[part.statistic] == "°" else "points"
-        group = labels.get(part) or (statistic if several else place_text(a))
+        group = labels.get(part) or (statistic if several else images_text(a))
         yield _Difference(
             group=group,
             name=_pair_text(a, b),
@@ -276,13 +277,13 @@ def _differences(claim: Claim, rows: Mapping[Comparison, Row]) -> Iterator[_Diff
 
 
 def _pair(part: statements.Better | Comparable) -> tuple[Term, Term]:
-    """Return the terms of a comparison, the later of the paper's methods first."""
+    """Return the two terms of a comparison, later methods of the paper first."""
     a, b = part.a, part.b
     return (a, b) if METHODS.index(a.method) >= METHODS.index(b.method) else (b, a)
 
 
 def _pair_text(a: Term, b: Term) -> str:
-    if place_text(a) == place_text(b):
+    if images_text(a) == images_text(b):
         return f"{method_label(a.method)} {MINUS} {method_label(b.method)}"
     return f"{term_text(a)} {MINUS} {term_text(b)}"
 
@@ -296,17 +297,14 @@ def _labels(statement: Statement, label: str = "") -> Iterator[tuple[Comparison,
         yield statement, label
 
 
-def _offset(place: int, n: int) -> float:
-    return (place - (n - 1) / 2) * 0.75 / n
+def _offset(index: int, n: int) -> float:
+    return (index - (n - 1) / 2) * 0.75 / n
 
 
-def _key(one: _Difference) -> Line2D:
-    style = method_style(one.method, METHODS)
-    name = method_label(one.method)
+def _key(difference: _Difference) -> Line2D:
+    style = method_style(difference.method, METHODS)
+    name = method_label(difference.method)
     return Line2D([], [], color=style.color, marker=style.marker, markersize=5, label=name)
-
-
-_ROW_IN = 0.185
 
 
 @mpl.rc_context(RC)
@@ -316,7 +314,7 @@ def table_picture(cells: pd.DataFrame) -> Figure:
     Parameters
     ----------
     cells : DataFrame
-        Of ``table1.csv``; see `nbv.experiment.report.settings`.
+        Rows of ``table1.csv``; see `nbv.experiment.report.settings`.
     """
     shown = cells[cells["metric"] == "mae"]
     methods = tuple(dict.fromkeys(shown["method"].astype(str)))
@@ -328,11 +326,11 @@ def table_picture(cells: pd.DataFrame) -> Figure:
     for name, part in rows:
         headings.append(len(labels))
         labels.append(str(name))
-        for found in part.to_dict("records"):
-            ours = float(found["value"]), float(found["ci_low"]), float(found["ci_high"])
-            style = method_style(str(found["method"]), methods)
-            draw_estimate(axes, len(labels), style, ours, float(found["published"]))
-            labels.append(method_label(str(found["method"])))
+        for cell in part.to_dict("records"):
+            ours = float(cell["value"]), float(cell["ci_low"]), float(cell["ci_high"])
+            style = method_style(str(cell["method"]), methods)
+            draw_estimate(axes, len(labels), style, ours, float(cell["published"]))
+            labels.append(method_label(str(cell["method"])))
     label_rows(axes, labels, headings)
     axes.set_xlim(left=0)
     key = "filled: ours, 95 % interval"

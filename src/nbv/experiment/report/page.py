@@ -1,17 +1,22 @@
-"""One HTML page with everything: what was found, then claims, tables, figures, settings and cost.
+"""The report: one HTML page with claims, tables, figures, settings and running time.
 
-It needs nothing but itself: no scripts, no links outward, figures written into the page.
+It is self-contained: no scripts, no external links, figures embedded as SVG in the page's colours.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable, Iterator, Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from nbv.experiment.config import read_configuration
 from nbv.experiment.paper.claims import CLAIMS
@@ -30,20 +35,92 @@ from nbv.experiment.paper.statements import (
 from nbv.experiment.paper.verdicts import read_claims
 from nbv.experiment.report.figures import FIGURES
 from nbv.experiment.report.forest import (
-    Row,
+    ClaimRow,
     claim_figure,
     claims_forest,
     comparisons_of,
     deciding_comparison,
     table_picture,
 )
-from nbv.experiment.report.svg import inline_svg, svg_text
+from nbv.experiment.report.table import HTML
 from nbv.experiment.report.tables import TABLES
-from nbv.experiment.report.templating import HTML
 from nbv.experiment.results import load_object_ids
 from nbv.experiment.statistics.paired import UNIT_OF
 from nbv.files import existing, read_csv, read_json, readable
 from nbv.labels import category_label, interval_text, number
+from nbv.robot.style import AGAINST, FOR, GRID, INK, MUTED, OPEN, RC, SAVED, SHADE
+
+_COLOURS: Mapping[str, str] = {
+    INK: "var(--ink)",
+    "#000000": "var(--ink)",
+    MUTED: "var(--muted)",
+    GRID: "var(--line)",
+    SHADE: "var(--shade)",
+    FOR: "var(--holds)",
+    OPEN: "var(--open)",
+    AGAINST: "var(--fails)",
+    "#ffffff": "var(--page)",
+}
+_COLOUR = re.compile("|".join(_COLOURS))
+_FILE_TAGS = {"metadata", "style"}
+_DECIMALS = re.compile(r"(\.\d\d)\d+(?!e)")
+_NAMED = re.compile(r"(?<=url\(#)")
+
+
+def svg_text(figure: Figure) -> str:
+    """Return a figure as the text of an SVG file, always the same for the same figure."""
+    with mpl.rc_context(RC), BytesIO() as file:
+        figure.savefig(file, format="svg", **SAVED["svg"])
+        return file.getvalue().decode("utf-8")
+
+
+def inline_svg(text: str, name: str, label: str) -> Markup:
+    """Return an SVG file of `nbv.robot.style.save_figure` as an element of an HTML page.
+
+    Parameters
+    ----------
+    text : str
+        The content of the file.
+    name : str
+        The prefix of element ids, which keeps the ids of several figures apart.
+    label : str
+        The description for screen readers.
+
+    Returns
+    -------
+    Markup
+        An ``svg`` element that scales with its container. Ink, grid, paper and verdicts use the
+        page's custom properties for colours, such as ``--ink``; the colours of methods stay.
+    """
+    root = ElementTree.fromstring(text)
+    for parent in root.iter():
+        for child in [element for element in parent if _local(element.tag) in _FILE_TAGS]:
+            parent.remove(child)
+        parent.tag = _local(parent.tag)
+        parent.attrib = {
+            _local(key): _page_attribute(_local(key), value, name)
+            for key, value in parent.attrib.items()
+        }
+    root.attrib = {"viewBox": root.attrib["viewBox"], "width": root.attrib["width"]}
+    root.attrib |= {"class": "drawing", "role": "img", "aria-label": label}
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def _local(name: str) -> str:
+    return name.rpartition("}")[2]
+
+
+def _page_attribute(key: str, value: str, name: str) -> str:
+    if key == "id":
+        return f"{name}-{value}"
+    if key in ("d", "transform"):
+        return _DECIMALS.sub(r"\1", value.replace("\n", ""))
+    if key == "style":
+        value = _COLOUR.sub(lambda match: _COLOURS[match[0]], value)
+    if key == "href" and value.startswith("#"):
+        return f"#{name}-{value[1:]}"
+    return _NAMED.sub(f"{name}-", value)
+
 
 _SECTIONS = {
     "claims": "The paper's claims",
@@ -93,18 +170,18 @@ def build_report(
     configuration, provenance : path
         ``configuration.yaml`` and ``provenance.json`` of the run.
     splits : mapping of category to path
-        Of every category that the configuration names.
+        The files of all categories in the configuration.
     tables : mapping of name to path
-        HTML fragments of `nbv.experiment.report.table.write_table`, in the order to show them. The
-        paper's tables that are not among them are named as such.
+        HTML fragments of `nbv.experiment.report.table.write_table`, in the order of the page. The
+        page lists the paper's tables that are absent.
     figures : mapping of name to path
-        SVG files, likewise.
+        SVG files, in the order of the page.
     table1 : path
         CSV of Table 1.
     runtime : path
         HTML fragment of `nbv.experiment.report.runtime.runtime_table`.
     caution : sequence of str
-        What a reader has to know before any number; see `nbv.experiment.run_size`.
+        Warnings that precede all numbers; see `nbv.experiment.run_size`.
 
     Raises
     ------
@@ -130,8 +207,8 @@ def build_report(
         sections=_SECTIONS,
         badges=_BADGES,
         run_facts=[*_run_facts(settings, splits), ("Commit", made_with.get("commit") or _UNKNOWN)],
-        claims_run=[_claim(claim, rows[claim.id], one) for claim, one in _with_claim(run)],
-        claims_not_run=[_claim(claim, {}, one) for claim, one in _with_claim(not_run)],
+        claims_run=[_claim(claim, rows[claim.id], summary) for claim, summary in _with_claim(run)],
+        claims_not_run=[_claim(claim, {}, summary) for claim, summary in _with_claim(not_run)],
         tally=_tally(each["verdict"]),
         point_tally=_tally(each["point_verdict"]),
         verdict_rules=VERDICT_RULES,
@@ -145,26 +222,29 @@ def build_report(
     )
 
 
-def _finding(rows: Mapping[str, Mapping[Comparison, Row]]) -> str:
-    """Say in one sentence what became of the paper's conclusion."""
+def _finding(rows: Mapping[str, Mapping[Comparison, ClaimRow]]) -> str:
+    """Return one sentence on whether the paper's conclusion holds."""
     (claim,) = (claim for claim in CLAIMS if claim.id == _MAIN_CLAIM)
-    says = "The paper concludes that Proposed has a lower error than the three other methods"
+    conclusion = "The paper concludes that Proposed has a lower error than the three other methods"
     if _MAIN_CLAIM not in rows:
-        return f"{says}. That is about its five categories together, which this run does not have."
+        return (
+            f"{conclusion}. That is about its five categories together, which this run does not "
+            "have."
+        )
     part = deciding_comparison(claim, rows[_MAIN_CLAIM])
     row = rows[_MAIN_CLAIM][part]
     words = {HOLDS: "holds", FAILS: "does not hold", UNDECIDED: "is undecided"}[row["verdict"]]
     rival = str(row["versus"]).split(" (")[0]
     difference = interval_text(row["difference"], row["ci_low"], row["ci_high"])
     return (
-        f"{says}. Here this {words}: over all categories, the mean error of Proposed is "
+        f"{conclusion}. Here this {words}: over all categories, the mean error of Proposed is "
         f"{number(row['value'])}°, that of {rival} {number(row['versus_value'])}°; the difference "
         f"is {difference} degrees."
     )
 
 
 def _opening(judged: pd.DataFrame, table1: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Yield the pictures that the page opens with, other than the figure of the method."""
+    """Yield the opening pictures of the page, except for the figure of the method."""
     published = " Open: as published." if table1["published"].notna().any() else ""
     picture = svg_text(table_picture(table1))
     caption = (
@@ -187,17 +267,19 @@ def _opening(judged: pd.DataFrame, table1: pd.DataFrame) -> Iterator[dict[str, A
         yield {"name": "claims-forest", "caption": caption, "svg": inline_svg(drawn, "p2", caption)}
 
 
-def _with_claim(each: pd.DataFrame) -> Iterator[tuple[Claim, Row]]:
+def _with_claim(each: pd.DataFrame) -> Iterator[tuple[Claim, ClaimRow]]:
     by_id = {claim.id: claim for claim in CLAIMS}
     for row in each.to_dict("records"):
         yield by_id[row["id"]], row
 
 
-def _claim(claim: Claim, rows: Mapping[Comparison, Row], one: Row) -> dict[Hashable, Any]:
-    """Return what the page shows of a claim; without rows it was not run."""
-    shown: dict[Hashable, Any] = {**one, "title": claim.title, "svg": None, "comparisons": []}
+def _claim(
+    claim: Claim, rows: Mapping[Comparison, ClaimRow], summary: ClaimRow
+) -> dict[Hashable, Any]:
+    """Return the page's entry for a claim; it has no rows where the claim was not run."""
+    shown: dict[Hashable, Any] = {**summary, "title": claim.title, "svg": None, "comparisons": []}
     if rows:
-        label = f"{claim.title}: {one['verdict']}. {one['summary']}"
+        label = f"{claim.title}: {summary['verdict']}. {summary['summary']}"
         drawn = svg_text(claim_figure(claim, rows))
         shown["svg"] = inline_svg(drawn, f"claim-{claim.id}", label)
         shown["comparisons"] = [_comparison(row) for row in rows.values()]
@@ -224,7 +306,7 @@ def _run_facts(
 
 
 def _repairs(density: Mapping[str, Any]) -> str:
-    """Say in which way Proposed is not the method as it is printed."""
+    """Return one sentence on how Proposed differs from the method as printed."""
     repairs = []
     if density["pose_likelihood"] == "given_estimate":
         repairs.append("the pose likelihood of Eq. 6 is given the estimate and not the truth")
@@ -251,15 +333,15 @@ def _machine_facts(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 def _tally(verdicts: pd.Series) -> str:
     counts = verdicts.value_counts()
-    one = ("holds", "does not hold", "is undecided", "was not run")
-    several = ("hold", "do not hold", "are undecided", "were not run")
-    words = zip(VERDICTS, one, several, strict=True)
-    found = [f"{counts[v]} {a if counts[v] == 1 else b}" for v, a, b in words if v in counts]
-    return ", ".join(found)
+    singular = ("holds", "does not hold", "is undecided", "was not run")
+    plural = ("hold", "do not hold", "are undecided", "were not run")
+    words = zip(VERDICTS, singular, plural, strict=True)
+    parts = [f"{counts[v]} {a if counts[v] == 1 else b}" for v, a, b in words if v in counts]
+    return ", ".join(parts)
 
 
 def _fragment(path: Path) -> Markup:
-    """Return HTML that `write_table` has escaped already."""
+    """Return HTML that `write_table` has escaped."""
     with readable(path):
         return Markup(path.read_text(encoding="utf-8"))
 
@@ -270,8 +352,8 @@ def _figure(name: str, path: Path) -> dict[str, Any]:
     return {"name": name, "caption": caption, "svg": inline_svg(text, name, caption)}
 
 
-def _comparison(part: Row) -> list[str]:
-    """Return the cells of one of the comparisons that a claim is made of."""
+def _comparison(part: ClaimRow) -> list[str]:
+    """Return the cells of one comparison of a claim."""
     unit = UNIT_OF.get(str(part["statistic"]), "")
     value, versus = (_with_unit(part[key], unit) for key in ("value", "versus_value"))
     printed, printed_versus = (

@@ -1,4 +1,4 @@
-"""What a run cost, from the benchmark and log files of its jobs."""
+"""The running time of a run, from the benchmark and log files of its jobs."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ RUNTIME_COLUMNS = (
 JOB_COLUMNS = ("rule", "cpu_s", "sampled", "wall_s", "peak_mib", "ended_s")
 TOTAL_ROW = "all"
 PAUSE_S = 60.0
-"""A gap between jobs that is longer than this is a pause of the run, not a part of it."""
+"""Longer gaps between jobs are pauses and do not count."""
 
 _PROCESSOR_TIME = re.compile(r"processor time (\d+\.\d+) s$", re.MULTILINE)
-# Benchmark files round to hundredths of a second, so that neighbours in time may seem to overlap.
+# Benchmark files round to hundredths of a second, so consecutive jobs may seem to overlap.
 _ROUNDING_S = 0.01
 _HEADER = (
     "Rule",
@@ -46,54 +46,52 @@ _HEADER = (
 
 
 def load_jobs(files: Iterable[tuple[str, Path, Path]]) -> pd.DataFrame:
-    """Read what each job cost from its benchmark, and its processor time from its log.
+    """Read the running time of jobs from their benchmark and log files.
 
-    Snakemake samples a script's process and its children: 31 times half a second apart, then
-    every 30 seconds, and keeps the last processor time that it saw. A job of 45 seconds may so be
-    short of two thirds of it. A job's log may end with what the operating system told the job
-    itself (``processor time 12.3 s``), which lacks only how the interpreter shut down. Neither can
-    be too much, so the larger is taken.
+    Snakemake samples a script's process and its children 31 times half a second apart, then every
+    30 seconds, and keeps the last processor time. For a job of 45 seconds it may miss two thirds.
+    A job's log may end with the operating system's figure (``processor time 12.3 s``), which misses
+    only the shutdown of the interpreter. Neither can be too large, so the larger one counts.
 
     Parameters
     ----------
     files : iterable of (rule, benchmark file, log file)
-        A job without a benchmark file is passed over: it was not timed. The file's time says when
-        the job ended: a copy must keep it.
+        Jobs without a benchmark file are skipped. The modification time of the file is the end of
+        the job: a copy must preserve it.
 
     Returns
     -------
     pandas.DataFrame
         `JOB_COLUMNS`, one row per job: processor and wall-clock seconds, whether the former is
-        only Snakemake's last sample, the largest sampled resident memory in MiB (Snakemake's
-        ``max_rss``; NaN for a job that ended before a sample), and the time of its end in seconds
-        since the epoch.
+        only Snakemake's last sample, peak resident memory in MiB (Snakemake's ``max_rss``; NaN for
+        a job that ended before a sample), and the end in seconds since the epoch.
     """
     jobs = []
     for rule, benchmark, log in files:
         if not benchmark.is_file():
             continue
-        told = _told_cpu_s(log)
+        logged = _logged_cpu_s(log)
         with readable(benchmark):
             table = pd.read_csv(benchmark, sep="\t", na_values=["-"])
         for row in table.reindex(columns=["s", "cpu_time", "max_rss"]).to_dict("records"):
-            cpu_s = max(told or 0.0, float(np.nan_to_num(row["cpu_time"])))
+            cpu_s = max(logged or 0.0, float(np.nan_to_num(row["cpu_time"])))
             ended_s = benchmark.stat().st_mtime
-            jobs.append((rule, cpu_s, told is None, row["s"], row["max_rss"], ended_s))
+            jobs.append((rule, cpu_s, logged is None, row["s"], row["max_rss"], ended_s))
     return pd.DataFrame(jobs, columns=list(JOB_COLUMNS))
 
 
 def summarise_jobs(jobs: pd.DataFrame) -> pd.DataFrame:
-    """Sum up the jobs of `load_jobs` by rule.
+    """Summarise the jobs of `load_jobs` by rule.
 
     Returns
     -------
     pandas.DataFrame
-        `RUNTIME_COLUMNS`: the rule that took longest first, and at the end the row `TOTAL_ROW`.
-        ``cpu_s`` and ``wall_s`` are sums over jobs; ``median_s`` and ``max_s`` are of one job's
-        wall clock; ``peak_mib`` is of the largest job; ``sampled_jobs`` counts those whose
-        processor time is too low (see `load_jobs`). The total alone has ``elapsed_s``, from the
-        first job's start to the last one's end less pauses of more than `PAUSE_S`, and
-        ``side_by_side``, the most jobs that ran at once. Empty where nothing was benchmarked.
+        `RUNTIME_COLUMNS`: rules by decreasing wall-clock time, then the row `TOTAL_ROW`. ``cpu_s``
+        and ``wall_s`` are sums over jobs; ``median_s`` and ``max_s`` are wall-clock times of single
+        jobs; ``peak_mib`` is that of the largest job; ``sampled_jobs`` counts jobs whose processor
+        time is too low (see `load_jobs`). Only the total has ``elapsed_s``, from the first start to
+        the last end less pauses of more than `PAUSE_S`, and ``side_by_side``, the most jobs at
+        once. Empty where nothing was benchmarked.
     """
     if jobs.empty:
         return pd.DataFrame(columns=list(RUNTIME_COLUMNS))
@@ -105,15 +103,8 @@ def summarise_jobs(jobs: pd.DataFrame) -> pd.DataFrame:
     return summary.astype({"side_by_side": "Int64"})
 
 
-def load_measured(path: Path) -> dict[str, tuple[int, float]]:
-    """Read jobs and wall-clock seconds by rule from the ``runtime.csv`` of a run."""
-    with readable(path):
-        table = pd.read_csv(path).set_index("rule")
-    return {str(rule): (int(row.jobs), float(row.wall_s)) for rule, row in table.iterrows()}
-
-
 def runtime_table(jobs: pd.DataFrame) -> Table:
-    """Return the table of what the jobs of `load_jobs` cost, rule by rule."""
+    """Return the table of the jobs of `load_jobs` by rule."""
     runtime = summarise_jobs(jobs)
     rows = tuple(_row(row) for row in runtime.to_dict("records"))
     notes = ("No job was timed in this run.",) if runtime.empty else tuple(_notes(runtime))
@@ -122,17 +113,17 @@ def runtime_table(jobs: pd.DataFrame) -> Table:
 
 
 def efficiency(runtime: pd.DataFrame) -> float:
-    """Return Σ cpu / (side_by_side × elapsed): the jobs' share of the processors they could use."""
+    """Return Σ cpu / (side_by_side × elapsed): the utilisation of the processors, in [0, 1]."""
     total = runtime.iloc[-1]
     return float(total["cpu_s"] / (total["side_by_side"] * total["elapsed_s"]))
 
 
-def _told_cpu_s(log_file: Path) -> float | None:
-    """Return the processor time that a job wrote at the end of its log, if it did."""
+def _logged_cpu_s(log_file: Path) -> float | None:
+    """Return the processor time at the end of a job's log, if it is there."""
     if not log_file.is_file():
         return None
-    told = _PROCESSOR_TIME.findall(log_file.read_text(encoding="utf-8", errors="replace"))
-    return float(told[-1]) if told else None
+    logged = _PROCESSOR_TIME.findall(log_file.read_text(encoding="utf-8", errors="replace"))
+    return float(logged[-1]) if logged else None
 
 
 def _row(summary: Mapping[Hashable, Any]) -> Row:
@@ -156,7 +147,7 @@ def _summary(rule: str, jobs: pd.DataFrame) -> dict[str, Any]:
 
 
 def _on_the_clock(jobs: pd.DataFrame) -> tuple[float, int]:
-    """Return the seconds that a run lasted, pauses left out, and the most jobs at once."""
+    """Return the duration of a run in seconds without pauses, and the most jobs at once."""
     ends = jobs["ended_s"].to_numpy(dtype=np.float64)
     starts = ends - jobs["wall_s"].to_numpy(dtype=np.float64)
     order = np.argsort(starts, kind="stable")

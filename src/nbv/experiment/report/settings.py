@@ -1,4 +1,4 @@
-"""What tables, claims and figures show, and the units and words that they share."""
+"""The choices that tables, claims and figures share: units, examples, labels and cells."""
 
 from __future__ import annotations
 
@@ -7,32 +7,37 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from nbv.core.angles import circular_distance_deg
 from nbv.errors import UserError, nearest
 from nbv.experiment.paper import published
 from nbv.experiment.results import Unit
 from nbv.experiment.statistics import paired
 from nbv.experiment.statistics.paired import PairedErrors, Resampler
-from nbv.labels import category_label
+from nbv.labels import category_label, method_label
+
+_BASELINE = "single"
+_SMOOTHING_DEG = 15.0
 
 TRANSFER = "transfer"
-"""Name of the table trained on × tested on, which is made on request only."""
+"""The table "trained on × tested on", which is made on request only."""
 
 
 @dataclass(frozen=True)
 class ReportSettings:
-    """Choices that no result depends on, only what is shown of it.
+    """Choices of presentation, on which no result depends.
 
     Attributes
     ----------
     methods : tuple of str
-        Columns of the tables, in order; those that were not evaluated are left out.
+        Columns of the tables, in order, without those that were not evaluated.
     focus_category : str or None
-        The category of Tables 2 and 4 to 7; None takes ``mug``, or else the first one present.
+        The category of Tables 2 and 4 to 7; None chooses ``mug``, or else the first category.
     reference_elevation_deg : int
-        The elevation of Tables 1, 3 and 5 to 7; a category's lowest one where it was not run.
+        The elevation of Tables 1, 3 and 5 to 7; a category's lowest elevation if it was not run.
     example_fold : int
-        Fold of the examples (Table 6, Figs. 2, 3, 7); the first one where this was not run.
+        Fold of the examples (Table 6, Figs. 2, 3, 7); the first fold if it was not run.
     example_initial_deg : tuple of int
         Initial azimuths of Table 6.
     criterion : str
@@ -40,7 +45,7 @@ class ReportSettings:
     subject, reference : str
         Tables close with the paired difference of `subject` to `reference`.
     n_resamples, seed : int
-        The object bootstrap.
+        Settings of the object bootstrap.
     """
 
     methods: tuple[str, ...] = published.METHODS
@@ -61,7 +66,7 @@ def focus_category(units: Iterable[Unit], settings: ReportSettings) -> str:
     Raises
     ------
     UserError
-        If there are no results, or the category asked for has none.
+        If there are no results, or none of the chosen category.
     """
     categories = list(dict.fromkeys(category for category, _ in units))
     if not categories:
@@ -78,9 +83,9 @@ def focus_category(units: Iterable[Unit], settings: ReportSettings) -> str:
 
 
 def reference_units(units: Iterable[Unit], settings: ReportSettings) -> list[Unit]:
-    """Return the units that categories are compared by: one of each, in the order given.
+    """Return one unit per category, in the order given.
 
-    Each category at the reference elevation, or where it was not run, at its lowest one.
+    Each category is at the reference elevation, or at its lowest one if that was not run.
     """
     by_category: dict[str, list[Unit]] = {}
     for unit in units:
@@ -89,14 +94,14 @@ def reference_units(units: Iterable[Unit], settings: ReportSettings) -> list[Uni
 
 
 def common_elevation_deg(units: Iterable[Unit], settings: ReportSettings) -> int:
-    """Return the reference elevation, or where none of the units has it, their lowest one."""
+    """Return the reference elevation, or the lowest one of the units if none has it."""
     elevations = {elevation for _, elevation in units}
     wanted = settings.reference_elevation_deg
     return wanted if wanted in elevations else min(elevations)
 
 
 def unit_label(unit: Unit, common_deg: int) -> str:
-    """Return a unit's category, with its elevation where the heading names another one."""
+    """Return a unit's category, with its elevation where it differs from the heading's."""
     category, elevation = unit
     label = category_label(category)
     return label if elevation == common_deg else f"{label} ({elevation}°)"
@@ -108,6 +113,75 @@ def focus_unit(units: Iterable[Unit], settings: ReportSettings) -> Unit:
     category = focus_category(present, settings)
     own = [unit for unit in present if unit[0] == category]
     return category, common_elevation_deg(own, settings)
+
+
+@dataclass(frozen=True)
+class Example:
+    """A test object, its fold, and the reason for choosing it."""
+
+    object_id: str
+    fold: int
+    reason: str
+
+
+def choose_example(frame: pd.DataFrame, settings: ReportSettings) -> Example:
+    """Return the test object with the median single-view error in the example fold.
+
+    The lower median for an even number; the first by name where errors tie. The middle object is
+    neither the easiest nor the hardest, and the choice does not depend on the result of the method
+    that the example shows.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        One unit, from `results.load_evaluations`.
+    settings : ReportSettings
+        Gives the fold.
+    """
+    folds = sorted(frame["fold"].unique())
+    fold = int(settings.example_fold if settings.example_fold in folds else folds[0])
+    in_fold = frame[frame["fold"] == fold]
+    method = _baseline(in_fold)
+    errors = in_fold[in_fold["method"] == method].groupby("object_id")["error_deg"].mean()
+    ordered = errors.sort_index().sort_values(kind="stable")
+    chosen = str(ordered.index[(len(ordered) - 1) // 2])
+    reason = (
+        f"the one with the median {method_label(method)} error of that fold's {len(ordered)} test "
+        "objects"
+    )
+    return Example(chosen, fold, reason)
+
+
+def example_row(
+    frame: pd.DataFrame, example: Example, method: str, azimuth_deg: float
+) -> pd.Series | None:
+    """Return the evaluation of one method on the example, or None if there is none."""
+    rows = frame[
+        (frame["method"] == method)
+        & (frame["object_id"] == example.object_id)
+        & (frame["fold"] == example.fold)
+        & (frame["initial_deg"] == azimuth_deg)
+    ]
+    return None if rows.empty else rows.iloc[0]
+
+
+def hardest_azimuth_deg(frame: pd.DataFrame) -> int:
+    """Return the initial azimuth around which the single-view error is largest.
+
+    The mean over objects, then over 31 degrees, so that a single view does not decide. Where the
+    category hides a distinctive part, this is the middle of the hidden range.
+    """
+    single = frame[frame["method"] == _baseline(frame)]
+    by_azimuth = single.groupby("initial_deg")["error_deg"].mean()
+    azimuths = by_azimuth.index.to_numpy(dtype=np.float64)
+    near = circular_distance_deg(azimuths[:, None], azimuths[None, :]) <= _SMOOTHING_DEG
+    smooth = (near @ by_azimuth.to_numpy(dtype=np.float64)) / near.sum(axis=1)
+    return int(azimuths[int(np.argmax(smooth))])
+
+
+def _baseline(frame: pd.DataFrame) -> str:
+    present = list(frame["method"].astype(str).unique())
+    return _BASELINE if _BASELINE in present else present[0]
 
 
 CELL_COLUMNS = (
@@ -135,7 +209,7 @@ def shared_resampler(settings: ReportSettings) -> Resampler:
 
 
 def cell(table: str, row: str, row_label: str, **rest: Any) -> dict[str, Any]:
-    """Return one cell; columns that are not given are absent."""
+    """Return one cell; columns that are not given are NaN."""
     return dict.fromkeys(CELL_COLUMNS, np.nan) | {
         "table": table,
         "row": row,
@@ -153,9 +227,9 @@ def method_cells(
     resampler: Resampler,
     settings: ReportSettings,
 ) -> list[dict[str, Any]]:
-    """Return one row's cells: a statistic of each of the settings' methods on the same images.
+    """Return the cells of a row: a statistic for the settings' methods on the same images.
 
-    Methods that the sample lacks are left out; differences are to the settings' ``reference``.
+    Methods that the sample lacks are skipped; differences are to the settings' ``reference``.
     """
     estimates = {
         method: paired.estimate(metric, sample, method, resampler)
@@ -165,12 +239,12 @@ def method_cells(
     reference = estimates.get(settings.reference)
     shared = {"metric": metric, "n_objects": sample.n_objects, "n_images": sample.n_images}
     cells = []
-    for method, found in estimates.items():
-        made = cell(table, row, row_label, method=method, **shared)
-        made |= found.interval().columns("value", "ci")
+    for method, estimate in estimates.items():
+        record = cell(table, row, row_label, method=method, **shared)
+        record |= estimate.interval().columns("value", "ci")
         if not metric.endswith("_sigma"):
-            made["sigma"] = paired.fold_sigma(metric, sample, method)
+            record["sigma"] = paired.fold_sigma(metric, sample, method)
         if reference and method != settings.reference:
-            made |= found.minus(reference).columns("difference")
-        cells.append(made)
+            record |= estimate.minus(reference).columns("difference")
+        cells.append(record)
     return cells

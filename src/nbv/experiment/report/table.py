@@ -1,4 +1,9 @@
-"""The one table: tidy cells and the rows that people read, with a writer for each kind of file."""
+"""Printed tables: tidy cells, the rows that people read, and a writer for each file format.
+
+Templates are filled in one of three environments. `HTML` escapes by itself. `MARKDOWN` and `LATEX`
+name their filter, ``md`` and ``tex``, where text goes in; LaTeX is full of braces, so its templates
+write ``<< value >>`` and ``<% block %>``.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +12,71 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from nbv.experiment.report.templating import HTML, LATEX, MARKDOWN
 from nbv.files import write_csv, write_text
-from nbv.labels import interval_text
+from nbv.labels import MINUS, interval_text
+
+_LATEX_CHARACTERS: Mapping[str, str] = {
+    "\\": "\\textbackslash{}",
+    "&": "\\&",
+    "%": "\\%",
+    "$": "\\$",
+    "#": "\\#",
+    "_": "\\_",
+    "{": "\\{",
+    "}": "\\}",
+    "~": "\\textasciitilde{}",
+    "^": "\\textasciicircum{}",
+    "°": "$^\\circ$",
+    "σ": "$\\sigma$",
+    "δ": "$\\delta$",
+    "τ": "$\\tau$",
+    "φ": "$\\varphi$",
+    "×": "$\\times$",
+    MINUS: "$-$",
+    "–": "--",
+    "…": "\\dots{}",
+    "→": "$\\rightarrow$",
+    "“": "``",
+    "”": "''",
+    "‘": "`",
+    "’": "'",
+    "\u00a0": "~",
+}
+
+
+def escape_latex(text: str) -> str:
+    """Escape LaTeX's special characters, degree signs and Greek letters."""
+    return "".join(_LATEX_CHARACTERS.get(character, character) for character in text)
+
+
+def escape_markdown(text: str) -> str:
+    """Escape the bars of a text, so that it stays within its cell."""
+    return text.replace("|", "\\|")
+
+
+HTML = Environment(
+    loader=PackageLoader("nbv.experiment"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+)
+MARKDOWN = HTML.overlay(autoescape=False)
+MARKDOWN.filters = {**HTML.filters, "md": escape_markdown}
+LATEX = HTML.overlay(
+    autoescape=False,
+    block_start_string="<%",
+    block_end_string="%>",
+    variable_start_string="<<",
+    variable_end_string=">>",
+    comment_start_string="<#",
+    comment_end_string="#>",
+)
+LATEX.filters = {**HTML.filters, "tex": escape_latex}
+
 
 _LONGEST_LINE = 60
 _PARAGRAPH = "p{18em}"
@@ -31,7 +97,7 @@ class Cell:
 Row = tuple[Cell, ...]
 
 DECIDED = "*: the interval excludes 0, before rounding."
-"""The note of a table that has differences."""
+"""The note of tables with differences."""
 
 
 def difference_cell(value: float, low: float, high: float) -> Cell:
@@ -41,7 +107,7 @@ def difference_cell(value: float, low: float, high: float) -> Cell:
 
 @dataclass(frozen=True)
 class Part:
-    """Rows under a heading of their own; without a heading they follow the table's."""
+    """Rows under a heading; without one they follow the table's header."""
 
     rows: tuple[Row, ...]
     heading: str = ""
@@ -49,7 +115,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Table:
-    """One table.
+    """A printed table.
 
     Attributes
     ----------
@@ -62,19 +128,19 @@ class Table:
     header : tuple of str
         A title for each column.
     rows : tuple of tuple of Cell, or tuple of Part
-        Rows as long as the header; the first cell of a row names it. Without any row the notes
-        are all there is to show.
+        Rows as long as the header; the first cell of a row names it. A table without rows shows
+        its notes only.
     notes : tuple of str
-        What to bear in mind.
+        Remarks below the table.
     decimals : int
         Decimals of the floats in the CSV file.
     n_text_columns : int
-        So many columns hold words and are aligned left; the others hold figures.
+        The number of columns of text, aligned left; the others hold numbers.
 
     Raises
     ------
     ValueError
-        If a row is not as long as the header.
+        If a row and the header differ in length.
     """
 
     name: str
@@ -106,14 +172,14 @@ class Table:
 
 
 def write_table(table: Table, paths: Mapping[str, Path], caution: Sequence[str] = ()) -> None:
-    """Write a table in each of the formats that have a path: ``csv``, ``md``, ``tex``, ``html``.
+    """Write a table in the formats that have a path: ``csv``, ``md``, ``tex``, ``html``.
 
-    The first notes are what a reader has to know before any number, the `caution`.
+    The warnings of `caution` precede its notes.
 
     Raises
     ------
     KeyError
-        If a format is none of these.
+        If the format is unknown.
     """
     cautious = replace(table, notes=(*caution, *table.notes))
     for kind, path in paths.items():
@@ -126,7 +192,7 @@ def table_markdown(table: Table) -> str:
 
 
 def table_latex(table: Table) -> str:
-    r"""Return a ``table`` environment, shrunk to the line where it is wider.
+    r"""Return a ``table`` environment, scaled down to the line width where it is wider.
 
     Needs ``\usepackage{booktabs,graphicx}``.
     """

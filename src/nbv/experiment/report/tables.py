@@ -1,28 +1,31 @@
 """The paper's Tables 1 to 7 from our results, laid out as in the paper.
 
-Their CSV files are tidy, one row per cell; see `nbv.experiment.report.settings` for the columns.
+A cell shows ``ours [published]``, the best method of a row in bold. Tables 1 to 5 close with the
+paired difference to the reference method and its interval, so that a difference can be told from
+noise without another table. Below, the same rows show the share of errors above 90°. The CSV files
+are tidy, one row per cell; see `nbv.experiment.report.settings` for the columns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from nbv.core.angles import circular_distance_deg
 from nbv.errors import UserError, nearest
 from nbv.experiment.paper import published
+from nbv.experiment.paper.published import PUBLISHED, SIGMA_ROW, Note
 from nbv.experiment.paper.statements import VERDICT_RULES, by_run
-from nbv.experiment.report import layout
-from nbv.experiment.report.layout import METRIC_TITLES, Body
 from nbv.experiment.report.settings import (
     CELL_COLUMNS,
     ReportSettings,
     cell,
+    choose_example,
     common_elevation_deg,
+    example_row,
     focus_category,
     focus_unit,
     method_cells,
@@ -30,90 +33,161 @@ from nbv.experiment.report.settings import (
     shared_resampler,
     unit_label,
 )
-from nbv.experiment.report.table import Cell, Part, Row, Table
+from nbv.experiment.report.table import DECIDED, Cell, Part, Row, Table, difference_cell
 from nbv.experiment.results import Unit
 from nbv.experiment.statistics import paired
-from nbv.experiment.statistics.paired import PairedErrors, pair_methods
-from nbv.labels import category_label, method_label
+from nbv.experiment.statistics.paired import LOWER_IS_BETTER, UNIT_OF, PairedErrors, pair_methods
+from nbv.labels import MINUS, category_label, method_label, number
 
-_BASELINE = "single"
-_SMOOTHING_DEG = 15.0
+Body = tuple[list[str], list[Row]]
+"""The titles of the columns after the first, and the rows."""
 
-
-@dataclass(frozen=True)
-class Example:
-    """One test object, the fold that tested it, and why it was taken."""
-
-    object_id: str
-    fold: int
-    reason: str
+METRIC_TITLES = {"mae": "MAE", "pauc": "pAUC"}
+HALF_TURNS = "above_90_percent"
 
 
-def choose_example(frame: pd.DataFrame, settings: ReportSettings) -> Example:
-    """Return the test object with the median single-view error in the example fold.
-
-    The lower median where their number is even; the first by name where errors tie. The middle
-    object is neither the easiest nor the hardest, and no choice by the result of the method
-    that the example is to show.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        One unit, from `results.load_evaluations`.
-    settings : ReportSettings
-        Gives the fold.
-    """
-    folds = sorted(frame["fold"].unique())
-    fold = int(settings.example_fold if settings.example_fold in folds else folds[0])
-    in_fold = frame[frame["fold"] == fold]
-    method = _baseline(in_fold)
-    errors = in_fold[in_fold["method"] == method].groupby("object_id")["error_deg"].mean()
-    ordered = errors.sort_index().sort_values(kind="stable")
-    chosen = str(ordered.index[(len(ordered) - 1) // 2])
-    reason = (
-        f"the one with the median {method_label(method)} error of that fold's {len(ordered)} test "
-        "objects"
-    )
-    return Example(chosen, fold, reason)
+def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
+    """Return rows by methods, then the difference of subject and reference (Tables 1 to 5)."""
+    methods = _methods(cells)
+    differs = _shows_difference(cells, settings)
+    rows = []
+    in_blocks = cells.sort_values("metric", key=lambda names: names == HALF_TURNS, kind="stable")
+    for (metric, label), part in in_blocks.groupby(["metric", "row_label"], sort=False):
+        title = f"{label}: errors above 90°" if metric == HALF_TURNS else str(label)
+        row = [Cell(title), *_values(part, methods)]
+        if differs:
+            subject = part[part["method"] == settings.subject].iloc[0]
+            ends = subject["difference_low"], subject["difference_high"]
+            row.append(difference_cell(subject["difference"], *ends))
+        rows.append(tuple(row))
+    titles = [method_label(method) for method in methods]
+    return titles + ([_difference_title(settings)] if differs else []), rows
 
 
-def example_row(
-    frame: pd.DataFrame, example: Example, method: str, azimuth_deg: float
-) -> pd.Series | None:
-    """Return the evaluation of one method on the example, or None where it was not made."""
-    rows = frame[
-        (frame["method"] == method)
-        & (frame["object_id"] == example.object_id)
-        & (frame["fold"] == example.fold)
-        & (frame["initial_deg"] == azimuth_deg)
-    ]
-    return None if rows.empty else rows.iloc[0]
+def fold_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
+    """Return folds by methods, with MAE and pAUC for each method (Table 7)."""
+    methods = _methods(cells)
+    rows = []
+    for label, part in cells.groupby("row_label", sort=False):
+        by_metric = [part[part["metric"] == metric] for metric in METRIC_TITLES]
+        columns = [_values(part, methods) for part in by_metric]
+        pairs = zip(*columns, strict=True)
+        rows.append((Cell(str(label)), *(cell for pair in pairs for cell in pair)))
+    titles = METRIC_TITLES.values()
+    return [f"{method_label(method)} {title}" for method in methods for title in titles], rows
 
 
-def hardest_azimuth_deg(frame: pd.DataFrame) -> int:
-    """Return the initial azimuth around which the single-view error is largest.
+def example_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
+    """Return our and the published example, different objects, in pairs of rows (Table 6)."""
+    methods = _methods(cells)
+    rows: list[Row] = []
+    for label, part in cells.groupby("row_label", sort=False):
+        errors = part[part["metric"] == "error"].set_index("method")
+        estimates = part[part["metric"] == "estimate"].set_index("method")
+        for column, suffix in (("value", ""), ("published", ", published")):
+            present = errors[column].reindex(methods)
+            if present.notna().any():
+                shown = _example_cells(estimates[column].reindex(methods), present)
+                rows.append((Cell(f"{label}{suffix}"), *shown))
+    return [method_label(method) for method in methods], rows
 
-    The mean over objects, then over 31 degrees, so that one odd view does not decide; where the
-    category hides what tells its pose, that is the middle of the hidden range.
-    """
-    single = frame[frame["method"] == _baseline(frame)]
-    by_azimuth = single.groupby("initial_deg")["error_deg"].mean()
-    azimuths = by_azimuth.index.to_numpy(dtype=np.float64)
-    near = circular_distance_deg(azimuths[:, None], azimuths[None, :]) <= _SMOOTHING_DEG
-    smooth = (near @ by_azimuth.to_numpy(dtype=np.float64)) / near.sum(axis=1)
-    return int(azimuths[int(np.argmax(smooth))])
+
+def comparison_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
+    """Yield notes on the cells, the number of objects, and the difference."""
+    yield _legend(cells)
+    objects = cells.groupby("row_label", sort=False)["n_objects"].max()
+    if objects.min() == objects.max():
+        yield f"{_counts(cells)} in each row."
+    else:
+        yield f"Test objects: {', '.join(f'{row} {int(n)}' for row, n in objects.items())}."
+    if _shows_difference(cells, settings):
+        yield (
+            f"{_difference_title(settings)} is the paired difference with its 95 % interval over "
+            f"objects ({settings.n_resamples} resamples). {DECIDED}"
+        )
 
 
-def _baseline(frame: pd.DataFrame) -> str:
-    present = list(frame["method"].astype(str).unique())
-    return _BASELINE if _BASELINE in present else present[0]
+def fold_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
+    """Yield notes on the cells and the number of objects in all folds."""
+    yield _legend(cells)
+    yield f"{_counts(cells)}."
+    yield "The average is over the pooled images of all folds."
+
+
+def published_notes(name: str, cells: pd.DataFrame) -> list[str]:
+    """Return the notes on the published numbers that a table shows."""
+    return [note.text for note in PUBLISHED[name].notes if _explains(note, cells)]
+
+
+def _methods(cells: pd.DataFrame) -> list[str]:
+    return list(dict.fromkeys(cells["method"]))
+
+
+def _values(row: pd.DataFrame, methods: list[str]) -> list[Cell]:
+    """Return ``ours [published]`` per method; the best of the row, as rounded, is bold."""
+    by_method = row.set_index("method").reindex(methods)
+    values = by_method["value"].round(2)
+    (metric,) = row["metric"].unique()
+    unit = "" if metric == "pauc" else UNIT_OF[metric]
+    lower_is_better = LOWER_IS_BETTER[metric] or (row["row"] == SIGMA_ROW).all()
+    best = values.min() if lower_is_better else values.max()
+    cells = []
+    for value, printed in zip(values, by_method["published"], strict=True):
+        if np.isfinite(value):
+            after = f"[{number(printed)}{unit}]" if np.isfinite(printed) else ""
+            cells.append(Cell(f"{number(value)}{unit}", bool(value == best), after))
+        else:
+            cells.append(Cell("–"))
+    return cells
+
+
+def _example_cells(estimates: pd.Series, errors: pd.Series) -> Iterator[Cell]:
+    """Yield ``estimate (error)`` per method; the least error, as rounded, is bold."""
+    least = errors.round(1).min()
+    for estimate, error in zip(estimates, errors, strict=True):
+        if np.isfinite(error):
+            turned = number(round(estimate, 1) % 360, 1)  # 359.96 is shown as 0.0, not as 360.0
+            yield Cell(f"{turned}° ({number(error, 1)}°)", bool(round(error, 1) == least))
+        else:
+            yield Cell("–")
+
+
+def _shows_difference(cells: pd.DataFrame, settings: ReportSettings) -> bool:
+    return {settings.subject, settings.reference} <= set(cells["method"])
+
+
+def _difference_title(settings: ReportSettings) -> str:
+    return f"{method_label(settings.subject)} {MINUS} {method_label(settings.reference)}"
+
+
+def _legend(cells: pd.DataFrame) -> str:
+    if cells["published"].notna().any():
+        return "Ours [published]; our best of each row in bold."
+    return "The best of each row in bold; the paper prints no such figures."
+
+
+def _counts(cells: pd.DataFrame) -> str:
+    objects, images = int(cells["n_objects"].max()), int(cells["n_images"].max())
+    return f"{objects} test objects, {images:,} initial views"
+
+
+def _explains(note: Note, cells: pd.DataFrame) -> bool:
+    """Return whether the note explains a number among the cells."""
+    explained = pd.Series(True, index=cells.index) if note.ours else cells["published"].notna()
+    if note.metric:
+        explained &= cells["metric"] == note.metric
+    if note.rows:
+        explained &= cells["row"].isin(note.rows)
+    if note.method:
+        explained &= cells["method"] == note.method
+    return bool(explained.any())
 
 
 def claims_table(claims: pd.DataFrame) -> Table:
-    """Return one row per claim: sentence, verdicts, our figures, and the paper's own.
+    """Return one row per claim: sentence, verdicts, our numbers, and the paper's own.
 
-    Those that were not run come last, under a heading of their own. The CSV file is what
-    `nbv.experiment.paper.verdicts.evaluate_claims` returned: a row for each comparison.
+    Claims that were not run come last, under a heading. The CSV file has a row for each comparison,
+    from `nbv.experiment.paper.verdicts.evaluate_claims`.
     """
     header = (
         "Section",
@@ -152,12 +226,12 @@ Evaluations = Mapping[Unit, pd.DataFrame]
 def build_table(
     name: str, evaluations: Evaluations, settings: ReportSettings | None = None
 ) -> Table:
-    """Build one of `TABLES` from whatever of it was run; the default settings are the paper's.
+    """Build one of `TABLES` from the units that were run; the default settings are the paper's.
 
     Raises
     ------
     UserError
-        If there is no such table, or nothing was evaluated.
+        If the table is unknown, or nothing was evaluated.
     """
     if name not in _KINDS:
         raise UserError(f"no table {name!r}; {nearest(name, _KINDS)}")
@@ -174,13 +248,13 @@ def build_table(
         cells,
         (made.row_title, *header),
         tuple(rows),
-        (*made.notes, *kind.notes(cells, chosen), *layout.published_notes(name, cells)),
+        (*made.notes, *kind.notes(cells, chosen), *published_notes(name, cells)),
     )
 
 
 @dataclass(frozen=True)
 class _Measured:
-    """The figures of a table, and the words that depend on what was evaluated."""
+    """The cells of a table, and the texts that depend on them."""
 
     title: str
     row_title: str
@@ -190,11 +264,11 @@ class _Measured:
 
 @dataclass(frozen=True)
 class _Kind:
-    """How a table is measured and laid out."""
+    """The functions that measure and lay out a table."""
 
     measure: Callable[[str, Evaluations, ReportSettings], _Measured]
-    body: Callable[[pd.DataFrame, ReportSettings], Body] = layout.comparison_body
-    notes: Callable[[pd.DataFrame, ReportSettings], Iterable[str]] = layout.comparison_notes
+    body: Callable[[pd.DataFrame, ReportSettings], Body] = comparison_body
+    notes: Callable[[pd.DataFrame, ReportSettings], Iterable[str]] = comparison_notes
 
 
 def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
@@ -206,7 +280,7 @@ def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) 
     for unit in units:
         sample = pair_methods(evaluations[unit], unit[0])
         label = unit_label(unit, elevation)
-        for shown in (metric, layout.HALF_TURNS):
+        for shown in (metric, HALF_TURNS):
             made = method_cells(name, unit[0], label, shown, sample, resampler, settings)
             cells += _with_published(made) if unit[1] == 0 else made
     title = f"{METRIC_TITLES[metric]} by category at elevation {elevation}°"
@@ -218,10 +292,10 @@ def _by_elevation(name: str, evaluations: Evaluations, settings: ReportSettings)
     category = focus_category(evaluations, settings)
     resampler = shared_resampler(settings)
     cells = []
-    for elevation in sorted(degrees for one, degrees in evaluations if one == category):
+    for elevation in sorted(degrees for other, degrees in evaluations if other == category):
         sample = pair_methods(evaluations[category, elevation], category)
         row = str(elevation), f"{elevation}°"
-        for shown in (metric, layout.HALF_TURNS):
+        for shown in (metric, HALF_TURNS):
             cells += method_cells(name, *row, shown, sample, resampler, settings)
     if category == published.FOCUS_CATEGORY:
         cells = _with_published(cells)
@@ -239,10 +313,10 @@ def _by_group(name: str, evaluations: Evaluations, settings: ReportSettings) -> 
             span = f"{start}–359°, 0–{stop - 1}°" if start > stop else f"{start}–{stop - 1}°"
             sample = everything.select(groups == group)
             row = str(group), f"{group} ({span})"
-            for shown in ("mae", layout.HALF_TURNS):
+            for shown in ("mae", HALF_TURNS):
                 cells += method_cells(name, *row, shown, sample, resampler, settings)
-    title = f"MAE of {_of_focus(unit, 'by viewpoint group')}"
-    return _Measured(title, "Viewpoint group", _published_of_focus(unit, cells))
+    title = f"MAE of {_focus_title(unit, 'by viewpoint group')}"
+    return _Measured(title, "Viewpoint group", _with_published_focus(unit, cells))
 
 
 def _by_fold(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
@@ -259,9 +333,9 @@ def _by_fold(name: str, evaluations: Evaluations, settings: ReportSettings) -> _
             cells += method_cells(name, row, label, metric, sample, resampler, settings)
         over_folds = name, published.SIGMA_ROW, "σ", f"{metric}_sigma"
         made = method_cells(*over_folds, everything, resampler, settings)
-        cells += [found | {"metric": metric} for found in made]
-    title = f"MAE and pAUC of {_of_focus(unit, 'by fold')}"
-    return _Measured(title, "Fold", _published_of_focus(unit, cells))
+        cells += [record | {"metric": metric} for record in made]
+    title = f"MAE and pAUC of {_focus_title(unit, 'by fold')}"
+    return _Measured(title, "Fold", _with_published_focus(unit, cells))
 
 
 def _examples(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
@@ -271,16 +345,16 @@ def _examples(name: str, evaluations: Evaluations, settings: ReportSettings) -> 
     cells = []
     for azimuth in settings.example_initial_deg:
         for method in settings.methods:
-            found = example_row(frame, example, method, azimuth)
-            if found is None:
+            outcome = example_row(frame, example, method, azimuth)
+            if outcome is None:
                 continue
             shared = {"method": method, "n_objects": 1, "n_images": 1}
             for metric, column in (("estimate", "pose_estimate_deg"), ("error", "error_deg")):
-                figure = {"metric": metric, "value": float(found[column])}
+                figure = {"metric": metric, "value": float(outcome[column])}
                 cells.append(cell(name, str(azimuth), f"{azimuth}°", **shared, **figure))
-    title = f"Examples of estimates (and errors) for {_of_focus(unit)}"
+    title = f"Examples of estimates (and errors) for {_focus_title(unit)}"
     note = f"Object {example.object_id} of fold {example.fold}: {example.reason}."
-    return _Measured(title, "Initial azimuth", _published_of_focus(unit, cells), (note,))
+    return _Measured(title, "Initial azimuth", _with_published_focus(unit, cells), (note,))
 
 
 def _focus_sample(evaluations: Evaluations, settings: ReportSettings) -> tuple[Unit, PairedErrors]:
@@ -288,21 +362,21 @@ def _focus_sample(evaluations: Evaluations, settings: ReportSettings) -> tuple[U
     return unit, pair_methods(evaluations[unit], unit[0])
 
 
-def _of_focus(unit: Unit, by: str = "") -> str:
+def _focus_title(unit: Unit, by: str = "") -> str:
     return f"{category_label(unit[0])} {by}".rstrip() + f" at elevation {unit[1]}°"
 
 
-def _published_of_focus(unit: Unit, cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Add what the paper prints, which is about one category at elevation 0° alone."""
+def _with_published_focus(unit: Unit, cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Add the published values, which exist for one category at elevation 0° only."""
     return _with_published(cells) if unit == (published.FOCUS_CATEGORY, 0) else cells
 
 
 def _with_published(cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return cells with what the paper prints in the same place."""
-    place = ("table", "metric", "row", "method")
+    """Return cells with the published values of the same cells."""
+    key = ("table", "metric", "row", "method")
     return [
-        one | {"published": published.published_value(*(one[key] for key in place))}
-        for one in cells
+        record | {"published": published.published_value(*(record[column] for column in key))}
+        for record in cells
     ]
 
 
@@ -312,9 +386,9 @@ _KINDS: Mapping[str, _Kind] = {
     "table3": _Kind(_by_category),
     "table4": _Kind(_by_elevation),
     "table5": _Kind(_by_group),
-    "table6": _Kind(_examples, layout.example_body, lambda *_: ()),
-    "table7": _Kind(_by_fold, layout.fold_body, layout.fold_notes),
+    "table6": _Kind(_examples, example_body, lambda *_: ()),
+    "table7": _Kind(_by_fold, fold_body, fold_notes),
 }
 
 TABLES = tuple(_KINDS)
-"""Names of the tables that `build_table` knows."""
+"""The names of the tables of `build_table`."""

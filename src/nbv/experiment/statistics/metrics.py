@@ -19,16 +19,16 @@ PAUC_LIMIT_DEG = 100.0
 """Upper end of the thresholds that the pAUC integrates over (Tables 3 and 4 of the paper)."""
 
 HALF_TURN_DEG = 90.0
-"""An error above it has front and back confused rather than being inaccurate."""
+"""Errors above this angle confuse front and back rather than being inaccurate."""
 
 
 def accuracy_area(errors_deg: ArrayLike) -> Floats:
-    """Return what each image adds to the mean that is the pAUC, in percent, in [0, 100]."""
+    """Return the contribution of each image to the pAUC, in percent, in [0, 100]."""
     return PAUC_LIMIT_DEG - np.minimum(np.asarray(errors_deg, dtype=np.float64), PAUC_LIMIT_DEG)
 
 
 def half_turned(errors_deg: ArrayLike) -> Floats:
-    """Return what each image adds to the share of errors above 90°, in percent: 0 or 100."""
+    """Return the contribution of each image to the share of errors above 90°: 0 or 100 percent."""
     return np.where(np.asarray(errors_deg, dtype=np.float64) > HALF_TURN_DEG, 100.0, 0.0)
 
 
@@ -37,7 +37,7 @@ _MEDIAN_GRID = 1001
 
 @dataclass(frozen=True)
 class Interval:
-    """A figure with the ends of its 95 % interval, all in the figure's unit."""
+    """A value with the ends of its 95 % interval, all in the same unit."""
 
     value: float
     low: float
@@ -46,7 +46,7 @@ class Interval:
     def columns(self, name: str, ends: str = "") -> dict[str, float]:
         """Return the columns of a tidy table: ``name``, ``<ends>_low`` and ``<ends>_high``.
 
-        The ends are called after `name` unless `ends` says otherwise (``ci`` for a value).
+        The ends are named after `ends` (``ci`` for a value), by default after `name`.
         """
         ends = ends or name
         return {name: self.value, f"{ends}_low": self.low, f"{ends}_high": self.high}
@@ -67,13 +67,13 @@ def mae_deg(errors_deg: ArrayLike) -> float:
     Raises
     ------
     ValueError
-        If there is no error at all.
+        If there are no errors.
     """
     return float(np.mean(_non_empty(errors_deg)))
 
 
 def median_deg(errors_deg: ArrayLike) -> float:
-    """Return the median error over images, in degrees (Fig. 9); otherwise as `mae_deg`."""
+    """Return the median error over images, in degrees (Fig. 9); same errors as `mae_deg`."""
     return float(np.median(_non_empty(errors_deg)))
 
 
@@ -81,8 +81,8 @@ def pea(errors_deg: ArrayLike, thresholds_deg: ArrayLike) -> Floats:
     """Return the pose estimation accuracy at each threshold (Eq. 10).
 
     The fraction of images, in [0, 1], whose error is strictly below the threshold: PEA(0) is 0
-    even for perfect estimates. Higher is better. Not a figure to compare methods by at one
-    threshold chosen after the fact; use the whole curve or the pAUC.
+    even for perfect estimates. Higher is better. Do not compare methods at one threshold chosen
+    after the fact; use the whole curve or the pAUC.
 
     Parameters
     ----------
@@ -100,10 +100,10 @@ def pauc(errors_deg: ArrayLike) -> float:
     """Return the area under PEA from 0 to 100 degrees, in percent of its largest value.
 
     Exactly ``100 - mean(min(error, 100))``: integrating the step of one image from 0 to 100
-    leaves the part of the range above its error. It is thus an MAE that counts no error above
-    100 degrees, and says little that the MAE does not unless half-turns are common. Higher is
-    better. Many published values are lower than this can be (`nbv.experiment.paper.published`). Takes and
-    raises what `mae_deg` does.
+    leaves the part of the range above its error. It is thus an MAE with errors clipped at 100
+    degrees, and adds little to the MAE unless half-turns are common. Higher is
+    better. Many published values are lower than this can be; see
+    `nbv.experiment.paper.published`. Same parameters and errors as `mae_deg`.
     """
     return float(np.mean(accuracy_area(_non_empty(errors_deg))))
 
@@ -112,16 +112,16 @@ def above_90_percent(errors_deg: ArrayLike) -> float:
     """Return the share of errors above 90 degrees, in percent: front and back are confused.
 
     Lower is better. The mean of two opposite estimates is 90 degrees from both, so averaging can
-    turn one error of 180 degrees into two of 90. Takes and raises what `mae_deg` does.
+    turn one error of 180 degrees into two of 90. Same parameters and errors as `mae_deg`.
     """
     return float(np.mean(half_turned(_non_empty(errors_deg))))
 
 
 def fold_std(values: ArrayLike) -> float:
-    """Return the sample standard deviation (ddof = 1) of one figure per fold, in its unit.
+    """Return the sample standard deviation (ddof = 1) of one value per fold, in its unit.
 
-    What the paper calls sigma. It measures how much folds differ (which objects happen to be
-    tested), not how well the average is known: for that use an interval over objects.
+    The paper's sigma. It measures how much folds differ (which objects happen to be tested), not
+    the uncertainty of the average: for that use an interval over objects.
 
     Returns
     -------
@@ -133,9 +133,9 @@ def fold_std(values: ArrayLike) -> float:
 
 
 def resample_objects(n_objects: int, rng: np.random.Generator, n_resamples: int) -> Ints:
-    """Draw as many objects as there are, with replacement, and return how often each was drawn.
+    """Draw n_objects objects with replacement, and return how often each was drawn.
 
-    Takes ``rng.integers(n_objects, size=(n_resamples, n_objects))`` and nothing else.
+    Calls ``rng.integers(n_objects, size=(n_resamples, n_objects))`` once.
 
     Returns
     -------
@@ -151,12 +151,12 @@ def resample_objects(n_objects: int, rng: np.random.Generator, n_resamples: int)
 def resampled_means(values: ArrayLike, objects: Ints, multiplicities: Ints) -> Floats:
     """Return the mean over images in each resample of the objects.
 
-    Per-object sums and counts are enough, so the cost is that of two small matrix products.
+    Per-object sums and counts suffice, so this costs two small matrix products.
 
     Parameters
     ----------
     values : (n_images,) float
-        Any figure per image.
+        Any value per image.
     objects : (n_images,) int
         Object of each image, in [0, n_objects).
     multiplicities : (n_resamples, n_objects) int
@@ -165,7 +165,7 @@ def resampled_means(values: ArrayLike, objects: Ints, multiplicities: Ints) -> F
     Returns
     -------
     (n_resamples,) float
-        NaN where no image was drawn at all.
+        NaN where no image was drawn.
     """
     n_objects = multiplicities.shape[1]
     sums = np.bincount(objects, weights=np.asarray(values, dtype=np.float64), minlength=n_objects)
@@ -180,10 +180,9 @@ def resampled_means(values: ArrayLike, objects: Ints, multiplicities: Ints) -> F
 def resampled_medians(values: ArrayLike, objects: Ints, multiplicities: Ints) -> Floats:
     """Return the median over images in each resample of the objects.
 
-    Read off a grid of 1,001 pooled quantiles, so exact to one thousandth in rank: far finer
-    than the spread of the resamples, and a matrix product instead of a sort for each one.
-
-    Parameters and result as for `resampled_means`.
+    Read from a grid of 1,001 pooled quantiles, so exact to one thousandth in rank: far finer than
+    the spread of the resamples, and a matrix product instead of a sort for each resample. Same
+    parameters and result as `resampled_means`.
     """
     flat = np.asarray(values, dtype=np.float64)
     grid = np.quantile(flat, np.linspace(0.0, 1.0, _MEDIAN_GRID), method="inverted_cdf")
@@ -198,7 +197,7 @@ def resampled_medians(values: ArrayLike, objects: Ints, multiplicities: Ints) ->
 
 
 def percentile_interval(samples: ArrayLike, level: float = 0.95) -> tuple[float, float]:
-    """Return the percentile interval of bootstrap samples; NaN samples are left out."""
+    """Return the percentile interval of bootstrap samples; NaN samples are ignored."""
     finite = np.asarray(samples, dtype=np.float64)
     finite = finite[np.isfinite(finite)]
     if finite.size == 0:

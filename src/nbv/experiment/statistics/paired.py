@@ -1,22 +1,26 @@
-"""Errors of several methods on the same images, and statistics with paired intervals.
+"""Errors of several methods on the same images or objects, and statistics with paired intervals.
 
 Tables and claims take their figures from here, so both state the same value and interval.
 """
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nbv.core.angles import travel_deg
 from nbv.errors import UserError
 from nbv.experiment.statistics import metrics
 from nbv.experiment.statistics.metrics import Floats, Interval, Ints, accuracy_area, half_turned
+from nbv.files import existing, read_csv
 
 VIEWPOINT_GROUPS: Mapping[int, tuple[int, int]] = {
     1: (315, 45),
@@ -24,11 +28,11 @@ VIEWPOINT_GROUPS: Mapping[int, tuple[int, int]] = {
     3: (135, 225),
     4: (225, 315),
 }
-"""Fig. 8: each group's first azimuth in degrees, and the first one after it."""
+"""The first azimuth of each group in degrees, and the first after the group (Fig. 8)."""
 
 
 def viewpoint_group(azimuth_deg: NDArray[np.float64]) -> Ints:
-    """Return the group, 1 to 4, of each azimuth in [0, 360) (Fig. 8: quarters centred on 0)."""
+    """Return the groups, 1 to 4, of azimuths in [0, 360) (Fig. 8: quarters centred on 0)."""
     return (np.floor(np.mod(azimuth_deg + 45.0, 360.0) / 90.0)).astype(np.int64) + 1
 
 
@@ -41,7 +45,7 @@ class PairedErrors:
     errors_deg : mapping of str to (n_images,) float
         One array per method, all in the same order of images.
     objects : (n_images,) int
-        Which object an image shows, in [0, n_objects).
+        The object in each image, in [0, n_objects).
     folds : (n_images,) int
         The fold in which it was tested, from 1.
     initial_deg : (n_images,) float
@@ -57,7 +61,7 @@ class PairedErrors:
     category_of: tuple[str, ...]
 
     def select(self, mask: NDArray[np.bool_]) -> PairedErrors:
-        """Keep the images of `mask`; objects keep their numbers."""
+        """Return the errors on the images of `mask`; objects keep their indices."""
         return PairedErrors(
             {method: errors[mask] for method, errors in self.errors_deg.items()},
             self.objects[mask],
@@ -68,7 +72,7 @@ class PairedErrors:
 
     @property
     def n_objects(self) -> int:
-        """Number of objects that still have an image."""
+        """Number of objects with at least one image."""
         return int(np.unique(self.objects).size)
 
     @property
@@ -111,7 +115,7 @@ def pair_methods(frame: pd.DataFrame, category: str) -> PairedErrors:
 
 
 def pool(parts: Sequence[PairedErrors]) -> PairedErrors:
-    """Join the images of several categories; the methods are those that all of them have."""
+    """Join the images of several categories; the methods are those that all categories have."""
     shared = [m for m in parts[0].errors_deg if all(m in part.errors_deg for part in parts)]
     offsets = np.cumsum([0, *(len(part.category_of) for part in parts)])
     return PairedErrors(
@@ -124,12 +128,12 @@ def pool(parts: Sequence[PairedErrors]) -> PairedErrors:
 
 
 def fewest_resampled(statistic: str, sample: PairedErrors) -> int:
-    """Return the smallest number of objects that `estimate` resamples together.
+    """Return the size of the smallest stratum that `estimate` resamples.
 
     Objects are resampled within their category, and for σ within their fold as well.
     """
     objects, images = np.unique(sample.objects, return_index=True)
-    strata = [sample.category_of[one] for one in objects]
+    strata = [sample.category_of[i] for i in objects]
     if statistic.endswith("_sigma"):
         strata = [f"{fold} {name}" for fold, name in zip(sample.folds[images], strata, strict=True)]
     return int(np.unique(strata, return_counts=True)[1].min(initial=objects.size))
@@ -137,10 +141,10 @@ def fewest_resampled(statistic: str, sample: PairedErrors) -> int:
 
 @dataclass
 class Resampler:
-    """Object resamples, drawn once per category, so that all comparisons share them.
+    """Object resamples, drawn once per category and shared by all comparisons.
 
-    A category's draws depend on the seed and its name alone, not on what else is asked, so a
-    table and a claim about the same unit give the same interval.
+    The draws depend on the seed and the category's name alone, so a table and a claim about the
+    same unit give the same interval.
     """
 
     seed: int
@@ -160,7 +164,7 @@ class Resampler:
     def multiplicities_by_fold(self, sample: PairedErrors) -> Ints:
         """Return (n_resamples, n_objects) draws, resampling within each fold's test objects.
 
-        For figures that compare folds: no resample may lose a fold.
+        For statistics that compare folds: no resample may lose a fold.
         """
         drawn = np.zeros((self.n_resamples, len(sample.category_of)), dtype=np.int64)
         for fold in np.unique(sample.folds):
@@ -178,7 +182,7 @@ class Resampler:
 
 
 STATISTICS = ("mae", "pauc", "above_90_percent", "median", "mae_sigma", "pauc_sigma")
-"""The statistics that `estimate` knows."""
+"""The statistics of `estimate`."""
 
 LOWER_IS_BETTER: Mapping[str, bool] = {name: name != "pauc" for name in STATISTICS}
 UNIT_OF: Mapping[str, str] = {
@@ -210,12 +214,12 @@ def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resam
     ----------
     statistic : str
         ``mae`` or ``median`` (degrees), ``pauc`` or ``above_90_percent`` (percent), or
-        ``mae_sigma`` and ``pauc_sigma``: the standard deviation over folds of the figure per fold.
+        ``mae_sigma`` and ``pauc_sigma``: the standard deviation over folds.
 
     Raises
     ------
     ValueError
-        If there is no image.
+        If there are no images.
     """
     errors, pooled = sample.errors_deg[method], statistic.removesuffix("_sigma")
     if pooled != statistic:
@@ -245,7 +249,7 @@ def _estimate_sigma(
 
 
 def _per_image(statistic: str, errors_deg: Floats) -> Floats:
-    """Return what each image adds to a statistic that is a mean over images."""
+    """Return the contribution of each image to a statistic that is a mean over images."""
     if statistic == "above_90_percent":
         return half_turned(errors_deg)
     return accuracy_area(errors_deg) if statistic == "pauc" else errors_deg
@@ -257,3 +261,100 @@ _METRICS: Mapping[str, Callable[[Floats], float]] = {
     "pauc": metrics.pauc,
     "above_90_percent": metrics.above_90_percent,
 }
+
+
+FoldFile = tuple[str, int, int]
+"""The key of a file: category, elevation in degrees and fold (from 1)."""
+
+MEAN_COLUMNS = ("error_deg", "pauc_percent", "above_90_percent", "travel_deg")
+OBJECT_COLUMNS = ("method", "object_id", "n_images", *MEAN_COLUMNS)
+
+
+def object_means(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Return each object's mean error, pAUC, share of errors above 90° and travel by method.
+
+    Parameters
+    ----------
+    frames : mapping of str to DataFrame
+        Rows of ``evaluation/.../<method>.csv`` by method.
+
+    Returns
+    -------
+    DataFrame
+        Columns `OBJECT_COLUMNS`; ``travel_deg`` is 0 where no second view was taken.
+    """
+    parts = []
+    for method, frame in frames.items():
+        travel = travel_deg(frame["delta_deg"].fillna(0).to_numpy(dtype=np.float64))
+        rows = frame.assign(
+            pauc_percent=accuracy_area(frame["error_deg"]),
+            above_90_percent=half_turned(frame["error_deg"]),
+            travel_deg=travel,
+        ).groupby("object_id", sort=True)
+        means = rows[list(MEAN_COLUMNS)].mean()
+        means.insert(0, "n_images", rows.size())
+        parts.append(means.reset_index().assign(method=method))
+    return pd.concat(parts, ignore_index=True)[list(OBJECT_COLUMNS)]
+
+
+def load_folds(files: Mapping[FoldFile, Path]) -> pd.DataFrame:
+    """Read a CSV file for each unit and fold into one frame, such as files of `object_means`.
+
+    Returns
+    -------
+    DataFrame
+        ``category, elevation_deg, fold`` and the columns of the files.
+    """
+    parts = []
+    for key, path in files.items():
+        rows = read_csv(existing(path))
+        for i, name in enumerate(("category", "elevation_deg", "fold")):
+            rows.insert(i, name, key[i])
+        parts.append(rows)
+    return pd.concat(parts, ignore_index=True)
+
+
+def paired_objects(means: pd.DataFrame, category: str) -> PairedErrors:
+    """Line up the methods of one category and elevation object by object.
+
+    Each object counts as one image with its mean error: with equally many viewpoints per object,
+    the mean over objects is the mean over images.
+    """
+    indexed = means.set_index(["object_id", "fold", "method"])["error_deg"]
+    wide = indexed.unstack("method")  # noqa: PD010 - nothing to aggregate
+    wide = wide.sort_index(level="object_id").dropna(axis=1)
+    n_objects = len(wide)
+    return PairedErrors(
+        {str(method): wide[method].to_numpy(dtype=np.float64) for method in wide.columns},
+        np.arange(n_objects, dtype=np.int64),
+        wide.index.get_level_values("fold").to_numpy(dtype=np.int64),
+        np.zeros(n_objects),
+        (category,) * n_objects,
+    )
+
+
+def mae_interval(sample: PairedErrors, method: str, resampler: Resampler) -> Interval:
+    """Return a method's MAE in degrees with its 95 % interval over objects."""
+    return estimate("mae", sample, method, resampler).interval()
+
+
+def mae_difference(sample: PairedErrors, method: str, other: str, resampler: Resampler) -> Interval:
+    """Return the paired difference of two methods' MAE in degrees, with its 95 % interval."""
+    mine = estimate("mae", sample, method, resampler)
+    return mine.minus(estimate("mae", sample, other, resampler))
+
+
+def indistinct_from_best(
+    sample: PairedErrors, methods: Sequence[str], resampler: Resampler
+) -> list[str]:
+    """Return the method of least MAE, then those whose 95 % interval to it includes 0."""
+    estimates = {method: estimate("mae", sample, method, resampler) for method in methods}
+    for method, mae in estimates.items():
+        if not math.isfinite(mae.value):
+            raise UserError(f"{method}: the MAE is {mae.value}: its errors are damaged")
+    best = min(methods, key=lambda method: estimates[method].value)
+    return [best] + [
+        method
+        for method in methods
+        if method != best and estimates[method].minus(estimates[best]).low <= 0.0
+    ]

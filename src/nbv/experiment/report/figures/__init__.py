@@ -1,4 +1,4 @@
-"""The paper's figures from our results, and three that it does not have."""
+"""The paper's figures from our results, and four more."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ __all__ = ["FIGURES", "FigureInputs", "FigureKind", "build_figure"]
 
 @dataclass(frozen=True)
 class FigureKind:
-    """One figure: how to draw it, what to print under it, and which of `FigureInputs` it needs.
+    """A figure: its function, its caption, and the `FigureInputs` that it needs.
 
-    ``needs`` is of ``depth``, ``objects`` and ``lookups``; every figure reads the evaluations.
+    ``needs`` names some of ``depth``, ``objects`` and ``lookups``; all need the evaluations.
     """
 
     draw: Callable[[FigureInputs], Figure]
@@ -114,7 +114,7 @@ def build_figure(name: str, inputs: FigureInputs) -> Figure:
     Raises
     ------
     UserError
-        If there is no such figure, nothing was evaluated, or a file it needs is missing.
+        If the figure is unknown, nothing was evaluated, or a file is missing.
     """
     if name not in FIGURES:
         raise UserError(f"no figure {name!r}; {nearest(name, FIGURES)}")

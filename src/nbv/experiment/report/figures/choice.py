@@ -1,4 +1,4 @@
-"""How a next viewpoint is selected: its cost (Fig. 2), the idea (3), each method's own (7)."""
+"""Figures of the selection of the next viewpoint: costs (2), the idea (3), all methods (7)."""
 
 from __future__ import annotations
 
@@ -95,12 +95,12 @@ def idea(inputs: FigureInputs) -> Figure:
     best = round(int(lookup.recommended_delta_deg[first]) / step)
     worst = int(np.argmax(lookup.cost[first]))
     given = viewpoint if lookup.pose_likelihood == "given_estimate" else estimates
-    one = method_style("single", ()).color
-    two = inputs.style(inputs.settings.subject).color
+    one_view_color = method_style("single", ()).color
+    two_view_color = inputs.style(inputs.settings.subject).color
     curves: list[list[tuple[Likelihood, str, str, str]]] = [
-        [(viewpoint[first], "p(φ | e)", one, "solid")],
+        [(viewpoint[first], "p(φ | e)", one_view_color, "solid")],
         [
-            (two_view_poses(viewpoint, given, best)[first], "recommended", two, "solid"),
+            (two_view_poses(viewpoint, given, best)[first], "recommended", two_view_color, "solid"),
             (two_view_poses(viewpoint, given, worst)[first], "worst", MUTED, "dashed"),
         ],
     ]
@@ -112,7 +112,7 @@ def idea(inputs: FigureInputs) -> Figure:
         delta = round(float(seen["delta_deg"]) / step)
         second = int(nearest_bin(float(seen["next_estimate_deg"]), n_bins))
         belief = two_view_belief(lookup, first, second, delta)
-        curves.append([(belief, "p(θ | e₁, e₂, δ)", two, "solid")])
+        curves.append([(belief, "p(θ | e₁, e₂, δ)", two_view_color, "solid")])
         titles.append(f"After the second view at δ = {delta * step:.0f}°")
     figure = new_figure(7.6, 2.1 * len(curves) + 0.4)
     grid = figure.add_gridspec(len(curves), 2, width_ratios=(1, 2.9))
@@ -148,29 +148,29 @@ def two_view_belief(lookup: LookupTable, first: int, second: int, delta: int) ->
     Parameters
     ----------
     lookup : LookupTable
-        Whose likelihoods.
+        The table with the likelihoods.
     first, second : int
         Bins of the two estimates.
     delta : int
         Bins from the first view to the second.
     """
-    one, estimates = lookup.viewpoint_likelihood[first], lookup.estimate_likelihood
-    belief = one * np.roll(estimates[:, second], -delta)
-    # As before the second view: two estimates that exclude each other say nothing.
-    belief = belief if belief.any() else np.ones_like(one)
+    first_belief, estimates = lookup.viewpoint_likelihood[first], lookup.estimate_likelihood
+    belief = first_belief * np.roll(estimates[:, second], -delta)
+    # Two estimates that exclude each other carry no information.
+    belief = belief if belief.any() else np.ones_like(first_belief)
     return np.asarray(belief / belief.sum())
 
 
 def _label_curve(axes: Axes, label: str, line: int, color: str, dashes: str) -> None:
-    """Name a curve at the right, one line below the other, with a piece of it before the name."""
+    """Write the label of a curve at the right, with a sample of its line."""
     height = 0.9 - 0.13 * line
-    place: Any = {"transform": axes.transAxes}
-    axes.plot([0.62, 0.67], [height] * 2, color=color, linestyle=dashes, linewidth=1.8, **place)
-    axes.text(0.685, height, label, va="center", fontsize=8, **place)
+    in_axes: Any = {"transform": axes.transAxes}
+    axes.plot([0.62, 0.67], [height] * 2, color=color, linestyle=dashes, linewidth=1.8, **in_axes)
+    axes.text(0.685, height, label, va="center", fontsize=8, **in_axes)
 
 
 def picks(inputs: FigureInputs) -> Figure:
-    """Fig. 7: the next view that each method takes for one initial image, and what it gains."""
+    """Fig. 7: the next view of each method for one initial image, and the resulting error."""
     shown = example_view(inputs)
     methods = [m for m, row in shown.outcomes.items() if np.isfinite(_delta(shown, m))]
     single = [m for m in shown.outcomes if m not in methods]

@@ -1,4 +1,4 @@
-"""How large errors are: boxplots (Fig. 9), accuracy by threshold, error by initial azimuth."""
+"""Figures of errors: boxplots (Fig. 9), accuracy by threshold, error by initial azimuth."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def boxplots(inputs: FigureInputs) -> Figure:
     whole, close = figure.subplots(2, 1)
     errors = {unit: _paired(inputs, unit).errors_deg for unit in units}
     offsets = (np.arange(len(methods)) - (len(methods) - 1) / 2) * 0.8 / len(methods)
-    places = np.add.outer(np.arange(len(units)), offsets).ravel()
+    positions = np.add.outer(np.arange(len(units)), offsets).ravel()
     for axes, whiskers in ((whole, (0, 100)), (close, (5, 95))):
         for offset, method in zip(offsets, methods, strict=True):
             style = inputs.style(method)
@@ -66,7 +66,7 @@ def boxplots(inputs: FigureInputs) -> Figure:
     whole.set_yticks([0, 45, 90, 135, 180])
     close.set_title("Close-up: whiskers to the 5th and 95th percentile, cut off where longer")
     close.set_ylim(0, max(_close_limit_deg(e) for unit in units for e in errors[unit].values()))
-    close.set_xticks(places, [method_label(m) for m in methods] * len(units), minor=True)
+    close.set_xticks(positions, [method_label(m) for m in methods] * len(units), minor=True)
     close.tick_params(axis="x", which="minor", length=0, labelsize=8, labelrotation=90)
     close.tick_params(axis="x", which="major", length=0, pad=52)
     figure.suptitle(
@@ -76,7 +76,7 @@ def boxplots(inputs: FigureInputs) -> Figure:
 
 
 def _close_limit_deg(errors_deg: NDArray[np.float64]) -> float:
-    """Return how high the close-up must reach for a method's box, mean and near tail."""
+    """Return the upper limit of the close-up for a method's box, mean and near tail."""
     lower, upper = np.quantile(errors_deg, [0.25, 0.75])
     return float(max(1.1 * np.mean(errors_deg), upper + 1.5 * (upper - lower)))
 
@@ -124,8 +124,8 @@ def by_azimuth(inputs: FigureInputs) -> Figure:
             axes.axvline(boundary, color=MUTED, linewidth=0.7, linestyle=":")
         axes.set_ylim(0, 1.1 * axes.get_ylim()[1])
         for group, centre in ((1, 22), (2, 90), (3, 180), (4, 270), (1, 338)):
-            place: Any = {"ha": "center", "va": "top", "transform": axes.get_xaxis_transform()}
-            axes.text(centre, 0.99, str(group), fontsize=8, color=MUTED, **place)
+            style: Any = {"ha": "center", "va": "top", "transform": axes.get_xaxis_transform()}
+            axes.text(centre, 0.99, str(group), fontsize=8, color=MUTED, **style)
         axes.grid(visible=False, axis="x")
         axes.set_title(unit_label(unit, common))
         axes.set_ylabel("Mean error (degrees)")

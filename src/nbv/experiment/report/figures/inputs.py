@@ -1,4 +1,4 @@
-"""What figures are made from, and the example that several of them share."""
+"""Inputs of the figures, and the example that several figures share."""
 
 from __future__ import annotations
 
@@ -14,8 +14,14 @@ from nbv.core.criteria import cost_unit
 from nbv.core.lookup import LookupTable
 from nbv.data.depth_images import Codes, open_depth
 from nbv.errors import UserError
-from nbv.experiment.report.settings import ReportSettings, focus_unit
-from nbv.experiment.report.tables import Example, choose_example, example_row, hardest_azimuth_deg
+from nbv.experiment.report.settings import (
+    Example,
+    ReportSettings,
+    choose_example,
+    example_row,
+    focus_unit,
+    hardest_azimuth_deg,
+)
 from nbv.experiment.results import Unit
 from nbv.files import existing
 from nbv.robot.style import MethodStyle, method_style
@@ -27,18 +33,18 @@ _LONGEST_NAME = 16
 
 @dataclass(frozen=True)
 class FigureInputs:
-    """Everything that figures are drawn from; `FigureKind.needs` says what each of them reads.
+    """The inputs of all figures; see `FigureKind.needs` for the inputs of a single figure.
 
     Attributes
     ----------
     evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
         Frames of `results.load_evaluations`.
     settings : ReportSettings
-        What to show.
+        The choices of presentation.
     depth, objects : mapping of (category, elevation_deg) to Path
         Depth images, and the ids of their objects.
     lookups : mapping of (category, elevation_deg, fold) to Path
-        Lookup tables that the method ``settings.subject`` follows.
+        The lookup tables of the method ``settings.subject``.
     """
 
     evaluations: Mapping[Unit, pd.DataFrame]
@@ -49,7 +55,7 @@ class FigureInputs:
 
     @property
     def focus(self) -> Unit:
-        """The category and elevation that the detailed figures are about."""
+        """The category and elevation of the detailed figures."""
         return focus_unit(self.evaluations, self.settings)
 
     def views(self, unit: Unit, object_id: str | None = None) -> Codes:
@@ -58,7 +64,7 @@ class FigureInputs:
         Raises
         ------
         UserError
-            If a file is missing or the unit has no such object.
+            If a file is missing or the object is unknown.
         """
         path = _given(self.depth, unit, "depth images")
         images = open_depth(path, _given(self.objects, unit, "objects of depth images"))
@@ -74,37 +80,37 @@ class FigureInputs:
         Raises
         ------
         UserError
-            If the subject follows none, or its file is missing.
+            If the subject follows no table, or its file is missing.
         """
         name = f"lookup table of {self.settings.subject}"
         return LookupTable.load(existing(_given(self.lookups, (*self.focus, fold), name)))
 
     def methods(self, unit: Unit) -> tuple[str, ...]:
-        """Return the methods to show that were evaluated for a unit, in order."""
+        """Return the methods of the settings that were evaluated for a unit, in order."""
         present = set(self.evaluations[unit]["method"].astype(str))
         return tuple(method for method in self.settings.methods if method in present)
 
     def style(self, method: str) -> MethodStyle:
-        """Return how a method of the settings is drawn."""
+        """Return the style of a method."""
         return method_style(method, self.settings.methods)
 
 
 @dataclass(frozen=True)
 class ExampleView:
-    """The example object seen from the hardest initial azimuth, and what each method made of it.
+    """The example object at the hardest initial azimuth, with the results of each method.
 
     Attributes
     ----------
     unit, example : Unit, Example
         The object.
     azimuth_deg : int
-        Its initial viewpoint: where the category's single-view error is largest.
+        Its initial viewpoint, where the category's single-view error is largest.
     estimate_deg : float
-        Its estimate there.
+        The estimate from there.
     views : (n_viewpoints, side, side) uint8
         Depth codes of every viewpoint of the object.
     outcomes : mapping of str to pandas.Series
-        Each method's row of the evaluation.
+        The row of the evaluation by method.
     """
 
     unit: Unit
@@ -121,10 +127,10 @@ class ExampleView:
 
     @property
     def title(self) -> str:
-        """Which object this is."""
+        """The object, its category, fold and elevation."""
         category, elevation = self.unit
         fold = self.example.fold
-        # Hashes of 32 digits fill the line; eight tell objects apart, and Table 6 has all.
+        # Hashes of 32 digits fill the line; eight digits are distinct, and Table 6 has all.
         name = self.example.object_id
         short = name if len(name) <= _LONGEST_NAME else f"{name[:8]}…"
         return f"{short} ({category}, fold {fold}, elevation {elevation}°)"
@@ -150,9 +156,9 @@ def example_view(inputs: FigureInputs) -> ExampleView:
 
 @dataclass(frozen=True)
 class CostWords:
-    """How figures name what selects the next view, what a lookup table holds, and the table.
+    """The names of the criterion, the cost and the lookup table in figures.
 
-    The paper's table goes by the spread that its ambiguity is.
+    The paper's table is named after the spread that measures its ambiguity.
     """
 
     selects: str
@@ -162,9 +168,9 @@ class CostWords:
 
 
 def cost_words(lookup: LookupTable) -> CostWords:
-    """Return the words for a lookup table, whatever its criterion."""
+    """Return the names for a lookup table of any criterion."""
     unit = cost_unit(lookup.criterion, {"spread": lookup.spread})
-    unit = "0–1" if unit == "1" else unit  # the range says more than that there is no unit
+    unit = "0–1" if unit == "1" else unit  # the range is more useful than "no unit"
     if lookup.criterion == "pose_ambiguity":
         spread = lookup.spread.replace("_", " ").capitalize()
         return CostWords("Ambiguity", "Ambiguity", unit, spread)
@@ -175,6 +181,6 @@ def cost_words(lookup: LookupTable) -> CostWords:
 def _given(files: Mapping[Key, Path], key: Key, kind: str) -> Path:
     """Return the file of a key, or raise a UserError."""
     if key not in files:
-        place = " ".join(map(str, key)) if isinstance(key, tuple) else key
-        raise UserError(f"no {kind} for {place}; run that stage first")
+        name = " ".join(map(str, key)) if isinstance(key, tuple) else key
+        raise UserError(f"no {kind} for {name}; run that stage first")
     return files[key]

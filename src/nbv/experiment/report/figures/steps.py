@@ -1,4 +1,4 @@
-"""The method in three steps, on the example: as one figure, and as an animation."""
+"""The method in three steps on the example, as a figure and as an animation."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ _STEP_MS, _READ_MS = 90, 2600
 
 
 @dataclass(frozen=True)
-class _Steps:
-    """The example, what the table says of its first estimate, and its estimate from everywhere.
+class _Scene:
+    """The example with its lookup table and its estimates from all azimuths.
 
-    Rotations are bins of the lookup table; `estimates_deg` holds one estimate for each azimuth
-    that the object was evaluated from.
+    Rotations are bins of the lookup table; `estimates_deg` maps the evaluated azimuths to
+    estimates.
     """
 
     shown: ExampleView
@@ -72,11 +72,11 @@ class _Steps:
         return np.asarray(self.lookup.viewpoint_likelihood[self.first])
 
     def azimuth_deg(self, delta: int) -> float:
-        """Return where the camera is after a rotation."""
+        """Return the azimuth of the camera after a rotation."""
         return float(wrap_deg(self.shown.azimuth_deg + delta * self.step_deg))
 
     def two_views(self, delta: int) -> Curve:
-        """Return the pose's distribution after a second view at a rotation."""
+        """Return the distribution of the pose after a second view at a rotation."""
         azimuths = np.array(list(self.estimates_deg))
         nearest = azimuths[circular_distance_deg(azimuths, self.azimuth_deg(delta)).argmin()]
         second = int(nearest_bin(self.estimates_deg[int(nearest)], self.n_bins))
@@ -85,32 +85,32 @@ class _Steps:
 
 def steps(inputs: FigureInputs) -> Figure:
     """Draw one view's distribution, the lookup table's row for it, and two views' distribution."""
-    found = _steps(inputs)
-    delta = round(found.best * found.step_deg)
+    scene = _scene(inputs)
+    delta = round(scene.best * scene.step_deg)
     figure = new_figure(3.9, 5.9)
     grid = figure.add_gridspec(3, 2, width_ratios=(1, 2.3))
-    limits = depth_limits(found.shown.views)
-    after = found.two_views(found.best)
-    top = _top([found.one_view, after])
+    limits = depth_limits(scene.shown.views)
+    after = scene.two_views(scene.best)
+    top = _top([scene.one_view, after])
     titles = (
-        f"1  One view, estimate {round(found.shown.estimate_deg) % 360}°",
+        f"1  One view, estimate {round(scene.shown.estimate_deg) % 360}°",
         "2  The table: cost of each turn",
         f"3  Two views, δ = {delta}°",
     )
-    for row, (title, turned) in enumerate(zip(titles, (0, None, found.best), strict=True)):
+    for row, (title, turned) in enumerate(zip(titles, (0, None, scene.best), strict=True)):
         axes = figure.add_subplot(grid[row, 1])
         axes.set_title(title, loc="left", fontweight="bold", fontsize=9)
         image = figure.add_subplot(grid[row, 0])
         if turned is None:
-            _draw_ring(image, found, [0, found.best])
-            _draw_cost(axes, found, found.best)
+            _draw_ring(image, scene, [0, scene.best])
+            _draw_cost(axes, scene, scene.best)
             azimuth_axis(axes, "Rotation δ (degrees)")
             continue
-        azimuth = found.azimuth_deg(turned)
-        draw_depth(image, found.shown.view(azimuth), limits)
+        azimuth = scene.azimuth_deg(turned)
+        draw_depth(image, scene.shown.view(azimuth), limits)
         image.set_xlabel(f"from {azimuth:.0f}°")
-        curve = after if turned else found.one_view
-        _draw_pose(axes, found, curve, method_style("single", ()).color if not turned else "", top)
+        curve = after if turned else scene.one_view
+        _draw_pose(axes, scene, curve, method_style("single", ()).color if not turned else "", top)
         azimuth_axis(axes, "Pose (degrees)")
     return figure
 
@@ -118,29 +118,29 @@ def steps(inputs: FigureInputs) -> Figure:
 def animation_frames(inputs: FigureInputs) -> Iterator[tuple[Figure, int]]:
     """Yield each frame with its duration in milliseconds.
 
-    One view; the table's row is looked through; the camera turns, and each frame shows what both
-    views would say if it stopped there; two views.
+    First one view; then the table's row from start to end; then the camera turns, each frame with
+    the distribution from both views if it stopped there; last two views.
     """
-    found = _steps(inputs)
-    best = found.best if found.best <= found.n_bins / 2 else found.best - found.n_bins
+    scene = _scene(inputs)
+    best = scene.best if scene.best <= scene.n_bins / 2 else scene.best - scene.n_bins
     turned = np.unique(np.linspace(0, best, _TURNING_FRAMES).round().astype(int))
     turned = turned if best >= 0 else turned[::-1]
-    looked = np.linspace(0, found.n_bins, _LOOKING_FRAMES, endpoint=False).astype(int)
-    top = _top([found.one_view, *(found.two_views(int(delta)) for delta in turned)])
-    estimate = round(found.shown.estimate_deg) % 360
-    delta = round(found.best * found.step_deg)
-    one = f"1  One view, estimate {estimate}°: many poses fit it"
-    yield _frame(found, one, 0, None, top), _READ_MS
+    looked = np.linspace(0, scene.n_bins, _LOOKING_FRAMES, endpoint=False).astype(int)
+    top = _top([scene.one_view, *(scene.two_views(int(delta)) for delta in turned)])
+    estimate = round(scene.shown.estimate_deg) % 360
+    delta = round(scene.best * scene.step_deg)
+    start = f"1  One view, estimate {estimate}°: many poses fit it"
+    yield _frame(scene, start, 0, None, top), _READ_MS
     look = f"2  The lookup table's row for {estimate}°: what does a turn cost?"
-    for place in looked:
-        yield _frame(found, look, 0, int(place), top), _STEP_MS
+    for delta_bin in looked:
+        yield _frame(scene, look, 0, int(delta_bin), top), _STEP_MS
     chosen = f"2  A turn by δ = {delta}° costs least"
-    yield _frame(found, chosen, 0, found.best, top), _READ_MS
+    yield _frame(scene, chosen, 0, scene.best, top), _READ_MS
     turning = "3  The camera turns, the shorter way"
-    for place in turned[1:-1]:
-        yield _frame(found, turning, int(place), found.best, top), _STEP_MS
-    two = f"3  Two views, δ = {delta}°: few poses fit both"
-    yield _frame(found, two, best, found.best, top), 2 * _READ_MS
+    for delta_bin in turned[1:-1]:
+        yield _frame(scene, turning, int(delta_bin), scene.best, top), _STEP_MS
+    end = f"3  Two views, δ = {delta}°: few poses fit both"
+    yield _frame(scene, end, best, scene.best, top), 2 * _READ_MS
 
 
 @mpl.rc_context(RC)
@@ -152,7 +152,7 @@ def save_animation(inputs: FigureInputs, path: Path) -> None:
             figure.savefig(file, format="png", dpi=_DPI, metadata={"Software": None})
             images.append(Image.open(file).convert("RGB"))
         durations.append(duration)
-    # One palette, so that what does not move does not flicker: of the first and the last frame.
+    # One palette, of the first and the last frame, so that static parts do not flicker.
     ends = Image.new("RGB", (images[0].width, 2 * images[0].height))
     ends.paste(images[0], (0, 0))
     ends.paste(images[-1], (0, images[0].height))
@@ -170,73 +170,73 @@ def save_animation(inputs: FigureInputs, path: Path) -> None:
         )
 
 
-def _steps(inputs: FigureInputs) -> _Steps:
+def _scene(inputs: FigureInputs) -> _Scene:
     shown = example_view(inputs)
     frame, example = inputs.evaluations[shown.unit], shown.example
-    of_object = frame[(frame["object_id"] == example.object_id) & (frame["fold"] == example.fold)]
-    each = of_object.drop_duplicates("initial_deg")
+    rows = frame[(frame["object_id"] == example.object_id) & (frame["fold"] == example.fold)]
+    each = rows.drop_duplicates("initial_deg")
     columns = each["initial_deg"].astype(int), each["initial_estimate_deg"].astype(float)
     estimates = dict(zip(*columns, strict=True))
     lookup = inputs.lookup(example.fold)
     color = inputs.style(inputs.settings.subject).color
-    return _Steps(shown, lookup, estimates, cost_words(lookup), color)
+    return _Scene(shown, lookup, estimates, cost_words(lookup), color)
 
 
-def _frame(found: _Steps, text: str, delta: int, looked: int | None, top: float) -> Figure:
-    """Draw the view after a rotation, and the row of the table up to a place."""
+def _frame(scene: _Scene, text: str, delta: int, looked: int | None, top: float) -> Figure:
+    """Draw the view after a rotation, and the row of the table with a marked rotation."""
     figure = new_figure(6.4, 4.3)
     grid = figure.add_gridspec(2, 2, width_ratios=(1, 2.1))
     image = figure.add_subplot(grid[0, 0])
-    azimuth = found.azimuth_deg(delta)
-    draw_depth(image, found.shown.view(azimuth), depth_limits(found.shown.views))
+    azimuth = scene.azimuth_deg(delta)
+    draw_depth(image, scene.shown.view(azimuth), depth_limits(scene.shown.views))
     image.set_xlabel(f"depth image from {azimuth:.0f}°")
     pose = figure.add_subplot(grid[0, 1])
     turned = delta != 0
-    curve = found.two_views(delta) if turned else found.one_view
-    _draw_pose(pose, found, curve, "" if turned else method_style("single", ()).color, top)
+    curve = scene.two_views(delta) if turned else scene.one_view
+    _draw_pose(pose, scene, curve, "" if turned else method_style("single", ()).color, top)
     azimuth_axis(pose, "Pose: azimuth of the first view (degrees)")
-    _draw_ring(figure.add_subplot(grid[1, 0]), found, [0, delta] if turned else [0])
+    _draw_ring(figure.add_subplot(grid[1, 0]), scene, [0, delta] if turned else [0])
     cost = figure.add_subplot(grid[1, 1])
-    _draw_cost(cost, found, looked)
+    _draw_cost(cost, scene, looked)
     azimuth_axis(cost, "Rotation δ to the next view (degrees)")
     figure.suptitle(text, fontsize=11, x=0.02, ha="left", fontweight="bold")
     return figure
 
 
-def _draw_pose(axes: Axes, found: _Steps, curve: Curve, color: str, top: float) -> None:
-    """Draw the pose's distribution; without a colour of its own in that of two views."""
-    azimuths = np.arange(found.n_bins) * found.step_deg
-    axes.plot(azimuths, curve, color=color or found.color, linewidth=1.8)
-    axes.fill_between(azimuths, curve, color=color or found.color, alpha=0.2, linewidth=0)
-    mark_azimuth(axes, found.shown.azimuth_deg, "true pose")
+def _draw_pose(axes: Axes, scene: _Scene, curve: Curve, color: str, top: float) -> None:
+    """Draw the distribution of the pose, by default in the colour of two views."""
+    azimuths = np.arange(scene.n_bins) * scene.step_deg
+    axes.plot(azimuths, curve, color=color or scene.color, linewidth=1.8)
+    axes.fill_between(azimuths, curve, color=color or scene.color, alpha=0.2, linewidth=0)
+    mark_azimuth(axes, scene.shown.azimuth_deg, "true pose")
     axes.set_ylim(0, top)
-    axes.set_ylabel(f"Probability per {found.step_deg:g}°")
+    axes.set_ylabel(f"Probability per {scene.step_deg:g}°")
 
 
-def _draw_cost(axes: Axes, found: _Steps, marked: int | None) -> None:
-    row = found.lookup.cost[found.first]
-    axes.plot(np.arange(found.n_bins) * found.step_deg, row, color=INK, linewidth=1.3)
+def _draw_cost(axes: Axes, scene: _Scene, marked: int | None) -> None:
+    row = scene.lookup.cost[scene.first]
+    axes.plot(np.arange(scene.n_bins) * scene.step_deg, row, color=INK, linewidth=1.3)
     if marked is not None:
-        place = marked % found.n_bins
-        least = place == found.best
+        index = marked % scene.n_bins
+        least = index == scene.best
         axes.plot(
-            place * found.step_deg,
-            row[place],
+            index * scene.step_deg,
+            row[index],
             marker="D" if least else "o",
-            color=found.color if least else MUTED,
+            color=scene.color if least else MUTED,
             markeredgecolor=INK,
             markersize=7,
             clip_on=False,
         )
         if least:
-            delta = place * found.step_deg
+            delta = index * scene.step_deg
             mark_azimuth(axes, delta, f"least at {delta:.0f}°")
     low, high = float(row.min()), float(row.max())
     axes.set_ylim(low - 0.1 * (high - low or 1.0), high + 0.3 * (high - low or 1.0))
-    axes.set_ylabel(f"{found.words.cost} ({found.words.unit})")
+    axes.set_ylabel(f"{scene.words.cost} ({scene.words.unit})")
 
 
-def _draw_ring(axes: Axes, found: _Steps, deltas: Sequence[int]) -> None:
+def _draw_ring(axes: Axes, scene: _Scene, deltas: Sequence[int]) -> None:
     """Draw the object from above and the camera before and after each rotation."""
     axes.set_axis_off()
     axes.set_aspect("equal")
@@ -244,15 +244,20 @@ def _draw_ring(axes: Axes, found: _Steps, deltas: Sequence[int]) -> None:
     axes.plot(np.cos(around), np.sin(around), color=MUTED, linewidth=0.8)
     axes.plot(0, 0, marker="o", color=MUTED, markersize=14)
     axes.set(xlim=(-1.45, 1.45), ylim=(-1.45, 1.45))
-    start = found.shown.azimuth_deg
+    start = scene.shown.azimuth_deg
     for number, delta in enumerate(deltas, 1):
-        turn = (delta * found.step_deg + 180) % 360 - 180
+        turn = (delta * scene.step_deg + 180) % 360 - 180
         angle = np.radians(start + turn)
-        color = method_style("single", ()).color if number == 1 else found.color
-        place = np.cos(angle), np.sin(angle)
-        axes.plot([0.35 * place[0], place[0]], [0.35 * place[1], place[1]], color=color, lw=0.9)
-        axes.plot(*place, marker="o", color=color, markersize=8)
-        # Two numbers need this angle between them.
+        color = method_style("single", ()).color if number == 1 else scene.color
+        position = np.cos(angle), np.sin(angle)
+        axes.plot(
+            [0.35 * position[0], position[0]],
+            [0.35 * position[1], position[1]],
+            color=color,
+            lw=0.9,
+        )
+        axes.plot(*position, marker="o", color=color, markersize=8)
+        # The least angle between two numbers.
         aside = np.copysign(max(0.0, 25.0 - abs(turn)), turn) if number > 1 else 0.0
         named = angle + np.radians(aside)
         axes.text(1.28 * np.cos(named), 1.28 * np.sin(named), str(number), ha="center", va="center")

@@ -1,4 +1,4 @@
-"""What the estimator sees (Figs. 5, 6, 8), and lookup tables as heat maps."""
+"""Figures of depth images (Figs. 5, 6, 8), and lookup tables as heat maps."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _BACKGROUND = 0
 
 
 def depth_limits(images: Codes) -> tuple[int, int]:
-    """Return the farthest and nearest code of some images, for one grey scale among them."""
+    """Return the farthest and nearest code of images, for a common grey scale."""
     seen = images[images != _BACKGROUND]
     return (int(seen.min()), int(seen.max())) if seen.size else (1, 255)
 
 
 def shade(codes: Codes, limits: tuple[int, int]) -> NDArray[np.float64]:
-    """Return grey levels in [0, 1]: dark far, light near, and white where nothing was hit.
+    """Return grey levels in [0, 1]: far dark, near light, background white.
 
-    The nearest grey stays short of white, so that the outline shows.
+    The nearest grey is darker than white, so that the outline is visible.
     """
     low, high = limits
     nearness = (codes.astype(np.float64) - low) / max(high - low, 1)
@@ -134,7 +134,7 @@ _DECADES = 3.0
 
 
 def lookup_maps(inputs: FigureInputs) -> Figure:
-    """V[estimate, viewpoint] and A[estimate, δ], with the recommended δ of each estimate."""
+    """Draw V[estimate, viewpoint] and A[estimate, δ], with the recommended δ by estimate."""
     unit = inputs.focus
     folds = sorted(inputs.evaluations[unit]["fold"].unique())
     wanted = inputs.settings.example_fold

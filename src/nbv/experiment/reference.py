@@ -1,4 +1,4 @@
-"""Reference results: what of a run is kept under version control, and what it was made with."""
+"""Reference results: the part of a run under version control, with its settings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from nbv.data.sensors import IDEAL
 from nbv.errors import UserError
 from nbv.experiment.config import default_of, read_configuration
-from nbv.experiment.paper.verdicts import need_verdicts
+from nbv.experiment.paper.verdicts import check_verdicts
 from nbv.experiment.provenance import read_provenance
 from nbv.experiment.report.settings import CELL_COLUMNS, TRANSFER
 from nbv.files import check_columns, existing, read_csv, replacing
@@ -23,14 +23,14 @@ SettingDifference = tuple[str, Any, Any]
 
 UNSET = "not set"
 
-Cell = dict[str, Any]
+CellRecord = dict[str, Any]
 """One cell of a table: its `CELL_COLUMNS`."""
 
 CELL_KEY = ("row", "method", "metric")
-"""What tells the cells of one table apart."""
+"""The columns that identify a cell within a table."""
 
-# They say where files are, which other runs are shown, and on what hardware and in which precision
-# an estimator is trained: that, too, is a retrained estimator and no other experiment.
+# Paths, the other runs that are shown, and the hardware and precision of training: a difference in
+# these retrains estimators, but the experiment is the same.
 _SURROUNDINGS = frozenset(
     {
         "experiment",
@@ -42,8 +42,8 @@ _SURROUNDINGS = frozenset(
         "estimator.precision",
     }
 )
-# What the paper's own tables do not depend on.
-_OF_EXTENSIONS = frozenset({TRANSFER, "extensions", "leaderboard_runs", "more_views"})
+# The paper's own tables do not depend on these.
+_EXTENSION_KEYS = frozenset({TRANSFER, "extensions", "leaderboard_runs", "more_views"})
 _FREE_TRAVEL = {"travel_cost": 0.0, "max_travel_deg": 180.0}
 _KEPT = ("tables/*.csv", "tables/*.md", "figures/figure[0-9].png")
 _REQUIRED = (
@@ -57,13 +57,12 @@ _REQUIRED = (
 
 
 def collect_reference(run: Path, reference: Path) -> list[Path]:
-    """Copy what a reviewer reads of a run, byte for byte, to be committed as a reference.
+    """Copy the files of a run that a reviewer reads, byte for byte, to commit as a reference.
 
     Tables, the paper's figures, claims, runtime, configuration and provenance: about 1 MB. The
     runtime goes to the folder above the tables. ``bench.json``, which ``python -m performance``
-    writes to the folder of the runs, goes to that of the references where there is one. Tables and
-    figures that the reference had and the run has not are removed; whatever else is there is left
-    alone.
+    writes to the folder of the runs, goes to the folder of the references if it exists. Tables and
+    figures of the reference that the run lacks are removed; other files stay.
 
     Parameters
     ----------
@@ -80,7 +79,7 @@ def collect_reference(run: Path, reference: Path) -> list[Path]:
     Raises
     ------
     UserError
-        If the run lacks one of them; the reference is then as it was.
+        If the run lacks one of them; the reference then stays unchanged.
     """
     copies = {reference / _kept_as(source.relative_to(run)): source for source in _sources(run)}
     bench = run.parent / "bench.json"
@@ -93,7 +92,7 @@ def collect_reference(run: Path, reference: Path) -> list[Path]:
             shutil.copyfile(source, temporary)
     commit = str(read_provenance(run).get("commit", "unknown"))
     if commit.endswith("-dirty") or commit == "unknown":
-        log.warning("%s was not made at a clean commit but at %s", run, commit)
+        log.warning("%s was made at %s, not at a clean commit", run, commit)
     size_mb = sum(target.stat().st_size for target in copies) / 1e6
     log.info(
         "%d files, %.1f MB, are now in %s",
@@ -107,10 +106,10 @@ def _sources(run: Path) -> Iterator[Path]:
     for name in _REQUIRED:
         yield existing(run / name)
     for pattern in _KEPT:
-        found = sorted(path for path in run.glob(pattern) if path.stem != "runtime")
-        if not found:
+        files = sorted(path for path in run.glob(pattern) if path.stem != "runtime")
+        if not files:
             raise UserError(f"{run / pattern}: no such file; finish the run first")
-        yield from found
+        yield from files
 
 
 def _kept_as(name: Path) -> Path:
@@ -118,34 +117,34 @@ def _kept_as(name: Path) -> Path:
 
 
 def find_reference(folder: Path, configuration: Mapping[str, Any]) -> Path:
-    """Return the reference to compare a run with, known before the run is made.
+    """Return the reference to compare a run with, before the run is made.
 
     Parameters
     ----------
     folder : pathlib.Path
         ``docs/reference``.
     configuration : mapping
-        The run's; its ``name`` says which reference.
+        The run's; its ``name`` is that of the reference.
 
     Raises
     ------
     UserError
-        If there is none of that name (those there are are named), or if it was made with other
-        settings (they are named).
+        If no reference has that name, with the names that exist; or if it was made with other
+        settings, with the settings.
     """
     name = str(configuration["name"])
-    found = folder / name
-    if not found.is_dir():
+    reference = folder / name
+    if not reference.is_dir():
         kept = sorted(path.parent.name for path in folder.glob("*/configuration.yaml"))
-        there = f"there are: {', '.join(kept)}" if kept else "there is none yet"
+        known = f"references: {', '.join(kept)}" if kept else "no reference exists yet"
         raise UserError(
-            f"{found} does not exist, so that {name!r} cannot be compared ({there}); "
-            "`snakemake --cores 2 reference` makes one of a run"
+            f"{reference} does not exist, so {name!r} cannot be compared ({known}); "
+            "`snakemake --cores 2 reference` makes a reference from a run"
         )
-    differences = differing_settings(read_configuration(found), configuration)
+    differences = differing_settings(read_configuration(reference), configuration)
     if differences:
-        raise UserError(other_settings(found, differences))
-    return found
+        raise UserError(other_settings(reference, differences))
+    return reference
 
 
 def table_files(root: Path) -> list[Path]:
@@ -154,15 +153,15 @@ def table_files(root: Path) -> list[Path]:
     Raises
     ------
     UserError
-        If there is none.
+        If none exists.
     """
-    found = sorted(path for path in (root / "tables").glob("*.csv") if path.stem != "runtime")
-    if not found:
+    files = sorted(path for path in (root / "tables").glob("*.csv") if path.stem != "runtime")
+    if not files:
         raise UserError(f"{root / 'tables'} holds no tables; finish the run first")
-    return found
+    return files
 
 
-def read_cells(path: Path) -> dict[tuple[str, ...], Cell]:
+def read_cells(path: Path) -> dict[tuple[str, ...], CellRecord]:
     """Read a table's cells by `CELL_KEY`, in their order.
 
     Raises
@@ -184,7 +183,7 @@ def read_verdicts(root: Path) -> dict[str, str]:
     path = root / "claims.csv"
     claims = read_csv(path)
     check_columns(path, claims, ("id", "verdict"))
-    need_verdicts(path, claims["verdict"])
+    check_verdicts(path, claims["verdict"])
     claims = claims.drop_duplicates("id")
     return dict(zip(claims["id"], claims["verdict"], strict=True))
 
@@ -192,14 +191,14 @@ def read_verdicts(root: Path) -> dict[str, str]:
 def differing_settings(
     reference: Mapping[str, Any], run: Mapping[str, Any]
 ) -> tuple[SettingDifference, ...]:
-    """Return the settings on which results depend and that differ, in the reference's order."""
-    differences = _differences(_telling(reference), _telling(run))
+    """Return the settings that affect results and differ, in the reference's order."""
+    differences = _differences(_relevant(reference), _relevant(run))
     return tuple(d for d in differences if d[0] not in _SURROUNDINGS)
 
 
-def _telling(configuration: Mapping[str, Any]) -> dict[str, Any]:
-    """Leave out what no table that every run has depends on."""
-    kept = {key: value for key, value in configuration.items() if key not in _OF_EXTENSIONS}
+def _relevant(configuration: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings that affect the tables which every run has."""
+    kept = {key: value for key, value in configuration.items() if key not in _EXTENSION_KEYS}
     if kept.get("recommendation") == _FREE_TRAVEL:
         del kept["recommendation"]
     if kept.get("sensor", {}).get("name") == IDEAL:
@@ -210,7 +209,7 @@ def _telling(configuration: Mapping[str, Any]) -> dict[str, Any]:
 def differing_surroundings(
     reference: Path, run: Path, known: Mapping[str, Any], ours: Mapping[str, Any]
 ) -> list[str]:
-    """Return a line on paths, hardware, commit and versions, where they differ."""
+    """Return a line with the paths, hardware, commit and versions that differ."""
     settings = [d for d in _differences(known, ours) if d[0] in _SURROUNDINGS]
     made = list(_differences(read_provenance(reference), read_provenance(run)))
     texts = [setting_text((key.removeprefix("packages."), *rest)) for key, *rest in settings + made]
@@ -218,9 +217,9 @@ def differing_surroundings(
 
 
 def other_settings(reference: Path, differences: Iterable[SettingDifference]) -> str:
-    """Return the line that says why a run cannot be expected to agree with a reference."""
+    """Return the reason why a run cannot be expected to agree with a reference."""
     texts = ", ".join(setting_text(difference) for difference in differences)
-    return f"other settings than {reference}, so that no agreement is to be expected: {texts}"
+    return f"settings differ from {reference}, so results will not agree: {texts}"
 
 
 def setting_text(difference: SettingDifference) -> str:
@@ -233,7 +232,7 @@ def _differences(
     theirs: Mapping[str, Any], mine: Mapping[str, Any], prefix: str = ""
 ) -> Iterator[SettingDifference]:
     for key in dict.fromkeys([*theirs, *mine]):
-        # A key that is younger than one of the two has its default there.
+        # A key that was added later has its default in the older configuration.
         otherwise = default_of(f"{prefix}{key}", UNSET)
         a, b = theirs.get(key, otherwise), mine.get(key, otherwise)
         if isinstance(a, Mapping) and isinstance(b, Mapping):

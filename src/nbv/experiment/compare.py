@@ -1,23 +1,22 @@
-"""Comparing a run with reference results.
+"""Compare a run with reference results.
 
 Two runs of one configuration have the same objects, folds and seeds. On one machine they give the
-same bytes. On two, floating point differs, and so every estimator is a retrained one: the figures
-move, though mostly less than they would with other objects, which is what their intervals are
-about. Hence the tolerances, cell by cell of the tables' tidy CSV files:
+same bytes. On two machines floating point differs, which amounts to retraining every estimator: the
+figures move, though mostly less than with other objects, which their intervals account for. Hence
+these tolerances for each cell of the tables' tidy CSV files:
 
 ===================  ===============================================================================
 a statistic          the new value lies in the reference's 95 % interval, or the reference's value
                      in the new one
 a paired difference  the 95 % intervals of reference and run have a point in common: pairing takes
                      out what objects do to all methods alike, but not what retraining does to each
-σ over k folds       the ratio of the two is one that two independent sets of k folds would stay
-                     within 95 times in 100 (F distribution; for five folds 0.32 to 3.1): it is
-                     known too poorly for more; not judged for the share of errors above 90°, which
-                     is 0 in many folds, so that a few images decide its σ
-examples (Table 6)   not judged: one object, which may be another one after retraining
+σ over k folds       the ratio lies in the 95 % range of two independent sets of k folds (F
+                     distribution; 0.32 to 3.1 for five folds); not judged for the share of errors
+                     above 90°, which is 0 in many folds, so that a few images decide its σ
+examples (Table 6)   not judged: one object, which may differ after retraining
 counts of objects    equal
-verdicts of claims   reported where they changed; a failure where one that held does not hold now,
-                     or the reverse, rather than being undecided
+verdicts of claims   reported where they changed; a failure where "holds" became "does not hold", or
+                     the reverse
 ===================  ===============================================================================
 """
 
@@ -34,9 +33,9 @@ from scipy import stats
 from nbv.experiment.config import read_configuration
 from nbv.experiment.paper.published import SIGMA_ROW
 from nbv.experiment.paper.statements import FAILS, HOLDS
-from nbv.experiment.reference.store import (
+from nbv.experiment.reference import (
     CELL_KEY,
-    Cell,
+    CellRecord,
     SettingDifference,
     differing_settings,
     differing_surroundings,
@@ -45,13 +44,13 @@ from nbv.experiment.reference.store import (
     read_verdicts,
     table_files,
 )
-from nbv.experiment.report.layout import HALF_TURNS
 from nbv.experiment.report.settings import CELL_COLUMNS, TRANSFER
+from nbv.experiment.report.tables import HALF_TURNS
 from nbv.labels import method_label, number
 
 IDENTICAL, WITHIN, OUTSIDE, UNJUDGED = "identical", "within", "outside", "not judged"
 
-# Which cell (table, row, row_label, method, metric), which of its figures, and how it was judged.
+# The cell (table, row, row_label, method, metric), one of its figures, and how it was judged.
 JUDGED_COLUMNS = (*CELL_COLUMNS[:5], "quantity", "reference", "low", "high", "here", "status")
 _EXAMPLE_METRICS = frozenset({"estimate", "error"})
 _METRIC_LABELS = {"mae": "MAE", "pauc": "pAUC", "above_90_percent": "errors above 90°"}
@@ -59,22 +58,22 @@ _COUNTS = {"n_objects": "test objects", "n_images": "initial views"}
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """What a run has in common with a reference, and what not.
+class RunComparison:
+    """The agreement of a run with a reference, and the differences.
 
     Attributes
     ----------
     reference, run : pathlib.Path
         The two folders.
     cells : pandas.DataFrame
-        `JUDGED_COLUMNS`: one row for each figure of each cell that both have. ``quantity`` is
-        ``value``, ``difference`` or ``sigma``; ``low`` and ``high`` are what ``here`` may lie
-        between (NaN where it is not judged); ``status`` is ``identical`` to the last written
-        digit, ``within``, ``outside`` or ``not judged``.
+        `JUDGED_COLUMNS`: one row for every figure in the cells that both have. ``quantity`` is
+        ``value``, ``difference`` or ``sigma``; ``here`` may lie between ``low`` and ``high`` (NaN
+        where it is not judged); ``status`` is ``identical`` to the last written digit, ``within``,
+        ``outside`` or ``not judged``.
     settings : tuple of (str, object, object)
-        Configuration keys on which results depend and that differ: key, reference's value, run's.
+        The configuration keys that affect results and differ: key, reference's value, run's.
     problems : tuple of str
-        One line for everything that speaks against agreement.
+        One line for each contradiction of the reference.
     remarks : tuple of str
         One line for every other difference.
     n_claims : int
@@ -91,19 +90,19 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the run, made with the reference's settings, bears the reference out."""
+        """Whether the run has the reference's settings and confirms its results."""
         return not self.settings and not self.problems
 
     def settings_line(self) -> str:
-        """Return the line that says which settings differ; empty where none does."""
+        """Return one line with the settings that differ; empty where none does."""
         return other_settings(self.reference, self.settings) if self.settings else ""
 
     def summary_line(self) -> str:
-        """Return the counts: how many cells are identical, within tolerance, outside."""
+        """Return the numbers of cells that are identical, within their tolerance, or outside."""
         by_cell = self.cells.groupby(["table", *CELL_KEY], sort=False)["status"].agg(set)
         counts = dict.fromkeys((IDENTICAL, WITHIN, OUTSIDE, UNJUDGED), 0)
-        for found in by_cell:
-            worst = next(s for s in (OUTSIDE, UNJUDGED, WITHIN, IDENTICAL) if s in found)
+        for statuses in by_cell:
+            worst = next(s for s in (OUTSIDE, UNJUDGED, WITHIN, IDENTICAL) if s in statuses)
             counts[worst] += 1
         return (
             f"{len(by_cell)} cells and {self.n_claims} claims compared: {counts[IDENTICAL]} cells "
@@ -112,14 +111,14 @@ class Comparison:
         )
 
     def lines(self) -> list[str]:
-        """Return everything as text: settings, problems, remarks, counts and the verdict."""
+        """Return the comparison as text: settings, problems, remarks, counts and the verdict."""
         verb = "agrees" if self.agrees else "does not agree"
         settings = [self.settings_line()] if self.settings else []
         judgement = f"{self.run} {verb} with {self.reference}"
         return [*settings, *self.problems, *self.remarks, self.summary_line(), judgement]
 
 
-def compare_runs(reference: Path, run: Path) -> Comparison:
+def compare_runs(reference: Path, run: Path) -> RunComparison:
     """Compare a run's tables and claims with a reference's.
 
     Parameters
@@ -131,8 +130,8 @@ def compare_runs(reference: Path, run: Path) -> Comparison:
 
     Returns
     -------
-    Comparison
-        Made in full even where the settings differ, for whoever wants to see by how much.
+    RunComparison
+        Complete even where the settings differ.
 
     Raises
     ------
@@ -143,7 +142,7 @@ def compare_runs(reference: Path, run: Path) -> Comparison:
     factor = sigma_ratio(int(known["n_folds"]))
     problems: list[str] = []
     remarks = differing_surroundings(reference, run, known, ours)
-    judged: list[Cell] = []
+    judged: list[CellRecord] = []
     for path in table_files(reference):
         other = run / "tables" / path.name
         if not other.is_file():
@@ -167,7 +166,7 @@ def compare_runs(reference: Path, run: Path) -> Comparison:
             problems.append(f"figures/{path.name}: missing")
     cells = pd.DataFrame(judged, columns=list(JUDGED_COLUMNS))
     settings = differing_settings(known, ours)
-    return Comparison(
+    return RunComparison(
         reference, run, cells, settings, tuple(problems), tuple(remarks), len(verdicts[0])
     )
 
@@ -182,9 +181,9 @@ def sigma_ratio(n_folds: int) -> float:
 
 
 def _unmatched(
-    these: Mapping[tuple[str, ...], Cell], those: Mapping[tuple[str, ...], Cell]
+    these: Mapping[tuple[str, ...], CellRecord], those: Mapping[tuple[str, ...], CellRecord]
 ) -> list[str]:
-    """Name what `those` lack: whole rows and methods as such, else cells."""
+    """Name the rows, methods or single cells that `those` lack."""
     rows, methods = ({key[i] for key in those} for i in (0, 1))
     texts = []
     for key, cell in these.items():
@@ -193,12 +192,12 @@ def _unmatched(
         elif key[1] not in methods:
             texts.append(f"method {method_label(key[1])}")
         elif key not in those:
-            texts.append(_place(cell))
+            texts.append(_cell_text(cell))
     return list(dict.fromkeys(texts))
 
 
-def _differing_counts(pairs: Iterable[tuple[Cell, Cell]]) -> list[str]:
-    """Return a line for each row that is about other numbers of objects or views."""
+def _differing_counts(pairs: Iterable[tuple[CellRecord, CellRecord]]) -> list[str]:
+    """Return a line for each row with different numbers of objects or views."""
     return list(
         dict.fromkeys(
             f"{theirs['table']}, {theirs['row_label']}: {mine[column]:.0f} {label}, "
@@ -210,15 +209,15 @@ def _differing_counts(pairs: Iterable[tuple[Cell, Cell]]) -> list[str]:
     )
 
 
-def judge_cell(theirs: Cell, mine: Cell, factor: float) -> list[Cell]:
-    """Judge the figures that a cell has: its value, its paired difference, its σ.
+def judge_cell(theirs: CellRecord, mine: CellRecord, factor: float) -> list[CellRecord]:
+    """Judge the figures of a cell: its value, its paired difference, its σ.
 
     ``theirs`` is the reference's, ``factor`` the `sigma_ratio`. Returns `JUDGED_COLUMNS`, one row
     for each figure that either cell has.
     """
     rows = []
     is_sigma = theirs["row"] == SIGMA_ROW
-    # A difference of two σ says nothing that the two, each judged, do not.
+    # Both σ are judged, so their difference adds nothing.
     for quantity in ("value",) if is_sigma else ("value", "difference", "sigma"):
         reference, here = float(theirs[quantity]), float(mine[quantity])
         rare = theirs["metric"] == HALF_TURNS
@@ -236,24 +235,26 @@ def judge_cell(theirs: Cell, mine: Cell, factor: float) -> list[Cell]:
     return rows
 
 
-def _tolerance(quantity: str, theirs: Cell, mine: Cell, factor: float) -> tuple[float, float]:
-    """Return what the new figure may lie between; see the module's docstring."""
+def _tolerance(
+    quantity: str, theirs: CellRecord, mine: CellRecord, factor: float
+) -> tuple[float, float]:
+    """Return the bounds for the new figure; see the module's docstring."""
     if quantity == "sigma":
         sigma = theirs["value"] if theirs["row"] == SIGMA_ROW else theirs["sigma"]
         return sigma / factor, sigma * factor
     interval = "ci" if quantity == "value" else quantity
     low, high = theirs[f"{interval}_low"], theirs[f"{interval}_high"]
-    # How far the new interval reaches to either side, turned into bounds for its figure.
+    # The reach of the new interval to either side, as bounds for its figure.
     below = mine[quantity] - mine[f"{interval}_low"]
     above = mine[f"{interval}_high"] - mine[quantity]
     if not (below >= 0 and above >= 0):
-        below = above = 0.0  # no interval, or one of something else
+        below = above = 0.0  # no interval, or that of another quantity
     if quantity == "value":
         return min(low, theirs["value"] - above), max(high, theirs["value"] + below)
     return low - above, high + below
 
 
-def _place(cell: Cell) -> str:
+def _cell_text(cell: CellRecord) -> str:
     metric = _METRIC_LABELS.get(cell["metric"], cell["metric"])
     return f"{cell['row_label']}, {method_label(cell['method'])}, {metric}"
 
@@ -261,10 +262,10 @@ def _place(cell: Cell) -> str:
 _QUANTITY_LABELS = {"value": "", "difference": " paired difference", "sigma": " σ over folds"}
 
 
-def _outside_text(row: Cell) -> str:
+def _outside_text(row: CellRecord) -> str:
     return (
-        f"{row['table']}, {_place(row)}{_QUANTITY_LABELS[row['quantity']]}: {number(row['here'])}, "
-        f"reference {number(row['reference'])} "
+        f"{row['table']}, {_cell_text(row)}{_QUANTITY_LABELS[row['quantity']]}: "
+        f"{number(row['here'])}, reference {number(row['reference'])} "
         f"(tolerance {number(row['low'])} to {number(row['high'])})"
     )
 
@@ -272,7 +273,7 @@ def _outside_text(row: Cell) -> str:
 def _changed_verdicts(
     theirs: Mapping[str, str], mine: Mapping[str, str]
 ) -> tuple[list[str], list[str]]:
-    """Return lines for claims that are missing or turned round, and for other changes."""
+    """Return lines for claims that are missing or reversed, and for other changes."""
     failures, changes = [], []
     for name, verdict in theirs.items():
         here = mine.get(name)

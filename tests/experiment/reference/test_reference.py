@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.errors import UserError
-from nbv.experiment.config import read_configuration
-from nbv.experiment.reference.compare import (
+from nbv.experiment.compare import (
     compare_runs,
 )
-from nbv.experiment.reference.store import (
+from nbv.experiment.config import read_configuration
+from nbv.experiment.reference import (
     UNSET,
     collect_reference,
     differing_settings,
@@ -58,7 +58,7 @@ def test_a_reference_made_again_loses_what_the_run_has_not(run, tmp_path, caplog
     kept = files(reference)
     assert not any("table7" in name or "figure7" in name for name in kept)
     assert {"README.md", "tables/table1.csv"} <= set(kept)
-    assert "not made at a clean commit but at 0123-dirty" in caplog.text
+    assert "made at 0123-dirty, not at a clean commit" in caplog.text
 
 
 @pytest.mark.parametrize("name", ["claims.md", "tables/runtime.csv", "figures/*.png"])
@@ -75,10 +75,10 @@ def test_an_unfinished_run_leaves_the_reference_as_it_was(run, finished, tmp_pat
 
 
 def test_a_name_without_a_reference_is_told_those_there_are(finished, tmp_path):
-    with pytest.raises(UserError, match="there is none yet"):
+    with pytest.raises(UserError, match="no reference exists yet"):
         find_reference(tmp_path / "reference", {"name": "quick"})
     collect_reference(finished, tmp_path / "reference" / "paper")
-    with pytest.raises(UserError, match=r"'quick' cannot be compared \(there are: paper\)"):
+    with pytest.raises(UserError, match=r"'quick' cannot be compared \(references: paper\)"):
         find_reference(tmp_path / "reference", {"name": "quick"})
 
 
@@ -87,7 +87,7 @@ def test_other_settings_are_told_before_a_run_is_made(finished, tmp_path):
     collect_reference(finished, reference)
     configuration = read_configuration(finished)
     assert find_reference(tmp_path, configuration) == reference
-    with pytest.raises(UserError, match=r"other settings than .*: seed=3 \(reference: not set\)$"):
+    with pytest.raises(UserError, match=r"settings differ from .*: seed=3 \(reference: not set\)$"):
         find_reference(tmp_path, configuration | {"seed": 3})
 
 

@@ -1,1 +1,0 @@
-"""Reference results under version control: keeping them, and comparing runs with them."""
