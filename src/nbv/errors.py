@@ -120,6 +120,35 @@ class NamedError(UserError):
         return type(self)(self.name, f"{what}: {self.message}")
 
 
+class FrameError(NamedError):
+    """Frames that no estimate should be made of; its name is the reason.
+
+    Examples
+    --------
+    >>> import numpy as np, nbv
+    >>> frame = nbv.example_frame()
+    >>> try:
+    ...     nbv.Recommender.load("mug").recommend(frame.depth_m, mask=np.zeros((480, 640)))
+    ... except nbv.FrameError as error:
+    ...     error.name
+    'empty-mask'
+    """
+
+
+class BundleError(NamedError):
+    """A file that is no sound bundle; its name is the reason.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> try:
+    ...     nbv.Recommender.load("cup")
+    ... except nbv.BundleError as error:
+    ...     error.name
+    'no-bundle'
+    """
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """Say what was probably meant by a misspelt name.
 

@@ -14,8 +14,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from nbv.data.camera import viewpoint_frames
-from nbv.errors import UserError
-from nbv.robot.errors import FrameError
+from nbv.errors import FrameError, UserError
 from nbv.robot.moves import (
     ROLL_LIMIT_DEG,
     as_pose,

@@ -13,8 +13,8 @@ from scipy import ndimage
 
 from nbv.data.camera import Camera, viewpoint_frames
 from nbv.data.depth_codes import STEP, ZERO_CODE, decode_depth
+from nbv.errors import FrameError
 from nbv.robot.crop import BEHIND_SURFACE, crop_frame, pixel_step
-from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
 
 DIAGONAL_M = 0.125

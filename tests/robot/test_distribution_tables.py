@@ -16,10 +16,9 @@ from tests.cli.test_command_line import POSE, fails, run, same_move
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.core.angles import circular_distance_deg
 from nbv.core.lookup import LookupTable
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.experiment.config import load_config
 from nbv.robot.distribution_table import AFFINITY, DistributionTable
-from nbv.robot.errors import FrameError
 from nbv.robot.moves import moved_camera
 from nbv.robot.pair_distributions import read_distributions
 from nbv.robot.pairs import PairTable

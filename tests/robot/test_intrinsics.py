@@ -11,8 +11,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nbv.errors import UserError
-from nbv.robot.errors import FrameError
+from nbv.errors import FrameError, UserError
 from nbv.robot.intrinsics import DepthCamera, Intrinsics, as_intrinsics, camera_of
 
 FX, FY, CX, CY = 572.41, 573.57, 325.26, 242.05

@@ -25,10 +25,9 @@ from made_bundles import settings as made_settings
 from nbv.core.angles import circular_distance_deg, travel_deg
 from nbv.core.distributions import direction_and_spread_deg, mean_direction_deg
 from nbv.core.logits import from_logits
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.experiment.make_bundle import bundled_model
 from nbv.robot.crop import crop_frame
-from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
 from nbv.robot.masks import object_mask
 from nbv.robot.next_view import after_rotations

@@ -11,9 +11,8 @@ import pytest
 from PIL import Image
 
 from made_bundles import FOCAL_PX, frame
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.robot.depth_files import read_depth
-from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
 from nbv.robot.recordings import read_manifest, see
 

@@ -8,9 +8,9 @@ with job(snakemake):
     import pandas as pd
     from studies.ingredients import ingredient_table
 
+    from nbv.errors import FrameError
     from nbv.experiment.report.table import write_table
     from nbv.files import read_csv
-    from nbv.robot.errors import FrameError
     from nbv.robot.evaluation import evaluate
     from nbv.robot.recommender import Recommender
     from nbv.robot.recordings import read_manifest, see

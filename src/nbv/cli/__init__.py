@@ -50,7 +50,7 @@ from nbv.labels import counted
 
 if TYPE_CHECKING:
     from nbv.cli.answers import Place
-    from nbv.robot.errors import FrameError
+    from nbv.errors import FrameError
     from nbv.robot.recommender import Recommender
     from nbv.robot.sweeps import Turn
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import nearest_bin
 from nbv.data.camera import Camera
-from nbv.errors import NamedError
+from nbv.errors import BundleError
 from nbv.files import missing, replacing
 from nbv.robot.ood import Familiarity
 
@@ -210,20 +210,6 @@ def _digest(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str
         found.update(f"{name} {array.dtype} {array.shape}".encode())
         found.update(array.tobytes())
     return found.hexdigest()
-
-
-class BundleError(NamedError):
-    """A file that is no sound bundle; its name is the reason.
-
-    Examples
-    --------
-    >>> import nbv
-    >>> try:
-    ...     nbv.Recommender.load("cup")
-    ... except nbv.BundleError as error:
-    ...     error.name
-    'no-bundle'
-    """
 
 
 def _check_format(path: Path, version: int) -> None:

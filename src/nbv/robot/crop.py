@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import encode_depth, median_depth
-from nbv.errors import UserError, need_number
+from nbv.errors import FrameError, UserError, need_number
 from nbv.robot.depth_files import DepthImage
-from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
 from nbv.robot.masks import NEAREST_SHARE, Mask, window_of
 

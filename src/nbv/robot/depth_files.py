@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.errors import UserError, reason_of
+from nbv.errors import FrameError, UserError, reason_of
 from nbv.files import as_path, missing, replacing
-from nbv.robot.errors import FrameError
 
 DepthImage = NDArray[np.float32]
 

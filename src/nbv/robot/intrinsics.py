@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nbv.errors import UserError, need_number, reason_of
+from nbv.errors import FrameError, UserError, need_number, reason_of
 from nbv.files import read_text
 from nbv.robot.depth_files import MILLIMETRE
-from nbv.robot.errors import FrameError
 
 OFF_CENTRE = 0.2
 """How far a principal point lies from the middle of an image, in its sides, to be remarkable."""

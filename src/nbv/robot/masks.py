@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.robot.depth_files import DepthImage, is_in_mask
-from nbv.robot.errors import FrameError
 
 Mask = NDArray[np.bool_]
 

@@ -14,9 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.files import read_numbers
-from nbv.robot.errors import FrameError
 
 Pose = NDArray[np.float64]
 

@@ -8,8 +8,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from nbv.errors import UserError
-from nbv.robot.bundle import BundleError
+from nbv.errors import BundleError, UserError
 
 Network = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
 """From codes (n, side, side) to logits (n, B)."""

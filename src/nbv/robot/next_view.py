@@ -22,9 +22,8 @@ from nbv.core.distributions import (
     rotated,
 )
 from nbv.core.look_alikes import MOST_COMPARED, Expected, LookAlikes
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.labels import counted
-from nbv.robot.errors import FrameError
 from nbv.robot.rotations import (
     MIN_SEPARATION_DEG,
     are_neighbours,

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.logits import from_logits
-from nbv.errors import UserError, nearest, need_number
+from nbv.errors import BundleError, UserError, nearest, need_number
 from nbv.files import as_path
 from nbv.labels import counted
-from nbv.robot.bundle import Bundle, BundleError
+from nbv.robot.bundle import Bundle
 from nbv.robot.crop import Crop, crop_frame, need_metres, need_plausible_nearest
 from nbv.robot.depth_files import to_metres
 from nbv.robot.intrinsics import Intrinsics, as_intrinsics
@@ -209,7 +209,7 @@ class Recommender:
 
         Raises
         ------
-        nbv.robot.errors.FrameError
+        nbv.FrameError
             Where a frame cannot be used; it says why.
         UserError
             Where the arguments do not fit each other, or gravity points up in the image.

@@ -11,10 +11,9 @@ from typing import NoReturn
 import numpy as np
 import pandas as pd
 
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.files import missing, read_rows
 from nbv.robot.depth_files import read_depth, read_mask
-from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics, camera_of
 from nbv.robot.recommender import Recommender
 from nbv.robot.sweeps import Turn
