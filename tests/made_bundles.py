@@ -17,7 +17,7 @@ from nbv.experiment.estimation.weights import Estimator
 from nbv.experiment.make_bundle import bundled_model
 from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.ood import fit_familiarity
-from nbv.robot.pair_distributions import bin_apart
+from nbv.robot.pairs import bin_apart
 from nbv.robot.sweeps import Turn
 
 CONFIG = Path(__file__).parents[1] / "config"

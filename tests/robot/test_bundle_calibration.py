@@ -25,7 +25,7 @@ from nbv.robot.calibration import (
     without_offset,
 )
 from nbv.robot.ood import unfamiliarity
-from nbv.robot.pair_distributions import WIDEST_GAP_DEG, bin_apart
+from nbv.robot.pairs import WIDEST_GAP_DEG, bin_apart
 from nbv.robot.recommender import Recommender
 from nbv.robot.sweeps import Turn
 

@@ -20,8 +20,7 @@ from nbv.errors import FrameError, UserError
 from nbv.experiment.config import load_config
 from nbv.robot.distribution_table import AFFINITY, DistributionTable
 from nbv.robot.moves import moved_camera
-from nbv.robot.pair_distributions import read_distributions
-from nbv.robot.pairs import PairTable
+from nbv.robot.pairs import PairTable, read_distributions
 from nbv.robot.recommender import Recommender
 
 AZIMUTHS = np.arange(BINS) * WIDTH

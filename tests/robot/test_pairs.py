@@ -16,8 +16,7 @@ from nbv.errors import UserError
 from nbv.experiment.config import load_config
 from nbv.experiment.estimates import write_estimates
 from nbv.robot.calibration import DENSITY
-from nbv.robot.pair_distributions import WIDEST_GAP_DEG
-from nbv.robot.pairs import N_VIEWS, PairTable
+from nbv.robot.pairs import N_VIEWS, WIDEST_GAP_DEG, PairTable
 
 CONFIG = Path(__file__).parents[2] / "config"
 

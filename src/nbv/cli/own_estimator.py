@@ -128,7 +128,7 @@ def recommend_by_distributions(
     from nbv.files import calibrated_file
     from nbv.robot.distribution_table import DistributionTable
     from nbv.robot.moves import check_axis
-    from nbv.robot.pair_distributions import read_distributions
+    from nbv.robot.pairs import read_distributions
 
     if table is None:
         raise UserError("--distribution and --table belong together")

@@ -12,8 +12,7 @@ from nbv.core.estimates import Estimates, Posteriors, posteriors_of
 from nbv.core.logits import fit_temperature
 from nbv.experiment.held_out import FoldEstimates
 from nbv.experiment.splits import need_objects, objects_with_role
-from nbv.robot.pair_distributions import evenly_apart
-from nbv.robot.pairs import Turns
+from nbv.robot.pairs import Turns, evenly_apart
 
 
 def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -> FoldEstimates:
@@ -34,7 +33,7 @@ def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -
     ------
     UserError
         As of `nbv.experiment.splits.need_objects` and
-        `nbv.robot.pair_distributions.evenly_apart`.
+        `nbv.robot.pairs.evenly_apart`.
     """
     need_objects(splits, found.object_ids)
     names = {role: objects_with_role(splits, fold, role) for role in ("calibration", "test")}

@@ -19,7 +19,7 @@ from nbv.robot.crop import pixel_step
 from nbv.robot.mirror import mirrored_classes
 from nbv.robot.network import Network, open_network
 from nbv.robot.ood import fit_familiarity
-from nbv.robot.pair_distributions import bin_apart
+from nbv.robot.pairs import bin_apart
 from nbv.robot.sweeps import Turn
 
 DEFAULT_FOCAL_PX = 600.0

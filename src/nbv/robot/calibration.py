@@ -17,8 +17,7 @@ from nbv.core.selection import chosen_lookup
 from nbv.errors import UserError
 from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.ood import FAMILIAR_SHARE, unfamiliarity
-from nbv.robot.pair_distributions import bin_apart
-from nbv.robot.pairs import full_turn
+from nbv.robot.pairs import bin_apart, full_turn
 from nbv.robot.sweeps import Turn
 
 ENOUGH_VIEWS = 24

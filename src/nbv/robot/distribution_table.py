@@ -30,7 +30,7 @@ from nbv.robot.next_view import (
     as_rotation_list,
     next_view,
 )
-from nbv.robot.pair_distributions import FEWEST_CLASSES, as_distributions, bin_apart
+from nbv.robot.pairs import FEWEST_CLASSES, as_distributions, bin_apart
 
 AFFINITY: Mapping[str, float] = {"power": 16.0, "pseudo_observations": 90.0}
 """What `config/` sets for the expected error given a distribution."""
