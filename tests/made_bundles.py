@@ -16,9 +16,9 @@ from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.estimation.weights import Estimator
 from nbv.experiment.make_bundle import bundled_model
 from nbv.robot.bundle import Bundle, PaperTables
-from nbv.robot.ood import fit_familiarity
+from nbv.robot.network import Sweep
+from nbv.robot.ood import fit_ood
 from nbv.robot.pairs import bin_apart
-from nbv.robot.sweeps import Turn
 
 CONFIG = Path(__file__).parents[1] / "config"
 BINS = 24
@@ -97,7 +97,7 @@ def made_bundle(seed: int = 0, **changes) -> Bundle:
         for elevation in elevations:
             codes = random_codes(rng, BINS)
             logits = soft_turns(rng, 1)[0]
-            turns.append(Turn(name, f"{elevation:g}", elevation, azimuth_deg, logits, codes))
+            turns.append(Sweep(name, f"{elevation:g}", elevation, azimuth_deg, logits, codes))
             rows.append(bin_apart(azimuth_deg, from_logits(logits, 1.0)))
     values = {
         "category": "mug",
@@ -111,10 +111,10 @@ def made_bundle(seed: int = 0, **changes) -> Bundle:
         "temperature": 1.25,
         "object_ids": tuple(turn.object_id for turn in turns),
         "elevation_deg": np.array([turn.elevation_deg for turn in turns], dtype=np.float32),
-        "turn_weight": np.ones(len(turns), dtype=np.float32),
+        "sweep_weights": np.ones(len(turns), dtype=np.float32),
         "distributions": np.stack(rows),
         "affinity": {"power": 4.0, "pseudo_observations": 10.0},
-        "familiarity": fit_familiarity(turns),
+        "ood": fit_ood(turns),
         "paper": PaperTables(
             np.array([0, 30], dtype=np.float32), rng.integers(15, 346, (2, 360)).astype(np.int16)
         ),

@@ -17,7 +17,7 @@ from nbv.core.angles import circular_distance_deg
 from nbv.core.distributions import mean_direction_deg, product_of_views
 from nbv.robot.bundle import Bundle
 from nbv.robot.next_view import AfterRotations, after_rotations, next_view
-from nbv.robot.recommender import Recommender, turn_share
+from nbv.robot.recommender import Recommender
 from nbv.robot.rotations import MIN_SEPARATION_DEG
 
 EVERY = 5
@@ -38,7 +38,7 @@ def of_turn(
     width = 360.0 / bundle.n_bins
     is_other = np.array(bundle.object_ids) != bundle.object_ids[turn]
     elevation_deg = float(bundle.elevation_deg[turn]) if is_given else None
-    share = turn_share(bundle, elevation_deg) * is_other + NOT_THERE
+    share = bundle.weights_at(elevation_deg) * is_other + NOT_THERE
     for first in range(turn % EVERY, bundle.n_bins, EVERY):
 
         def seen(rotations: list[float], first: int = first) -> tuple[NDArray[np.float64], float]:

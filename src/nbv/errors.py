@@ -14,7 +14,7 @@ _REASONS = (
     (".*allow_pickle.*", "it holds no array of numbers"),
     ("File is not a zip file", "it is no .npz file, or only a part of one"),
     (".*context manager protocol.*", "it is one array, and no .npz file"),
-    ("could not convert string to float: (.*)", "{0} is no number"),
+    ("could not convert string to float: (.*)", "{0} is not a number"),
     ("No columns to parse from file", "it is empty"),
     (
         r".*Expected (\d+) fields in line (\d+), saw (\d+)",
@@ -48,8 +48,8 @@ def reason_of(error: Exception) -> str:
     return reason
 
 
-def need_number(name: str, value: object) -> None:
-    """Raise UserError where a value is no number, such as a text of one."""
+def check_number(name: str, value: object) -> None:
+    """Raise UserError where a value is not a number, such as a text of one."""
     try:
         if not isinstance(value, str | bytes):
             float(value)  # type: ignore[arg-type]
@@ -58,7 +58,7 @@ def need_number(name: str, value: object) -> None:
         pass
     except OverflowError:
         raise UserError(f"{name}: the number is too large") from None
-    raise UserError(f"{name}: {value!r} is no number")
+    raise UserError(f"{name}: {value!r} is not a number")
 
 
 class UserError(Exception):

@@ -25,15 +25,15 @@ from nbv.core.angles import signed_difference_deg
 from nbv.core.criteria import CRITERIA
 from nbv.core.lookup import LookupTable
 from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
-from nbv.core.selection import chosen_lookup
+from nbv.core.selection import DENSITY, chosen_lookup
 from nbv.robot.bundle import FORMAT, Bundle
-from nbv.robot.calibration import DENSITY, recalibrated
+from nbv.robot.calibration import recalibrated
 from nbv.robot.depth_files import read_depth
-from nbv.robot.evaluation import evaluate, familiarity_of
+from nbv.robot.evaluation import count_ood, evaluate
 from nbv.robot.moves import check_axis, elevation_from_gravity, moved_camera
 from nbv.robot.pairs import PairTable
 from nbv.robot.recommender import Recommender
-from nbv.robot.recordings import read_manifest, see
+from nbv.robot.recordings import read_manifest, run_network
 
 POSE = [[0.0, 0.0, 1.0, -0.6], [-1.0, 0.0, 0.0, 0.1], [0.0, -1.0, 0.0, 0.2], [0.0, 0.0, 0.0, 1.0]]
 
@@ -105,7 +105,7 @@ def same_answer(printed: dict, answer) -> None:
     assert printed["spread_deg"] == pytest.approx(answer.spread_deg)
     assert printed["expected_error_deg"] == pytest.approx(answer.expected_error_deg, rel=1e-4)
     assert printed["belief"] == pytest.approx(answer.belief.tolist(), abs=1e-5)
-    assert printed["unfamiliarity"] == pytest.approx(answer.unfamiliarity, rel=1e-4)
+    assert printed["ood_score"] == pytest.approx(answer.ood_score, rel=1e-4)
     same_move(printed, answer)
 
 
@@ -309,8 +309,8 @@ def test_frames_all_round_have_a_pose_and_no_next_view(manifest, capsys):
 
 @pytest.mark.parametrize(("limit", "is_told"), [(1e-6, True), (1e6, False)])
 def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
-    known = replace(bundle.familiarity, threshold=limit, scales=np.array([[0, 1], [-1e3, 1]]))
-    replace(bundle, familiarity=known).save("limit.safetensors")
+    known = replace(bundle.ood, threshold=limit, scales=np.array([[0, 1], [-1e3, 1]]))
+    replace(bundle, ood=known).save("limit.safetensors")
     out = run(capsys, "recommend", "f0.npy", "--bundle", "limit.safetensors")
     assert ("warning:" in out) == is_told
 
@@ -324,7 +324,7 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
         (["f0.npy", "f1.npy"], "2 frames and 1 rotation; give one for each frame"),
         (["f0.npy", "--rotations", "0", "90"], "1 frame and 2 rotations"),
         (["f0.npy", "--rotations", "0", "x"], "x: no known kind of file"),
-        (["f0.npy", "--rotations", "zero"], "--rotations: 'zero' is no number"),
+        (["f0.npy", "--rotations", "zero"], "--rotations: 'zero' is not a number"),
         (["f0.npy", "--rotations="], "give a number"),
         (["--mask", "m.npy", "f0.npy"], "frames stand before --mask"),
         (["f0.npy", "--rotations", "10"], "the first is 10"),
@@ -519,7 +519,7 @@ def test_an_estimate_is_a_number(pairs, capsys):
 
 def turns_of(manifest):
     recommender = Recommender.load("b.safetensors")
-    return [see(recommender, one, None, None, print) for one in read_manifest(manifest)]
+    return [run_network(recommender, one, None, None, print) for one in read_manifest(manifest)]
 
 
 def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
@@ -584,7 +584,7 @@ def test_what_does_not_go_with_frames_is_refused(manifest, capsys):
     # Pairs may have the columns of a manifest too.
     pd.read_csv(manifest).assign(estimate_deg="north").to_csv("both.csv")
     message = fails(capsys, "calibrate", "both.csv", "--output", "own.npz")
-    assert "row 2: estimate_deg is no number" in message
+    assert "row 2: estimate_deg is not a number" in message
 
 
 def test_the_camera_is_assumed_where_neither_manifest_nor_option_has_it(manifest, capsys):
@@ -701,8 +701,8 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
     )
     printed = json.loads(out)
     assert pd.DataFrame(printed["errors"]).equals(wanted)
-    familiar = familiarity_of(Bundle.load("b.safetensors"), turns_of(manifest))
-    assert pd.DataFrame(printed["familiarity"]).equals(familiar)
+    familiar = count_ood(Bundle.load("b.safetensors"), turns_of(manifest))
+    assert pd.DataFrame(printed["ood"]).equals(familiar)
     written = pd.read_csv("table.csv", dtype={"object_id": str, "sequence": str})
     pd.testing.assert_frame_equal(written, wanted.round(4))
     text = run(
@@ -730,7 +730,7 @@ def test_no_warning_of_a_recording_is_null(manifest, capsys, monkeypatch, warnin
 
     monkeypatch.setattr(nbv.robot.evaluation, "frame_warning", lambda *_: warning)
     options = ("manifest.csv", "--bundle", "b.safetensors", "--views", "2", "--json")
-    (told,) = json.loads(run(capsys, "evaluate", *options))["familiarity"]
+    (told,) = json.loads(run(capsys, "evaluate", *options))["ood"]
     assert told["warning"] == (warning or None)
 
 
@@ -808,7 +808,7 @@ def test_inspect_shows_what_a_bundle_holds(here, bundle, capsys):
     assert about["temperature"] == bundle.temperature
     assert about["network"] == dict(bundle.estimator)
     assert about["affinity"] == dict(bundle.affinity)
-    assert about["familiar_within"] == bundle.familiarity.threshold
+    assert about["familiar_within"] == bundle.ood.threshold
     assert about["extent_m"] == list(bundle.extent_m)
     assert {key: about[key] for key in bundle.provenance} == bundle.provenance
     lines = run(capsys, "inspect", "b.safetensors").splitlines()

@@ -18,16 +18,16 @@ from nbv.errors import UserError
 from nbv.robot.calibration import (
     DENSITY,
     LEAST_LIMIT,
-    PRIOR_TURNS,
+    PRIOR_SWEEPS,
     paper_tables,
     recalibrated,
     temperature_of,
     without_offset,
 )
-from nbv.robot.ood import unfamiliarity
+from nbv.robot.network import Sweep
+from nbv.robot.ood import ood_score
 from nbv.robot.pairs import WIDEST_GAP_DEG, bin_apart
 from nbv.robot.recommender import Recommender
-from nbv.robot.sweeps import Turn
 
 AZIMUTHS = np.arange(BINS) * WIDTH
 # Where the choice of a density does not matter.
@@ -44,7 +44,7 @@ def turn(
         aim = 3.0 * np.cos(np.radians(classes - np.asarray(azimuth_deg)[:, None]))
         logits = aim + rng.normal(0, 0.5, (n, BINS))
     codes = random_codes(rng, n) if codes is None else codes
-    return Turn(name, sequence, elevation, np.asarray(azimuth_deg, float), logits, codes)
+    return Sweep(name, sequence, elevation, np.asarray(azimuth_deg, float), logits, codes)
 
 
 def without_common_error(logits):
@@ -199,21 +199,21 @@ def test_a_bundle_is_calibrated_again(bundle):
     assert np.array_equal(
         found.elevation_deg, [10.0, np.nan, 40.0, *bundle.elevation_deg], equal_nan=True
     )
-    assert found.elevation_deg.dtype == found.turn_weight.dtype == np.float32
+    assert found.elevation_deg.dtype == found.sweep_weights.dtype == np.float32
     # The pseudo-observations have the weight that they had next to the bundle's own turns.
-    assert np.array_equal(found.turn_weight[3:], bundle.turn_weight)
-    assert found.turn_weight[:3] == pytest.approx(len(bundle.object_ids) / PRIOR_TURNS)
+    assert np.array_equal(found.sweep_weights[3:], bundle.sweep_weights)
+    assert found.sweep_weights[:3] == pytest.approx(len(bundle.object_ids) / PRIOR_SWEEPS)
     # The bundle's own turns stay, as they are at the new temperature.
     prior = np.log(bundle.distributions.astype(float)) * bundle.temperature / found.temperature
     prior -= np.log(np.exp(prior).sum(axis=-1, keepdims=True))
     assert np.log(found.distributions[3:]) == pytest.approx(prior, abs=1e-3)
     for row, own in zip(found.distributions[:3], logits, strict=True):
         assert row == pytest.approx(from_logits(own, found.temperature), rel=1e-5)
-    known = bundle.familiarity
-    scores = np.concatenate([unfamiliarity(known, one.codes, one.logits) for one in turns])
+    known = bundle.ood
+    scores = np.concatenate([ood_score(known, one.codes, one.logits) for one in turns])
     limit = max(np.quantile(scores, 0.95), LEAST_LIMIT)
-    assert found.familiarity.threshold == pytest.approx(limit * known.threshold)
-    assert np.array_equal(found.familiarity.references, known.references)
+    assert found.ood.threshold == pytest.approx(limit * known.threshold)
+    assert np.array_equal(found.ood.references, known.references)
     # Each turn counts for the nearest table; without an elevation, for the lowest.
     of_table = np.array([0.0, 0.0, 30.0, *bundle.elevation_deg])
     wanted = paper_tables(of_table, found.distributions, ONE_DENSITY)
@@ -268,7 +268,7 @@ def test_calibrations_one_after_the_other_weigh_turns_as_one_with_all(bundle):
     twice = recalibrated(twice, others, "others.csv", ONE_DENSITY)
     once = recalibrated(bundle, [*others, first], "all.csv", ONE_DENSITY)
     assert twice.object_ids == once.object_ids
-    assert np.array_equal(twice.turn_weight, once.turn_weight)
+    assert np.array_equal(twice.sweep_weights, once.sweep_weights)
     assert twice.temperature == pytest.approx(once.temperature, rel=0.02)
 
 
@@ -282,7 +282,7 @@ def log_likelihood_at(temperature: float, logits, azimuth_deg) -> float:
 
 @pytest.mark.parametrize("n_turns", [1, 40])
 def test_the_temperature_is_the_likeliest_of_turns_and_of_the_bundles_own(bundle, n_turns):
-    """The bundle's turns together count as `PRIOR_TURNS` of the others."""
+    """The bundle's turns together count as `PRIOR_SWEEPS` of the others."""
     logits = [without_common_error(5 * t) for t in soft_turns(np.random.default_rng(6), n_turns)]
     turns = [turn(str(place), logits=rows) for place, rows in enumerate(logits)]
     found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY).temperature
@@ -291,7 +291,7 @@ def test_the_temperature_is_the_likeliest_of_turns_and_of_the_bundles_own(bundle
     def total(temperature: float) -> float:
         of_own = [log_likelihood_at(temperature, rows, AZIMUTHS) for rows in own]
         of_turns = [log_likelihood_at(temperature, t.logits, t.azimuth_deg) for t in turns]
-        return PRIOR_TURNS * float(np.mean(of_own)) + sum(of_turns)
+        return PRIOR_SWEEPS * float(np.mean(of_own)) + sum(of_turns)
 
     assert total(found) > max(total(found * factor) for factor in (0.97, 0.99, 1.01, 1.03))
     ends = sorted([bundle.temperature, temperature_of(turns)])

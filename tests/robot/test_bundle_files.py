@@ -21,10 +21,10 @@ from nbv.robot.bundle import (
     PROBABILITY_STEP,
     Bundle,
     BundleError,
-    as_steps,
-    from_steps,
+    dequantize_logp,
+    quantize_logp,
 )
-from nbv.robot.ood import unfamiliarity
+from nbv.robot.ood import ood_score
 from nbv.robot.recommender import Recommender, bundle_path
 
 # Round trips
@@ -33,9 +33,9 @@ from nbv.robot.recommender import Recommender, bundle_path
 def test_everything_but_distributions_comes_back_exactly(bundle, bundle_file):
     found = Bundle.load(bundle_file)
     for name in ("mean", "basis", "references", "scales"):
-        wanted = getattr(bundle.familiarity, name)
-        assert np.array_equal(getattr(found.familiarity, name), wanted), name
-    assert found.familiarity.threshold == bundle.familiarity.threshold
+        wanted = getattr(bundle.ood, name)
+        assert np.array_equal(getattr(found.ood, name), wanted), name
+    assert found.ood.threshold == bundle.ood.threshold
     assert np.array_equal(found.elevation_deg, bundle.elevation_deg)
     for name in (
         *("category", "estimator", "camera", "diagonal_m", "extent_m", "focal_px", "temperature"),
@@ -58,7 +58,7 @@ def test_a_second_round_changes_nothing(bundle_file, tmp_path):
     once = Bundle.load(bundle_file)
     once.save(tmp_path / "twice.safetensors")
     twice = Bundle.load(tmp_path / "twice.safetensors")
-    apart = as_steps(once.distributions).astype(int) - as_steps(twice.distributions)
+    apart = quantize_logp(once.distributions).astype(int) - quantize_logp(twice.distributions)
     assert np.abs(apart).max() <= 1
     assert once.network == twice.network
 
@@ -75,15 +75,15 @@ def test_it_does_not_matter_how_arrays_lie_in_memory(bundle, bundle_file, tmp_pa
         return np.asfortranarray(array)
 
     familiarity = replace(
-        bundle.familiarity,
-        basis=other_order(bundle.familiarity.basis),
-        references=other_order(bundle.familiarity.references),
+        bundle.ood,
+        basis=other_order(bundle.ood.basis),
+        references=other_order(bundle.ood.references),
     )
     changed = replace(
         bundle,
         distributions=other_order(bundle.distributions),
         elevation_deg=np.repeat(bundle.elevation_deg, 2)[::2],
-        familiarity=familiarity,
+        ood=familiarity,
     )
     changed.save(tmp_path / "a.safetensors")
     assert (tmp_path / "a.safetensors").read_bytes() == bundle_file.read_bytes()
@@ -91,8 +91,8 @@ def test_it_does_not_matter_how_arrays_lie_in_memory(bundle, bundle_file, tmp_pa
 
 def test_what_is_familiar_stays_familiar(bundle, bundle_file, rng):
     codes, logits = random_codes(rng, 50), rng.normal(0, 1, (50, bundle.n_bins))
-    loaded = Bundle.load(bundle_file).familiarity
-    scores = [unfamiliarity(known, codes, logits) for known in (bundle.familiarity, loaded)]
+    loaded = Bundle.load(bundle_file).ood
+    scores = [ood_score(known, codes, logits) for known in (bundle.ood, loaded)]
     assert np.array_equal(*scores)
 
 
@@ -124,18 +124,18 @@ def test_a_bundle_serves_from_its_file(recommender, bundle_file):
 @given(arrays(np.float64, (4, 24), elements=st.floats(1e-6, 1.0)))
 def test_steps_keep_probabilities_within_half_a_step(values):
     rows = values / values.sum(axis=1, keepdims=True)
-    steps = as_steps(rows)
+    steps = quantize_logp(rows)
     assert steps.dtype == np.uint8
     kept = np.exp(-PROBABILITY_STEP * steps.astype(float))
     in_range = rows > np.exp(-255 * PROBABILITY_STEP)
     assert np.abs(np.log(kept / rows))[in_range].max() <= PROBABILITY_STEP / 2 + 1e-9
-    assert from_steps(steps) == pytest.approx(kept / kept.sum(axis=1, keepdims=True), rel=1e-4)
+    assert dequantize_logp(steps) == pytest.approx(kept / kept.sum(axis=1, keepdims=True), rel=1e-4)
 
 
 @given(arrays(np.uint8, (3, 16)))
 def test_steps_of_steps_are_the_same(steps):
     """Up to the same number of steps in the whole row, which the sum of 1 takes off."""
-    again = as_steps(from_steps(steps)).astype(int)
+    again = quantize_logp(dequantize_logp(steps)).astype(int)
     apart = again - steps
     inside = (again < 255) & (steps < 255)
     for row, kept in zip(apart, inside, strict=True):
@@ -144,7 +144,7 @@ def test_steps_of_steps_are_the_same(steps):
 
 
 def test_impossible_and_certain_have_steps():
-    steps = as_steps(np.array([0.0, 1e-40, 1e-6, 1.0, 1.0 + 1e-7]))
+    steps = quantize_logp(np.array([0.0, 1e-40, 1e-6, 1.0, 1.0 + 1e-7]))
     assert steps.tolist() == [255, 255, 255, 0, 0]
     assert np.exp(-255 * PROBABILITY_STEP) == pytest.approx(1e-6, rel=0.1)
 
@@ -287,12 +287,12 @@ def test_metadata_that_makes_no_sense_is_one_line(bundle_file, tmp_path, changes
     assert "no sound bundle" in refused(path)
 
 
-@pytest.mark.parametrize("name", ["familiarity", "elevation_deg", "turn_weight"])
+@pytest.mark.parametrize("name", ["ood", "elevation_deg", "sweep_weights"])
 def test_numbers_that_are_not_finite_are_one_line(bundle, tmp_path, name):
     changed = {
-        "familiarity": replace(bundle.familiarity, mean=np.full(512, np.inf, np.float32)),
+        "ood": replace(bundle.ood, mean=np.full(512, np.inf, np.float32)),
         "elevation_deg": bundle.elevation_deg + np.float32(np.inf),
-        "turn_weight": bundle.turn_weight * np.float32(np.inf),
+        "sweep_weights": bundle.sweep_weights * np.float32(np.inf),
     }
     replace(bundle, **{name: changed[name]}).save(tmp_path / "a.safetensors")
     assert "not finite" in refused(tmp_path / "a.safetensors")
@@ -303,15 +303,15 @@ def test_arrays_that_do_not_fit_are_one_line(bundle, tmp_path):
         {"distributions": bundle.distributions[:-1]},
         {"distributions": bundle.distributions[:, :-1]},
         {"elevation_deg": bundle.elevation_deg[:-1]},
-        {"turn_weight": bundle.turn_weight[:-1]},
-        {"turn_weight": np.zeros_like(bundle.turn_weight)},
+        {"sweep_weights": bundle.sweep_weights[:-1]},
+        {"sweep_weights": np.zeros_like(bundle.sweep_weights)},
         {"object_ids": bundle.object_ids[:-1]},
         {"estimator": {**bundle.estimator, "n_classes": 12}},
         {"paper": replace(bundle.paper, rotation_deg=bundle.paper.rotation_deg + np.int16(9999))},
-        {"familiarity": replace(bundle.familiarity, mean=bundle.familiarity.mean[:-1])},
-        {"familiarity": replace(bundle.familiarity, basis=bundle.familiarity.basis[:, :-1])},
-        {"familiarity": replace(bundle.familiarity, references=bundle.familiarity.references[:0])},
-        {"familiarity": replace(bundle.familiarity, scales=bundle.familiarity.scales[:1])},
+        {"ood": replace(bundle.ood, mean=bundle.ood.mean[:-1])},
+        {"ood": replace(bundle.ood, basis=bundle.ood.basis[:, :-1])},
+        {"ood": replace(bundle.ood, references=bundle.ood.references[:0])},
+        {"ood": replace(bundle.ood, scales=bundle.ood.scales[:1])},
     ):
         replace(bundle, **changes).save(tmp_path / "a.safetensors")
         assert "no sound bundle" in refused(tmp_path / "a.safetensors")

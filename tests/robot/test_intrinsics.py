@@ -225,7 +225,7 @@ def test_a_camera_that_is_not_calibrated_is_said_to_be_so(tmp_path):
 @pytest.mark.parametrize("name", ["fx", "fy", "cx", "cy", "width", "height"])
 def test_every_parameter_is_a_number(name):
     given_ = {"fx": 575.0, "fy": 575.0, "cx": 320.0, "cy": 240.0} | {name: "575"}
-    with pytest.raises(UserError, match=f"intrinsics: {name}: '575' is no number"):
+    with pytest.raises(UserError, match=f"intrinsics: {name}: '575' is not a number"):
         Intrinsics(**given_)
 
 
@@ -272,27 +272,27 @@ def test_text_that_is_neither_numbers_nor_a_file_is_one_line(text):
 
 
 def test_intrinsics_of_another_resolution_are_refused():
-    SIZED.need_resolution(480, 640)
+    SIZED.check_resolution(480, 640)
     for rows, columns in ((240, 320), (640, 480), (480, 641)):
         with pytest.raises(FrameError, match="640 × 480 pixels") as error:
-            SIZED.need_resolution(rows, columns)
+            SIZED.check_resolution(rows, columns)
         assert error.value.name == "other-resolution"
 
 
 def test_a_principal_point_far_outside_is_of_another_resolution():
-    WANTED.need_resolution(480, 640)
+    WANTED.check_resolution(480, 640)
     # A crop of an image keeps its intrinsics, so that its own middle may lie off the frame a bit.
-    WANTED.need_resolution(200, 300)
+    WANTED.check_resolution(200, 300)
     for rows, columns in ((480, 200), (120, 640)):
         with pytest.raises(FrameError, match="another resolution") as error:
-            WANTED.need_resolution(rows, columns)
+            WANTED.check_resolution(rows, columns)
         assert error.value.name == "other-resolution"
 
 
 @given(rows=st.integers(1, 5000), columns=st.integers(1, 5000))
 def test_focal_lengths_alone_serve_every_resolution(rows, columns):
-    Intrinsics(575.0, 575.0).need_resolution(rows, columns)
-    Intrinsics(575.0, 575.0, columns / 2, rows / 2, columns, rows).need_resolution(rows, columns)
+    Intrinsics(575.0, 575.0).check_resolution(rows, columns)
+    Intrinsics(575.0, 575.0, columns / 2, rows / 2, columns, rows).check_resolution(rows, columns)
 
 
 @given(factor=st.floats(0.3, 2.9), off=st.floats(-8, 8))
@@ -300,11 +300,11 @@ def test_a_principal_point_in_the_middle_of_another_image_is_refused(factor, off
     """Binned, cut in half or doubled: a camera's own tolerance is neither refused nor doubted."""
     camera = Intrinsics(FX * factor, FY * factor, (320 + off) * factor, (240 + off) * factor)
     if abs(factor - 1) < 0.1:
-        camera.need_resolution(480, 640)
+        camera.check_resolution(480, 640)
         assert not camera.doubts(480, 640)
     elif abs(factor - 1) > 0.25:
         with pytest.raises(FrameError, match="640 × 480") as error:
-            camera.need_resolution(480, 640)
+            camera.check_resolution(480, 640)
         assert error.value.name == "other-resolution"
 
 
@@ -313,7 +313,7 @@ def test_a_principal_point_off_the_middle_is_doubted():
     assert not Intrinsics(575.0, 575.0).doubts(480, 640)
     for place in ((500.0, 240.0), (320.0, 100.0), (520.0, 100.0)):
         camera = Intrinsics(FX, FY, *place)
-        camera.need_resolution(480, 640)
+        camera.check_resolution(480, 640)
         (doubt,) = camera.doubts(480, 640)
         assert "640 × 480" in doubt
         assert "cut out" in doubt

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from nbv.core.angles import circular_distance_deg, wrap_deg
 from nbv.core.estimates import Estimates
+from nbv.core.selection import DENSITY
 from nbv.errors import UserError
 from nbv.experiment.config import load_config
 from nbv.experiment.estimates import write_estimates
-from nbv.robot.calibration import DENSITY
 from nbv.robot.pairs import N_VIEWS, WIDEST_GAP_DEG, PairTable
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -177,7 +177,7 @@ def test_what_is_no_number_is_named_with_its_row(tmp_path, value, column):
     table.loc[7, column] = value
     table.to_csv(tmp_path / "p.csv", index=False)
     # Row 1 has the names of the columns.
-    assert f"row 9: {column} is no number" in refused(tmp_path / "p.csv")
+    assert f"row 9: {column} is not a number" in refused(tmp_path / "p.csv")
 
 
 @pytest.mark.parametrize("column", ["object_id", "azimuth_deg", "estimate_deg"])
@@ -232,7 +232,7 @@ def units(tmp_path, rows=()) -> Path:
 @pytest.mark.parametrize(("category", "shift"), [("mug", 0), ("cup", 1)])
 @pytest.mark.parametrize("elevation", [0, 15])
 def test_rows_of_one_category_and_elevation_are_read(tmp_path, category, shift, elevation):
-    found = PairTable.load(units(tmp_path)).of_unit(category, elevation).estimates
+    found = PairTable.load(units(tmp_path)).for_unit(category, elevation).estimates
     assert found.object_ids == ("a",)
     wanted = (np.arange(360) + 10 * elevation + shift) % 360
     assert np.array_equal(found.estimate_deg[0], wanted)
@@ -265,7 +265,7 @@ def test_units_that_nothing_tells_apart_are_one_line(tmp_path, absent):
 
 def test_a_category_without_rows_is_one_line(tmp_path):
     with pytest.raises(UserError, match="no rows with category=chair"):
-        PairTable.load(units(tmp_path)).of_unit("chair", 0)
+        PairTable.load(units(tmp_path)).for_unit("chair", 0)
 
 
 def test_a_compressed_file_is_read_as_the_file_itself(tmp_path):

@@ -8,7 +8,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from nbv.robot.calibration import DENSITY, recalibrated
+from nbv.core.selection import DENSITY
+from nbv.robot.calibration import recalibrated
 from nbv.robot.evaluation import (
     FIXED,
     OPPOSITE,
@@ -19,7 +20,7 @@ from nbv.robot.evaluation import (
     evaluate,
 )
 from nbv.robot.recommender import Recommender, shipped_bundles
-from nbv.robot.recordings import read_manifest, see
+from nbv.robot.recordings import read_manifest, run_network
 
 ROOT = Path(__file__).parents[2]
 FRAMES = Path(os.environ.get("NBV_FRAMES", ROOT.parent / "shared/data/frames"))
@@ -37,7 +38,7 @@ def never(path, error):
 def turns():
     recommender = Recommender.load("mug")
     recordings = read_manifest(FRAMES / "manifest.csv")
-    return {one.sequence: see(recommender, one, None, None, never) for one in recordings}
+    return {one.sequence: run_network(recommender, one, None, None, never) for one in recordings}
 
 
 def evaluated(bundle, turns, n_views):

@@ -29,7 +29,7 @@ def recommendation(rotation_deg: float = 90.0, n_frames: int = 1) -> Recommendat
         alternatives=(Move(-45.0, 45.0, 9.0),),
         belief=np.full(BINS, 1 / BINS),
         error_after_deg=error,
-        unfamiliarity=0.5,
+        ood_score=0.5,
         bayes_factor=1.0,
         warnings=(),
         n_views=n_frames,

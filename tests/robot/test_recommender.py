@@ -27,14 +27,15 @@ from nbv.core.distributions import direction_and_spread_deg, mean_direction_deg
 from nbv.core.logits import from_logits
 from nbv.errors import FrameError, UserError
 from nbv.experiment.make_bundle import bundled_model
+from nbv.robot.bundle import elevation_weights
 from nbv.robot.crop import crop_frame
 from nbv.robot.intrinsics import Intrinsics
 from nbv.robot.masks import object_mask
+from nbv.robot.network import Sweep
 from nbv.robot.next_view import after_rotations
-from nbv.robot.ood import fit_familiarity, unfamiliarity
+from nbv.robot.ood import fit_ood, ood_score
 from nbv.robot.recommender import Recommender
 from nbv.robot.rotations import MIN_SEPARATION_DEG, N_ALTERNATIVES
-from nbv.robot.sweeps import Turn, elevation_share
 from nbv.robot.synthetic import example_frame
 
 HERE = np.arange(BINS) * WIDTH
@@ -167,7 +168,7 @@ def test_it_does_not_matter_which_frame_is_called_the_first(recommender, seed, o
     assert one.expected_error_deg == pytest.approx(other.expected_error_deg, rel=1e-3)
     assert one.error_after_deg == pytest.approx(other.error_after_deg, rel=1e-3)
     assert one.move.expected_error_deg == pytest.approx(other.move.expected_error_deg, rel=1e-3)
-    assert one.unfamiliarity == other.unfamiliarity
+    assert one.ood_score == other.ood_score
 
 
 @settings(max_examples=25)
@@ -260,7 +261,7 @@ def test_expected_errors_are_those_of_objects_that_look_alike(
     found = recommender.recommend_crops(
         codes, [turn * WIDTH for turn in bins], elevation_deg=elevation, followed=followed
     )
-    share = None if elevation is None else elevation_share(bundle.elevation_deg, elevation)
+    share = None if elevation is None else elevation_weights(bundle.elevation_deg, elevation)
     now, after, more = brute_force(bundle, recommender.distributions(codes), bins, share)
     free = np.isfinite(found.error_after_deg)
     assert free.sum() == BINS - len(bins)
@@ -305,7 +306,7 @@ def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):
             bundle,
             distributions=bundle.distributions[of_it],
             elevation_deg=bundle.elevation_deg[of_it],
-            turn_weight=bundle.turn_weight[of_it],
+            sweep_weights=bundle.sweep_weights[of_it],
             object_ids=tuple(bundle.object_ids[place] for place in of_it),
         )
         wanted = Recommender(only).recommend_crops(codes)
@@ -371,7 +372,7 @@ def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
         network=bundled_model(random_estimator(estimator)),
         distributions=rng.dirichlet(np.full(120, 0.3), (2, 120)).astype(np.float32) + 1e-6,
         elevation_deg=np.zeros(2, np.float32),
-        turn_weight=np.ones(2, np.float32),
+        sweep_weights=np.ones(2, np.float32),
         object_ids=("a", "b"),
     )
     recommender = Recommender(rough)
@@ -622,13 +623,13 @@ def test_a_principal_point_off_the_middle_is_doubted():
 
 def test_the_least_familiar_frame_counts(recommender):
     codes = codes_of(11, 3)
-    known = recommender.bundle.familiarity
-    apart = unfamiliarity(known, codes, recommender.network(codes))
-    alone = [recommender.recommend_crops(codes[i : i + 1]).unfamiliarity for i in range(3)]
+    known = recommender.bundle.ood
+    apart = ood_score(known, codes, recommender.network(codes))
+    alone = [recommender.recommend_crops(codes[i : i + 1]).ood_score for i in range(3)]
     assert alone == pytest.approx(apart, rel=1e-5)
     together = recommender.recommend_crops(codes, [0.0, 60.0, 120.0])
-    assert together.unfamiliarity == pytest.approx(max(alone), rel=1e-5)
-    assert together.is_unfamiliar == (together.unfamiliarity > 1)
+    assert together.ood_score == pytest.approx(max(alone), rel=1e-5)
+    assert together.is_ood == (together.ood_score > 1)
 
 
 def test_what_no_calibration_image_resembles_is_less_familiar(bundle, recommender):
@@ -637,12 +638,12 @@ def test_what_no_calibration_image_resembles_is_less_familiar(bundle, recommende
     for name in "abc":
         codes = random_codes(np.random.default_rng(ord(name)), BINS)
         logits = recommender.network(codes)
-        turns.append(Turn(name, "1", 0.0, azimuth_deg, logits, codes))
-    made = Recommender(replace(bundle, familiarity=fit_familiarity(turns)))
+        turns.append(Sweep(name, "1", 0.0, azimuth_deg, logits, codes))
+    made = Recommender(replace(bundle, ood=fit_ood(turns)))
     strange = np.full((1, 32, 32), 255, dtype=np.uint8)
     known, other = (made.recommend_crops(codes) for codes in (codes_of(12, 1), strange))
-    assert not known.is_unfamiliar
-    assert other.unfamiliarity > known.unfamiliarity
+    assert not known.is_ood
+    assert other.ood_score > known.ood_score
 
 
 # Frames
@@ -860,11 +861,11 @@ def test_a_mask_may_be_any_array(recommender):
         ({"mask": ["m.png"]}, "mask: 'm.png' is text"),
         ({"intrinsics": "585"}, "intrinsics: '585' is text; give numbers"),
         ({"intrinsics": Path("camera.json")}, "intrinsics: 'camera.json' is text"),
-        ({"near_m": "1"}, "`near_m`: '1' is no number"),
+        ({"near_m": "1"}, "`near_m`: '1' is not a number"),
         ({"far_m": 10**400}, "`far_m`: the number is too large"),
         ({"intrinsics": 10**400}, "are no numbers; give fx,fy,cx,cy"),
-        ({"far_m": [1.0]}, r"`far_m`: \[1.0\] is no number"),
-        ({"elevation_deg": "high"}, "elevation: 'high' is no number"),
+        ({"far_m": [1.0]}, r"`far_m`: \[1.0\] is not a number"),
+        ({"elevation_deg": "high"}, "elevation: 'high' is not a number"),
     ],
 )
 def test_an_argument_of_another_type_is_one_line(recommender, options, message):

@@ -25,13 +25,13 @@ from nbv.robot.evaluation import (
     SPACED,
     at_random,
     best_fixed_deg,
+    count_ood,
     evaluate,
-    familiarity_of,
     fixed_errors_deg,
 )
-from nbv.robot.ood import unfamiliarity
+from nbv.robot.network import Sweep
+from nbv.robot.ood import ood_score
 from nbv.robot.recommender import Recommender
-from nbv.robot.sweeps import Turn
 
 COLUMNS = [
     *("object_id", "sequence", "choice", "n_views", "mae_deg", "median_deg", "above_45_percent"),
@@ -40,12 +40,12 @@ COLUMNS = [
 CHOICES = {RANDOM, FIXED, OPPOSITE, RECOMMENDED, PAPER}
 
 
-def recording(seed=0, n=BINS, elevation=np.nan, name="cup", logits=None) -> Turn:
+def recording(seed=0, n=BINS, elevation=np.nan, name="cup", logits=None) -> Sweep:
     azimuth_deg = np.arange(n) * (360.0 / n)
     if logits is None:
         logits = soft_turns(np.random.default_rng(seed), 1, n)[0]
     codes = random_codes(np.random.default_rng(seed), n)
-    return Turn(name, "1", elevation, azimuth_deg, logits.astype(np.float32), codes)
+    return Sweep(name, "1", elevation, azimuth_deg, logits.astype(np.float32), codes)
 
 
 def sure(azimuth_deg, error_deg=0.0) -> np.ndarray:
@@ -304,7 +304,7 @@ def test_recordings_do_not_matter_to_one_another(bundle):
     turns = [recording(1, name="a"), recording(2, name="b"), recording(3, name="a")]
     turns[2] = replace(turns[2], sequence="2")
     done: list[int] = []
-    together = evaluate(bundle, turns, n_views=(2,), tell=done.append)
+    together = evaluate(bundle, turns, n_views=(2,), report=done.append)
     assert done == [1, 2, 3]
     assert list(dict.fromkeys(zip(together["object_id"], together["sequence"], strict=True))) == [
         *(("a", "1"), ("b", "1"), ("a", "2"))
@@ -374,19 +374,19 @@ def test_unfamiliar_and_wrong_frames_are_counted(bundle):
     frames = np.arange(BINS)
     turn = recording(logits=sure(azimuth_deg, np.where(frames % 4 == 0, 90.0, 0.0)))
     # Far from all crops that were calibrated, and near their middle.
-    familiar = replace(bundle.familiarity, scales=np.array([[50, 1], [0, 1e9]], np.float32))
+    familiar = replace(bundle.ood, scales=np.array([[50, 1], [0, 1e9]], np.float32))
     strange = np.indices((32, 32)).sum(axis=0) % 2 * np.uint8(255)
-    mean = bundle.familiarity.mean[:256].reshape(16, 16) > 64
+    mean = bundle.ood.mean[:256].reshape(16, 16) > 64
     usual = np.kron(mean, np.ones((2, 2))).astype(np.uint8) * np.uint8(128)
     codes = np.where((frames % 3 == 0)[:, None, None], strange, usual).astype(np.uint8)
     limit = replace(familiar, threshold=1e-6)
-    apart = unfamiliarity(limit, codes, turn.logits)
+    apart = ood_score(limit, codes, turn.logits)
     limit = replace(familiar, threshold=float(1e-6 * np.median([apart.min(), apart.max()])))
-    changed = replace(bundle, familiarity=limit)
-    (row,) = familiarity_of(changed, [replace(turn, codes=codes)]).to_dict("records")
+    changed = replace(bundle, ood=limit)
+    (row,) = count_ood(changed, [replace(turn, codes=codes)]).to_dict("records")
     assert row == {
         **{"object_id": "cup", "sequence": "1", "n_frames": 24},
-        **{"n_unfamiliar": 8, "n_wrong": 6, "n_wrong_unfamiliar": 2, "warning": ""},
+        **{"n_ood": 8, "n_wrong": 6, "n_wrong_ood": 2, "warning": ""},
     }
 
 
@@ -406,6 +406,6 @@ ALL_ROUND = np.arange(BINS) * WIDTH
 def test_azimuths_that_estimates_do_not_follow_are_told(bundle, azimuths_deg, warning):
     """A constant offset is no such thing: it is shown apart."""
     turn = recording(logits=sure(ALL_ROUND, np.zeros(BINS)))
-    (row,) = familiarity_of(bundle, [replace(turn, azimuth_deg=azimuths_deg)]).to_dict("records")
+    (row,) = count_ood(bundle, [replace(turn, azimuth_deg=azimuths_deg)]).to_dict("records")
     assert warning in row["warning"]
     assert bool(warning) == bool(row["warning"])

@@ -14,7 +14,7 @@ from made_bundles import FOCAL_PX, frame
 from nbv.errors import FrameError, UserError
 from nbv.robot.depth_files import read_depth
 from nbv.robot.intrinsics import Intrinsics
-from nbv.robot.recordings import read_manifest, see
+from nbv.robot.recordings import read_manifest, run_network
 
 AZIMUTHS = (0.0, 10.0, 20.0, 350.0)
 
@@ -162,7 +162,7 @@ def test_a_missing_column_is_named(folder, column):
 @pytest.mark.parametrize("value", ["", "nan", "inf", "north", "NA"])
 def test_an_azimuth_that_is_no_number_is_named_with_its_row(folder, value):
     message = refused(manifest(folder, table(azimuth_deg=[0, 10, value, 30])))
-    assert "row 4: azimuth_deg is no number" in message
+    assert "row 4: azimuth_deg is not a number" in message
 
 
 @pytest.mark.parametrize(
@@ -194,12 +194,12 @@ def test_a_manifest_without_rows_or_that_does_not_exist_is_one_line(tmp_path):
     ("columns", "message"),
     [
         ({"mask": ["", "m9.png", "", ""]}, "row 3: mask 'm9.png' does not exist"),
-        ({"fx": [500, "", "wide", 500]}, "row 4: fx is no number"),
+        ({"fx": [500, "", "wide", 500]}, "row 4: fx is not a number"),
         ({"fx": [500, -500, "", 500]}, "row 3: intrinsics: fx=-500 must be above 0"),
         ({"fx": [500, "", "", ""], "cx": ["", "", "", 320]}, "row 5: cx without fx"),
         ({"fx": [500] * 4, "cx": [320, 320, 320, ""], "cy": [240, "", 240, ""]}, "cx without cy"),
         ({"elevation_deg": [10, "", 100, ""]}, "row 4: elevation_deg=100 lies not between"),
-        ({"elevation_deg": [10, "", "", "high"]}, "row 5: elevation_deg is no number"),
+        ({"elevation_deg": [10, "", "", "high"]}, "row 5: elevation_deg is not a number"),
     ],
 )
 def test_a_cell_that_cannot_be_is_named_with_its_row(folder, columns, message):
@@ -212,7 +212,7 @@ def test_a_cell_that_cannot_be_is_named_with_its_row(folder, columns, message):
 def seen(recommender, path, intrinsics=None, depth_scale=None):
     lines: list[str] = []
     (recording,) = read_manifest(path)
-    return see(recommender, recording, intrinsics, depth_scale, told(lines)), lines
+    return run_network(recommender, recording, intrinsics, depth_scale, told(lines)), lines
 
 
 def crops(recommender, places, **options):

@@ -40,9 +40,9 @@ from nbv.cli.arguments import (
     WholeNumbers,
     allowed_rotations,
     as_paragraphs,
+    check_writable,
     in_flags,
     joined_numbers,
-    need_writable,
 )
 from nbv.cli.own_estimator import calibrate_table, recommend_by_distributions, recommend_by_table
 from nbv.errors import NamedError, UserError
@@ -51,8 +51,8 @@ from nbv.labels import counted
 if TYPE_CHECKING:
     from nbv.cli.answers import Place
     from nbv.errors import FrameError
+    from nbv.robot.network import Sweep
     from nbv.robot.recommender import Recommender
-    from nbv.robot.sweeps import Turn
 
 USER_ERROR = 2
 
@@ -267,10 +267,10 @@ def recommend(
         hint = "; frames stand before --mask" if mask is not None else ""
         raise UserError(f"give a depth frame, or --estimate or --distribution with --table{hint}")
     if plot is not None:
-        need_writable("--plot", plot, FIGURES)
+        check_writable("--plot", plot, FIGURES)
     place = _known_place(camera_pose, axis)
     if gravity is not None and len(gravity) != 3:
-        # Before frames are read: what is no number after the option is taken for one.
+        # Before frames are read: what is not a number after the option is taken for one.
         noun = counted(len(gravity), "number")
         raise UserError(f"--gravity has {noun}; give three, the direction down: x,y,z")
     from nbv.robot.depth_files import read_depth, read_mask
@@ -380,12 +380,12 @@ def calibrate(
                 f"--output={output} is a bundle, and frames make one with --bundle: add "
                 "--bundle mug; pairs make a table, an .npz file"
             )
-        need_writable("--output", output, [".npz"])
+        check_writable("--output", output, [".npz"])
         calibrate_table(source, output, criterion or "pose_ambiguity", as_json=json)
         return
     if criterion is not None:
         raise UserError("--criterion is for pairs, which need no --bundle; leave one of them out")
-    need_writable("--output", output, [".safetensors"])
+    check_writable("--output", output, [".safetensors"])
     from nbv.core.distributions import mean_direction_deg
     from nbv.core.logits import from_logits
     from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
@@ -466,10 +466,10 @@ def evaluate(
         Print JSON.
     """
     if output is not None:
-        need_writable("--output", output, [".csv"])
+        check_writable("--output", output, [".csv"])
     from nbv.files import write_csv
+    from nbv.robot.evaluation import count_ood
     from nbv.robot.evaluation import evaluate as evaluate_
-    from nbv.robot.evaluation import familiarity_of
 
     seen = _seen_frames(bundle, manifest, intrinsics, depth_scale, near, far, as_json=json)
     held, turns = seen.recommender.bundle, seen.turns
@@ -478,17 +478,17 @@ def evaluate(
         if len(turns) > 1:
             print(f"evaluated {n_done} of {len(turns)} recordings", file=sys.stderr)  # noqa: T201
 
-    found = evaluate_(held, turns, views or [2, 3, 4, 5], tell=tell)
+    found = evaluate_(held, turns, views or [2, 3, 4, 5], report=tell)
     if output is not None:
         write_csv(output, found)
-    familiar = familiarity_of(held, turns)
+    familiar = count_ood(held, turns)
     calibrated_by = sorted({turn.object_id for turn in turns} & set(held.object_ids))
     if json:
         say_json(
             {
                 "errors": found.to_dict("records"),
                 "calibrated_by": calibrated_by,
-                "familiarity": [
+                "ood": [
                     about | {"warning": about["warning"] or None}
                     for about in familiar.to_dict("records")
                 ],
@@ -565,7 +565,7 @@ def render(
         raise UserError("give a mesh file, or --example")
     if example and (up, front) != (UP, FRONT):
         raise UserError("--up and --front are of a mesh file; leave them out with --example")
-    need_writable("--output", output, [".npy", ".png"])
+    check_writable("--output", output, [".npy", ".png"])
     from nbv.robot.depth_files import write_depth
     from nbv.robot.synthetic import draw_frame, example_mesh, read_mesh
 
@@ -616,7 +616,7 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
         "mirror_plane_deg": held.mirror_plane_deg,
         "temperature": round(held.temperature, 3),
         "affinity": dict(held.affinity),
-        "familiar_within": held.familiarity.threshold,
+        "familiar_within": held.ood.threshold,
         "calibration_objects": len(set(held.object_ids)),
         "calibration_turns": len(held.object_ids),
         "elevations_deg": sorted(
@@ -646,7 +646,7 @@ def export(bundle: str = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
     json
         Print JSON.
     """
-    need_writable("--onnx", onnx, [".onnx"])
+    check_writable("--onnx", onnx, [".onnx"])
     from nbv.files import replacing
     from nbv.robot.bundle import Bundle
     from nbv.robot.network import open_session
@@ -671,7 +671,7 @@ class SeenFrames:
     """What a bundle makes of recordings; the focal length of `n_assumed` frames is assumed."""
 
     recommender: Recommender
-    turns: list[Turn]
+    turns: list[Sweep]
     n_assumed: int
     left_out: dict[str, FrameError]
 
@@ -699,7 +699,7 @@ def _seen_frames(
 ) -> SeenFrames:
     """Return what a bundle makes of the frames of a manifest, and tell which are left out."""
     from nbv.robot.recommender import Recommender
-    from nbv.robot.recordings import read_manifest, see
+    from nbv.robot.recordings import read_manifest, run_network
 
     left_out: dict[str, FrameError] = {}
 
@@ -709,7 +709,10 @@ def _seen_frames(
         print(line, file=sys.stderr) if as_json else say(line)  # noqa: T201
 
     recommender, recordings = Recommender.load(bundle), read_manifest(manifest)
-    turns = [see(recommender, one, intrinsics, depth_scale, tell, near, far) for one in recordings]
+    turns = [
+        run_network(recommender, one, intrinsics, depth_scale, tell, near, far)
+        for one in recordings
+    ]
     n_assumed = sum(
         camera is None and intrinsics is None and path not in left_out
         for one in recordings

@@ -82,7 +82,7 @@ _KEYS = (
     "expected_error_deg",
     "move",
     "alternatives",
-    "unfamiliarity",
+    "ood_score",
     "bayes_factor",
     "warnings",
     "assumed_focal_px",
@@ -131,7 +131,7 @@ def recommendation_as_json(
         "azimuth_deg": answer.azimuth_deg,
         "spread_deg": answer.spread_deg,
         "expected_error_deg": answer.expected_error_deg,
-        "unfamiliarity": None if math.isnan(answer.unfamiliarity) else answer.unfamiliarity,
+        "ood_score": None if math.isnan(answer.ood_score) else answer.ood_score,
         "bayes_factor": answer.bayes_factor,
         "assumed_focal_px": assumed_focal_px,
         "object_position_m": answer.object_position_m,
@@ -206,7 +206,7 @@ def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
     found : DataFrame
         From `nbv.robot.evaluation.evaluate`.
     familiar : DataFrame
-        From `nbv.robot.evaluation.familiarity_of`.
+        From `nbv.robot.evaluation.count_ood`.
     """
     for about in familiar.to_dict("records"):
         is_own = (found["object_id"] == about["object_id"]) & (
@@ -216,8 +216,8 @@ def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
         say(
             f"{about['object_id']}, sequence {about['sequence']}: "
             f"{counted(about['n_frames'], 'frame')}; "
-            f"offset {rows['offset_deg'].iloc[0]:+.1f}°; {about['n_unfamiliar']} unfamiliar, "
-            f"{about['n_wrong']} wrong by more than 45°, {about['n_wrong_unfamiliar']} both"
+            f"offset {rows['offset_deg'].iloc[0]:+.1f}°; {about['n_ood']} unfamiliar, "
+            f"{about['n_wrong']} wrong by more than 45°, {about['n_wrong_ood']} both"
         )
         if about["warning"]:
             say_warnings([about["warning"]])

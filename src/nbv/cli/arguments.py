@@ -130,7 +130,7 @@ def allowed_rotations(given: list[float] | Path | None) -> Any:
     return read_rotations(given) if isinstance(given, Path) else given
 
 
-def need_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:
+def check_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:
     """Refuse a file that cannot be written, before anything is computed.
 
     Parameters

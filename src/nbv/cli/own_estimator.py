@@ -33,8 +33,7 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
     from nbv.core.criteria import CRITERIA
     from nbv.core.distributions import mean_direction_deg
     from nbv.core.offset import FOR_PAIRS, Offset
-    from nbv.core.selection import chosen_lookup
-    from nbv.robot.calibration import DENSITY
+    from nbv.core.selection import DENSITY, chosen_lookup
     from nbv.robot.distribution_table import DistributionTable
     from nbv.robot.pairs import PairTable
 
@@ -42,7 +41,7 @@ def calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool
         raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
     pairs = PairTable.load(source)
     estimates, turns = pairs.estimates.estimate_deg, pairs.distributions
-    given = DistributionTable.of_pairs(turns) if turns else None
+    given = DistributionTable.from_pairs(turns) if turns else None
     lookup = chosen_lookup(estimates, criterion, DENSITY)
     if given is None:
         lookup.save(output)

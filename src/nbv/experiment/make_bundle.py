@@ -16,11 +16,9 @@ from nbv.experiment.estimation.weights import Estimator
 from nbv.robot.bundle import Bundle
 from nbv.robot.calibration import paper_tables, temperature_of
 from nbv.robot.crop import pixel_step
-from nbv.robot.mirror import mirrored_classes
-from nbv.robot.network import Network, open_network
-from nbv.robot.ood import fit_familiarity
+from nbv.robot.network import Network, Sweep, mirrored_classes, open_network
+from nbv.robot.ood import fit_ood
 from nbv.robot.pairs import bin_apart
-from nbv.robot.sweeps import Turn
 
 DEFAULT_FOCAL_PX = 600.0
 """Of a bundle whose training simulated no sensor."""
@@ -36,7 +34,7 @@ def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -
     ----------
     estimator : Estimator
     mirror_plane_deg : float, optional
-        From `nbv.robot.mirror.find_mirror_plane`.
+        From `nbv.robot.network.find_mirror_plane`.
     """
     if mirror_plane_deg is None:
         return onnx_model(estimator)
@@ -57,14 +55,14 @@ def turns_of(
     elevations_deg: Sequence[float],
     object_ids: Sequence[str],
     step: int = 1,
-) -> tuple[list[Turn], float, float]:
+) -> tuple[list[Sweep], float, float]:
     """Return the turns of some objects at every elevation, and the extent of what they show.
 
     Of each turn, every `step`-th view from the first on; the network sees no others.
 
     Returns
     -------
-    list of Turn
+    list of Sweep
     float, float
         The least and the largest diagonal of an object's box in an image, pixels, of 98 % of
         these images.
@@ -76,7 +74,7 @@ def turns_of(
             logits = network(codes)
             azimuth_deg = np.arange(0, len(whole), step, dtype=np.float64) * (360.0 / len(whole))
             turns.append(
-                Turn(object_id, f"{elevation:g}", float(elevation), azimuth_deg, logits, codes)
+                Sweep(object_id, f"{elevation:g}", float(elevation), azimuth_deg, logits, codes)
             )
             extents.append(_extents(codes))
     low, high = np.quantile(np.concatenate(extents), (0.01, 0.99))
@@ -98,7 +96,7 @@ def _length(seen: NDArray[np.bool_]) -> NDArray[np.float64]:
 def make_bundle(
     category: str,
     estimator: Estimator,
-    turns: Sequence[Turn],
+    turns: Sequence[Sweep],
     extent_px: tuple[float, float],
     *,
     mirror_plane_deg: float | None,
@@ -114,13 +112,13 @@ def make_bundle(
     category : str
     estimator : Estimator
         A classifier, trained on ``<object id>/<elevation>``.
-    turns : sequence of Turn
+    turns : sequence of Sweep
         Of calibration objects, which the estimator has not seen, by its `bundled_network` with
         the plane.
     extent_px : (float, float)
         From `turns_of`.
     mirror_plane_deg : float or None
-        From `nbv.robot.mirror.find_mirror_plane`.
+        From `nbv.robot.network.find_mirror_plane`.
     camera : Camera
         That of the training.
     sensor : mapping
@@ -151,10 +149,10 @@ def make_bundle(
         temperature=temperature,
         object_ids=tuple(turn.object_id for turn in turns),
         elevation_deg=elevation_deg,
-        turn_weight=np.ones(len(turns), dtype=np.float32),
+        sweep_weights=np.ones(len(turns), dtype=np.float32),
         distributions=distributions,
         affinity={key: affinity[key] for key in ("power", "pseudo_observations")},
-        familiarity=fit_familiarity(turns),
+        ood=fit_ood(turns),
         paper=paper_tables(elevation_deg, distributions),
         provenance=dict(provenance) | {"training_objects": n_objects},
     )

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import encode_depth, median_depth
-from nbv.errors import FrameError, UserError, need_number
+from nbv.errors import FrameError, UserError, check_number
 from nbv.robot.depth_files import DepthImage
 from nbv.robot.intrinsics import Intrinsics
 from nbv.robot.masks import NEAREST_SHARE, Mask, window_of
@@ -104,13 +104,13 @@ def crop_frame(
         ``implausible-size``.
     """
     rows, columns = depth_m.shape
-    intrinsics.need_resolution(rows, columns)
+    intrinsics.check_resolution(rows, columns)
     of_rows, of_columns = window = window_of(mask)
     if not of_rows.stop:
         raise FrameError("empty-mask", "the mask has no pixel")
     top, bottom = of_rows.start, of_rows.stop - 1
     left, right = of_columns.start, of_columns.stop - 1
-    _need_inside(top, bottom, left, right, (rows, columns), intrinsics)
+    _check_inside(top, bottom, left, right, (rows, columns), intrinsics)
     middle = (left + right + 1) / 2, (top + bottom + 1) / 2
     axes, principal = _facing(intrinsics, *middle)
     towards = axes[2]
@@ -118,7 +118,7 @@ def crop_frame(
     width_m = (right - left + 1) * distance_m / intrinsics.fx
     height_m = (bottom - top + 1) * distance_m / intrinsics.fy
     extent = math.hypot(width_m, height_m)
-    _need_plausible(distance_m, extent, diagonal_m, extent_m)
+    _check_plausible(distance_m, extent, diagonal_m, extent_m)
     # A pixel covers the same length on the object's middle as in training.
     away_m = distance_m + BEHIND_SURFACE * diagonal_m
     step = pixel_step(camera) * diagonal_m / away_m
@@ -195,7 +195,7 @@ def _facing(
     return axes, principal
 
 
-def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:
+def check_depth_limits(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:
     """Refuse limits of depth that are no metres.
 
     Parameters
@@ -214,7 +214,7 @@ def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) ->
     limits = (("`near_m`", near_m, FARTHEST), ("`far_m`", far_m, _NO_LIMIT))
     for name, limit_m, most in limits:
         if limit_m is not None:
-            need_number(name, limit_m)
+            check_number(name, limit_m)
         if limit_m is not None and not limit_m >= 0:
             raise UserError(f"{name}={limit_m:g}: give metres, 0 or more")
         if limit_m is not None and most * diagonal_m < limit_m < math.inf:
@@ -224,7 +224,7 @@ def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) ->
             )
 
 
-def need_plausible_nearest(
+def check_plausible_nearest(
     depth_m: DepthImage, reach_m: float, diagonal_m: float, near_m: float | None = None
 ) -> None:
     """Refuse a frame in which the object cannot be what lies nearest, for its distance.
@@ -277,7 +277,7 @@ def _help(unit: float | None) -> str:
     return f"depths {unit:g} times as large would fit: multiply depths or `depth_scale` by it"
 
 
-def _need_inside(
+def _check_inside(
     top: int, bottom: int, left: int, right: int, shape: tuple[int, ...], intrinsics: Intrinsics
 ) -> None:
     rows, columns = shape
@@ -294,7 +294,7 @@ def _need_inside(
         )
 
 
-def _need_plausible(
+def _check_plausible(
     distance_m: float, extent: float, diagonal_m: float, extent_m: tuple[float, float]
 ) -> None:
     def is_plausible(unit: float) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nbv.errors import FrameError, UserError, need_number, reason_of
+from nbv.errors import FrameError, UserError, check_number, reason_of
 from nbv.files import read_text
 from nbv.robot.depth_files import MILLIMETRE
 
@@ -56,7 +56,7 @@ class Intrinsics:
     def __post_init__(self) -> None:
         for name in ("fx", "fy", "cx", "cy", "width", "height"):
             if (value := getattr(self, name)) is not None or name in ("fx", "fy"):
-                need_number(f"intrinsics: {name}", value)
+                check_number(f"intrinsics: {name}", value)
         for name in ("fx", "fy"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
@@ -64,7 +64,7 @@ class Intrinsics:
         for name in ("cx", "cy"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
-                raise UserError(f"intrinsics: {name}={value:g} is no number")
+                raise UserError(f"intrinsics: {name}={value:g} is not a number")
         if (self.cx is None) != (self.cy is None):
             known, missing = ("cy", "cx") if self.cx is None else ("cx", "cy")
             raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
@@ -76,16 +76,16 @@ class Intrinsics:
                     "depth image, or leave out width and height"
                 )
 
-    def need_resolution(self, rows: int, columns: int) -> None:
+    def check_resolution(self, rows: int, columns: int) -> None:
         """Raise FrameError ``other-resolution`` where they are for images of another size.
 
         Examples
         --------
         >>> import nbv
         >>> camera = nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5, width=640, height=480)
-        >>> camera.need_resolution(rows=480, columns=640)
+        >>> camera.check_resolution(rows=480, columns=640)
         >>> try:
-        ...     camera.need_resolution(rows=240, columns=320)
+        ...     camera.check_resolution(rows=240, columns=320)
         ... except nbv.FrameError as error:
         ...     error.name
         'other-resolution'

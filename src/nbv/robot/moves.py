@@ -51,7 +51,7 @@ def _as_vector(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.fl
     return vector
 
 
-def _need_metres(place: NDArray[np.float64], name: str) -> None:
+def _check_metres(place: NDArray[np.float64], name: str) -> None:
     if (np.abs(place) > _FARTHEST_M).any():
         raise UserError(f"{name}: a place {np.abs(place).max():g} m away; give metres")
 
@@ -84,7 +84,7 @@ def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
     )
     if not is_rotation:
         raise UserError(f"{name}: no rotation with a translation; is it transposed or scaled?")
-    _need_metres(pose[:3, 3], name)
+    _check_metres(pose[:3, 3], name)
     return pose
 
 
@@ -126,7 +126,7 @@ def _as_axis(
     """Return a point (3,) and the direction (3,) of unit length."""
     three = "three finite numbers: x,y,z"
     origin = _as_vector(point, "axis: the point", three)
-    _need_metres(origin, "axis: the point")
+    _check_metres(origin, "axis: the point")
     axis = _as_vector(direction, "axis: the direction", three)
     largest = float(np.abs(axis).max())
     if largest <= 1e-9:
@@ -215,7 +215,7 @@ def check_axis(
     'axis'
     """
     if object_position_m is not None and diagonal_m is not None:
-        _need_object_on_axis(camera_pose, point, direction, object_position_m, diagonal_m)
+        _check_object_on_axis(camera_pose, point, direction, object_position_m, diagonal_m)
     down = down_of_axis(camera_pose, point, direction)
     elevation_deg, roll_deg = _elevation_and_roll(down)
     if not LEAST_ELEVATION_DEG <= elevation_deg <= MOST_ELEVATION_DEG:
@@ -231,7 +231,7 @@ def check_axis(
     )
 
 
-def _need_object_on_axis(
+def _check_object_on_axis(
     camera_pose: ArrayLike,
     point: ArrayLike,
     direction: ArrayLike,

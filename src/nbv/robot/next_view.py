@@ -95,7 +95,7 @@ class Recommendation:
     error_after_deg : ndarray (B,)
         Expected error after a further view, by its rotation 360 d / B degrees from the last frame;
         inf where the camera may not go. Of allowed rotations, the nearest of these are finite.
-    unfamiliarity : float
+    ood_score : float
         How far the least familiar frame is from everything calibrated; above 1 farther than 95 %
         of calibration images. NaN where no frame was seen.
     bayes_factor : float
@@ -127,7 +127,7 @@ class Recommendation:
     alternatives: tuple[Move, ...]
     belief: NDArray[np.float64]
     error_after_deg: NDArray[np.float64]
-    unfamiliarity: float
+    ood_score: float
     bayes_factor: float
     warnings: tuple[str, ...]
     n_views: int
@@ -148,16 +148,16 @@ class Recommendation:
         return () if self.move is None else (self.move, *self.alternatives)
 
     @property
-    def is_unfamiliar(self) -> bool:
+    def is_ood(self) -> bool:
         """Whether a frame is like nothing that was calibrated.
 
         Examples
         --------
         >>> import nbv
-        >>> nbv.Recommender.load("mug").recommend(nbv.example_frame().depth_m).is_unfamiliar
+        >>> nbv.Recommender.load("mug").recommend(nbv.example_frame().depth_m).is_ood
         False
         """
-        return self.unfamiliarity > 1.0
+        return self.ood_score > 1.0
 
 
 def after_rotations(
@@ -188,7 +188,7 @@ def next_view(
     allowed_deg: ArrayLike | None = None,
     max_travel_deg: float = 180.0,
     followed: bool = True,
-    unfamiliarity: float = math.nan,
+    ood_score: float = math.nan,
     warnings: tuple[str, ...] = (),
     crops: tuple[NDArray[np.uint8], ...] = (),
     object_position_m: tuple[float, float, float] | None = None,
@@ -214,7 +214,7 @@ def next_view(
         How much each calibration turn counts.
     allowed_deg, max_travel_deg, followed
         See `nbv.Recommender.recommend`.
-    unfamiliarity, warnings, crops, object_position_m
+    ood_score, warnings, crops, object_position_m
         What the frames of the views show; see `Recommendation`.
 
     Raises
@@ -273,7 +273,7 @@ def next_view(
         alternatives=tuple(moves[1:]),
         belief=rotated(belief, -last),
         error_after_deg=error_after_deg,
-        unfamiliarity=unfamiliarity,
+        ood_score=ood_score,
         bayes_factor=bayes_factor,
         warnings=(*warnings, *_contradictions(bayes_factor)),
         n_views=len(distributions),

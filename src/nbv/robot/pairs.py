@@ -59,19 +59,21 @@ class PairTable:
         Raises
         ------
         UserError
-            Where the file cannot be read, a column is missing, or a value is no number.
+            Where the file cannot be read, a column is missing, or a value is not a number.
         """
         path = Path(path)
         rows = read_rows(path, COLUMNS, _OF_FRAMES)
         for name in COLUMNS[1:]:
             rows[name] = pd.to_numeric(rows[name], errors="coerce")
             if not (finite := np.isfinite(rows[name].to_numpy(dtype=np.float64))).all():
-                raise UserError(f"{path}, row {int((~finite).argmax()) + 2}: {name} is no number")
+                raise UserError(
+                    f"{path}, row {int((~finite).argmax()) + 2}: {name} is not a number"
+                )
         if "elevation_deg" in rows:
             rows["elevation_deg"] = pd.to_numeric(rows["elevation_deg"], errors="coerce")
         return cls(path, rows)
 
-    def of_unit(self, category: str, elevation_deg: float) -> PairTable:
+    def for_unit(self, category: str, elevation_deg: float) -> PairTable:
         """Return the rows of a category and an elevation, where columns tell them apart.
 
         Raises
@@ -158,7 +160,7 @@ class PairTable:
                 )
         found = {}
         for category, elevations in elevations_deg.items():
-            ids = [self.of_unit(category, one).estimates.object_ids for one in elevations]
+            ids = [self.for_unit(category, one).estimates.object_ids for one in elevations]
             if missing := set().union(*ids) - set(ids[0]).intersection(*ids):
                 raise UserError(
                     f"{self.path}: object {min(missing)!r} has no pairs at some elevation of "

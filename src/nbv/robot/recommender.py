@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.logits import from_logits
-from nbv.errors import BundleError, UserError, nearest, need_number
+from nbv.errors import BundleError, UserError, check_number, nearest
 from nbv.files import as_path
 from nbv.labels import counted
-from nbv.robot.bundle import Bundle
-from nbv.robot.crop import Crop, crop_frame, need_metres, need_plausible_nearest
+from nbv.robot.bundle import ELEVATION_BANDWIDTH_DEG, Bundle
+from nbv.robot.crop import Crop, check_depth_limits, check_plausible_nearest, crop_frame
 from nbv.robot.depth_files import to_metres
 from nbv.robot.intrinsics import Intrinsics, as_intrinsics
 from nbv.robot.masks import object_mask
@@ -29,8 +29,7 @@ from nbv.robot.next_view import (
     as_rotation_list,
     next_view,
 )
-from nbv.robot.ood import unfamiliarity
-from nbv.robot.sweeps import ELEVATION_BANDWIDTH_DEG, elevation_share
+from nbv.robot.ood import ood_score
 
 IntrinsicsLike = Intrinsics | ArrayLike | None
 """Intrinsics, or their numbers; None where they are not known."""
@@ -133,9 +132,9 @@ class Recommender:
         camera = bundle.focal_px if intrinsics is None else intrinsics
         known = as_intrinsics([camera] if isinstance(camera, float) else camera)
         reach_m = REACH * bundle.diagonal_m
-        need_metres(near_m, far_m, bundle.diagonal_m)
+        check_depth_limits(near_m, far_m, bundle.diagonal_m)
         if mask is None and far_m is None:
-            need_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
+            check_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
         inside = object_mask(depth, reach_m, mask, near_m, far_m)
         return crop_frame(depth, inside, known, bundle.camera, bundle.diagonal_m, bundle.extent_m)
 
@@ -233,7 +232,7 @@ class Recommender:
         rotations_deg = as_rotation_list(rotations_deg, len(frames))
         called = _as_names(names, len(frames))
         # Of all frames: no message should name one.
-        need_metres(near_m, far_m, self.bundle.diagonal_m)
+        check_depth_limits(near_m, far_m, self.bundle.diagonal_m)
         crops: list[Crop] = []
         for frame, own, camera, name in zip(frames, masks, cameras, called, strict=True):
             try:
@@ -307,23 +306,23 @@ class Recommender:
         followed: bool,
     ) -> Recommendation:
         if elevation_deg is not None:
-            need_number("elevation", elevation_deg)
+            check_number("elevation", elevation_deg)
         if elevation_deg is not None and not -90 <= elevation_deg <= 90:
             raise UserError(
                 f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
             )
         logits = self.network(codes)
-        unfamiliar = float(unfamiliarity(self.bundle.familiarity, codes, logits).max())
+        unfamiliar = float(ood_score(self.bundle.ood, codes, logits).max())
         return next_view(
             from_logits(logits, self.bundle.temperature),
             rotations_deg,
             self._calibrated,
             self.bundle.affinity,
-            turn_share(self.bundle, elevation_deg),
+            self.bundle.weights_at(elevation_deg),
             allowed_deg=allowed_deg,
             max_travel_deg=max_travel_deg,
             followed=followed,
-            unfamiliarity=unfamiliar,
+            ood_score=unfamiliar,
             warnings=(
                 *doubts,
                 *_unfamiliar(unfamiliar),
@@ -333,14 +332,6 @@ class Recommender:
             crops=tuple(codes),
             object_position_m=object_position_m,
         )
-
-
-def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float64]:
-    """Return how much each calibration turn (S,) counts for frames of an elevation, or of any."""
-    weight = np.asarray(bundle.turn_weight, dtype=np.float64)
-    if elevation_deg is None:
-        return weight
-    return weight * elevation_share(bundle.elevation_deg, elevation_deg)
 
 
 def _unfamiliar(unfamiliar: float) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from nbv.data.renderers import open_renderer
 from nbv.data.sensors import Sensor
 from nbv.data.sensors.triangulation import Kinect, Stereo
 from nbv.data.sources.files import EXTENSIONS
-from nbv.errors import UserError, nearest, need_number
+from nbv.errors import UserError, check_number, nearest
 from nbv.robot.crop import FARTHEST, NEAREST
 from nbv.robot.depth_files import DepthImage
 from nbv.robot.intrinsics import Intrinsics
@@ -99,7 +99,7 @@ def draw_frame(
         Where an angle is none, the object would be nearer or farther than is plausible or than the
         sensor measures, the sensor is unknown, or the seed is negative.
     """
-    _need_view(azimuth_deg, elevation_deg, distance_m, diagonal_m)
+    _check_view(azimuth_deg, elevation_deg, distance_m, diagonal_m)
     if sensor not in CAMERAS:
         raise UserError(f"sensor={sensor}: {nearest(sensor, CAMERAS)}")
     if seed < 0:
@@ -128,11 +128,11 @@ def draw_frame(
     return Frame(depth_m, depth_m > 0, intrinsics, azimuth_deg, elevation_deg)
 
 
-def _need_view(
+def _check_view(
     azimuth_deg: float, elevation_deg: float, distance_m: float, diagonal_m: float
 ) -> None:
-    need_number("azimuth", azimuth_deg)
-    need_number("elevation", elevation_deg)
+    check_number("azimuth", azimuth_deg)
+    check_number("elevation", elevation_deg)
     if not math.isfinite(azimuth_deg):
         raise UserError(f"an azimuth of {azimuth_deg:g}°: give a number of degrees")
     if not -90 <= elevation_deg <= 90:
