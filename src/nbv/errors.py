@@ -1,4 +1,4 @@
-"""Mistakes that are the user's to mend, and the help they give."""
+"""Errors for the user: mistakes in the input, with their remedy."""
 
 from __future__ import annotations
 
@@ -8,40 +8,40 @@ import re
 from collections.abc import Iterable
 from typing import Self
 
-# What libraries say of a file, and what it means for whoever wrote it; `{…}` is a group.
+# Messages of libraries about a file, and what they mean for its author; `{…}` is a group.
 _REASONS = (
-    # numpy takes whatever is no array of its own for objects, and tells to load them unsafely.
-    (".*allow_pickle.*", "it holds no array of numbers"),
-    ("File is not a zip file", "it is no .npz file, or only a part of one"),
-    (".*context manager protocol.*", "it is one array, and no .npz file"),
+    # numpy takes any other content for pickled objects, and advises to load them unsafely.
+    (".*allow_pickle.*", "it is not an array of numbers"),
+    ("File is not a zip file", "it is not an .npz file, or only a part of one"),
+    (".*context manager protocol.*", "it is one array and not an .npz file"),
     ("could not convert string to float: (.*)", "{0} is not a number"),
     ("No columns to parse from file", "it is empty"),
     (
         r".*Expected (\d+) fields in line (\d+), saw (\d+)",
-        "line {1} has {2} columns in place of {0}: is a comma too many, or are quotes missing?",
+        "line {1} has {2} columns instead of {0}: is there an extra comma, or are quotes missing?",
     ),
     (
         r".*EOF inside string starting at row \d+",
-        "a cell begins with a quote and has no second one",
+        "a cell has an opening quote and no closing one",
     ),
 )
 
 
 def reason_of(error: Exception) -> str:
-    """Return why a file could not be read, in one line; where it is known, the place in a text."""
+    """Return why a file could not be read, in one line, with the position in a text if known."""
     reason = " ".join(str(error).split()) or type(error).__name__
     if isinstance(error, json.JSONDecodeError):
-        return f"line {error.lineno}, column {error.colno} is no JSON; mend it there"
+        return f"line {error.lineno}, column {error.colno} is not JSON; correct it there"
     if isinstance(error, UnicodeDecodeError):
         return "it is not UTF-8 text"
     if isinstance(error, RecursionError):
         return "it is nested too deeply"
-    # yaml is imported where a file is read, and not for this.
+    # By name, because yaml is imported only where a file is read.
     if type(error).__module__.partition(".")[0] == "yaml":
         mark = getattr(error, "problem_mark", None)
         if mark is None:
-            return "it is no YAML"
-        return f"line {mark.line + 1}, column {mark.column + 1} is no YAML; mend it there"
+            return "it is not YAML"
+        return f"line {mark.line + 1}, column {mark.column + 1} is not YAML; correct it there"
     for pattern, meaning in _REASONS:
         if found := re.fullmatch(pattern, reason):
             return meaning.format(*found.groups())
@@ -49,7 +49,7 @@ def reason_of(error: Exception) -> str:
 
 
 def check_number(name: str, value: object) -> None:
-    """Raise UserError where a value is not a number, such as a text of one."""
+    """Raise UserError unless a value is a number; text is not."""
     try:
         if not isinstance(value, str | bytes):
             float(value)  # type: ignore[arg-type]
@@ -62,9 +62,9 @@ def check_number(name: str, value: object) -> None:
 
 
 class UserError(Exception):
-    """A mistake in the input: one line that names the file, key or value, and what to do.
+    """A mistake in the input: one line that names the file, key or value, and the remedy.
 
-    What cannot be printed, such as the line break in a file's name, is shown by its escape.
+    Unprintable characters, such as a line break in a file's name, are escaped.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class UserError(Exception):
         super().__init__("".join(shown))
 
     def about(self, what: str) -> Self:
-        """Return the same mistake with a message that says first what it is about.
+        """Return the same error with its subject in front of the message.
 
         Examples
         --------
@@ -93,14 +93,14 @@ class UserError(Exception):
 
 
 class NamedError(UserError):
-    """A mistake that has a name, for programs.
+    """An error with a name, for programs.
 
     Attributes
     ----------
     name : str
-        Stable, such as ``empty-mask``; the message starts with it.
+        A stable name, such as ``empty-mask``, with which the text of the error starts.
     message : str
-        What follows the name.
+        The text after the name.
     """
 
     def __init__(self, name: str, message: str) -> None:
@@ -109,7 +109,7 @@ class NamedError(UserError):
         self.message = message
 
     def about(self, what: str) -> Self:
-        """Return the same mistake; after its name, the message says first what it is about.
+        """Return the same error with its subject between the name and the message.
 
         Examples
         --------
@@ -121,7 +121,7 @@ class NamedError(UserError):
 
 
 class FrameError(NamedError):
-    """Frames that no estimate should be made of; its name is the reason.
+    """A frame that cannot be used; the name of the error is the reason.
 
     Examples
     --------
@@ -136,7 +136,7 @@ class FrameError(NamedError):
 
 
 class BundleError(NamedError):
-    """A file that is no sound bundle; its name is the reason.
+    """A file that is not a valid bundle; the name of the error is the reason.
 
     Examples
     --------
@@ -150,19 +150,19 @@ class BundleError(NamedError):
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """Say what was probably meant by a misspelt name.
+    """Suggest what a misspelt name probably means.
 
     Parameters
     ----------
     name : str
-        What the user wrote.
+        The name that the user gave.
     valid : iterable of str
-        What could have been written.
+        All valid names.
 
     Returns
     -------
     str
-        ``"did you mean 'x'?"`` where a valid name is close, else ``"choose from: a, b, c"``.
+        ``"did you mean 'x'?"`` if a valid name is close, else ``"choose from: a, b, c"``.
     """
     choices = sorted(valid)
     close = difflib.get_close_matches(name, choices, n=1, cutoff=0.6)

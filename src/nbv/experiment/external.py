@@ -12,17 +12,17 @@ from nbv.core.estimates import Estimates, Posteriors, posteriors_of
 from nbv.core.logits import fit_temperature
 from nbv.experiment.held_out import FoldEstimates
 from nbv.experiment.splits import need_objects, objects_with_role
-from nbv.robot.pairs import Turns, evenly_apart
+from nbv.robot.pairs import Sweeps, evenly_apart
 
 
-def take_fold(found: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -> FoldEstimates:
+def take_fold(found: Estimates, turns: Sweeps, splits: pd.DataFrame, fold: int) -> FoldEstimates:
     """Return what another program found of a fold's calibration and test objects.
 
     Parameters
     ----------
     found : Estimates
         Of all objects.
-    turns : Turns
+    turns : Sweeps
         What distributions it gave, of the same objects; empty where it gave none. Calibration
         objects choose one temperature.
     splits : DataFrame
