@@ -50,7 +50,7 @@ def test_an_estimate_that_is_no_number_has_no_rotation(bad):
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     for rotations in (table.recommend, table.least_cost):
         for estimate in (bad, [0.0, bad]):
-            with pytest.raises(UserError, match="no finite number"):
+            with pytest.raises(UserError, match="one is not finite"):
                 rotations(estimate)
 
 

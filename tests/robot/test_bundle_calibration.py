@@ -119,7 +119,7 @@ def test_a_sure_network_stays_right(offset):
 @pytest.mark.parametrize("views", [[0], [0, 180], list(range(0, 340, 5)), list(range(10, 355, 15))])
 def test_a_gap_is_refused(views):
     views = np.array(views, dtype=float)
-    with pytest.raises(UserError, match="° apart somewhere on the turn") as error:
+    with pytest.raises(UserError, match="views leave a gap of ") as error:
         bin_apart(views, np.full((len(views), BINS), 1 / BINS))
     widest = np.diff(np.sort(views), append=views.min() + 360).max()
     assert f"{widest:.0f}°" in str(error.value)

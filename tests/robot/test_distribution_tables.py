@@ -148,7 +148,7 @@ def test_views_come_in_any_order_and_anywhere_closer_than_15_degrees():
     wanted, found = (DistributionTable.from_pairs(each) for each in (given_turns, shuffled))
     assert found.temperature == pytest.approx(wanted.temperature)
     assert found.distributions == pytest.approx(wanted.distributions, abs=1e-5)
-    with pytest.raises(UserError, match=r"^object '.*': views are 30° apart"):
+    with pytest.raises(UserError, match=r"^object '.*': views leave a gap of 30°"):
         DistributionTable.from_pairs({n: (a[::2], p[::2]) for n, (a, p) in given_turns.items()})
 
 
@@ -157,14 +157,14 @@ def test_what_does_not_fit_is_one_line(table):
     for probabilities, rotations, kind, message in (
         (p[:12] / p[:12].sum(), [0.0], UserError, "12 probabilities; calibration objects have 24"),
         (p[:3], [0.0], UserError, "8 classes or more"),
-        (2 * p, [0.0], UserError, "row 1: probabilities have the sum 2 "),
-        ([p, -p], [0.0, 90.0], UserError, "row 2, p0: a probability is below 0"),
+        (2 * p, [0.0], UserError, "row 1: probabilities sum to 2 "),
+        ([p, -p], [0.0, 90.0], UserError, "row 2, p0: a probability is negative"),
         (p, [0.0, 90.0], FrameError, "1 view and 2 rotations"),
         ([p, p], [0.0], FrameError, "2 views and 1 rotation"),
-        ([["a"] * 24], [0.0], UserError, "probabilities are numbers"),
-        (p + 0j, [0.0], UserError, "probabilities are numbers"),
+        ([["a"] * 24], [0.0], UserError, "give probabilities as numbers"),
+        (p + 0j, [0.0], UserError, "give probabilities as numbers"),
         ([p, p[:5]], [0.0, 90.0], UserError, "rows of different lengths"),
-        (100 * p, [0.0], UserError, "the sum 100 and not 1"),
+        (100 * p, [0.0], UserError, "sum to 100 instead of 1"),
         (np.log(p), [0.0], UserError, "give probabilities, not their logarithms"),
     ):
         with pytest.raises(kind, match=message):
@@ -370,9 +370,9 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
             lambda t: t.drop(columns="p3"),
             "23 columns of probabilities are not p0 to p22: rename 'p23'",
         ),
-        (lambda t: t.assign(p3=2.0), "row 2: probabilities have the sum"),
-        (lambda t: t.assign(p3=["x", *t["p3"][1:]]), "row 2, p3: a probability is below 0 or no"),
-        (lambda t: t.assign(p3=[*t["p3"][:-1], -0.5]), "row 73, p3: a probability is below 0"),
+        (lambda t: t.assign(p3=2.0), "row 2: probabilities sum to"),
+        (lambda t: t.assign(p3=["x", *t["p3"][1:]]), "row 2, p3: a probability is negative or not"),
+        (lambda t: t.assign(p3=[*t["p3"][:-1], -0.5]), "row 73, p3: a probability is negative"),
         (lambda t: t.rename(columns={"p3": "P3"}), "rename 'P3'"),
         (lambda t: t.rename(columns={"p3": "p_3"}), "rename 'p_3'"),
         (lambda t: t.iloc[:, :3].assign(p1=0.5), "rename 'p1'"),

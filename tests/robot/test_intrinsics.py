@@ -149,7 +149,7 @@ def test_a_scene_has_a_camera_for_each_image(tmp_path):
     assert other.intrinsics == Intrinsics(2 * FX, 2 * FY, 2 * CX, 2 * CY)
     assert other.unit_m == 0.001
     for frame in ("000004.png", "depth.png", "12_depth.png", ""):
-        with pytest.raises(UserError, match="cameras of images 3 to 12, and none for"):
+        with pytest.raises(UserError, match="cameras for images 3 to 12 but not for"):
             camera_of(str(path), frame)
 
 
@@ -252,10 +252,10 @@ def test_bytes_that_are_no_text_are_one_line(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.json", '{"fx": 585,\n "fy": }', "line 2, column 8 is no JSON; mend it there"),
+        ("a.json", '{"fx": 585,\n "fy": }', "line 2, column 8 is not JSON; correct it there"),
         ("a.json", "[" * 100_000, "it is nested too deeply"),
-        ("a.yaml", "fx: 585\nfy: [585\n", "line 3, column 1 is no YAML; mend it there"),
-        ("a.yaml", "fx: 585\0", "it is no YAML"),
+        ("a.yaml", "fx: 585\nfy: [585\n", "line 3, column 1 is not YAML; correct it there"),
+        ("a.yaml", "fx: 585\0", "it is not YAML"),
     ],
 )
 def test_where_a_camera_file_is_broken_is_said(tmp_path, name, text, message):
@@ -284,7 +284,7 @@ def test_a_principal_point_far_outside_is_of_another_resolution():
     # A crop of an image keeps its intrinsics, so that its own middle may lie off the frame a bit.
     WANTED.check_resolution(200, 300)
     for rows, columns in ((480, 200), (120, 640)):
-        with pytest.raises(FrameError, match="another resolution") as error:
+        with pytest.raises(FrameError, match="this resolution") as error:
             WANTED.check_resolution(rows, columns)
         assert error.value.name == "other-resolution"
 

@@ -198,8 +198,8 @@ def test_a_missing_column_is_named(tmp_path, column):
         (b"object_id,azimuth_deg,estimate_deg\n", "p.csv has no rows"),
         (b"\xff\xfe\x00", "p.csv, line 1: this is not UTF-8; save the file as UTF-8"),
         ("a,b\r\ncup,1\r\nTässchen,2".encode("latin-1"), "p.csv, line 3: this is not UTF-8"),
-        (b"a,b\n1,2\n1,2,3\n", "line 3 has 3 columns in place of 2: is a comma too many"),
-        (b'a,b\n"1,2\n3', "a cell begins with a quote and has no second one"),
+        (b"a,b\n1,2\n1,2,3\n", "line 3 has 3 columns instead of 2: is there an extra comma"),
+        (b'a,b\n"1,2\n3', "a cell has an opening quote and no closing one"),
         (b"\0", "no column 'object_id'"),
     ],
 )
@@ -248,7 +248,7 @@ def test_the_objects_of_each_category_are_those_of_all_its_elevations(tmp_path):
 
 def test_an_object_that_is_missing_at_an_elevation_is_one_line(tmp_path):
     more = [("mug", 0, "b", view, view) for view in np.arange(0, 360, 10)]
-    with pytest.raises(UserError, match="object 'b' has no pairs at some elevation of mug"):
+    with pytest.raises(UserError, match="object 'b' lacks pairs at an elevation of mug"):
         PairTable.load(units(tmp_path, more)).objects({"mug": [0, 15]})
     assert PairTable.load(units(tmp_path, more)).objects({"mug": [0]}) == {"mug": ["a", "b"]}
 

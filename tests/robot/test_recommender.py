@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from made_bundles import (
     BINS,
     COLUMNS,
-    DIAGONAL_M,
     FOCAL_PX,
     ROWS,
     WIDTH,
@@ -540,11 +539,11 @@ def test_allowed_rotations_are_numbers(recommender, allowed):
         (2, 0.0, "2 frames and 1 rotation; give one for each frame"),
         (2, [], "2 frames and 0 rotations"),
         (1, [[0.0]], "1 frame and 1 rotation"),
-        (1, "here", "'here' are no numbers"),
+        (1, "here", "'here' are not numbers"),
         (1, 5.0, "the first is 5"),
         (2, [10.0, 20.0], "the first is 10"),
-        (2, [0.0, np.nan], "no finite number"),
-        (2, [0.0, np.inf], "no finite number"),
+        (2, [0.0, np.nan], "one is not finite"),
+        (2, [0.0, np.inf], "one is not finite"),
     ],
 )
 def test_rotations_that_do_not_fit_the_frames_are_refused(recommender, n, rotations, message):
@@ -570,13 +569,13 @@ def test_of_one_frame_the_rotation_may_be_a_number(recommender, rotations):
 def test_an_elevation_unlike_all_that_were_calibrated_is_told(recommender, elevation, is_told):
     """The bundle's are 0 and 30 degrees."""
     found = recommender.recommend_crops(codes_of(0, 1), elevation_deg=elevation)
-    assert any("is unlike those that were calibrated, 0 to 30°" in w for w in found.warnings) == (
+    assert any("is outside the calibrated range of 0 to 30°" in w for w in found.warnings) == (
         is_told
     )
 
 
 def test_an_elevation_is_a_number(recommender):
-    with pytest.raises(UserError, match="elevation of nan"):
+    with pytest.raises(UserError, match="`elevation_deg`=nan"):
         recommender.recommend_crops(codes_of(0, 1), elevation_deg=float("nan"))
 
 
@@ -596,26 +595,6 @@ def test_a_turn_the_wrong_way_contradicts_the_frames():
     assert wrong.bayes_factor < 0.05
     (warning,) = wrong.warnings
     assert "contradict" in warning
-
-
-@pytest.mark.parametrize("factor", [0.5, 1.5, 2.0])
-def test_intrinsics_of_another_resolution_are_refused(factor):
-    frame, recommender = example_frame(azimuth_deg=250.0), Recommender.load("mug")
-    camera = frame.intrinsics
-    scaled = [factor * value for value in (camera.fx, camera.fy, camera.cx, camera.cy)]
-    with pytest.raises(FrameError, match="640 × 480") as error:
-        recommender.recommend(frame.depth_m, intrinsics=scaled)
-    assert error.value.name == "other-resolution"
-    assert not recommender.recommend(frame.depth_m, intrinsics=camera).warnings
-
-
-def test_a_principal_point_off_the_middle_is_doubted():
-    frame, recommender = example_frame(azimuth_deg=250.0), Recommender.load("mug")
-    camera = frame.intrinsics
-    answer = recommender.recommend(
-        frame.depth_m, intrinsics=[camera.fx, camera.fy, camera.cx + 150, camera.cy]
-    )
-    assert any("cut out of a larger one" in warning for warning in answer.warnings)
 
 
 # What is familiar
@@ -675,11 +654,6 @@ def test_a_frame_may_be_given_in_many_forms(recommender):
     assert np.isnan(hole).any()
 
 
-def test_whole_numbers_are_millimetres(recommender):
-    millimetres = np.rint(FRAMES[0] * 1000).astype(np.uint16)
-    same(recommender.recommend(millimetres), recommender.recommend(millimetres / 1000))
-
-
 def test_several_frames_may_be_a_list_or_an_array(recommender):
     rotations = [0.0, 60.0, -60.0]
     wanted = recommender.recommend(FRAMES[:3], rotations_deg=rotations)
@@ -687,34 +661,6 @@ def test_several_frames_may_be_a_list_or_an_array(recommender):
     same(recommender.recommend(tuple(FRAMES[:3]), rotations_deg=np.array(rotations)), wanted)
     crops = np.stack([recommender.crop(depth).codes for depth in FRAMES[:3]])
     same(recommender.recommend_crops(crops, rotations), wanted)
-
-
-def test_frames_may_have_other_sizes(recommender):
-    wanted = recommender.recommend(FRAMES[:2], rotations_deg=[0.0, 45.0])
-    padded = np.pad(FRAMES[1], ((7, 9), (20, 4)))
-    same(recommender.recommend([FRAMES[0], padded], rotations_deg=[0.0, 45.0]), wanted)
-
-
-def test_frames_are_not_changed(recommender):
-    before = FRAMES[0].copy()
-    recommender.recommend(FRAMES[0], mask=FRAMES[0] > 0)
-    assert np.array_equal(FRAMES[0], before)
-
-
-def test_the_same_frame_gives_the_same_answer(bundle, recommender):
-    same(recommender.recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
-    same(Recommender(bundle).recommend(FRAMES[0]), recommender.recommend(FRAMES[0]))
-
-
-def test_a_mask_takes_the_object_from_its_surroundings(recommender):
-    wanted = recommender.recommend(FRAMES[0])
-    table = np.where(FRAMES[0] > 0, FRAMES[0], 0.55).astype(np.float32)
-    mask = FRAMES[0] > 0
-    same(recommender.recommend(table, mask=mask), wanted)
-    same(recommender.recommend(table, mask=[255 * mask.astype(np.uint8)]), wanted)
-    same(recommender.recommend([table], mask=mask[None]), wanted)
-    with pytest.raises(FrameError, match="mask-at-border"):
-        recommender.recommend(table)
 
 
 @settings(max_examples=25)
@@ -746,13 +692,6 @@ def test_a_repeated_sequence_of_rotations_has_the_same_answer(bundle):
         same(found, fresh)
 
 
-def test_near_and_far_take_the_object_from_its_surroundings(recommender):
-    wanted = recommender.recommend(FRAMES[0])
-    wall = np.where(FRAMES[0] > 0, FRAMES[0], 0.9).astype(np.float32)
-    wall[5:20, 5:20] = 0.2
-    same(recommender.recommend(wall, near_m=0.3, far_m=0.8), wanted)
-
-
 def test_without_intrinsics_the_bundle_has_a_focal_length(recommender):
     wanted = recommender.recommend(FRAMES[0])
     middle = COLUMNS / 2, ROWS / 2
@@ -769,30 +708,6 @@ def test_without_intrinsics_the_bundle_has_a_focal_length(recommender):
     assert np.abs(apart).max() <= 1
     other = recommender.recommend(FRAMES[0], intrinsics=1.3 * FOCAL_PX)
     assert not np.array_equal(other.crops[0], wanted.crops[0])
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        ("empty-mask", lambda depth: {"depth_m": np.zeros_like(depth)}),
-        ("few-levels", lambda depth: {"depth_m": (depth * 100).astype(np.uint8)}),
-        ("colour-image", lambda depth: {"depth_m": [np.stack([depth] * 3, axis=2)]}),
-        ("implausible-size", lambda depth: {"depth_m": depth, "intrinsics": 50.0}),
-        ("mask-at-border", lambda depth: {"depth_m": depth[:, 60:]}),
-        (
-            "other-resolution",
-            lambda depth: {
-                "depth_m": depth,
-                "intrinsics": Intrinsics(150.0, 150.0, width=9, height=9),
-            },
-        ),
-        ("little-depth", lambda depth: {"depth_m": depth, "mask": np.ones_like(depth)}),
-    ],
-)
-def test_a_frame_that_cannot_be_used_is_refused(recommender, name, change):
-    with pytest.raises(FrameError) as error:
-        recommender.recommend(**change(FRAMES[0]))
-    assert error.value.name == name
 
 
 @pytest.mark.parametrize("unit", [1000.0, 10_000.0, 4000.0, 0.001])
@@ -812,28 +727,13 @@ def test_a_wrong_unit_is_named_however_the_object_is_found(recommender, unit, su
         assert f"depths {1 / unit:g} times as large" in str(error.value)
 
 
-def test_what_is_nearest_may_be_nearer_than_the_middle_of_the_object(recommender):
-    """A handle that points to the camera: its own distance would be too short."""
-    depth = frame(0, distance=2.2)
-    depth[depth > 0] -= np.float32(0.1 * DIAGONAL_M)
-    depth[40:46, 55:65] = 1.2 * DIAGONAL_M
-    recommender.recommend(depth, intrinsics=[60.0])
-    with pytest.raises(FrameError, match="implausible-distance"):
-        recommender.recommend(0.3 * depth, intrinsics=[60.0])
-
-
-def test_one_bad_frame_of_several_is_refused_by_its_number(recommender):
-    with pytest.raises(FrameError, match=r"^empty-mask: frame 2 of 2: "):
-        recommender.recommend([FRAMES[0], np.zeros_like(FRAMES[0])], rotations_deg=[0.0, 90.0])
-
-
 def test_a_bad_frame_is_refused_by_its_name_where_it_has_one(recommender):
     bad = np.zeros_like(FRAMES[0])
     with pytest.raises(FrameError, match=r"^empty-mask: left: the frame has no depth"):
         recommender.recommend(bad, names=["left"])
     with pytest.raises(FrameError, match=r"^empty-mask: right: the frame has no depth"):
         recommender.recommend([FRAMES[0], bad], rotations_deg=[0, 90], names=["left", "right"])
-    with pytest.raises(UserError, match=r"^a longest travel"):
+    with pytest.raises(UserError, match=r"^`max_travel_deg`=-1"):
         recommender.recommend(FRAMES[0], names=["left"], max_travel_deg=-1.0)
     with pytest.raises(UserError, match=r"^`far_m`=900: give metres"):
         recommender.recommend(FRAMES[0], names=["left"], far_m=900.0)
@@ -854,18 +754,21 @@ def test_a_mask_may_be_any_array(recommender):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"depth_m": "frame.npy"}, "depth: 'frame.npy' is text and no array; read the file with"),
+        (
+            {"depth_m": "frame.npy"},
+            "depth: 'frame.npy' is text; give an array, such as that of nbv.read_depth",
+        ),
         ({"depth_m": [Path("a.npy")]}, "depth: 'a.npy' is text"),
-        ({"depth_m": None}, "depth holds object, no numbers"),
-        ({"mask": "m.png"}, "mask: 'm.png' is text and no array; give an array"),
+        ({"depth_m": None}, "depth holds object; give numbers"),
+        ({"mask": "m.png"}, "mask: 'm.png' is text; give an array"),
         ({"mask": ["m.png"]}, "mask: 'm.png' is text"),
         ({"intrinsics": "585"}, "intrinsics: '585' is text; give numbers"),
         ({"intrinsics": Path("camera.json")}, "intrinsics: 'camera.json' is text"),
         ({"near_m": "1"}, "`near_m`: '1' is not a number"),
         ({"far_m": 10**400}, "`far_m`: the number is too large"),
-        ({"intrinsics": 10**400}, "are no numbers; give fx,fy,cx,cy"),
+        ({"intrinsics": 10**400}, "are not numbers; give fx,fy,cx,cy"),
         ({"far_m": [1.0]}, r"`far_m`: \[1.0\] is not a number"),
-        ({"elevation_deg": "high"}, "elevation: 'high' is not a number"),
+        ({"elevation_deg": "high"}, "`elevation_deg`: 'high' is not a number"),
     ],
 )
 def test_an_argument_of_another_type_is_one_line(recommender, options, message):
@@ -877,21 +780,15 @@ def test_a_recommender_is_of_a_bundle(bundle):
     for name in (3, None):
         with pytest.raises(UserError, match=f"{name} is no name of a file"):
             Recommender.load(name)
-    with pytest.raises(UserError, match="'mug' is no bundle; give its name or file to Recommen"):
+    with pytest.raises(UserError, match="'mug' is not a Bundle; give its name or file to Recommen"):
         Recommender("mug")
 
 
 def test_crops_are_bytes(recommender):
     codes = recommender.crop(FRAMES[0]).codes
     for wrong in ("crop", codes, codes[None] / 255):
-        with pytest.raises(UserError, match=r"crops: .*; give \(n, side, side\) uint8"):
+        with pytest.raises(UserError, match=r"`codes`: .*; give \(n, side, side\) uint8"):
             recommender.recommend_crops(wrong)
-
-
-def test_frames_of_several_sizes_are_arrays(recommender):
-    rows = FRAMES[0].tolist()
-    with pytest.raises(UserError, match="give a list of numpy arrays"):
-        recommender.recommend([rows, rows[1:]], rotations_deg=[0.0, 90.0])
 
 
 def test_masks_are_as_many_as_frames(recommender):
@@ -902,17 +799,6 @@ def test_masks_are_as_many_as_frames(recommender):
         recommender.recommend(FRAMES[0], mask=[mask, mask])
     with pytest.raises(UserError, match="the mask has"):
         recommender.recommend(FRAMES[0], mask=mask.T)
-
-
-def test_a_mask_of_colours_is_refused(recommender):
-    mask = FRAMES[0] > 0
-    for given_ in (np.dstack([mask] * 3), [np.dstack([mask] * 3)], np.dstack([mask] * 4)):
-        with pytest.raises(UserError, match="the mask has 3 axes"):
-            recommender.recommend(FRAMES[0], mask=given_)
-    same(
-        recommender.recommend(FRAMES[0], mask=mask[:, :, None]),
-        recommender.recommend(FRAMES[0], mask=mask),
-    )
 
 
 def test_each_frame_may_have_a_camera_of_its_own(recommender):
@@ -936,22 +822,6 @@ def test_limits_in_millimetres_are_refused(recommender, limits, name):
     with pytest.raises(UserError, match=f"{name}: give metres; the object is 0.18 to 2.4 m away"):
         recommender.recommend(FRAMES[0], **limits)
     recommender.recommend(FRAMES[0], near_m=0.3, far_m=np.inf)
-
-
-def test_a_frame_without_any_depth_says_so(recommender):
-    for nothing in (np.nan, 0.0, -1.0, np.inf):
-        with pytest.raises(FrameError, match="the frame has no depth at all"):
-            recommender.recommend(np.full_like(FRAMES[0], nothing))
-
-
-def test_the_unit_and_the_size_of_the_object_go_together(bundle, recommender):
-    """An object twice as large, twice as far away, with a bundle for such objects."""
-    large = replace(
-        bundle,
-        diagonal_m=2 * DIAGONAL_M,
-        extent_m=(2 * bundle.extent_m[0], 2 * bundle.extent_m[1]),
-    )
-    same(Recommender(large).recommend(2 * FRAMES[0]), recommender.recommend(FRAMES[0]))
 
 
 def test_distributions_are_those_of_the_logits(recommender):

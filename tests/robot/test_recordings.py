@@ -170,7 +170,7 @@ def test_an_azimuth_that_is_no_number_is_named_with_its_row(folder, value):
     [
         ("no.npy", "does not exist"),
         ("sub/f0.npy", "does not exist"),
-        ("", "is no name"),
+        ("", "is empty"),
         (".", "is a folder"),
     ],
 )
@@ -198,7 +198,7 @@ def test_a_manifest_without_rows_or_that_does_not_exist_is_one_line(tmp_path):
         ({"fx": [500, -500, "", 500]}, "row 3: intrinsics: fx=-500 must be above 0"),
         ({"fx": [500, "", "", ""], "cx": ["", "", "", 320]}, "row 5: cx without fx"),
         ({"fx": [500] * 4, "cx": [320, 320, 320, ""], "cy": [240, "", 240, ""]}, "cx without cy"),
-        ({"elevation_deg": [10, "", 100, ""]}, "row 4: elevation_deg=100 lies not between"),
+        ({"elevation_deg": [10, "", 100, ""]}, "row 4: elevation_deg=100 is not between"),
         ({"elevation_deg": [10, "", "", "high"]}, "row 5: elevation_deg is not a number"),
     ],
 )
@@ -245,7 +245,7 @@ def test_a_recording_without_a_usable_frame_is_one_line(recommender, folder):
     for place in range(4):
         np.save(folder / f"f{place}.npy", np.zeros((5, 5), np.float32))
     wanted = (
-        "^empty-mask: object 'cup', sequence '1': every frame is refused; the first, .*f0.npy: "
+        "^empty-mask: object 'cup', sequence '1': every frame is rejected; the first, .*f0.npy: "
     )
     with pytest.raises(FrameError, match=wanted):
         seen(recommender, manifest(folder, table()))
