@@ -74,7 +74,7 @@ def test_it_does_not_matter_how_arrays_lie_in_memory(bundle, bundle_file, tmp_pa
     def other_order(array):
         return np.asfortranarray(array)
 
-    familiarity = replace(
+    model = replace(
         bundle.ood,
         basis=other_order(bundle.ood.basis),
         references=other_order(bundle.ood.references),
@@ -83,13 +83,13 @@ def test_it_does_not_matter_how_arrays_lie_in_memory(bundle, bundle_file, tmp_pa
         bundle,
         distributions=other_order(bundle.distributions),
         elevation_deg=np.repeat(bundle.elevation_deg, 2)[::2],
-        ood=familiarity,
+        ood=model,
     )
     changed.save(tmp_path / "a.safetensors")
     assert (tmp_path / "a.safetensors").read_bytes() == bundle_file.read_bytes()
 
 
-def test_what_is_familiar_stays_familiar(bundle, bundle_file, rng):
+def test_the_ood_score_survives_the_file(bundle, bundle_file, rng):
     codes, logits = random_codes(rng, 50), rng.normal(0, 1, (50, bundle.n_bins))
     loaded = Bundle.load(bundle_file).ood
     scores = [ood_score(known, codes, logits) for known in (bundle.ood, loaded)]

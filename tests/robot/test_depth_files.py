@@ -356,7 +356,7 @@ def test_a_transparent_colour_of_a_palette_is_not_in_the_mask(tmp_path):
 def test_a_mask_has_rows_and_columns(tmp_path):
     with pytest.raises(UserError, match="1 axes; a mask has two"):
         read_mask(saved(tmp_path / "a.npy", np.ones(5)))
-    with pytest.raises(UserError, match="no numbers"):
+    with pytest.raises(UserError, match="give a mask of numbers"):
         read_mask(saved(tmp_path / "b.npy", np.array([["a"]])))
-    with pytest.raises(UserError, match="no numbers"):
+    with pytest.raises(UserError, match="give a mask of numbers"):
         read_mask(saved(tmp_path / "c.npy", np.zeros((2, 2), "f4,i4")))

@@ -597,10 +597,10 @@ def test_a_turn_the_wrong_way_contradicts_the_frames():
     assert "contradict" in warning
 
 
-# What is familiar
+# Out of distribution
 
 
-def test_the_least_familiar_frame_counts(recommender):
+def test_the_worst_ood_score_counts(recommender):
     codes = codes_of(11, 3)
     known = recommender.bundle.ood
     apart = ood_score(known, codes, recommender.network(codes))
@@ -611,7 +611,7 @@ def test_the_least_familiar_frame_counts(recommender):
     assert together.is_ood == (together.ood_score > 1)
 
 
-def test_what_no_calibration_image_resembles_is_less_familiar(bundle, recommender):
+def test_what_no_calibration_image_resembles_scores_higher(bundle, recommender):
     azimuth_deg = np.arange(BINS) * WIDTH
     turns = []
     for name in "abc":

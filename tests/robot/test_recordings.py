@@ -220,22 +220,22 @@ def crops(recommender, places, **options):
 
 
 def test_a_turn_has_the_outputs_of_every_frame(recommender, folder):
-    turn, lines = seen(recommender, manifest(folder, table(elevation_deg=[20, 20, 20, 20])))
+    sweep, lines = seen(recommender, manifest(folder, table(elevation_deg=[20, 20, 20, 20])))
     seen_crops = crops(recommender, range(4))
-    assert np.array_equal(turn.logits, recommender.network(seen_crops))
-    assert np.array_equal(turn.codes, seen_crops)
-    assert turn.azimuth_deg.tolist() == list(AZIMUTHS)
-    assert (turn.object_id, turn.sequence, turn.elevation_deg) == ("cup", "1", 20.0)
+    assert np.array_equal(sweep.logits, recommender.network(seen_crops))
+    assert np.array_equal(sweep.codes, seen_crops)
+    assert sweep.azimuth_deg.tolist() == list(AZIMUTHS)
+    assert (sweep.object_id, sweep.sequence, sweep.elevation_deg) == ("cup", "1", 20.0)
     assert lines == []
 
 
 def test_a_refused_frame_is_told_and_left_out(recommender, folder):
     np.save(folder / "f1.npy", np.zeros_like(frame(1)))
     np.save(folder / "f3.npy", (frame(3) * 100).astype(np.uint8))
-    turn, lines = seen(recommender, manifest(folder, table()))
-    assert turn.azimuth_deg.tolist() == [0.0, 20.0]
+    sweep, lines = seen(recommender, manifest(folder, table()))
+    assert sweep.azimuth_deg.tolist() == [0.0, 20.0]
     logits = recommender.network(crops(recommender, (0, 2)))
-    assert np.array_equal(turn.logits, logits)
+    assert np.array_equal(sweep.logits, logits)
     assert len(lines) == 2
     assert "f1.npy is left out: empty-mask" in lines[0]
     assert "f3.npy is left out: few-levels" in lines[1]
@@ -269,10 +269,10 @@ def test_masks_are_used_where_there_are_any(recommender, folder):
     wall = np.where(frame(1) > 0, frame(1), 0.56).astype(np.float32)
     np.save(folder / "f1.npy", wall)
     rows = table(mask=["", "m1.png", "m2.png", ""])
-    turn, lines = seen(recommender, manifest(folder, rows))
+    sweep, lines = seen(recommender, manifest(folder, rows))
     assert lines == []
     logits = recommender.network(crops(recommender, range(4)))
-    assert np.array_equal(turn.logits, logits)
+    assert np.array_equal(sweep.logits, logits)
     _, lines = seen(recommender, manifest(folder, table()))
     assert len(lines) == 1
 
@@ -280,11 +280,11 @@ def test_masks_are_used_where_there_are_any(recommender, folder):
 def test_intrinsics_of_a_frame_come_before_those_of_all(recommender, folder):
     others = 1.1 * FOCAL_PX
     rows = table(fx=[FOCAL_PX, "", FOCAL_PX, ""])
-    turn, _ = seen(recommender, manifest(folder, rows), str(others))
+    sweep, _ = seen(recommender, manifest(folder, rows), str(others))
     own = crops(recommender, range(4))
     of_all = crops(recommender, range(4), intrinsics=(others,))
     logits = recommender.network(np.stack([own[0], of_all[1], own[2], of_all[3]]))
-    assert np.array_equal(turn.logits, logits)
+    assert np.array_equal(sweep.logits, logits)
 
 
 def test_a_scene_of_bop_gives_every_frame_its_own_camera_and_scale(recommender, folder):
@@ -298,7 +298,7 @@ def test_a_scene_of_bop_gives_every_frame_its_own_camera_and_scale(recommender, 
         }
     (folder / "scene_camera.json").write_text(json.dumps(scene))
     rows = table(file=[f"00{place}.npy" for place in range(4)])
-    turn, lines = seen(recommender, manifest(folder, rows), str(folder / "scene_camera.json"))
+    sweep, lines = seen(recommender, manifest(folder, rows), str(folder / "scene_camera.json"))
     wanted = [
         recommender.crop(
             read_depth(folder / f"00{place}.npy", (1e-4, 2e-4)[place % 2]),
@@ -307,14 +307,14 @@ def test_a_scene_of_bop_gives_every_frame_its_own_camera_and_scale(recommender, 
         for place in range(4)
     ]
     assert lines == []
-    assert np.array_equal(turn.codes, wanted)
+    assert np.array_equal(sweep.codes, wanted)
 
 
 def test_the_scale_of_whole_numbers_is_that_of_the_recording(recommender, folder):
     wanted, _ = seen(recommender, manifest(folder, table()))
     for place in range(4):
         np.save(folder / f"f{place}.npy", np.rint(frame(place) * 1e5).astype(np.uint32))
-    turn, _ = seen(recommender, manifest(folder, table()), depth_scale=1e-5)
-    assert turn.logits == pytest.approx(wanted.logits, abs=0.2)
+    sweep, _ = seen(recommender, manifest(folder, table()), depth_scale=1e-5)
+    assert sweep.logits == pytest.approx(wanted.logits, abs=0.2)
     with pytest.raises(UserError, match="every frame"):
         seen(recommender, manifest(folder, table()))
