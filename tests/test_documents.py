@@ -31,11 +31,11 @@ TERMS = (
         "bundle",
         "reach",
         "mirror plane",
-        "calibration turn",
+        "calibration sweep",
         "recording",
         "offset",
         "expected error",
-        "unfamiliarity",
+        "out-of-distribution score",
     ),
     *("spread", "single"),
 )

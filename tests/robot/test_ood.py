@@ -1,4 +1,4 @@
-"""What is like the calibration, and what is not."""
+"""The out-of-distribution score of crops."""
 
 from __future__ import annotations
 
