@@ -249,10 +249,10 @@ def check_plausible_nearest(
     FrameError
         ``implausible-distance``.
     """
-    seen = depth_m[depth_m > (near_m or 0.0)]
-    if not seen.size:
+    measured = depth_m[depth_m > (near_m or 0.0)]
+    if not measured.size:
         return
-    nearest_m = float(np.quantile(seen, NEAREST_SHARE))
+    nearest_m = float(np.quantile(measured, NEAREST_SHARE))
     is_too_near = nearest_m + reach_m < NEAREST * diagonal_m
     if is_too_near or nearest_m > FARTHEST * diagonal_m:
         unit = next((unit for unit in _UNITS if _is_near(unit * nearest_m, diagonal_m)), None)

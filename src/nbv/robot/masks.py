@@ -138,10 +138,10 @@ def _without_islands(inside: Mask) -> Mask:
 
 
 def _limits(depth_m: DepthImage, near: float, far: float) -> str:
-    seen = depth_m[depth_m > 0]
+    measured = depth_m[depth_m > 0]
     return (
-        f" between `near_m`={near:g} and `far_m`={far:g}, of {seen.min():.2f} to "
-        f"{seen.max():.2f} m in the frame"
+        f" between `near_m`={near:g} and `far_m`={far:g}, of {measured.min():.2f} to "
+        f"{measured.max():.2f} m in the frame"
     )
 
 

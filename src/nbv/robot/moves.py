@@ -242,13 +242,13 @@ def _check_object_on_axis(
     diagonal_m: float,
 ) -> None:
     origin, along = _as_axis(point, direction)
-    seen = (as_pose(camera_pose) @ np.append(np.asarray(object_position_m), 1.0))[:3]
-    apart_m = float(np.linalg.norm(np.cross(seen - origin, along)))
+    position = (as_pose(camera_pose) @ np.append(np.asarray(object_position_m), 1.0))[:3]
+    apart_m = float(np.linalg.norm(np.cross(position - origin, along)))
     if apart_m > diagonal_m:
-        position = ", ".join(f"{coordinate:.3g}" for coordinate in seen)
+        shown = ", ".join(f"{coordinate:.3g}" for coordinate in position)
         raise FrameError(
             "axis",
-            f"the object is seen at {position} in the base frame, {apart_m:.3g} m from the axis; "
+            f"the object is seen at {shown} in the base frame, {apart_m:.3g} m from the axis; "
             f"at most {diagonal_m:.2g} m is plausible: is the camera pose that of the optical "
             "frame (z forward) in the base frame, and are both in metres?",
         )

@@ -213,10 +213,10 @@ def next_view(
     taken = tuple(rotation - last for rotation in rotations_deg)
     n_steps = len(expected.total)
     if allowed_deg is None:
-        may = _allowed_bins(n_bins, n_steps, taken, max_travel_deg)
+        allowed = _allowed_bins(n_bins, n_steps, taken, max_travel_deg)
     else:
-        may = _allowed(as_allowed(allowed_deg), width, n_steps, taken, max_travel_deg)
-    rotation_deg = may.rotation_deg
+        allowed = _allowed(as_allowed(allowed_deg), width, n_steps, taken, max_travel_deg)
+    rotation_deg = allowed.rotation_deg
     if not rotation_deg.size and _allowed_bins(n_bins, n_steps, taken, 180.0).rotation_deg.size:
         raise UserError(
             "no admissible rotation; relax `allowed_deg` or `max_travel_deg`: a view is "
@@ -231,18 +231,21 @@ def next_view(
         now_deg += _optimism_deg(before, rotations_deg[:-1], n_bins)
     error = expected.after_deg
     if rotation_deg.size:
-        error = error + expected.optimism_deg(may.is_choice)
+        error = error + expected.optimism_deg(allowed.is_choice)
     # Rotations from the first view become rotations from the last one.
     error = np.roll(error, -round(last / width)) if last else error
     if allowed_deg is None:
-        cost, error_after_deg = error[may.is_allowed], np.where(may.is_allowed, error, np.inf)
+        cost, error_after_deg = (
+            error[allowed.is_allowed],
+            np.where(allowed.is_allowed, error, np.inf),
+        )
     else:
         cost, nearest = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
         error_after_deg = np.full(n_bins, np.inf)
         error_after_deg[nearest] = error[nearest]
     moves = [
         Move(rotation, abs(rotation), error_deg)
-        for rotation, error_deg in best_rotations(may.rotations, cost, may.near)
+        for rotation, error_deg in best_rotations(allowed.rotations, cost, allowed.near)
     ]
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))

@@ -166,7 +166,7 @@ class Recommender:
             Depth in metres, NaN or 0 where nothing was measured; integer depth in millimetres.
         rotations_deg : sequence of float
             Rotation of each frame around the object from the first one, degrees, counter-clockwise
-            seen from above. The first is 0. A number will do for one frame.
+            seen from above. The first is 0. For one frame it may be a number.
         mask : (rows, columns), or a sequence of such, optional
             Not 0 at the object's pixels. Without it the object is the nearest surface, or the one
             between `near_m` and `far_m`.
