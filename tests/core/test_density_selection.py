@@ -117,7 +117,7 @@ def test_an_error_that_is_not_a_number_is_never_the_least():
     methods = {"opposite": {"policy": "opposite", "fusion": "average"}}
     with np.errstate(invalid="ignore"), pytest.raises(UserError, match="is nan: the estimates"):
         choose_densities(estimate, methods, SETTINGS | {"n_parts": 5} | grid)
-    with np.errstate(invalid="ignore"), pytest.raises(UserError, match="one is not finite"):
+    with np.errstate(invalid="ignore"), pytest.raises(UserError, match="no finite number"):
         choose_density(estimate, **grid)
 
 

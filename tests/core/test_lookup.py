@@ -50,7 +50,7 @@ def test_an_estimate_that_is_no_number_has_no_rotation(bad):
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     for rotations in (table.recommend, table.least_cost):
         for estimate in (bad, [0.0, bad]):
-            with pytest.raises(UserError, match="one is not finite"):
+            with pytest.raises(UserError, match="no finite number"):
                 rotations(estimate)
 
 
@@ -154,7 +154,7 @@ def test_a_table_that_cannot_be_is_refused(tmp_path, damage):
     ("name", "content", "message"),
     [
         ("no.npz", None, "no.npz does not exist; name the file that nbv calibrate wrote"),
-        ("cut.npz", b"PK\x03\x04", "it is no .npz file, or only a part of one"),
+        ("cut.npz", b"PK\x03\x04", "it is not an .npz file, or only a part of one"),
         ("one.npy", b"", "one.npy: cannot be read "),
     ],
 )
