@@ -81,14 +81,7 @@ class UserError(Exception):
         super().__init__("".join(shown))
 
     def about(self, what: str) -> Self:
-        """Return the same error with its subject in front of the message.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> print(nbv.UserError("no pixel").about("frame 2 of 3"))
-        frame 2 of 3: no pixel
-        """
+        """Return the same error with its subject in front of the message."""
         return type(self)(f"{what}: {self}")
 
 
@@ -109,14 +102,7 @@ class NamedError(UserError):
         self.message = message
 
     def about(self, what: str) -> Self:
-        """Return the same error with its subject between the name and the message.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> print(nbv.FrameError("empty-mask", "no pixel").about("frame 2 of 3"))
-        empty-mask: frame 2 of 3: no pixel
-        """
+        """Return the same error with its subject between the name and the message."""
         return type(self)(self.name, f"{what}: {self.message}")
 
 
