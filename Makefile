@@ -10,6 +10,7 @@
 # make lock        the locks again              UPGRADE=--upgrade takes the newest versions
 # make soak        2,000 damaged files, for half an hour at most
 # make docs        the documentation site, build/site/index.html
+# make tables      the pages' tables of numbers, from docs/reference
 
 PYTHON ?= python3
 CORES ?= 2
@@ -24,7 +25,7 @@ LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --genera
 	--no-annotate --custom-compile-command "make lock"
 
 .PHONY: reproduce quick confirm bundles compare reference bench test test-quick test-slurm test-browser soak coverage mutation \
-	check lock audit licences docs clean
+	check lock audit licences docs tables clean
 
 reproduce: $(READY)
 	@echo "nbv: now the paper: usually half an hour on two cores with native bfloat16, an hour without"
@@ -92,6 +93,9 @@ licences: $(AUDIT) $(DOCS)
 
 soak: $(READY)
 	$(BIN)/python -m tests.fuzz
+
+tables: $(READY)
+	$(BIN)/python tools/tables.py
 
 docs: $(DOCS)
 	$(BIN)/python -m sphinx --quiet --jobs $(CORES) --fail-on-warning --keep-going --conf-dir docs/site --doctree-dir build/doctrees . build/site

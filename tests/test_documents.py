@@ -3,10 +3,11 @@
 import ast
 import pkgutil
 import re
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 
-import pandas as pd
 import pytest
 from PIL import Image
 
@@ -22,52 +23,7 @@ DOCUMENTS = sorted(
 )
 PAGES = [path for path in DOCUMENTS if path.name == "README.md" or "reference" not in path.parts]
 
-TERMS = (
-    *("warm start", "affinity", "choice", "plan", "shuffle", "density", "embedded objects", "fold"),
-    *("viewpoint", "pose", "view", "estimate", "rotation δ", "calibration pair", "conditional"),
-    *("evidence", "belief", "criterion", "cost", "policy", "fusion", "method", "extension", "unit"),
-    *(
-        "frame",
-        "bundle",
-        "reach",
-        "mirror plane",
-        "calibration sweep",
-        "recording",
-        "offset",
-        "expected error",
-        "out-of-distribution score",
-    ),
-    *("spread", "single"),
-)
-
-# Each pattern with the word that takes its place. An underscore separates words, and so does a
-# capital within a name.
-BANNED = {
-    r"\bcontend\w*": "extension; evaluate, compare",
-    r"\bcontest\w*": "extensions; evaluate",
-    r"\bbesides?\b": "compared_runs; next to, with",
-    r"\bstanding\b": "mae_interval; is, lies",
-    r"\bsheets?\b": "table",
-    r"\blooks\b": "views; takes a view, seems",
-    r"\b(?:a|one|two|each|every|another|first|second|next|more)\s+look\b": "view",
-    r"\blook\s+again\b": "take another view",
-    r"\bworths?\b": "cost; what it brings",
-    r"\blent\b": "given, shared",
-    r"\breadings\b": "interpretations; measurements, depth values",
-    r"\b(?:an?|the|its|this|which|each|one|other|nearest)\s+reading\b": "interpretation; value",
-    r"\breading\s+settings\b": "ReportSettings",
-    r"(?<![\"'`])[\"'`.]reading\b|\breading=|\breading: str": "pose_likelihood",
-    r"\bh(?:eld|olds?|olding)(?:\s+\w+){0,4}\s+against\b": "compare with",
-    r"\bsidebyside\b": "run_comparison",
-    r"(?<=[/\"'`])beyond\b|\bbeyond(?=[/\"'`(=]|\.\w)": "extensions, extension_gains",
-    r"\bbeyond\s+the\s+paper\b": "extension",
-}
-# What is said only to define "extension".
-ALLOWED = {
-    "docs/glossary.md": ("beyond the paper",),
-    "docs/reference/extensions/README.md": ("docs/reference/beyond",),
-}
-TREES = ("src", "workflow", "config", "docs", "tests", "performance", "profiles")
+TREES = ("src", "studies", "workflow", "config", "docs", "tests", "performance", "tools")
 SUFFIXES = {".py", ".smk", ".yaml", ".md", ".rst", ".j2", ".css", ".js", ".html"}
 
 
@@ -133,9 +89,9 @@ def test_a_name_that_links_to_a_module_is_defined_there(path: Path) -> None:
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_source_files_that_a_document_names_exist(path: Path) -> None:
-    example = "src/nbv/recommendation/criteria/sharpest.py"
-    named = re.findall(r"\b(?:src/nbv|config|tests)/[\w/]+(?:\.\w+)?", path.read_text("utf-8"))
-    assert not [name for name in set(named) - {example} if not (ROOT / name).exists()]
+    places = r"\b(?:src/nbv|config|tests|tools)/[\w/]+(?:\.\w+)?"
+    named = re.findall(places, path.read_text("utf-8"))
+    assert not [name for name in set(named) if not (ROOT / name).exists()]
 
 
 @pytest.mark.parametrize("name", ["README.md", "docs/camera.md", "docs/five-minutes.md"])
@@ -159,18 +115,10 @@ def test_the_readme_begins_with_the_two_commands() -> None:
     assert commands == ["sh", "make reproduce", "make test"]
 
 
-def test_the_readme_has_table_1_of_the_reference_run() -> None:
-    cells = pd.read_csv(ROOT / "docs/reference/paper/tables/table1.csv")
-    expected = []
-    for label, row in cells[cells["metric"] == "mae"].groupby("row_label", sort=False):
-        least = row["value"].min()
-        shown = [
-            f"{f'**{value:.2f}**' if value == least else f'{value:.2f}'} [{published:.2f}]"
-            for value, published in zip(row["value"], row["published"], strict=True)
-        ]
-        expected.append(f"| {label} | {' | '.join(shown)} |")
-    text = (ROOT / "README.md").read_text("utf-8")
-    assert re.findall(r"^\| [A-Z]\w+ \|.*\]\s\|$", text, re.MULTILINE) == expected
+def test_the_tables_of_numbers_are_those_of_the_reference() -> None:
+    command = [sys.executable, ROOT / "tools/tables.py", "--check"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_everything_that_the_paper_numbers_has_its_place() -> None:
@@ -181,7 +129,7 @@ def test_everything_that_the_paper_numbers_has_its_place() -> None:
 
 
 def test_every_name_of_the_package_that_a_text_gives_exists() -> None:
-    """`nbv.module.name` in docstrings, comments and documents leads somewhere."""
+    """Every dotted name in code form can be imported, in docstrings, comments and documents."""
     texts = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
     texts += [path for tree in TREES for path in sorted((ROOT / tree).rglob("*"))]
     missing = []

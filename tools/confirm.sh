@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The confirmatory run of docs/protocol.md. It takes hours; the same command goes on where it was stopped.
-#   MESHES=<folder of airplane, car, chair, toilet> adds real meshes
-#   MUGS=<ShapeNetCore> WITHOUT_HANDLE=<file of ids> adds real mugs
+#   MESHES=<folder of airplane, car, chair, toilet> adds other people's meshes
+#   MUGS=<ShapeNetCore> WITHOUT_HANDLE=<file of ids> adds their mugs
 set -euo pipefail
 cores=${CORES:-2}
 # Three bandwidths, and pseudo-observations from hardly any to a V that is nearly flat.

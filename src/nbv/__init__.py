@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from nbv.robot.recommender import Recommender as Recommender
     from nbv.robot.synthetic import example_frame as example_frame
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # Names and not imports: `import nbv` stays quick, and no job depends on all of these modules.
 _MODULES = {

@@ -76,8 +76,8 @@ def lines_of(path: Path) -> dict[str, int]:
 
 
 def module_of(path: str) -> str:
-    """Return the name of the module in a file below src/."""
-    return ".".join(Path(path).with_suffix("").parts[1:]).removesuffix(".__init__")
+    """Return the name of the module in a file."""
+    return ".".join(Path(path).with_suffix("").parts).removeprefix("src.").removesuffix(".__init__")
 
 
 def source_of(domain: str, info: dict[str, str]) -> str | None:

@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+"""Write the pages' tables from docs/reference, between markers; with --check only compare."""
+
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import pandas as pd
+
+ROOT = Path(__file__).parents[1]
+REFERENCE = ROOT / "docs/reference"
+MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+BUNDLE_ROWS = {
+    "round procedural mugs": "generated",
+    "square procedural mugs": "generated, square",
+    "procedural mugs of any reach": "generated, any reach",
+    "other people's meshes (ShapeNet)": "shapenet",
+    "real mug, nearly level": "real, nearly level",
+    "real mug, from above": "real, from above",
+}
+BUNDLE_COLUMNS = {
+    "one": ("single", 1),
+    "random": ("random", 2),
+    "best fixed": ("best fixed", 2),
+    "opposite": ("opposite", 2),
+    "recommended": ("recommended", 2),
+    "paper": ("paper's table, averaged", 2),
+    "three": ("recommended", 3),
+}
+CONFIRMATION_ROWS = {
+    "one view": ("none", "none"),
+    "as printed, average": ("as_printed", "average"),
+    "repaired, average": ("given_estimate", "average"),
+    "fixed, posterior": ("fixed", "posterior"),
+    "expected error, posterior": ("expected_error", "posterior"),
+    "opposite, product": ("opposite", "product"),
+    "fixed, product": ("fixed", "product"),
+    "expected error, product": ("expected_error", "product"),
+}
+CONFIRMATION_COLUMNS = {
+    "procedural, regressor": "embedded",
+    "other people's, regressor": "real",
+    "procedural, classifier": "embedded-classifier",
+    "other people's, classifier": "real-classifier",
+}
+
+
+def bold_least(values: Iterable[float | None], decimals: int) -> list[str]:
+    """Return numbers as text, the least one in bold and a missing one as a dash."""
+    texts = ["–" if value is None else f"{value:.{decimals}f}" for value in values]
+    least = min(texts, key=lambda text: float(text.replace("–", "inf")))
+    return [f"**{text}**" if text == least else text for text in texts]
+
+
+def table1() -> pd.DataFrame:
+    """Table 1 of the paper: our value, and the published one in brackets."""
+    cells = pd.read_csv(REFERENCE / "paper/tables/table1.csv").query("metric == 'mae'")
+    rows = {}
+    for label, row in cells.groupby("row_label", sort=False):
+        both = zip(bold_least(row["value"], 2), row["published"], strict=True)
+        rows[label] = [f"{ours} [{published:.2f}]" for ours, published in both]
+    return pd.DataFrame(rows, index=["Single", "Random", "Opposite", "Proposed"]).T
+
+
+def confirmation() -> pd.DataFrame:
+    """MAE over all categories and trainings, degrees."""
+    found = pd.read_csv(REFERENCE / "confirmation/methods.csv")
+    found = found.query("category == 'all' and n_views <= 2")
+    mae = found.set_index(["dataset", "choice", "fusion"])["mae_deg"]
+    columns = {
+        label: bold_least([mae.get((data, *method)) for method in CONFIRMATION_ROWS.values()], 1)
+        for label, data in CONFIRMATION_COLUMNS.items()
+    }
+    return pd.DataFrame(columns, index=[*CONFIRMATION_ROWS])
+
+
+def bundle() -> pd.DataFrame:
+    """MAE of the shipped bundle, degrees."""
+    errors = pd.read_csv(REFERENCE / "bundles/trainings.csv")
+    mae = errors.groupby(["objects", "choice", "n_views"])["seed_0"].mean()
+    columns = {
+        label: [f"{mae[objects, *view]:.1f}" for objects in BUNDLE_ROWS.values()]
+        for label, view in BUNDLE_COLUMNS.items()
+    }
+    return pd.DataFrame(columns, index=[*BUNDLE_ROWS])
+
+
+def views() -> pd.DataFrame:
+    """MAE of one view, and of two where the second one is recommended."""
+    trained = confirmation().loc[["one view", "expected error, product"]].T
+    shipped = bundle()[["one", "recommended"]]
+    rows = {
+        "rendered, procedural objects of all categories": trained.loc["procedural, classifier"],
+        "rendered, other people's meshes": trained.loc["other people's, classifier"],
+        "a real camera and one real mug, nearly level": shipped.loc["real mug, nearly level"],
+        "the same mug, from above": shipped.loc["real mug, from above"],
+    }
+    plain = {label: [str(cell).strip("*") for cell in row] for label, row in rows.items()}
+    return pd.DataFrame(plain, index=["one view", "two views"]).T
+
+
+TABLES = {"table1": table1, "confirmation": confirmation, "bundle": bundle, "views": views}
+
+
+def markdown(table: pd.DataFrame) -> str:
+    """Return a table in Markdown, its numbers to the right."""
+    lines = [["", *table.columns], ["---", *["---:"] * table.shape[1]]]
+    lines += [[str(row.Index), *row[1:]] for row in table.itertuples()]
+    return "\n" + "".join(f"| {' | '.join(cells)} |\n" for cells in lines) + "\n"
+
+
+for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
+    text = page.read_text("utf-8")
+    fresh = MARKED.sub(lambda found: found[1] + markdown(TABLES[found[2]]()) + found[3], text)
+    if fresh != text:
+        if "--check" in sys.argv:
+            sys.exit(f"{page}: a table differs from docs/reference; run make tables")
+        page.write_text(fresh, "utf-8")
