@@ -139,7 +139,7 @@ def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
     Raises
     ------
     UserError
-        For anything else.
+        Where the value has none of these forms.
     """
     if isinstance(value, Intrinsics):
         return value
