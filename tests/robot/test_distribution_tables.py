@@ -260,7 +260,7 @@ def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
         capsys, "recommend", "--estimate", "20", "--table", "plain.npz"
     )
     message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "plain.npz")
-    assert "--table=plain.npz: no table of distributions" in message
+    assert "--table=plain.npz: not a table of distributions" in message
 
 
 @pytest.mark.parametrize(
@@ -294,7 +294,7 @@ def test_a_damaged_table_is_one_line(here, capsys):
     ):
         np.savez("d.npz", **(stored | {f"distribution.{name}": value}))
         message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "d.npz")
-        assert "--table=d.npz: no table of distributions" in message
+        assert "--table=d.npz: not a table of distributions" in message
 
 
 @pytest.mark.parametrize("file", ["views.csv", "views.npy"])
@@ -354,7 +354,7 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
         (("--distribution", "pose.json", "--table", "t.npz"), "pose.json"),
         (
             ("--distribution", "views.csv", "--table", "pairs.csv"),
-            "--table=pairs.csv: no table of distributions; give the .npz file",
+            "--table=pairs.csv: not a table of distributions; give the .npz file",
         ),
         (("--distribution", "bad.npy", "--table", "t.npz"), "bad.npy cannot be read"),
         (("--distribution", "empty.npy", "--table", "t.npz"), "empty.npy cannot be read"),
