@@ -16,9 +16,9 @@ from nbv.experiment.estimation.make_bundle import bundled_model
 from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.estimation.weights import Estimator
 from nbv.robot.bundle import Bundle, PaperTables
-from nbv.robot.ood import fit_familiarity
-from nbv.robot.pair_distributions import bin_apart
-from nbv.robot.sweeps import Turn
+from nbv.robot.network import Sweep
+from nbv.robot.ood import fit_ood
+from nbv.robot.pairs import bin_apart
 
 CONFIG = Path(__file__).parents[1] / "config"
 BINS = 24
@@ -76,28 +76,28 @@ def random_model(seed: int = 0, plane_deg: float | None = None) -> bytes:
 
 
 def soft_turns(
-    rng: np.random.Generator, n_turns: int, n_views: int = BINS, n_bins: int = BINS
+    rng: np.random.Generator, n_sweeps: int, n_views: int = BINS, n_bins: int = BINS
 ) -> NDArray[np.float64]:
-    """Logits (n_turns, n_views, n_bins) that are largest near the true azimuth, with noise."""
+    """Logits (n_sweeps, n_views, n_bins) that are largest near the true azimuth, with noise."""
     truth = np.arange(n_views) * (360.0 / n_views)
     classes = np.arange(n_bins) * (360.0 / n_bins)
     aim = 4.0 * np.cos(np.radians(classes - truth[:, None]))
     # A blind range: there the network cannot tell.
     aim *= np.where(np.abs(truth - 90.0) < 50.0, 0.2, 1.0)[:, None]
-    return aim + rng.normal(0, 0.8, (n_turns, n_views, n_bins))
+    return aim + rng.normal(0, 0.8, (n_sweeps, n_views, n_bins))
 
 
 def made_bundle(seed: int = 0, **changes) -> Bundle:
     rng = np.random.default_rng(seed)
     names = ("a", "b", "c")
     elevations = (0.0, 30.0)
-    turns, rows = [], []
+    sweeps, rows = [], []
     azimuth_deg = np.arange(BINS) * WIDTH
     for name in names:
         for elevation in elevations:
             codes = random_codes(rng, BINS)
             logits = soft_turns(rng, 1)[0]
-            turns.append(Turn(name, f"{elevation:g}", elevation, azimuth_deg, logits, codes))
+            sweeps.append(Sweep(name, f"{elevation:g}", elevation, azimuth_deg, logits, codes))
             rows.append(bin_apart(azimuth_deg, from_logits(logits, 1.0)))
     values = {
         "category": "mug",
@@ -109,12 +109,12 @@ def made_bundle(seed: int = 0, **changes) -> Bundle:
         "focal_px": FOCAL_PX,
         "mirror_plane_deg": None,
         "temperature": 1.25,
-        "object_ids": tuple(turn.object_id for turn in turns),
-        "elevation_deg": np.array([turn.elevation_deg for turn in turns], dtype=np.float32),
-        "turn_weight": np.ones(len(turns), dtype=np.float32),
+        "object_ids": tuple(sweep.object_id for sweep in sweeps),
+        "elevation_deg": np.array([sweep.elevation_deg for sweep in sweeps], dtype=np.float32),
+        "sweep_weights": np.ones(len(sweeps), dtype=np.float32),
         "distributions": np.stack(rows),
         "affinity": {"power": 4.0, "pseudo_observations": 10.0},
-        "familiarity": fit_familiarity(turns),
+        "ood": fit_ood(sweeps),
         "paper": PaperTables(
             np.array([0, 30], dtype=np.float32), rng.integers(15, 346, (2, 360)).astype(np.int16)
         ),

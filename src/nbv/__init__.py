@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     from nbv.core.fusion import posterior as posterior
     from nbv.core.lookup import LookupTable as LookupTable
     from nbv.core.lookup import build_lookup as build_lookup
+    from nbv.errors import BundleError as BundleError
+    from nbv.errors import FrameError as FrameError
     from nbv.errors import UserError as UserError
-    from nbv.robot.bundle import BundleError as BundleError
     from nbv.robot.depth_files import read_depth as read_depth
     from nbv.robot.distribution_table import DistributionTable as DistributionTable
-    from nbv.robot.errors import FrameError as FrameError
     from nbv.robot.intrinsics import Intrinsics as Intrinsics
     from nbv.robot.moves import check_axis as check_axis
     from nbv.robot.moves import moved_camera as moved_camera
@@ -54,8 +54,8 @@ _MODULES = {
     "DistributionTable": "nbv.robot.distribution_table",
     "moved_camera": "nbv.robot.moves",
     "check_axis": "nbv.robot.moves",
-    "BundleError": "nbv.robot.bundle",
-    "FrameError": "nbv.robot.errors",
+    "BundleError": "nbv.errors",
+    "FrameError": "nbv.errors",
     "Intrinsics": "nbv.robot.intrinsics",
     "read_depth": "nbv.robot.depth_files",
     "example_frame": "nbv.robot.synthetic",

@@ -19,21 +19,21 @@ from made_bundles import BINS, COLUMNS, FOCAL_PX, ROWS, WIDTH, frame
 pytest.importorskip("cyclopts")
 
 from nbv.cli import main
-from nbv.cli.answers import say_offset
+from nbv.cli.answers import print_offset
 from nbv.cli.arguments import as_paragraphs
 from nbv.core.angles import signed_difference_deg
 from nbv.core.criteria import CRITERIA
 from nbv.core.lookup import LookupTable
 from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
-from nbv.core.selection import chosen_lookup
+from nbv.core.selection import DENSITY, chosen_lookup
 from nbv.robot.bundle import FORMAT, Bundle
-from nbv.robot.calibration import DENSITY, recalibrated
+from nbv.robot.calibration import recalibrated
 from nbv.robot.depth_files import read_depth
-from nbv.robot.evaluation import evaluate, familiarity_of
-from nbv.robot.moves import check_axis, elevation_from_gravity, moved_camera
+from nbv.robot.evaluation import count_ood, evaluate
+from nbv.robot.moves import elevation_from_gravity, moved_camera
 from nbv.robot.pairs import PairTable
 from nbv.robot.recommender import Recommender
-from nbv.robot.recordings import read_manifest, see
+from nbv.robot.recordings import read_manifest, run_network
 
 POSE = [[0.0, 0.0, 1.0, -0.6], [-1.0, 0.0, 0.0, 0.1], [0.0, -1.0, 0.0, 0.2], [0.0, 0.0, 0.0, 1.0]]
 
@@ -105,7 +105,7 @@ def same_answer(printed: dict, answer) -> None:
     assert printed["spread_deg"] == pytest.approx(answer.spread_deg)
     assert printed["expected_error_deg"] == pytest.approx(answer.expected_error_deg, rel=1e-4)
     assert printed["belief"] == pytest.approx(answer.belief.tolist(), abs=1e-5)
-    assert printed["unfamiliarity"] == pytest.approx(answer.unfamiliarity, rel=1e-4)
+    assert printed["ood_score"] == pytest.approx(answer.ood_score, rel=1e-4)
     same_move(printed, answer)
 
 
@@ -165,15 +165,6 @@ def test_every_option_of_a_recommendation_counts(here, capsys):
     assert printed["assumed_focal_px"] is None
 
 
-def test_near_and_far_are_metres(here, capsys):
-    wall = np.where(frame(0) > 0, frame(0), 0.9).astype(np.float32)
-    wall[5:20, 5:20] = 0.2
-    np.save(here / "wall.npy", wall)
-    options = ("--bundle", "b.safetensors", "--json")
-    wanted = run(capsys, "recommend", "f0.npy", *options)
-    assert run(capsys, "recommend", "wall.npy", *options, "--near", "0.3", "--far", "0.8") == wanted
-
-
 def test_allowed_rotations_may_stand_in_a_file(here, capsys):
     mask = np.zeros(8, dtype=bool)
     mask[[2, 5]] = True
@@ -223,11 +214,8 @@ def test_an_axis_is_refused_that_is_not_where_the_object_is_seen(here, capsys):
 @pytest.mark.parametrize(
     ("gravity", "elevation", "leans"),
     [
-        (("0", "9.81", "0"), 0.0, None),
-        (("0,1,1",), 45.0, None),
         (("-3", "0", "-3"), -45.0, "90° to the right"),
         (("1", "1.41421356", "1"), 30.0, "35° to the left"),
-        (("0", "0", "1e-300"), 90.0, None),
     ],
 )
 def test_the_direction_down_gives_the_elevation_and_the_roll(
@@ -308,9 +296,9 @@ def test_frames_all_round_have_a_pose_and_no_next_view(manifest, capsys):
 
 
 @pytest.mark.parametrize(("limit", "is_told"), [(1e-6, True), (1e6, False)])
-def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
-    known = replace(bundle.familiarity, threshold=limit, scales=np.array([[0, 1], [-1e3, 1]]))
-    replace(bundle, familiarity=known).save("limit.safetensors")
+def test_an_ood_frame_gives_a_warning(here, bundle, capsys, limit, is_told):
+    model = replace(bundle.ood, threshold=limit, scales=np.array([[0, 1], [-1e3, 1]]))
+    replace(bundle, ood=model).save("limit.safetensors")
     out = run(capsys, "recommend", "f0.npy", "--bundle", "limit.safetensors")
     assert ("warning:" in out) == is_told
 
@@ -319,74 +307,32 @@ def test_an_unfamiliar_frame_is_told(here, bundle, capsys, limit, is_told):
     ("arguments", "message"),
     [
         ([], "give a depth frame"),
-        (["no.npy"], "no.npy does not exist"),
-        (["m.npy"], "m.npy holds bool"),
-        (["f0.npy", "f1.npy"], "2 frames and 1 rotation; give one for each frame"),
-        (["f0.npy", "--rotations", "0", "90"], "1 frame and 2 rotations"),
-        (["f0.npy", "--rotations", "0", "x"], "x: no known kind of file"),
-        (["f0.npy", "--rotations", "zero"], "--rotations: 'zero' is no number"),
+        (["f0.npy", "--rotations", "0", "x"], "x: unknown kind of file"),
+        (["f0.npy", "--rotations", "zero"], "--rotations: 'zero' is not a number"),
         (["f0.npy", "--rotations="], "give a number"),
-        (["--mask", "m.npy", "f0.npy"], "frames stand before --mask"),
-        (["f0.npy", "--rotations", "10"], "the first is 10"),
+        (["--mask", "m.npy", "f0.npy"], "give frames before --mask"),
         (["f0.npy", "--max-travel", "3"], "relax --allowed or --max-travel"),
-        (["f0.npy", "--max-travel", "-5"], "a longest travel of -5.0°: give degrees, 0 or more"),
-        (["f0.npy", "--max-travel", "nan"], "a longest travel of nan°"),
-        (["f0.npy", "--allowed", "0"], "no admissible rotation"),
+        (["f0.npy", "--max-travel", "-5"], "--max-travel=-5.0: give degrees, 0 or more"),
         (["f0.npy", "--allowed", "left"], "left: give rotations in degrees, or a .npy file"),
-        (["f0.npy", "--allowed", "no.npy"], "no.npy does not exist"),
-        (["f0.npy", "--allowed", "pose.json"], "pose.json: give rotations in degrees, or a .npy"),
-        (["f0.npy", "--allowed", "m.npy"], "m.npy: a mask of 2 axes"),
         (["f0.npy", "--allowed="], "give a number"),
         (["f0.npy", "--far", "0.1"], "have a depth between --near=0 and --far=0.1, of 0."),
-        (["f0.npy", "--far", "800"], "--far=800: give metres"),
         (["f0.npy", "--near", "300"], "--near=300: give metres"),
         (["f0.npy", "--plot", "x.jpg"], "--plot=x.jpg: give a name that ends in .png or .pdf"),
-        (["f0.npy", "--plot", "m.npy/x.png"], "--plot=m.npy/x.png: m.npy is a file and no folder"),
+        (["f0.npy", "--plot", "m.npy/x.png"], "--plot=m.npy/x.png: m.npy is a file; give a path"),
         (["f0.npy", "--plot", "."], "--plot=.: give a name"),
-        (["f0.npy", "--near", "2", "--far", "1"], "near < far"),
-        (["f0.npy", "--near", "-1"], "--near=-1: give metres, 0 or more"),
-        (["f0.npy", "--near", "nan"], "--near=nan: give metres, 0 or more"),
         (["f0.npy", "--depth-scale", "0.001"], "depths 1000 times as large would fit"),
         (["f0.npy", "--depth-scale", "-1"], "--depth-scale=-1"),
-        (["f0.npy", "--mask", "m.npy", "m.npy"], "1 frame and 2 masks"),
         (["f0.npy", "--intrinsics", "wide"], "--intrinsics=wide"),
-        (["f0.npy", "--intrinsics", "1,2,3"], "3 numbers"),
-        (["f0.npy", "--intrinsics", "nope.json"], "nope.json: the file does not exist"),
-        (["f0.npy", "--intrinsics", "x" * 5000], "cannot be read"),
-        (["f0.npy", "--elevation", "nan"], "elevation of nan"),
+        (["f0.npy", "--elevation", "nan"], "--elevation=nan"),
         (["f0.npy", "--camera-pose", "pose.json"], "--camera-pose and --axis belong together"),
         (["f0.npy", "--axis", "0", "0", "0"], "--camera-pose and --axis belong together"),
         (["f0.npy", "--camera-pose", "pose.json", "--axis", "0", "0"], "--axis has 2 numbers"),
-        (
-            ["f0.npy", "--camera-pose", "pose.json", "--axis", "0", "0", "0", "0", "0", "0"],
-            "axis: give a point and a direction",
-        ),
-        (["f0.npy", "--camera-pose", "f0.npy", "--axis", "0", "0", "0"], "give the 16"),
-        (
-            [
-                "f0.npy",
-                "--intrinsics",
-                "150",
-                "--camera-pose",
-                "pose.json",
-                "--axis",
-                "0",
-                "0",
-                "0",
-                "0",
-                "0",
-                "-1",
-            ],
-            "axis: the axis is 180° away from up in the image",
-        ),
-        (["f0.npy", "--elevation", "high"], "high"),
         (["f0.npy", "--gravity", "0", "1"], "--gravity has 2 numbers; give three"),
         (["f0.npy", "--gravity", "0", "9.81", "a"], "--gravity has 2 numbers; give three"),
-        (["f0.npy", "--gravity", "0", "1", "0", "0"], "--gravity has 4 numbers; give three"),
-        (["f0.npy", "--gravity", "0,nan,1"], "gravity: give three finite numbers"),
-        (["f0.npy", "--gravity", "0,0,inf"], "gravity: give three finite numbers"),
-        (["f0.npy", "--gravity", "0,0,0"], "gravity: 0,0,0 is no direction"),
-        (["f0.npy", "--gravity", "0,1,0", "--elevation", "0"], "give it or an elevation"),
+        (
+            ["f0.npy", "--gravity", "0,1,0", "--elevation", "0"],
+            "--gravity and --elevation: give one",
+        ),
         (["f0.npy", "--nearest", "2"], "--nearest"),
     ],
 )
@@ -396,29 +342,12 @@ def test_what_cannot_be_recommended_is_one_line(here, capsys, arguments, message
 
 def test_a_frame_that_is_refused_is_named(here, capsys):
     np.save("dark.npy", np.zeros((ROWS, COLUMNS), np.float32))
-    np.save("none.npy", np.zeros((ROWS, COLUMNS), bool))
-    np.save("all.npy", np.ones((ROWS, COLUMNS), bool))
     for options, message in (
         (("dark.npy",), "empty-mask: dark.npy: the frame has no depth at all"),
-        (("f0.npy", "--mask", "none.npy"), "empty-mask: f0.npy: the mask has no pixel"),
-        (("f0.npy", "--mask", "all.npy"), "little-depth: f0.npy: only "),
         (("f0.npy", "dark.npy", "--rotations", "0", "90"), "empty-mask: dark.npy: the frame has"),
     ):
         line = fails(capsys, "recommend", *options, "--bundle", "b.safetensors")
         assert line.startswith(f"nbv: error: {message}")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--estimate", "30"], "--estimate and --table belong together"),
-        (["--table", "t.npz"], "--estimate and --table belong together"),
-        (["--table", "t.npz", "--estimate", "30"], "t.npz does not exist"),
-        (["--table", "f0.npy", "--estimate", "30"], "f0.npy"),
-    ],
-)
-def test_a_table_that_is_not_there_is_one_line(here, capsys, arguments, message):
-    assert message in fails(capsys, "recommend", *arguments)
 
 
 def test_a_missing_or_damaged_bundle_is_one_line(here, capsys):
@@ -473,7 +402,7 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
 
 def test_the_help_names_every_criterion(here, capsys):
     text = " ".join(run(capsys, "calibrate", "--help").split())
-    _, _, told = text.partition("Of the lookup table: ")
+    _, _, told = text.partition("Criterion of the lookup table: ")
     told, _, _ = told.replace("│", "").partition(".")
     assert set(re.findall(r"[a-z]+_[a-z]+|fixed", told)) == set(CRITERIA)
 
@@ -490,17 +419,12 @@ def test_a_table_is_made_of_pairs_alone(pairs, capsys):
     for arguments, message in (
         (("no.csv", "--output", "t.npz"), "no.csv does not exist"),
         (("pairs.csv", "--output", "t.dat"), "--output=t.dat: give a name that ends in .npz"),
-        (("pairs.csv", "--output", "t"), "ends in .npz"),
         (
             ("pairs.csv", "--output", "t.safetensors"),
             "is a bundle, and frames make one with --bund",
         ),
         (("pairs.csv", "--output", "t.npz", "--intrinsics", "500"), "--intrinsics is for frames"),
-        (("pairs.csv", "--output", "t.npz", "--depth-scale", "1"), "--depth-scale is for frames"),
-        (("pairs.csv", "--output", "t.npz", "--near", "1"), "--near is for frames"),
-        (("pairs.csv", "--output", "t.npz", "--far", "1"), "--far is for frames"),
         (("pairs.csv",), "--output"),
-        (("pairs.csv", "--output", "t.npz", "--criterion", "eror"), "--criterion=eror"),
         (
             ("pairs.csv", "--output", "t.npz", "--criterion", "expected_eror"),
             "did you mean 'expected_error'?",
@@ -510,16 +434,9 @@ def test_a_table_is_made_of_pairs_alone(pairs, capsys):
     assert not list(Path().glob("*t.*"))
 
 
-def test_an_estimate_is_a_number(pairs, capsys):
-    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz", "--criterion", "expected_error")
-    for estimate in ("nan", "inf"):
-        message = fails(capsys, "recommend", "--estimate", estimate, "--table", "t.npz")
-        assert f"--estimate={estimate}" in message
-
-
-def turns_of(manifest):
+def sweeps_of(manifest):
     recommender = Recommender.load("b.safetensors")
-    return [see(recommender, one, None, None, print) for one in read_manifest(manifest)]
+    return [run_network(recommender, one, None, None, print) for one in read_manifest(manifest)]
 
 
 def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
@@ -533,7 +450,7 @@ def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
     # A network of random weights has no zero.
     assert warning.startswith("warning: ")
     assert tail == "own.safetensors: mug, calibrated on 1 recording"
-    wanted = recalibrated(Bundle.load("b.safetensors"), turns_of(manifest), "manifest.csv")
+    wanted = recalibrated(Bundle.load("b.safetensors"), sweeps_of(manifest), "manifest.csv")
     wanted.save("wanted.safetensors")
     assert Path("own.safetensors").read_bytes() == Path("wanted.safetensors").read_bytes()
     options = ("--bundle", "b.safetensors", "--output", "json.safetensors", "--json")
@@ -564,7 +481,7 @@ def test_a_turn_with_a_gap_does_not_calibrate(manifest, capsys):
     options = ("--bundle", "b.safetensors", "--output", "x.safetensors")
     assert main(["calibrate", "gap.csv", *options]) == 2
     out, err = capsys.readouterr()
-    assert err.startswith("nbv: error: object 'cup', sequence '1': views are 60° apart")
+    assert err.startswith("nbv: error: object 'cup', sequence '1': views leave a gap of 60°")
     assert err.count("\n") == 1
     # What was found before stays: the offset tells which frames there are.
     assert "cup, sequence 1: 21 frames" in out
@@ -584,7 +501,7 @@ def test_what_does_not_go_with_frames_is_refused(manifest, capsys):
     # Pairs may have the columns of a manifest too.
     pd.read_csv(manifest).assign(estimate_deg="north").to_csv("both.csv")
     message = fails(capsys, "calibrate", "both.csv", "--output", "own.npz")
-    assert "row 2: estimate_deg is no number" in message
+    assert "row 2: estimate_deg is not a number" in message
 
 
 def test_the_camera_is_assumed_where_neither_manifest_nor_option_has_it(manifest, capsys):
@@ -669,7 +586,7 @@ def test_an_offset_of_frames_is_added_and_a_large_one_told(capsys, change, is_ad
     estimate_deg = change(azimuth_deg) % 360
     found = Offset.of(azimuth_deg, estimate_deg, FOR_FRAMES)
     assert (frame_warning(azimuth_deg, estimate_deg) == "") == is_added
-    say_offset("cup", "36 frames", found, is_added=is_added)
+    print_offset("cup", "36 frames", found, is_added=is_added)
     head, *told = capsys.readouterr().out.splitlines()
     assert head.endswith(", added to the azimuths") == is_added
     if warning is None:
@@ -694,15 +611,15 @@ def test_several_recordings_show_how_many_are_evaluated(manifest, capsys):
 
 
 def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
-    wanted = evaluate(Bundle.load("b.safetensors"), turns_of(manifest), [2, 3])
+    wanted = evaluate(Bundle.load("b.safetensors"), sweeps_of(manifest), [2, 3])
     out = run(
         *(capsys, "evaluate", "manifest.csv", "--bundle", "b.safetensors"),
         *("--views", "2", "3", "--json", "--output", "table.csv"),
     )
     printed = json.loads(out)
     assert pd.DataFrame(printed["errors"]).equals(wanted)
-    familiar = familiarity_of(Bundle.load("b.safetensors"), turns_of(manifest))
-    assert pd.DataFrame(printed["familiarity"]).equals(familiar)
+    ood = count_ood(Bundle.load("b.safetensors"), sweeps_of(manifest))
+    assert pd.DataFrame(printed["ood"]).equals(ood)
     written = pd.read_csv("table.csv", dtype={"object_id": str, "sequence": str})
     pd.testing.assert_frame_equal(written, wanted.round(4))
     text = run(
@@ -712,7 +629,7 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
     assert camera == ASSUMED
     assert head.startswith("cup, sequence 1: 24 frames; offset ")
     # The network of this bundle is random.
-    assert warning == f"warning: {familiar['warning'][0]}"
+    assert warning == f"warning: {ood['warning'][0]}"
     assert "estimates do not follow azimuths" in warning
     assert numbers.split()[-3:] == ["1", "2", "3"]
     assert len(lines) == wanted["choice"].nunique()
@@ -724,23 +641,11 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
         ]
 
 
-@pytest.mark.parametrize("warning", ["", "estimates are radians"])
-def test_no_warning_of_a_recording_is_null(manifest, capsys, monkeypatch, warning):
-    import nbv.robot.evaluation
-
-    monkeypatch.setattr(nbv.robot.evaluation, "frame_warning", lambda *_: warning)
-    options = ("manifest.csv", "--bundle", "b.safetensors", "--views", "2", "--json")
-    (told,) = json.loads(run(capsys, "evaluate", *options))["familiarity"]
-    assert told["warning"] == (warning or None)
-
-
 def test_an_object_that_calibrated_the_bundle_is_named(manifest, capsys):
     options = ("manifest.csv", "--bundle", "b.safetensors")
     run(capsys, "calibrate", *options, "--output", "own.safetensors")
     options = ("evaluate", "manifest.csv", "--views", "2", "--bundle")
-    assert "warning: cup: the bundle was calibrated with" in run(
-        capsys, *options, "own.safetensors"
-    )
+    assert "warning: cup: the bundle was calibrated on" in run(capsys, *options, "own.safetensors")
     printed = json.loads(run(capsys, *options, "own.safetensors", "--json"))
     assert printed["calibrated_by"] == ["cup"]
     assert json.loads(run(capsys, *options, "b.safetensors", "--json"))["calibrated_by"] == []
@@ -767,15 +672,11 @@ def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["no.csv"], "no.csv does not exist"),
         (["masks.csv"], "turn/2.npy: the mask has 3 × 4 pixels and the frame"),
-        (["pairs.csv"], "no column 'sequence'"),
-        (["manifest.csv", "--views", "1"], "needs 2 or more"),
-        (["manifest.csv", "--views", "40"], "24 frames, too few for 40 views"),
         (["manifest.csv", "--views", "two"], "two"),
-        (["manifest.csv", "--views", "2.5"], "--views: '2.5' is no whole number"),
+        (["manifest.csv", "--views", "2.5"], "--views: '2.5' is not an integer"),
         (["manifest.csv", "--output", "x.json"], "--output=x.json: give a name that ends in .csv"),
-        (["manifest.csv", "--output", "pairs.csv/x.csv"], "pairs.csv is a file and no folder"),
+        (["manifest.csv", "--output", "pairs.csv/x.csv"], "pairs.csv is a file; give a path"),
         (["manifest.csv", "--intrinsics", "30"], "every frame"),
     ],
 )
@@ -803,12 +704,12 @@ def test_inspect_shows_what_a_bundle_holds(here, bundle, capsys):
     assert about["category"] == "mug"
     assert about["classes"] == BINS
     assert about["calibration_objects"] == 3
-    assert about["calibration_turns"] == 6
+    assert about["calibration_sweeps"] == 6
     assert about["elevations_deg"] == [0.0, 30.0]
     assert about["temperature"] == bundle.temperature
     assert about["network"] == dict(bundle.estimator)
     assert about["affinity"] == dict(bundle.affinity)
-    assert about["familiar_within"] == bundle.familiarity.threshold
+    assert about["ood_threshold"] == bundle.ood.threshold
     assert about["extent_m"] == list(bundle.extent_m)
     assert {key: about[key] for key in bundle.provenance} == bundle.provenance
     lines = run(capsys, "inspect", "b.safetensors").splitlines()
@@ -868,16 +769,6 @@ def test_a_drawn_frame_is_told(here, capsys):
     assert "first Kinect: 640 x 480 pixels, a focal length of 585 px" in text
 
 
-def test_a_frame_may_be_drawn_as_a_png_of_another_sensor(here, capsys):
-    options = ("--example", "--sensor", "stereo")
-    for name in ("x.png", "x.npy"):
-        printed = json.loads(run(capsys, "render", *options, "--output", name, "--json"))
-        assert printed["intrinsics"]["fx"] == 424.0
-    assert np.abs(read_depth("x.png") - read_depth("x.npy")).max() < 0.00051
-    run(capsys, "render", *options, "--output", "other.npy", "--seed", "1")
-    assert not np.array_equal(read_depth("other.npy"), read_depth("x.npy"))
-
-
 def test_an_axis_of_a_mesh_file_may_begin_with_a_hyphen(here, capsys):
     faces = "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
     Path("wedge.obj").write_text(f"v 0 0 0\nv 4 0 0\nv 0 1 0\nv 0 0 1\n{faces}")
@@ -893,20 +784,14 @@ def test_an_axis_of_a_mesh_file_may_begin_with_a_hyphen(here, capsys):
     ("more", "message"),
     [
         (("--output", "x.jpg"), "--output=x.jpg: give a name that ends in .npy or .png"),
-        (("--output", "x.npy", "--front", "-z"), "--up and --front are of a mesh file"),
-        (("--output", "x.npy", "--sensor", "lidar"), "sensor=lidar: choose from"),
-        (("--output", "x.npy", "--azimuth", "nan"), "an azimuth of nan"),
-        (("--output", "x.npy", "--distance", "800"), "a distance of 800 m"),
+        (("--output", "x.npy", "--front", "-z"), "--up and --front are for a mesh file"),
+        (("--output", "x.npy", "--azimuth", "nan"), "--azimuth=nan"),
         (
             ("--output", "x.npy", "--diagonal", "5"),
-            "a distance of 0.8 m from an object of 5 m: 7.5 to 100 m are plausible; change the",
-        ),
-        (
-            ("--output", "x.npy", "--distance", "0.01"),
-            "a distance of 0.01 m from an object of 0.17 m: 0.255 to 3.4 m are plausible",
+            "--distance=0.8 from an object with --diagonal=5: 7.5 to 100 m are plausible",
         ),
         (("mesh.obj", "--output", "x.npy"), "give a mesh file, or --example"),
-        (("--output", "x.npy", "--seed", "1.5"), "--seed: '1.5' is no whole number"),
+        (("--output", "x.npy", "--seed", "1.5"), "--seed: '1.5' is not an integer"),
     ],
 )
 def test_what_cannot_be_rendered_is_one_line(here, capsys, more, message):
@@ -991,7 +876,10 @@ def test_characters_that_an_encoding_lacks_are_escaped(here):
 def test_a_closed_stream_is_no_traceback(here):
     done = program("nbv inspect b.safetensors >&-")
     assert done.returncode == 2
-    assert done.stderr == "nbv: error: standard output is closed: give it a file, or /dev/null\n"
+    assert (
+        done.stderr
+        == "nbv: error: standard output is closed: redirect it to a file or to /dev/null\n"
+    )
     done = program("nbv inspect b.safetensors 2>&-")
     assert done.returncode == 0
     assert done.stdout == program("nbv inspect b.safetensors").stdout
@@ -1032,16 +920,16 @@ def test_paths_are_checked_before_a_network_runs(here, capsys, monkeypatch):
     monkeypatch.setattr(Recommender, "load", lambda *_: pytest.fail("too late"))
     frames = ("recommend", "f0.npy")
     assert "--plot=x.gif" in fails(capsys, *frames, "--plot", "x.gif")
-    assert "no folder" in fails(capsys, *frames, "--plot", "pose.json/x.png")
+    assert "is a file" in fails(capsys, *frames, "--plot", "pose.json/x.png")
     assert "no-pose.npy" in fails(
         capsys, *frames, "--camera-pose", "no-pose.npy", "--axis", "0", "0", "0"
     )
     (here / "locked").mkdir(mode=0o500)
     monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "locked")
     message = fails(capsys, *frames, "--plot", "locked/x.png")
-    assert "may not be written to" in message
+    assert "is not writable" in message
     message = fails(capsys, "evaluate", "m.csv", "--output", "locked/x.csv")
-    assert "may not be written to" in message
+    assert "is not writable" in message
 
 
 def test_help_and_version_succeed(capsys):
@@ -1201,41 +1089,6 @@ def test_an_estimate_has_target_poses_where_camera_and_axis_are_known(pairs, cap
     assert np.array(rows) == pytest.approx(wanted, abs=1e-5)
 
 
-def test_a_rolled_camera_is_told_whatever_the_recommendation_is_of(pairs, capsys):
-    run(capsys, "calibrate", "pairs.csv", "--output", "table.npz")
-    # An axis that leans by 30 degrees in the image of the camera of POSE.
-    axis = f"0,0,0,0,{-np.sin(np.radians(30))},{np.cos(np.radians(30))}"
-    placed = ("--camera-pose", "pose.json", "--axis", axis)
-    (wanted,) = check_axis(POSE, (0, 0, 0), (0, -np.sin(np.radians(30)), np.cos(np.radians(30))))
-    assert "leans 30° to the right" in wanted
-    for options in (
-        ("--estimate", "90", "--table", "table.npz"),
-        ("f0.npy", "--bundle", "b.safetensors"),
-        # Nearly the same roll: the axis decides.
-        ("f0.npy", "--bundle", "b.safetensors", "--gravity", "-0.5,0.8,0"),
-    ):
-        printed = json.loads(run(capsys, "recommend", *options, *placed, "--json"))
-        assert [line for line in printed["warnings"] if "leans" in line] == [wanted]
-        assert f"warning: {wanted}" in run(capsys, "recommend", *options, *placed).splitlines()
-
-
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        (("--camera-pose", "pose.json"), "--camera-pose and --axis belong together"),
-        (("--axis", "0,0,0"), "--camera-pose and --axis belong together"),
-        (
-            ("--camera-pose", "pose.json", "--axis", "0,0,0,0,0,-1"),
-            "does the direction point up",
-        ),
-    ],
-)
-def test_an_estimate_needs_a_camera_pose_and_an_axis_that_fit(pairs, capsys, more, message):
-    run(capsys, "calibrate", "pairs.csv", "--output", "table.npz")
-    options = ("recommend", "--estimate", "90", "--table", "table.npz")
-    assert message in fails(capsys, *options, *more)
-
-
 @pytest.mark.parametrize(
     ("criterion", "unit"), [("pose_ambiguity", " nats"), ("expected_error", " degrees")]
 )
@@ -1268,8 +1121,7 @@ def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, crite
         assert "no admissible rotation" in fails(capsys, *options, *limits)
 
 
-@pytest.mark.parametrize("name", ["pairs.csv", "f0.npy", "b.safetensors"])
-def test_what_is_no_lookup_table_is_not_to_be_deleted(pairs, capsys, name):
-    message = fails(capsys, "recommend", "--estimate", "90", "--table", name)
-    assert "no lookup table; give the .npz file that nbv calibrate wrote" in message
+def test_what_is_no_lookup_table_is_not_to_be_deleted(pairs, capsys):
+    message = fails(capsys, "recommend", "--estimate", "90", "--table", "pairs.csv")
+    assert "not a lookup table; give the .npz file that nbv calibrate wrote" in message
     assert "delete" not in message

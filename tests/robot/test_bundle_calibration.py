@@ -1,4 +1,4 @@
-"""What held-out turns teach about a network."""
+"""What held-out sweeps teach about a network."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from nbv.errors import UserError
 from nbv.robot.calibration import (
     DENSITY,
     LEAST_LIMIT,
-    PRIOR_TURNS,
+    PRIOR_SWEEPS,
     paper_tables,
     recalibrated,
     temperature_of,
     without_offset,
 )
-from nbv.robot.ood import unfamiliarity
-from nbv.robot.pair_distributions import WIDEST_GAP_DEG, bin_apart
+from nbv.robot.network import Sweep
+from nbv.robot.ood import ood_score
+from nbv.robot.pairs import WIDEST_GAP_DEG, bin_apart
 from nbv.robot.recommender import Recommender
-from nbv.robot.sweeps import Turn
 
 AZIMUTHS = np.arange(BINS) * WIDTH
 # Where the choice of a density does not matter.
 ONE_DENSITY = {**DENSITY, "bandwidths_deg": [8], "pseudo_observations": [10]}
 
 
-def turn(
+def sweep(
     name="a", seed=0, azimuth_deg=AZIMUTHS, elevation=0.0, logits=None, codes=None, sequence="1"
 ):
     rng = np.random.default_rng(seed)
@@ -44,7 +44,7 @@ def turn(
         aim = 3.0 * np.cos(np.radians(classes - np.asarray(azimuth_deg)[:, None]))
         logits = aim + rng.normal(0, 0.5, (n, BINS))
     codes = random_codes(rng, n) if codes is None else codes
-    return Turn(name, sequence, elevation, np.asarray(azimuth_deg, float), logits, codes)
+    return Sweep(name, sequence, elevation, np.asarray(azimuth_deg, float), logits, codes)
 
 
 def without_common_error(logits):
@@ -119,7 +119,7 @@ def test_a_sure_network_stays_right(offset):
 @pytest.mark.parametrize("views", [[0], [0, 180], list(range(0, 340, 5)), list(range(10, 355, 15))])
 def test_a_gap_is_refused(views):
     views = np.array(views, dtype=float)
-    with pytest.raises(UserError, match="° apart somewhere on the turn") as error:
+    with pytest.raises(UserError, match="views leave a gap of ") as error:
         bin_apart(views, np.full((len(views), BINS), 1 / BINS))
     widest = np.diff(np.sort(views), append=views.min() + 360).max()
     assert f"{widest:.0f}°" in str(error.value)
@@ -154,13 +154,13 @@ def test_the_temperature_of_samples_is_found(temperature):
     p /= p.sum(axis=1, keepdims=True)
     truth = np.array([rng.choice(BINS, p=row) for row in p]) * WIDTH
     halves = [
-        turn(azimuth_deg=truth[part], logits=logits[part]) for part in (np.s_[:1500], np.s_[1500:])
+        sweep(azimuth_deg=truth[part], logits=logits[part]) for part in (np.s_[:1500], np.s_[1500:])
     ]
     assert temperature_of(halves) == pytest.approx(temperature, rel=0.1)
 
 
 def test_logits_that_grow_raise_the_temperature():
-    one, other = turn(), turn(logits=5 * turn().logits)
+    one, other = sweep(), sweep(logits=5 * sweep().logits)
     assert temperature_of([other]) == pytest.approx(5 * temperature_of([one]), rel=1e-3)
 
 
@@ -189,32 +189,32 @@ def test_each_elevation_has_the_lookup_table_of_its_own_pairs(bundle):
 
 def test_a_bundle_is_calibrated_again(bundle):
     logits = [without_common_error(2 * t) for t in soft_turns(np.random.default_rng(5), 3)]
-    turns = [
-        turn("x", logits=logits[0], elevation=10.0),
-        turn("x", logits=logits[1], elevation=np.nan),
-        turn("y", logits=logits[2], elevation=40.0),
+    sweeps = [
+        sweep("x", logits=logits[0], elevation=10.0),
+        sweep("x", logits=logits[1], elevation=np.nan),
+        sweep("y", logits=logits[2], elevation=40.0),
     ]
-    found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY)
+    found = recalibrated(bundle, sweeps, "recording.csv", ONE_DENSITY)
     assert found.object_ids == ("x", "x", "y", *bundle.object_ids)
     assert np.array_equal(
         found.elevation_deg, [10.0, np.nan, 40.0, *bundle.elevation_deg], equal_nan=True
     )
-    assert found.elevation_deg.dtype == found.turn_weight.dtype == np.float32
-    # The pseudo-observations have the weight that they had next to the bundle's own turns.
-    assert np.array_equal(found.turn_weight[3:], bundle.turn_weight)
-    assert found.turn_weight[:3] == pytest.approx(len(bundle.object_ids) / PRIOR_TURNS)
-    # The bundle's own turns stay, as they are at the new temperature.
+    assert found.elevation_deg.dtype == found.sweep_weights.dtype == np.float32
+    # The pseudo-observations have the weight that they had next to the bundle's own sweeps.
+    assert np.array_equal(found.sweep_weights[3:], bundle.sweep_weights)
+    assert found.sweep_weights[:3] == pytest.approx(len(bundle.object_ids) / PRIOR_SWEEPS)
+    # The bundle's own sweeps stay, as they are at the new temperature.
     prior = np.log(bundle.distributions.astype(float)) * bundle.temperature / found.temperature
     prior -= np.log(np.exp(prior).sum(axis=-1, keepdims=True))
     assert np.log(found.distributions[3:]) == pytest.approx(prior, abs=1e-3)
     for row, own in zip(found.distributions[:3], logits, strict=True):
         assert row == pytest.approx(from_logits(own, found.temperature), rel=1e-5)
-    known = bundle.familiarity
-    scores = np.concatenate([unfamiliarity(known, one.codes, one.logits) for one in turns])
+    known = bundle.ood
+    scores = np.concatenate([ood_score(known, one.codes, one.logits) for one in sweeps])
     limit = max(np.quantile(scores, 0.95), LEAST_LIMIT)
-    assert found.familiarity.threshold == pytest.approx(limit * known.threshold)
-    assert np.array_equal(found.familiarity.references, known.references)
-    # Each turn counts for the nearest table; without an elevation, for the lowest.
+    assert found.ood.threshold == pytest.approx(limit * known.threshold)
+    assert np.array_equal(found.ood.references, known.references)
+    # Each sweep counts for the nearest table; without an elevation, for the lowest.
     of_table = np.array([0.0, 0.0, 30.0, *bundle.elevation_deg])
     wanted = paper_tables(of_table, found.distributions, ONE_DENSITY)
     assert found.paper.elevation_deg.tolist() == bundle.paper.elevation_deg.tolist() == [0.0, 30.0]
@@ -227,13 +227,13 @@ def test_a_bundle_is_calibrated_again(bundle):
 
 @pytest.mark.parametrize("zero", [1.0, -9.0, 90.0])
 def test_the_zero_of_the_turntable_does_not_matter(bundle, zero):
-    """Nor whether several turns have several."""
-    turns = [turn("x", 1), turn("y", 2, azimuth_deg=AZIMUTHS + 4.0)]
+    """Nor whether several sweeps have several."""
+    sweeps = [sweep("x", 1), sweep("y", 2, azimuth_deg=AZIMUTHS + 4.0)]
     moved = [
-        replace(turns[0], azimuth_deg=(turns[0].azimuth_deg + zero) % 360),
-        replace(turns[1], azimuth_deg=(turns[1].azimuth_deg - 2 * zero) % 360),
+        replace(sweeps[0], azimuth_deg=(sweeps[0].azimuth_deg + zero) % 360),
+        replace(sweeps[1], azimuth_deg=(sweeps[1].azimuth_deg - 2 * zero) % 360),
     ]
-    found, wanted = (recalibrated(bundle, each, "r", ONE_DENSITY) for each in (moved, turns))
+    found, wanted = (recalibrated(bundle, each, "r", ONE_DENSITY) for each in (moved, sweeps))
     assert found.temperature == pytest.approx(wanted.temperature)
     assert found.distributions == pytest.approx(wanted.distributions, abs=1e-6)
     assert np.array_equal(found.paper.rotation_deg, wanted.paper.rotation_deg)
@@ -241,7 +241,7 @@ def test_the_zero_of_the_turntable_does_not_matter(bundle, zero):
 
 @pytest.mark.parametrize("temperature", [0.2, 1.0])
 def test_the_offset_is_that_of_the_estimates_at_the_temperature(temperature):
-    given = turn("x", 1, azimuth_deg=AZIMUTHS + 4.0)
+    given = sweep("x", 1, azimuth_deg=AZIMUTHS + 4.0)
     estimates = mean_direction_deg(from_logits(given.logits, temperature))
     errors = (estimates - given.azimuth_deg + 180) % 360 - 180
     wanted = (given.azimuth_deg + np.median(errors)) % 360
@@ -251,24 +251,24 @@ def test_the_offset_is_that_of_the_estimates_at_the_temperature(temperature):
 
 @pytest.mark.parametrize("azimuth_deg", [-AZIMUTHS, np.radians(AZIMUTHS), 7.0 * AZIMUTHS])
 def test_azimuths_that_estimates_do_not_follow_stay(azimuth_deg):
-    given = replace(turn("x", 1), azimuth_deg=azimuth_deg % 360)
+    given = replace(sweep("x", 1), azimuth_deg=azimuth_deg % 360)
     assert without_offset(given, 1.0) is given
 
 
 def test_azimuths_in_radians_are_named_for_a_bundle_too(bundle):
-    given = replace(turn("x", 1), azimuth_deg=np.radians(AZIMUTHS))
+    given = replace(sweep("x", 1), azimuth_deg=np.radians(AZIMUTHS))
     with pytest.raises(UserError, match="these azimuths seem to be radians"):
         recalibrated(bundle, [given], "r", ONE_DENSITY)
 
 
 def test_calibrations_one_after_the_other_weigh_turns_as_one_with_all(bundle):
     logits = 2 * soft_turns(np.random.default_rng(5), 3)
-    first, *others = (turn(str(place), logits=rows) for place, rows in enumerate(logits))
+    first, *others = (sweep(str(place), logits=rows) for place, rows in enumerate(logits))
     twice = recalibrated(bundle, [first], "one.csv", ONE_DENSITY)
     twice = recalibrated(twice, others, "others.csv", ONE_DENSITY)
     once = recalibrated(bundle, [*others, first], "all.csv", ONE_DENSITY)
     assert twice.object_ids == once.object_ids
-    assert np.array_equal(twice.turn_weight, once.turn_weight)
+    assert np.array_equal(twice.sweep_weights, once.sweep_weights)
     assert twice.temperature == pytest.approx(once.temperature, rel=0.02)
 
 
@@ -280,31 +280,33 @@ def log_likelihood_at(temperature: float, logits, azimuth_deg) -> float:
     return float(np.mean([row[c] for row, c in zip(logs, place, strict=True)]))
 
 
-@pytest.mark.parametrize("n_turns", [1, 40])
-def test_the_temperature_is_the_likeliest_of_turns_and_of_the_bundles_own(bundle, n_turns):
-    """The bundle's turns together count as `PRIOR_TURNS` of the others."""
-    logits = [without_common_error(5 * t) for t in soft_turns(np.random.default_rng(6), n_turns)]
-    turns = [turn(str(place), logits=rows) for place, rows in enumerate(logits)]
-    found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY).temperature
+@pytest.mark.parametrize("n_sweeps", [1, 40])
+def test_the_temperature_is_the_likeliest_of_turns_and_of_the_bundles_own(bundle, n_sweeps):
+    """The bundle's sweeps together count as `PRIOR_SWEEPS` of the others."""
+    logits = [without_common_error(5 * t) for t in soft_turns(np.random.default_rng(6), n_sweeps)]
+    sweeps = [sweep(str(place), logits=rows) for place, rows in enumerate(logits)]
+    found = recalibrated(bundle, sweeps, "recording.csv", ONE_DENSITY).temperature
     own = [bundle.temperature * np.log(rows.astype(float)) for rows in bundle.distributions]
 
     def total(temperature: float) -> float:
         of_own = [log_likelihood_at(temperature, rows, AZIMUTHS) for rows in own]
-        of_turns = [log_likelihood_at(temperature, t.logits, t.azimuth_deg) for t in turns]
-        return PRIOR_TURNS * float(np.mean(of_own)) + sum(of_turns)
+        of_sweeps = [log_likelihood_at(temperature, t.logits, t.azimuth_deg) for t in sweeps]
+        return PRIOR_SWEEPS * float(np.mean(of_own)) + sum(of_sweeps)
 
     assert total(found) > max(total(found * factor) for factor in (0.97, 0.99, 1.01, 1.03))
-    ends = sorted([bundle.temperature, temperature_of(turns)])
+    ends = sorted([bundle.temperature, temperature_of(sweeps)])
     assert ends[0] < found < ends[1]
-    assert (abs(found - temperature_of(turns)) < abs(found - bundle.temperature)) == (n_turns == 40)
+    assert (abs(found - temperature_of(sweeps)) < abs(found - bundle.temperature)) == (
+        n_sweeps == 40
+    )
 
 
 def test_one_turn_does_not_decide_the_temperature(bundle):
     """One that is nearly always right would make a bundle three times as sure."""
-    easy = turn("x", logits=3.0 * np.eye(BINS) + np.zeros((BINS, BINS)))
+    easy = sweep("x", logits=3.0 * np.eye(BINS) + np.zeros((BINS, BINS)))
     alone = temperature_of([easy])
     found = recalibrated(bundle, [easy], "recording.csv", ONE_DENSITY).temperature
-    own = temperature_of([turn("y", logits=bundle.temperature * np.log(bundle.distributions[0]))])
+    own = temperature_of([sweep("y", logits=bundle.temperature * np.log(bundle.distributions[0]))])
     assert alone < found < 2 * max(own, bundle.temperature)
     assert found > 3 * alone
 
@@ -312,15 +314,15 @@ def test_one_turn_does_not_decide_the_temperature(bundle):
 def test_a_paper_table_without_new_turns_stays(bundle):
     marked = replace(bundle.paper, rotation_deg=np.full((2, 360), 77, np.int16))
     known = replace(bundle, paper=marked)
-    found = recalibrated(known, [turn("x", elevation=31.0)], "recording.csv", ONE_DENSITY)
+    found = recalibrated(known, [sweep("x", elevation=31.0)], "recording.csv", ONE_DENSITY)
     assert (found.paper.rotation_deg[0] == 77).all()
     assert (found.paper.rotation_deg[1] != 77).any()
     assert (known.paper.rotation_deg == 77).all()
 
 
 def test_without_elevations_all_turns_count_alike(bundle):
-    turns = [turn("x", 1, elevation=np.nan), turn("y", 2, elevation=np.nan)]
-    found = recalibrated(bundle, turns, "recording.csv", ONE_DENSITY)
+    sweeps = [sweep("x", 1, elevation=np.nan), sweep("y", 2, elevation=np.nan)]
+    found = recalibrated(bundle, sweeps, "recording.csv", ONE_DENSITY)
     found = replace(found, elevation_deg=np.full(len(found.elevation_deg), np.nan, np.float32))
     codes = np.random.default_rng(0).integers(0, 256, (1, 32, 32)).astype(np.uint8)
     recommender = Recommender(found)
@@ -330,7 +332,7 @@ def test_without_elevations_all_turns_count_alike(bundle):
 
 def test_the_cameras_focal_length_is_kept_where_it_is_known(bundle):
     unknown, *known = (
-        replace(turn(name), focal_px=f) for name, f in zip("abc", (np.nan, 610, 620), strict=True)
+        replace(sweep(name), focal_px=f) for name, f in zip("abc", (np.nan, 610, 620), strict=True)
     )
     assert recalibrated(bundle, [unknown], "r", ONE_DENSITY).focal_px == bundle.focal_px
     assert recalibrated(bundle, [unknown, *known], "r", ONE_DENSITY).focal_px == 615
@@ -338,4 +340,4 @@ def test_the_cameras_focal_length_is_kept_where_it_is_known(bundle):
 
 def test_a_turn_with_a_gap_does_not_calibrate(bundle):
     with pytest.raises(UserError, match=r"^object 'b', sequence '1': views"):
-        recalibrated(bundle, [turn(), turn("b", azimuth_deg=AZIMUTHS[3:])], "recording.csv")
+        recalibrated(bundle, [sweep(), sweep("b", azimuth_deg=AZIMUTHS[3:])], "recording.csv")

@@ -21,10 +21,10 @@ from nbv.robot.bundle import (
     PROBABILITY_STEP,
     Bundle,
     BundleError,
-    as_steps,
-    from_steps,
+    dequantize_logp,
+    quantize_logp,
 )
-from nbv.robot.ood import unfamiliarity
+from nbv.robot.ood import ood_score
 from nbv.robot.recommender import Recommender, bundle_path
 
 # Round trips
@@ -33,9 +33,9 @@ from nbv.robot.recommender import Recommender, bundle_path
 def test_everything_but_distributions_comes_back_exactly(bundle, bundle_file):
     found = Bundle.load(bundle_file)
     for name in ("mean", "basis", "references", "scales"):
-        wanted = getattr(bundle.familiarity, name)
-        assert np.array_equal(getattr(found.familiarity, name), wanted), name
-    assert found.familiarity.threshold == bundle.familiarity.threshold
+        wanted = getattr(bundle.ood, name)
+        assert np.array_equal(getattr(found.ood, name), wanted), name
+    assert found.ood.threshold == bundle.ood.threshold
     assert np.array_equal(found.elevation_deg, bundle.elevation_deg)
     for name in (
         *("category", "estimator", "camera", "diagonal_m", "extent_m", "focal_px", "temperature"),
@@ -58,7 +58,7 @@ def test_a_second_round_changes_nothing(bundle_file, tmp_path):
     once = Bundle.load(bundle_file)
     once.save(tmp_path / "twice.safetensors")
     twice = Bundle.load(tmp_path / "twice.safetensors")
-    apart = as_steps(once.distributions).astype(int) - as_steps(twice.distributions)
+    apart = quantize_logp(once.distributions).astype(int) - quantize_logp(twice.distributions)
     assert np.abs(apart).max() <= 1
     assert once.network == twice.network
 
@@ -74,25 +74,25 @@ def test_it_does_not_matter_how_arrays_lie_in_memory(bundle, bundle_file, tmp_pa
     def other_order(array):
         return np.asfortranarray(array)
 
-    familiarity = replace(
-        bundle.familiarity,
-        basis=other_order(bundle.familiarity.basis),
-        references=other_order(bundle.familiarity.references),
+    model = replace(
+        bundle.ood,
+        basis=other_order(bundle.ood.basis),
+        references=other_order(bundle.ood.references),
     )
     changed = replace(
         bundle,
         distributions=other_order(bundle.distributions),
         elevation_deg=np.repeat(bundle.elevation_deg, 2)[::2],
-        familiarity=familiarity,
+        ood=model,
     )
     changed.save(tmp_path / "a.safetensors")
     assert (tmp_path / "a.safetensors").read_bytes() == bundle_file.read_bytes()
 
 
-def test_what_is_familiar_stays_familiar(bundle, bundle_file, rng):
+def test_the_ood_score_survives_the_file(bundle, bundle_file, rng):
     codes, logits = random_codes(rng, 50), rng.normal(0, 1, (50, bundle.n_bins))
-    loaded = Bundle.load(bundle_file).familiarity
-    scores = [unfamiliarity(known, codes, logits) for known in (bundle.familiarity, loaded)]
+    loaded = Bundle.load(bundle_file).ood
+    scores = [ood_score(known, codes, logits) for known in (bundle.ood, loaded)]
     assert np.array_equal(*scores)
 
 
@@ -124,18 +124,18 @@ def test_a_bundle_serves_from_its_file(recommender, bundle_file):
 @given(arrays(np.float64, (4, 24), elements=st.floats(1e-6, 1.0)))
 def test_steps_keep_probabilities_within_half_a_step(values):
     rows = values / values.sum(axis=1, keepdims=True)
-    steps = as_steps(rows)
+    steps = quantize_logp(rows)
     assert steps.dtype == np.uint8
     kept = np.exp(-PROBABILITY_STEP * steps.astype(float))
     in_range = rows > np.exp(-255 * PROBABILITY_STEP)
     assert np.abs(np.log(kept / rows))[in_range].max() <= PROBABILITY_STEP / 2 + 1e-9
-    assert from_steps(steps) == pytest.approx(kept / kept.sum(axis=1, keepdims=True), rel=1e-4)
+    assert dequantize_logp(steps) == pytest.approx(kept / kept.sum(axis=1, keepdims=True), rel=1e-4)
 
 
 @given(arrays(np.uint8, (3, 16)))
 def test_steps_of_steps_are_the_same(steps):
     """Up to the same number of steps in the whole row, which the sum of 1 takes off."""
-    again = as_steps(from_steps(steps)).astype(int)
+    again = quantize_logp(dequantize_logp(steps)).astype(int)
     apart = again - steps
     inside = (again < 255) & (steps < 255)
     for row, kept in zip(apart, inside, strict=True):
@@ -144,7 +144,7 @@ def test_steps_of_steps_are_the_same(steps):
 
 
 def test_impossible_and_certain_have_steps():
-    steps = as_steps(np.array([0.0, 1e-40, 1e-6, 1.0, 1.0 + 1e-7]))
+    steps = quantize_logp(np.array([0.0, 1e-40, 1e-6, 1.0, 1.0 + 1e-7]))
     assert steps.tolist() == [255, 255, 255, 0, 0]
     assert np.exp(-255 * PROBABILITY_STEP) == pytest.approx(1e-6, rel=0.1)
 
@@ -207,9 +207,9 @@ def test_other_files_are_no_bundles(tmp_path):
     np.save(tmp_path / "a.npy", np.ones(5))
     refused(tmp_path / "a.npy")
     plain = safetensors.numpy.save({"weights": np.ones(5)})
-    assert "no bundle of nbv" in refused(written(tmp_path / "b.safetensors", plain), "no-bundle")
+    assert "not a bundle of nbv" in refused(written(tmp_path / "b.safetensors", plain), "no-bundle")
     other = safetensors.numpy.save({"weights": np.ones(5)}, metadata={"format": "pt"})
-    assert "no bundle of nbv" in refused(written(tmp_path / "c.safetensors", other), "no-bundle")
+    assert "not a bundle of nbv" in refused(written(tmp_path / "c.safetensors", other), "no-bundle")
 
 
 def test_an_estimator_is_no_bundle(tmp_path):
@@ -223,7 +223,7 @@ def test_an_estimator_is_no_bundle(tmp_path):
     torch.manual_seed(0)
     estimator = Estimator(build_network(settings(), SIDE), settings(), SIDE, ["a"])
     save_estimator(tmp_path / "e.safetensors", estimator, choose_hardware("cpu", "float32"))
-    assert "is an estimator, no bundle" in refused(tmp_path / "e.safetensors", "no-bundle")
+    assert "is an estimator and not a bundle" in refused(tmp_path / "e.safetensors", "no-bundle")
 
 
 def test_a_newer_format_says_what_to_do(bundle_file, tmp_path):
@@ -244,7 +244,7 @@ def test_an_older_format_says_what_to_do(bundle_file, tmp_path, version):
 
 def test_a_bundle_without_its_digest_is_refused(bundle_file, tmp_path):
     path = with_about(bundle_file, tmp_path / "a.safetensors", sha256="")
-    assert "not the bytes that were written" in refused(path)
+    assert "its checksum differs" in refused(path)
     assert Bundle.load(with_about(bundle_file, tmp_path / "b.safetensors")).category == "mug"
 
 
@@ -284,15 +284,15 @@ def test_a_bundle_without_its_digest_is_refused(bundle_file, tmp_path):
 )
 def test_metadata_that_makes_no_sense_is_one_line(bundle_file, tmp_path, changes):
     path = with_about(bundle_file, tmp_path / "a.safetensors", **changes)
-    assert "no sound bundle" in refused(path)
+    assert "is damaged" in refused(path)
 
 
-@pytest.mark.parametrize("name", ["familiarity", "elevation_deg", "turn_weight"])
+@pytest.mark.parametrize("name", ["ood", "elevation_deg", "sweep_weights"])
 def test_numbers_that_are_not_finite_are_one_line(bundle, tmp_path, name):
     changed = {
-        "familiarity": replace(bundle.familiarity, mean=np.full(512, np.inf, np.float32)),
+        "ood": replace(bundle.ood, mean=np.full(512, np.inf, np.float32)),
         "elevation_deg": bundle.elevation_deg + np.float32(np.inf),
-        "turn_weight": bundle.turn_weight * np.float32(np.inf),
+        "sweep_weights": bundle.sweep_weights * np.float32(np.inf),
     }
     replace(bundle, **{name: changed[name]}).save(tmp_path / "a.safetensors")
     assert "not finite" in refused(tmp_path / "a.safetensors")
@@ -303,18 +303,18 @@ def test_arrays_that_do_not_fit_are_one_line(bundle, tmp_path):
         {"distributions": bundle.distributions[:-1]},
         {"distributions": bundle.distributions[:, :-1]},
         {"elevation_deg": bundle.elevation_deg[:-1]},
-        {"turn_weight": bundle.turn_weight[:-1]},
-        {"turn_weight": np.zeros_like(bundle.turn_weight)},
+        {"sweep_weights": bundle.sweep_weights[:-1]},
+        {"sweep_weights": np.zeros_like(bundle.sweep_weights)},
         {"object_ids": bundle.object_ids[:-1]},
         {"estimator": {**bundle.estimator, "n_classes": 12}},
         {"paper": replace(bundle.paper, rotation_deg=bundle.paper.rotation_deg + np.int16(9999))},
-        {"familiarity": replace(bundle.familiarity, mean=bundle.familiarity.mean[:-1])},
-        {"familiarity": replace(bundle.familiarity, basis=bundle.familiarity.basis[:, :-1])},
-        {"familiarity": replace(bundle.familiarity, references=bundle.familiarity.references[:0])},
-        {"familiarity": replace(bundle.familiarity, scales=bundle.familiarity.scales[:1])},
+        {"ood": replace(bundle.ood, mean=bundle.ood.mean[:-1])},
+        {"ood": replace(bundle.ood, basis=bundle.ood.basis[:, :-1])},
+        {"ood": replace(bundle.ood, references=bundle.ood.references[:0])},
+        {"ood": replace(bundle.ood, scales=bundle.ood.scales[:1])},
     ):
         replace(bundle, **changes).save(tmp_path / "a.safetensors")
-        assert "no sound bundle" in refused(tmp_path / "a.safetensors")
+        assert "is damaged" in refused(tmp_path / "a.safetensors")
 
 
 def test_random_damage_is_one_line_or_harmless(bundle, bundle_file, tmp_path):
@@ -361,7 +361,7 @@ def test_one_bit_anywhere_in_an_array_is_noticed(bundle_file, tmp_path, seed):
     for _ in range(20):
         place, bit = int(rng.integers(header, len(content))), 1 << int(rng.integers(0, 8))
         content[place] ^= bit
-        assert "no sound bundle" in refused(written(tmp_path / "a.safetensors", bytes(content)))
+        assert "is damaged" in refused(written(tmp_path / "a.safetensors", bytes(content)))
         content[place] ^= bit
     Bundle.load(written(tmp_path / "a.safetensors", bytes(content)))
 
@@ -395,5 +395,5 @@ def test_without_shipped_bundles_a_name_is_one_line(tmp_path, monkeypatch):
     from nbv.robot import recommender as module
 
     monkeypatch.setattr(module.resources, "files", lambda package: tmp_path)
-    with pytest.raises(UserError, match="no bundle comes with this nbv"):
+    with pytest.raises(UserError, match="this nbv ships no bundle"):
         bundle_path("mug")

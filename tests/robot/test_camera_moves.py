@@ -14,8 +14,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from nbv.data.camera import viewpoint_frames
-from nbv.errors import UserError
-from nbv.robot.errors import FrameError
+from nbv.errors import FrameError, UserError
 from nbv.robot.moves import (
     ROLL_LIMIT_DEG,
     as_pose,
@@ -211,7 +210,7 @@ def test_the_direction_down_in_the_camera_tells_its_elevation(elevation, azimuth
 
 @pytest.mark.parametrize("down", [(0, -9.81, 0), (0, -1, 1), (3, -1, 1), (0, -0.2, -1)])
 def test_gravity_does_not_point_up_in_the_image(down):
-    with pytest.raises(UserError, match="points up, and y is down in the optical frame"):
+    with pytest.raises(UserError, match="points up, but y is down in the optical frame"):
         elevation_from_gravity(down)
 
 
@@ -293,17 +292,17 @@ def test_what_is_no_rotation_with_a_translation_is_refused(name):
 
 
 @pytest.mark.parametrize(
-    ("place", "value", "message"),
+    ("row", "value", "message"),
     [
-        ((3, 3), 2.0, "camera pose: the last row is 0 0 0 2, and that of a pose is 0 0 0 1"),
-        ((3, 0), 0.25, "camera pose: the last row is 0.25 0 0 1, and"),
+        ((3, 3), 2.0, "camera pose: the last row is 0 0 0 2, but a pose has 0 0 0 1"),
+        ((3, 0), 0.25, "camera pose: the last row is 0.25 0 0 1, but"),
         ((1, 1), np.nan, "camera pose: row 2 is 0 nan 0 0; give finite numbers"),
         ((3, 2), -np.inf, "camera pose: row 4 is 0 0 -inf 1; give finite numbers"),
     ],
 )
-def test_a_wrong_row_of_a_pose_is_shown(place, value, message):
+def test_a_wrong_row_of_a_pose_is_shown(row, value, message):
     pose = np.eye(4)
-    pose[place] = value
+    pose[row] = value
     with pytest.raises(UserError, match=message):
         as_pose(pose)
 
@@ -326,7 +325,7 @@ def test_what_is_no_numbers_is_refused(values):
 def test_a_pose_is_within_reach():
     pose = random_pose(1)
     pose[1, 3] = 1e300
-    with pytest.raises(UserError, match=r"camera pose: a place 1e\+300 m away; give metres"):
+    with pytest.raises(UserError, match=r"camera pose: 1e\+300 m away; give metres"):
         as_pose(pose)
 
 
@@ -339,7 +338,7 @@ def test_rounded_numbers_are_a_pose():
 
 @given(mask=st.lists(st.booleans(), min_size=1, max_size=400).filter(any))
 def test_an_entry_of_a_mask_is_its_share_of_the_circle(mask):
-    wanted = [360 * place / len(mask) for place, may in enumerate(mask) if may]
+    wanted = [360 * k / len(mask) for k, may in enumerate(mask) if may]
     assert as_rotations(mask) == pytest.approx(wanted)
     assert as_rotations(np.array(wanted)) == pytest.approx(wanted)
 
@@ -347,13 +346,13 @@ def test_an_entry_of_a_mask_is_its_share_of_the_circle(mask):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ([], "give one at least"),
-        ([False, False], "give one at least"),
-        (np.zeros(0, dtype=bool), "give one at least"),
-        ([30.0, np.nan], "one is no finite number of degrees"),
+        ([], "give at least one"),
+        ([False, False], "give at least one"),
+        (np.zeros(0, dtype=bool), "give at least one"),
+        ([30.0, np.nan], "one is not finite"),
         (np.ones((4, 4), dtype=bool), "a mask of 2 axes"),
-        (["30", "60"], "neither numbers of degrees nor booleans"),
-        ([1j], "neither numbers of degrees nor booleans"),
+        (["30", "60"], "give degrees or booleans"),
+        ([1j], "give degrees or booleans"),
         ([[1.0], [2.0, 3.0]], "rows of different lengths"),
     ],
 )
@@ -507,22 +506,3 @@ def test_usual_mistakes_of_a_camera_pose_are_refused(mistake, elevation, azimuth
     check_axis(pose, centre, up, seen, 0.17)
     with pytest.raises(FrameError, match="optical frame"):
         check_axis(mistake(pose), centre, up, seen, 0.17)
-
-
-@pytest.mark.parametrize("direction", [(0, 0, -1), (1, 0, 0), (0, -1, 0)])
-def test_an_axis_that_lies_or_points_down_is_refused(direction):
-    centre = np.array([0.5, 0.2, 0.1])
-    with pytest.raises(FrameError, match="does the direction point up"):
-        check_axis(camera_at(30.0, 130.0, 0.7, centre), centre, direction)
-
-
-@pytest.mark.parametrize(("elevation", "azimuth"), [(0.0, 10.0), (30.0, 130.0), (60.0, 250.0)])
-def test_a_pose_of_another_frame_is_refused_without_a_position_too(elevation, azimuth):
-    centre = np.array([0.5, 0.2, 0.1])
-    with pytest.raises(FrameError, match="optical frame"):
-        check_axis(link_frame(camera_at(elevation, azimuth, 0.7, centre)), centre, (0, 0, 1))
-
-
-def test_an_axis_without_a_direction_is_refused_with_an_object_too():
-    with pytest.raises(UserError, match="a direction that is not 0"):
-        check_axis(np.eye(4), (0, 0, 0), (0, 0, 0), (0, 0, 1), 0.17)

@@ -13,8 +13,8 @@ from scipy import ndimage
 
 from nbv.data.camera import Camera, viewpoint_frames
 from nbv.data.depth_codes import STEP, ZERO_CODE, decode_depth
+from nbv.errors import FrameError
 from nbv.robot.crop import BEHIND_SURFACE, crop_frame, pixel_step
-from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
 
 DIAGONAL_M = 0.125
@@ -411,7 +411,7 @@ def test_an_object_of_another_size_is_refused():
     depth = frame(20.0, 200.0, 5.0) * DIAGONAL_M
     for extent_m in ((1.3 * DIAGONAL_M, 2 * DIAGONAL_M), (0.1 * DIAGONAL_M, 0.5 * DIAGONAL_M)):
         message = refused("implausible-size", depth, extent_m=extent_m)
-        assert "mask the object alone" in message
+        assert "mask only the object" in message
         assert "`depth_scale`" not in message
 
 

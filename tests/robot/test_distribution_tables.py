@@ -16,13 +16,12 @@ from tests.cli.test_command_line import POSE, fails, run, same_move
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.core.angles import circular_distance_deg
 from nbv.core.lookup import LookupTable
-from nbv.errors import UserError
+from nbv.core.selection import AFFINITY
+from nbv.errors import FrameError, UserError
 from nbv.experiment.config import load_config
-from nbv.robot.distribution_table import AFFINITY, DistributionTable
-from nbv.robot.errors import FrameError
+from nbv.robot.distribution_table import DistributionTable
 from nbv.robot.moves import moved_camera
-from nbv.robot.pair_distributions import read_distributions
-from nbv.robot.pairs import PairTable
+from nbv.robot.pairs import PairTable, read_distributions
 from nbv.robot.recommender import Recommender
 
 AZIMUTHS = np.arange(BINS) * WIDTH
@@ -41,7 +40,7 @@ def turns(seed=0, n=3, sharpness=1.0):
 
 @pytest.fixture(scope="module")
 def table():
-    return DistributionTable.of_pairs(turns())
+    return DistributionTable.from_pairs(turns())
 
 
 def test_the_affinity_is_that_of_the_experiments():
@@ -64,7 +63,7 @@ def test_it_answers_as_a_bundle_does_of_frames(bundle, rotations):
     assert found.error_after_deg == pytest.approx(wanted.error_after_deg, rel=1e-3)
     assert found.move.rotation_deg == wanted.move.rotation_deg
     assert found.n_views == wanted.n_views == len(rotations)
-    assert np.isnan(found.unfamiliarity)
+    assert np.isnan(found.ood_score)
     assert found.crops == ()
 
 
@@ -104,7 +103,7 @@ def test_between_two_classes_an_estimator_errs_by_up_to_half_a_class(n_classes):
     azimuths = np.arange(0.0, 360.0)
     nearest = np.floor(azimuths / width + 0.5).astype(int) % n_classes
     rows = np.eye(n_classes)[nearest] * 0.97 + 0.03 / n_classes
-    table = DistributionTable.of_pairs({"a": (azimuths, rows), "b": (azimuths, rows)})
+    table = DistributionTable.from_pairs({"a": (azimuths, rows), "b": (azimuths, rows)})
     n_bins = table.distributions.shape[-1]
     assert 360 / n_bins <= 6
     assert n_bins % n_classes == 0
@@ -116,7 +115,7 @@ def test_between_two_classes_an_estimator_errs_by_up_to_half_a_class(n_classes):
         assert best == pytest.approx(width / 4, rel=1e-6)
     else:  # Between two classes a view halves the error, and none is without error.
         assert 0.02 * width < best < 0.5 * width / 4
-    more = DistributionTable.of_pairs(
+    more = DistributionTable.from_pairs(
         {"a": (azimuths, np.eye(120)[nearest * 0 + 3] * 0.5 + 0.5 / 120)}
     )
     assert more.distributions.shape[-1] == more.n_classes == 120
@@ -125,8 +124,8 @@ def test_between_two_classes_an_estimator_errs_by_up_to_half_a_class(n_classes):
 def test_a_temperature_at_its_limit_is_told(here, capsys):
     right = 0.1 * np.eye(BINS) + 0.9 / BINS
     certain = {"a": (AZIMUTHS, right), "b": (AZIMUTHS, right)}
-    assert "the temperature 0.05 is at its limit" in DistributionTable.of_pairs(certain).warning
-    assert DistributionTable.of_pairs(turns()).warning == ""
+    assert "the temperature 0.05 is at its limit" in DistributionTable.from_pairs(certain).warning
+    assert DistributionTable.from_pairs(turns()).warning == ""
     written(here, certain)
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     assert out.splitlines()[-1].startswith("warning: the temperature 0.05 is at its limit")
@@ -136,8 +135,8 @@ def test_a_temperature_at_its_limit_is_told(here, capsys):
 @given(power=st.floats(0.3, 6.0), seed=st.integers(0, 5))
 def test_how_sure_an_estimator_says_it_is_does_not_matter(power, seed):
     """The same probabilities to any power: another temperature, the same table and answer."""
-    plain = DistributionTable.of_pairs(turns(seed))
-    sharp = DistributionTable.of_pairs(turns(seed, sharpness=power))
+    plain = DistributionTable.from_pairs(turns(seed))
+    sharp = DistributionTable.from_pairs(turns(seed, sharpness=power))
     assert sharp.temperature == pytest.approx(power * plain.temperature, rel=2e-3)
     assert sharp.distributions == pytest.approx(plain.distributions, abs=2e-3)
 
@@ -146,11 +145,11 @@ def test_views_come_in_any_order_and_anywhere_closer_than_15_degrees():
     given_turns = turns()
     order = np.random.default_rng(0).permutation(BINS)
     shuffled = {name: (a[order], p[order]) for name, (a, p) in given_turns.items()}
-    wanted, found = (DistributionTable.of_pairs(each) for each in (given_turns, shuffled))
+    wanted, found = (DistributionTable.from_pairs(each) for each in (given_turns, shuffled))
     assert found.temperature == pytest.approx(wanted.temperature)
     assert found.distributions == pytest.approx(wanted.distributions, abs=1e-5)
-    with pytest.raises(UserError, match=r"^object '.*': views are 30° apart"):
-        DistributionTable.of_pairs({n: (a[::2], p[::2]) for n, (a, p) in given_turns.items()})
+    with pytest.raises(UserError, match=r"^object '.*': views leave a gap of 30°"):
+        DistributionTable.from_pairs({n: (a[::2], p[::2]) for n, (a, p) in given_turns.items()})
 
 
 def test_what_does_not_fit_is_one_line(table):
@@ -158,24 +157,24 @@ def test_what_does_not_fit_is_one_line(table):
     for probabilities, rotations, kind, message in (
         (p[:12] / p[:12].sum(), [0.0], UserError, "12 probabilities; calibration objects have 24"),
         (p[:3], [0.0], UserError, "8 classes or more"),
-        (2 * p, [0.0], UserError, "row 1: probabilities have the sum 2 "),
-        ([p, -p], [0.0, 90.0], UserError, "row 2, p0: a probability is below 0"),
+        (2 * p, [0.0], UserError, "row 1: probabilities sum to 2 "),
+        ([p, -p], [0.0, 90.0], UserError, "row 2, p0: a probability is negative"),
         (p, [0.0, 90.0], FrameError, "1 view and 2 rotations"),
         ([p, p], [0.0], FrameError, "2 views and 1 rotation"),
-        ([["a"] * 24], [0.0], UserError, "probabilities are numbers"),
-        (p + 0j, [0.0], UserError, "probabilities are numbers"),
+        ([["a"] * 24], [0.0], UserError, "give probabilities as numbers"),
+        (p + 0j, [0.0], UserError, "give probabilities as numbers"),
         ([p, p[:5]], [0.0, 90.0], UserError, "rows of different lengths"),
-        (100 * p, [0.0], UserError, "the sum 100 and not 1"),
+        (100 * p, [0.0], UserError, "sum to 100 instead of 1"),
         (np.log(p), [0.0], UserError, "give probabilities, not their logarithms"),
     ):
         with pytest.raises(kind, match=message):
             table.recommend(probabilities, rotations)
     for azimuths in (AZIMUTHS[:5], ["a"] * BINS, [*AZIMUTHS[1:], np.nan], AZIMUTHS[None]):
         with pytest.raises(UserError, match="object 'x': azimuths"):
-            DistributionTable.of_pairs({"x": (azimuths, turns()["o0"][1])})
+            DistributionTable.from_pairs({"x": (azimuths, turns()["o0"][1])})
     other = {"x": (np.arange(36) * 10.0, np.full((36, 36), 1 / 36)), **turns()}
     with pytest.raises(UserError, match=r"\[24, 36\] classes"):
-        DistributionTable.of_pairs(other)
+        DistributionTable.from_pairs(other)
 
 
 def test_zeros_exclude_no_pose(table):
@@ -198,7 +197,7 @@ def test_where_no_direction_is_likelier_the_error_is_90(period):
     peaked = 1e-4 + (classes % (BINS // period or 1) == 0) if period > 1 else np.ones(BINS)
     rows = np.stack([np.roll(peaked, k) for k in range(BINS)])
     rows = rows / rows.sum(axis=1, keepdims=True)
-    flat = DistributionTable.of_pairs({"a": (AZIMUTHS, rows)})
+    flat = DistributionTable.from_pairs({"a": (AZIMUTHS, rows)})
     answer = flat.recommend(rows[0])
     assert answer.expected_error_deg == pytest.approx(90.0)
     assert answer.move.expected_error_deg == pytest.approx(90.0)
@@ -241,7 +240,7 @@ def test_pairs_with_distributions_come_back_as_they_are(here):
 
 def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
-    wanted = DistributionTable.of_pairs(PairTable.load("pairs.csv").distributions)
+    wanted = DistributionTable.from_pairs(PairTable.load("pairs.csv").distributions)
     told = f"distributions: {BINS} classes, temperature {wanted.temperature:.2f}; offset "
     assert out.splitlines()[-1].startswith(told)
     printed = json.loads(run(capsys, "calibrate", "pairs.csv", "--output", "j.npz", "--json"))
@@ -261,7 +260,7 @@ def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
         capsys, "recommend", "--estimate", "20", "--table", "plain.npz"
     )
     message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "plain.npz")
-    assert "--table=plain.npz: no table of distributions" in message
+    assert "--table=plain.npz: not a table of distributions" in message
 
 
 @pytest.mark.parametrize(
@@ -295,7 +294,7 @@ def test_a_damaged_table_is_one_line(here, capsys):
     ):
         np.savez("d.npz", **(stored | {f"distribution.{name}": value}))
         message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "d.npz")
-        assert "--table=d.npz: no table of distributions" in message
+        assert "--table=d.npz: not a table of distributions" in message
 
 
 @pytest.mark.parametrize("file", ["views.csv", "views.npy"])
@@ -308,7 +307,7 @@ def test_the_command_answers_as_python_does(here, capsys, file):
     answer = table.recommend(read_distributions(file), [0.0, 90.0], max_travel_deg=120.0)
     assert printed["azimuth_deg"] == answer.azimuth_deg
     same_move(printed, answer)
-    assert printed["unfamiliarity"] is None
+    assert printed["ood_score"] is None
     assert printed["assumed_focal_px"] is None
     target = moved_camera(np.array(POSE), [0.5, 0, 0.1], [0, 0, 1], answer.move.rotation_deg)
     assert printed["target_camera_pose"] == pytest.approx(target)
@@ -355,7 +354,7 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
         (("--distribution", "pose.json", "--table", "t.npz"), "pose.json"),
         (
             ("--distribution", "views.csv", "--table", "pairs.csv"),
-            "--table=pairs.csv: no table of distributions; give the .npz file",
+            "--table=pairs.csv: not a table of distributions; give the .npz file",
         ),
         (("--distribution", "bad.npy", "--table", "t.npz"), "bad.npy cannot be read"),
         (("--distribution", "empty.npy", "--table", "t.npz"), "empty.npy cannot be read"),
@@ -371,9 +370,9 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
             lambda t: t.drop(columns="p3"),
             "23 columns of probabilities are not p0 to p22: rename 'p23'",
         ),
-        (lambda t: t.assign(p3=2.0), "row 2: probabilities have the sum"),
-        (lambda t: t.assign(p3=["x", *t["p3"][1:]]), "row 2, p3: a probability is below 0 or no"),
-        (lambda t: t.assign(p3=[*t["p3"][:-1], -0.5]), "row 73, p3: a probability is below 0"),
+        (lambda t: t.assign(p3=2.0), "row 2: probabilities sum to"),
+        (lambda t: t.assign(p3=["x", *t["p3"][1:]]), "row 2, p3: a probability is negative or not"),
+        (lambda t: t.assign(p3=[*t["p3"][:-1], -0.5]), "row 73, p3: a probability is negative"),
         (lambda t: t.rename(columns={"p3": "P3"}), "rename 'P3'"),
         (lambda t: t.rename(columns={"p3": "p_3"}), "rename 'p_3'"),
         (lambda t: t.iloc[:, :3].assign(p1=0.5), "rename 'p1'"),

@@ -65,9 +65,9 @@ def test_a_stereo_camera_has_its_own_image_and_noise():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"sensor": "stero"}, "sensor=stero: did you mean 'stereo'"),
-        ({"seed": -1}, "seed=-1: must be 0 or more"),
-        ({"distance": 0.31}, "a distance of 0.31 m: kinect measures nothing nearer than 0.33 m"),
+        ({"sensor": "stero"}, "`sensor`=stero: did you mean 'stereo'"),
+        ({"seed": -1}, "`seed`=-1: give 0 or more"),
+        ({"distance": 0.31}, "`distance_m`=0.31: kinect measures only from 0.33 m on"),
     ],
 )
 def test_what_no_camera_can_take_is_refused(more, message):
@@ -111,7 +111,7 @@ def test_a_mesh_file_is_read_with_its_axes(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("cup.npy", "", "no known kind of mesh file; give .obj, .ply, .off, .stl, .glb"),
+        ("cup.npy", "", "unknown kind of mesh file; give .obj, .ply, .off, .stl, .glb"),
         ("cup.obj", "a cup\n", "no line is a vertex, 'v x y z'; is it an OBJ file?"),
         ("cup.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "the mesh has no faces"),
         ("cup.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "all faces lie in one point"),
@@ -128,13 +128,13 @@ def test_a_file_without_a_mesh_is_one_line(tmp_path, name, content, message):
 @pytest.mark.parametrize(
     ("view", "message"),
     [
-        ((np.nan, 10.0, 0.9), "an azimuth of nan"),
-        ((np.inf, 10.0, 0.9), "an azimuth of inf"),
-        ((0.0, np.nan, 0.9), "an elevation of nan"),
-        ((0.0, 91.0, 0.9), "an elevation of 91"),
-        ((0.0, 10.0, 0.0), "a distance of 0 m"),
-        ((0.0, 10.0, -1.0), "a distance of -1 m"),
-        ((0.0, 10.0, np.nan), "a distance of nan m"),
+        ((np.nan, 10.0, 0.9), "`azimuth_deg`=nan"),
+        ((np.inf, 10.0, 0.9), "`azimuth_deg`=inf"),
+        ((0.0, np.nan, 0.9), "`elevation_deg`=nan"),
+        ((0.0, 91.0, 0.9), "`elevation_deg`=91"),
+        ((0.0, 10.0, 0.0), "`distance_m`=0"),
+        ((0.0, 10.0, -1.0), "`distance_m`=-1"),
+        ((0.0, 10.0, np.nan), "`distance_m`=nan"),
         ((0.0, 10.0, 800.0), "0.3 to 4 m are plausible"),
         ((0.0, 10.0, 0.2), "0.3 to 4 m are plausible"),
     ],

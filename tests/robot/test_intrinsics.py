@@ -11,8 +11,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nbv.errors import UserError
-from nbv.robot.errors import FrameError
+from nbv.errors import FrameError, UserError
 from nbv.robot.intrinsics import DepthCamera, Intrinsics, as_intrinsics, camera_of
 
 FX, FY, CX, CY = 572.41, 573.57, 325.26, 242.05
@@ -150,7 +149,7 @@ def test_a_scene_has_a_camera_for_each_image(tmp_path):
     assert other.intrinsics == Intrinsics(2 * FX, 2 * FY, 2 * CX, 2 * CY)
     assert other.unit_m == 0.001
     for frame in ("000004.png", "depth.png", "12_depth.png", ""):
-        with pytest.raises(UserError, match="cameras of images 3 to 12, and none for"):
+        with pytest.raises(UserError, match="cameras for images 3 to 12 but not for"):
             camera_of(str(path), frame)
 
 
@@ -226,7 +225,7 @@ def test_a_camera_that_is_not_calibrated_is_said_to_be_so(tmp_path):
 @pytest.mark.parametrize("name", ["fx", "fy", "cx", "cy", "width", "height"])
 def test_every_parameter_is_a_number(name):
     given_ = {"fx": 575.0, "fy": 575.0, "cx": 320.0, "cy": 240.0} | {name: "575"}
-    with pytest.raises(UserError, match=f"intrinsics: {name}: '575' is no number"):
+    with pytest.raises(UserError, match=f"intrinsics: {name}: '575' is not a number"):
         Intrinsics(**given_)
 
 
@@ -253,10 +252,10 @@ def test_bytes_that_are_no_text_are_one_line(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.json", '{"fx": 585,\n "fy": }', "line 2, column 8 is no JSON; mend it there"),
+        ("a.json", '{"fx": 585,\n "fy": }', "line 2, column 8 is not JSON; correct it there"),
         ("a.json", "[" * 100_000, "it is nested too deeply"),
-        ("a.yaml", "fx: 585\nfy: [585\n", "line 3, column 1 is no YAML; mend it there"),
-        ("a.yaml", "fx: 585\0", "it is no YAML"),
+        ("a.yaml", "fx: 585\nfy: [585\n", "line 3, column 1 is not YAML; correct it there"),
+        ("a.yaml", "fx: 585\0", "it is not YAML"),
     ],
 )
 def test_where_a_camera_file_is_broken_is_said(tmp_path, name, text, message):
@@ -273,27 +272,27 @@ def test_text_that_is_neither_numbers_nor_a_file_is_one_line(text):
 
 
 def test_intrinsics_of_another_resolution_are_refused():
-    SIZED.need_resolution(480, 640)
+    SIZED.check_resolution(480, 640)
     for rows, columns in ((240, 320), (640, 480), (480, 641)):
         with pytest.raises(FrameError, match="640 × 480 pixels") as error:
-            SIZED.need_resolution(rows, columns)
+            SIZED.check_resolution(rows, columns)
         assert error.value.name == "other-resolution"
 
 
 def test_a_principal_point_far_outside_is_of_another_resolution():
-    WANTED.need_resolution(480, 640)
+    WANTED.check_resolution(480, 640)
     # A crop of an image keeps its intrinsics, so that its own middle may lie off the frame a bit.
-    WANTED.need_resolution(200, 300)
+    WANTED.check_resolution(200, 300)
     for rows, columns in ((480, 200), (120, 640)):
-        with pytest.raises(FrameError, match="another resolution") as error:
-            WANTED.need_resolution(rows, columns)
+        with pytest.raises(FrameError, match="this resolution") as error:
+            WANTED.check_resolution(rows, columns)
         assert error.value.name == "other-resolution"
 
 
 @given(rows=st.integers(1, 5000), columns=st.integers(1, 5000))
 def test_focal_lengths_alone_serve_every_resolution(rows, columns):
-    Intrinsics(575.0, 575.0).need_resolution(rows, columns)
-    Intrinsics(575.0, 575.0, columns / 2, rows / 2, columns, rows).need_resolution(rows, columns)
+    Intrinsics(575.0, 575.0).check_resolution(rows, columns)
+    Intrinsics(575.0, 575.0, columns / 2, rows / 2, columns, rows).check_resolution(rows, columns)
 
 
 @given(factor=st.floats(0.3, 2.9), off=st.floats(-8, 8))
@@ -301,11 +300,11 @@ def test_a_principal_point_in_the_middle_of_another_image_is_refused(factor, off
     """Binned, cut in half or doubled: a camera's own tolerance is neither refused nor doubted."""
     camera = Intrinsics(FX * factor, FY * factor, (320 + off) * factor, (240 + off) * factor)
     if abs(factor - 1) < 0.1:
-        camera.need_resolution(480, 640)
+        camera.check_resolution(480, 640)
         assert not camera.doubts(480, 640)
     elif abs(factor - 1) > 0.25:
         with pytest.raises(FrameError, match="640 × 480") as error:
-            camera.need_resolution(480, 640)
+            camera.check_resolution(480, 640)
         assert error.value.name == "other-resolution"
 
 
@@ -314,7 +313,7 @@ def test_a_principal_point_off_the_middle_is_doubted():
     assert not Intrinsics(575.0, 575.0).doubts(480, 640)
     for place in ((500.0, 240.0), (320.0, 100.0), (520.0, 100.0)):
         camera = Intrinsics(FX, FY, *place)
-        camera.need_resolution(480, 640)
+        camera.check_resolution(480, 640)
         (doubt,) = camera.doubts(480, 640)
         assert "640 × 480" in doubt
         assert "cut out" in doubt

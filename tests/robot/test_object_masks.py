@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nbv.errors import UserError
-from nbv.robot.errors import FrameError
+from nbv.errors import FrameError, UserError
 from nbv.robot.masks import object_mask
 
 ROWS, COLUMNS = 48, 64

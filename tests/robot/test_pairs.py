@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 
 from nbv.core.angles import circular_distance_deg, wrap_deg
 from nbv.core.estimates import Estimates
+from nbv.core.selection import DENSITY
 from nbv.errors import UserError
 from nbv.experiment.config import load_config
 from nbv.experiment.estimates import write_estimates
-from nbv.robot.calibration import DENSITY
-from nbv.robot.pair_distributions import WIDEST_GAP_DEG
-from nbv.robot.pairs import N_VIEWS, PairTable
+from nbv.robot.pairs import N_VIEWS, WIDEST_GAP_DEG, PairTable
 
 CONFIG = Path(__file__).parents[2] / "config"
 
@@ -178,7 +177,7 @@ def test_what_is_no_number_is_named_with_its_row(tmp_path, value, column):
     table.loc[7, column] = value
     table.to_csv(tmp_path / "p.csv", index=False)
     # Row 1 has the names of the columns.
-    assert f"row 9: {column} is no number" in refused(tmp_path / "p.csv")
+    assert f"row 9: {column} is not a number" in refused(tmp_path / "p.csv")
 
 
 @pytest.mark.parametrize("column", ["object_id", "azimuth_deg", "estimate_deg"])
@@ -199,8 +198,8 @@ def test_a_missing_column_is_named(tmp_path, column):
         (b"object_id,azimuth_deg,estimate_deg\n", "p.csv has no rows"),
         (b"\xff\xfe\x00", "p.csv, line 1: this is not UTF-8; save the file as UTF-8"),
         ("a,b\r\ncup,1\r\nTässchen,2".encode("latin-1"), "p.csv, line 3: this is not UTF-8"),
-        (b"a,b\n1,2\n1,2,3\n", "line 3 has 3 columns in place of 2: is a comma too many"),
-        (b'a,b\n"1,2\n3', "a cell begins with a quote and has no second one"),
+        (b"a,b\n1,2\n1,2,3\n", "line 3 has 3 columns instead of 2: is there an extra comma"),
+        (b'a,b\n"1,2\n3', "a cell has an opening quote and no closing one"),
         (b"\0", "no column 'object_id'"),
     ],
 )
@@ -233,7 +232,7 @@ def units(tmp_path, rows=()) -> Path:
 @pytest.mark.parametrize(("category", "shift"), [("mug", 0), ("cup", 1)])
 @pytest.mark.parametrize("elevation", [0, 15])
 def test_rows_of_one_category_and_elevation_are_read(tmp_path, category, shift, elevation):
-    found = PairTable.load(units(tmp_path)).of_unit(category, elevation).estimates
+    found = PairTable.load(units(tmp_path)).for_unit(category, elevation).estimates
     assert found.object_ids == ("a",)
     wanted = (np.arange(360) + 10 * elevation + shift) % 360
     assert np.array_equal(found.estimate_deg[0], wanted)
@@ -249,7 +248,7 @@ def test_the_objects_of_each_category_are_those_of_all_its_elevations(tmp_path):
 
 def test_an_object_that_is_missing_at_an_elevation_is_one_line(tmp_path):
     more = [("mug", 0, "b", view, view) for view in np.arange(0, 360, 10)]
-    with pytest.raises(UserError, match="object 'b' has no pairs at some elevation of mug"):
+    with pytest.raises(UserError, match="object 'b' lacks pairs at an elevation of mug"):
         PairTable.load(units(tmp_path, more)).objects({"mug": [0, 15]})
     assert PairTable.load(units(tmp_path, more)).objects({"mug": [0]}) == {"mug": ["a", "b"]}
 
@@ -266,7 +265,7 @@ def test_units_that_nothing_tells_apart_are_one_line(tmp_path, absent):
 
 def test_a_category_without_rows_is_one_line(tmp_path):
     with pytest.raises(UserError, match="no rows with category=chair"):
-        PairTable.load(units(tmp_path)).of_unit("chair", 0)
+        PairTable.load(units(tmp_path)).for_unit("chair", 0)
 
 
 def test_a_compressed_file_is_read_as_the_file_itself(tmp_path):

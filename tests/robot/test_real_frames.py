@@ -8,7 +8,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from nbv.robot.calibration import DENSITY, recalibrated
+from nbv.core.selection import DENSITY
+from nbv.robot.calibration import recalibrated
 from nbv.robot.evaluation import (
     FIXED,
     OPPOSITE,
@@ -19,7 +20,7 @@ from nbv.robot.evaluation import (
     evaluate,
 )
 from nbv.robot.recommender import Recommender, shipped_bundles
-from nbv.robot.recordings import read_manifest, see
+from nbv.robot.recordings import read_manifest, run_network
 
 ROOT = Path(__file__).parents[2]
 FRAMES = Path(os.environ.get("NBV_FRAMES", ROOT.parent / "shared/data/frames"))
@@ -34,20 +35,20 @@ def never(path, error):
 
 
 @pytest.fixture(scope="module")
-def turns():
+def sweeps():
     recommender = Recommender.load("mug")
     recordings = read_manifest(FRAMES / "manifest.csv")
-    return {one.sequence: see(recommender, one, None, None, never) for one in recordings}
+    return {one.sequence: run_network(recommender, one, None, None, never) for one in recordings}
 
 
-def evaluated(bundle, turns, n_views):
-    found = evaluate(bundle, turns, n_views=n_views)
+def evaluated(bundle, sweeps, n_views):
+    found = evaluate(bundle, sweeps, n_views=n_views)
     return found.set_index(["sequence", "choice", "n_views"])
 
 
 @pytest.fixture(scope="module")
-def found(turns):
-    return evaluated(Recommender.load("mug").bundle, list(turns.values()), (2, 3))
+def found(sweeps):
+    return evaluated(Recommender.load("mug").bundle, list(sweeps.values()), (2, 3))
 
 
 @pytest.fixture(scope="module")
@@ -95,13 +96,13 @@ def test_without_the_offset_the_recommended_view_has_the_least_error(found, sequ
 
 @pytest.mark.parametrize(("calibrating", "other"), [("2", "1"), ("1", "2")])
 def test_calibrated_by_the_other_recording_the_recommended_view_has_the_least_error(
-    turns, calibrating, other
+    sweeps, calibrating, other
 ):
     # The paper's tables, which are of no interest here, are made soon with one density.
     density = {**DENSITY, "bandwidths_deg": [8], "pseudo_observations": [10]}
     bundle = Recommender.load("mug").bundle
-    calibrated = recalibrated(bundle, [turns[calibrating]], "the other recording", density)
-    found = evaluated(calibrated, [turns[other]], (2,)).loc[other]
+    calibrated = recalibrated(bundle, [sweeps[calibrating]], "the other recording", density)
+    found = evaluated(calibrated, [sweeps[other]], (2,)).loc[other]
     for errors in (found["mae_deg"], found["mae_without_offset_deg"]):
         for choice in (RANDOM, OPPOSITE, FIXED):
             assert errors[RECOMMENDED, 2] < errors[choice, 2]

@@ -29,7 +29,7 @@ def recommendation(rotation_deg: float = 90.0, n_frames: int = 1) -> Recommendat
         alternatives=(Move(-45.0, 45.0, 9.0),),
         belief=np.full(BINS, 1 / BINS),
         error_after_deg=error,
-        unfamiliarity=0.5,
+        ood_score=0.5,
         bayes_factor=1.0,
         warnings=(),
         n_views=n_frames,
@@ -59,7 +59,7 @@ def points(path: ElementTree.Element) -> np.ndarray:
 @pytest.mark.parametrize(
     ("n_frames", "titles"),
     [
-        (1, ["What the network sees"]),
+        (1, ["Network input"]),
         (2, ["Frame 1", "Frame 2"]),
         (4, ["Frame 1", "Frame 2", "Frame 3", "Frame 4"]),
         (6, ["Frame 3 of 6", "Frame 4 of 6", "Frame 5 of 6", "Frame 6 of 6"]),
@@ -67,12 +67,12 @@ def points(path: ElementTree.Element) -> np.ndarray:
 )
 def test_each_crop_has_the_number_of_its_frame(drawn, n_frames, titles):
     found = texts(drawn(recommendation(n_frames=n_frames)))
-    assert [text for text in found if re.match("Frame|What", text)] == titles
+    assert [text for text in found if re.match("Frame|Network", text)] == titles
 
 
 def test_both_circles_say_what_they_show(drawn):
     found = texts(drawn(recommendation(-90.0)))
-    assert "Azimuth about the mug: 86°" in found
+    assert "Azimuth (camera around mug): 86°" in found
     assert "expected error 12.3°" in found
     assert "radius: √p(azimuth)" in found
     assert "best: −90°, 6.0°" in found
@@ -113,7 +113,7 @@ def test_without_a_next_view_there_is_no_circle_of_errors(drawn):
     nowhere = np.full(BINS, np.inf)
     root = drawn(replace(whole, move=None, alternatives=(), error_after_deg=nowhere))
     found = " ".join(texts(root))
-    assert "Azimuth about the mug: 86°" in found
+    assert "Azimuth (camera around mug): 86°" in found
     assert "best" not in found
     assert "camera now" not in found
     assert not any(one.attrib.get("id") == "move" for one in root.iter(f"{SVG}g"))

@@ -25,13 +25,13 @@ from nbv.robot.evaluation import (
     SPACED,
     at_random,
     best_fixed_deg,
+    count_ood,
     evaluate,
-    familiarity_of,
     fixed_errors_deg,
 )
-from nbv.robot.ood import unfamiliarity
+from nbv.robot.network import Sweep
+from nbv.robot.ood import ood_score
 from nbv.robot.recommender import Recommender
-from nbv.robot.sweeps import Turn
 
 COLUMNS = [
     *("object_id", "sequence", "choice", "n_views", "mae_deg", "median_deg", "above_45_percent"),
@@ -40,12 +40,12 @@ COLUMNS = [
 CHOICES = {RANDOM, FIXED, OPPOSITE, RECOMMENDED, PAPER}
 
 
-def recording(seed=0, n=BINS, elevation=np.nan, name="cup", logits=None) -> Turn:
+def recording(seed=0, n=BINS, elevation=np.nan, name="cup", logits=None) -> Sweep:
     azimuth_deg = np.arange(n) * (360.0 / n)
     if logits is None:
         logits = soft_turns(np.random.default_rng(seed), 1, n)[0]
     codes = random_codes(np.random.default_rng(seed), n)
-    return Turn(name, "1", elevation, azimuth_deg, logits.astype(np.float32), codes)
+    return Sweep(name, "1", elevation, azimuth_deg, logits.astype(np.float32), codes)
 
 
 def sure(azimuth_deg, error_deg=0.0) -> np.ndarray:
@@ -69,8 +69,8 @@ def error(pose, truth):
 
 
 def test_a_network_that_is_right_has_no_error(bundle):
-    turn = recording(logits=sure(np.arange(BINS) * WIDTH))
-    found = evaluate(bundle, [turn])
+    sweep = recording(logits=sure(np.arange(BINS) * WIDTH))
+    found = evaluate(bundle, [sweep])
     assert list(found.columns) == COLUMNS
     assert len(found) == 1 + 4 * 5
     for column in ("mae_deg", "median_deg", "mae_without_offset_deg", "above_45_percent"):
@@ -81,8 +81,8 @@ def test_a_network_that_is_right_has_no_error(bundle):
 @pytest.mark.parametrize("offset", [30.0, -75.0, 170.0, 3.0])
 def test_a_constant_offset_is_told_and_taken_off(bundle, offset):
     """The turntable's zero: all errors are alike."""
-    turn = recording(logits=sure(np.arange(BINS) * WIDTH, offset))
-    found = evaluate(bundle, [turn], n_views=(2, 3))
+    sweep = recording(logits=sure(np.arange(BINS) * WIDTH, offset))
+    found = evaluate(bundle, [sweep], n_views=(2, 3))
     assert found["offset_deg"].to_numpy() == pytest.approx(offset, abs=0.2)
     assert found["mae_deg"].to_numpy() == pytest.approx(abs(offset), abs=0.3)
     assert found["median_deg"].to_numpy() == pytest.approx(abs(offset), abs=0.3)
@@ -91,12 +91,12 @@ def test_a_constant_offset_is_told_and_taken_off(bundle, offset):
 
 
 def test_the_offset_is_the_circular_median_of_single_view_errors(bundle):
-    turn = recording(3)
-    rows = from_logits(turn.logits, bundle.temperature)
+    sweep = recording(3)
+    rows = from_logits(sweep.logits, bundle.temperature)
     angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
-    errors = error(np.degrees(np.angle(rows @ angles)), turn.azimuth_deg)
+    errors = error(np.degrees(np.angle(rows @ angles)), sweep.azimuth_deg)
     left = [np.abs(error(errors, one)).mean() for one in errors]
-    found = evaluate(bundle, [turn], n_views=(2,))
+    found = evaluate(bundle, [sweep], n_views=(2,))
     (offset,) = set(found["offset_deg"])
     single = rows_of(found, SINGLE, 1)
     assert single["mae_deg"] == pytest.approx(np.abs(errors).mean())
@@ -110,24 +110,24 @@ def test_the_offset_is_the_circular_median_of_single_view_errors(bundle):
 # Brute force
 
 
-def two_view_errors(bundle, turn, rotation) -> np.ndarray:
+def two_view_errors(bundle, sweep, rotation) -> np.ndarray:
     """From every frame, with the frame that is nearest to the rotation."""
-    rows = from_logits(turn.logits, bundle.temperature)
+    rows = from_logits(sweep.logits, bundle.temperature)
     found = []
-    for first, azimuth in enumerate(turn.azimuth_deg):
-        apart = circular_distance_deg(turn.azimuth_deg - azimuth, rotation)
+    for first, azimuth in enumerate(sweep.azimuth_deg):
+        apart = circular_distance_deg(sweep.azimuth_deg - azimuth, rotation)
         apart[first] = np.inf
         second = int(apart.argmin())
-        pose = product(rows[first], rows[second], turn.azimuth_deg[second] - azimuth)
+        pose = product(rows[first], rows[second], sweep.azimuth_deg[second] - azimuth)
         found.append(error(pose, azimuth))
     return np.array(found)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_opposite_view_is_half_a_turn_away(bundle, seed):
-    turn = recording(seed)
-    wanted = np.abs(two_view_errors(bundle, turn, 180.0))
-    row = rows_of(evaluate(bundle, [turn], n_views=(2,)), OPPOSITE, 2)
+    sweep = recording(seed)
+    wanted = np.abs(two_view_errors(bundle, sweep, 180.0))
+    row = rows_of(evaluate(bundle, [sweep], n_views=(2,)), OPPOSITE, 2)
     assert row["mae_deg"] == pytest.approx(wanted.mean(), rel=1e-4)
     assert row["median_deg"] == pytest.approx(np.median(wanted), rel=1e-4)
     assert row["above_45_percent"] == pytest.approx(100 * (wanted > 45).mean())
@@ -135,8 +135,8 @@ def test_the_opposite_view_is_half_a_turn_away(bundle, seed):
 
 @pytest.mark.parametrize("n_views", [3, 4, 6])
 def test_evenly_spaced_views_are_the_product_of_all(bundle, n_views):
-    turn = recording(5)
-    rows = from_logits(turn.logits, bundle.temperature)
+    sweep = recording(5)
+    rows = from_logits(sweep.logits, bundle.temperature)
     step = BINS // n_views
     angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
     wanted = []
@@ -145,7 +145,7 @@ def test_evenly_spaced_views_are_the_product_of_all(bundle, n_views):
         logs = sum(np.roll(np.log(rows[v]), -step * i) for i, v in enumerate(views))
         pose = np.degrees(np.angle(np.exp(logs - logs.max()) @ angles))
         wanted.append(abs(error(pose, first * WIDTH)))
-    found = rows_of(evaluate(bundle, [turn], n_views=(n_views,)), SPACED, n_views)
+    found = rows_of(evaluate(bundle, [sweep], n_views=(n_views,)), SPACED, n_views)
     assert found["mae_deg"] == pytest.approx(np.mean(wanted), rel=1e-4)
 
 
@@ -157,18 +157,18 @@ def test_the_best_fixed_rotation_is_that_of_the_calibration(bundle, elevation):
     cost = np.zeros(BINS)
     for own, counts in zip(bundle.distributions.astype(float), share, strict=True):
         for first in range(BINS):
-            for turn in range(BINS):
-                pose = product(own[first], own[(first + turn) % BINS], turn * WIDTH)
-                cost[turn] += counts * abs(error(pose, first * WIDTH))
+            for step in range(BINS):
+                pose = product(own[first], own[(first + step) % BINS], step * WIDTH)
+                cost[step] += counts * abs(error(pose, first * WIDTH))
     wanted = np.abs(two_view_errors(bundle, recording(1), cost.argmin() * WIDTH))
-    turn = recording(1, elevation=elevation)
-    row = rows_of(evaluate(bundle, [turn], n_views=(2,)), FIXED, 2)
+    sweep = recording(1, elevation=elevation)
+    row = rows_of(evaluate(bundle, [sweep], n_views=(2,)), FIXED, 2)
     assert row["mae_deg"] == pytest.approx(wanted.mean(), rel=1e-4)
 
 
 @pytest.mark.parametrize("n_views", [2, 3, 4, 6])
 def test_the_best_fixed_step_keeps_views_apart_and_errs_least(bundle, n_views):
-    """Of views at equal steps on the calibration turns, multiplied one after the other."""
+    """Of views at equal steps on the calibration sweeps, multiplied one after the other."""
     angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
     errors = {}
     for step in range(BINS):
@@ -211,9 +211,9 @@ def test_random_views_end_where_there_is_no_room():
 @pytest.mark.parametrize("n_views", [2, 3, 4])
 def test_recommended_views_are_those_that_the_recommender_names(bundle, elevation, n_views):
     """Frame after frame: the recommender is shown all frames so far and asked where to go."""
-    turn = recording(2, elevation=elevation)
+    sweep = recording(2, elevation=elevation)
     recommender = Recommender(bundle)
-    recommender.network = lambda codes: turn.logits[codes[:, 0, 0].astype(int)]
+    recommender.network = lambda codes: sweep.logits[codes[:, 0, 0].astype(int)]
     known = None if np.isnan(elevation) else elevation
     wanted = []
     for first in range(BINS):
@@ -227,7 +227,7 @@ def test_recommended_views_are_those_that_the_recommender_names(bundle, elevatio
                 break
             taken.append((taken[-1] + round(answer.move.rotation_deg / WIDTH)) % BINS)
         wanted.append(abs(error(answer.azimuth_deg, taken[-1] * WIDTH)))
-    found = rows_of(evaluate(bundle, [turn], n_views=(n_views, 4)), RECOMMENDED, n_views)
+    found = rows_of(evaluate(bundle, [sweep], n_views=(n_views, 4)), RECOMMENDED, n_views)
     # A tie in single precision may be decided otherwise in one of them.
     assert found["mae_deg"] == pytest.approx(np.mean(wanted), rel=0.02)
     assert found["median_deg"] == pytest.approx(np.median(wanted), rel=0.05)
@@ -239,23 +239,23 @@ def test_the_papers_views_are_those_of_the_table_of_the_nearest_elevation(
     bundle, elevation, table, n_views
 ):
     """Without a known elevation the lowest table; estimates are averaged as directions."""
-    turn = recording(2, elevation=elevation)
-    rows = from_logits(turn.logits, bundle.temperature)
+    sweep = recording(2, elevation=elevation)
+    rows = from_logits(sweep.logits, bundle.temperature)
     angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
     estimates = np.degrees(np.angle(rows @ angles)) % 360
     wanted = []
-    for first, azimuth in enumerate(turn.azimuth_deg):
+    for first, azimuth in enumerate(sweep.azimuth_deg):
         taken, total = [first], np.exp(1j * np.radians(estimates[first]))
         while len(taken) < n_views:
             here = taken[-1]
             rotation = bundle.paper.rotation_deg[table][round(estimates[here]) % 360]
-            apart = circular_distance_deg(turn.azimuth_deg - turn.azimuth_deg[here], rotation)
+            apart = circular_distance_deg(sweep.azimuth_deg - sweep.azimuth_deg[here], rotation)
             apart[taken] = np.inf
             taken.append(int(apart.argmin()))
-            moved = estimates[taken[-1]] - (turn.azimuth_deg[taken[-1]] - azimuth)
+            moved = estimates[taken[-1]] - (sweep.azimuth_deg[taken[-1]] - azimuth)
             total += np.exp(1j * np.radians(moved))
         wanted.append(abs(error(np.degrees(np.angle(total)), azimuth)))
-    found = rows_of(evaluate(bundle, [turn], n_views=(n_views,)), PAPER, n_views)
+    found = rows_of(evaluate(bundle, [sweep], n_views=(n_views,)), PAPER, n_views)
     assert found["mae_deg"] == pytest.approx(np.mean(wanted), rel=1e-4)
 
 
@@ -265,15 +265,15 @@ def test_random_views_are_the_mean_over_many(bundle):
     Views from nearly the same place err alike, opposite ones the other way.
     """
     azimuth_deg = np.arange(BINS) * WIDTH
-    turn = recording(logits=sure(azimuth_deg, 40.0 * np.sin(np.radians(azimuth_deg))))
+    sweep = recording(logits=sure(azimuth_deg, 40.0 * np.sin(np.radians(azimuth_deg))))
     each = np.stack(
-        [np.abs(two_view_errors(bundle, turn, WIDTH * turn_)) for turn_ in range(1, BINS)]
+        [np.abs(two_view_errors(bundle, sweep, WIDTH * step)) for step in range(1, BINS)]
     )
     # A draw within half a bin of 15 or 345 degrees is half as likely.
     weights = np.r_[0.5, np.ones(BINS - 3), 0.5] / (BINS - 2)
     wanted = weights @ each.mean(axis=1)
     assert each.mean(axis=1).max() > 5 * each.mean(axis=1).min()
-    row = rows_of(evaluate(bundle, [turn], n_views=(2,), n_random=200), RANDOM, 2)
+    row = rows_of(evaluate(bundle, [sweep], n_views=(2,), n_random=200), RANDOM, 2)
     assert row["mae_deg"] == pytest.approx(wanted, rel=0.05)
 
 
@@ -281,9 +281,9 @@ def test_random_views_are_the_mean_over_many(bundle):
 
 
 def test_draws_depend_on_the_seed_alone(bundle):
-    turn = recording(4)
-    one, same = (evaluate(bundle, [turn], n_views=(2,), seed=1) for _ in range(2))
-    other = evaluate(bundle, [turn], n_views=(2,), seed=2)
+    sweep = recording(4)
+    one, same = (evaluate(bundle, [sweep], n_views=(2,), seed=1) for _ in range(2))
+    other = evaluate(bundle, [sweep], n_views=(2,), seed=2)
     assert one.equals(same)
     assert rows_of(one, RANDOM, 2)["mae_deg"] != rows_of(other, RANDOM, 2)["mae_deg"]
     for choice in CHOICES - {RANDOM}:
@@ -291,40 +291,40 @@ def test_draws_depend_on_the_seed_alone(bundle):
 
 
 def test_the_order_of_frames_does_not_matter(bundle, rng):
-    turn = recording(6)
+    sweep = recording(6)
     order = rng.permutation(BINS)
-    shuffled = replace(turn, azimuth_deg=turn.azimuth_deg[order], logits=turn.logits[order])
-    one, other = (evaluate(bundle, [each], n_views=(2, 3)) for each in (turn, shuffled))
+    shuffled = replace(sweep, azimuth_deg=sweep.azimuth_deg[order], logits=sweep.logits[order])
+    one, other = (evaluate(bundle, [each], n_views=(2, 3)) for each in (sweep, shuffled))
     kept = one["choice"] != RANDOM
     numbers = COLUMNS[4:]
     assert one[kept][numbers].to_numpy() == pytest.approx(other[kept][numbers].to_numpy(), rel=1e-3)
 
 
 def test_recordings_do_not_matter_to_one_another(bundle):
-    turns = [recording(1, name="a"), recording(2, name="b"), recording(3, name="a")]
-    turns[2] = replace(turns[2], sequence="2")
+    sweeps = [recording(1, name="a"), recording(2, name="b"), recording(3, name="a")]
+    sweeps[2] = replace(sweeps[2], sequence="2")
     done: list[int] = []
-    together = evaluate(bundle, turns, n_views=(2,), tell=done.append)
+    together = evaluate(bundle, sweeps, n_views=(2,), report=done.append)
     assert done == [1, 2, 3]
     assert list(dict.fromkeys(zip(together["object_id"], together["sequence"], strict=True))) == [
         *(("a", "1"), ("b", "1"), ("a", "2"))
     ]
-    for turn in turns:
-        alone = evaluate(bundle, [turn], n_views=(2,))
+    for sweep in sweeps:
+        alone = evaluate(bundle, [sweep], n_views=(2,))
         part = together[
-            (together["object_id"] == turn.object_id) & (together["sequence"] == turn.sequence)
+            (together["object_id"] == sweep.object_id) & (together["sequence"] == sweep.sequence)
         ]
         assert part.reset_index(drop=True).equals(alone)
 
 
 def test_a_turn_of_the_object_leaves_evenly_spaced_views_alone(bundle):
-    turn = recording(7)
+    sweep = recording(7)
     moved = replace(
-        turn,
-        azimuth_deg=(turn.azimuth_deg + 5 * WIDTH) % 360,
-        logits=np.roll(turn.logits, 5, axis=1),
+        sweep,
+        azimuth_deg=(sweep.azimuth_deg + 5 * WIDTH) % 360,
+        logits=np.roll(sweep.logits, 5, axis=1),
     )
-    one, other = (evaluate(bundle, [each], n_views=(2, 4)) for each in (turn, moved))
+    one, other = (evaluate(bundle, [each], n_views=(2, 4)) for each in (sweep, moved))
     for choice, n_views in ((SINGLE, 1), (OPPOSITE, 2), (SPACED, 4), (FIXED, 2)):
         assert rows_of(one, choice, n_views)["mae_deg"] == pytest.approx(
             rows_of(other, choice, n_views)["mae_deg"], rel=1e-4
@@ -336,9 +336,9 @@ def test_a_turn_of_the_object_leaves_evenly_spaced_views_alone(bundle):
 
 def test_all_frames_of_a_short_recording_are_one_answer(bundle):
     """Four frames and four views: every way takes all of them, in some order."""
-    turn = recording(0)
+    sweep = recording(0)
     few = np.array([0, 5, 11, 17])
-    short = replace(turn, azimuth_deg=turn.azimuth_deg[few], logits=turn.logits[few])
+    short = replace(sweep, azimuth_deg=sweep.azimuth_deg[few], logits=sweep.logits[few])
     found = evaluate(bundle, [short], n_views=(4,))
     # Averaged estimates are another answer than the product.
     rows = found[~found["choice"].isin([SINGLE, PAPER])]
@@ -352,11 +352,11 @@ def test_a_number_of_views_counts_once(bundle):
 
 
 def test_more_views_than_frames_are_one_line(bundle):
-    turn = recording(0)
-    short = replace(turn, azimuth_deg=turn.azimuth_deg[:3], logits=turn.logits[:3])
+    sweep = recording(0)
+    short = replace(sweep, azimuth_deg=sweep.azimuth_deg[:3], logits=sweep.logits[:3])
     evaluate(bundle, [short], n_views=(2, 3))
     with pytest.raises(UserError, match="object 'cup', sequence '1' has 3 frames, too few for 5"):
-        evaluate(bundle, [turn, short])
+        evaluate(bundle, [sweep, short])
 
 
 @pytest.mark.parametrize("n_views", [(1,), (0,), (-2, 3), (2, 1)])
@@ -365,28 +365,28 @@ def test_a_choice_of_views_needs_two(bundle, n_views):
         evaluate(bundle, [recording()], n_views=n_views)
 
 
-# What is unfamiliar
+# Out of distribution
 
 
-def test_unfamiliar_and_wrong_frames_are_counted(bundle):
+def test_ood_and_wrong_frames_are_counted(bundle):
     """Every third frame is far from everything; every fourth is wrong by 90 degrees."""
     azimuth_deg = np.arange(BINS) * WIDTH
     frames = np.arange(BINS)
-    turn = recording(logits=sure(azimuth_deg, np.where(frames % 4 == 0, 90.0, 0.0)))
+    sweep = recording(logits=sure(azimuth_deg, np.where(frames % 4 == 0, 90.0, 0.0)))
     # Far from all crops that were calibrated, and near their middle.
-    familiar = replace(bundle.familiarity, scales=np.array([[50, 1], [0, 1e9]], np.float32))
+    model = replace(bundle.ood, scales=np.array([[50, 1], [0, 1e9]], np.float32))
     strange = np.indices((32, 32)).sum(axis=0) % 2 * np.uint8(255)
-    mean = bundle.familiarity.mean[:256].reshape(16, 16) > 64
+    mean = bundle.ood.mean[:256].reshape(16, 16) > 64
     usual = np.kron(mean, np.ones((2, 2))).astype(np.uint8) * np.uint8(128)
     codes = np.where((frames % 3 == 0)[:, None, None], strange, usual).astype(np.uint8)
-    limit = replace(familiar, threshold=1e-6)
-    apart = unfamiliarity(limit, codes, turn.logits)
-    limit = replace(familiar, threshold=float(1e-6 * np.median([apart.min(), apart.max()])))
-    changed = replace(bundle, familiarity=limit)
-    (row,) = familiarity_of(changed, [replace(turn, codes=codes)]).to_dict("records")
+    limit = replace(model, threshold=1e-6)
+    apart = ood_score(limit, codes, sweep.logits)
+    limit = replace(model, threshold=float(1e-6 * np.median([apart.min(), apart.max()])))
+    changed = replace(bundle, ood=limit)
+    (row,) = count_ood(changed, [replace(sweep, codes=codes)]).to_dict("records")
     assert row == {
         **{"object_id": "cup", "sequence": "1", "n_frames": 24},
-        **{"n_unfamiliar": 8, "n_wrong": 6, "n_wrong_unfamiliar": 2, "warning": ""},
+        **{"n_ood": 8, "n_wrong": 6, "n_wrong_ood": 2, "warning": ""},
     }
 
 
@@ -405,7 +405,7 @@ ALL_ROUND = np.arange(BINS) * WIDTH
 )
 def test_azimuths_that_estimates_do_not_follow_are_told(bundle, azimuths_deg, warning):
     """A constant offset is no such thing: it is shown apart."""
-    turn = recording(logits=sure(ALL_ROUND, np.zeros(BINS)))
-    (row,) = familiarity_of(bundle, [replace(turn, azimuth_deg=azimuths_deg)]).to_dict("records")
+    sweep = recording(logits=sure(ALL_ROUND, np.zeros(BINS)))
+    (row,) = count_ood(bundle, [replace(sweep, azimuth_deg=azimuths_deg)]).to_dict("records")
     assert warning in row["warning"]
     assert bool(warning) == bool(row["warning"])

@@ -11,11 +11,10 @@ import pytest
 from PIL import Image
 
 from made_bundles import FOCAL_PX, frame
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.robot.depth_files import read_depth
-from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
-from nbv.robot.recordings import read_manifest, see
+from nbv.robot.recordings import read_manifest, run_network
 
 AZIMUTHS = (0.0, 10.0, 20.0, 350.0)
 
@@ -163,7 +162,7 @@ def test_a_missing_column_is_named(folder, column):
 @pytest.mark.parametrize("value", ["", "nan", "inf", "north", "NA"])
 def test_an_azimuth_that_is_no_number_is_named_with_its_row(folder, value):
     message = refused(manifest(folder, table(azimuth_deg=[0, 10, value, 30])))
-    assert "row 4: azimuth_deg is no number" in message
+    assert "row 4: azimuth_deg is not a number" in message
 
 
 @pytest.mark.parametrize(
@@ -171,7 +170,7 @@ def test_an_azimuth_that_is_no_number_is_named_with_its_row(folder, value):
     [
         ("no.npy", "does not exist"),
         ("sub/f0.npy", "does not exist"),
-        ("", "is no name"),
+        ("", "is empty"),
         (".", "is a folder"),
     ],
 )
@@ -195,12 +194,12 @@ def test_a_manifest_without_rows_or_that_does_not_exist_is_one_line(tmp_path):
     ("columns", "message"),
     [
         ({"mask": ["", "m9.png", "", ""]}, "row 3: mask 'm9.png' does not exist"),
-        ({"fx": [500, "", "wide", 500]}, "row 4: fx is no number"),
+        ({"fx": [500, "", "wide", 500]}, "row 4: fx is not a number"),
         ({"fx": [500, -500, "", 500]}, "row 3: intrinsics: fx=-500 must be above 0"),
         ({"fx": [500, "", "", ""], "cx": ["", "", "", 320]}, "row 5: cx without fx"),
         ({"fx": [500] * 4, "cx": [320, 320, 320, ""], "cy": [240, "", 240, ""]}, "cx without cy"),
-        ({"elevation_deg": [10, "", 100, ""]}, "row 4: elevation_deg=100 lies not between"),
-        ({"elevation_deg": [10, "", "", "high"]}, "row 5: elevation_deg is no number"),
+        ({"elevation_deg": [10, "", 100, ""]}, "row 4: elevation_deg=100 is not between"),
+        ({"elevation_deg": [10, "", "", "high"]}, "row 5: elevation_deg is not a number"),
     ],
 )
 def test_a_cell_that_cannot_be_is_named_with_its_row(folder, columns, message):
@@ -213,7 +212,7 @@ def test_a_cell_that_cannot_be_is_named_with_its_row(folder, columns, message):
 def seen(recommender, path, intrinsics=None, depth_scale=None):
     lines: list[str] = []
     (recording,) = read_manifest(path)
-    return see(recommender, recording, intrinsics, depth_scale, told(lines)), lines
+    return run_network(recommender, recording, intrinsics, depth_scale, told(lines)), lines
 
 
 def crops(recommender, places, **options):
@@ -221,22 +220,22 @@ def crops(recommender, places, **options):
 
 
 def test_a_turn_has_the_outputs_of_every_frame(recommender, folder):
-    turn, lines = seen(recommender, manifest(folder, table(elevation_deg=[20, 20, 20, 20])))
+    sweep, lines = seen(recommender, manifest(folder, table(elevation_deg=[20, 20, 20, 20])))
     seen_crops = crops(recommender, range(4))
-    assert np.array_equal(turn.logits, recommender.network(seen_crops))
-    assert np.array_equal(turn.codes, seen_crops)
-    assert turn.azimuth_deg.tolist() == list(AZIMUTHS)
-    assert (turn.object_id, turn.sequence, turn.elevation_deg) == ("cup", "1", 20.0)
+    assert np.array_equal(sweep.logits, recommender.network(seen_crops))
+    assert np.array_equal(sweep.codes, seen_crops)
+    assert sweep.azimuth_deg.tolist() == list(AZIMUTHS)
+    assert (sweep.object_id, sweep.sequence, sweep.elevation_deg) == ("cup", "1", 20.0)
     assert lines == []
 
 
 def test_a_refused_frame_is_told_and_left_out(recommender, folder):
     np.save(folder / "f1.npy", np.zeros_like(frame(1)))
     np.save(folder / "f3.npy", (frame(3) * 100).astype(np.uint8))
-    turn, lines = seen(recommender, manifest(folder, table()))
-    assert turn.azimuth_deg.tolist() == [0.0, 20.0]
+    sweep, lines = seen(recommender, manifest(folder, table()))
+    assert sweep.azimuth_deg.tolist() == [0.0, 20.0]
     logits = recommender.network(crops(recommender, (0, 2)))
-    assert np.array_equal(turn.logits, logits)
+    assert np.array_equal(sweep.logits, logits)
     assert len(lines) == 2
     assert "f1.npy is left out: empty-mask" in lines[0]
     assert "f3.npy is left out: few-levels" in lines[1]
@@ -246,7 +245,7 @@ def test_a_recording_without_a_usable_frame_is_one_line(recommender, folder):
     for place in range(4):
         np.save(folder / f"f{place}.npy", np.zeros((5, 5), np.float32))
     wanted = (
-        "^empty-mask: object 'cup', sequence '1': every frame is refused; the first, .*f0.npy: "
+        "^empty-mask: object 'cup', sequence '1': every frame is rejected; the first, .*f0.npy: "
     )
     with pytest.raises(FrameError, match=wanted):
         seen(recommender, manifest(folder, table()))
@@ -270,10 +269,10 @@ def test_masks_are_used_where_there_are_any(recommender, folder):
     wall = np.where(frame(1) > 0, frame(1), 0.56).astype(np.float32)
     np.save(folder / "f1.npy", wall)
     rows = table(mask=["", "m1.png", "m2.png", ""])
-    turn, lines = seen(recommender, manifest(folder, rows))
+    sweep, lines = seen(recommender, manifest(folder, rows))
     assert lines == []
     logits = recommender.network(crops(recommender, range(4)))
-    assert np.array_equal(turn.logits, logits)
+    assert np.array_equal(sweep.logits, logits)
     _, lines = seen(recommender, manifest(folder, table()))
     assert len(lines) == 1
 
@@ -281,11 +280,11 @@ def test_masks_are_used_where_there_are_any(recommender, folder):
 def test_intrinsics_of_a_frame_come_before_those_of_all(recommender, folder):
     others = 1.1 * FOCAL_PX
     rows = table(fx=[FOCAL_PX, "", FOCAL_PX, ""])
-    turn, _ = seen(recommender, manifest(folder, rows), str(others))
+    sweep, _ = seen(recommender, manifest(folder, rows), str(others))
     own = crops(recommender, range(4))
     of_all = crops(recommender, range(4), intrinsics=(others,))
     logits = recommender.network(np.stack([own[0], of_all[1], own[2], of_all[3]]))
-    assert np.array_equal(turn.logits, logits)
+    assert np.array_equal(sweep.logits, logits)
 
 
 def test_a_scene_of_bop_gives_every_frame_its_own_camera_and_scale(recommender, folder):
@@ -299,7 +298,7 @@ def test_a_scene_of_bop_gives_every_frame_its_own_camera_and_scale(recommender, 
         }
     (folder / "scene_camera.json").write_text(json.dumps(scene))
     rows = table(file=[f"00{place}.npy" for place in range(4)])
-    turn, lines = seen(recommender, manifest(folder, rows), str(folder / "scene_camera.json"))
+    sweep, lines = seen(recommender, manifest(folder, rows), str(folder / "scene_camera.json"))
     wanted = [
         recommender.crop(
             read_depth(folder / f"00{place}.npy", (1e-4, 2e-4)[place % 2]),
@@ -308,14 +307,14 @@ def test_a_scene_of_bop_gives_every_frame_its_own_camera_and_scale(recommender, 
         for place in range(4)
     ]
     assert lines == []
-    assert np.array_equal(turn.codes, wanted)
+    assert np.array_equal(sweep.codes, wanted)
 
 
 def test_the_scale_of_whole_numbers_is_that_of_the_recording(recommender, folder):
     wanted, _ = seen(recommender, manifest(folder, table()))
     for place in range(4):
         np.save(folder / f"f{place}.npy", np.rint(frame(place) * 1e5).astype(np.uint32))
-    turn, _ = seen(recommender, manifest(folder, table()), depth_scale=1e-5)
-    assert turn.logits == pytest.approx(wanted.logits, abs=0.2)
+    sweep, _ = seen(recommender, manifest(folder, table()), depth_scale=1e-5)
+    assert sweep.logits == pytest.approx(wanted.logits, abs=0.2)
     with pytest.raises(UserError, match="every frame"):
         seen(recommender, manifest(folder, table()))

@@ -17,7 +17,7 @@ from nbv.robot.bundle import Bundle
 from nbv.robot.depth_files import write_depth
 from nbv.robot.evaluation import evaluate
 from nbv.robot.recommender import Recommender
-from nbv.robot.recordings import read_manifest, see
+from nbv.robot.recordings import read_manifest, run_network
 from nbv.robot.synthetic import example_frame
 from projects import TINY, Project, copy_of_project, finished_project
 
@@ -175,7 +175,7 @@ def test_ingredients_are_left_out_of_training_and_not_of_the_test(made: Project)
     single = []
     for folder in folders[0]:
         bundle = Recommender.load(folder / "mug.safetensors")
-        seen = see(bundle, recording, None, None, lambda path, error: None)
+        seen = run_network(bundle, recording, None, None, lambda path, error: None)
         errors = evaluate(bundle.bundle, [seen], n_views=(2,)).set_index("choice")
         single.append(errors["mae_deg"]["single"])
     assert table["one_view_real"][0] == pytest.approx(np.mean(single), abs=1e-3)

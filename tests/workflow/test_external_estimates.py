@@ -16,7 +16,7 @@ from nbv.core.distributions import mean_direction_deg
 from nbv.core.fusion import product
 from nbv.core.logits import fit_temperature
 from nbv.core.lookup import LookupTable
-from nbv.robot.calibration import DENSITY
+from nbv.core.selection import DENSITY
 from projects import TINY, Project, copy_of_project
 
 pytestmark = pytest.mark.slow

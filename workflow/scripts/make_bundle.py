@@ -15,7 +15,7 @@ with job(snakemake):
     from nbv.experiment.splits import objects_with_role, read_splits
     from nbv.files import write_csv
     from nbv.robot.evaluation import evaluate
-    from nbv.robot.mirror import find_mirror_plane
+    from nbv.robot.network import find_mirror_plane
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     use_one_thread()

@@ -8,12 +8,12 @@ with job(snakemake):
     import pandas as pd
     from studies.ingredients import ingredient_table
 
+    from nbv.errors import FrameError
     from nbv.experiment.report.table import write_table
     from nbv.files import read_csv
-    from nbv.robot.errors import FrameError
     from nbv.robot.evaluation import evaluate
     from nbv.robot.recommender import Recommender
-    from nbv.robot.recordings import read_manifest, see
+    from nbv.robot.recordings import read_manifest, run_network
 
     params, given = snakemake.params, snakemake.input
     log = logging.getLogger("nbv")
@@ -30,7 +30,7 @@ with job(snakemake):
         recordings = read_manifest(given.frames[0])
         for key, path in zip(keys, given.bundles, strict=True):
             recommender = Recommender.load(path)
-            turns = [see(recommender, one, None, None, left_out) for one in recordings]
-            real.setdefault(key, []).append(evaluate(recommender.bundle, turns, n_views=(2,)))
+            sweeps = [run_network(recommender, one, None, None, left_out) for one in recordings]
+            real.setdefault(key, []).append(evaluate(recommender.bundle, sweeps, n_views=(2,)))
     table = ingredient_table(rendered, real)
     write_table(table, dict(snakemake.output.items()), params.caution)

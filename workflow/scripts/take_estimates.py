@@ -10,7 +10,7 @@ with job(snakemake):
 
     given, output, wildcards = snakemake.input, snakemake.output, snakemake.wildcards
     pairs = PairTable.load(given.pairs)
-    pairs = pairs.of_unit(wildcards.category, float(wildcards.elevation))
+    pairs = pairs.for_unit(wildcards.category, float(wildcards.elevation))
     found = take_fold(
         pairs.estimates,
         pairs.distributions if output.get("test_posteriors") else {},

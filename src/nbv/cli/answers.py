@@ -1,4 +1,4 @@
-"""What the commands print, for people and as JSON."""
+"""Print the answers of commands, as text or as JSON."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ if TYPE_CHECKING:
     from nbv.core.offset import Offset
     from nbv.robot.next_view import Recommendation
 
-Place = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
-"""A camera's pose in the base frame, and a point and the direction of the object's axis."""
+Placement = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
+"""Camera pose in the base frame, point on the object's axis, and direction of the axis."""
 
 
-def say(line: str) -> None:
+def print_line(line: str) -> None:
     """Print a line."""
     print(line)  # noqa: T201
 
 
-def say_json(value: Any) -> None:
-    """Print JSON, indented, in characters that every encoding has."""
-    say(json.dumps(value, indent=2))
+def print_json(value: Any) -> None:
+    """Print indented ASCII JSON."""
+    print_line(json.dumps(value, indent=2))
 
 
-def say_assumed_camera(focal_px: float, n_frames: int | None = None) -> None:
-    """Say which focal length is assumed, and of how many frames where that is known."""
-    of_frames = "" if n_frames is None else f" for {counted(n_frames, 'frame')}"
-    say(f"camera     not given{of_frames}: a focal length of {focal_px:g} px is assumed")
+def print_assumed_camera(focal_px: float, n_frames: int | None = None) -> None:
+    """Print the assumed focal length, and the number of frames if it is given."""
+    frames = "" if n_frames is None else f" for {counted(n_frames, 'frame')}"
+    print_line(f"camera     not given{frames}: a focal length of {focal_px:g} px is assumed")
 
 
 def target_poses(
-    rotations_deg: Iterable[float], place: Place | None
+    rotations_deg: Iterable[float], placement: Placement | None
 ) -> list[NDArray[np.float64]] | None:
-    """Return the camera's poses (4, 4) after each of several rotations, where its own is known."""
+    """Return the camera's pose (4, 4) after each rotation; None without a placement."""
     from nbv.robot.moves import moved_camera
 
-    if place is None:
+    if placement is None:
         return None
-    return [moved_camera(*place, rotation_deg) for rotation_deg in rotations_deg]
+    return [moved_camera(*placement, rotation_deg) for rotation_deg in rotations_deg]
 
 
 def with_targets(
     moves: Sequence[Mapping[str, Any]], targets: Sequence[NDArray[np.float64]] | None
 ) -> list[dict[str, Any]]:
-    """Return moves for JSON, each with the camera's pose after it where that is known."""
+    """Return moves for JSON, each with the camera's pose after it if that is known."""
     if targets is None:
         return [dict(move) for move in moves]
     return [
@@ -61,19 +61,19 @@ def with_targets(
     ]
 
 
-def say_warnings(warnings: Iterable[str]) -> None:
-    """Print warnings, a line each."""
+def print_warnings(warnings: Iterable[str]) -> None:
+    """Print one line for each warning."""
     for warning in warnings:
-        say(f"warning: {warning}")
+        print_line(f"warning: {warning}")
 
 
-def say_target(targets: Sequence[NDArray[np.float64]] | None) -> None:
-    """Print the camera's pose after the best move, where it is known and there is a move."""
+def print_target(targets: Sequence[NDArray[np.float64]] | None) -> None:
+    """Print the camera's pose after the best move, if both exist."""
     if not targets:
         return
-    say("target camera pose in the base frame")
+    print_line("target camera pose in the base frame")
     for row in targets[0]:
-        say("  " + " ".join(f"{value:9.5f}" for value in row))
+        print_line("  " + " ".join(f"{value:9.5f}" for value in row))
 
 
 _KEYS = (
@@ -82,7 +82,7 @@ _KEYS = (
     "expected_error_deg",
     "move",
     "alternatives",
-    "unfamiliarity",
+    "ood_score",
     "bayes_factor",
     "warnings",
     "assumed_focal_px",
@@ -90,7 +90,7 @@ _KEYS = (
     "belief",
     "error_after_deg",
 )
-"""What every answer has, in this order; None where it is not known."""
+"""Keys of every answer, in this order; the values of unknown ones are None."""
 
 
 def _as_json(
@@ -99,11 +99,11 @@ def _as_json(
     warnings: Iterable[str],
     targets: Sequence[NDArray[np.float64]] | None,
 ) -> dict[str, Any]:
-    """Return an answer for JSON, of what is known of the pose and of moves, best first."""
+    """Return an answer for JSON from known values and moves, best first."""
     listed = with_targets(moves, targets)
     best = listed[0] if listed else None
-    told = {"move": best, "alternatives": listed[1:], "warnings": list(warnings)}
-    about = dict.fromkeys(_KEYS) | dict(known) | told
+    given = {"move": best, "alternatives": listed[1:], "warnings": list(warnings)}
+    about = dict.fromkeys(_KEYS) | dict(known) | given
     if targets is not None:
         about["target_camera_pose"] = best["target_camera_pose"] if best else None
     return about
@@ -121,17 +121,17 @@ def recommendation_as_json(
     ----------
     answer : Recommendation
     warnings : iterable of str
-        Those of the answer, and of the camera's pose.
+        Warnings of the answer and of the camera's pose.
     targets : sequence of ndarray (4, 4), optional
         The camera's pose after the move and after each alternative.
     assumed_focal_px : float, optional
-        Pixels; None where intrinsics were given.
+        Pixels; None if intrinsics were given.
     """
     known = {
         "azimuth_deg": answer.azimuth_deg,
         "spread_deg": answer.spread_deg,
         "expected_error_deg": answer.expected_error_deg,
-        "unfamiliarity": None if math.isnan(answer.unfamiliarity) else answer.unfamiliarity,
+        "ood_score": None if math.isnan(answer.ood_score) else answer.ood_score,
         "bayes_factor": answer.bayes_factor,
         "assumed_focal_px": assumed_focal_px,
         "object_position_m": answer.object_position_m,
@@ -149,9 +149,10 @@ def table_answer_as_json(
     warnings: Iterable[str],
     targets: Sequence[NDArray[np.float64]] | None,
 ) -> dict[str, Any]:
-    """Return a lookup table's rotations and their costs, best first, as `recommendation_as_json`.
+    """Return a lookup table's rotations and costs, best first, for JSON.
 
-    In addition it has the criterion, the unit of its cost, and the cost of each move.
+    The keys are those of `recommendation_as_json`, and the criterion, the unit of its cost, and the
+    cost of each move.
     """
     moves = [
         {"rotation_deg": rotation, "travel_deg": abs(rotation), "expected_error_deg": None}
@@ -162,22 +163,22 @@ def table_answer_as_json(
     return _as_json({"azimuth_deg": estimate_deg % 360.0}, moves, warnings, targets) | about
 
 
-def say_recommendation(
+def print_recommendation(
     answer: Recommendation,
-    thing: str,
+    category: str,
     warnings: Iterable[str],
     targets: Sequence[NDArray[np.float64]] | None,
 ) -> None:
-    """Print a recommendation for a thing, such as a mug, in a few lines."""
-    say(
-        f"pose       azimuth {answer.azimuth_deg:.1f}° (camera around {thing}); "
+    """Print a recommendation for an object of a category in a few lines."""
+    print_line(
+        f"pose       azimuth {answer.azimuth_deg:.1f}° (camera around {category}); "
         f"expected error {answer.expected_error_deg:.1f}°, spread {answer.spread_deg:.1f}° "
         f"({counted(answer.n_views, 'view')})"
     )
     if (move := answer.move) is None:
-        say("next view  none: all candidates are within 15° of an existing view")
+        print_line("next view  none: all candidates are within 15° of an existing view")
     else:
-        say(
+        print_line(
             f"next view  turn by {move.rotation_deg:+g}° (travel {move.travel_deg:g}°): "
             f"expected error {move.expected_error_deg:.1f}°"
         )
@@ -185,66 +186,68 @@ def say_recommendation(
         others = (
             f"{m.rotation_deg:+g}° ({m.expected_error_deg:.1f}°)" for m in answer.alternatives
         )
-        say(f"or         {', '.join(others)}")
-    say_warnings(warnings)
-    say_target(targets)
+        print_line(f"or         {', '.join(others)}")
+    print_warnings(warnings)
+    print_target(targets)
 
 
-def say_offset(name: str, number: str, offset: Offset, *, is_added: bool = False) -> None:
-    """Print the offset of a recording or a file, and whether calibration adds it to azimuths."""
-    done = ", added to the azimuths" if is_added else ""
-    say(f"{name}: {number}; offset {offset.offset_deg:+.1f}°{done}")
+def print_offset(name: str, number: str, offset: Offset, *, is_added: bool = False) -> None:
+    """Print the offset of a recording or a file, and whether it is added to the azimuths."""
+    added = ", added to the azimuths" if is_added else ""
+    print_line(f"{name}: {number}; offset {offset.offset_deg:+.1f}°{added}")
     if offset.warning:
-        say_warnings([offset.warning])
+        print_warnings([offset.warning])
 
 
-def say_evaluation(found: pd.DataFrame, familiar: pd.DataFrame) -> None:
-    """Print the errors of every recording, a line for each way to choose views.
+def print_evaluation(errors: pd.DataFrame, ood: pd.DataFrame) -> None:
+    """Print the errors of every recording, one line for each way to choose views.
 
     Parameters
     ----------
-    found : DataFrame
+    errors : DataFrame
         From `nbv.robot.evaluation.evaluate`.
-    familiar : DataFrame
-        From `nbv.robot.evaluation.familiarity_of`.
+    ood : DataFrame
+        From `nbv.robot.evaluation.count_ood`.
     """
-    for about in familiar.to_dict("records"):
-        is_own = (found["object_id"] == about["object_id"]) & (
-            found["sequence"] == about["sequence"]
+    for about in ood.to_dict("records"):
+        is_recording = (errors["object_id"] == about["object_id"]) & (
+            errors["sequence"] == about["sequence"]
         )
-        rows = found[is_own]
-        say(
+        rows = errors[is_recording]
+        print_line(
             f"{about['object_id']}, sequence {about['sequence']}: "
             f"{counted(about['n_frames'], 'frame')}; "
-            f"offset {rows['offset_deg'].iloc[0]:+.1f}°; {about['n_unfamiliar']} unfamiliar, "
-            f"{about['n_wrong']} wrong by more than 45°, {about['n_wrong_unfamiliar']} both"
+            f"offset {rows['offset_deg'].iloc[0]:+.1f}°; {about['n_ood']} out of distribution, "
+            f"{about['n_wrong']} wrong by more than 45°, {about['n_wrong_ood']} both"
         )
         if about["warning"]:
-            say_warnings([about["warning"]])
+            print_warnings([about["warning"]])
         numbers = sorted(rows["n_views"].unique())
-        say(f"  {'MAE (without offset), degrees':<30}" + "".join(f"{n:>15}" for n in numbers))
+        print_line(
+            f"  {'MAE (without offset), degrees':<30}" + "".join(f"{n:>15}" for n in numbers)
+        )
         for choice in dict.fromkeys(rows["choice"]):
-            of_choice = rows[rows["choice"] == choice].set_index("n_views")
+            by_views = rows[rows["choice"] == choice].set_index("n_views")
             cells = (
-                f"{of_choice['mae_deg'][n]:.1f} ({of_choice['mae_without_offset_deg'][n]:.1f})"
-                if n in of_choice.index
+                f"{by_views['mae_deg'][n]:.1f} ({by_views['mae_without_offset_deg'][n]:.1f})"
+                if n in by_views.index
                 else ""
                 for n in numbers
             )
-            say(f"  {choice:<30}" + "".join(f"{cell:>15}" for cell in cells))
+            print_line(f"  {choice:<30}" + "".join(f"{cell:>15}" for cell in cells))
 
 
-def say_names(about: Mapping[str, Any]) -> None:
-    """Print names and values, one a line; of a mapping its own names and values."""
+def print_names(about: Mapping[str, Any]) -> None:
+    """Print names and values, one per line, with nested names joined by dots."""
     shown = dict(_flat(about))
     width = max(map(len, shown))
     for name, value in shown.items():
-        say(f"{name:<{width}}  {value}")
+        print_line(f"{name:<{width}}  {value}")
 
 
-def _flat(about: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def _flat(about: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     for name, value in about.items():
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{before}{name}.")
+            yield from _flat(value, f"{prefix}{name}.")
         else:
-            yield f"{before}{name}", value
+            yield f"{prefix}{name}", value

@@ -1,4 +1,4 @@
-"""What stands on the command line: lists of numbers, cameras, and files to write."""
+"""Types and checks of command-line arguments: lists of numbers, rotations and output files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Command = TypeVar("Command", bound=Callable[..., None])
 
 
 def as_whole_number(_kind: Any, tokens: Sequence[Token]) -> int:
-    """Return the whole number of an option, which is not rounded to one."""
+    """Return the integer of an option; other numbers are not rounded."""
     return int(_number(int, tokens[0].value))
 
 
@@ -25,12 +25,12 @@ def _number(kind: Callable[[str], float], text: str) -> float:
     try:
         return kind(text)
     except ValueError:
-        what = "whole number" if kind is int else "number"
-        raise ValueError(f"{text!r} is no {what}") from None
+        what = "an integer" if kind is int else "a number"
+        raise ValueError(f"{text!r} is not {what}") from None
 
 
 def as_numbers(kind: Any, tokens: Sequence[Token]) -> list[Any]:
-    """Return the numbers of an option, between commas or spaces; `kind` is a list of some type."""
+    """Return the numbers of an option, separated by commas or spaces; `kind` is a list type."""
     (kind_of_number,) = kind.__args__
     texts = [text for token in tokens for text in token.value.replace(",", " ").split()]
     if not texts:
@@ -39,7 +39,7 @@ def as_numbers(kind: Any, tokens: Sequence[Token]) -> list[Any]:
 
 
 def as_rotations_or_file(_kind: Any, tokens: Sequence[Token]) -> list[float] | Path:
-    """Return the numbers of an option, or the file that its one value names."""
+    """Return the numbers of an option, or the file that its only value names."""
     if len(tokens) == 1 and tokens[0].value and not _is_numbers(tokens[0].value):
         return Path(tokens[0].value)
     return as_numbers(list[float], tokens)
@@ -50,7 +50,7 @@ def _list_parameter(converter: Callable[..., Any], metavar: str) -> Parameter:
 
 
 Numbers = Annotated[list[float] | None, _list_parameter(as_numbers, "NUMBER...")]
-# -z is an axis here, and no option.
+# -z is an axis here and not an option.
 FileAxis = Annotated[str, Parameter(allow_leading_hyphen=True)]
 WholeNumbers = Annotated[list[int] | None, _list_parameter(as_numbers, "NUMBER...")]
 WholeNumber = Annotated[int, Parameter(converter=as_whole_number, n_tokens=1, metavar="INT")]
@@ -61,13 +61,20 @@ Rotations = Annotated[
 Json = Annotated[bool, Parameter(negative=())]
 
 SHIPPED = "mug"
-"""The bundle that is taken where none is named."""
+"""The default bundle."""
 
 
 _FLAGS = {
     "allowed_deg": "--allowed",
     "bundle": "--bundle",
     "depth_scale": "--depth-scale",
+    "diagonal_m": "--diagonal",
+    "distance_m": "--distance",
+    "azimuth_deg": "--azimuth",
+    "elevation_deg": "--elevation",
+    "gravity": "--gravity",
+    "seed": "--seed",
+    "sensor": "--sensor",
     "far_m": "--far",
     "intrinsics": "--intrinsics",
     "max_travel_deg": "--max-travel",
@@ -77,14 +84,14 @@ _FLAGS = {
 
 
 def in_flags(message: str) -> str:
-    """Return a library's message with its `parameters` as the flags of the command line."""
-    return re.sub("`([a-z_]+)`", lambda found: _FLAGS.get(found[1], found[0]), message)
+    """Return a library's message with its `parameters` replaced by flags."""
+    return re.sub("`([a-z_]+)`", lambda match: _FLAGS.get(match[1], match[0]), message)
 
 
 def as_paragraphs(command: Command) -> Command:
-    """Return a command whose help has a line for each paragraph; what prints it wraps it.
+    """Return a command whose help has one line for each paragraph.
 
-    The help in plain text breaks lines where the docstring does, and then again.
+    Cyclopts wraps the lines of plain text, but also keeps the line breaks of the docstring.
     """
     joined: list[str] = []
     head, _, parameters = inspect.cleandoc(command.__doc__ or "").partition("\nParameters\n")
@@ -98,21 +105,22 @@ def as_paragraphs(command: Command) -> Command:
     return command
 
 
-OF_NUMBERS = ("--rotations", "--allowed", "--axis", "--gravity", "--views", "--intrinsics")
+NUMBER_OPTIONS = ("--rotations", "--allowed", "--axis", "--gravity", "--views", "--intrinsics")
 
 
 def joined_numbers(arguments: Sequence[str]) -> list[str]:
-    """Return arguments in which the numbers after an option of `OF_NUMBERS` are one.
+    """Return arguments in which the numbers after an option of `NUMBER_OPTIONS` are joined.
 
-    The list ends where no number follows: the frame in ``--rotations 0 90 frame.npy`` is none.
+    The list ends at the first argument that is not a number, such as the frame in
+    ``--rotations 0 90 frame.npy``.
     """
-    found: list[str] = []
+    joined: list[str] = []
     for argument in arguments:
-        if found and found[-1].split("=")[0] in OF_NUMBERS and _is_numbers(argument):
-            found[-1] += ("," if "=" in found[-1] else "=") + argument
+        if joined and joined[-1].split("=")[0] in NUMBER_OPTIONS and _is_numbers(argument):
+            joined[-1] += ("," if "=" in joined[-1] else "=") + argument
         else:
-            found.append(argument)
-    return found
+            joined.append(argument)
+    return joined
 
 
 def _is_numbers(text: str) -> bool:
@@ -124,36 +132,36 @@ def _is_numbers(text: str) -> bool:
 
 
 def allowed_rotations(given: list[float] | Path | None) -> Any:
-    """Return the rotations of ``--allowed``, read where it names a file."""
+    """Return the rotations of ``--allowed``, read from a file if it names one."""
     from nbv.robot.moves import read_rotations
 
     return read_rotations(given) if isinstance(given, Path) else given
 
 
-def need_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:
-    """Refuse a file that cannot be written, before anything is computed.
+def check_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:
+    """Check that a file can be written, before anything is computed.
 
     Parameters
     ----------
     option : str
         Such as ``--plot``.
     path : path
-        Folders that it needs are made later.
+        Missing folders are made later.
     kinds : sequence of str
-        The suffixes that it may have; any without it.
+        Allowed suffixes; all without it.
 
     Raises
     ------
     UserError
-        Where the suffix is another one, the path is a folder, or a folder above it is no folder or
-        may not be written to.
+        Where the suffix is not allowed, the path is a folder, or its parent is a file or is not
+        writable.
     """
     if kinds and path.suffix.lower() not in kinds:
         raise UserError(f"{option}={path}: give a name that ends in {' or '.join(kinds)}")
     if path.is_dir():
-        raise UserError(f"{option}={path}: this is a folder; give the name of a file")
+        raise UserError(f"{option}={path}: it is a folder; give the name of a file")
     folder = next(parent for parent in path.absolute().parents if parent.exists())
     if not folder.is_dir():
-        raise UserError(f"{option}={path}: {folder.name} is a file and no folder")
+        raise UserError(f"{option}={path}: {folder.name} is a file; give a path in a folder")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise UserError(f"{option}={path}: the folder {folder} may not be written to")
+        raise UserError(f"{option}={path}: the folder {folder} is not writable; give another one")

@@ -33,6 +33,20 @@ from nbv.errors import UserError, nearest
 
 log = logging.getLogger(__name__)
 
+DENSITY: Mapping[str, Any] = {
+    "pose_likelihood": "given_estimate",
+    "spread": "entropy",
+    "bandwidths_deg": [4, 6, 8, 12, 16],
+    "pseudo_observations": [3, 10, 30, 100],
+    "n_parts": 5,
+    "travel_cost": 0.0,
+    "max_travel_deg": 180.0,
+}
+"""Settings of the paper's lookup tables; the defaults of ``density`` and ``recommendation``."""
+
+AFFINITY: Mapping[str, float] = {"power": 16.0, "pseudo_observations": 90.0}
+"""Settings of the expected error given a distribution; the defaults of ``affinity``."""
+
 Candidate = tuple[float, float]
 """A bandwidth (degrees) and a number of pseudo-observations."""
 

@@ -13,18 +13,19 @@ from nbv.core.estimates import Estimates, Posteriors, posteriors_of
 from nbv.core.logits import fit_temperature
 from nbv.experiment.estimation.inference import FoldEstimates
 from nbv.experiment.splits import check_objects, objects_with_role
-from nbv.robot.pair_distributions import evenly_apart
-from nbv.robot.pairs import Turns
+from nbv.robot.pairs import Sweeps, evenly_apart
 
 
-def take_fold(estimates: Estimates, turns: Turns, splits: pd.DataFrame, fold: int) -> FoldEstimates:
+def take_fold(
+    estimates: Estimates, sweeps: Sweeps, splits: pd.DataFrame, fold: int
+) -> FoldEstimates:
     """Return the estimates of another program for a fold's calibration and test objects.
 
     Parameters
     ----------
     estimates : Estimates
         The estimates for all objects.
-    turns : Turns
+    sweeps : Sweeps
         The distributions for the same objects; empty if the program gives none. Calibration objects
         choose one temperature.
     splits : DataFrame
@@ -35,13 +36,13 @@ def take_fold(estimates: Estimates, turns: Turns, splits: pd.DataFrame, fold: in
     ------
     UserError
         Where the objects differ from those in the splits, or the azimuths do not allow evenly
-        spaced views (`nbv.robot.pair_distributions.evenly_apart`).
+        spaced views (`nbv.robot.pairs.evenly_apart`).
     """
     check_objects(splits, estimates.object_ids)
     names = {role: objects_with_role(splits, fold, role) for role in ("calibration", "test")}
     temperature = 1.0
-    if turns:
-        azimuths, given = zip(*(turns[name] for name in names["calibration"]), strict=True)
+    if sweeps:
+        azimuths, given = zip(*(sweeps[name] for name in names["calibration"]), strict=True)
         temperature = fit_temperature(np.log(np.concatenate(given)), np.concatenate(azimuths))
     taken: FoldEstimates = {}
     for role, object_ids in names.items():
@@ -49,11 +50,11 @@ def take_fold(estimates: Estimates, turns: Turns, splits: pd.DataFrame, fold: in
             [estimates.object_ids.index(name) for name in object_ids]
         ]
         posteriors = None
-        if turns:
+        if sweeps:
             n_views = estimate_deg.shape[1]
             whole = []
             for name in object_ids:
-                azimuth_deg, rows = turns[name]
+                azimuth_deg, rows = sweeps[name]
                 # The temperature was fitted to the distributions before they are rotated.
                 own = posteriors_of((name,), np.log(rows)[None], temperature).distributions[0]
                 whole.append(evenly_apart(azimuth_deg, own, n_views))

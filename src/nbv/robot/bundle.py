@@ -1,7 +1,8 @@
-"""A bundle: a trained network with what its errors on held-out objects taught, in one file.
+"""A bundle: a trained network and its calibration data, in one file.
 
-The file is of the safetensors format: arrays, and metadata as JSON. It holds no code. The network
-is an ONNX model. Calibration distributions are kept as logs, one byte each, see `PROBABILITY_STEP`.
+The file has the safetensors format: arrays, and metadata as JSON. It holds no code. The network is
+an ONNX model. Calibration distributions are stored as logarithms of one byte, in steps of
+`PROBABILITY_STEP`.
 """
 
 from __future__ import annotations
@@ -21,20 +22,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import nearest_bin
 from nbv.data.camera import Camera
-from nbv.errors import NamedError
+from nbv.errors import BundleError
 from nbv.files import missing, replacing
-from nbv.robot.ood import Familiarity
+from nbv.robot.ood import OodModel
 
 FORMAT = 4
-"""Raised when the file changes; a program reads its own format alone."""
+"""Increased when the file changes; a program reads only its own format."""
 
 PROBABILITY_STEP = 0.054
-"""Between kept logs of probabilities, in nats: 256 of them reach down to 1e-6."""
+"""Step of stored log probabilities, nats: 256 steps reach down to 1e-6."""
+
+
+ELEVATION_BANDWIDTH_DEG = 10.0
+"""Width of the kernel by which calibration sweeps count for frames at another elevation."""
 
 
 @dataclass(frozen=True)
 class PaperTables:
-    """What the paper's lookup tables recommend, one for each elevation.
+    """The paper's lookup tables, one for each elevation.
 
     Attributes
     ----------
@@ -46,13 +51,13 @@ class PaperTables:
     elevation_deg: NDArray[np.float32]
     rotation_deg: NDArray[np.int16]
 
-    def table_of(self, elevation_deg: float) -> int:
-        """Return which table is nearest to an elevation: the lowest where it is not known (NaN)."""
+    def table_index(self, elevation_deg: float) -> int:
+        """Return the index of the table nearest to an elevation; 0 where it is unknown (NaN)."""
         return int(np.nan_to_num(np.abs(self.elevation_deg - elevation_deg)).argmin())
 
     def recommend(self, estimate_deg: ArrayLike, elevation_deg: float) -> NDArray[np.float64]:
-        """Return the rotations for estimates, of the table of `table_of` an elevation."""
-        table = self.rotation_deg[self.table_of(elevation_deg)]
+        """Return the rotations for estimates, from the table nearest to an elevation."""
+        table = self.rotation_deg[self.table_index(elevation_deg)]
         rotations = table[nearest_bin(estimate_deg, len(table))]
         return np.asarray(rotations, dtype=np.float64)
 
@@ -67,34 +72,34 @@ class Bundle:
     network : bytes
         From `nbv.experiment.estimation.make_bundle.onnx_model`.
     estimator : mapping
-        Its settings.
+        Settings of the network.
     camera : Camera
-        What it was trained with.
+        The camera of the training images.
     diagonal_m : float
-        Of the bounding box of a usual object, metres.
+        Diagonal of the bounding box of a typical object, metres.
     extent_m : (float, float)
-        Between which the diagonal of an object's box in the image is plausible, metres.
+        Plausible range of the diagonal of an object's box in the image, metres.
     focal_px : float
-        Of the sensor that training simulated: what is assumed where a camera is not known.
+        Focal length of the simulated sensor, pixels; assumed where a camera is unknown.
     mirror_plane_deg : float or None
-        The azimuth of the plane about which objects are symmetric, degrees in [0, 180); see
-        `nbv.robot.mirror`. None where there is none.
+        Azimuth of the plane about which objects are symmetric, degrees in [0, 180); see
+        `nbv.robot.network`. None if they have no such plane.
     temperature : float
-        What logits are divided by.
+        Divisor of the logits.
     object_ids : tuple of str
-        Of each of S calibration turns: which object it shows.
+        The object in each of S calibration sweeps.
     elevation_deg : ndarray (S,)
-        Of each calibration turn; NaN where it is not known.
-    turn_weight : ndarray (S,) float32
-        How much each calibration turn counts.
+        Elevation of each calibration sweep; NaN where it is unknown.
+    sweep_weights : ndarray (S,) float32
+        Weight of each calibration sweep.
     distributions : ndarray (S, B, B) float32
         p(azimuth | image) of views a bin apart.
     affinity : mapping
         ``power`` and ``pseudo_observations`` of the expected error.
-    familiarity : Familiarity
+    ood : OodModel
     paper : PaperTables
     provenance : mapping
-        Run, commit, versions, settings, and what calibrated it.
+        Run, commit, versions, settings, and the source of the calibration.
     """
 
     category: str
@@ -108,17 +113,27 @@ class Bundle:
     temperature: float
     object_ids: tuple[str, ...]
     elevation_deg: NDArray[np.float32]
-    turn_weight: NDArray[np.float32]
+    sweep_weights: NDArray[np.float32]
     distributions: NDArray[np.float32]
     affinity: Mapping[str, float]
-    familiarity: Familiarity
+    ood: OodModel
     paper: PaperTables
     provenance: Mapping[str, Any]
 
     @property
     def n_bins(self) -> int:
-        """B, the number of classes."""
+        """Number of classes, B."""
         return int(self.distributions.shape[-1])
+
+    def weights_at(self, elevation_deg: float | None) -> NDArray[np.float64]:
+        """Return the weights (S,) of the calibration sweeps for frames at an elevation.
+
+        None or NaN where the elevation is unknown: every sweep then has its own weight.
+        """
+        weights = np.asarray(self.sweep_weights, dtype=np.float64)
+        if elevation_deg is None:
+            return weights
+        return weights * elevation_weights(self.elevation_deg, elevation_deg)
 
     def save(self, path: str | Path) -> None:
         """Write a bundle: the same bundle gives the same bytes."""
@@ -134,24 +149,25 @@ class Bundle:
             "temperature": self.temperature,
             "object_ids": list(self.object_ids),
             "affinity": dict(self.affinity),
-            "familiar_within": self.familiarity.threshold,
+            "familiar_within": self.ood.threshold,
             "provenance": dict(self.provenance),
         }
         arrays: dict[str, NDArray[Any]] = {
             "network": np.frombuffer(self.network, dtype=np.uint8),
             "calibration.elevation_deg": self.elevation_deg.astype(np.float32),
-            "calibration.weight": self.turn_weight.astype(np.float32),
-            "calibration.distributions": as_steps(self.distributions),
-            "familiarity.mean": self.familiarity.mean,
-            "familiarity.basis": self.familiarity.basis.astype(np.float16),
-            "familiarity.references": self.familiarity.references.astype(np.float16),
-            "familiarity.scales": self.familiarity.scales,
+            "calibration.weight": self.sweep_weights.astype(np.float32),
+            "calibration.distributions": quantize_logp(self.distributions),
+            "familiarity.mean": self.ood.mean,
+            "familiarity.basis": self.ood.basis.astype(np.float16),
+            "familiarity.references": self.ood.references.astype(np.float16),
+            "familiarity.scales": self.ood.scales,
             "paper.elevation_deg": self.paper.elevation_deg,
             "paper.rotation_deg": self.paper.rotation_deg,
         }
         # safetensors writes the memory of an array as it lies, whatever its order.
         arrays = {name: np.asarray(array, order="C") for name, array in arrays.items()}
-        # As it is read again. The metadata has one entry: safetensors orders several at random.
+        # As `load` reads it. The metadata has one entry, because safetensors orders several at
+        # random.
         about = json.loads(json.dumps(about))
         about["sha256"] = _digest(about, arrays)
         metadata = {"nbv": json.dumps(about, sort_keys=True)}
@@ -160,13 +176,13 @@ class Bundle:
 
     @classmethod
     def load(cls, path: str | Path) -> Bundle:
-        """Read what `save` wrote.
+        """Read a file of `save`.
 
         Raises
         ------
         BundleError
-            ``no-bundle`` where the file is missing or another one, ``damaged-bundle`` also where
-            it is cut short, ``older-bundle`` and ``newer-bundle`` where it is of another format.
+            ``no-bundle`` where the file is missing or is not a bundle, ``damaged-bundle`` where
+            it was changed or cut short, ``older-bundle`` or ``newer-bundle`` for another format.
         """
         path = Path(path)
         if not path.is_file():
@@ -177,53 +193,53 @@ class Bundle:
             about, arrays = _read(path)
             _check_format(path, about["format"])
             if about.pop("sha256") != _digest(about, arrays):
-                raise ValueError("not the bytes that were written")
-            bundle = _of_parts(about, arrays)
-            _need_sound(bundle)
+                raise ValueError("its checksum differs")
+            bundle = _bundle_of(about, arrays)
+            _check_sound(bundle)
         except BundleError:
             raise
-        # No list of what a reader may raise on arbitrary bytes is complete.
+        # A reader may raise any exception on arbitrary bytes.
         except Exception as error:
             reason = " ".join(str(error).split()) or type(error).__name__
             raise BundleError(
-                "damaged-bundle", f"{path} is no sound bundle ({reason}); get it again"
+                "damaged-bundle", f"{path} is damaged ({reason}); get it again"
             ) from error
         return bundle
 
 
-def as_steps(distributions: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Return distributions as whole steps of -log p, 0 to 255."""
+def elevation_weights(known_deg: NDArray[np.floating], elevation_deg: float) -> NDArray[np.float64]:
+    """Return the weights (S,) of calibration sweeps at elevations `known_deg` (S,) for frames.
+
+    The weight falls off as a normal kernel of `ELEVATION_BANDWIDTH_DEG`; the nearest sweep has the
+    weight 1. A sweep of unknown elevation (NaN) has the weight 1, and so has every sweep where
+    `elevation_deg` is NaN.
+    """
+    if math.isnan(elevation_deg) or np.isnan(known_deg).all():
+        return np.ones(len(known_deg))
+    apart = ((known_deg - elevation_deg) / ELEVATION_BANDWIDTH_DEG) ** 2
+    weights = np.exp(-0.5 * (apart - np.nanmin(apart)))
+    return np.asarray(np.nan_to_num(weights, nan=1.0), dtype=np.float64)
+
+
+def quantize_logp(distributions: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Return -log p of distributions in steps of `PROBABILITY_STEP`, 0 to 255."""
     steps = -np.log(np.maximum(distributions, 1e-30)) / PROBABILITY_STEP
     return np.asarray(np.rint(np.minimum(steps, 255)), dtype=np.uint8)
 
 
-def from_steps(steps: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return what `as_steps` kept, with rows that sum to 1 again."""
-    kept = np.exp(np.arange(256) * -PROBABILITY_STEP).astype(np.float32)[steps]
-    return np.asarray(kept / kept.sum(axis=-1, keepdims=True))
+def dequantize_logp(steps: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return the distributions of `quantize_logp`, normalised again."""
+    rows = np.exp(np.arange(256) * -PROBABILITY_STEP).astype(np.float32)[steps]
+    return np.asarray(rows / rows.sum(axis=-1, keepdims=True))
 
 
 def _digest(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
-    """Return the SHA-256 of all that a bundle holds: a damaged number shows nowhere else."""
-    found = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    """Return the SHA-256 of a bundle's content, which detects damaged numbers."""
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
     for name, array in sorted(arrays.items()):
-        found.update(f"{name} {array.dtype} {array.shape}".encode())
-        found.update(array.tobytes())
-    return found.hexdigest()
-
-
-class BundleError(NamedError):
-    """A file that is no sound bundle; its name is the reason.
-
-    Examples
-    --------
-    >>> import nbv
-    >>> try:
-    ...     nbv.Recommender.load("cup")
-    ... except nbv.BundleError as error:
-    ...     error.name
-    'no-bundle'
-    """
+        digest.update(f"{name} {array.dtype} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def _check_format(path: Path, version: int) -> None:
@@ -245,16 +261,17 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     with safetensors.safe_open(path, framework="numpy") as stored:
         metadata = stored.metadata() or {}
         if "nbv" not in metadata:
-            raise BundleError("no-bundle", f"{path} is no bundle of nbv")
+            raise BundleError("no-bundle", f"{path} is not a bundle of nbv; name one")
         about = json.loads(metadata["nbv"])
         if "format" not in about:
             raise BundleError(
-                "no-bundle", f"{path} is an estimator, no bundle: make one with snakemake bundles"
+                "no-bundle",
+                f"{path} is an estimator and not a bundle: make one with snakemake bundles",
             )
         return about, {name: stored.get_tensor(name) for name in sorted(stored.keys())}
 
 
-def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Bundle:
+def _bundle_of(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Bundle:
     low, high = about["extent_m"]
     return Bundle(
         category=about["category"],
@@ -268,10 +285,10 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
         temperature=about["temperature"],
         object_ids=tuple(about["object_ids"]),
         elevation_deg=arrays["calibration.elevation_deg"],
-        turn_weight=arrays["calibration.weight"],
-        distributions=from_steps(arrays["calibration.distributions"]),
+        sweep_weights=arrays["calibration.weight"],
+        distributions=dequantize_logp(arrays["calibration.distributions"]),
         affinity=about["affinity"],
-        familiarity=Familiarity(
+        ood=OodModel(
             arrays["familiarity.mean"],
             arrays["familiarity.basis"].astype(np.float32),
             arrays["familiarity.references"].astype(np.float32),
@@ -283,48 +300,48 @@ def _of_parts(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> B
     )
 
 
-def _need_sound(bundle: Bundle) -> None:
-    n_turns, n_bins = len(bundle.object_ids), bundle.n_bins
-    if bundle.distributions.shape != (n_turns, n_bins, n_bins) or not n_turns:
-        raise ValueError(f"calibration of {bundle.distributions.shape} for {n_turns} turns")
-    if not bundle.elevation_deg.shape == bundle.turn_weight.shape == (n_turns,):
-        raise ValueError("an elevation or a weight for each turn is missing")
-    if not (bundle.turn_weight > 0).all():
-        raise ValueError("a turn has no weight above 0")
+def _check_sound(bundle: Bundle) -> None:
+    n_sweeps, n_bins = len(bundle.object_ids), bundle.n_bins
+    if bundle.distributions.shape != (n_sweeps, n_bins, n_bins) or not n_sweeps:
+        raise ValueError(f"calibration of {bundle.distributions.shape} for {n_sweeps} sweeps")
+    if not bundle.elevation_deg.shape == bundle.sweep_weights.shape == (n_sweeps,):
+        raise ValueError("the elevation or the weight of a sweep is missing")
+    if not (bundle.sweep_weights > 0).all():
+        raise ValueError("the weight of a sweep is not above 0")
     n_tables = len(bundle.paper.elevation_deg)
     if not n_tables or bundle.paper.rotation_deg.shape != (n_tables, 360):
-        raise ValueError("the paper's tables are no tables")
+        raise ValueError("the paper's tables have another shape")
     if bundle.estimator["n_classes"] != n_bins or 360 % n_bins:
         raise ValueError(f"{n_bins} bins for {bundle.estimator['n_classes']} classes")
     plane = bundle.mirror_plane_deg
     if plane is not None and not (0 <= plane < 180 and (2 * plane * n_bins / 360).is_integer()):
         raise ValueError(f"a mirror plane at {plane}°")
-    numbers = [bundle.diagonal_m, bundle.focal_px, bundle.temperature, bundle.familiarity.threshold]
+    numbers = [bundle.diagonal_m, bundle.focal_px, bundle.temperature, bundle.ood.threshold]
     if not all(math.isfinite(number) and number > 0 for number in numbers):
         raise ValueError("a size, focal length, temperature or threshold is not above 0")
-    arrays = [bundle.turn_weight, bundle.paper.elevation_deg]
-    known = bundle.familiarity
-    arrays += [known.mean, known.basis, known.references, known.scales]
+    arrays = [bundle.sweep_weights, bundle.paper.elevation_deg]
+    model = bundle.ood
+    arrays += [model.mean, model.basis, model.references, model.scales]
     if (
         not all(np.isfinite(array).all() for array in arrays)
         or np.isinf(bundle.elevation_deg).any()
     ):
         raise ValueError("a number is not finite")
     if not 0 < bundle.extent_m[0] < bundle.extent_m[1]:
-        raise ValueError("the plausible extents are no range")
+        raise ValueError("the plausible extents are not a range")
     if (np.abs(bundle.paper.rotation_deg.astype(np.int64)) > 360).any():
         raise ValueError("a rotation of the paper's tables is more than a full turn")
-    n_features, n_components = known.basis.shape
+    n_features, n_components = model.basis.shape
     if not (
-        known.mean.shape == (n_features,)
-        and known.references.shape[1:] == (n_components,)
-        and len(known.references)
-        and known.scales.shape == (2, 2)
+        model.mean.shape == (n_features,)
+        and model.references.shape[1:] == (n_components,)
+        and len(model.references)
+        and model.scales.shape == (2, 2)
     ):
-        raise ValueError("what is familiar has arrays that do not fit each other")
+        raise ValueError("arrays of the OOD score do not fit each other")
     if set(bundle.affinity) != {"power", "pseudo_observations"} or not all(
         math.isfinite(value) and value >= 0 for value in bundle.affinity.values()
     ):
         raise ValueError(f"an affinity of {dict(bundle.affinity)}")
     if not isinstance(bundle.provenance, dict):
-        raise ValueError("a provenance that is no object")
+        raise ValueError("the provenance is not an object")

@@ -1,10 +1,10 @@
-"""From a depth frame to the crop that a network was trained on.
+"""Crop a depth frame to what a network was trained on.
 
-The network saw the object from ``camera.distance`` diagonals with ``camera.focal_px``. A frame is
-taken from any distance, with any focal length, by a camera that is not directed at the object. What
-stays the same is the size of a pixel on the object, ``camera.distance / camera.focal_px``
-diagonals. So the frame is sampled at this step, by a camera in the same place that is directed at
-the object.
+The network was trained on images taken from ``camera.distance`` diagonals with
+``camera.focal_px``. A frame comes from any distance, with any focal length, from a camera that need
+not point at the object. The crop keeps the size of a pixel on the object,
+``camera.distance / camera.focal_px`` diagonals: the frame is sampled at this step by a virtual
+camera at the same position that points at the object.
 """
 
 from __future__ import annotations
@@ -18,34 +18,33 @@ from numpy.typing import NDArray
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import encode_depth, median_depth
-from nbv.errors import UserError, check_number
+from nbv.errors import FrameError, UserError, check_number
 from nbv.robot.depth_files import DepthImage
-from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics
 from nbv.robot.masks import NEAREST_SHARE, Mask, window_of
 
 BEHIND_SURFACE = 0.15
-"""How far an object's origin lies behind the median of what is visible of it, in diagonals."""
+"""Distance of an object's origin behind the median of its visible surface, diagonals."""
 
 CROPPED_DEG = 25.0
-"""A frame with less field of view was cropped about its object, which may touch the border."""
+"""A frame with a smaller field of view is a cut-out, whose object may touch the border."""
 
 NEAREST, FARTHEST = 1.5, 20.0
-"""Distances that are plausible, in diagonals."""
+"""Plausible distances, diagonals."""
 
 _Axis = tuple[float, float, float]
 
-# Diagonals: a limit of depth beyond it is none.
+# A limit of depth beyond this has no effect; diagonals.
 _NO_LIMIT = 100.0
 
-# What mends a wrong unit, the likeliest first: millimetres, tenths and quarters of them,
+# Factors that correct a wrong unit, the likeliest first: millimetres, tenths and quarters of them,
 # centimetres, and back.
 _UNITS = (0.001, 1000.0, 0.1, 0.0001, 0.25, 0.01, 10.0, 100.0, 0.00025, 4000.0, 10000.0)
 
 
 @dataclass(frozen=True)
 class Crop:
-    """What a network sees of a frame.
+    """A network's input, and the measurements made on the way to it.
 
     Attributes
     ----------
@@ -56,10 +55,10 @@ class Crop:
     extent_m : float
         The diagonal of the object's bounding box in the image, metres.
     centre_m : tuple of float, or None
-        About where the object's origin is in the camera's optical frame (x right, y down, z
-        forward), metres; None where the principal point is not known.
+        Approximate position of the object's origin in the camera's optical frame (x right, y
+        down, z forward), metres; None where the principal point is unknown.
     doubts : tuple of str
-        What may be wrong with the frame, a sentence each.
+        Likely mistakes in the frame, a sentence each.
     """
 
     codes: NDArray[np.uint8]
@@ -70,7 +69,7 @@ class Crop:
 
 
 def pixel_step(camera: Camera) -> float:
-    """Return the size of a crop's pixel on the object, in diagonals."""
+    """Return the size of a crop's pixel on the object, diagonals."""
     return camera.distance / camera.focal_px
 
 
@@ -92,11 +91,11 @@ def crop_frame(
         See `nbv.robot.masks.object_mask`.
     intrinsics : Intrinsics
     camera : Camera
-        That of the training.
+        The camera of the training images.
     diagonal_m : float
-        Of the object's bounding box, metres; that of a usual object of the category.
+        Diagonal of the bounding box of a typical object of the category, metres.
     extent_m : (float, float)
-        Between which the object's extent in the image is plausible, metres.
+        Plausible range of the object's extent in the image, metres.
 
     Raises
     ------
@@ -105,13 +104,13 @@ def crop_frame(
         ``implausible-size``.
     """
     rows, columns = depth_m.shape
-    intrinsics.need_resolution(rows, columns)
-    of_rows, of_columns = window = window_of(mask)
-    if not of_rows.stop:
+    intrinsics.check_resolution(rows, columns)
+    window_rows, window_columns = window = window_of(mask)
+    if not window_rows.stop:
         raise FrameError("empty-mask", "the mask has no pixel")
-    top, bottom = of_rows.start, of_rows.stop - 1
-    left, right = of_columns.start, of_columns.stop - 1
-    _need_inside(top, bottom, left, right, (rows, columns), intrinsics)
+    top, bottom = window_rows.start, window_rows.stop - 1
+    left, right = window_columns.start, window_columns.stop - 1
+    _check_inside(top, bottom, left, right, (rows, columns), intrinsics)
     middle = (left + right + 1) / 2, (top + bottom + 1) / 2
     axes, principal = _facing(intrinsics, *middle)
     towards = axes[2]
@@ -119,21 +118,23 @@ def crop_frame(
     width_m = (right - left + 1) * distance_m / intrinsics.fx
     height_m = (bottom - top + 1) * distance_m / intrinsics.fy
     extent = math.hypot(width_m, height_m)
-    _need_plausible(distance_m, extent, diagonal_m, extent_m)
-    # A pixel covers the same length on the object's middle as in training.
+    _check_plausible(distance_m, extent, diagonal_m, extent_m)
+    # A pixel covers the same length at the object's centre as in training.
     away_m = distance_m + BEHIND_SURFACE * diagonal_m
     step = pixel_step(camera) * diagonal_m / away_m
-    # From the pixels of a camera that is directed at the object to those of the frame, which has a
-    # border of one pixel, in homogeneous coordinates: each of its axes becomes a column.
+    # The homography maps pixels of the virtual camera to pixels of the frame with a border of one
+    # pixel, in homogeneous coordinates: each axis of the camera becomes a column.
     column, row = principal[0] + 1.0, principal[1] + 1.0
     to_pixels = [
         (intrinsics.fx * x + column * z, intrinsics.fy * y + row * z, z) for x, y, z in axes
     ]
     homography = np.array(to_pixels).T * (step, step, 1.0)
-    pixels = homography @ _middles(camera.image_side)
-    # What lies outside the window has no depth, as its border here.
+    pixels = homography @ _pixel_centres(camera.image_side)
+    # Pixels outside the window have no depth; they read its border.
     measured = np.pad(np.where(mask[window], depth_m[window], np.float32(0)), 1)
-    depth = measured.take(_places(pixels, of_rows, of_columns)) / (diagonal_m * pixels[2])
+    depth = measured.take(_window_indices(pixels, window_rows, window_columns)) / (
+        diagonal_m * pixels[2]
+    )
     images = depth.astype(np.float32).reshape(1, camera.image_side, camera.image_side)
     codes = encode_depth(images, camera)[0]
     right_m, down_m, ahead_m = (away_m * part for part in towards)
@@ -142,26 +143,26 @@ def crop_frame(
 
 
 @cache
-def _middles(side: int) -> NDArray[np.float64]:
-    """Return the middles of a crop's pixels, from the middle of the crop, pixels.
+def _pixel_centres(side: int) -> NDArray[np.float64]:
+    """Return the centres of a crop's pixels relative to the centre of the crop, pixels.
 
-    They are homogeneous coordinates (3, side²): columns, rows and ones.
+    The result holds homogeneous coordinates (3, side²): columns, rows and ones.
     """
     along = np.arange(side, dtype=np.float64) + 0.5 - side / 2
-    middles = np.stack([np.tile(along, side), np.repeat(along, side), np.ones(side**2)])
-    middles.flags.writeable = False
-    return middles
+    centres = np.stack([np.tile(along, side), np.repeat(along, side), np.ones(side**2)])
+    centres.flags.writeable = False
+    return centres
 
 
-def _places(pixels: NDArray[np.float64], rows: slice, columns: slice) -> NDArray[np.intp]:
-    """Return indices (n,) into a bordered window, row by row.
+def _window_indices(pixels: NDArray[np.float64], rows: slice, columns: slice) -> NDArray[np.intp]:
+    """Return indices (n,) into the flattened window with its border.
 
     Parameters
     ----------
     pixels : ndarray (3, n)
-        Homogeneous coordinates in the frame, which has a border of one pixel.
+        Homogeneous coordinates in the frame with a border of one pixel.
     rows, columns : slice
-        The window. What lies outside is in its border.
+        The window. Pixels outside are moved to its border.
     """
     positions = pixels[:2] / pixels[2]
     np.maximum(positions, [[columns.start], [rows.start]], out=positions)
@@ -174,14 +175,15 @@ def _places(pixels: NDArray[np.float64], rows: slice, columns: slice) -> NDArray
 def _facing(
     intrinsics: Intrinsics, column: float, row: float
 ) -> tuple[tuple[_Axis, _Axis, _Axis], tuple[float, float]]:
-    """Return the axes of a camera directed at a place of the image, and the principal point.
+    """Return the axes of a virtual camera that points at a pixel, and the principal point.
 
-    The axes are right, down and ahead, in the camera's own frame. It is turned by the shortest
-    rotation. Where the principal point is not known, the camera is taken to be directed there.
+    The axes are right, down and ahead in the frame of the real camera, from which the virtual one
+    differs by the shortest rotation. If the principal point is unknown, it is taken to be the
+    pixel.
     """
     if intrinsics.cx is None or intrinsics.cy is None:
         return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (column, row)
-    # In files, whole numbers are the middles of pixels.
+    # In camera files, integers are the centres of pixels.
     principal = intrinsics.cx + 0.5, intrinsics.cy + 0.5
     x, y = (column - principal[0]) / intrinsics.fx, (row - principal[1]) / intrinsics.fy
     ahead = 1.0 / math.sqrt(x**2 + y**2 + 1.0)
@@ -196,21 +198,21 @@ def _facing(
     return axes, principal
 
 
-def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:
-    """Refuse limits of depth that are no metres.
+def check_depth_limits(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:
+    """Check that limits of depth are metres.
 
     Parameters
     ----------
     near_m, far_m : float, optional
         See `nbv.robot.masks.object_mask`.
     diagonal_m : float
-        Of the object's bounding box, metres.
+        Diagonal of the object's bounding box, metres.
 
     Raises
     ------
     UserError
-        Where one is negative or no number, and where the object would lie beyond all plausible
-        distances, or might lie anywhere.
+        Where a limit is negative or not a number, excludes all plausible distances, or is too
+        large to exclude anything.
     """
     limits = (("`near_m`", near_m, FARTHEST), ("`far_m`", far_m, _NO_LIMIT))
     for name, limit_m, most in limits:
@@ -225,13 +227,13 @@ def need_metres(near_m: float | None, far_m: float | None, diagonal_m: float) ->
             )
 
 
-def need_plausible_nearest(
+def check_plausible_nearest(
     depth_m: DepthImage, reach_m: float, diagonal_m: float, near_m: float | None = None
 ) -> None:
-    """Refuse a frame in which the object cannot be what lies nearest, for its distance.
+    """Check that the nearest surface of a frame is at a plausible distance for the object.
 
-    In another unit `reach_m` would cut the object to pieces, or take in all that is behind it, and
-    what is wrong could not be told from the mask.
+    In another unit `reach_m` would cut the object to pieces or include everything behind it, and
+    the mask would not reveal the mistake.
 
     Parameters
     ----------
@@ -240,17 +242,17 @@ def need_plausible_nearest(
     reach_m, near_m : float
         See `nbv.robot.masks.object_mask`.
     diagonal_m : float
-        Of the object's bounding box, metres.
+        Diagonal of the object's bounding box, metres.
 
     Raises
     ------
     FrameError
         ``implausible-distance``.
     """
-    seen = depth_m[depth_m > (near_m or 0.0)]
-    if not seen.size:
+    measured = depth_m[depth_m > (near_m or 0.0)]
+    if not measured.size:
         return
-    nearest_m = float(np.quantile(seen, NEAREST_SHARE))
+    nearest_m = float(np.quantile(measured, NEAREST_SHARE))
     is_too_near = nearest_m + reach_m < NEAREST * diagonal_m
     if is_too_near or nearest_m > FARTHEST * diagonal_m:
         unit = next((unit for unit in _UNITS if _is_near(unit * nearest_m, diagonal_m)), None)
@@ -272,13 +274,13 @@ def _implausible_distance(distance_m: float, diagonal_m: float, unit: float | No
 def _help(unit: float | None) -> str:
     if unit is None:
         return (
-            "mask the object alone; are the intrinsics those of this resolution, and is it of this "
-            "category and size?"
+            "mask only the object; check the intrinsics, their resolution, and the object's "
+            "category and size"
         )
     return f"depths {unit:g} times as large would fit: multiply depths or `depth_scale` by it"
 
 
-def _need_inside(
+def _check_inside(
     top: int, bottom: int, left: int, right: int, shape: tuple[int, ...], intrinsics: Intrinsics
 ) -> None:
     rows, columns = shape
@@ -291,11 +293,11 @@ def _need_inside(
         raise FrameError(
             "mask-at-border",
             f"the object touches the {' and '.join(cut)} border of the frame: part of it is cut "
-            "off; move the camera, or mask the object alone",
+            "off; move the camera, or mask only the object",
         )
 
 
-def _need_plausible(
+def _check_plausible(
     distance_m: float, extent: float, diagonal_m: float, extent_m: tuple[float, float]
 ) -> None:
     def is_plausible(unit: float) -> bool:

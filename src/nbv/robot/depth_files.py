@@ -1,4 +1,4 @@
-"""Depth images from files, in metres.
+"""Read and write depth images and masks.
 
 Floating-point depth is in metres, NaN or 0 where nothing was measured; integer depth is in
 millimetres or in a scale's units, 0 where nothing was measured (ROS REP 118: 32FC1 and 16UC1).
@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.errors import UserError, reason_of
+from nbv.errors import FrameError, UserError, reason_of
 from nbv.files import as_path, missing, replacing
-from nbv.robot.errors import FrameError
 
 DepthImage = NDArray[np.float32]
 
@@ -23,11 +22,11 @@ MILLIMETRE = 0.001
 ARRAYS, IMAGES = (".npy", ".npz"), (".png", ".tif", ".tiff", ".pgm")
 
 _MOST_PIXELS = 10**8
-# Metres per unit: numbers from 0 to 1 may reach as far as a sensor does.
+# Metres per unit: enough for depth that is scaled from 0 to 1.
 _LARGEST_SCALE = 10.0
 _MOST_CHANNELS = 4
 _NUMBERS = "biuf"
-# Kind, columns, rows and the largest value that may occur; comments may stand between them.
+# Kind, columns, rows and the largest value, possibly with comments between them.
 _PGM_HEADER = re.compile(rb"P[25]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)")
 
 
@@ -39,12 +38,12 @@ def read_depth(
     Parameters
     ----------
     path : path
-        ``.npy``, ``.npz`` (one array, or one that is called ``depth``), or a 16-bit image:
+        ``.npy``, ``.npz`` (a single array, or the array ``depth``), or a 16-bit image:
         ``.png``, ``.tif``, ``.pgm``.
     depth_scale : float, optional
-        Metres per unit. (BOP's ``depth_scale`` counts millimetres: divide it by 1000.)
+        Metres per unit. (BOP's ``depth_scale`` is in millimetres: divide it by 1000.)
     unit_m : float
-        Metres per unit of whole numbers where there is no `depth_scale`.
+        Metres per unit of integer depth without `depth_scale`.
 
     Returns
     -------
@@ -54,7 +53,7 @@ def read_depth(
     Raises
     ------
     FrameError
-        ``colour-image`` or ``few-levels`` where the file is no depth image.
+        ``colour-image`` or ``few-levels`` where the file is not a depth image.
     UserError
         Where the file cannot be read.
 
@@ -75,10 +74,10 @@ def write_depth(path: Path, depth_m: DepthImage) -> None:
     Raises
     ------
     UserError
-        Where a depth is beyond what 16 bits can hold.
+        Where a depth exceeds 16 bits.
     """
     if path.suffix.lower() != ".png":
-        # An open file, because numpy adds a suffix to names in capitals.
+        # An open file, because numpy appends .npy to a name in capitals.
         with replacing(path) as temporary, temporary.open("wb") as file:
             np.save(file, depth_m)
         return
@@ -86,32 +85,36 @@ def write_depth(path: Path, depth_m: DepthImage) -> None:
 
     millimetres = np.rint(depth_m / MILLIMETRE)
     if millimetres.max() > np.iinfo(np.uint16).max:
-        raise UserError(f"{path}: {depth_m.max():.3g} m are too far for a PNG; write a .npy file")
+        raise UserError(f"{path}: {depth_m.max():.3g} m is too far for a PNG; write a .npy file")
     with replacing(path) as temporary:
         Image.fromarray(millimetres.astype(np.uint16)).save(temporary)
 
 
 def read_mask(path: str | Path) -> NDArray[np.bool_]:
-    """Read a mask (rows, columns): true where the file is not 0; errors as of `read_depth`.
+    """Read a mask (rows, columns): true where the file is not 0.
 
-    Of several arrays in an ``.npz`` it is the one that is called ``mask``. Of an image with a
-    channel for opacity, pixels that are transparent are false as well.
+    From several arrays in an ``.npz`` it reads ``mask``. Transparent pixels of an image are false.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read, or is not an image of numbers.
     """
     values = _read_array(as_path(path), "mask")
     if values.dtype.kind not in _NUMBERS:
-        raise UserError(f"{path} holds {values.dtype}, no numbers")
+        raise UserError(f"{path} holds {values.dtype}; give a mask of numbers")
     mask = is_in_mask(values)
     if mask.ndim == 3:
         has_opacity = mask.shape[2] in (2, 4)
         colours = mask[:, :, :-1] if has_opacity else mask
         mask = np.asarray(colours.any(axis=2) & (mask[:, :, -1] if has_opacity else True))
     if mask.ndim != 2:
-        raise UserError(f"{path}: a mask has rows and columns, this has {mask.ndim} axes")
+        raise UserError(f"{path}: {mask.ndim} axes; a mask has two, rows and columns")
     return mask
 
 
 def is_in_mask(mask: ArrayLike) -> NDArray[np.bool_]:
-    """Return where a mask is not 0, a number, and not masked itself."""
+    """Return where a mask is neither 0 nor NaN nor masked itself."""
     values = np.asarray(np.ma.filled(mask, 0))
     if values.dtype.kind == "f":
         return np.asarray((values != 0) & ~np.isnan(values))
@@ -124,34 +127,34 @@ def to_metres(
     name: str = "depth",
     unit_m: float = MILLIMETRE,
 ) -> DepthImage:
-    """Return a depth image in metres, 0 where nothing was measured; see `read_depth`.
+    """Return a depth image in metres, 0 where nothing was measured.
 
-    What is masked in a masked array was not measured. An image that is in metres already is
-    returned as it is.
+    Masked pixels of a masked array were not measured. An image in metres is returned unchanged.
+    Same parameters and errors as `read_depth`; `name` is used in messages.
     """
     values = np.asarray(np.ma.filled(values, 0))
     if values.dtype.kind not in "iuf":
-        raise UserError(f"{name} holds {values.dtype}, no numbers")
+        raise UserError(f"{name} holds {values.dtype}; give numbers")
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[:, :, 0]
     if values.ndim != 2:
         is_colour = values.ndim == 3 and values.shape[2] <= _MOST_CHANNELS
         what = "a colour image" if is_colour else f"an array of shape {values.shape}"
         raise FrameError(
-            "colour-image", f"{name} is {what}; give one depth image, rows and columns alone"
+            "colour-image", f"{name} is {what}; give one depth image of rows and columns"
         )
     if depth_scale is not None and not 0 < depth_scale <= _LARGEST_SCALE:
         raise UserError(
             f"`depth_scale`={depth_scale:g}: give metres per unit, above 0 and at most "
-            f"{_LARGEST_SCALE:g}; of millimetres 0.001"
+            f"{_LARGEST_SCALE:g}; 0.001 for millimetres"
         )
     if values.dtype.kind == "f":
         scale = 1.0 if depth_scale is None else depth_scale
     else:
         if values.dtype.itemsize == 1:
-            raise FrameError("few-levels", f"{name} has 8 bits a pixel, and depth needs 16")
+            raise FrameError("few-levels", f"{name} has 8 bits per pixel; give 16")
         scale = unit_m if depth_scale is None else depth_scale
-    # What overflows is as far away as what is infinite: nothing was measured.
+    # Overflow is treated like infinite depth: nothing was measured.
     with np.errstate(invalid="ignore", over="ignore"):
         metres = values.astype(np.float32, copy=False)
         if scale != 1.0:
@@ -162,21 +165,21 @@ def to_metres(
 
 
 def _read_array(path: Path, name: str) -> NDArray[Any]:
-    """Return the numbers of a file; `name` is that of the array among several."""
+    """Return the numbers of a file; `name` selects one of several arrays."""
     suffix = path.suffix.lower()
     if suffix not in ARRAYS + IMAGES:
-        raise UserError(f"{path}: no known kind of file; give {', '.join(ARRAYS + IMAGES)}")
+        raise UserError(f"{path}: unknown kind of file; give {', '.join(ARRAYS + IMAGES)}")
     try:
         if not path.is_file():
             raise UserError(f"{path} {missing(path)}")
         values = _read_image(path) if suffix in IMAGES else _read_numpy(path, name)
     except UserError:
         raise
-    # No list of what a reader may raise on arbitrary bytes is complete.
+    # A reader may raise any exception on arbitrary bytes.
     except Exception as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     if not values.size:
-        raise UserError(f"{path} holds no pixel")
+        raise UserError(f"{path} is empty; give an image with pixels")
     return values
 
 
@@ -186,19 +189,21 @@ def _read_numpy(path: Path, name: str) -> NDArray[Any]:
         return np.array(stored)
     with stored:
         if not stored.files:
-            raise UserError(f"{path} holds no array")
+            raise UserError(f"{path} is empty; give a file with an array")
         if name not in stored.files and len(stored.files) > 1:
-            raise UserError(f"{path} holds {', '.join(stored.files)}: call one of them {name!r}")
+            raise UserError(f"{path} holds {', '.join(stored.files)}: name one of them {name!r}")
         return np.asarray(stored[name if name in stored.files else stored.files[0]])
 
 
 def _read_image(path: Path) -> NDArray[Any]:
-    from PIL import Image  # here, so that arrays cost no import of it
+    from PIL import Image  # here, because reading an array does not need it
 
     with Image.open(path) as image:
         if image.width * image.height > _MOST_PIXELS:
-            raise UserError(f"{path}: {image.width} × {image.height} pixels are too many")
-        # The numbers of a palette image name colours, one of which may be transparent.
+            raise UserError(
+                f"{path}: {image.width} × {image.height} pixels; give at most {_MOST_PIXELS}"
+            )
+        # The numbers of a palette image are indices of colours, one of which may be transparent.
         colours = "RGBA" if "transparency" in image.info else "RGB"
         values = np.asarray(image.convert(colours) if image.mode == "P" else image)
         if image.format == "PPM" and image.mode == "I":
@@ -207,8 +212,8 @@ def _read_image(path: Path) -> NDArray[Any]:
 
 
 def _as_stored(values: NDArray[Any], path: Path) -> NDArray[Any]:
-    """Return a 16-bit PGM's own numbers: Pillow stretches them to 65535."""
+    """Return the numbers stored in a 16-bit PGM, which Pillow scales to 65535."""
     header = _PGM_HEADER.match(path.read_bytes())
     if header is None:
-        raise ValueError("its header has no largest value")
+        raise ValueError("its header lacks the largest value")
     return np.rint(values * (int(header[3]) / 65535)).astype(np.int32)

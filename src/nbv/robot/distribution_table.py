@@ -1,4 +1,4 @@
-"""What the distributions of any estimator, on calibration objects, say of its next ones."""
+"""Next views for any estimator, from the distributions that it gave of calibration objects."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.logits import TEMPERATURES, fit_temperature, from_logits, on_degrees
 from nbv.core.lookup import LookupTable
+from nbv.core.selection import AFFINITY
 from nbv.errors import UserError
 from nbv.files import (
     calibrated_file,
@@ -30,13 +31,10 @@ from nbv.robot.next_view import (
     as_rotation_list,
     next_view,
 )
-from nbv.robot.pair_distributions import FEWEST_CLASSES, as_distributions, bin_apart
-
-AFFINITY: Mapping[str, float] = {"power": 16.0, "pseudo_observations": 90.0}
-"""What `config/` sets for the expected error given a distribution."""
+from nbv.robot.pairs import FEWEST_CLASSES, as_distributions, bin_apart
 
 WIDEST_BIN_DEG = 6.0
-"""Of a table: an estimator errs by up to half a class between its classes."""
+"""Widest bin of a table, because an estimator errs by up to half a class between its classes."""
 
 _AGAIN = "make it again with nbv calibrate"
 
@@ -46,31 +44,31 @@ _NAMES = tuple(_PREFIX + name for name in ("object_ids", "temperature", "n_class
 
 @dataclass(frozen=True)
 class DistributionTable:
-    """The distributions that an estimator gave of calibration objects.
+    """Distributions that an estimator gave of calibration objects.
 
-    `recommend` does for distributions of any estimator what `nbv.Recommender` does for frames.
+    `recommend` does for the distributions of any estimator what `nbv.Recommender` does for frames.
 
     Attributes
     ----------
     object_ids : tuple of str
-        Of each of S calibration turns: which object it shows.
+        The object in each of S calibration sweeps.
     temperature : float
-        p^(1/T) is calibrated; above 1 the estimator was too sure of itself.
+        p^(1/T) is calibrated; above 1 the estimator was overconfident.
     distributions : ndarray (S, B, B) float32
         Calibrated p(azimuth | image) of views a bin apart.
     n_classes : int
-        Of the estimator; B is the least multiple of it whose bins are at most `WIDEST_BIN_DEG`. So
-        views between two classes count with the error that they have.
+        Number of the estimator's classes. B is its least multiple whose bins are at most
+        `WIDEST_BIN_DEG` wide, so that views between two classes count with their error.
 
     Examples
     --------
     >>> import numpy as np, nbv
-    >>> apart = np.radians(np.subtract.outer(np.arange(36) * 10.0, np.arange(36) * 10.0))
-    >>> turn = np.exp(4 * np.cos(apart))
-    >>> turn[:9] = turn[4]  # from these views every answer is the same
-    >>> turn /= turn.sum(axis=1, keepdims=True)
-    >>> table = nbv.DistributionTable.of_pairs({"mug-17": (np.arange(36) * 10.0, turn)})
-    >>> answer = table.recommend(turn[4])
+    >>> azimuths = np.arange(36) * 10.0
+    >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
+    >>> rows[:9] = rows[4]  # from these views every answer is the same
+    >>> rows /= rows.sum(axis=1, keepdims=True)
+    >>> table = nbv.DistributionTable.from_pairs({"mug-17": (azimuths, rows)})
+    >>> answer = table.recommend(rows[4])
     >>> answer.move.expected_error_deg < answer.expected_error_deg
     True
     """
@@ -81,32 +79,22 @@ class DistributionTable:
     n_classes: int
 
     @classmethod
-    def of_pairs(cls, turns: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> DistributionTable:
+    def from_pairs(cls, sweeps: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> DistributionTable:
         """Return the table of calibration objects.
 
         Parameters
         ----------
-        turns : mapping of str to (azimuth_deg, probabilities)
-            For each object the true azimuths (n,) of its views, and what the estimator gave of
-            them: (n, B), where class k is the azimuth 360 k / B. Views are 15° apart or closer.
+        sweeps : mapping of str to (azimuth_deg, probabilities)
+            For each object the true azimuths (n,) of its views, at most 15° apart, and the
+            estimator's distributions (n, B), where class k is the azimuth 360 k / B.
 
         Raises
         ------
         UserError
-            Where views are farther apart, probabilities are no distributions, or objects have
-            different numbers of classes.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> azimuths = np.arange(24) * 15.0
-        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
-        >>> rows /= rows.sum(axis=1, keepdims=True)
-        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
-        >>> table.object_ids, table.n_classes
-        (('mug-17',), 24)
+            Where views are farther apart, a row is not a distribution, or objects have different
+            numbers of classes.
         """
-        known = {name: _as_turn(name, *turn) for name, turn in turns.items()}
+        known = {name: _as_sweep(name, *sweep) for name, sweep in sweeps.items()}
         n_classes, *others = widths = {rows.shape[1] for _, rows in known.values()}
         if others:
             raise UserError(f"objects have {sorted(widths)} classes; give all the same number")
@@ -114,28 +102,17 @@ class DistributionTable:
             np.log(np.concatenate([rows for _, rows in known.values()])),
             np.concatenate([azimuth for azimuth, _ in known.values()]),
         )
-        turned, n_bins = [], _n_bins(n_classes)
+        distributions, n_bins = [], _n_bins(n_classes)
         for name, (azimuth, rows) in known.items():
             try:
-                turned.append(bin_apart(azimuth, _in_bins(rows, temperature, n_bins)))
+                distributions.append(bin_apart(azimuth, _in_bins(rows, temperature, n_bins)))
             except UserError as error:
                 raise error.about(f"object {name!r}") from error
-        return cls(tuple(known), temperature, np.stack(turned), n_classes)
+        return cls(tuple(known), temperature, np.stack(distributions), n_classes)
 
     @property
     def warning(self) -> str:
-        """What may be wrong with the calibration objects; empty where nothing is.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> azimuths = np.arange(24) * 15.0
-        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
-        >>> rows /= rows.sum(axis=1, keepdims=True)
-        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
-        >>> table.warning.split(":")[0]  # this estimator is always right
-        'the temperature 0.05 is at its limit'
-        """
+        """A likely mistake in the calibration objects; empty if there is none."""
         least, most = TEMPERATURES
         if 1.1 * least < self.temperature < most / 1.1:
             return ""
@@ -157,36 +134,25 @@ class DistributionTable:
         max_travel_deg: float = 180.0,
         followed: bool = True,
     ) -> Recommendation:
-        """Return the pose that views show, and the next view.
+        """Return the estimated pose and the next view.
 
         Parameters
         ----------
         probabilities : (B,), or (n, B)
-            What the estimator gave of each view of the object.
+            The estimator's distribution of each view of the object.
         rotations_deg, allowed_deg, max_travel_deg, followed
             See `nbv.Recommender.recommend`.
 
         Returns
         -------
         Recommendation
-            No frame was seen: `unfamiliarity` is NaN, and there are no crops.
+            Without frames: `ood_score` is NaN, and there are no crops.
 
         Raises
         ------
         UserError
-            Where probabilities are no distributions of this estimator, or the arguments do not fit
-            each other.
-
-        Examples
-        --------
-        >>> import numpy as np, nbv
-        >>> azimuths = np.arange(24) * 15.0
-        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
-        >>> rows /= rows.sum(axis=1, keepdims=True)
-        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
-        >>> answer = table.recommend([rows[3], rows[9]], rotations_deg=[0, 90])
-        >>> round(answer.azimuth_deg), answer.n_views  # of the last view
-        (135, 2)
+            Where a row is not a distribution of this estimator, or the arguments do not fit each
+            other.
         """
         rows = as_distributions(probabilities, "the views")
         if rows.shape[1] != self.n_classes:
@@ -206,26 +172,17 @@ class DistributionTable:
 
     @classmethod
     def load(cls, path: str | Path) -> DistributionTable:
-        """Read what `save`, or ``nbv calibrate`` of pairs with distributions, wrote.
+        """Read a file of `save`, or of ``nbv calibrate`` for pairs with distributions.
 
         Raises
         ------
         UserError
             Where the file cannot be read, or has no such table.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> try:
-        ...     nbv.DistributionTable.load("table.npz")
-        ... except nbv.UserError as error:
-        ...     print(error)
-        table.npz does not exist; name the file that nbv calibrate wrote
         """
         stored = read_arrays(calibrated_file(path), (), _AGAIN)
         if any(name not in stored for name in _NAMES):
             raise UserError(
-                f"{path} holds no distributions: make it with nbv calibrate, of pairs that have "
+                f"{path} holds no distributions: make it with nbv calibrate, from pairs that have "
                 "columns p0, p1, …"
             )
         with readable(path, _AGAIN):
@@ -242,20 +199,7 @@ class DistributionTable:
             return cls(tuple(map(str, object_ids)), float(temperature), rows, int(n_classes))
 
     def save(self, path: str | Path, lookup: LookupTable | None = None) -> None:
-        """Write the table as ``.npz``; with a lookup table of the same estimator, both in one file.
-
-        Examples
-        --------
-        >>> import tempfile, numpy as np, nbv
-        >>> azimuths = np.arange(24) * 15.0
-        >>> rows = np.exp(4 * np.cos(np.radians(azimuths - azimuths[:, None])))
-        >>> rows /= rows.sum(axis=1, keepdims=True)
-        >>> table = nbv.DistributionTable.of_pairs({"mug-17": (azimuths, rows)})
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     table.save(f"{folder}/table.npz")
-        ...     nbv.DistributionTable.load(f"{folder}/table.npz").object_ids
-        ('mug-17',)
-        """
+        """Write the table as ``.npz``, with the lookup table of the same estimator if given."""
         numbers = np.asarray(self.temperature), np.asarray(self.n_classes)
         kept = np.asarray(self.object_ids), *numbers, self.distributions
         arrays = dict(zip(_NAMES, kept, strict=True))
@@ -270,19 +214,19 @@ def _n_bins(n_classes: int) -> int:
 
 
 def _in_bins(rows: NDArray[np.float64], temperature: float, n_bins: int) -> NDArray[np.float64]:
-    """Return calibrated distributions (n, B), linear between the centres of classes (n, k)."""
+    """Return calibrated distributions (n, B), interpolated between the classes of rows (n, k)."""
     calibrated = from_logits(np.log(rows), temperature)
     return calibrated if n_bins == rows.shape[1] else on_degrees(calibrated, n_bins)
 
 
-def _as_turn(
+def _as_sweep(
     name: str, azimuth_deg: ArrayLike, probabilities: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     rows = as_distributions(probabilities, f"object {name!r}")
     try:
         azimuths = np.asarray(azimuth_deg, dtype=np.float64)
     except (TypeError, ValueError):
-        raise UserError(f"object {name!r}: azimuths are no numbers") from None
+        raise UserError(f"object {name!r}: azimuths are not numbers") from None
     if azimuths.shape != (len(rows),) or not np.isfinite(azimuths).all():
         raise UserError(
             f"object {name!r}: azimuths of shape {azimuths.shape} for "

@@ -1,4 +1,4 @@
-"""How far each way of choosing further views gets on recordings with known azimuths."""
+"""Errors of every way to choose further views, on recordings with known azimuths."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ from nbv.core.offset import constant_offset_deg, frame_warning
 from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.robot.bundle import Bundle, PaperTables
+from nbv.robot.network import Sweep
 from nbv.robot.next_view import AfterRotations, after_rotations
-from nbv.robot.ood import unfamiliarity
-from nbv.robot.recommender import turn_share
+from nbv.robot.ood import ood_score
 from nbv.robot.rotations import MIN_SEPARATION_DEG
-from nbv.robot.sweeps import Turn
 
 SINGLE, RANDOM, FIXED = "single", "random", "best fixed"
 OPPOSITE, SPACED, RECOMMENDED = "opposite", "evenly spaced", "recommended"
 PAPER = "paper's table, averaged"
-"""Views by the lookup table, estimates averaged. All others fuse distributions."""
+"""Views by the lookup table, with averaged estimates. All others fuse distributions."""
 
 LARGE_ERROR_DEG = 45.0
 
@@ -34,117 +33,122 @@ _MOST_DRAWS = 100
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a bundle makes of one recording.
+class Predictions:
+    """A bundle's distributions for one recording.
 
     Attributes
     ----------
     object_id, sequence : str
     azimuth_deg : ndarray (n,)
-        The truth.
+        True azimuths, degrees.
     distributions : ndarray (n, B)
-    share : ndarray (S,)
-        How much each calibration turn counts for it.
+        Calibrated p(azimuth | image).
+    sweep_weights : ndarray (S,)
+        Weights of the calibration sweeps for the recording's elevation.
     """
 
     object_id: str
     sequence: str
     azimuth_deg: NDArray[np.float64]
     distributions: NDArray[np.float64]
-    share: NDArray[np.float64]
+    sweep_weights: NDArray[np.float64]
 
 
-def fixed_errors_deg(alike: LookAlikes, n_views: int) -> NDArray[np.float64]:
-    """Return the mean error of each calibration turn with n views at equal steps, (S, B).
+def fixed_errors_deg(views: LookAlikes, n_views: int) -> NDArray[np.float64]:
+    """Return each calibration sweep's mean error (S, B) after n views at equal steps.
 
-    `alike` is of one view, and every view is a first one. By the step, in bins; infinite where two
-    of the views are nearer than `MIN_SEPARATION_DEG`, as none are that are chosen. Evenly spaced
-    views may always be taken.
+    `views` holds single views, all of which serve as first views. The columns are steps in bins. A
+    step is infinitely bad where two views are closer than `MIN_SEPARATION_DEG`, which no choice
+    allows; even spacing is always allowed.
     """
-    n_turns, _, n_bins = alike.seen.shape
+    n_sweeps, _, n_bins = views.seen.shape
     steps = np.arange(n_bins)
     apart = travel_deg(np.arange(1, n_views)[:, None] * steps * (360.0 / n_bins)).min(axis=0)
-    may = (apart >= MIN_SEPARATION_DEG) | (steps == round(n_bins / n_views))
-    errors = np.full((n_turns, n_bins), np.inf)
+    is_allowed = (apart >= MIN_SEPARATION_DEG) | (steps == round(n_bins / n_views))
+    errors = np.full((n_sweeps, n_bins), np.inf)
     if n_views == 2:
         group, ahead = np.zeros(n_bins, dtype=int), np.arange(n_bins)
-        for turn, views in enumerate(in_object_frame(alike.seen)):
-            after = error_after_deg(views, views[None], group, ahead)
-            errors[turn, may] = after.mean(axis=0)[may]
+        for sweep, rows in enumerate(in_object_frame(views.seen)):
+            after = error_after_deg(rows, rows[None], group, ahead)
+            errors[sweep, is_allowed] = after.mean(axis=0)[is_allowed]
         return errors
-    for step in steps[may]:
-        turned_alike = alike
+    for step in steps[is_allowed]:
+        fused = views
         for view in range(1, n_views):
-            turned_alike = turned_alike.after(int(view * step) % n_bins)
-        errors[:, step] = turned_alike.error_now_deg.mean(axis=1)
+            fused = fused.after(int(view * step) % n_bins)
+        errors[:, step] = fused.error_now_deg.mean(axis=1)
     return errors
 
 
-def best_fixed_deg(errors_deg: NDArray[np.float64], share: NDArray[np.float64]) -> float:
-    """Return the step, in degrees, that is best on all calibration views.
+def best_fixed_deg(errors_deg: NDArray[np.float64], sweep_weights: NDArray[np.float64]) -> float:
+    """Return the step of least mean error on calibration sweeps, degrees.
 
     Parameters
     ----------
     errors_deg : ndarray (S, B)
         From `fixed_errors_deg`.
-    share : ndarray (S,)
-        How much each calibration turn counts; above 0.
+    sweep_weights : ndarray (S,)
+        Weights of the calibration sweeps, above 0.
     """
-    return float((share @ errors_deg).argmin() * (360.0 / errors_deg.shape[1]))
+    return float((sweep_weights @ errors_deg).argmin() * (360.0 / errors_deg.shape[1]))
 
 
 Chooser = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
-"""The next rotations from the first views (n,), of beliefs (n, B) and rotations so far (n, t)."""
+"""Maps beliefs (n, B) and rotations so far (n, t) to the next ones (n,), from first views."""
 
 
-def replay(seen: Seen, choose: Chooser, n_views: int) -> NDArray[np.float64]:
-    """Return the signed error of the pose after each number of views, from every first frame.
+def replay(predictions: Predictions, choose: Chooser, n_views: int) -> NDArray[np.float64]:
+    """Return the signed pose error after each number of views, from every first frame.
 
-    Each next view is the frame nearest to the chosen rotation that was not taken yet.
+    Each next view is the unused frame nearest to the chosen rotation.
 
     Returns
     -------
     ndarray (n, n_views)
         Degrees in [-180, 180).
     """
-    n = len(seen.azimuth_deg)
+    azimuth_deg, distributions = predictions.azimuth_deg, predictions.distributions
+    n = len(azimuth_deg)
     taken = np.arange(n)[:, None]
-    turns = (seen.azimuth_deg - seen.azimuth_deg[:, None]) % 360.0
-    logs = np.log(seen.distributions)
+    rotations_deg = (azimuth_deg - azimuth_deg[:, None]) % 360.0
+    logs = np.log(distributions)
     errors = []
     for view in range(n_views):
         beliefs = np.exp(logs - logs.max(axis=1, keepdims=True))
         beliefs /= beliefs.sum(axis=1, keepdims=True)
-        errors.append(signed_difference_deg(mean_direction_deg(beliefs), seen.azimuth_deg))
+        errors.append(signed_difference_deg(mean_direction_deg(beliefs), azimuth_deg))
         if view + 1 == n_views:
             break
-        chosen = choose(beliefs, np.take_along_axis(turns, taken, axis=1))
-        apart = circular_distance_deg(turns, chosen[:, None])
+        chosen = choose(beliefs, np.take_along_axis(rotations_deg, taken, axis=1))
+        apart = circular_distance_deg(rotations_deg, chosen[:, None])
         np.put_along_axis(apart, taken, np.inf, axis=1)
         following = apart.argmin(axis=1)
-        rotation = turns[np.arange(n), following]
-        logs = logs + np.log(rotated(seen.distributions[following], rotation))
+        rotation = rotations_deg[np.arange(n), following]
+        logs = logs + np.log(rotated(distributions[following], rotation))
         taken = np.column_stack([taken, following])
     return np.stack(errors, axis=1)
 
 
-def recommended(calibrated: AfterRotations, seen: Seen, affinity: Mapping[str, float]) -> Chooser:
-    """Return the choice of least expected error, given the look-alikes after the same rotations."""
-    n_bins = seen.distributions.shape[-1]
-    here = np.arange(n_bins) * (360.0 / n_bins)
+def recommended(
+    calibrated: AfterRotations, predictions: Predictions, affinity: Mapping[str, float]
+) -> Chooser:
+    """Return the choice of least expected error, given look-alikes after the same rotations."""
+    n_bins = predictions.distributions.shape[-1]
+    candidates_deg = np.arange(n_bins) * (360.0 / n_bins)
 
     def choose(beliefs: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
         bins = np.rint(rotations * (n_bins / 360.0)).astype(int) % n_bins
-        different, of_row = np.unique(bins, axis=0, return_inverse=True)
+        sequences, sequence_of_row = np.unique(bins, axis=0, return_inverse=True)
         error = np.empty(beliefs.shape)
-        # In their order, what the rotations of two neighbours have in common is found once.
-        for place, so_far in enumerate(different.tolist()):
-            alike = calibrated(tuple(so_far[1:]))
-            for row in np.flatnonzero(of_row.ravel() == place):
-                expected = alike.expected(beliefs[row], **affinity, share=seen.share)
+        # Sorted, so that neighbouring sequences share the look-alikes of their first rotations.
+        for i, sequence in enumerate(sequences.tolist()):
+            alike = calibrated(tuple(sequence[1:]))
+            for row in np.flatnonzero(sequence_of_row.ravel() == i):
+                expected = alike.expected(beliefs[row], **affinity, share=predictions.sweep_weights)
                 error[row] = expected.after_deg
-        near = circular_distance_deg(here[:, None], rotations[:, None, :]).min(axis=2)
-        return np.asarray(here[np.where(near < MIN_SEPARATION_DEG, np.inf, error).argmin(axis=1)])
+        near = circular_distance_deg(candidates_deg[:, None], rotations[:, None, :]).min(axis=2)
+        best = np.where(near < MIN_SEPARATION_DEG, np.inf, error).argmin(axis=1)
+        return np.asarray(candidates_deg[best])
 
     return choose
 
@@ -152,7 +156,7 @@ def recommended(calibrated: AfterRotations, seen: Seen, affinity: Mapping[str, f
 def at_random(rng: np.random.Generator) -> Chooser:
     """Return a uniformly random choice, `MIN_SEPARATION_DEG` or more from every view so far.
 
-    Where views are so many that `_MOST_DRAWS` draws find no such place, the last one counts.
+    If `_MOST_DRAWS` draws find no such rotation among many views, the last draw counts.
     """
 
     def choose(beliefs: NDArray[np.float64], taken: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -172,9 +176,9 @@ def at_random(rng: np.random.Generator) -> Chooser:
 
 
 def baselines(n_views: int, fixed_deg: float, rng: np.random.Generator) -> dict[str, Chooser]:
-    """Return the ways to choose `n_views` views with which the recommended ones are compared.
+    """Return the choices of `n_views` views with which the recommended ones are compared.
 
-    The best fixed step is `fixed_deg`.
+    `fixed_deg` is the best fixed step.
     """
 
     def at_steps(step_deg: float) -> Chooser:
@@ -188,142 +192,148 @@ def baselines(n_views: int, fixed_deg: float, rng: np.random.Generator) -> dict[
 
 
 def paper_errors(
-    seen: Seen, tables: PaperTables, elevation_deg: float, n_views: int
+    predictions: Predictions, tables: PaperTables, elevation_deg: float, n_views: int
 ) -> NDArray[np.float64]:
     """Return the signed error (n,) of the paper's method from every first frame, degrees.
 
-    The paper takes two views. Of more, the table says of every newest estimate where to go from
-    there, and all estimates are averaged as directions.
+    The paper takes two views. For more, the table recommends the next rotation from each newest
+    estimate, and all estimates are averaged as directions.
 
     Parameters
     ----------
-    seen : Seen
+    predictions : Predictions
     tables : PaperTables
     elevation_deg : float
-        NaN where it is not known.
+        NaN where it is unknown.
     n_views : int
     """
-    estimates = mean_direction_deg(seen.distributions)
+    azimuth_deg = predictions.azimuth_deg
+    estimates = mean_direction_deg(predictions.distributions)
     first = np.arange(len(estimates))
-    turns = (seen.azimuth_deg - seen.azimuth_deg[:, None]) % 360.0
+    rotations_deg = (azimuth_deg - azimuth_deg[:, None]) % 360.0
     advised = tables.recommend(estimates, elevation_deg)
     taken = first[:, None]
     while taken.shape[1] < n_views:
         newest = taken[:, -1]
-        chosen = turns[first, newest] + advised[newest]
-        apart = circular_distance_deg(turns, chosen[:, None])
+        chosen = rotations_deg[first, newest] + advised[newest]
+        apart = circular_distance_deg(rotations_deg, chosen[:, None])
         np.put_along_axis(apart, taken, np.inf, axis=1)
         taken = np.column_stack([taken, apart.argmin(axis=1)])
-    back = np.radians(estimates[taken] - np.take_along_axis(turns, taken, axis=1))
-    pose = np.degrees(np.arctan2(np.sin(back).sum(axis=1), np.cos(back).sum(axis=1)))
-    return np.asarray(signed_difference_deg(pose, seen.azimuth_deg))
+    poses = np.radians(estimates[taken] - np.take_along_axis(rotations_deg, taken, axis=1))
+    pose = np.degrees(np.arctan2(np.sin(poses).sum(axis=1), np.cos(poses).sum(axis=1)))
+    return np.asarray(signed_difference_deg(pose, azimuth_deg))
 
 
-def seen_by(bundle: Bundle, turn: Turn) -> Seen:
-    """Return what a bundle makes of a turn: distributions at its temperature."""
-    return Seen(
-        turn.object_id,
-        turn.sequence,
-        turn.azimuth_deg,
-        from_logits(turn.logits, bundle.temperature),
-        turn_share(bundle, turn.elevation_deg),
+def predict(bundle: Bundle, sweep: Sweep) -> Predictions:
+    """Return a bundle's distributions for a sweep, at the bundle's temperature."""
+    return Predictions(
+        sweep.object_id,
+        sweep.sequence,
+        sweep.azimuth_deg,
+        from_logits(sweep.logits, bundle.temperature),
+        bundle.weights_at(sweep.elevation_deg),
     )
 
 
 def evaluate(
     bundle: Bundle,
-    turns: Sequence[Turn],
+    sweeps: Sequence[Sweep],
     n_views: Sequence[int] = (2, 3, 4, 5),
     n_random: int = 10,
     seed: int = 0,
-    tell: Callable[[int], None] = lambda n_done: None,
+    report: Callable[[int], None] = lambda n_done: None,
 ) -> pd.DataFrame:
     """Return the errors of every way to choose views, for each recording.
 
-    `tell` is called after each recording, with how many are done.
+    `report` is called after each recording with the number of finished ones.
 
     Returns
     -------
     DataFrame
         ``object_id, sequence, choice, n_views, mae_deg, median_deg, above_45_percent, offset_deg,
         mae_without_offset_deg``. The offset is the circular median of all single-view errors of
-        the recording: what is constant may be the turntable's zero.
+        the recording, because a constant error may be the turntable's zero.
 
     Raises
     ------
     UserError
-        Where a number of views is below 2, or above that of a recording's frames.
+        Where a number of views is below 2, or above the number of a recording's frames.
     """
     numbers = list(dict.fromkeys(n_views))
     if min(numbers) < 2:
         raise UserError(f"{min(numbers)} views: a choice of views needs 2 or more")
-    for turn in turns:
-        if len(turn.azimuth_deg) < max(numbers):
+    for sweep in sweeps:
+        if len(sweep.azimuth_deg) < max(numbers):
             raise UserError(
-                f"object {turn.object_id!r}, sequence {turn.sequence!r} has "
-                f"{counted(len(turn.azimuth_deg), 'frame')}, too few for {max(numbers)} views"
+                f"object {sweep.object_id!r}, sequence {sweep.sequence!r} has "
+                f"{counted(len(sweep.azimuth_deg), 'frame')}, too few for {max(numbers)} views"
             )
     rows, calibrated = [], after_rotations(bundle.distributions, bundle.object_ids)
-    every_view = LookAlikes.of_views(bundle.distributions)
-    of_steps = {number: fixed_errors_deg(every_view, number) for number in numbers}
-    for n_done, turn in enumerate(turns, start=1):
-        seen = seen_by(bundle, turn)
-        # However many views there are, the first ones are the same.
-        errors = replay(seen, recommended(calibrated, seen, bundle.affinity), max(numbers))
+    single_views = LookAlikes.of_views(bundle.distributions)
+    fixed_errors = {number: fixed_errors_deg(single_views, number) for number in numbers}
+    for n_done, sweep in enumerate(sweeps, start=1):
+        predictions = predict(bundle, sweep)
+        # The first views are the same for every number of views.
+        choose_best = recommended(calibrated, predictions, bundle.affinity)
+        errors = replay(predictions, choose_best, max(numbers))
         single = errors[:, 0]
         offset = constant_offset_deg(single)
-        rows.append(_row(seen, SINGLE, 1, single, offset))
+        rows.append(_row(predictions, SINGLE, 1, single, offset))
         for number in numbers:
-            of_paper = paper_errors(seen, bundle.paper, turn.elevation_deg, number)
-            rows.append(_row(seen, PAPER, number, of_paper, offset))
-            fixed = best_fixed_deg(of_steps[number], seen.share)
+            by_table = paper_errors(predictions, bundle.paper, sweep.elevation_deg, number)
+            rows.append(_row(predictions, PAPER, number, by_table, offset))
+            fixed = best_fixed_deg(fixed_errors[number], predictions.sweep_weights)
             rng = np.random.default_rng(seed)
             for name, choose in baselines(number, fixed, rng).items():
                 repeats = n_random if name == RANDOM else 1
-                last = [replay(seen, choose, number)[:, -1] for _ in range(repeats)]
-                rows.append(_row(seen, name, number, np.concatenate(last), offset))
-            rows.append(_row(seen, RECOMMENDED, number, errors[:, number - 1], offset))
-        tell(n_done)
+                last = [replay(predictions, choose, number)[:, -1] for _ in range(repeats)]
+                rows.append(_row(predictions, name, number, np.concatenate(last), offset))
+            rows.append(_row(predictions, RECOMMENDED, number, errors[:, number - 1], offset))
+        report(n_done)
     return pd.DataFrame(rows)
 
 
-def familiarity_of(bundle: Bundle, turns: Sequence[Turn]) -> pd.DataFrame:
-    """Return how often a bundle calls a single frame unfamiliar, and whether that frame was wrong.
+def count_ood(bundle: Bundle, sweeps: Sequence[Sweep]) -> pd.DataFrame:
+    """Return how many single frames look out of distribution, and how many of them are wrong.
 
     Returns
     -------
     DataFrame
-        ``object_id, sequence, n_frames, n_unfamiliar, n_wrong, n_wrong_unfamiliar, warning`` for
-        each recording; wrong is an error above 45 degrees, and the warning says why estimates do
+        ``object_id, sequence, n_frames, n_ood, n_wrong, n_wrong_ood, warning`` for each recording.
+        An estimate is wrong if its error is above 45 degrees. The warning says why estimates do
         not follow azimuths, or is empty.
     """
-    known, rows = bundle.familiarity, []
-    for turn in turns:
-        seen = seen_by(bundle, turn)
-        estimates = mean_direction_deg(seen.distributions)
-        is_wrong = circular_distance_deg(estimates, turn.azimuth_deg) > LARGE_ERROR_DEG
-        is_strange = unfamiliarity(known, turn.codes, turn.logits) > 1.0
+    rows = []
+    for sweep in sweeps:
+        predictions = predict(bundle, sweep)
+        estimates = mean_direction_deg(predictions.distributions)
+        is_wrong = circular_distance_deg(estimates, sweep.azimuth_deg) > LARGE_ERROR_DEG
+        is_ood = ood_score(bundle.ood, sweep.codes, sweep.logits) > 1.0
         rows.append(
             {
-                "object_id": turn.object_id,
-                "sequence": turn.sequence,
+                "object_id": sweep.object_id,
+                "sequence": sweep.sequence,
                 "n_frames": len(is_wrong),
-                "n_unfamiliar": int(is_strange.sum()),
+                "n_ood": int(is_ood.sum()),
                 "n_wrong": int(is_wrong.sum()),
-                "n_wrong_unfamiliar": int((is_wrong & is_strange).sum()),
-                "warning": frame_warning(turn.azimuth_deg, estimates),
+                "n_wrong_ood": int((is_wrong & is_ood).sum()),
+                "warning": frame_warning(sweep.azimuth_deg, estimates),
             }
         )
     return pd.DataFrame(rows)
 
 
 def _row(
-    seen: Seen, choice: str, n_views: int, error_deg: NDArray[np.float64], offset: float
+    predictions: Predictions,
+    choice: str,
+    n_views: int,
+    error_deg: NDArray[np.float64],
+    offset: float,
 ) -> dict[str, object]:
     size = np.abs(error_deg)
     return {
-        "object_id": seen.object_id,
-        "sequence": seen.sequence,
+        "object_id": predictions.object_id,
+        "sequence": predictions.sequence,
         "choice": choice,
         "n_views": n_views,
         "mae_deg": float(size.mean()),

@@ -1,4 +1,4 @@
-"""The intrinsic parameters of a pinhole camera, from the files that are in use."""
+"""Intrinsic parameters of a pinhole camera, from numbers or from BOP and ROS files."""
 
 from __future__ import annotations
 
@@ -13,19 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nbv.errors import UserError, check_number, reason_of
+from nbv.errors import FrameError, UserError, check_number, reason_of
 from nbv.files import read_text
 from nbv.robot.depth_files import MILLIMETRE
-from nbv.robot.errors import FrameError
 
 OFF_CENTRE = 0.2
-"""How far a principal point lies from the middle of an image, in its sides, to be remarkable."""
+"""Offset of a principal point from the image centre that is suspicious, as a share of the side."""
 
 _SAME_SCALE = 0.03
-"""How much two scales of an image may differ to be one."""
+"""Relative tolerance between the horizontal and the vertical scale of an image."""
 
 _LEAST_SCALE = 0.2
-"""Below it a principal point is near a corner, and the middle of no image of the camera."""
+"""Below it a principal point is near a corner and cannot be the centre of a scaled image."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +35,20 @@ class Intrinsics:
     ----------
     fx, fy : float
     cx, cy : float, optional
-        None: the middle of the object, as if the camera were directed at it.
+        None: the centre of the object, as if the camera pointed at it.
     width, height : int, optional
-        Of the images that they are for, where that is known.
+        Size of the images that they belong to, if known.
 
     Examples
     --------
     >>> import nbv
-    >>> nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5, width=640, height=480).fx
-    585.0
+    >>> camera = nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5)
+    >>> camera.check_resolution(rows=480, columns=640)
+    >>> try:
+    ...     camera.check_resolution(rows=240, columns=320)
+    ... except nbv.FrameError as error:
+    ...     error.name
+    'other-resolution'
     """
 
     fx: float
@@ -65,7 +69,7 @@ class Intrinsics:
         for name in ("cx", "cy"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
-                raise UserError(f"intrinsics: {name}={value:g} is no number")
+                raise UserError(f"intrinsics: {name}={value:g} is not a number")
         if (self.cx is None) != (self.cy is None):
             known, missing = ("cy", "cx") if self.cx is None else ("cx", "cy")
             raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
@@ -73,23 +77,17 @@ class Intrinsics:
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise UserError(
-                    f"intrinsics: {name}={value:g} must be above 0 (pixels); give that of the "
+                    f"intrinsics: {name}={value:g} must be above 0 (pixels); give the size of the "
                     "depth image, or leave out width and height"
                 )
 
-    def need_resolution(self, rows: int, columns: int) -> None:
-        """Raise FrameError ``other-resolution`` where they are for images of another size.
+    def check_resolution(self, rows: int, columns: int) -> None:
+        """Check that the intrinsics belong to images of a size.
 
-        Examples
-        --------
-        >>> import nbv
-        >>> camera = nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5, width=640, height=480)
-        >>> camera.need_resolution(rows=480, columns=640)
-        >>> try:
-        ...     camera.need_resolution(rows=240, columns=320)
-        ... except nbv.FrameError as error:
-        ...     error.name
-        'other-resolution'
+        Raises
+        ------
+        FrameError
+            ``other-resolution``.
         """
         known = self.width is not None and self.height is not None
         if known and (self.height, self.width) != (rows, columns):
@@ -102,36 +100,26 @@ class Intrinsics:
             if value is not None and not -0.5 * size <= value <= 1.5 * size:
                 raise FrameError(
                     "other-resolution",
-                    f"the principal point {name}={value:g} lies far outside a frame of {columns} × "
-                    f"{rows} pixels: are the intrinsics of another resolution? Of a frame that "
-                    "is cut out of a larger one, give the focal length alone",
+                    f"the principal point {name}={value:g} is far outside a frame of {columns} × "
+                    f"{rows} pixels: give the intrinsics of this resolution; for a frame cut out "
+                    "of a larger one, only the focal length",
                 )
         if known or self.cx is None or self.cy is None:
             return
-        # A cut-out frame hardly has its principal point in both directions at the same share.
+        # A cut-out frame is unlikely to have the same scale in both directions.
         scale, other = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
         is_whole = scale > _LEAST_SCALE and abs(scale - other) < _SAME_SCALE * scale
         if is_whole and abs(scale - 1) > OFF_CENTRE:
             raise FrameError(
                 "other-resolution",
-                f"the principal point ({self.cx:g}, {self.cy:g}) is the middle of an image of "
+                f"the principal point ({self.cx:g}, {self.cy:g}) is the centre of an image of "
                 f"{scale * columns:.0f} × {scale * rows:.0f} pixels, and the frame has {columns} × "
-                f"{rows}: give the intrinsics of this resolution. Of a frame that is cut out of a "
-                "larger one, give the focal length alone, or its own width and height too",
+                f"{rows}: give the intrinsics of this resolution; for a frame cut out of a larger "
+                "one, only the focal length, or also its own width and height",
             )
 
     def doubts(self, rows: int, columns: int) -> tuple[str, ...]:
-        """Return a sentence where they may be for another image than one of this size, or none.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> camera = nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5)
-        >>> camera.doubts(rows=480, columns=640)
-        ()
-        >>> len(camera.doubts(rows=400, columns=400))
-        1
-        """
+        """Return a sentence if the intrinsics may belong to an image of another size, else ()."""
         off = [
             value is not None and abs(value - (size - 1) / 2) > OFF_CENTRE * size
             for value, size in ((self.cx, columns), (self.cy, rows))
@@ -139,8 +127,8 @@ class Intrinsics:
         if not any(off):
             return ()
         return (
-            f"the principal point ({self.cx:g}, {self.cy:g}) is far from the middle of {columns} × "
-            f"{rows} pixels: is the frame cut out of a larger one, or are the intrinsics of "
+            f"the principal point ({self.cx:g}, {self.cy:g}) is far from the centre of {columns} × "
+            f"{rows} pixels: is the frame cut out of a larger one, or do the intrinsics belong to "
             "another camera or resolution?",
         )
 
@@ -151,7 +139,7 @@ def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
     Raises
     ------
     UserError
-        For anything else.
+        Where the value has none of these forms.
     """
     if isinstance(value, Intrinsics):
         return value
@@ -160,7 +148,7 @@ def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
     try:
         numbers = [float(number) for number in np.ravel(np.asarray(value, dtype=np.float64))]
     except (TypeError, ValueError, OverflowError):
-        raise UserError(f"intrinsics: {value!r:.60} are no numbers; give fx,fy,cx,cy") from None
+        raise UserError(f"intrinsics: {value!r:.60} are not numbers; give fx,fy,cx,cy") from None
     if len(numbers) == 1:
         return Intrinsics(numbers[0], numbers[0])
     if len(numbers) == 4:
@@ -181,13 +169,13 @@ def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
 
 @dataclass(frozen=True)
 class DepthCamera:
-    """What is known of the camera that took a frame.
+    """Intrinsics and depth unit of the camera that took a frame.
 
     Attributes
     ----------
     intrinsics : Intrinsics, optional
     unit_m : float
-        Metres per unit of a frame of whole numbers.
+        Metres per unit of integer depth.
     """
 
     intrinsics: Intrinsics | None = None
@@ -198,22 +186,21 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
     """Return the camera of a frame, from ``f``, ``fx,fy,cx,cy`` or the name of a camera file.
 
     A camera file is JSON or YAML: BOP's ``camera.json`` (``fx, fy, cx, cy, width, height``) or
-    ``cam_K``, both with ``depth_scale`` or without; BOP's ``scene_camera.json``, which has a camera
-    for each image; or ROS's ``CameraInfo`` (``k`` or ``K``, or ``camera_matrix.data``).
+    ``cam_K``, each with or without ``depth_scale``; BOP's ``scene_camera.json``, with a camera for
+    each image; or ROS's ``CameraInfo`` (``k`` or ``K``, or ``camera_matrix.data``).
 
     Parameters
     ----------
     text : str or None
-        None where nothing is known.
+        None if the camera is unknown.
     frame : path
-        The number at the end of its name, without the suffix, is that of the image in a
-        ``scene_camera.json``, as BOP names images. Where all images have the same camera, the name
-        does not matter.
+        The number at the end of its stem selects the image in a ``scene_camera.json``, as BOP
+        names images. The name does not matter if all images have the same camera.
 
     Raises
     ------
     UserError
-        Where the text is none of this, or the file has no camera for the frame.
+        Where the text has none of these forms, or the file has no camera for the frame.
     """
     if text is None:
         return DepthCamera()
@@ -227,7 +214,7 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
         if not path.is_file():
             raise UserError(f"`intrinsics`={text}: {_what_is_missing(path)}")
         values = _read_mapping(path)
-        return _of_mapping(_of_image(values, path, Path(frame)), path)
+        return _camera_of_mapping(_image_entry(values, path, Path(frame)), path)
     except UserError:
         raise
     except Exception as error:
@@ -236,14 +223,14 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
 
 def _what_is_missing(path: Path) -> str:
     if path.is_dir():
-        return "this is a folder; name a camera file in it, or give fx,fy,cx,cy"
+        return "it is a folder; name a camera file in it, or give fx,fy,cx,cy"
     if path.suffix or len(path.parts) > 1:
         return "the file does not exist; name a camera file, or give fx,fy,cx,cy"
-    return "no numbers fx,fy,cx,cy, and no file of this name exists"
+    return "neither numbers nor a file; give fx,fy,cx,cy or a camera file"
 
 
-def _of_image(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[str, Any]:
-    """Return what a camera file has for a frame: that of its image, where each has its own."""
+def _image_entry(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[str, Any]:
+    """Return the camera of a frame: its image's if each image has its own, else the file's."""
     by_image: dict[int, Mapping[str, Any]] = {
         int(key): value for key, value in values.items() if str(key).isdecimal()
     }
@@ -251,15 +238,15 @@ def _of_image(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[str
         return values
     cameras = list(by_image.values())
     if not all(isinstance(camera, Mapping) for camera in cameras):
-        raise UserError(f"{path} holds images without a camera")
+        raise UserError(f"{path} has images without a camera; give fx,fy,cx,cy")
     known = [{key: camera.get(key) for key in ("cam_K", "depth_scale")} for camera in cameras]
     if all(camera == known[0] for camera in known):
         return known[0]
     number = re.search(r"\d+$", frame.stem)
     if number is None or int(number[0]) not in by_image:
         raise UserError(
-            f"{path} has cameras of images {min(by_image)} to {max(by_image)}, and none for "
-            f"{frame.name}: a frame is named by its image, as 000012.png is; or give fx,fy,cx,cy"
+            f"{path} has cameras for images {min(by_image)} to {max(by_image)} but not for "
+            f"{frame.name}: name the frame after its image, such as 000012.png, or give fx,fy,cx,cy"
         )
     return by_image[int(number[0])]
 
@@ -271,14 +258,14 @@ def _read_mapping(path: Path) -> Mapping[str, Any]:
     else:
         import yaml
 
-        # `ros2 topic echo --once` ends with the mark of a further document.
+        # `ros2 topic echo --once` ends with a separator of documents.
         values = next(iter(yaml.safe_load_all(text)), None)
     if not isinstance(values, Mapping):
-        raise UserError(f"{path} holds no camera: no names with values")
+        raise UserError(f"{path} is not a camera file; give names with values, or fx,fy,cx,cy")
     return values
 
 
-def _of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
+def _camera_of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
     size = (
         values.get("width", values.get("image_width")),
         values.get("height", values.get("image_height")),
@@ -289,19 +276,21 @@ def _of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
     if matrix is None:
         absent = [name for name in ("fx", "fy", "cx", "cy") if name not in values]
         if absent:
-            raise UserError(f"{path} holds no {absent[0]}, and no cam_K, K or camera_matrix")
+            raise UserError(
+                f"{path} lacks {absent[0]}; give fx, fy, cx and cy, or cam_K, K or camera_matrix"
+            )
         matrix = [values[name] for name in ("fx", "fy", "cx", "cy")]
     try:
-        found = as_intrinsics(matrix)
+        given = as_intrinsics(matrix)
         width, height = (int(side) if isinstance(side, int | float) else None for side in size)
-        intrinsics = Intrinsics(found.fx, found.fy, found.cx, found.cy, width, height)
+        intrinsics = Intrinsics(given.fx, given.fy, given.cx, given.cy, width, height)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
     return DepthCamera(intrinsics, _unit_m(values.get("depth_scale"), path))
 
 
 def _unit_m(depth_scale: Any, path: Path) -> float:
-    """Return metres per unit, of millimetres per unit as BOP has them."""
+    """Return metres per unit from BOP's millimetres per unit."""
     if depth_scale is None:
         return MILLIMETRE
     is_number = isinstance(depth_scale, int | float) and not isinstance(depth_scale, bool)

@@ -1,4 +1,4 @@
-"""Which pixels of a depth image show the object."""
+"""Segment the object in a depth image."""
 
 from __future__ import annotations
 
@@ -6,34 +6,33 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.robot.depth_files import DepthImage, is_in_mask
-from nbv.robot.errors import FrameError
 
 Mask = NDArray[np.bool_]
 
 LEAST_MEASURED = 0.5
-"""Of a mask's pixels.
+"""Least share of a mask's pixels that need a depth.
 
-Of 60 drawn mugs that lost half of theirs in patches, 19 were refused as two objects, and a third of
-the others' answers were off by more than 45°.
+When half of the depth of 60 drawn mugs was removed in patches, 19 were rejected as two objects, and
+a third of the other estimates were off by more than 45°.
 """
 
 ISLAND = 0.02
-"""A part of a mask that is smaller than this share of the largest part is dropped as noise."""
+"""A part smaller than this share of the largest part is dropped as noise."""
 
 SECOND_OBJECT = 0.5
-"""A part of a mask that is at least this share of the largest part is another object."""
+"""A part of at least this share of the largest part is another object."""
 
 NEAREST_SHARE = 0.02
-"""Of all depths: what is nearer than this share of them is noise before the object."""
+"""Share of the nearest depths that may be noise in front of the object."""
 
 _LEAST_PIXELS = 30
 _EIGHT = np.ones((3, 3), dtype=bool)
 
 
 def window_of(mask: Mask) -> tuple[slice, slice]:
-    """Return the rows and columns of the smallest window around a mask; empty without a pixel."""
+    """Return the rows and columns of the bounding box of a mask; empty without a pixel."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     if not rows.size:
         return slice(0, 0), slice(0, 0)
@@ -54,10 +53,10 @@ def object_mask(
     depth_m : (rows, columns) float32
         Metres; 0 where nothing was measured.
     reach_m : float
-        How far the object reaches behind its nearest point, metres. Used without mask and `far_m`:
-        the object is then what lies nearest to the camera.
+        Depth of the object behind its nearest point, metres. Used without mask and `far_m`: the
+        object is then the surface nearest to the camera.
     mask : (rows, columns), optional
-        Not 0 where the object is.
+        Not 0 at the object's pixels.
     near_m, far_m : float, optional
         The object lies between them, metres.
 
@@ -71,13 +70,13 @@ def object_mask(
     FrameError
         ``empty-mask``, ``little-depth`` or ``two-objects``.
     UserError
-        Where mask and frame have different sizes, or the limits are no range.
+        Where mask and frame have different sizes, or the limits are not a range.
     """
     inside = depth_m > 0
     if not np.count_nonzero(inside):
         raise FrameError(
             "empty-mask",
-            "the frame has no depth at all, no number above 0: is the sensor covered, or too near?",
+            "the frame has no depth at all, no number above 0: is the sensor covered or too close?",
         )
     if mask is not None:
         given = is_in_mask(mask)
@@ -85,22 +84,22 @@ def object_mask(
             given = given[:, :, 0]
         if given.ndim != 2:
             raise UserError(
-                f"the mask has {given.ndim} axes; give rows and columns alone, such as one channel "
-                "of a colour image"
+                f"the mask has {given.ndim} axes; give rows and columns, such as one channel of a "
+                "colour image"
             )
         if given.shape != depth_m.shape:
             raise UserError(
                 f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}: "
-                "give a mask of the same pixels"
+                "give a mask of the same size"
             )
         if not (n_given := np.count_nonzero(given)):
-            raise FrameError("empty-mask", "the mask has no pixel")
+            raise FrameError("empty-mask", "the mask has no pixel; mark the object")
         inside &= given
         if (share := np.count_nonzero(inside) / n_given) < LEAST_MEASURED:
             raise FrameError(
                 "little-depth",
-                f"only {100 * share:.0f} % of the mask's pixels have a depth; need 50 %: mask the "
-                "object alone, or move the camera",
+                f"only {100 * share:.0f} % of the mask's pixels have a depth; need 50 %: mask only "
+                "the object, or move the camera",
             )
     near = 0.0 if near_m is None else near_m
     far = np.inf if far_m is None else far_m
@@ -116,18 +115,18 @@ def object_mask(
             "empty-mask",
             f"{np.count_nonzero(inside)} pixels of the object have a depth{limits}; need 30",
         )
-    # Most of a frame is not the object.
+    # Only the window, because most of a frame is background.
     window = window_of(inside)
     inside[window] = _without_islands(inside[window])
     return inside
 
 
 def _without_islands(inside: Mask) -> Mask:
-    # In the numbers of an index, so that they need not be converted to such below.
+    # As indices, which need no conversion below.
     parts = np.empty(inside.shape, dtype=np.int64)
     if ndimage.label(inside, _EIGHT, output=parts) == 1:
         return inside
-    # In Python: mostly a few numbers, for which numpy takes longer.
+    # In Python, which is faster than numpy for a few numbers.
     _, *sizes = np.bincount(parts.ravel()).tolist()
     second, largest = sorted(sizes)[-2:]
     if second >= SECOND_OBJECT * largest:
@@ -139,10 +138,10 @@ def _without_islands(inside: Mask) -> Mask:
 
 
 def _limits(depth_m: DepthImage, near: float, far: float) -> str:
-    seen = depth_m[depth_m > 0]
+    measured = depth_m[depth_m > 0]
     return (
-        f" between `near_m`={near:g} and `far_m`={far:g}, of {seen.min():.2f} to "
-        f"{seen.max():.2f} m in the frame"
+        f" between `near_m`={near:g} and `far_m`={far:g}, of {measured.min():.2f} to "
+        f"{measured.max():.2f} m in the frame"
     )
 
 

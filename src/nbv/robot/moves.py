@@ -1,9 +1,8 @@
-"""Rotations about the object, and poses of the camera in the robot's base frame.
+"""Camera poses in the robot's base frame, and rotations around the object.
 
-Poses are 4 × 4 matrices that take points of the camera's frame to the base frame. The camera's
-frame is the optical one: z forward, x right, y down (ROS REP 103). The object's axis points up; a
-positive rotation is counter-clockwise seen from its tip, so that the camera moves to larger
-azimuths.
+Poses are 4 × 4 matrices that map points from the camera's frame to the base frame. The camera's
+frame is the optical frame: z forward, x right, y down (ROS REP 103). The object's axis points up. A
+positive rotation is counter-clockwise seen from above and moves the camera to larger azimuths.
 """
 
 from __future__ import annotations
@@ -14,9 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.files import read_numbers
-from nbv.robot.errors import FrameError
 
 Pose = NDArray[np.float64]
 
@@ -24,15 +22,18 @@ _ROTATION_TOLERANCE = 1e-3
 _FARTHEST_M = 1e6
 
 ROLL_LIMIT_DEG = 10.0
-"""Of a camera about its line of sight: at it, two opposite views err by half as much again."""
+"""Roll of a camera at which two opposite views have a 50 % larger error."""
 
 MOST_ROLL_DEG = 45.0
 LEAST_ELEVATION_DEG, MOST_ELEVATION_DEG = -30.0, 80.0
-"""Far beyond what a bundle is trained for, so that only mistakes are outside."""
+"""Far beyond the elevations of a bundle's training, so that only mistakes are outside."""
 
 UPSIDE_DOWN = 0.1
-"""Share of the direction down that may point up in the image: of a camera that is directed straight
-down it is little, and its sign is chance."""
+"""Share of the direction down that may point up in the image.
+
+If a camera points straight down, the vertical component in the image is small and has a random
+sign.
+"""
 
 
 def _as_numbers(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.float64]:
@@ -42,7 +43,7 @@ def _as_numbers(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.f
             return given.astype(np.float64)
     except (TypeError, ValueError):
         pass
-    raise UserError(f"{name}: no numbers; give {what_to_give}")
+    raise UserError(f"{name}: not numbers; give {what_to_give}")
 
 
 def _as_vector(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.float64]:
@@ -52,9 +53,9 @@ def _as_vector(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.fl
     return vector
 
 
-def _need_metres(place: NDArray[np.float64], name: str) -> None:
-    if (np.abs(place) > _FARTHEST_M).any():
-        raise UserError(f"{name}: a place {np.abs(place).max():g} m away; give metres")
+def _check_metres(position: NDArray[np.float64], name: str) -> None:
+    if (np.abs(position) > _FARTHEST_M).any():
+        raise UserError(f"{name}: {np.abs(position).max():g} m away; give metres")
 
 
 def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
@@ -63,7 +64,7 @@ def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
     Raises
     ------
     UserError
-        Where it is no rotation with a translation.
+        Where the matrix is not a rotation with a translation.
     """
     numbers = _as_numbers(values, name, "the 16 of a 4 × 4 matrix").ravel()
     if numbers.size != 16:
@@ -71,42 +72,42 @@ def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
     pose = numbers.reshape(4, 4)
     if not (finite := np.isfinite(pose).all(axis=1)).all():
         row = int((~finite).argmax())
-        raise UserError(f"{name}: row {row + 1} is {_told(pose[row])}; give finite numbers")
+        raise UserError(f"{name}: row {row + 1} is {_joined(pose[row])}; give finite numbers")
     if not np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9):
         raise UserError(
-            f"{name}: the last row is {_told(pose[3])}, and that of a pose is 0 0 0 1; is it "
-            "transposed or scaled?"
+            f"{name}: the last row is {_joined(pose[3])}, but a pose has 0 0 0 1; is it transposed "
+            "or scaled?"
         )
-    turn = pose[:3, :3]
+    rotation = pose[:3, :3]
     is_rotation = (
-        (np.abs(turn) < 2).all()  # else the product may overflow
-        and np.allclose(turn @ turn.T, np.eye(3), atol=_ROTATION_TOLERANCE)
-        and np.linalg.det(turn) > 0
+        (np.abs(rotation) < 2).all()  # else the product may overflow
+        and np.allclose(rotation @ rotation.T, np.eye(3), atol=_ROTATION_TOLERANCE)
+        and np.linalg.det(rotation) > 0
     )
     if not is_rotation:
-        raise UserError(f"{name}: no rotation with a translation; is it transposed or scaled?")
-    _need_metres(pose[:3, 3], name)
+        raise UserError(f"{name}: not a rotation with a translation; is it transposed or scaled?")
+    _check_metres(pose[:3, 3], name)
     return pose
 
 
-def _told(row: NDArray[np.float64]) -> str:
+def _joined(row: NDArray[np.float64]) -> str:
     return " ".join(f"{number:g}" for number in row)
 
 
 def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> Pose:
-    """Return the motion that turns everything about an axis (Rodrigues' formula), (4, 4).
+    """Return the rigid motion (4, 4) that rotates points about an axis (Rodrigues' formula).
 
     Parameters
     ----------
     point, direction : (3,)
-        Of the axis, in the base frame.
+        A point on the axis and its direction, in the base frame.
     angle_deg : float
         Counter-clockwise seen from the direction's tip.
 
     Raises
     ------
     UserError
-        Where the axis has no direction, or the angle is no finite number.
+        Where the axis has no direction, or the angle is not a finite number.
     """
     origin, (x, y, z) = _as_axis(point, direction)
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -114,20 +115,20 @@ def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> 
     if degrees.size != 1 or not np.isfinite(degrees).all():
         raise UserError(f"rotation: {angle_deg}; give one finite number of degrees")
     angle = math.radians(degrees.item())
-    turn = np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
+    rotation = np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
     motion = np.eye(4)
-    motion[:3, :3] = turn
-    motion[:3, 3] = origin - turn @ origin
+    motion[:3, :3] = rotation
+    motion[:3, 3] = origin - rotation @ origin
     return motion
 
 
 def _as_axis(
     point: ArrayLike, direction: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a point (3,) and the direction (3,) of unit length."""
+    """Return a point (3,) on an axis and its unit direction (3,)."""
     three = "three finite numbers: x,y,z"
     origin = _as_vector(point, "axis: the point", three)
-    _need_metres(origin, "axis: the point")
+    _check_metres(origin, "axis: the point")
     axis = _as_vector(direction, "axis: the direction", three)
     largest = float(np.abs(axis).max())
     if largest <= 1e-9:
@@ -140,22 +141,22 @@ def _as_axis(
 def moved_camera(
     camera_pose: ArrayLike, point: ArrayLike, direction: ArrayLike, rotation_deg: float
 ) -> Pose:
-    """Return the camera's pose after a rotation about the object's axis, (4, 4).
+    """Return the camera's pose (4, 4) after a rotation about the object's axis.
 
     Parameters
     ----------
     camera_pose : (4, 4)
         From the camera's optical frame to the base frame.
     point, direction : (3,)
-        Of the object's axis, in the base frame.
+        A point on the object's axis and its direction, in the base frame.
     rotation_deg : float
         Counter-clockwise seen from the direction's tip.
 
     Raises
     ------
     UserError
-        Where the pose is no rotation with a translation, the axis has no direction, or the
-        rotation is no finite number.
+        Where the pose is not a rotation with a translation, the axis has no direction, or the
+        rotation is not a finite number.
 
     Examples
     --------
@@ -175,33 +176,34 @@ def check_axis(
     object_position_m: ArrayLike | None = None,
     diagonal_m: float | None = None,
 ) -> tuple[str, ...]:
-    """Refuse a camera pose and an axis that do not fit the frame, before a robot moves.
+    """Check that a camera pose and an axis fit the frame, before a robot moves.
 
-    Such as a pose in another unit, of another frame, inverted or turned round. The network knows
-    upright objects. So in the image the axis points up, within `MOST_ROLL_DEG`, and the camera is
-    at an elevation of `LEAST_ELEVATION_DEG` to `MOST_ELEVATION_DEG`.
+    A pose may be in another unit, of another frame, inverted or rotated. The network knows only
+    upright objects, so the axis has to point up in the image within `MOST_ROLL_DEG`, and the camera
+    has to be at an elevation between `LEAST_ELEVATION_DEG` and `MOST_ELEVATION_DEG`.
 
     Parameters
     ----------
     camera_pose, point, direction
         See `moved_camera`.
     object_position_m : (3,), optional
-        Where the object is seen (`nbv.Recommendation.object_position_m`); it lies on the axis.
+        Position of the object in the camera's frame (`nbv.Recommendation.object_position_m`),
+        which has to be near the axis.
     diagonal_m : float, optional
-        The largest distance from the axis that is plausible, metres: the diagonal of the object's
-        bounding box. Without it, or without a position, the distance is not checked.
+        Largest plausible distance from the axis, metres: the diagonal of the object's bounding
+        box. Without it, or without a position, the distance is not checked.
 
     Returns
     -------
     tuple of str
-        What to heed: a camera that is rolled by more than `ROLL_LIMIT_DEG`.
+        Warnings: a camera rolled by more than `ROLL_LIMIT_DEG`.
 
     Raises
     ------
     FrameError
-        ``axis``.
+        ``axis`` where pose and axis do not fit the frame.
     UserError
-        As of `moved_camera`.
+        Where the pose is not a rotation with a translation, or the axis has no direction.
 
     Examples
     --------
@@ -216,23 +218,23 @@ def check_axis(
     'axis'
     """
     if object_position_m is not None and diagonal_m is not None:
-        _need_object_on_axis(camera_pose, point, direction, object_position_m, diagonal_m)
+        _check_object_on_axis(camera_pose, point, direction, object_position_m, diagonal_m)
     down = down_of_axis(camera_pose, point, direction)
     elevation_deg, roll_deg = _elevation_and_roll(down)
     if not LEAST_ELEVATION_DEG <= elevation_deg <= MOST_ELEVATION_DEG:
-        seen = f"the camera is at an elevation of {elevation_deg:.0f}° about this axis"
+        problem = f"the camera is at an elevation of {elevation_deg:.0f}° around this axis"
     elif abs(roll_deg) > MOST_ROLL_DEG:
-        seen = f"the axis is {abs(roll_deg):.0f}° away from up in the image"
+        problem = f"the axis is {abs(roll_deg):.0f}° away from up in the image"
     else:
         return roll_warnings(down)
     raise FrameError(
         "axis",
-        f"{seen}, and the object stands upright: does the direction point up, and is the camera "
+        f"{problem}, but the object is upright: does the direction point up, and is the camera "
         "pose that of the optical frame (z forward, y down) in the base frame?",
     )
 
 
-def _need_object_on_axis(
+def _check_object_on_axis(
     camera_pose: ArrayLike,
     point: ArrayLike,
     direction: ArrayLike,
@@ -240,14 +242,14 @@ def _need_object_on_axis(
     diagonal_m: float,
 ) -> None:
     origin, along = _as_axis(point, direction)
-    seen = (as_pose(camera_pose) @ np.append(np.asarray(object_position_m), 1.0))[:3]
-    apart_m = float(np.linalg.norm(np.cross(seen - origin, along)))
+    position = (as_pose(camera_pose) @ np.append(np.asarray(object_position_m), 1.0))[:3]
+    apart_m = float(np.linalg.norm(np.cross(position - origin, along)))
     if apart_m > diagonal_m:
-        place = ", ".join(f"{coordinate:.3g}" for coordinate in seen)
+        shown = ", ".join(f"{coordinate:.3g}" for coordinate in position)
         raise FrameError(
             "axis",
-            f"the object is seen at {place} in the base frame, {apart_m:.3g} m from the axis, and "
-            f"{diagonal_m:.2g} m at the most are plausible: is the camera pose that of the optical "
+            f"the object is seen at {shown} in the base frame, {apart_m:.3g} m from the axis; "
+            f"at most {diagonal_m:.2g} m is plausible: is the camera pose that of the optical "
             "frame (z forward) in the base frame, and are both in metres?",
         )
 
@@ -255,7 +257,7 @@ def _need_object_on_axis(
 def down_of_axis(
     camera_pose: ArrayLike, point: ArrayLike, direction: ArrayLike
 ) -> NDArray[np.float64]:
-    """Return the direction down (3,) along an axis, in the camera's frame; see `moved_camera`."""
+    """Return the direction down (3,) in the camera's frame; parameters as in `moved_camera`."""
     _, along = _as_axis(point, direction)
     return np.asarray(-(as_pose(camera_pose)[:3, :3].T @ along))
 
@@ -267,13 +269,13 @@ def _elevation_and_roll(down: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def roll_warnings(down: ArrayLike) -> tuple[str, ...]:
-    """Return a sentence where a camera is rolled about its line of sight beyond `ROLL_LIMIT_DEG`.
+    """Return a sentence if a camera is rolled by more than `ROLL_LIMIT_DEG`, else ().
 
     Parameters
     ----------
     down : (3,)
-        The direction down in the camera's optical frame. Of a camera that is directed nearly
-        straight down or up, beyond `MOST_ELEVATION_DEG`, it says nothing.
+        The direction down in the camera's optical frame. Roll is not defined for a camera that
+        points nearly straight down or up, beyond `MOST_ELEVATION_DEG`.
     """
     elevation_deg, roll_deg = _elevation_and_roll(_as_down(down))
     if abs(roll_deg) <= ROLL_LIMIT_DEG or abs(elevation_deg) > MOST_ELEVATION_DEG:
@@ -281,22 +283,21 @@ def roll_warnings(down: ArrayLike) -> tuple[str, ...]:
     side = "left" if roll_deg > 0 else "right"
     return (
         f"the camera is rolled: in the image the object leans {abs(roll_deg):.0f}° to the {side}, "
-        f"and above {ROLL_LIMIT_DEG:g}° errors may grow; hold the camera level, or turn the frame",
+        f"and above {ROLL_LIMIT_DEG:g}° errors may grow; level the camera, or rotate the frame",
     )
 
 
 def _as_down(gravity: ArrayLike) -> NDArray[np.float64]:
     down = _as_vector(gravity, "gravity", "three finite numbers, the direction down: x,y,z")
     if not down.any():
-        raise UserError("gravity: 0,0,0 is no direction")
+        raise UserError("gravity: 0,0,0 is not a direction; give x,y,z")
     return down
 
 
 def elevation_from_gravity(gravity: ArrayLike) -> float:
-    """Return the elevation, degrees, of a camera that is directed at the object.
+    """Return the elevation of a camera that points at the object, degrees.
 
-    It is the arcsine of the forward component of the unit vector that points down: a camera that
-    is inclined downwards is above the object.
+    The elevation is the arcsine of the forward component of the unit vector that points down.
 
     Parameters
     ----------
@@ -306,15 +307,15 @@ def elevation_from_gravity(gravity: ArrayLike) -> float:
     Raises
     ------
     UserError
-        Where it is not three finite numbers, has no length, or points up in the image: the camera
-        then hangs upside down, or the signs are wrong.
+        Where it is not three finite numbers, has no length, or points up in the image: then the
+        camera is upside down, or the signs are wrong.
     """
     down = _as_down(gravity)
     if down[1] < -UPSIDE_DOWN * math.hypot(*down.tolist()):
         raise UserError(
-            f"gravity: y={down[1]:g} points up, and y is down in the optical frame; an "
-            "accelerometer reports the direction up: reverse the sign of all three numbers; of a "
-            "camera that hangs upside down, turn the frame by 180° and reverse x and y"
+            f"gravity: y={down[1]:g} points up, but y is down in the optical frame; an "
+            "accelerometer reports the direction up: reverse the sign of all three numbers; if the "
+            "camera is upside down, rotate the frame by 180° and reverse x and y"
         )
     return _elevation_and_roll(down)[0]
 
@@ -325,35 +326,43 @@ def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[
     Parameters
     ----------
     values : array-like
-        Rotations in degrees; or (n,) bool, where entry k says whether 360 k / n degrees is one.
+        Rotations in degrees; or (n,) bool, where entry k selects 360 k / n degrees.
     name : str
-        Of what they are, for messages.
+        Name of the rotations in messages.
 
     Raises
     ------
     UserError
-        Where they are neither, one is not finite, or there is none.
+        Where values are neither, one is not finite, or there are none.
     """
     try:
         given = np.asarray(values)
     except ValueError:
-        raise UserError(f"{name}: rows of different lengths") from None
+        raise UserError(f"{name}: rows of different lengths; give one row") from None
     if given.dtype == np.bool_:
         if given.ndim != 1:
-            raise UserError(f"{name}: a mask of {given.ndim} axes; it has one, all round")
+            raise UserError(
+                f"{name}: a mask of {given.ndim} axes; give one axis, around the circle"
+            )
         given = 360.0 * np.flatnonzero(given) / max(given.size, 1)
     elif given.dtype.kind not in "iuf":
-        raise UserError(f"{name}: neither numbers of degrees nor booleans")
+        raise UserError(f"{name}: {given.dtype}; give degrees or booleans")
     rotations = given.astype(np.float64).ravel()
     if not rotations.size:
-        raise UserError(f"{name}: give one at least, in degrees")
+        raise UserError(f"{name}: none; give at least one, in degrees")
     if not np.isfinite(rotations).all():
-        raise UserError(f"{name}: one is no finite number of degrees")
+        raise UserError(f"{name}: one is not finite; give degrees")
     return rotations
 
 
 def read_rotations(path: str | Path) -> NDArray[np.float64]:
-    """Read rotations in degrees, or a mask of them, from ``.npy``; errors as of `as_rotations`."""
+    """Read rotations in degrees, or a mask of them, from ``.npy``.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read, and as in `as_rotations`.
+    """
     path = Path(path)
     if path.suffix.lower() != ".npy":
         raise UserError(f"{path}: give rotations in degrees, or a .npy file")
@@ -361,6 +370,12 @@ def read_rotations(path: str | Path) -> NDArray[np.float64]:
 
 
 def read_pose(path: str | Path) -> Pose:
-    """Read a pose from ``.npy``, ``.json``, or text with 16 numbers; errors as of `as_pose`."""
+    """Read a pose from ``.npy``, ``.json``, or text with 16 numbers.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read, and as in `as_pose`.
+    """
     path = Path(path)
     return as_pose(read_numbers(path), str(path))

@@ -1,4 +1,4 @@
-"""From the distributions of one object's views to its pose and the next view."""
+"""Pose and next view from the distributions of one object's views."""
 
 from __future__ import annotations
 
@@ -10,11 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.angles import (
-    circular_distance_deg,
-    nearest_bin,
-    wrap_deg,
-)
+from nbv.core.angles import circular_distance_deg, nearest_bin, wrap_deg
 from nbv.core.distributions import (
     direction_and_spread_deg,
     log_bayes_factor,
@@ -22,9 +18,8 @@ from nbv.core.distributions import (
     rotated,
 )
 from nbv.core.look_alikes import MOST_COMPARED, Expected, LookAlikes
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.labels import counted
-from nbv.robot.errors import FrameError
 from nbv.robot.rotations import (
     MIN_SEPARATION_DEG,
     are_neighbours,
@@ -36,30 +31,30 @@ from nbv.robot.rotations import (
 )
 
 LEAST_BAYES_FACTOR = 0.05
-"""Below it views contradict each other. Of right ones, one in 20 at the most is below."""
+"""Below it views contradict each other; at most 1 in 20 correct sets of views is below."""
 
 N_KEPT = 6
-"""So many sequences of rotations are remembered; the look-alikes of `mug` take 4 MB for each."""
+"""Number of cached sequences of rotations; the look-alikes of `mug` take 4 MB each."""
 
 _LARGEST_LOG = 700.0
-"""Below that of the largest number; very many views agree so well."""
+"""Below the log of the largest float, which many agreeing views would exceed."""
 
 AfterRotations = Callable[[tuple[int, ...]], LookAlikes]
-"""Calibration turns after rotations from the first view, in bins."""
+"""Maps rotations from the first view, in bins, to the calibration sweeps after them."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """A rotation of the camera about the object, and what is expected of it.
+    """A rotation of the camera around the object, and the expected error after it.
 
     Attributes
     ----------
     rotation_deg : float
-        From where the camera is now, counter-clockwise seen from above, in (-180, 180].
+        From the camera's current position, counter-clockwise seen from above, in (-180, 180].
     travel_deg : float
-        How far that is, in [0, 180].
+        Its absolute value, in [0, 180].
     expected_error_deg : float
-        Of the pose, once the view from there is added.
+        Expected error of the pose once the new view is added.
 
     Examples
     --------
@@ -75,42 +70,42 @@ class Move:
 
 @dataclass(frozen=True)
 class Recommendation:
-    """What frames say of an object's pose, and where to look next.
+    """The estimated pose of an object, and the recommended next view.
 
     Attributes
     ----------
     azimuth_deg : float
-        Of the camera about the object at the last frame, in [0, 360).
+        Azimuth of the camera around the object at the last frame, in [0, 360).
     spread_deg : float
         Circular standard deviation of the belief.
     expected_error_deg : float
-        Error of `azimuth_deg`: what objects that looked alike erred in calibration; more where the
-        last view was recommended, because the same errors chose it.
+        Expected error of `azimuth_deg`: the mean calibration error of objects that looked alike.
+        It is raised if the last view was recommended, because the same errors chose that view.
     move : Move, or None
-        The best next view; None where the views so far are all round, so that each further one
-        would be nearer than 15° to one of them.
+        The best next view; None if every candidate is within 15° of an existing view.
     alternatives : tuple of Move
-        Other views, each the best of its neighbourhood, best first.
+        Other local optima, best first.
     belief : ndarray (B,)
         p(azimuth of the camera at the last frame); index b is 360 b / B degrees.
     error_after_deg : ndarray (B,)
-        Expected error after a further view, by its rotation 360 d / B degrees from the last frame;
-        inf where the camera may not go. Of allowed rotations, the nearest of these are finite.
-    unfamiliarity : float
-        How far the least familiar frame is from everything calibrated; above 1 farther than 95 %
-        of calibration images. NaN where no frame was seen.
+        Expected error after one more view at the rotation 360 d / B degrees from the last frame;
+        inf where the rotation is not admissible. With `allowed_deg`, only the bins nearest to
+        allowed rotations are finite.
+    ood_score : float
+        Out-of-distribution score of the worst frame; 95 % of calibration images have at most 1.
+        NaN without frames.
     bayes_factor : float
-        How many times as probable the frames are of one pose, at their rotations, as of poses that
-        have nothing in common; 1 for one frame.
+        Likelihood of one pose for all frames at their rotations, relative to unrelated poses; 1
+        for one frame.
     warnings : tuple of str
-        What may be wrong with the frames, a sentence each.
+        Likely mistakes in the frames, a sentence each.
     n_views : int
-        How many views the belief is the product of.
+        Number of views whose product is the belief.
     crops : tuple of ndarray (side, side) uint8
-        What the network saw of each frame; none where no frame was seen.
+        The network's input for each frame; empty without frames.
     object_position_m : tuple of float, or None
-        About where the object's origin is in the last frame's optical frame (x right, y down, z
-        forward), metres. None where the intrinsics have no principal point, or no frame was seen.
+        Approximate position of the object's origin in the last frame's optical frame (x right, y
+        down, z forward), metres. None without frames or without a principal point.
 
     Examples
     --------
@@ -128,7 +123,7 @@ class Recommendation:
     alternatives: tuple[Move, ...]
     belief: NDArray[np.float64]
     error_after_deg: NDArray[np.float64]
-    unfamiliarity: float
+    ood_score: float
     bayes_factor: float
     warnings: tuple[str, ...]
     n_views: int
@@ -137,37 +132,22 @@ class Recommendation:
 
     @property
     def moves(self) -> tuple[Move, ...]:
-        """`move` and `alternatives`, best first; empty where there is no further view.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> answer = nbv.Recommender.load("mug").recommend(nbv.example_frame().depth_m)
-        >>> answer.moves[0] == answer.move, len(answer.moves) == 1 + len(answer.alternatives)
-        (True, True)
-        """
+        """`move` and `alternatives`, best first; empty if there is no further view."""
         return () if self.move is None else (self.move, *self.alternatives)
 
     @property
-    def is_unfamiliar(self) -> bool:
-        """Whether a frame is like nothing that was calibrated.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> nbv.Recommender.load("mug").recommend(nbv.example_frame().depth_m).is_unfamiliar
-        False
-        """
-        return self.unfamiliarity > 1.0
+    def is_ood(self) -> bool:
+        """Whether a frame is out of distribution."""
+        return self.ood_score > 1.0
 
 
 def after_rotations(
     distributions: NDArray[np.float32], object_ids: Sequence[str], n_kept: int = N_KEPT
 ) -> AfterRotations:
-    """Return what gives the calibration turns after some rotations, of distributions (S, B, B).
+    """Return a function from rotations to the calibration sweeps (S, B, B) after them.
 
-    Turn s shows the object ``object_ids[s]``. Turns after rotations, and the errors that were found
-    for them, are kept for `n_kept` sequences of rotations.
+    Sweep s shows the object ``object_ids[s]``. The function caches sweeps and their errors for
+    `n_kept` sequences of rotations.
     """
 
     @lru_cache(maxsize=n_kept)
@@ -189,54 +169,54 @@ def next_view(
     allowed_deg: ArrayLike | None = None,
     max_travel_deg: float = 180.0,
     followed: bool = True,
-    unfamiliarity: float = math.nan,
+    ood_score: float = math.nan,
     warnings: tuple[str, ...] = (),
     crops: tuple[NDArray[np.uint8], ...] = (),
     object_position_m: tuple[float, float, float] | None = None,
 ) -> Recommendation:
-    """Return the pose that views show, and the next view.
+    """Return the estimated pose and the next view.
 
-    Views are fused by product. The next one has the least error that calibration objects, rotated
-    alike, made after it (`nbv.core.look_alikes`). Expected errors after it are raised by
-    what the choice makes them too low. So is the expected error now, where the last view was
-    recommended.
+    Views are fused by product. The next one has the least expected error, which is the mean error
+    of calibration objects after the same rotations (`nbv.core.look_alikes`). Choosing the least
+    value makes it too low by the optimism of the choice, which is added. If a recommendation chose
+    the last view, the same holds for the current expected error.
 
     Parameters
     ----------
     distributions : ndarray (n, B)
         p(azimuth | image) of each view, above 0.
     rotations_deg : sequence of float
-        From the first view to each one; the first is 0.
+        Rotation from the first view to each view; the first is 0.
     calibrated : AfterRotations
         See `after_rotations`.
     affinity : mapping
         ``power`` and ``pseudo_observations``.
     share : ndarray (S,), optional
-        How much each calibration turn counts.
+        Weights of the calibration sweeps.
     allowed_deg, max_travel_deg, followed
         See `nbv.Recommender.recommend`.
-    unfamiliarity, warnings, crops, object_position_m
-        What the frames of the views show; see `Recommendation`.
+    ood_score, warnings, crops, object_position_m
+        Attributes of the `Recommendation` for views from frames.
 
     Raises
     ------
     UserError
-        Where there is a further view, but none that is allowed, or the longest travel is none.
+        Where limits exclude every further view, or the maximum travel is invalid.
     """
     max_travel_deg = as_travel(max_travel_deg)
     belief = product_of_views(distributions, rotations_deg)
     n_bins = len(belief)
     width = 360.0 / n_bins
-    bins = [round(turn / width) % n_bins for turn in rotations_deg[1:]]
+    bins = [round(rotation / width) % n_bins for rotation in rotations_deg[1:]]
     expected = calibrated(tuple(bins)).expected(belief, **affinity, share=share)
     last = rotations_deg[-1]
     taken = tuple(rotation - last for rotation in rotations_deg)
     n_steps = len(expected.total)
     if allowed_deg is None:
-        may = _allowed_bins(n_bins, n_steps, taken, max_travel_deg)
+        allowed = _allowed_bins(n_bins, n_steps, taken, max_travel_deg)
     else:
-        may = _allowed(as_allowed(allowed_deg), width, n_steps, taken, max_travel_deg)
-    rotation_deg = may.rotation_deg
+        allowed = _allowed(as_allowed(allowed_deg), width, n_steps, taken, max_travel_deg)
+    rotation_deg = allowed.rotation_deg
     if not rotation_deg.size and _allowed_bins(n_bins, n_steps, taken, 180.0).rotation_deg.size:
         raise UserError(
             "no admissible rotation; relax `allowed_deg` or `max_travel_deg`: a view is "
@@ -247,22 +227,25 @@ def next_view(
         before = calibrated(tuple(bins[:-1])).expected(
             product_of_views(distributions[:-1], rotations_deg[:-1]), **affinity, share=share
         )
-        # The errors that chose the last view also make up its expected error.
+        # The errors that chose the last view are also those of its expected error.
         now_deg += _optimism_deg(before, rotations_deg[:-1], n_bins)
     error = expected.after_deg
     if rotation_deg.size:
-        error = error + expected.optimism_deg(may.is_choice)
-    # From the frame of the first view to that of the last one.
+        error = error + expected.optimism_deg(allowed.is_choice)
+    # Rotations from the first view become rotations from the last one.
     error = np.roll(error, -round(last / width)) if last else error
     if allowed_deg is None:
-        cost, error_after_deg = error[may.is_allowed], np.where(may.is_allowed, error, np.inf)
+        cost, error_after_deg = (
+            error[allowed.is_allowed],
+            np.where(allowed.is_allowed, error, np.inf),
+        )
     else:
-        cost, places = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
+        cost, nearest = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
         error_after_deg = np.full(n_bins, np.inf)
-        error_after_deg[places] = error[places]
+        error_after_deg[nearest] = error[nearest]
     moves = [
         Move(rotation, abs(rotation), error_deg)
-        for rotation, error_deg in best_rotations(may.rotations, cost, may.near)
+        for rotation, error_deg in best_rotations(allowed.rotations, cost, allowed.near)
     ]
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
@@ -274,7 +257,7 @@ def next_view(
         alternatives=tuple(moves[1:]),
         belief=rotated(belief, -last),
         error_after_deg=error_after_deg,
-        unfamiliarity=unfamiliarity,
+        ood_score=ood_score,
         bayes_factor=bayes_factor,
         warnings=(*warnings, *_contradictions(bayes_factor)),
         n_views=len(distributions),
@@ -284,7 +267,7 @@ def next_view(
 
 
 def _optimism_deg(before: Expected, rotations_deg: Sequence[float], n_bins: int) -> float:
-    """Return by how much the choice of a view after `rotations_deg` makes its error too low."""
+    """Return the optimism of choosing a view after `rotations_deg`, degrees."""
     taken = tuple(rotation - rotations_deg[-1] for rotation in rotations_deg)
     is_choice = _allowed_bins(n_bins, len(before.total), taken, 180.0).is_choice
     return before.optimism_deg(is_choice) if is_choice.any() else 0.0
@@ -296,7 +279,7 @@ def _contradictions(bayes_factor: float) -> tuple[str, ...]:
     return (
         f"the views contradict each other (Bayes factor {bayes_factor:.1g}): check the "
         "rotations and their sign (counter-clockwise seen from above), and that all "
-        "are of one object",
+        "show one object",
     )
 
 
@@ -308,40 +291,42 @@ def as_rotation_list(
     Raises
     ------
     FrameError
-        ``rotations``: where there are not n numbers, or the first is not 0.
+        ``rotations`` where there are not n numbers, or the first is not 0.
     """
     try:
         given = np.asarray(rotations_deg, dtype=np.float64)
     except (TypeError, ValueError):
-        raise FrameError("rotations", f"{rotations_deg!r} are no numbers of degrees") from None
+        raise FrameError("rotations", f"{rotations_deg!r} are not numbers; give degrees") from None
     rotations: list[float] = given.reshape(-1).tolist()
     if given.ndim > 1 or len(rotations) != n:
         raise FrameError(
             "rotations",
             f"{counted(n, noun)} and {counted(len(rotations), 'rotation')}; give one for each "
-            f"{noun}, from the first {noun}'s place: 0, …",
+            f"{noun}, counted from the first {noun}: 0, …",
         )
     if not all(math.isfinite(rotation) for rotation in rotations):
-        raise FrameError("rotations", "one is no finite number of degrees")
+        raise FrameError("rotations", "one is not finite; give degrees")
     if rotations[0] != 0:
-        raise FrameError("rotations", f"the first is {rotations[0]:g}; all count from it: 0")
+        raise FrameError(
+            "rotations", f"the first is {rotations[0]:g}; give 0, from which all count"
+        )
     return rotations
 
 
 @dataclass(frozen=True)
 class _Allowed:
-    """Rotations from the last view that the camera may take.
+    """Admissible rotations from the last view.
 
     Attributes
     ----------
     is_allowed : ndarray (n,)
-        Of those that were asked for, which may be taken.
+        Whether each requested rotation is admissible.
     rotation_deg : ndarray (m,)
-        These.
+        The admissible rotations.
     rotations, near : list (m,)
-        The same for `best_rotations`.
+        The same rotations and their neighbourhood, for `best_rotations`.
     is_choice : ndarray (n_steps,)
-        Of rotations from the first view that are evenly apart, which are nearest to one of these.
+        Whether each of n evenly spaced rotations from the first view is nearest to one of them.
     """
 
     is_allowed: NDArray[np.bool_]
@@ -358,7 +343,7 @@ def _allowed(
     taken: tuple[float, ...],
     max_travel_deg: float,
 ) -> _Allowed:
-    """Return which rotations (n,) are near enough, and not too near to a view that was `taken`.
+    """Return which rotations (n,) are within the travel and not too close to views `taken` so far.
 
     The first of `taken` is the first view.
     """
@@ -374,7 +359,7 @@ def _allowed(
 def _allowed_bins(
     n_bins: int, n_steps: int, taken: tuple[float, ...], max_travel_deg: float
 ) -> _Allowed:
-    found = _allowed(bins_deg(n_bins), 360.0 / n_bins, n_steps, taken, max_travel_deg)
-    for array in (found.is_allowed, found.rotation_deg, found.is_choice):
+    allowed = _allowed(bins_deg(n_bins), 360.0 / n_bins, n_steps, taken, max_travel_deg)
+    for array in (allowed.is_allowed, allowed.rotation_deg, allowed.is_choice):
         array.flags.writeable = False
-    return found
+    return allowed

@@ -1,35 +1,38 @@
-"""Calibration pairs of any estimator, from a CSV file."""
+"""Calibration pairs of any estimator: true azimuths, estimates and distributions, from files."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import signed_difference_deg, wrap_deg
+from nbv.core.distributions import rotated
 from nbv.core.estimates import COLUMNS, Estimates
+from nbv.core.logits import LEAST_PROBABILITY
 from nbv.core.offset import FOR_PAIRS, Offset
 from nbv.errors import UserError
-from nbv.files import read_rows
-from nbv.robot.pair_distributions import (
-    FEWEST_CLASSES,
-    WIDEST_GAP_DEG,
-    class_columns,
-    distributions_of_rows,
-    radians_hint,
-    widest_gap_deg,
-)
+from nbv.files import read_numbers, read_rows
+
+FEWEST_CLASSES = 8
+
+SUM_TOLERANCE = 0.05
+"""Tolerance of a row's sum: rounded probabilities are normalised again."""
+
+WIDEST_GAP_DEG = 15.0
+"""Widest gap between neighbouring views of a calibration object."""
 
 N_VIEWS = 360
 
 _OF_FRAMES = "; frames need a `bundle`, such as mug, and an `output` that ends in .safetensors"
 
-Turns = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
-"""For each object the azimuths (n,) of its views, and their distributions (n, B)."""
+Sweeps = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
+"""Maps each object to the azimuths (n,) of its views and their distributions (n, B)."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +44,9 @@ class PairTable:
     path : Path
         The file, for messages.
     rows : DataFrame
-        Columns ``object_id, azimuth_deg, estimate_deg``, and as text ``p0, p1, …, p<B-1>`` where
-        the file has them: ``p<k>`` is the probability of the azimuth 360 k / B. The index counts
-        the rows of the file from 0.
+        Columns ``object_id, azimuth_deg, estimate_deg`` and optionally, as text,
+        ``p0, p1, …, p<B-1>``: ``p<k>`` is the probability of the azimuth 360 k / B. The index
+        counts the rows of the file from 0.
     """
 
     path: Path
@@ -56,20 +59,22 @@ class PairTable:
         Raises
         ------
         UserError
-            Where the file cannot be read, a column is missing, or a value is no number.
+            Where the file cannot be read, a column is missing, or a value is not a number.
         """
         path = Path(path)
         rows = read_rows(path, COLUMNS, _OF_FRAMES)
         for name in COLUMNS[1:]:
             rows[name] = pd.to_numeric(rows[name], errors="coerce")
             if not (finite := np.isfinite(rows[name].to_numpy(dtype=np.float64))).all():
-                raise UserError(f"{path}, row {int((~finite).argmax()) + 2}: {name} is no number")
+                raise UserError(
+                    f"{path}, row {int((~finite).argmax()) + 2}: {name} is not a number"
+                )
         if "elevation_deg" in rows:
             rows["elevation_deg"] = pd.to_numeric(rows["elevation_deg"], errors="coerce")
         return cls(path, rows)
 
-    def of_unit(self, category: str, elevation_deg: float) -> PairTable:
-        """Return the rows of a category and an elevation, where columns tell them apart.
+    def for_unit(self, category: str, elevation_deg: float) -> PairTable:
+        """Return the rows of a category and an elevation, as far as columns distinguish them.
 
         Raises
         ------
@@ -81,14 +86,14 @@ class PairTable:
             if name in rows:
                 rows = rows[rows[name] == wanted]
                 if rows.empty:
-                    raise UserError(f"{self.path} has no rows with {name}={wanted}")
+                    raise UserError(f"{self.path} has no rows with {name}={wanted}; add them")
         return replace(self, rows=rows)
 
     @property
     def estimates(self) -> Estimates:
-        """Estimates of views one degree apart, objects in the order of the file.
+        """Estimates of views one degree apart, with objects in the order of the file.
 
-        A view that the file does not have takes the error of the nearest one that it has.
+        Views between those of the file have the error of the nearest one.
 
         Raises
         ------
@@ -96,20 +101,20 @@ class PairTable:
             Where an object has two views at one azimuth, or views are farther apart than
             `WIDEST_GAP_DEG`.
         """
-        turns = {
-            str(name): _object_turn(self.path, str(name), rows)
+        estimates = {
+            str(name): _object_estimates(self.path, str(name), rows)
             for name, rows in self.rows.groupby("object_id", sort=False)
         }
-        return Estimates(tuple(turns), np.stack(list(turns.values())))
+        return Estimates(tuple(estimates), np.stack(list(estimates.values())))
 
     @property
-    def distributions(self) -> Turns:
-        """Distributions of each object's views; empty where the file has none.
+    def distributions(self) -> Sweeps:
+        """Distributions of each object's views; empty if the file has none.
 
         Raises
         ------
         UserError
-            Where a column is missing between others, or a row is no distribution.
+            Where a column is missing between others, or a row is not a distribution.
         """
         if not class_columns(self.path, self.rows):
             return {}
@@ -123,7 +128,7 @@ class PairTable:
 
     @property
     def offset(self) -> Offset:
-        """What all estimates have in common."""
+        """Constant offset of all estimates."""
         azimuth_deg, estimate_deg = (
             self.rows[name].to_numpy(dtype=np.float64) for name in COLUMNS[1:]
         )
@@ -140,8 +145,8 @@ class PairTable:
         Raises
         ------
         UserError
-            Where a column is missing that tells categories or elevations apart, an object is
-            missing at an elevation, and as in `estimates`.
+            Where the column of categories or elevations is missing, an object is missing at an
+            elevation, and as in `estimates`.
         """
         several = {
             "category": ("categories", len(elevations_deg)),
@@ -153,55 +158,57 @@ class PairTable:
                     f"{self.path} has no column {name!r}, and the run has {number} {what}: add the "
                     "column, or run one (overrides=[categories=[mug],elevations_deg.mug=[0]])"
                 )
-        found = {}
+        objects = {}
         for category, elevations in elevations_deg.items():
-            ids = [self.of_unit(category, one).estimates.object_ids for one in elevations]
+            ids = [
+                self.for_unit(category, elevation).estimates.object_ids for elevation in elevations
+            ]
             if missing := set().union(*ids) - set(ids[0]).intersection(*ids):
                 raise UserError(
-                    f"{self.path}: object {min(missing)!r} has no pairs at some elevation of "
+                    f"{self.path}: object {min(missing)!r} lacks pairs at an elevation of "
                     f"{category}; give them, or leave the object out"
                 )
-            found[category] = list(ids[0])
-        return found
+            objects[category] = list(ids[0])
+        return objects
 
     def check_classes(self, n_classes: int | None) -> None:
-        """Check that the file has columns of `n_classes` probabilities; none without a number.
+        """Check that the file has `n_classes` columns of probabilities, or none if that is None.
 
         Raises
         ------
         UserError
-            Where it has another number of them.
+            Where the file has another number of them.
         """
-        found = len(class_columns(self.path, self.rows))
-        if n_classes is None and found:
-            may = found >= FEWEST_CLASSES and 360 % found == 0 and found % 2 == 0
+        n_columns = len(class_columns(self.path, self.rows))
+        if n_classes is None and n_columns:
+            is_valid = n_columns >= FEWEST_CLASSES and 360 % n_columns == 0 and n_columns % 2 == 0
             choose = (
-                f"choose estimator=external_distributions with estimator.n_classes={found}, or "
+                f"choose estimator=external_distributions with estimator.n_classes={n_columns}, or "
             )
             raise UserError(
-                f"{self.path} has distributions (p0 to p{found - 1}): {choose if may else ''}leave "
-                "these columns out"
+                f"{self.path} has distributions (p0 to p{n_columns - 1}): "
+                f"{choose if is_valid else ''}leave these columns out"
             )
-        if n_classes is not None and found != n_classes:
+        if n_classes is not None and n_columns != n_classes:
             raise UserError(
-                f"{self.path} has {found} columns of probabilities (p0, p1, …), and "
+                f"{self.path} has {n_columns} columns of probabilities (p0, p1, …), but "
                 f"estimator.n_classes={n_classes}: "
                 + (
-                    f"set it to {found}"
-                    if found
+                    f"set it to {n_columns}"
+                    if n_columns
                     else "choose estimator=external for estimates alone"
                 )
             )
 
 
-def _object_turn(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float64]:
+def _object_estimates(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float64]:
     azimuth_deg, estimate_deg = (rows[key].to_numpy(dtype=np.float64) for key in COLUMNS[1:])
     values, counts = np.unique(wrap_deg(azimuth_deg), return_counts=True)
     if counts.max() > 1:
         raise UserError(
             f"{path}: object {name!r} has {counts.max()} views at "
-            f"{values[counts.argmax()]:g}°; give one, and other elevations and categories in "
-            "files of their own; only estimator=external tells them apart by columns"
+            f"{values[counts.argmax()]:g}°; give one, and a separate file for each elevation and "
+            "category; only estimator=external distinguishes them by columns"
         )
     if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
         raise UserError(
@@ -214,11 +221,149 @@ def _object_turn(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float6
 def full_turn(
     azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the estimates (360,) of views one degree apart, of views (n,) anywhere on a turn.
+    """Return the estimates (360,) of views one degree apart, from views (n,) at any azimuths.
 
-    Each view takes the error of the nearest one that there is.
+    Each view has the error of the nearest given view.
     """
     apart = signed_difference_deg(np.arange(N_VIEWS)[:, None], azimuth_deg)
     nearest = np.abs(apart).argmin(axis=1)
     moved = apart[np.arange(N_VIEWS), nearest]
     return wrap_deg(np.where(moved == 0.0, estimate_deg[nearest], estimate_deg[nearest] + moved))
+
+
+def as_distributions(
+    values: ArrayLike, name: str, numbers: ArrayLike | None = None
+) -> NDArray[np.float64]:
+    """Return rows (n, B) of probabilities above 0, each with the sum 1.
+
+    Because no image excludes a pose, a probability of 0 is replaced by the smallest other one of
+    its row, or by `LEAST_PROBABILITY` if that is less.
+
+    Parameters
+    ----------
+    values : array-like (n, B), or (B,)
+    name : str
+        Source of the rows, for messages.
+    numbers : array-like (n,), optional
+        Numbers of the rows in messages; 1, 2, … without it.
+
+    Raises
+    ------
+    UserError
+        Where the shape is wrong, a value is not a probability, or a sum differs from 1 by more
+        than `SUM_TOLERANCE`.
+    """
+    try:
+        given = np.asarray(values)
+    except ValueError:
+        raise UserError(f"{name}: rows of different lengths; give equal ones") from None
+    if given.dtype.kind not in "iuf":
+        raise UserError(f"{name}: {given.dtype}; give probabilities as numbers")
+    rows = np.atleast_2d(given).astype(np.float64)
+    if rows.ndim != 2 or not len(rows) or rows.shape[1] < FEWEST_CLASSES:
+        raise UserError(
+            f"{name}: probabilities of shape {given.shape}; give a row for each view, with "
+            f"{FEWEST_CLASSES} classes or more"
+        )
+    number = np.arange(1, len(rows) + 1) if numbers is None else np.asarray(numbers)
+    is_wrong = ~np.isfinite(rows) | (rows < 0)
+    if is_wrong.any():
+        row, column = (int(index[0]) for index in np.nonzero(is_wrong))
+        raise UserError(
+            f"{name}, row {number[row]}, p{column}: a probability is negative or not a number; "
+            "give probabilities, not their logarithms"
+        )
+    sums = rows.sum(axis=1)
+    if (far := np.abs(sums - 1.0) > SUM_TOLERANCE).any():
+        row = int(far.argmax())
+        raise UserError(
+            f"{name}, row {number[row]}: probabilities sum to {sums[row]:.3g} instead of 1; give "
+            "softmax outputs, with more decimals if they are rounded"
+        )
+    smallest = np.where(rows > 0, rows, np.inf).min(axis=1, keepdims=True)
+    rows = np.where(rows > 0, rows, np.minimum(smallest, LEAST_PROBABILITY))
+    return np.asarray(rows / rows.sum(axis=1, keepdims=True))
+
+
+def widest_gap_deg(azimuth_deg: NDArray[np.float64]) -> float:
+    """Return the widest gap between neighbouring azimuths (n,) on the circle, degrees."""
+    ordered = np.sort(wrap_deg(azimuth_deg))
+    return float(np.diff(ordered, append=ordered[0] + 360.0).max())
+
+
+def radians_hint(azimuth_deg: NDArray[np.float64]) -> str:
+    """Return a hint for a message about a gap if azimuths (n,) seem to be radians, else ""."""
+    is_small = np.abs(azimuth_deg).max() <= 2 * np.pi
+    if is_small and widest_gap_deg(np.degrees(azimuth_deg)) <= 2 * WIDEST_GAP_DEG:
+        return "; these azimuths seem to be radians: multiply them by 180/π"
+    return ""
+
+
+def evenly_apart(
+    azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64], n_views: int
+) -> NDArray[np.float64]:
+    """Return distributions (n_views, B) of evenly spaced views, from views (n,) at any azimuths.
+
+    Each view has the distribution of the nearest given view, rotated by the angle between them.
+
+    Raises
+    ------
+    UserError
+        Where neighbouring views are farther than `WIDEST_GAP_DEG` apart.
+    """
+    if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
+        raise UserError(
+            f"views leave a gap of {gap:.0f}°; calibration needs one every "
+            f"{WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
+        )
+    distributions = np.empty((n_views, rows.shape[1]))
+    for i, azimuth in enumerate(np.arange(n_views) * (360.0 / n_views)):
+        apart = signed_difference_deg(azimuth_deg, azimuth)
+        nearest = int(np.abs(apart).argmin())
+        distributions[i] = rotated(rows[nearest], float(apart[nearest]))
+    return distributions
+
+
+def bin_apart(azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return distributions (B, B) of views a bin apart; see `evenly_apart`."""
+    return evenly_apart(azimuth_deg, rows, rows.shape[1]).astype(np.float32)
+
+
+def read_distributions(path: str | Path) -> NDArray[np.float64]:
+    """Read distributions (n, B) of n views: CSV with columns ``p0, p1, …``, or a ``.npy`` array.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read or a row is not a distribution.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".npy":
+        return as_distributions(read_numbers(path), str(path))
+    return distributions_of_rows(path, read_rows(path, ["p0"]))
+
+
+def class_columns(path: Path, table: pd.DataFrame) -> list[str]:
+    """Return the names of the columns of probabilities in order; empty if there are none.
+
+    Raises
+    ------
+    UserError
+        Where a column is missing between others.
+    """
+    given = [str(name) for name in table.columns]
+    similar = [name for name in given if re.fullmatch(r"\s*[pP][ _]?\d+\s*", name)]
+    wanted = [f"p{number}" for number in range(len(similar))]
+    if strange := sorted(set(similar) - set(wanted)):
+        raise UserError(
+            f"{path}: {len(similar)} columns of probabilities are not p0 to p{len(similar) - 1}: "
+            f"rename {strange[0]!r}"
+        )
+    return wanted
+
+
+def distributions_of_rows(path: Path, table: pd.DataFrame) -> NDArray[np.float64]:
+    """Return the distributions (n, B) in the columns ``p0, p1, …`` of a file's rows."""
+    texts = table[class_columns(path, table)]
+    numbers = texts.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
+    return as_distributions(numbers, str(path), table.index.to_numpy() + 2)

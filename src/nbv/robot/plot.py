@@ -1,4 +1,4 @@
-"""A recommendation as a picture: what the network saw, what it believes, and where to look next."""
+"""Figure of a recommendation: crops, belief, expected errors and the next view."""
 
 from __future__ import annotations
 
@@ -23,28 +23,27 @@ KINDS = ("png", "pdf", "svg")
 _METHOD = method_style("expected_error", ())
 _MOST_CROPS = 4
 
-# Of the largest error: the move is drawn outside all curves.
+# Multiples of the largest error, so that the move is drawn outside all curves.
 _MOVE_RADIUS, _RIM = 1.14, 1.26
 
 
 def draw_recommendation(answer: Recommendation, path: str | Path, category: str = "object") -> None:
     """Draw crops, belief, expected errors and the move into one figure.
 
-    Of more than four frames the last four are shown. Without a next view, errors and move are left
-    out.
+    It shows at most the last four frames, and no errors and move if there is no next view.
 
     Parameters
     ----------
     answer : Recommendation
     path : path
-        Its suffix chooses the kind, one of `KINDS`.
+        Its suffix selects the format, one of `KINDS`.
     category : str
-        For the titles.
+        Name of the object in the titles.
 
     Raises
     ------
     UserError
-        For another kind of file.
+        Where the suffix is not one of `KINDS`.
     """
     path = Path(path)
     kind = path.suffix.lower().removeprefix(".")
@@ -56,10 +55,10 @@ def draw_recommendation(answer: Recommendation, path: str | Path, category: str 
         figure = new_figure(2.3 * len(crops) + 3.2 * circles, 3.3)
         widths = [1.0] * len(crops) + [1.4] * circles
         grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
-        for place, codes in enumerate(crops):
-            axes = figure.add_subplot(grid[place])
+        for i, codes in enumerate(crops):
+            axes = figure.add_subplot(grid[i])
             axes.imshow(decode_depth(codes), cmap="viridis", vmin=-0.4, vmax=0.4)
-            axes.set(xticks=[], yticks=[], title=_frame_title(place, len(crops), len(answer.crops)))
+            axes.set(xticks=[], yticks=[], title=_frame_title(i, len(crops), len(answer.crops)))
             axes.spines[:].set_visible(False)
             axes.grid(visible=False)
         axes = figure.add_subplot(grid[len(crops)], projection="polar")
@@ -70,10 +69,10 @@ def draw_recommendation(answer: Recommendation, path: str | Path, category: str 
     save_figure(figure, {kind: path})
 
 
-def _frame_title(place: int, n_shown: int, n: int) -> str:
+def _frame_title(i: int, n_shown: int, n: int) -> str:
     if n == 1:
-        return "What the network sees"
-    number = n - n_shown + place + 1
+        return "Network input"
+    number = n - n_shown + i + 1
     return f"Frame {number}" if n == n_shown else f"Frame {number} of {n}"
 
 
@@ -91,7 +90,7 @@ def _closed(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _draw_belief(axes: PolarAxes, answer: Recommendation, category: str) -> None:
-    # The radius is a square root, so that areas are probabilities.
+    # The square root makes areas proportional to probabilities.
     angles, radius = _closed(np.sqrt(answer.belief))
     axes.fill(angles, radius, color=INK, alpha=0.2)
     axes.plot(angles, radius, color=INK)
@@ -100,7 +99,7 @@ def _draw_belief(axes: PolarAxes, answer: Recommendation, category: str) -> None
     axes.set_yticklabels([])
     axes.set_xlabel("radius: √p(azimuth)")
     axes.set_title(
-        f"Azimuth about the {category}: {answer.azimuth_deg:.0f}°\n"
+        f"Azimuth (camera around {category}): {answer.azimuth_deg:.0f}°\n"
         f"expected error {answer.expected_error_deg:.1f}°"
     )
 
@@ -108,7 +107,7 @@ def _draw_belief(axes: PolarAxes, answer: Recommendation, category: str) -> None
 def _draw_errors(axes: PolarAxes, answer: Recommendation, best: Move) -> None:
     error = np.where(np.isfinite(answer.error_after_deg), answer.error_after_deg, np.nan)
     axes.plot(*_closed(error), color=INK, linewidth=1.3)
-    # A line shows no value that has none next to it.
+    # A line does not show a value without neighbours.
     alone = np.isnan(np.roll(error, 1)) & np.isnan(np.roll(error, -1))
     axes.plot(*_closed(np.where(alone, error, np.nan)), ".", color=INK)
     axes.plot(
@@ -136,7 +135,7 @@ def _draw_errors(axes: PolarAxes, answer: Recommendation, best: Move) -> None:
     _draw_move(axes, best.rotation_deg, _MOVE_RADIUS * largest)
     _label_radii(axes, largest)
     axes.set_xticklabels(["", "+90°", "180°", "−90°"])
-    # A tick's own label is centred, and so wide a one would reach into the circle.
+    # A tick's own label is centred; this one is so wide that it would reach into the circle.
     axes.annotate(
         *("0°: the\ncamera\nnow", (0.0, _RIM * largest), (5, 0)),
         textcoords="offset points",
@@ -145,12 +144,13 @@ def _draw_errors(axes: PolarAxes, answer: Recommendation, best: Move) -> None:
     )
     rotation = f"{best.rotation_deg:+g}".replace("-", "−")
     axes.set_title(
-        f"Expected error (degrees) after a turn\nbest: {rotation}°, {best.expected_error_deg:.1f}°"
+        "Expected error (degrees) after a rotation\n"
+        f"best: {rotation}°, {best.expected_error_deg:.1f}°"
     )
 
 
 def _draw_move(axes: PolarAxes, rotation_deg: float, radius: float) -> None:
-    """Draw the way that the camera takes, from 0° on."""
+    """Draw the path of the camera from 0°."""
     angles = np.radians(np.linspace(0.0, rotation_deg, 181))
     axes.add_patch(
         FancyArrowPatch(
@@ -168,7 +168,7 @@ def _draw_move(axes: PolarAxes, rotation_deg: float, radius: float) -> None:
 
 
 def _label_radii(axes: PolarAxes, largest: float) -> None:
-    """Write errors on their circles along 0°: no curve is near the camera's own place."""
+    """Label the circles of errors along 0°, where there is no curve."""
     ticks = [tick for tick in MaxNLocator(4).tick_values(0.0, largest) if 0 < tick <= largest]
     axes.set_ylim(0, _RIM * largest)
     axes.set_yticks(ticks, [""] * len(ticks))

@@ -1,4 +1,4 @@
-"""From depth frames of one object to its pose and to the next view."""
+"""Pose and next view from depth frames of one object."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.logits import from_logits
-from nbv.errors import UserError, check_number, nearest
+from nbv.errors import BundleError, UserError, check_number, nearest
 from nbv.files import as_path
 from nbv.labels import counted
-from nbv.robot.bundle import Bundle, BundleError
-from nbv.robot.crop import Crop, crop_frame, need_metres, need_plausible_nearest
+from nbv.robot.bundle import ELEVATION_BANDWIDTH_DEG, Bundle
+from nbv.robot.crop import Crop, check_depth_limits, check_plausible_nearest, crop_frame
 from nbv.robot.depth_files import to_metres
 from nbv.robot.intrinsics import Intrinsics, as_intrinsics
 from nbv.robot.masks import object_mask
@@ -29,14 +29,13 @@ from nbv.robot.next_view import (
     as_rotation_list,
     next_view,
 )
-from nbv.robot.ood import unfamiliarity
-from nbv.robot.sweeps import ELEVATION_BANDWIDTH_DEG, elevation_share
+from nbv.robot.ood import ood_score
 
 IntrinsicsLike = Intrinsics | ArrayLike | None
-"""Intrinsics, or their numbers; None where they are not known."""
+"""Intrinsics, or their numbers; None if they are unknown."""
 
 REACH = 0.75
-"""How far an object reaches behind its nearest point, in diagonals, where nothing masks it."""
+"""Depth of an object behind its nearest point without a mask, diagonals."""
 
 
 def shipped_bundles() -> dict[str, Path]:
@@ -44,29 +43,29 @@ def shipped_bundles() -> dict[str, Path]:
     folder = resources.files("nbv.robot") / "shipped"
     if not folder.is_dir():
         return {}
-    found = {Path(str(item)).stem: Path(str(item)) for item in folder.iterdir()}
-    return {name: path for name, path in sorted(found.items()) if path.suffix == ".safetensors"}
+    paths = sorted(Path(str(item)) for item in folder.iterdir())
+    return {path.stem: path for path in paths if path.suffix == ".safetensors"}
 
 
 def bundle_path(name: str | Path) -> Path:
-    """Return the file of a bundle: that of a shipped one by its name, or the file itself.
+    """Return the path of a shipped bundle of this name, or of a file.
 
     Raises
     ------
-    UserError
-        Where there is neither.
+    BundleError
+        ``no-bundle`` where there is neither.
     """
     shipped = shipped_bundles()
     if str(name) in shipped:
         return shipped[str(name)]
     if not as_path(name).exists():
-        known = nearest(str(name), shipped) if shipped else "no bundle comes with this nbv"
-        raise BundleError("no-bundle", f"{str(name)!r}: there is no such file; {known}")
+        known = nearest(str(name), shipped) if shipped else "this nbv ships no bundle; give a file"
+        raise BundleError("no-bundle", f"{str(name)!r} does not exist; {known}")
     return Path(name)
 
 
 class Recommender:
-    """A bundle, ready for frames.
+    """Estimates poses and recommends next views with a bundle.
 
     Parameters
     ----------
@@ -76,13 +75,22 @@ class Recommender:
     --------
     >>> import nbv
     >>> recommender = nbv.Recommender.load("mug")
-    >>> recommender.bundle.category
-    'mug'
+    >>> frame = nbv.example_frame()
+    >>> answer = recommender.recommend(frame.depth_m, intrinsics=frame.intrinsics)
+    >>> 0 <= answer.azimuth_deg < 360, answer.move.travel_deg >= 15
+    (True, True)
+    >>> crop = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics)
+    >>> recommender.recommend_crops(crop.codes[None]).move == answer.move
+    True
+    >>> recommender.distributions(crop.codes[None]).shape
+    (1, 120)
     """
 
     def __init__(self, bundle: Bundle) -> None:
         if not isinstance(bundle, Bundle):
-            raise UserError(f"{bundle!r} is no bundle; give its name or file to Recommender.load")
+            raise UserError(
+                f"{bundle!r} is not a Bundle; give its name or file to Recommender.load"
+            )
         self.bundle = bundle
         self.network: Network = open_network(
             bundle.network, bundle.camera.image_side, bundle.n_bins
@@ -90,18 +98,12 @@ class Recommender:
 
     @classmethod
     def load(cls, name: str | Path) -> Recommender:
-        """Return the recommender of a bundle: the name of a shipped one, or a file.
+        """Load a bundle by the name of a shipped one, or from a file.
 
         Raises
         ------
-        UserError
-            Where there is no such bundle, or it is damaged.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> nbv.Recommender.load("mug").bundle.category
-        'mug'
+        BundleError
+            Where the bundle does not exist, or is damaged.
         """
         return cls(Bundle.load(bundle_path(name)))
 
@@ -118,39 +120,23 @@ class Recommender:
         near_m: float | None = None,
         far_m: float | None = None,
     ) -> Crop:
-        """Return what the network sees of a frame; parameters and errors as of `recommend`.
+        """Return the network's input for one frame.
 
-        Examples
-        --------
-        >>> import nbv
-        >>> frame, recommender = nbv.example_frame(), nbv.Recommender.load("mug")
-        >>> crop = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics)
-        >>> crop.codes.shape, crop.codes.dtype.name
-        ((64, 64), 'uint8')
+        Same parameters and errors as `recommend`.
         """
         bundle = self.bundle
         depth = to_metres(np.asanyarray(depth_m))
         camera = bundle.focal_px if intrinsics is None else intrinsics
         known = as_intrinsics([camera] if isinstance(camera, float) else camera)
         reach_m = REACH * bundle.diagonal_m
-        need_metres(near_m, far_m, bundle.diagonal_m)
+        check_depth_limits(near_m, far_m, bundle.diagonal_m)
         if mask is None and far_m is None:
-            need_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
+            check_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
         inside = object_mask(depth, reach_m, mask, near_m, far_m)
         return crop_frame(depth, inside, known, bundle.camera, bundle.diagonal_m, bundle.extent_m)
 
     def distributions(self, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Return p(azimuth | image) (n, B) of crops (n, side, side).
-
-        Examples
-        --------
-        >>> import nbv
-        >>> frame, recommender = nbv.example_frame(), nbv.Recommender.load("mug")
-        >>> codes = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics).codes
-        >>> (p,) = recommender.distributions(codes[None])
-        >>> len(p), round(float(p.sum()), 6)
-        (120, 1.0)
-        """
+        """Return p(azimuth | image) (n, B) of crops (n, side, side)."""
         return from_logits(self.network(codes), self.bundle.temperature)
 
     def recommend(
@@ -169,61 +155,55 @@ class Recommender:
         followed: bool = True,
         names: Sequence[str] | None = None,
     ) -> Recommendation:
-        """Return the pose that frames show, and the next view.
+        """Return the estimated pose and the next view.
 
-        Views closer than 15° add no information: what hides the pose in one hides it in the other.
-        So the next view is 15° or more from every view so far.
+        Views closer than 15° add no information, because the same parts are hidden. So the next
+        view is at least 15° from every view so far.
 
         Parameters
         ----------
         depth_m : (rows, columns), or a sequence of such
-            Depth in metres; NaN or 0 where nothing was measured. Whole numbers are millimetres.
+            Depth in metres, NaN or 0 where nothing was measured; integer depth in millimetres.
         rotations_deg : sequence of float
-            Where each frame was taken: degrees about the object from the first frame's place,
-            counter-clockwise seen from above. The first is 0. Of one frame it may be a number.
+            Rotation of each frame around the object from the first one, degrees, counter-clockwise
+            seen from above. The first is 0. For one frame it may be a number.
         mask : (rows, columns), or a sequence of such, optional
-            Not 0 where the object is. Without it the object is what lies nearest, or between
-            `near_m` and `far_m`.
+            Not 0 at the object's pixels. Without it the object is the nearest surface, or the one
+            between `near_m` and `far_m`.
         intrinsics : Intrinsics, (fx, fy, cx, cy) or 3 × 3, optional
             Pixels; or a list of Intrinsics, one for each frame. Without it the focal length of the
-            simulated sensor.
+            simulated sensor is assumed.
         near_m, far_m : float, optional
-            Metres.
+            Depth limits of the object, metres.
         elevation_deg : float, optional
-            Of the camera above the object's base plane, where it is known.
+            Elevation of the camera above the object's base plane, if known.
         gravity : (3,), optional
             Instead of `elevation_deg`: the direction down in the optical frame of the last frame's
-            camera, of any length. It gives the elevation, and a warning where the camera is rolled.
+            camera, of any length. It gives the elevation, and a warning if the camera is rolled.
             An accelerometer reports the opposite direction.
         allowed_deg : array-like, optional
-            Rotations from the last frame's place that the camera may take; all without it. An
-            array of n booleans is a mask over the circle: entry k is the rotation 360 k / n.
+            Admissible rotations from the last frame; all without it. An array of n booleans is a
+            mask over the circle: entry k selects the rotation 360 k / n.
         max_travel_deg : float
         followed : bool
-            Whether a recommendation chose the last of several frames. The calibration errors that
-            chose it also make up its expected error, which is too low by that; True adds the
-            difference. Give False where rotations were fixed beforehand, as with a turntable or
-            several cameras. Of one frame it changes nothing.
+            Whether a recommendation chose the last of several frames. Its expected error is made
+            of the calibration errors that chose it, and so it is too low; True adds the
+            difference. Give False for rotations fixed beforehand, as with a turntable or several
+            cameras. It has no effect on one frame.
         names : sequence of str, optional
-            What messages call the frames, such as their files; else one of several is counted.
+            Names of the frames in messages, such as their files; numbers without it.
 
         Raises
         ------
-        nbv.robot.errors.FrameError
-            Where a frame cannot be used; it says why.
+        FrameError
+            Where a frame cannot be used; its name is the reason.
         UserError
             Where the arguments do not fit each other, or gravity points up in the image.
-
-        Examples
-        --------
-        >>> import nbv
-        >>> frame = nbv.example_frame()
-        >>> answer = nbv.Recommender.load("mug").recommend(frame.depth_m, mask=frame.mask)
-        >>> 0 <= answer.azimuth_deg < 360
-        True
         """
         if gravity is not None and elevation_deg is not None:
-            raise UserError("gravity gives the elevation: give it or an elevation, not both")
+            raise UserError(
+                "`gravity` and `elevation_deg`: give one of them, gravity determines the elevation"
+            )
         rolled: tuple[str, ...] = ()
         if gravity is not None:
             elevation_deg, rolled = elevation_from_gravity(gravity), roll_warnings(gravity)
@@ -231,11 +211,11 @@ class Recommender:
         masks = _as_masks(mask, len(frames))
         cameras = _as_cameras(intrinsics, len(frames))
         rotations_deg = as_rotation_list(rotations_deg, len(frames))
-        called = _as_names(names, len(frames))
-        # Of all frames: no message should name one.
-        need_metres(near_m, far_m, self.bundle.diagonal_m)
+        labels = _as_names(names, len(frames))
+        # Here, because the limits hold for all frames: the message should not name one.
+        check_depth_limits(near_m, far_m, self.bundle.diagonal_m)
         crops: list[Crop] = []
-        for frame, own, camera, name in zip(frames, masks, cameras, called, strict=True):
+        for frame, own, camera, name in zip(frames, masks, cameras, labels, strict=True):
             try:
                 crop = self.crop(frame, mask=own, intrinsics=camera, near_m=near_m, far_m=far_m)
             except UserError as error:
@@ -244,7 +224,7 @@ class Recommender:
                 raise error.about(name) from error
             crops.append(crop)
         doubts = (doubt for crop in crops for doubt in crop.doubts)
-        return self._of_crops(
+        return self._recommend_codes(
             np.array([crop.codes for crop in crops]),
             rotations_deg,
             elevation_deg,
@@ -266,25 +246,18 @@ class Recommender:
         max_travel_deg: float = 180.0,
         followed: bool = True,
     ) -> Recommendation:
-        """Return what `recommend` does, of crops (n, side, side) uint8.
+        """Return the estimated pose and the next view from crops (n, side, side) uint8.
 
-        Examples
-        --------
-        >>> import nbv
-        >>> frame, recommender = nbv.example_frame(), nbv.Recommender.load("mug")
-        >>> crop = recommender.crop(frame.depth_m, intrinsics=frame.intrinsics)
-        >>> of_crop = recommender.recommend_crops(crop.codes[None])
-        >>> of_crop.move == recommender.recommend(frame.depth_m, intrinsics=frame.intrinsics).move
-        True
+        Same parameters and errors as `recommend`.
         """
         codes = np.asarray(codes)
         if codes.ndim != 3 or codes.dtype != np.uint8:
             raise UserError(
-                f"crops: {codes.dtype} of shape {codes.shape}; give (n, side, side) uint8, such as "
-                "the codes of Recommender.crop"
+                f"`codes`: {codes.dtype} of shape {codes.shape}; give (n, side, side) uint8, such "
+                "as those of Recommender.crop"
             )
         rotations_deg = as_rotation_list(rotations_deg, len(codes))
-        return self._of_crops(
+        return self._recommend_codes(
             codes,
             rotations_deg,
             elevation_deg,
@@ -293,7 +266,7 @@ class Recommender:
             followed=followed,
         )
 
-    def _of_crops(
+    def _recommend_codes(
         self,
         codes: NDArray[np.uint8],
         rotations_deg: list[float],
@@ -307,27 +280,27 @@ class Recommender:
         followed: bool,
     ) -> Recommendation:
         if elevation_deg is not None:
-            check_number("elevation", elevation_deg)
+            check_number("`elevation_deg`", elevation_deg)
         if elevation_deg is not None and not -90 <= elevation_deg <= 90:
             raise UserError(
-                f"an elevation of {elevation_deg:g}°: it lies from -90 to 90, or give none"
+                f"`elevation_deg`={elevation_deg:g}: give -90 to 90 degrees, or leave it out"
             )
         logits = self.network(codes)
-        unfamiliar = float(unfamiliarity(self.bundle.familiarity, codes, logits).max())
+        score = float(ood_score(self.bundle.ood, codes, logits).max())
         return next_view(
             from_logits(logits, self.bundle.temperature),
             rotations_deg,
             self._calibrated,
             self.bundle.affinity,
-            turn_share(self.bundle, elevation_deg),
+            self.bundle.weights_at(elevation_deg),
             allowed_deg=allowed_deg,
             max_travel_deg=max_travel_deg,
             followed=followed,
-            unfamiliarity=unfamiliar,
+            ood_score=score,
             warnings=(
                 *doubts,
-                *_unfamiliar(unfamiliar),
-                *_other_elevation(self.bundle, elevation_deg),
+                *_ood_warnings(score),
+                *_elevation_warnings(self.bundle, elevation_deg),
                 *rolled,
             ),
             crops=tuple(codes),
@@ -335,24 +308,16 @@ class Recommender:
         )
 
 
-def turn_share(bundle: Bundle, elevation_deg: float | None) -> NDArray[np.float64]:
-    """Return how much each calibration turn (S,) counts for frames of an elevation, or of any."""
-    weight = np.asarray(bundle.turn_weight, dtype=np.float64)
-    if elevation_deg is None:
-        return weight
-    return weight * elevation_share(bundle.elevation_deg, elevation_deg)
-
-
-def _unfamiliar(unfamiliar: float) -> tuple[str, ...]:
-    if unfamiliar <= 1.0:
+def _ood_warnings(score: float) -> tuple[str, ...]:
+    if score <= 1.0:
         return ()
     return (
-        f"frame looks out of distribution (score {unfamiliar:.1f}, threshold 1): check mask, units "
+        f"frame looks out of distribution (score {score:.1f}, threshold 1): check mask, units "
         "and category",
     )
 
 
-def _other_elevation(bundle: Bundle, elevation_deg: float | None) -> tuple[str, ...]:
+def _elevation_warnings(bundle: Bundle, elevation_deg: float | None) -> tuple[str, ...]:
     if elevation_deg is None:
         return ()
     known = bundle.elevation_deg[np.isfinite(bundle.elevation_deg)]
@@ -362,8 +327,8 @@ def _other_elevation(bundle: Bundle, elevation_deg: float | None) -> tuple[str, 
     if least - ELEVATION_BANDWIDTH_DEG <= elevation_deg <= most + ELEVATION_BANDWIDTH_DEG:
         return ()
     return (
-        f"an elevation of {elevation_deg:g}° is unlike those that were calibrated, "
-        f"{least:g} to {most:g}°: expected errors may be too low",
+        f"the elevation {elevation_deg:g}° is outside the calibrated range of {least:g} to "
+        f"{most:g}°: expected errors may be too low",
     )
 
 
@@ -372,28 +337,28 @@ def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.gene
         return [depth_m]
     if isinstance(depth_m, list | tuple) and depth_m and isinstance(depth_m[0], np.ndarray):
         return [np.asanyarray(frame) for frame in depth_m]
-    _refuse_text("depth", depth_m, "read the file with nbv.read_depth")
+    _reject_text("depth", depth_m, "give an array, such as that of nbv.read_depth")
     try:
         values = np.asanyarray(depth_m)
     except ValueError as error:
-        raise UserError("frames of several sizes: give a list of numpy arrays") from error
-    return _images_of(values)
+        raise UserError("frames of different sizes: give a list of numpy arrays") from error
+    return _split(values)
 
 
-def _images_of(values: NDArray[Any]) -> list[NDArray[Any]]:
-    """Return the images of a stack (n, rows, columns), or the one image with up to 4 channels."""
+def _split(values: NDArray[Any]) -> list[NDArray[Any]]:
+    """Return the images of a stack (n, rows, columns), or one image with up to 4 channels."""
     return list(values) if values.ndim == 3 and values.shape[2] > 4 else [values]
 
 
 def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[ArrayLike | None]:
     if mask is None:
         return [None] * n
-    _refuse_text("mask", mask, "give an array of the file's pixels")
+    _reject_text("mask", mask, "give an array of pixels")
     masks: list[Any]
     if isinstance(mask, list | tuple) and not (mask and np.ndim(mask[0]) == 1):
         masks = list(mask)
     else:
-        masks = list(_images_of(np.asanyarray(mask)))
+        masks = list(_split(np.asanyarray(mask)))
     if len(masks) != n:
         raise UserError(
             f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"
@@ -401,17 +366,17 @@ def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[
     return masks
 
 
-def _refuse_text(name: str, value: Any, what_to_do: str) -> None:
-    """Refuse the name of a file, alone or in a list, where an array is meant."""
-    for one in value if isinstance(value, list | tuple) else [value]:
-        if isinstance(one, str | bytes | Path):
-            raise UserError(f"{name}: {str(one)!r} is text and no array; {what_to_do}")
+def _reject_text(name: str, value: Any, what_to_do: str) -> None:
+    """Raise UserError for a file name, alone or in a list, in place of an array."""
+    for item in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(item, str | bytes | Path):
+            raise UserError(f"{name}: {str(item)!r} is text; {what_to_do}")
 
 
 def _as_names(names: Sequence[str] | None, n: int) -> Sequence[str | None]:
-    """Return what each of n frames is called; None of a single one without a name."""
+    """Return the name of each of n frames; None for a single frame without a name."""
     if names is None:
-        return [None] if n == 1 else [f"frame {place} of {n}" for place in range(1, n + 1)]
+        return [None] if n == 1 else [f"frame {i} of {n}" for i in range(1, n + 1)]
     if len(names) != n:
         raise UserError(
             f"{counted(n, 'frame')} and {counted(len(names), 'name')}: give one for each frame"
@@ -423,9 +388,9 @@ def _as_cameras(
     intrinsics: IntrinsicsLike | Sequence[Intrinsics | None], n: int
 ) -> Sequence[IntrinsicsLike]:
     each = list(intrinsics) if isinstance(intrinsics, list | tuple) else []
-    if not each or not all(one is None or isinstance(one, Intrinsics) for one in each):
-        of_all: Any = intrinsics
-        return [of_all] * n
+    if not each or not all(item is None or isinstance(item, Intrinsics) for item in each):
+        shared: Any = intrinsics
+        return [shared] * n
     if len(each) != n:
         raise UserError(
             f"{counted(n, 'frame')} and {counted(len(each), 'camera')}: give intrinsics for all, "

@@ -11,24 +11,23 @@ from typing import NoReturn
 import numpy as np
 import pandas as pd
 
-from nbv.errors import UserError
+from nbv.errors import FrameError, UserError
 from nbv.files import missing, read_rows
 from nbv.robot.depth_files import read_depth, read_mask
-from nbv.robot.errors import FrameError
 from nbv.robot.intrinsics import Intrinsics, camera_of
+from nbv.robot.network import Sweep
 from nbv.robot.recommender import Recommender
-from nbv.robot.sweeps import Turn
 
-NEEDED = ("object_id", "sequence", "file", "azimuth_deg")
+REQUIRED = ("object_id", "sequence", "file", "azimuth_deg")
 OPTIONAL = ("mask", "elevation_deg", "fx", "fy", "cx", "cy")
 
-# Of a name that is an optional one, mistyped: one letter of elevation_deg, and not its unit.
-_ALIKE = 0.9
+# Similarity of a misspelt optional column: one letter of elevation_deg, but not its unit.
+_SIMILARITY = 0.9
 
 
 @dataclass(frozen=True)
 class Recording:
-    """Frames of one object, taken with one camera height.
+    """Frames of one object, taken from one camera height.
 
     Attributes
     ----------
@@ -37,7 +36,7 @@ class Recording:
         ``path, azimuth_deg`` and, where the manifest has them, ``mask, elevation_deg``, in the
         order of the manifest.
     intrinsics : tuple of Intrinsics or None
-        Of each frame.
+        One for each frame.
     """
 
     object_id: str
@@ -47,38 +46,38 @@ class Recording:
 
     @property
     def azimuth_deg(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """Of each frame."""
+        """True azimuth of each frame, degrees."""
         return self.frames["azimuth_deg"].to_numpy(dtype=np.float64)
 
     @property
     def elevation_deg(self) -> float:
-        """The mean over the frames; NaN where the manifest says nothing."""
+        """Mean elevation of the frames, degrees; NaN if the manifest has none."""
         if "elevation_deg" not in self.frames:
             return float("nan")
         return float(self.frames["elevation_deg"].mean())
 
 
 def read_manifest(path: str | Path) -> list[Recording]:
-    """Read a manifest: CSV with the columns `NEEDED`, and any of `OPTIONAL`.
+    """Read a manifest: a CSV file with the columns `REQUIRED`, and any of `OPTIONAL`.
 
-    Names of files count from the manifest's folder; azimuths are degrees, counter-clockwise about
-    the object seen from above.
+    File names are relative to the manifest's folder. Azimuths are degrees, counter-clockwise
+    around the object seen from above.
 
     Raises
     ------
     UserError
-        Where a column or a file is missing, a file occurs twice in a sequence, an azimuth is no
-        number, or another cell holds what it cannot hold; it names the row.
+        Where a column or a file is missing, a file occurs twice in a sequence, or a cell holds an
+        invalid value; it names the row.
     """
     path = Path(path)
-    table = read_rows(path, NEEDED)
+    table = read_rows(path, REQUIRED)
     for name in map(str, table):
         if name != (known := name.strip().lower()) and known in OPTIONAL:
             raise UserError(f"{path}: a column {name!r}; call it {known!r}")
     absent = [name for name in OPTIONAL if name not in table]
     for name in map(str, table):
-        if name not in (*NEEDED, *OPTIONAL) and (
-            alike := difflib.get_close_matches(name.lower(), absent, 1, _ALIKE)
+        if name not in (*REQUIRED, *OPTIONAL) and (
+            alike := difflib.get_close_matches(name.lower(), absent, 1, _SIMILARITY)
             or [known for known in absent if known == f"{name.lower()}_deg"]
         ):
             raise UserError(
@@ -89,8 +88,8 @@ def read_manifest(path: str | Path) -> list[Recording]:
             table[name] = _numbers(path, table[name])
     table["path"] = _files(path, table["file"])
     if (again := table.duplicated(["object_id", "sequence", "file"])).any():
-        place = int(again.to_numpy().argmax())
-        _refuse(path, place, f"file {table['file'][place]!r} is in this sequence already")
+        row = int(again.to_numpy().argmax())
+        _reject(path, row, f"file {table['file'][row]!r} is in this sequence already")
     if "mask" in table:
         table["mask"] = _files(path, table["mask"])
     intrinsics = list(_intrinsics(path, table))
@@ -99,93 +98,93 @@ def read_manifest(path: str | Path) -> list[Recording]:
             str(object_id),
             str(sequence),
             rows.reset_index(drop=True),
-            tuple(intrinsics[place] for place in rows.index),
+            tuple(intrinsics[row] for row in rows.index),
         )
         for (object_id, sequence), rows in table.groupby(["object_id", "sequence"], sort=True)
     ]
 
 
-def _refuse(path: Path, place: int, what: str) -> NoReturn:
-    # The first row is that of the names.
-    raise UserError(f"{path}, row {place + 2}: {what}")
+def _reject(path: Path, row: int, what: str) -> NoReturn:
+    # Row 1 of the file holds the names of the columns.
+    raise UserError(f"{path}, row {row + 2}: {what}")
 
 
 def _numbers(path: Path, texts: pd.Series[str]) -> pd.Series[float]:
     """Return a column of numbers; NaN where an optional one is empty."""
     numbers = pd.to_numeric(texts, errors="coerce").astype(float)
     name = str(texts.name)
-    for place, (text, number) in enumerate(zip(texts, numbers, strict=True)):
+    for row, (text, number) in enumerate(zip(texts, numbers, strict=True)):
         is_absent = name in OPTIONAL and text.strip().lower() in ("", "nan")
         if not (np.isfinite(number) or is_absent):
-            _refuse(path, place, f"{name} is no number")
+            _reject(path, row, f"{name} is not a number")
         if name == "elevation_deg" and abs(number) > 90:
-            _refuse(path, place, f"elevation_deg={text} lies not between -90 and 90")
+            _reject(path, row, f"elevation_deg={text} is not between -90 and 90")
     return numbers
 
 
 def _files(path: Path, names: pd.Series[str]) -> list[str | None]:
-    """Return the files of a column, whose names count from the manifest's folder."""
-    found: list[str | None] = []
-    for place, name in enumerate(names):
+    """Return the files of a column, whose names are relative to the manifest's folder."""
+    files: list[str | None] = []
+    for row, name in enumerate(names):
         file = path.parent / name
         is_absent = names.name in OPTIONAL and not name
         if not (is_absent or file.is_file()):
-            _refuse(path, place, f"{names.name} {name!r} {missing(file) if name else 'is no name'}")
-        found.append(None if is_absent else str(file))
-    return found
+            _reject(path, row, f"{names.name} {name!r} {missing(file) if name else 'is empty'}")
+        files.append(None if is_absent else str(file))
+    return files
 
 
 def _intrinsics(path: Path, table: pd.DataFrame) -> Iterator[Intrinsics | None]:
-    for place, row in enumerate(table.to_dict("records")):
+    for row, values in enumerate(table.to_dict("records")):
         names = ("fx", "fy", "cx", "cy")
-        known = {name: row[name] for name in names if np.isfinite(row.get(name, np.nan))}
+        known = {name: values[name] for name in names if np.isfinite(values.get(name, np.nan))}
         if not known:
             yield None
         elif "fx" not in known:
-            _refuse(path, place, f"{next(iter(known))} without fx; give fx too")
+            _reject(path, row, f"{next(iter(known))} without fx; give fx too")
         else:
             try:
                 yield Intrinsics(**{"fy": known["fx"]} | known)
             except UserError as error:
-                _refuse(path, place, str(error))
+                _reject(path, row, str(error))
 
 
-def see(
+def run_network(
     recommender: Recommender,
     recording: Recording,
     intrinsics: str | None,
     depth_scale: float | None,
-    tell: Callable[[str, FrameError], None],
+    report: Callable[[str, FrameError], None],
     near_m: float | None = None,
     far_m: float | None = None,
-) -> Turn:
-    """Return what a network makes of a recording; frames that are refused are told and left out.
+) -> Sweep:
+    """Return the crops and logits of a recording; rejected frames are reported and skipped.
 
     Parameters
     ----------
     recommender : Recommender
     recording : Recording
     intrinsics : str or None
-        Of frames for which the manifest has none; see `nbv.robot.intrinsics.camera_of`.
+        Intrinsics of frames without any in the manifest; see `nbv.robot.intrinsics.camera_of`.
     depth_scale : float or None
         See `nbv.robot.depth_files.read_depth`.
-    tell : callable
-        Takes the file of a frame that is refused, and why.
+    report : callable
+        Takes the file of a rejected frame, and the reason.
     near_m, far_m : float, optional
         The object lies between them in every frame, metres.
 
     Raises
     ------
     UserError
-        Where a file cannot be read, or no frame is left.
+        Where a file cannot be read, or every frame is rejected.
     """
     codes, kept, focal_px = [], [], []
     first: tuple[str, FrameError] | None = None
-    for place, (row, own) in enumerate(
+    for i, (row, own_intrinsics) in enumerate(
         zip(recording.frames.to_dict("records"), recording.intrinsics, strict=True)
     ):
         mask, camera = row.get("mask"), camera_of(intrinsics, row["path"])
-        known = own or camera.intrinsics
+        known = own_intrinsics or camera.intrinsics
         object_mask = read_mask(mask) if isinstance(mask, str) else None
         try:
             depth_m = read_depth(row["path"], depth_scale, camera.unit_m)
@@ -198,20 +197,20 @@ def see(
             except UserError as error:
                 raise error.about(row["path"]) from error
         except FrameError as error:
-            tell(row["path"], error)
+            report(row["path"], error)
             first = first or (row["path"], error)
             continue
         codes.append(crop.codes)
-        kept.append(place)
+        kept.append(i)
         focal_px.append(known.fx if known else float("nan"))
     if first and not kept:
-        path, refusal = first
-        raise refusal.about(
+        path, rejection = first
+        raise rejection.about(
             f"object {recording.object_id!r}, sequence {recording.sequence!r}: every frame is "
-            f"refused; the first, {path}"
+            f"rejected; the first, {path}"
         )
     crops = np.stack(codes)
-    return Turn(
+    return Sweep(
         recording.object_id,
         recording.sequence,
         recording.elevation_deg,

@@ -1,4 +1,4 @@
-"""One style for every figure: colours for the colour-blind, marks that survive grey print."""
+"""Style of all figures: colours for the colour-blind, markers that survive grey print."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ MUTED = "#666666"
 GRID = "#d9d9d9"
 SHADE = "#e4e4e4"
 FOR, OPEN, AGAINST = "#00664a", "#6b5500", "#9c2a00"
-"""What a difference says: for, undecided, against."""
+"""Colours of a difference: in favour, undecided, against."""
 
 RC: Any = {
-    # A matplotlibrc of the user does not matter.
+    # Overrides the user's matplotlibrc.
     **{key: value for key, value in mpl.rcParamsDefault.items() if key != "backend"},
-    # The first is matplotlib's own. Verdana is as wide, where an SVG file is read without it.
+    # DejaVu Sans comes with matplotlib. Verdana has the same width, for SVG viewers without it.
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"],
     "font.size": 9.0,
@@ -46,23 +46,23 @@ RC: Any = {
     "legend.fontsize": 9.0,
     "hatch.linewidth": 0.7,
     "pdf.fonttype": 42,
-    # Text stays text: small, sharp at every size, found by a search.
+    # Text stays text: small, sharp at every size, searchable.
     "svg.fonttype": "none",
     "svg.hashsalt": "nbv",
 }
-"""Matplotlib settings in force while a figure is built and saved."""
+"""Matplotlib settings for building and saving figures."""
 
 SAVED: Mapping[str, Mapping[str, Any]] = {
     "png": {"dpi": 150, "metadata": {"Software": None}},
     "pdf": {"metadata": {"CreationDate": None}},
     "svg": {"metadata": {"Date": None}},
 }
-"""How each kind of file is saved, so that a figure gives the same bytes."""
+"""Settings of each file format that make saved figures reproducible."""
 
 
 @dataclass(frozen=True)
 class MethodStyle:
-    """One method's colour, line, marker and hatch, the same in every figure."""
+    """A method's colour, line, marker and hatch in every figure."""
 
     color: str
     line: LineStyleType
@@ -72,7 +72,7 @@ class MethodStyle:
 
     @property
     def curve(self) -> dict[str, Any]:
-        """How the method's curves are drawn, without markers."""
+        """Arguments that draw the method's curves, without markers."""
         return {"color": self.color, "linestyle": self.line, "linewidth": self.width}
 
 
@@ -89,7 +89,7 @@ _FURTHER = (
     MethodStyle("#8C6D00", (0, (2.0, 2.0)), "<", "oo"),
 )
 _ERROR, _GAIN, _DISPERSION, _FIXED = _FURTHER
-# By policy: what a method turns by has the colour, what it fuses by the line.
+# By policy: the colour shows the policy, the line the fusion.
 _POLICIES: Mapping[str, MethodStyle] = {
     "random": _STYLES["random"],
     "opposite": _STYLES["opposite"],
@@ -117,8 +117,8 @@ _FUSIONS: Mapping[str, LineStyleType] = {
 def method_style(method: str, methods: tuple[str, ...]) -> MethodStyle:
     """Return a method's style.
 
-    Extensions go by the policy and the fusion that their name says; other names take the further
-    styles in turn.
+    An extension has the style of the policy and the fusion in its name; other names have the
+    further styles in order.
     """
     if method in _STYLES:
         return _STYLES[method]
@@ -132,7 +132,7 @@ def method_style(method: str, methods: tuple[str, ...]) -> MethodStyle:
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
-    """Return an empty figure that draws itself without a display or any global state."""
+    """Return an empty figure that needs neither a display nor global state."""
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
@@ -140,14 +140,14 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 @dataclass(frozen=True)
 class Panels:
-    """A figure of several panels, and the cell that they leave, if they leave one."""
+    """A figure of several panels, and the spare cell if there is one."""
 
     figure: Figure
     panels: list[Axes]
     spare: Axes | None
 
     def add_key(self, handles: Sequence[Artist]) -> Legend:
-        """Say once which method is drawn how: in the spare cell, or else below all panels."""
+        """Draw one legend, in the spare cell or else below all panels."""
         if self.spare is not None:
             return self.spare.legend(handles=handles, loc="center", handlelength=3.2)
         columns = min(len(handles), 2 * len(self.panels))
@@ -159,7 +159,7 @@ class Panels:
 
 
 def panel_grid(n_panels: int, width_in: float, height_in: float) -> Panels:
-    """Return a figure of panels of a size, three abreast unless that leaves two cells or more."""
+    """Return a figure of panels, three per row unless that leaves two cells or more empty."""
     columns = min(_ABREAST, key=lambda abreast: max(-n_panels % abreast - 1, 0))
     columns = min(columns, n_panels)
     rows = -(-n_panels // columns)
@@ -174,7 +174,7 @@ _ABREAST = (3, 2, 4)
 
 
 def mark_azimuth(axes: Axes, azimuth_deg: float, name: str) -> None:
-    """Mark an azimuth or a rotation by a line, with its name at the top next to it."""
+    """Mark an azimuth or a rotation by a line, with its name at the top."""
     axes.axvline(azimuth_deg, color=INK, linewidth=1.0, linestyle=":")
     right = azimuth_deg < 180
     axes.annotate(
@@ -190,7 +190,7 @@ def mark_azimuth(axes: Axes, azimuth_deg: float, name: str) -> None:
 
 
 def azimuth_axis(axes: Axes, label: str, vertical: bool = False) -> None:
-    """Mark a circle of degrees every 90."""
+    """Label an axis of degrees every 90."""
     ticks = [0, 90, 180, 270, 360]
     if vertical:
         axes.set(ylim=(0, 360), yticks=ticks, ylabel=label)
@@ -200,28 +200,26 @@ def azimuth_axis(axes: Axes, label: str, vertical: bool = False) -> None:
 
 def draw_estimate(
     axes: Axes,
-    place: float,
+    row: float,
     style: MethodStyle,
     ours: tuple[float, float, float],
     published: float,
 ) -> None:
-    """Draw a value and the ends of its interval in a row, and what is published as an open mark."""
+    """Draw a value with its interval in a row, and the published value as an open marker."""
     value, low, high = ours
-    axes.plot([low, high], [place, place], color=style.color, linewidth=1.4)
+    axes.plot([low, high], [row, row], color=style.color, linewidth=1.4)
     filled: Any = {"markerfacecolor": style.color, "markeredgecolor": INK, "markeredgewidth": 0.6}
-    axes.plot(value, place, marker=style.marker, markersize=5, **filled)
+    axes.plot(value, row, marker=style.marker, markersize=5, **filled)
     if np.isfinite(published):
         opened: Any = {"markerfacecolor": "none", "markeredgecolor": style.color}
-        axes.plot(
-            published, place, marker=style.marker, markersize=5, markeredgewidth=1.2, **opened
-        )
+        axes.plot(published, row, marker=style.marker, markersize=5, markeredgewidth=1.2, **opened)
 
 
 def label_rows(axes: Axes, labels: Sequence[str], headings: Sequence[int]) -> None:
-    """Name the rows of a picture from the top; some of them are headings."""
+    """Label the rows of a figure from the top; `headings` are the indices of headings."""
     axes.set_yticks(range(len(labels)), labels, fontsize=8)
-    for place in headings:
-        axes.get_yticklabels()[place].set_fontweight("bold")
+    for row in headings:
+        axes.get_yticklabels()[row].set_fontweight("bold")
     axes.tick_params(axis="y", length=0)
     axes.tick_params(axis="x", labelsize=8)
     axes.xaxis.label.set_fontsize(8)
@@ -231,10 +229,10 @@ def label_rows(axes: Axes, labels: Sequence[str], headings: Sequence[int]) -> No
 
 
 def save_figure(figure: Figure, paths: Mapping[str, Path]) -> None:
-    """Write a figure as ``png`` (150 dpi), ``pdf`` or ``svg``; a figure gives the same bytes."""
+    """Write a figure reproducibly as ``png`` (150 dpi), ``pdf`` or ``svg``."""
     with mpl.rc_context(RC):
         for kind, path in paths.items():
-            # In memory first: matplotlib's PDF writer has no clear message for a full disk.
+            # In memory first, because matplotlib's PDF writer has no clear message for a full disk.
             whole = io.BytesIO()
             figure.savefig(whole, format=kind, **SAVED[kind])
             with replacing(path) as temporary:

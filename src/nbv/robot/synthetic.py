@@ -1,4 +1,4 @@
-"""Depth frames that a sensor would take of a mesh: to try things without a camera."""
+"""Synthetic depth frames of a mesh, to try things without a camera."""
 
 from __future__ import annotations
 
@@ -41,22 +41,22 @@ CAMERAS = {
     "stereo": _DepthCamera(_STEREO, _STEREO.focal_px, 848),
     "none": _DepthCamera(None, _KINECT.focal_px, WIDTH),
 }
-"""What `draw_frame` can be taken with, by name; all have `HEIGHT` rows."""
+"""Depth cameras of `draw_frame`, by name; all images have `HEIGHT` rows."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A depth frame, and what is known of it.
+    """A depth frame and its ground truth.
 
     Attributes
     ----------
     depth_m : (480, columns) float32
         Metres; 0 where nothing was measured.
     mask : (480, columns) bool
-        The pixels of the object where depth was measured.
+        Pixels of the object with a depth.
     intrinsics : Intrinsics
     azimuth_deg, elevation_deg : float
-        Of the camera.
+        Position of the camera around the object.
     """
 
     depth_m: DepthImage
@@ -76,33 +76,34 @@ def draw_frame(
     *,
     sensor: str = "kinect",
 ) -> Frame:
-    """Return what a depth camera measures of an object in front of it.
+    """Return a frame that a depth camera would take of a mesh.
 
     Parameters
     ----------
     mesh : Mesh
-        Of unit diagonal.
+        A mesh of unit diagonal.
     azimuth_deg, elevation_deg : float
-        Of the camera about the object, which it is directed at.
+        Position of the camera, which points at the object.
     distance_m : float
+        Distance of the camera from the object, metres.
     diagonal_m : float
-        Of the object's bounding box.
+        Diagonal of the object's bounding box, metres.
     seed : int
-        Of the noise.
+        Seed of the noise.
     sensor : str
-        A name in `CAMERAS`. ``none`` is the Kinect's camera with the true depth.
+        A name in `CAMERAS`. ``none`` gives the true depth in the Kinect's image.
 
     Raises
     ------
     UserError
-        Where an angle is none, the object would be nearer or farther than is plausible or than the
-        sensor measures, the sensor is unknown, or the seed is negative.
+        Where an angle is invalid, the distance is implausible or below the sensor's range, the
+        sensor is unknown, or the seed is negative.
     """
-    _need_view(azimuth_deg, elevation_deg, distance_m, diagonal_m)
+    _check_view(azimuth_deg, elevation_deg, distance_m, diagonal_m)
     if sensor not in CAMERAS:
-        raise UserError(f"sensor={sensor}: {nearest(sensor, CAMERAS)}")
+        raise UserError(f"`sensor`={sensor}: {nearest(sensor, CAMERAS)}")
     if seed < 0:
-        raise UserError(f"seed={seed}: must be 0 or more")
+        raise UserError(f"`seed`={seed}: give 0 or more")
     taken_by = CAMERAS[sensor]
     focal_px, width = taken_by.focal_px, taken_by.width
     fov_deg = math.degrees(2 * math.atan(width / 2 / focal_px))
@@ -113,41 +114,41 @@ def draw_frame(
     if taken_by.measure is not None:
         if distance_m < (nearest_m := taken_by.measure.nearest_m):
             raise UserError(
-                f"a distance of {distance_m:g} m: {sensor} measures nothing nearer than "
-                f"{nearest_m:.2g} m"
+                f"`distance_m`={distance_m:g}: {sensor} measures only from {nearest_m:.2g} m on; "
+                "move the camera away"
             )
         depth = taken_by.measure(depth, camera, diagonal_m, np.random.default_rng(seed))
     above = (width - HEIGHT) // 2
     depth_m = (depth[0, above : above + HEIGHT] * np.float32(diagonal_m)).astype(np.float32)
     if not depth_m.any():
-        raise UserError("no pixel of the object is seen in this frame: bring the camera nearer")
+        raise UserError("no pixel of the object is visible in this frame: move the camera closer")
     intrinsics = Intrinsics(
         focal_px, focal_px, width / 2 - 0.5, HEIGHT / 2 - 0.5, width=width, height=HEIGHT
     )
     return Frame(depth_m, depth_m > 0, intrinsics, azimuth_deg, elevation_deg)
 
 
-def _need_view(
+def _check_view(
     azimuth_deg: float, elevation_deg: float, distance_m: float, diagonal_m: float
 ) -> None:
-    check_number("azimuth", azimuth_deg)
-    check_number("elevation", elevation_deg)
+    check_number("`azimuth_deg`", azimuth_deg)
+    check_number("`elevation_deg`", elevation_deg)
     if not math.isfinite(azimuth_deg):
-        raise UserError(f"an azimuth of {azimuth_deg:g}°: give a number of degrees")
+        raise UserError(f"`azimuth_deg`={azimuth_deg:g}: give a finite number of degrees")
     if not -90 <= elevation_deg <= 90:
-        raise UserError(f"an elevation of {elevation_deg:g}°: it lies from -90 to 90")
+        raise UserError(f"`elevation_deg`={elevation_deg:g}: give -90 to 90 degrees")
     if not (math.isfinite(diagonal_m) and diagonal_m > 0):
-        raise UserError(f"a diagonal of {diagonal_m:g} m: it must be above 0")
+        raise UserError(f"`diagonal_m`={diagonal_m:g}: give metres above 0")
     if not NEAREST * diagonal_m <= distance_m <= FARTHEST * diagonal_m:
         raise UserError(
-            f"a distance of {distance_m:g} m from an object of {diagonal_m:g} m: "
+            f"`distance_m`={distance_m:g} from an object with `diagonal_m`={diagonal_m:g}: "
             f"{NEAREST * diagonal_m:.3g} to {FARTHEST * diagonal_m:.3g} m are plausible; change "
-            "the distance or the object's diagonal, both in metres"
+            "one of them, both are in metres"
         )
 
 
 def example_frame(azimuth_deg: float = 75.0, elevation_deg: float = 15.0) -> Frame:
-    """Return a frame of a generated mug, 0.8 m away. From 75° its handle is hidden.
+    """Return a frame of a procedural mug, 0.8 m away. From 75° its handle is hidden.
 
     Examples
     --------
@@ -159,22 +160,22 @@ def example_frame(azimuth_deg: float = 75.0, elevation_deg: float = 15.0) -> Fra
 
 
 def example_mesh() -> Mesh:
-    """Return a generated mug of unit diagonal."""
+    """Return a procedural mug of unit diagonal."""
     from nbv.data.procedural import generate
 
     return as_mesh(normalise(generate("mug", seed=0, index=0), "+z", "+x", 0.0, "origin"))
 
 
 def read_mesh(path: str | Path, up: str = "+z", front: str = "+x") -> Mesh:
-    """Read a mesh file and bring it to unit diagonal, its axes as of `dataset.up` and `front`.
+    """Read a mesh file and scale it to unit diagonal; `up` and `front` name axes of the file.
 
     Raises
     ------
     UserError
-        Where it is of no kind in `EXTENSIONS`, cannot be read, or has no surface.
+        Where the suffix is not one of `EXTENSIONS`, the file cannot be read, or it has no surface.
     """
     if Path(path).suffix.lower() not in EXTENSIONS:
-        raise UserError(f"{path}: no known kind of mesh file; give {', '.join(EXTENSIONS)}")
+        raise UserError(f"{path}: unknown kind of mesh file; give {', '.join(EXTENSIONS)}")
     mesh = MeshReader().read(Path(path))
     check_mesh(mesh, str(path))
     return as_mesh(normalise(mesh, up, front, 0.0, "box"))

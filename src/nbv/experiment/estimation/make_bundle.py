@@ -21,11 +21,9 @@ from nbv.experiment.estimation.weights import Estimator
 from nbv.robot.bundle import Bundle
 from nbv.robot.calibration import paper_tables, temperature_of
 from nbv.robot.crop import pixel_step
-from nbv.robot.mirror import mirrored_classes
-from nbv.robot.network import Network, open_network
-from nbv.robot.ood import fit_familiarity
-from nbv.robot.pair_distributions import bin_apart
-from nbv.robot.sweeps import Turn
+from nbv.robot.network import Network, Sweep, mirrored_classes, open_network
+from nbv.robot.ood import fit_ood
+from nbv.robot.pairs import bin_apart
 
 DEFAULT_FOCAL_PX = 600.0
 """The focal length of a bundle whose training simulated no sensor."""
@@ -41,7 +39,7 @@ def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -
     ----------
     estimator : Estimator
     mirror_plane_deg : float, optional
-        From `nbv.robot.mirror.find_mirror_plane`.
+        From `nbv.robot.network.find_mirror_plane`.
     """
     if mirror_plane_deg is None:
         return onnx_model(estimator)
@@ -62,14 +60,14 @@ def turns_of(
     elevations_deg: Sequence[float],
     object_ids: Sequence[str],
     step: int = 1,
-) -> tuple[list[Turn], float, float]:
+) -> tuple[list[Sweep], float, float]:
     """Return the turns of objects at every elevation, and their extent in the images.
 
     A turn has every `step`-th view, from the first on.
 
     Returns
     -------
-    list of Turn
+    list of Sweep
     float, float
         The 1 % and 99 % quantiles of the diagonal of an object's box in an image, pixels.
     """
@@ -80,7 +78,7 @@ def turns_of(
             logits = network(codes)
             azimuth_deg = np.arange(0, len(whole), step, dtype=np.float64) * (360.0 / len(whole))
             turns.append(
-                Turn(object_id, f"{elevation:g}", float(elevation), azimuth_deg, logits, codes)
+                Sweep(object_id, f"{elevation:g}", float(elevation), azimuth_deg, logits, codes)
             )
             extents.append(_extents(codes))
     low, high = np.quantile(np.concatenate(extents), (0.01, 0.99))
@@ -102,7 +100,7 @@ def _length(visible: NDArray[np.bool_]) -> NDArray[np.float64]:
 def make_bundle(
     category: str,
     estimator: Estimator,
-    turns: Sequence[Turn],
+    turns: Sequence[Sweep],
     extent_px: tuple[float, float],
     *,
     mirror_plane_deg: float | None,
@@ -118,13 +116,13 @@ def make_bundle(
     category : str
     estimator : Estimator
         A classifier, trained on ``<object id>/<elevation>``.
-    turns : sequence of Turn
+    turns : sequence of Sweep
         Turns of calibration objects, which the estimator has not seen, by its `bundled_network`
         with the mirror plane.
     extent_px : (float, float)
         From `turns_of`.
     mirror_plane_deg : float or None
-        From `nbv.robot.mirror.find_mirror_plane`.
+        From `nbv.robot.network.find_mirror_plane`.
     camera : Camera
         The camera of the training images.
     sensor : mapping
@@ -155,10 +153,10 @@ def make_bundle(
         temperature=temperature,
         object_ids=tuple(turn.object_id for turn in turns),
         elevation_deg=elevation_deg,
-        turn_weight=np.ones(len(turns), dtype=np.float32),
+        sweep_weights=np.ones(len(turns), dtype=np.float32),
         distributions=distributions,
         affinity={key: affinity[key] for key in ("power", "pseudo_observations")},
-        familiarity=fit_familiarity(turns),
+        ood=fit_ood(turns),
         paper=paper_tables(elevation_deg, distributions),
         provenance=dict(provenance) | {"training_objects": n_objects},
     )

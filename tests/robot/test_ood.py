@@ -1,4 +1,4 @@
-"""What is like the calibration, and what is not."""
+"""The out-of-distribution score of crops."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from made_bundles import BINS, random_codes, soft_turns
+from nbv.robot.network import Sweep
 from nbv.robot.ood import (
-    FAMILIAR_SHARE,
+    IN_DISTRIBUTION_SHARE,
     MOST_REFERENCES,
     NEIGHBOUR,
     crop_features,
     energy,
-    fit_familiarity,
-    unfamiliarity,
+    fit_ood,
+    ood_score,
 )
-from nbv.robot.sweeps import Turn
 
 
-def turns(n: int, seed: int = 0, views: int = BINS) -> list[Turn]:
+def sweeps(n: int, seed: int = 0, views: int = BINS) -> list[Sweep]:
     rng = np.random.default_rng(seed)
     logits = soft_turns(rng, n, views)
     azimuth_deg = np.arange(views) * (360.0 / views)
     return [
-        Turn(f"o{i}", "1", 0.0, azimuth_deg, logits[i], random_codes(rng, views)) for i in range(n)
+        Sweep(f"o{i}", "1", 0.0, azimuth_deg, logits[i], random_codes(rng, views)) for i in range(n)
     ]
 
 
 def of_all(found, made) -> np.ndarray:
-    return np.concatenate([unfamiliarity(found, one.codes, one.logits) for one in made])
+    return np.concatenate([ood_score(found, one.codes, one.logits) for one in made])
 
 
 @pytest.mark.parametrize("side", [16, 32, 48])
@@ -57,10 +57,10 @@ def test_the_energy_is_that_of_its_definition_at_any_size_of_logits(shift, seed)
 
 
 def test_the_score_is_that_of_its_definition():
-    made = turns(3)
-    found = fit_familiarity(made)
+    made = sweeps(3)
+    found = fit_ood(made)
     codes, logits = made[0].codes[:5], made[0].logits[:5]
-    for code, logit, score in zip(codes, logits, unfamiliarity(found, codes, logits), strict=True):
+    for code, logit, score in zip(codes, logits, ood_score(found, codes, logits), strict=True):
         place = (crop_features(code[None])[0] - found.mean) @ found.basis
         apart = np.sort(np.linalg.norm(found.references - place, axis=1))[NEIGHBOUR - 1]
         (near, spread), (low, width) = found.scales
@@ -69,47 +69,47 @@ def test_the_score_is_that_of_its_definition():
 
 
 def test_the_limit_keeps_its_share_of_other_objects():
-    found = fit_familiarity(turns(20))
-    others = of_all(found, turns(40, seed=1))
-    assert np.mean(others <= 1) == pytest.approx(FAMILIAR_SHARE, abs=0.04)
+    found = fit_ood(sweeps(20))
+    others = of_all(found, sweeps(40, seed=1))
+    assert np.mean(others <= 1) == pytest.approx(IN_DISTRIBUTION_SHARE, abs=0.04)
 
 
 def test_the_own_object_does_not_count_in_the_limit():
-    """A turn that is there twice is near itself; the limit must not believe that."""
-    made = turns(4)
+    """A sweep that is there twice is near itself; the limit must not believe that."""
+    made = sweeps(4)
     doubled = [*made, *made]
-    found = fit_familiarity(doubled)
-    assert np.mean(of_all(found, made) <= 1) > FAMILIAR_SHARE
-    assert np.mean(of_all(found, turns(20, seed=2)) <= 1) > 0.8
+    found = fit_ood(doubled)
+    assert np.mean(of_all(found, made) <= 1) > IN_DISTRIBUTION_SHARE
+    assert np.mean(of_all(found, sweeps(20, seed=2)) <= 1) > 0.8
 
 
 @pytest.mark.parametrize("code", [1, 255])
-def test_what_is_seen_otherwise_is_unfamiliar(code):
+def test_what_is_seen_otherwise_is_out_of_distribution(code):
     """A near or a far plane that fills the crop, for a network that is as sure as ever."""
-    made = turns(6)
-    found = fit_familiarity(made)
+    made = sweeps(6)
+    found = fit_ood(made)
     strange = np.full_like(made[0].codes, code)
-    scores = unfamiliarity(found, strange, made[0].logits)
+    scores = ood_score(found, strange, made[0].logits)
     assert np.quantile(scores, 0.1) > np.quantile(of_all(found, made), 0.9)
     assert np.median(scores) > 1
 
 
-def test_what_the_network_is_unsure_of_is_less_familiar():
+def test_what_the_network_is_unsure_of_scores_higher():
     """Outside the range in which the made logits are noise alone."""
-    made = turns(6)
-    found = fit_familiarity(made)
+    made = sweeps(6)
+    found = fit_ood(made)
     is_sure = np.abs(made[0].azimuth_deg - 90.0) > 60.0
     codes, logits = made[0].codes[is_sure], made[0].logits[is_sure]
-    scores = [unfamiliarity(found, codes, factor * logits) for factor in (1.0, 0.7, 0.4)]
+    scores = [ood_score(found, codes, factor * logits) for factor in (1.0, 0.7, 0.4)]
     assert (np.diff(scores, axis=0) >= 0).all()
     assert np.median(scores[2]) > np.median(scores[0])
 
 
 def test_there_are_no_more_references_than_a_bundle_can_hold():
-    found = fit_familiarity(turns(12, views=360))
+    found = fit_ood(sweeps(12, views=360))
     assert 0.5 * MOST_REFERENCES <= len(found.references) <= MOST_REFERENCES
 
 
 def test_one_object_alone_is_its_own_calibration():
-    made = turns(1)
-    assert np.mean(of_all(fit_familiarity(made), made) <= 1) >= FAMILIAR_SHARE - 0.05
+    made = sweeps(1)
+    assert np.mean(of_all(fit_ood(made), made) <= 1) >= IN_DISTRIBUTION_SHARE - 0.05

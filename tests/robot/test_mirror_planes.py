@@ -13,8 +13,7 @@ from nbv.data.depth_codes import encode_depth
 from nbv.data.meshes import normalise
 from nbv.data.procedural import generate
 from nbv.data.render import open_renderer
-from nbv.robot.mirror import find_mirror_plane, mirrored_classes
-from nbv.robot.sweeps import Turn
+from nbv.robot.network import Sweep, find_mirror_plane, mirrored_classes
 
 CAMERA = Camera(image_side=32)
 N_CLASSES = 60
@@ -48,10 +47,10 @@ def network_of_templates(mesh: trimesh.Trimesh, seed: int = 0):
     return network
 
 
-def turns_of(network, meshes) -> list[Turn]:
+def turns_of(network, meshes) -> list[Sweep]:
     azimuth_deg = np.arange(48) * 7.5
     codes = [images_of(mesh, azimuth_deg) for mesh in meshes]
-    return [Turn(str(i), "", 30.0, azimuth_deg, network(c), c) for i, c in enumerate(codes)]
+    return [Sweep(str(i), "", 30.0, azimuth_deg, network(c), c) for i, c in enumerate(codes)]
 
 
 def objects(category: str, n: int) -> list[trimesh.Trimesh]:

@@ -1,0 +1,309 @@
+"""The commands ``nbv calibrate`` and ``nbv evaluate``: known azimuths of frames or estimates."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from nbv.cli.answers import (
+    print_assumed_camera,
+    print_evaluation,
+    print_json,
+    print_line,
+    print_offset,
+    print_warnings,
+)
+from nbv.cli.arguments import SHIPPED, Json, WholeNumbers, as_paragraphs, check_writable, in_flags
+from nbv.errors import UserError, nearest
+from nbv.labels import counted
+
+if TYPE_CHECKING:
+    from nbv.errors import FrameError
+    from nbv.robot.network import Sweep
+    from nbv.robot.recommender import Recommender
+
+
+@as_paragraphs
+def calibrate(
+    source: Annotated[Path, Parameter(name="PAIRS_OR_MANIFEST")],
+    /,
+    *,
+    output: Path,
+    bundle: str | None = None,
+    criterion: str | None = None,
+    intrinsics: str | None = None,
+    depth_scale: float | None = None,
+    near: float | None = None,
+    far: float | None = None,
+    json: Json = False,
+) -> None:
+    """Calibrate an estimator's error model from ground-truth azimuths.
+
+    From pairs (object_id, azimuth_deg, estimate_deg) of any estimator it makes
+    a lookup table for nbv recommend --estimate. With columns p0, p1, ..., the
+    probabilities of the azimuths 360 k / B, the table also serves nbv recommend
+    --distribution. From a manifest of frames (object_id, sequence, file,
+    azimuth_deg) and a bundle it makes a bundle for your camera.
+
+    Example: nbv calibrate pairs.csv --output table.npz
+
+    Example: nbv calibrate manifest.csv --bundle mug --output my.safetensors
+
+    Parameters
+    ----------
+    source
+        A CSV file of pairs or of frames.
+    output
+        The file to write: .npz for a table, .safetensors for a bundle.
+    bundle
+        The bundle to calibrate on the frames: the name of a shipped one, or a file.
+    criterion
+        Criterion of the lookup table: pose_ambiguity (default), information_gain,
+        expected_dispersion, bayes_error, expected_error or fixed.
+    intrinsics
+        Camera of the frames: fx,fy,cx,cy in pixels, only the focal length, or a camera file.
+    depth_scale
+        Metres per unit of depth. Default: 1 for floating-point depth; for integer depth the value
+        of the camera file, or 0.001.
+    near
+        Least depth of the object, metres.
+    far
+        Largest depth of the object, metres.
+    json
+        Print JSON.
+    """
+    if bundle is None:
+        frame_options = {"--intrinsics": intrinsics, "--depth-scale": depth_scale}
+        frame_options |= {"--near": near, "--far": far}
+        if ignored := [name for name, value in frame_options.items() if value is not None]:
+            raise UserError(f"{ignored[0]} is for frames, which need --bundle: --bundle mug")
+        if output.suffix.lower() == ".safetensors":
+            raise UserError(
+                f"--output={output} is a bundle, and frames make one with --bundle: add "
+                "--bundle mug; pairs make a table, an .npz file"
+            )
+        check_writable("--output", output, [".npz"])
+        _calibrate_table(source, output, criterion or "pose_ambiguity", as_json=json)
+        return
+    if criterion is not None:
+        raise UserError("--criterion is for pairs, which need no --bundle; leave one of them out")
+    check_writable("--output", output, [".safetensors"])
+    from nbv.core.distributions import mean_direction_deg
+    from nbv.core.logits import from_logits
+    from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
+    from nbv.robot.calibration import recalibrated
+
+    run = _run_on_manifest(bundle, source, intrinsics, depth_scale, near, far, as_json=json)
+    used, sweeps = run.recommender.bundle, run.sweeps
+    if run.n_assumed and not json:
+        print_assumed_camera(used.focal_px, run.n_assumed)
+    recordings: list[dict[str, Any]] = []
+    for sweep in sweeps:
+        estimate_deg = mean_direction_deg(from_logits(sweep.logits, used.temperature))
+        offset = Offset.of(sweep.azimuth_deg, estimate_deg, FOR_FRAMES)
+        is_added = not frame_warning(sweep.azimuth_deg, estimate_deg)
+        about = {"object_id": sweep.object_id, "sequence": sweep.sequence}
+        counts = {"n_frames": len(estimate_deg)}
+        recordings.append(about | counts | asdict(offset) | {"is_added": is_added})
+        if not json:
+            # Before making the tables, which takes up to a minute.
+            name = f"{sweep.object_id}, sequence {sweep.sequence}"
+            print_offset(name, counted(len(estimate_deg), "frame"), offset, is_added=is_added)
+    sys.stdout.flush()
+    recalibrated(used, sweeps, str(source)).save(output)
+    if json:
+        print_json(
+            {
+                "file": str(output),
+                "category": used.category,
+                "n_objects": len({sweep.object_id for sweep in sweeps}),
+                "recordings": recordings,
+                **run.as_json(),
+            }
+        )
+        return
+    print_line(f"{output}: {used.category}, calibrated on {counted(len(sweeps), 'recording')}")
+
+
+@as_paragraphs
+def evaluate(
+    manifest: Annotated[Path, Parameter(name="MANIFEST")],
+    /,
+    *,
+    bundle: str = SHIPPED,
+    views: WholeNumbers = None,
+    intrinsics: str | None = None,
+    depth_scale: float | None = None,
+    near: float | None = None,
+    far: float | None = None,
+    output: Path | None = None,
+    json: Json = False,
+) -> None:
+    """Evaluate every way to choose views on frames with known azimuths.
+
+    Example: nbv evaluate manifest.csv --views 2 3
+
+    Parameters
+    ----------
+    manifest
+        CSV with object_id, sequence, file, azimuth_deg, and optionally mask, elevation_deg, fx, fy,
+        cx, cy.
+    bundle
+        The name of a shipped bundle, or a file.
+    views
+        Numbers of views. Default: 2 3 4 5.
+    intrinsics
+        fx,fy,cx,cy in pixels, only the focal length, or a camera file.
+    depth_scale
+        Metres per unit of depth. Default: 1 for floating-point depth; for integer depth the value
+        of the camera file, or 0.001.
+    near
+        Least depth of the object, metres.
+    far
+        Largest depth of the object, metres.
+    output
+        Also write the errors to this CSV file.
+    json
+        Print JSON.
+    """
+    if output is not None:
+        check_writable("--output", output, [".csv"])
+    from nbv.files import write_csv
+    from nbv.robot import evaluation
+
+    run = _run_on_manifest(bundle, manifest, intrinsics, depth_scale, near, far, as_json=json)
+    used, sweeps = run.recommender.bundle, run.sweeps
+
+    def report(n_done: int) -> None:
+        if len(sweeps) > 1:
+            print(f"evaluated {n_done} of {len(sweeps)} recordings", file=sys.stderr)  # noqa: T201
+
+    errors = evaluation.evaluate(used, sweeps, views or [2, 3, 4, 5], report=report)
+    if output is not None:
+        write_csv(output, errors)
+    ood = evaluation.count_ood(used, sweeps)
+    calibrated_by = sorted({sweep.object_id for sweep in sweeps} & set(used.object_ids))
+    if json:
+        print_json(
+            {
+                "errors": errors.to_dict("records"),
+                "calibrated_by": calibrated_by,
+                "ood": [
+                    about | {"warning": about["warning"] or None}
+                    for about in ood.to_dict("records")
+                ],
+                **run.as_json(),
+            }
+        )
+        return
+    if run.n_assumed:
+        print_assumed_camera(used.focal_px, run.n_assumed)
+    if calibrated_by:
+        print_warnings(
+            [
+                f"{', '.join(calibrated_by)}: the bundle was calibrated on an object of this name, "
+                "so its errors are too low; evaluate other objects"
+            ]
+        )
+    print_evaluation(errors, ood)
+
+
+def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool) -> None:
+    """Make the tables of ``nbv calibrate`` from calibration pairs."""
+    import numpy as np
+
+    from nbv.core.criteria import CRITERIA
+    from nbv.core.distributions import mean_direction_deg
+    from nbv.core.offset import FOR_PAIRS, Offset
+    from nbv.core.selection import DENSITY, chosen_lookup
+    from nbv.robot.distribution_table import DistributionTable
+    from nbv.robot.pairs import PairTable
+
+    if criterion not in CRITERIA:
+        raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
+    pairs = PairTable.load(source)
+    estimates, sweeps = pairs.estimates.estimate_deg, pairs.distributions
+    table = DistributionTable.from_pairs(sweeps) if sweeps else None
+    lookup = chosen_lookup(estimates, criterion, DENSITY)
+    if table is None:
+        lookup.save(output)
+    else:
+        table.save(output, lookup)
+    number = counted(len(estimates), "object")
+    about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)}
+    about |= asdict(pairs.offset)
+    if not as_json:
+        print_offset(str(source), number, pairs.offset)
+        print_line(f"{output}: {criterion} from {number}")
+    if table is not None:
+        azimuth_deg, rows = (np.concatenate(parts) for parts in zip(*sweeps.values(), strict=True))
+        offset = Offset.of(azimuth_deg, mean_direction_deg(rows), FOR_PAIRS)
+        offset = replace(offset, warning=offset.warning or table.warning or None)
+        about["distributions"] = {"temperature": table.temperature} | asdict(offset)
+        if not as_json:
+            classes = f"{table.n_classes} classes, temperature {table.temperature:.2f}"
+            print_offset("distributions", classes, offset)
+    if as_json:
+        print_json(about)
+
+
+@dataclass(frozen=True)
+class ManifestRun:
+    """A bundle's predictions for a manifest, and the frames that were skipped.
+
+    The focal length of `n_assumed` frames is assumed.
+    """
+
+    recommender: Recommender
+    sweeps: list[Sweep]
+    n_assumed: int
+    left_out: dict[str, FrameError]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the assumed focal length and the skipped frames for JSON."""
+        return {
+            "assumed_focal_px": self.recommender.bundle.focal_px if self.n_assumed else None,
+            "n_frames_without_camera": self.n_assumed,
+            "left_out": [
+                {"file": path, "reason": error.name, "message": in_flags(error.message)}
+                for path, error in self.left_out.items()
+            ],
+        }
+
+
+def _run_on_manifest(
+    bundle: str,
+    manifest: Path,
+    intrinsics: str | None,
+    depth_scale: float | None,
+    near: float | None,
+    far: float | None,
+    *,
+    as_json: bool,
+) -> ManifestRun:
+    """Run a bundle's network on the frames of a manifest, and print which frames are skipped."""
+    from nbv.robot.recommender import Recommender
+    from nbv.robot.recordings import read_manifest, run_network
+
+    left_out: dict[str, FrameError] = {}
+
+    def report(path: str, error: FrameError) -> None:
+        left_out[path] = error
+        line = f"skipping {path}: {in_flags(str(error))}"
+        print(line, file=sys.stderr) if as_json else print_line(line)  # noqa: T201
+
+    recommender, recordings = Recommender.load(bundle), read_manifest(manifest)
+    sweeps = [
+        run_network(recommender, recording, intrinsics, depth_scale, report, near, far)
+        for recording in recordings
+    ]
+    n_assumed = sum(
+        camera is None and intrinsics is None and path not in left_out
+        for recording in recordings
+        for path, camera in zip(recording.frames["path"], recording.intrinsics, strict=True)
+    )
+    return ManifestRun(recommender, sweeps, n_assumed, left_out)
