@@ -26,7 +26,7 @@ def caption_of(shows, units):
     """What the captions say of a result, as a parameter of its rule."""
     return {
         "shows": shows,
-        "objects": {category: len(OBJECTS[category]) for category, _ in units},
+        "objects": {category: len(PLAN.objects[category]) for category, _ in units},
         "n_folds": CONFIG["n_folds"],
         "seed": CONFIG["seed"],
     }
@@ -35,12 +35,12 @@ def caption_of(shows, units):
 def caption_of_table(wildcards):
     name = wildcards.table
     shows = f"{numbered(name)}: {TABLES_SHOW[name]}, ours next to the published values."
-    return caption_of(shows, units_of(name))
+    return caption_of(shows, PLAN.units_of(name))
 
 
 def caption_of_figure(wildcards):
     name = wildcards.figure
-    return caption_of(FIGURES[name].caption, units_of(name))
+    return caption_of(FIGURES[name].caption, PLAN.units_of(name))
 
 
 def in_report(path, category, caption, labels):
@@ -53,7 +53,7 @@ def in_report(path, category, caption, labels):
 def table_in_report(kind, form):
     """A table of the paper, as a table or as its numbers."""
     return in_report(
-        LAYOUT.table("{table}", kind),
+        f"<results>/tables/{{table}}.{kind}",
         "Tables",
         "result",
         lambda wildcards: {

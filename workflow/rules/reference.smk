@@ -5,34 +5,40 @@ import os
 
 from nbv.experiment.reference.store import find_reference
 
-REFERENCES = Path(os.path.relpath(BASE / "docs/reference"))
+REFERENCES = Path(os.path.relpath(ROOT / "docs/reference"))
+
+
+def reference_of_run(wildcards):
+    """The reference to compare with, found before anything is run."""
+    with one_line():
+        return str(find_reference(REFERENCES, CONFIG) / "configuration.yaml")
 
 
 rule compare:
     input:
         sources("compare_with_reference"),
         reference=reference_of_run,
-        report=rules.report.output[0],
+        report="<results>/report.html",
     log:
-        LAYOUT.log("compare"),
+        "<logs>/compare.log",
     conda:
         ENVIRONMENT
     params:
         run=lambda wildcards, input: str(Path(input.report).parent),
     script:
-        f"{SCRIPTS}/compare_with_reference.py"
+        "../scripts/compare_with_reference.py"
 
 
 rule reference:
     input:
         sources("keep_reference"),
-        report=rules.report.output[0],
+        report="<results>/report.html",
     log:
-        LAYOUT.log("reference"),
+        "<logs>/reference.log",
     conda:
         ENVIRONMENT
     params:
         run=lambda wildcards, input: str(Path(input.report).parent),
         reference=str(REFERENCES / CONFIG["name"]),
     script:
-        f"{SCRIPTS}/keep_reference.py"
+        "../scripts/keep_reference.py"

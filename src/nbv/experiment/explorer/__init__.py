@@ -67,7 +67,7 @@ class ExplorerInputs:
     posteriors : mapping of (category, elevation_deg, fold) to Path
         Distributions of test images, where the estimator gives them.
     caution : sequence of str
-        What a reader has to know before any number; see `nbv.experiment.run_size`.
+        What a reader has to know before any number; see `nbv.experiment.plan`.
     """
 
     name: str

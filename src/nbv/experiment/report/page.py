@@ -104,7 +104,7 @@ def build_report(
     runtime : path
         HTML fragment of `nbv.experiment.report.runtime.runtime_table`.
     caution : sequence of str
-        What a reader has to know before any number; see `nbv.experiment.run_size`.
+        What a reader has to know before any number; see `nbv.experiment.plan`.
 
     Raises
     ------
