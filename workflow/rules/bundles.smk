@@ -2,24 +2,6 @@
 # neither the paper's images nor its estimators, which know their elevation.
 
 
-def bundle_elevations(pattern):
-    """The path of every elevation of the wildcards' category."""
-
-    def found(wildcards):
-        with one_line():
-            PLAN.check_bundle(wildcards.category)
-        elevations = CONFIG["elevations_deg"][wildcards.category]
-        return paths(pattern, [(wildcards.category, each) for each in elevations])
-
-    return found
-
-
-def bundle_settings(randomisation, **more):
-    """What a bundle says of its training."""
-    said = {key: CONFIG[key] for key in ("dataset", "sensor", "seed")}
-    return said | {"randomisation": randomisation} | more
-
-
 rule render_bundle:
     input:
         sources("render_bundle"),
@@ -49,8 +31,12 @@ rule train_bundle:
     input:
         sources("train_bundle"),
         splits="<results>/splits/{category}.csv",
-        depth=bundle_elevations(rules.render_bundle.output.depth),
-        objects=bundle_elevations(rules.render_bundle.output.objects),
+        depth=lambda wildcards: bundle_elevations(
+            wildcards, rules.render_bundle.output.depth
+        ),
+        objects=lambda wildcards: bundle_elevations(
+            wildcards, rules.render_bundle.output.objects
+        ),
     output:
         "<results>/bundles/estimators/{category}.safetensors",
     log:
@@ -75,10 +61,18 @@ rule bundle:
     input:
         sources("make_bundle"),
         splits="<results>/splits/{category}.csv",
-        depth=bundle_elevations(rules.render_bundle.output.depth),
-        objects=bundle_elevations(rules.render_bundle.output.objects),
-        test_depth=bundle_elevations(rules.render_bundle.output.depth),
-        test_objects=bundle_elevations(rules.render_bundle.output.objects),
+        depth=lambda wildcards: bundle_elevations(
+            wildcards, rules.render_bundle.output.depth
+        ),
+        objects=lambda wildcards: bundle_elevations(
+            wildcards, rules.render_bundle.output.objects
+        ),
+        test_depth=lambda wildcards: bundle_elevations(
+            wildcards, rules.render_bundle.output.depth
+        ),
+        test_objects=lambda wildcards: bundle_elevations(
+            wildcards, rules.render_bundle.output.objects
+        ),
         estimator=rules.train_bundle.output[0],
         provenance="<results>/provenance.json",
     output:
@@ -99,7 +93,7 @@ rule bundle:
         camera=CONFIG["camera"],
         sensor=CONFIG["sensor"],
         affinity=CONFIG["affinity"],
-        settings=bundle_settings(CONFIG["randomisation"]),
+        settings=PLAN.bundle_settings,
     script:
         "../scripts/make_bundle.py"
 

@@ -1,6 +1,7 @@
 # The plan of the run, where its files lie, and the functions of the rule files. The studies' own
 # Snakefile includes this file too.
 
+import os
 import re
 import sys
 import time
@@ -19,6 +20,7 @@ from nbv.errors import UserError
 from nbv.experiment.config import snakemake_overrides
 from nbv.experiment.jobs import forget_last_error, hold_lock, why_stopped
 from nbv.experiment.plan import PRETRAINED, Plan, paths, stage_from
+from nbv.experiment.reference.store import find_reference
 from nbv.experiment.results import ESTIMATED_ROLES
 
 STARTED = time.time()
@@ -46,6 +48,7 @@ with one_line():
 
 CONFIG, UNITS = PLAN.config, PLAN.units
 METHODS = CONFIG["methods"]
+REFERENCES = Path(os.path.relpath(ROOT / "docs/reference"))
 # Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
 ENVIRONMENT = str(ROOT / "workflow/environment.yaml")
 
@@ -69,6 +72,13 @@ def sources(script, settings=None):
     """The files that a script depends on, as inputs: an edit reruns what uses them."""
     (path,) = ROOT.glob(f"*/scripts/{script}.py")
     return PLAN.sources(path, settings)
+
+
+@one_line()
+def mesh_sources(wildcards):
+    """The files that meshes depend on."""
+    PLAN.check_images()
+    return sources("prepare_meshes")
 
 
 def per_attempt(amount):
@@ -112,6 +122,20 @@ def stage_of(wildcards):
     """The settings of a training."""
     start = PLAN.start(wildcards.category, int(wildcards.elevation))
     return PLAN.stage(stage_from(start))
+
+
+@one_line()
+def bundle_elevations(wildcards, pattern):
+    """The path of every elevation of a category that can have a bundle."""
+    PLAN.check_bundle(wildcards.category)
+    elevations = CONFIG["elevations_deg"][wildcards.category]
+    return paths(pattern, [(wildcards.category, each) for each in elevations])
+
+
+@one_line()
+def reference_of_run(wildcards):
+    """The reference to compare with, found before anything is run."""
+    return str(find_reference(REFERENCES, CONFIG) / "configuration.yaml")
 
 
 def banner(*lines):

@@ -1,13 +1,6 @@
 # What a run was made with; its meshes, folds and depth images.
 
 
-def mesh_sources(wildcards):
-    """The modules that meshes depend on."""
-    with one_line():
-        PLAN.check_images()
-    return sources("prepare_meshes")
-
-
 rule settings:
     input:
         sorted(

@@ -1,18 +1,6 @@
 # Reference results under version control: one rule compares a run with them, one makes them.
 # Both run only where somebody asks for them.
 
-import os
-
-from nbv.experiment.reference.store import find_reference
-
-REFERENCES = Path(os.path.relpath(ROOT / "docs/reference"))
-
-
-def reference_of_run(wildcards):
-    """The reference to compare with, found before anything is run."""
-    with one_line():
-        return str(find_reference(REFERENCES, CONFIG) / "configuration.yaml")
-
 
 rule compare:
     input:

@@ -15,28 +15,7 @@ SHOWN_FIGURES = [
 JOBS = PLAN.jobs(TABLES, SHOWN_FIGURES)
 
 
-def evaluations_for(name):
-    """Category, elevation, fold and method of what a table or figure is about."""
-    return PLAN.evaluations_of(PLAN.units_of(name))
-
-
-def figure_inputs(wildcards):
-    """The files that a figure needs."""
-    name = wildcards.figure
-    units, needs = PLAN.units_of(name), FIGURES[name].needs
-    lookup = rules.lookup.output[0].replace("{criterion}", str(PROPOSED_LOOKUP))
-    found = {
-        "evaluations": paths(
-            rules.evaluate_recommended.output[0], evaluations_for(name)
-        ),
-        "depth": paths(rules.render.output.depth, units),
-        "objects": paths(rules.render.output.objects, units),
-        "lookups": paths(lookup, PLAN.folds_of(units)),
-    }
-    return {kind: found[kind] for kind in found if kind in ("evaluations", *needs)}
-
-
-include: "captions.smk"
+include: "shown.smk"
 
 
 rule table:
@@ -197,15 +176,6 @@ use rule figure as animate with:
         "<benchmarks>/animate/{figure}.tsv"
     wildcard_constraints:
         figure="steps",
-
-
-def steps_animation(wildcards):
-    """The animation, where the run has what it shows."""
-    if "steps" not in SHOWN_FIGURES:
-        sys.exit(
-            "nbv: error: animation needs depth images and a lookup table of proposed"
-        )
-    return "<results>/figures/steps.gif"
 
 
 rule animation:

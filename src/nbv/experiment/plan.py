@@ -206,6 +206,11 @@ class Plan:
             settings["handle_reach"] = settings["square_share"] = 0.0
         return settings | {"exclude": [], "exclude_file": None}
 
+    @property
+    def bundle_settings(self) -> dict[str, Any]:
+        """What a bundle says of its training."""
+        return {key: self.config[key] for key in ("dataset", "sensor", "seed", "randomisation")}
+
     # Checks of what a target needs
 
     def check_images(self) -> None:

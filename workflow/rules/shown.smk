@@ -1,4 +1,35 @@
-# What Snakemake's own report (snakemake --report report.zip) says of each result.
+# What tables and figures are about, and what Snakemake's own report (snakemake --report report.zip)
+# says of each result.
+
+
+def evaluations_for(name):
+    """Category, elevation, fold and method of every evaluation of a table or figure."""
+    return PLAN.evaluations_of(PLAN.units_of(name))
+
+
+def figure_inputs(wildcards):
+    """The files that a figure needs."""
+    name = wildcards.figure
+    units, needs = PLAN.units_of(name), FIGURES[name].needs
+    lookup = "<results>/lookup/{category}/el{elevation}/fold{fold}"
+    found = {
+        "evaluations": paths(
+            rules.evaluate_recommended.output[0], evaluations_for(name)
+        ),
+        "depth": paths(rules.render.output.depth, units),
+        "objects": paths(rules.render.output.objects, units),
+        "lookups": paths(f"{lookup}/{PROPOSED_LOOKUP}.npz", PLAN.folds_of(units)),
+    }
+    return {kind: found[kind] for kind in found if kind in ("evaluations", *needs)}
+
+
+@one_line()
+def steps_animation(wildcards):
+    """The animation, where the run has what it shows."""
+    if "steps" not in SHOWN_FIGURES:
+        raise UserError("animation needs depth images and a lookup table of proposed")
+    return "<results>/figures/steps.gif"
+
 
 TABLES_SHOW = {
     "table1": "mean absolute error by category",
