@@ -32,10 +32,10 @@ rule train_bundle:
         sources("train_bundle"),
         splits="<results>/splits/{category}.csv",
         depth=lambda wildcards: bundle_elevations(
-            wildcards, rules.render_bundle.output.depth
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}.npy"
         ),
         objects=lambda wildcards: bundle_elevations(
-            wildcards, rules.render_bundle.output.objects
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}_objects.json"
         ),
     output:
         "<results>/bundles/estimators/{category}.safetensors",
@@ -62,18 +62,18 @@ rule bundle:
         sources("make_bundle"),
         splits="<results>/splits/{category}.csv",
         depth=lambda wildcards: bundle_elevations(
-            wildcards, rules.render_bundle.output.depth
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}.npy"
         ),
         objects=lambda wildcards: bundle_elevations(
-            wildcards, rules.render_bundle.output.objects
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}_objects.json"
         ),
         test_depth=lambda wildcards: bundle_elevations(
-            wildcards, rules.render_bundle.output.depth
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}.npy"
         ),
         test_objects=lambda wildcards: bundle_elevations(
-            wildcards, rules.render_bundle.output.objects
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}_objects.json"
         ),
-        estimator=rules.train_bundle.output[0],
+        estimator="<results>/bundles/estimators/{category}.safetensors",
         provenance="<results>/provenance.json",
     output:
         bundle="<results>/bundles/{category}.safetensors",
@@ -100,4 +100,4 @@ rule bundle:
 
 rule bundles:
     input:
-        paths(rules.bundle.output.bundle, zip(PLAN.categories)),
+        paths("<results>/bundles/{category}.safetensors", zip(PLAN.categories)),

@@ -106,4 +106,4 @@ rule render:
 
 rule renders:
     input:
-        paths(rules.render.output.depth, UNITS),
+        paths("<results>/depth/{category}/el{elevation}.npy", UNITS),

@@ -6,8 +6,10 @@ rule pretrain:
     input:
         sources("pretrain_network"),
         splits=paths("<results>/splits/{category}.csv", zip(PLAN.categories)),
-        depth=paths(rules.render.output.depth, PLAN.lowest_units),
-        objects=paths(rules.render.output.objects, PLAN.lowest_units),
+        depth=paths("<results>/depth/{category}/el{elevation}.npy", PLAN.lowest_units),
+        objects=paths(
+            "<results>/depth/{category}/el{elevation}_objects.json", PLAN.lowest_units
+        ),
     output:
         "<results>/estimators/pretrained/fold{fold}/estimator.safetensors",
     log:
@@ -112,9 +114,11 @@ else:
             splits="<results>/splits/{category}.csv",
             depth="<results>/depth/{category}/el{elevation}.npy",
             objects="<results>/depth/{category}/el{elevation}_objects.json",
-            estimator=rules.train.output.estimator,
+            estimator="<results>/estimators/{category}/el{elevation}/fold{fold}/estimator.safetensors",
             of_parts=expand(
-                rules.train_part.output.estimator, part=PLAN.parts, allow_missing=True
+                "<results>/estimators/{category}/el{elevation}/fold{fold}/without_part{part}.safetensors",
+                part=PLAN.parts,
+                allow_missing=True,
             ),
         output:
             **estimates_of_fold(),
@@ -135,7 +139,10 @@ else:
 
 rule estimators:
     input:
-        paths(rules.train.output.estimator, PLAN.folds_of(UNITS)),
+        paths(
+            "<results>/estimators/{category}/el{elevation}/fold{fold}/estimator.safetensors",
+            PLAN.folds_of(UNITS),
+        ),
 
 
 rule estimates:

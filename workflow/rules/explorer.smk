@@ -5,11 +5,23 @@ rule explorer:
     input:
         sources("build_explorer"),
         evaluations=paths(
-            rules.evaluate_recommended.output[0], PLAN.evaluations_of(UNITS)
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            PLAN.evaluations_of(UNITS),
         ),
-        lookups=paths(rules.lookup.output[0], PLAN.lookups),
-        depth=[] if PLAN.external else paths(rules.render.output.depth, UNITS),
-        objects=[] if PLAN.external else paths(rules.render.output.objects, UNITS),
+        lookups=paths(
+            "<results>/lookup/{category}/el{elevation}/fold{fold}/{criterion}.npz",
+            PLAN.lookups,
+        ),
+        depth=(
+            []
+            if PLAN.external
+            else paths("<results>/depth/{category}/el{elevation}.npy", UNITS)
+        ),
+        objects=(
+            []
+            if PLAN.external
+            else paths("<results>/depth/{category}/el{elevation}_objects.json", UNITS)
+        ),
         posteriors=(
             paths(estimates_of_fold()["test_posteriors"], PLAN.folds_of(UNITS))
             if CONFIG["gives_distributions"]

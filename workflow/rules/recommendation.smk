@@ -69,10 +69,16 @@ rule evaluate_recommended:
 
 rule lookups:
     input:
-        paths(rules.lookup.output[0], PLAN.lookups),
+        paths(
+            "<results>/lookup/{category}/el{elevation}/fold{fold}/{criterion}.npz",
+            PLAN.lookups,
+        ),
 
 
 rule evaluation:
     input:
         rules.settings.output,
-        paths(rules.evaluate_recommended.output[0], PLAN.evaluations_of(UNITS)),
+        paths(
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            PLAN.evaluations_of(UNITS),
+        ),

@@ -22,7 +22,8 @@ rule table:
     input:
         sources("tabulate_paper"),
         evaluations=lambda wildcards: paths(
-            rules.evaluate_recommended.output[0], evaluations_for(wildcards.table)
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            evaluations_for(wildcards.table),
         ),
     output:
         csv=table_in_report("csv", "numbers"),
@@ -81,7 +82,8 @@ rule claims:
     input:
         sources("judge_claims"),
         evaluations=paths(
-            rules.evaluate_recommended.output[0], PLAN.evaluations_of(UNITS)
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            PLAN.evaluations_of(UNITS),
         ),
     output:
         csv=in_report("<results>/claims.csv", "Claims", "result", {"form": "numbers"}),

@@ -14,10 +14,13 @@ def figure_inputs(wildcards):
     lookup = "<results>/lookup/{category}/el{elevation}/fold{fold}"
     found = {
         "evaluations": paths(
-            rules.evaluate_recommended.output[0], evaluations_for(name)
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            evaluations_for(name),
         ),
-        "depth": paths(rules.render.output.depth, units),
-        "objects": paths(rules.render.output.objects, units),
+        "depth": paths("<results>/depth/{category}/el{elevation}.npy", units),
+        "objects": paths(
+            "<results>/depth/{category}/el{elevation}_objects.json", units
+        ),
         "lookups": paths(f"{lookup}/{PROPOSED_LOOKUP}.npz", PLAN.folds_of(units)),
     }
     return {kind: found[kind] for kind in found if kind in ("evaluations", *needs)}

@@ -136,6 +136,13 @@ def why_stopped(
     ]
 
 
+def import_from(folder: Path) -> None:
+    """Let this process, and the jobs that it starts, import the packages in a folder."""
+    sys.path.insert(0, str(folder))
+    before = os.environ.get("PYTHONPATH", "")
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(folder), before]))
+
+
 def forget_last_error(results: str) -> None:
     """Begin a run with no error: the first thing that it writes.
 

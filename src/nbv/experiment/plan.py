@@ -174,7 +174,7 @@ class Plan:
     @property
     def decision(self) -> dict[str, Any]:
         """What decides on a rotation: the conditionals, and the cost of travel."""
-        return self.config["density"] | self.config["recommendation"]
+        return {**self.config["density"], **self.config["recommendation"]}
 
     @property
     def caution(self) -> tuple[str, ...]:
@@ -275,8 +275,10 @@ class Plan:
         return {"methods": list(self.config["methods"]), **settings}
 
     def settings_of(self, name: str) -> dict[str, Any]:
-        """Return the report settings that a table or figure depends on; figures have no intervals."""
-        shown = self.resampled if name.startswith("table") else {"methods": self.resampled["methods"]}
+        """Return the report settings that a table or figure depends on."""
+        # Figures have no intervals.
+        keys = ("methods", "n_resamples", "seed") if name.startswith("table") else ("methods",)
+        shown = {key: self.resampled[key] for key in keys}
         of_focus = name in OF_ELEVATIONS | OF_FOCUS
         return shown | ({"focus_category": self.focus} if of_focus else {})
 
