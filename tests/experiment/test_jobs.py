@@ -13,8 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from nbv.errors import UserError
-from nbv.experiment.checksums import write_checksum
-from nbv.experiment.jobs import NO_SPACE, job, why_stopped
+from nbv.experiment.jobs import NO_SPACE, job, why_stopped, write_checksum
 
 
 @pytest.fixture
@@ -201,7 +200,7 @@ subprocess.run(["bash", "-c", f"{sys.executable} {sys.argv[1]}; true"])
 JOB = """
 import time
 from pathlib import Path
-from nbv.experiment.processes import end_with_snakemake
+from nbv.experiment.jobs import end_with_snakemake
 end_with_snakemake()
 for beat in range(600):
     Path("beat.txt").write_text(str(beat))

@@ -142,7 +142,7 @@ class Sensor(Section):
 
 
 class Schedule(Section):
-    """How long and at which peak rate a stage trains; see `nbv.experiment.estimation.warm_start`."""
+    """How long and at which peak rate a stage trains; see `nbv.experiment.plan`."""
 
     epochs: Epochs
     learning_rate: LearningRate
@@ -289,7 +289,7 @@ class Randomisation(Section):
 
 
 class Bundles(Section):
-    """What bundles are compared without, and on which frames; see workflow/rules/bundles.smk."""
+    """What bundles are compared without, and on which frames; see studies/rules/ingredients.smk."""
 
     ingredients: dict[Name, dict[Name, Number | None]] = {}
     replicates: Annotated[list[Replicate], Field(min_length=1), Distinct] = [0]
