@@ -12,8 +12,8 @@ from nbv.core.criteria import CRITERIA
 from nbv.data.sensors import check_sensor
 from nbv.errors import UserError
 from nbv.experiment.config import load_condition, read_configuration
-from nbv.experiment.plan import Fold, Plan, Unit
-from nbv.experiment.results import ESTIMATED_ROLES
+from nbv.experiment.plan import Fold, Plan
+from nbv.experiment.results import ESTIMATED_ROLES, Unit
 from studies.kept_estimates import kept_settings
 
 Training = tuple[int, int]
@@ -243,7 +243,7 @@ class Studies:
         bundles = self.run.config["bundles"]
         return [
             (category, without, replicate)
-            for category in self.run.categories
+            for category in self.run.config["categories"]
             for without in ("", *bundles["ingredients"])
             for replicate in bundles["replicates"]
         ]

@@ -83,7 +83,7 @@ def shuffled_splits(wildcards):
 
 
 def all_shuffled_splits(wildcards):
-    return paths(shuffled_splits(wildcards), zip(PLAN.categories))
+    return paths(shuffled_splits(wildcards), zip(CONFIG["categories"]))
 
 
 def replicate_start(wildcards):

@@ -100,4 +100,4 @@ rule bundle:
 
 rule bundles:
     input:
-        paths("<results>/bundles/{category}.safetensors", zip(PLAN.categories)),
+        paths("<results>/bundles/{category}.safetensors", zip(CONFIG["categories"])),

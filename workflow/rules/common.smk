@@ -60,7 +60,7 @@ pathvars:
 
 
 wildcard_constraints:
-    category="|".join(map(re.escape, PLAN.categories)),
+    category="|".join(map(re.escape, CONFIG["categories"])),
     elevation=r"\d\d",
     fold="|".join(map(str, PLAN.folds)),
     part="|".join(map(str, PLAN.parts)) or "none",

@@ -5,7 +5,7 @@
 rule pretrain:
     input:
         sources("pretrain_network"),
-        splits=paths("<results>/splits/{category}.csv", zip(PLAN.categories)),
+        splits=paths("<results>/splits/{category}.csv", zip(CONFIG["categories"])),
         depth=paths("<results>/depth/{category}/el{elevation}.npy", PLAN.lowest_units),
         objects=paths(
             "<results>/depth/{category}/el{elevation}_objects.json", PLAN.lowest_units
@@ -21,10 +21,10 @@ rule pretrain:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=per_attempt(2500 + 500 * len(PLAN.categories)),
+        mem_mb=per_attempt(2500 + 500 * len(CONFIG["categories"])),
         runtime=per_attempt(30),
     params:
-        categories=PLAN.categories,
+        categories=CONFIG["categories"],
         estimator=PLAN.stage("pretraining"),
         seed=CONFIG["seed"],
     script:

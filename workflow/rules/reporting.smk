@@ -137,7 +137,7 @@ rule report:
         provenance=rules.settings.output.provenance,
         claims=rules.claims.output.csv,
         runtime=rules.runtime.output.html,
-        splits=paths("<results>/splits/{category}.csv", zip(PLAN.categories)),
+        splits=paths("<results>/splits/{category}.csv", zip(CONFIG["categories"])),
         tables=[f"<results>/tables/{name}.html" for name in TABLES],
         table1="<results>/tables/table1.csv",
         figures=[f"<results>/figures/{name}.svg" for name in SHOWN_FIGURES],
@@ -150,7 +150,7 @@ rule report:
     conda:
         ENVIRONMENT
     params:
-        categories=PLAN.categories,
+        categories=CONFIG["categories"],
         tables=list(TABLES),
         figures=SHOWN_FIGURES,
         caution=PLAN.caution,

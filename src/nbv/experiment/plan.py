@@ -18,19 +18,12 @@ from nbv.data.sources import SOURCES, open_source, select_objects
 from nbv.errors import UserError
 from nbv.experiment import provenance
 from nbv.experiment.config import load_config
-from nbv.experiment.report.settings import (
-    ReportSettings,
-    focus_category,
-    focus_unit,
-    reference_units,
-)
+from nbv.experiment.report import settings as report
+from nbv.experiment.results import Unit
 from nbv.robot.pairs import PairTable
 
-Unit = tuple[str, int]
-"""A category and an elevation, degrees."""
-
 Fold = tuple[str, int, int]
-"""A unit and one of its folds, from 1."""
+"""Category, elevation in degrees, and fold, from 1."""
 
 PRETRAINED: Final = "pretrained"
 Start = int | Literal["pretrained"] | None
@@ -99,11 +92,6 @@ class Plan:
         return f"results/{self.config['name']}"
 
     @property
-    def categories(self) -> list[str]:
-        """The categories, in the order of the configuration."""
-        return list(self.config["categories"])
-
-    @property
     def external(self) -> bool:
         """Whether the estimates come from a file of another program."""
         return "pairs" in self.config["estimator"]
@@ -112,11 +100,6 @@ class Plan:
     def crossfit(self) -> bool:
         """Whether calibration is cross-fitted."""
         return bool(self.config["calibration"] == "crossfit")
-
-    @property
-    def pretrains(self) -> bool:
-        """Whether trainings start from a network of all categories."""
-        return self.config["estimator"]["warm_start"] in ("categories", "both")
 
     @property
     def folds(self) -> Sequence[int]:
@@ -132,13 +115,17 @@ class Plan:
     def units(self) -> list[Unit]:
         """Every category at each of its elevations. Each fold of a unit has its own estimator."""
         elevations = self.config["elevations_deg"]
-        return [(category, each) for category in self.categories for each in elevations[category]]
+        return [
+            (category, each)
+            for category in self.config["categories"]
+            for each in elevations[category]
+        ]
 
     @property
     def lowest_units(self) -> list[Unit]:
         """Each category at its lowest elevation."""
         elevations = self.config["elevations_deg"]
-        return [(category, min(elevations[category])) for category in self.categories]
+        return [(category, min(elevations[category])) for category in self.config["categories"]]
 
     def folds_of(self, units: Iterable[Unit]) -> list[Fold]:
         """Return every fold of some units."""
@@ -216,10 +203,10 @@ class Plan:
     def check_images(self) -> None:
         """Raise UserError where the estimator is external."""
         if self.external:
+            kind = self.config["estimator"]["kind"]
             raise UserError(
-                f"estimator={self.config['estimator']['kind']} has no meshes, images or "
-                "trainings, and what was asked for needs them: ask for the report (no target), "
-                "extensions or leaderboard, or choose another estimator"
+                f"estimator={kind} has no meshes, images or trainings, which this target needs; "
+                "the report (no target) needs none"
             )
 
     def check_bundle(self, category: str) -> None:
@@ -243,24 +230,24 @@ class Plan:
     # What is shown
 
     @property
-    def report_settings(self) -> ReportSettings:
+    def report_settings(self) -> report.ReportSettings:
         """The settings that decide which units are shown."""
-        return ReportSettings(focus_category=self.config["focus_category"])
+        return report.ReportSettings(focus_category=self.config["focus_category"])
 
     @property
     def focus(self) -> str:
         """The category that the detailed tables and figures are about."""
-        return focus_category(self.units, self.report_settings)
+        return report.focus_category(self.units, self.report_settings)
 
     @property
     def focus_unit(self) -> Unit:
         """The focus category at the reference elevation."""
-        return focus_unit(self.units, self.report_settings)
+        return report.focus_unit(self.units, self.report_settings)
 
     @property
     def reference_units(self) -> list[Unit]:
         """The units that categories are compared by."""
-        return reference_units(self.units, self.report_settings)
+        return report.reference_units(self.units, self.report_settings)
 
     def units_of(self, name: str) -> list[Unit]:
         """Return the units that a table or figure is about."""
@@ -271,8 +258,8 @@ class Plan:
     @property
     def resampled(self) -> dict[str, Any]:
         """The report settings of tables that have intervals."""
-        settings = {key: self.config[key] for key in ("n_resamples", "seed")}
-        return {"methods": list(self.config["methods"]), **settings}
+        resamples = {key: self.config[key] for key in ("n_resamples", "seed")}
+        return {"methods": list(self.config["methods"])} | resamples
 
     def settings_of(self, name: str) -> dict[str, Any]:
         """Return the report settings that a table or figure depends on."""
@@ -287,14 +274,15 @@ class Plan:
 
         A log is named as below the folder of logs, without suffix.
         """
-        units, categories = ([], []) if self.external else (self.units, self.categories)
+        units, categories = ([], []) if self.external else (self.units, self.config["categories"])
         folds, trained = self.folds_of(self.units), self.folds_of(units)
-        pretrained = self.folds if self.pretrains else ()
+        pretrains = self.config["estimator"]["warm_start"] in ("categories", "both")
+        pretrained = self.folds if pretrains else ()
         estimated = folds if self.crossfit or self.external else []
         fold = "{category}/el{elevation}/fold{fold}"
         logs = {
             "meshes": paths("{category}", zip(categories)),
-            "splits": paths("{category}", zip(self.categories)),
+            "splits": paths("{category}", zip(self.config["categories"])),
             "render": paths("{category}/el{elevation}", units),
             "pretrain": paths("fold{fold}", zip(pretrained)),
             "pretrain_part": [f"fold{k}/{part}" for k in pretrained for part in self.parts],
@@ -363,25 +351,22 @@ def _objects(config: Mapping[str, Any]) -> dict[str, Sequence[str]]:
 
 
 def paths(pattern: str, keys: Iterable[Sequence[Any]]) -> list[str]:
-    """Return a path for each key, whose values stand in the order of the pattern's wildcards.
+    """Return a path for each key; its values stand in the order of the pattern's wildcards.
 
     >>> paths("depth/{category}/el{elevation}.npy", [("mug", 0), ("car", 15)])
     ['depth/mug/el00.npy', 'depth/car/el15.npy']
     """
-    names = re.findall(r"\{(\w+)\}", pattern)
-    return [
-        pattern.format(
-            **{
-                name: f"{int(value):02d}" if name == "elevation" else value
-                for name, value in zip(names, key, strict=True)
-            }
-        )
-        for key in keys
-    ]
+    names, found = re.findall(r"\{(\w+)\}", pattern), []
+    for key in keys:
+        values = dict(zip(names, key, strict=True))
+        if "elevation" in values:
+            values["elevation"] = f"{int(values['elevation']):02d}"
+        found.append(pattern.format(**values))
+    return found
 
 
 def too_small(n_objects: Mapping[str, int], epochs: int | None) -> tuple[str, ...]:
-    """Return a sentence that says why a run's numbers mean nothing, or nothing.
+    """Return a sentence that says why a run's numbers mean nothing; none where it is large enough.
 
     Parameters
     ----------
@@ -389,11 +374,6 @@ def too_small(n_objects: Mapping[str, int], epochs: int | None) -> tuple[str, ..
         Objects of each category.
     epochs : int or None
         Of the estimator; None for estimates of another program.
-
-    Returns
-    -------
-    tuple of str
-        One sentence, or none where the run is large enough.
     """
     reasons = []
     few = {category: n for category, n in n_objects.items() if n < FEWEST_OBJECTS}
