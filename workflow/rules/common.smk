@@ -1,5 +1,6 @@
 # The plan of the run, where its files lie, and the functions of the rule files. The studies' own
-# Snakefile includes this file too.
+# Snakefile includes this file too. Rules write paths and not, say, `rules.train.output`: where a
+# study uses `train` with other outputs, that would be the study's.
 
 import os
 import re
