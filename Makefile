@@ -107,8 +107,9 @@ check: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakefmt --check Snakefile workflow studies
 	$(BIN)/snakemake --lint
+	$(BIN)/snakemake --snakefile studies/Snakefile --lint
 
 $(READY): requirements.lock requirements-torch.lock workflow/environment.post-deploy.sh pyproject.toml
 	@echo "nbv: first the environment: what is locked, into $(VENV); usually two minutes and 1.9 GB, once only"

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from nbv.experiment.layout import Layout
 from nbv.experiment.report.runtime import efficiency
 from nbv.files import read_csv
 from performance.figures import Figure, Target
@@ -47,5 +46,5 @@ def utilisation(results: Path) -> Figure:
 
 
 def _runtime(results: Path) -> pd.DataFrame:
-    table = Path(Layout(str(results)).table("runtime", "csv"))
+    table = results / "tables/runtime.csv"
     return read_csv(table) if table.is_file() else pd.DataFrame()

@@ -72,7 +72,7 @@ MORE_VIEWS: Final[Mapping[str, Pair]] = {
     "information_gain_product": ("information_gain", "product"),
     "expected_error_product": ("expected_error", "product"),
 }
-"""Choice and fusion of the policies of `studies.more_views` in the comparison."""
+"""Choice and fusion of the policies of `studies.curves` in the comparison."""
 
 DENSITY_COLUMNS = (
     "choice",
@@ -226,7 +226,7 @@ def evaluate_more_views(
     more_views: Mapping[str, Any],
     rng: np.random.Generator,
 ) -> pd.DataFrame:
-    """Return `studies.more_views.more_views_rows` of the test objects of one fold.
+    """Return `studies.curves.more_views_rows` of the test objects of one fold.
 
     Parameters
     ----------

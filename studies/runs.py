@@ -7,13 +7,13 @@ categories), and ``difference*`` compares with the first run.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from nbv.experiment.layout import unit_folder
 from nbv.experiment.report.settings import (
     CELL_COLUMNS,
     ReportSettings,
@@ -106,7 +106,7 @@ def _scopes(
         by_category.setdefault(unit[0], []).append(unit)
     for category, own in by_category.items():
         for unit in own:
-            yield unit_folder(*unit), unit_label(unit, common_deg), {category: [unit]}
+            yield f"{category}/el{unit[1]:02d}", unit_label(unit, common_deg), {category: [unit]}
         if len(own) > 1:
             yield category, f"{category_label(category)}, all elevations", {category: own}
     if len(by_category) > 1:
@@ -137,3 +137,16 @@ def _row(label: str, part: pd.DataFrame, runs: list[str]) -> Row:
             ends = by_run[run]["difference_low"], by_run[run]["difference_high"]
             differences[index] = difference_cell(by_run[run]["difference"], *ends)
     return (Cell(label), *values, *differences)
+
+
+def files_by_run(
+    keys: Sequence[tuple[Any, ...]], paths: Iterable[str]
+) -> dict[str, dict[tuple[Any, ...], str]]:
+    """Return the files of each run by the rest of their key.
+
+    A key is a run's name and what the file is about: category, elevation, fold, ….
+    """
+    files: dict[str, dict[tuple[Any, ...], str]] = {}
+    for (run, *rest), path in zip(keys, paths, strict=True):
+        files.setdefault(run, {})[tuple(rest)] = path
+    return files

@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PARTS = ("Snakefile", "config", "workflow", "profiles", "src")
+PARTS = ("Snakefile", "config", "workflow", "studies", "profiles", "src")
+STUDIES = ("--snakefile", "studies/Snakefile")
 TINY = (
     "categories=[mug,chair]",
     "elevations_deg.mug=[0]",
@@ -68,7 +69,10 @@ class Project:
         return done
 
     def would_run(self, *more: str, targets: tuple[str, ...] = ()) -> dict[str, int]:
-        """Return how many jobs of which rule a run with more overrides would start."""
+        """Return how many jobs of which rule a run with more overrides would start.
+
+        `targets` may begin with `STUDIES`.
+        """
         asked = ("--cores", "2", "--dry-run", "--workflow-profile", "none", *targets)
         done = self.run(*asked, overrides=(*TINY, *more))
         stats = re.search(r"^job +count\n[- ]+\n(.*?)\n\n", done.stdout, re.M | re.S)

@@ -16,7 +16,7 @@ train() {
         suffix=${suffix:+-$suffix}
         # Nobody has trained on objects or folds of this seed.
         file=results/$1$suffix/confirmation/estimates.npz
-        snakemake --cores "$cores" "$file" --config name="$1$suffix" estimator="$estimator" "${@:4}" \
+        snakemake --cores "$cores" --snakefile studies/Snakefile "$file" --config name="$1$suffix" estimator="$estimator" "${@:4}" \
             overrides="[confirmation.dataset=$2$suffix,seed=11,elevations_deg.mug=[0],estimator.warm_start=both,$density${3:+,$3}]"
         kept+=("$file")
     done
@@ -33,4 +33,4 @@ if [[ -n ${MUGS:-} ]]; then
         dataset=shapenet
 fi
 from=$(IFS=,; echo "${kept[*]}")
-snakemake --cores "$cores" statistics --config name=confirmation from="[$from]"
+snakemake --cores "$cores" --snakefile studies/Snakefile statistics --config name=confirmation from="[$from]"

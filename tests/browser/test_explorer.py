@@ -25,7 +25,6 @@ from nbv.core.simulation import bisecting_next, recommended_next
 from nbv.experiment.estimates import write_posteriors
 from nbv.experiment.explorer import ExplorerInputs, build_explorer
 from nbv.experiment.explorer.data import page_table
-from nbv.experiment.layout import Layout
 
 METHODS = synthetic.METHODS
 EXPLORED = (("mug", 0), ("mug", 30), ("chair", 0))
@@ -41,9 +40,10 @@ def path(explored):
 @pytest.fixture(scope="session")
 def outcomes(explored):
     """All evaluation files, a row for each unit, object, first view and method."""
-    layout, frames = Layout(str(explored.results)), []
+    frames = []
     for (category, elevation), fold, method in product(EXPLORED, (1, 2), METHODS):
-        frame = pd.read_csv(layout.evaluation(category, elevation, fold, method))
+        unit = f"{category}/el{elevation:02d}"
+        frame = pd.read_csv(explored.results / f"evaluation/{unit}/fold{fold}/{method}.csv")
         place = {"category": category, "elevation": elevation, "fold": fold, "method": method}
         frames.append(frame.assign(**place))
     keys = ["category", "elevation", "object_id", "initial_deg", "method"]
@@ -52,21 +52,13 @@ def outcomes(explored):
 
 def inputs_of(root: Path, **more) -> ExplorerInputs:
     """The explorer of a synthetic results tree."""
-    layout = Layout(str(root))
-    folds = (1, 2, 3)
     return ExplorerInputs(
         name="synthetic",
         policies=dict(zip(METHODS, ("none", "random", "opposite", "pose_ambiguity"), strict=True)),
-        evaluations={
-            (*unit, fold, method): Path(layout.evaluation(*unit, fold, method))
-            for unit in UNITS
-            for method in METHODS
-            for fold in folds
-        },
+        evaluations=synthetic.evaluation_files(root, UNITS, 3),
         lookups={
-            (*unit, fold, "pose_ambiguity"): Path(layout.lookup(*unit, fold, "pose_ambiguity"))
-            for unit in UNITS
-            for fold in folds
+            (*fold, "pose_ambiguity"): path
+            for fold, path in synthetic.lookup_files(root, UNITS, 3).items()
         },
         min_separation_deg=APART_DEG,
         n_views=5,
@@ -278,7 +270,7 @@ def test_five_views_are_those_of_the_packages_own_functions(
     visit, path, outcomes, explored, policy
 ):
     page = visit(path)
-    layout, known = Layout(str(explored.results)), {}
+    known = {}
     for state in random_states(outcomes, 12, seed=1):
         state |= {"views": 5, "method": "proposed", "next": policy}
         if policy == "halves":
@@ -289,7 +281,8 @@ def test_five_views_are_those_of_the_packages_own_functions(
         first = rows.loc[(state["azimuth"], state["method"])]
         unit = (*place, int(first["fold"]))
         if unit not in known:
-            known[unit] = page_evidence(LookupTable.load(layout.lookup(*unit, "pose_ambiguity")))
+            folder = explored.results / "lookup/{}/el{:02d}/fold{}".format(*unit)
+            known[unit] = page_evidence(LookupTable.load(folder / "pose_ambiguity.npz"))
         evidence, coarse = known[unit]
         shown = page.evaluate(
             "(({turns, beliefs}) => [turns, beliefs.map(b => [...b])])(explorer.followed())"
@@ -508,12 +501,11 @@ def test_larger_errors_are_darker(visit, path):
 
 
 def test_a_classifiers_own_distribution_is_shown(visit, tree, tmp_path):
-    layout, rng, files, kept = Layout(str(tree)), np.random.default_rng(0), {}, {}
+    rng, files, kept = np.random.default_rng(0), {}, {}
     for category, elevation in UNITS:
         for fold in (1, 2, 3):
-            rows = pd.read_csv(
-                layout.evaluation(category, elevation, fold, "single"), dtype={"object_id": str}
-            )
+            folder = tree / f"evaluation/{category}/el{elevation:02d}/fold{fold}"
+            rows = pd.read_csv(folder / "single.csv", dtype={"object_id": str})
             ids = tuple(rows["object_id"].drop_duplicates())
             posteriors = posteriors_of(ids, rng.normal(0, 3, (len(ids), 360, 24)), 1.0)
             key = (category, elevation, fold)

@@ -11,13 +11,13 @@ import pytest
 import synthetic
 from conftest import UNITS
 from nbv.experiment.paper.verdicts import evaluate_claims
+from nbv.experiment.plan import too_small
 from nbv.experiment.report.figures import FIGURES, FigureInputs, build_figure
 from nbv.experiment.report.page import build_report
 from nbv.experiment.report.runtime import load_jobs, runtime_table
 from nbv.experiment.report.settings import ReportSettings
 from nbv.experiment.report.table import write_table
 from nbv.experiment.report.tables import TABLES, build_table, claims_table
-from nbv.experiment.run_size import too_small
 from nbv.robot.style import save_figure
 
 WIDTHS = (390, 768, 1280)

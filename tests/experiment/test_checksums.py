@@ -7,7 +7,7 @@ import subprocess
 import pytest
 
 from nbv.errors import UserError
-from nbv.experiment import checksums
+from nbv.experiment import jobs
 
 PATH = "results/tiny/estimates/mug/el00/fold1/test.csv"
 CONTENT = b"object_id,azimuth_deg,estimate_deg\n" + bytes(range(256))
@@ -19,7 +19,7 @@ def written(tmp_path, monkeypatch):
     path = tmp_path / PATH
     path.parent.mkdir(parents=True)
     path.write_bytes(CONTENT)
-    checksums.write_checksum(PATH)
+    jobs.write_checksum(PATH)
     return path
 
 
@@ -28,8 +28,8 @@ def flipped(content):
 
 
 def test_what_was_written_is_read_again(written):
-    checksums.check(PATH)
-    assert checksums.states_of_files("results/tiny") == {PATH: "intact"}
+    jobs.check(PATH)
+    assert jobs.states_of_files("results/tiny") == {PATH: "intact"}
     assert written.read_bytes() == CONTENT
 
 
@@ -46,26 +46,26 @@ def test_damage_is_noticed_whatever_the_time_of_the_file_and_the_file_is_set_asi
     times = written.stat()
     written.write_bytes(damage(CONTENT))
     os.utime(written, ns=(times.st_atime_ns, times.st_mtime_ns))
-    assert checksums.states_of_files("results/tiny") == {PATH: "damaged"}
+    assert jobs.states_of_files("results/tiny") == {PATH: "damaged"}
     with pytest.raises(UserError, match=rf"{PATH} changed after it was written"):
-        checksums.need_intact("results/tiny")
+        jobs.need_intact("results/tiny")
     with pytest.raises(UserError, match=rf"{PATH} changed after .* run the same command again"):
-        checksums.check(PATH)
+        jobs.check(PATH)
     assert not written.exists()
     assert written.with_name("test.csv.damaged").read_bytes() == damage(CONTENT)
-    assert checksums.states_of_files("results/tiny") == {PATH: "missing"}
-    checksums.need_intact("results/tiny")
+    assert jobs.states_of_files("results/tiny") == {PATH: "missing"}
+    jobs.need_intact("results/tiny")
 
 
 def test_files_of_no_run_have_no_checksum(tmp_path):
     for path in ("src/nbv/files.py", "results/loose.csv", str(tmp_path / "elsewhere.csv")):
-        checksums.write_checksum(path)
-        checksums.check(path)
-    assert checksums.states_of_files("results/tiny") == {PATH: "intact"}
+        jobs.write_checksum(path)
+        jobs.check(path)
+    assert jobs.states_of_files("results/tiny") == {PATH: "intact"}
 
 
 def test_a_file_of_an_earlier_version_is_read(written):
     shutil.rmtree("results/tiny/checksums")
     written.write_bytes(b"anything")
-    checksums.check(PATH)
-    assert checksums.state_of(PATH) == "without checksum"
+    jobs.check(PATH)
+    assert jobs.state_of(PATH) == "without checksum"

@@ -5,7 +5,6 @@ import io
 import json
 import re
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -35,7 +34,6 @@ from nbv.experiment.explorer.data import (
     ring_of,
     rows_differenced,
 )
-from nbv.experiment.layout import Layout
 from nbv.experiment.report.figures.views import depth_limits, shade
 
 FOLDS = range(1, N_FOLDS + 1)
@@ -49,17 +47,14 @@ POLICIES = {
 
 @pytest.fixture(scope="module")
 def given_files(tree):
-    layout = Layout(str(tree))
-    lookups = {
-        (*unit, fold, "pose_ambiguity"): Path(layout.lookup(*unit, fold, "pose_ambiguity"))
-        for unit in UNITS
-        for fold in FOLDS
-    }
     return {
         "name": "synthetic",
         "policies": POLICIES,
         "evaluations": synthetic.evaluation_files(tree, UNITS, N_FOLDS),
-        "lookups": lookups,
+        "lookups": {
+            (*fold, "pose_ambiguity"): path
+            for fold, path in synthetic.lookup_files(tree, UNITS, N_FOLDS).items()
+        },
         "min_separation_deg": 15.0,
         "n_views": 5,
         "depth": synthetic.depth_files(tree, UNITS),
@@ -136,7 +131,7 @@ def test_outcomes_are_the_rows_of_the_files(evaluations):
 
 
 def test_tables_are_off_by_no_more_than_the_page_says(tree):
-    table = LookupTable.load(Layout(str(tree)).lookup("mug", 0, 1, "pose_ambiguity"))
+    table = LookupTable.load(tree / "lookup/mug/el00/fold1/pose_ambiguity.npz")
     stored = page_table(table)
     for found, exact in (
         (stored.viewpoint_likelihood, table.viewpoint_likelihood),

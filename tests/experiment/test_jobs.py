@@ -13,8 +13,15 @@ from types import SimpleNamespace
 import pytest
 
 from nbv.errors import UserError
-from nbv.experiment.checksums import write_checksum
-from nbv.experiment.jobs import NO_SPACE, job, why_stopped
+from nbv.experiment.jobs import (
+    LAST_ERROR,
+    NO_SPACE,
+    forget_last_error,
+    import_from,
+    job,
+    why_stopped,
+    write_checksum,
+)
 
 
 @pytest.fixture
@@ -193,6 +200,28 @@ def test_the_log_of_snakemake_says_what_no_job_could(told, cut_off, first, tmp_p
     assert lines[:1] == ([] if first is None else [first.format(results=results)])
 
 
+def test_a_run_begins_with_no_error(tmp_path):
+    logs = tmp_path / "results/one/logs"
+    logs.mkdir(parents=True)
+    (logs / LAST_ERROR).write_text("error: of yesterday\n")
+    forget_last_error(str(logs.parent))
+    assert why_stopped(logs, time.time()) == []
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match=r"file/two cannot be written"):
+        forget_last_error(str(tmp_path / "file/two"))
+
+
+def test_jobs_import_packages_of_a_folder_before_those_of_others(tmp_path, monkeypatch):
+    (tmp_path / "beside.py").write_text("print('found')")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.setenv("PYTHONPATH", "/elsewhere")
+    import_from(tmp_path)
+    assert sys.path[0] == str(tmp_path)
+    assert os.environ["PYTHONPATH"] == f"{tmp_path}{os.pathsep}/elsewhere"
+    done = subprocess.run([sys.executable, "-c", "import beside"], capture_output=True, text=True)
+    assert done.stdout == "found\n"
+
+
 # A process called snakemake starts a shell, which starts a job that says how long it lives.
 STARTER = """
 import subprocess, sys
@@ -201,7 +230,7 @@ subprocess.run(["bash", "-c", f"{sys.executable} {sys.argv[1]}; true"])
 JOB = """
 import time
 from pathlib import Path
-from nbv.experiment.processes import end_with_snakemake
+from nbv.experiment.jobs import end_with_snakemake
 end_with_snakemake()
 for beat in range(600):
     Path("beat.txt").write_text(str(beat))

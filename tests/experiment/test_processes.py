@@ -3,12 +3,12 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from nbv.experiment.processes import hold_lock
+from nbv.experiment.jobs import hold_lock
 
 HOLDER = """
 import sys
 from pathlib import Path
-from nbv.experiment.processes import hold_lock
+from nbv.experiment.jobs import hold_lock
 held = hold_lock(Path(sys.argv[1]))
 print(held is not None, flush=True)
 sys.stdin.read()

@@ -15,13 +15,13 @@ from conftest import UNITS
 from nbv.errors import UserError
 from nbv.experiment.paper.claims import CLAIMS
 from nbv.experiment.paper.verdicts import evaluate_claims
+from nbv.experiment.plan import too_small
 from nbv.experiment.report.figures import FIGURES
 from nbv.experiment.report.page import build_report, inline_svg, svg_text
 from nbv.experiment.report.runtime import load_jobs, runtime_table
 from nbv.experiment.report.settings import ReportSettings
 from nbv.experiment.report.table import write_table
 from nbv.experiment.report.tables import TABLES, build_table, claims_table
-from nbv.experiment.run_size import too_small
 from nbv.robot.style import INK, RC, new_figure, save_figure
 
 VOID = {"meta", "img", "br", "link", "hr"}

@@ -1,76 +1,102 @@
-"""Paths: one place spells them, with values and with wildcards alike."""
-
 from __future__ import annotations
 
 import re
-from itertools import product
-from pathlib import Path
 
-from nbv.experiment.layout import Layout, files_by_run, fold_folder, unit_folder
+import pytest
 
-ROOT = Path(__file__).parents[2]
-LAYOUT = Layout("results/paper")
-OF_FOLD = [
-    LAYOUT.estimator,
-    *(
-        lambda *fold, path=path, name=name: path(*fold, name)
-        for path, name in [
-            *product([LAYOUT.estimates, LAYOUT.posteriors], ["calibration", "test"]),
-            *product([LAYOUT.lookup, LAYOUT.evaluation, LAYOUT.extension], ["one", "another"]),
-            *product([LAYOUT.part_estimator], ["1", "2"]),
-        ]
-    ),
-]
+from experiment.table_readers import html_cells, pipe_rows
+from nbv.experiment.report.settings import ReportSettings
+from nbv.experiment.report.table import table_html, table_latex, table_markdown
+from nbv.experiment.report.tables import TABLES, build_table
+
+QUICK = ReportSettings(n_resamples=100)
 
 
-def test_wildcards_stand_for_values():
-    for path in OF_FOLD:
-        pattern = path("{category}", "{elevation}", "{fold}")
-        assert pattern.format(category="mug", elevation="05", fold=3) == path("mug", 5, 3)
-    assert LAYOUT.depth("{category}", "{elevation}").format(category="mug", elevation="75") == (
-        LAYOUT.depth("mug", 75)
-    )
-    assert LAYOUT.table("{table}", "csv").format(table="table1") == LAYOUT.table("table1", "csv")
+@pytest.fixture(scope="module")
+def tables(evaluations):
+    return {name: build_table(name, evaluations, QUICK) for name in TABLES}
 
 
-def test_no_two_things_share_a_path():
-    places = list(product(("mug", "chair"), (0, 15), (1, 2)))
-    found = [path(*place) for path in OF_FOLD for place in places]
-    found += [LAYOUT.depth(category, elevation) for category, elevation, fold in places if fold < 2]
-    found += [path(c) for path in (LAYOUT.meshes, LAYOUT.splits) for c in ("mug", "chair")]
-    found += [LAYOUT.ablation("one"), LAYOUT.log("train"), LAYOUT.benchmark("train")]
-    found += [LAYOUT.table("table1", kind) for kind in ("csv", "md", "tex", "html")]
-    found += [LAYOUT.figure("figure2", kind) for kind in ("png", "pdf")]
-    found += [LAYOUT.claims("csv"), LAYOUT.report, LAYOUT.configuration, LAYOUT.provenance]
-    assert len(set(found)) == len(found)
-    assert all(path.startswith("results/paper/") for path in found)
+@pytest.mark.parametrize("name", TABLES)
+def test_every_format_shows_the_same_rows(tables, name):
+    markdown, latex = table_markdown(tables[name]), table_latex(tables[name])
+    rows = pipe_rows(markdown)
+    assert html_cells(table_html(tables[name])) == [cell for row in rows for cell in row]
+    body = latex.split("\\midrule\n")[1].split("\\bottomrule")[0].strip().splitlines()
+    assert len(body) == len(rows) - 1
+    assert all(line.count(" & ") == len(rows[0]) - 1 and line.endswith("\\\\") for line in body)
+    assert markdown.count("**") // 2 == latex.count("\\textbf{")
 
 
-def test_a_subfolder_has_the_same_paths():
-    below = LAYOUT.below("transfer", "kinect")
-    assert below.depth("mug", 0) == "results/paper/transfer/kinect/depth/mug/el00.npy"
-    for path in ("estimator", "part_estimator", "evaluation"):
-        arguments = ("mug", 0, 1, *(["x"] if path != "estimator" else []))
-        relative = getattr(LAYOUT, path)(*arguments).removeprefix("results/paper/")
-        assert getattr(below, path)(*arguments) == f"results/paper/transfer/kinect/{relative}"
+@pytest.mark.parametrize("name", TABLES)
+def test_latex_is_balanced_and_plain(tables, name):
+    latex = table_latex(tables[name])
+    assert latex.isascii()
+    assert latex.count("{") - latex.count("\\{") == latex.count("}") - latex.count("\\}")
+    for environment in ("table", "tabular"):
+        assert latex.count(f"\\begin{{{environment}}}") == 1
+        assert latex.count(f"\\end{{{environment}}}") == 1
+    assert re.search(r"\\begin\{tabular\}\{lr+\}", latex)
+    assert latex.count("\\toprule") == latex.count("\\midrule") == latex.count("\\bottomrule") == 1
 
 
-def test_folders_are_parts_of_paths():
-    assert unit_folder("mug", 5) == "mug/el05"
-    assert fold_folder("mug", 5, 2) in LAYOUT.estimator("mug", 5, 2)
+def test_the_best_is_the_lowest_error_and_the_highest_pauc(tables):
+    for name, best in (("table2", min), ("table4", max)):
+        for row in pipe_rows(table_markdown(tables[name]))[1:]:
+            values = [float(re.search(r"[\d.]+", cell)[0]) for cell in row[1:5]]
+            bold = [value for value, cell in zip(values, row[1:5], strict=True) if "**" in cell]
+            assert set(bold) == {(min if row[0].endswith("above 90°") else best)(values)}
 
 
-def test_rules_and_scripts_spell_no_path():
-    stages = "meshes|splits|depth|estimators|estimates|lookup|evaluation|extensions|tables|figures"
-    spelt = re.compile(rf"[}}\"'/](?:{stages}|logs|benchmarks|ablation|transfer)/")
-    for path in [*ROOT.glob("workflow/rules/**/*.smk"), *ROOT.glob("workflow/scripts/*.py")]:
-        code = re.sub(r"\.(?:log|benchmark)\(\s*f?\".*?\"\s*\)", "", path.read_text(), flags=re.S)
-        assert not spelt.search(code), path
+def test_the_least_spread_over_folds_is_the_best(tables):
+    (sigma,) = (row for row in tables["table7"].rows if row[0].text == "σ")
+    for offset in (1, 2):
+        values = [float(cell.text.rstrip("°")) for cell in sigma[offset::2]]
+        bold = [float(cell.text.rstrip("°")) for cell in sigma[offset::2] if cell.bold]
+        assert set(bold) == {min(values)}
 
 
-def test_files_are_told_apart_by_run():
-    keys = [("one", "mug", 1), ("two", "mug", 1), ("one", "mug", 2)]
-    assert files_by_run(keys, ["a", "b", "c"]) == {
-        "one": {("mug", 1): "a", ("mug", 2): "c"},
-        "two": {("mug", 1): "b"},
-    }
+def test_the_share_of_half_turns_stands_below_the_figures(tables):
+    for name in ("table1", "table2", "table3", "table4", "table5"):
+        labels = [row[0].text for row in tables[name].rows]
+        half = len(labels) // 2
+        assert labels[half:] == [f"{label}: errors above 90°" for label in labels[:half]]
+
+
+def test_published_figures_are_in_brackets_and_never_bold(tables):
+    markdown = table_markdown(tables["table1"])
+    assert "[11.03°]" in markdown
+    assert not re.search(r"\*\*[^*|]*\[[^*|]*\*\*", markdown)
+    assert re.search(r"\*\*[\d.]+°\*\* \[", markdown)
+
+
+def test_the_last_column_is_the_difference_that_the_cells_have(tables):
+    table = tables["table1"]
+    assert table.header[-1] == "Proposed − Opposite"
+    cells = table.cells[table.cells["method"] == "proposed"]
+    for row in table.rows:
+        label, *half_turns = row[0].text.split(": ")
+        shown = cells[(cells["metric"] == "mae") != bool(half_turns)]
+        found = shown[shown["row_label"] == label].iloc[0]
+        value, low, high = (
+            float(text.replace("−", "-")) for text in re.findall(r"[−\d.]+", row[-1].text)
+        )
+        assert (value, low, high) == pytest.approx(
+            (found["difference"], found["difference_low"], found["difference_high"]), abs=0.005
+        )
+
+
+def test_table_6_pairs_ours_with_the_published_example(tables):
+    labels = [row[0].text for row in tables["table6"].rows]
+    assert labels[:2] == ["0°", "0°, published"]
+    assert "342.0° (18.0°)" in [cell.text for cell in tables["table6"].rows[1]]
+
+
+def test_an_estimate_that_rounds_to_a_full_turn_is_zero(evaluations):
+    frame = evaluations["mug", 0].copy()
+    first = (frame["initial_deg"] == 0) & (frame["method"] == "single")
+    frame.loc[first, ["pose_estimate_deg", "error_deg"]] = (359.96, 0.04)
+    table = build_table("table6", {("mug", 0): frame}, QUICK)
+    texts = [cell.text for cell in table.rows[0]]
+    assert "0.0° (0.0°)" in texts
+    assert not any("360.0°" in text for text in texts)

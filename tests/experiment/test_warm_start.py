@@ -5,67 +5,11 @@ import hashlib
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
-from hypothesis import strategies as st
 
 from clock_faces import CPU, SETTINGS, clock_faces, named, untrained
 from nbv.errors import UserError
-from nbv.experiment.config import load_config
 from nbv.experiment.estimation.training import train_estimator, train_network
-from nbv.experiment.estimation.warm_start import STAGES, stage_from, stage_settings, start_of
 from nbv.experiment.estimation.weights import Estimator, read_start, save_estimator, with_category
-from projects import ROOT
-
-ELEVATIONS = st.sets(st.integers(0, 89), min_size=1)
-
-
-@given(ELEVATIONS, st.sampled_from(["none", "elevations", "categories", "both"]))
-def test_every_chain_of_starts_ends_with_what_the_setting_says(elevations, warm_start):
-    for elevation in elevations:
-        chain: list[int | str | None] = [elevation]
-        while isinstance(chain[-1], int):
-            chain.append(start_of(warm_start, elevations, chain[-1]))
-        *steps, last = chain
-        if warm_start in ("elevations", "both"):
-            assert steps == sorted((e for e in elevations if e <= elevation), reverse=True)
-        else:
-            assert steps == [elevation]
-        assert last == ("pretrained" if warm_start in ("categories", "both") else None)
-
-
-@pytest.mark.parametrize("kind", ["regressor", "classifier"])
-def test_a_stage_has_its_own_epochs_and_rate_and_nothing_of_the_others(kind):
-    estimator = load_config(ROOT / "config", [f"estimator={kind}"])["estimator"]
-    stages = {stage: stage_settings(estimator, stage) for stage in STAGES}
-    for stage, settings in stages.items():
-        own = estimator if stage == "training" else estimator[stage]
-        assert (settings["epochs"], settings["learning_rate"]) == (
-            own["epochs"],
-            own["learning_rate"],
-        )
-    # What a training from random weights is recorded with: the same keys as ever.
-    assert set(stages["training"]) == set(estimator) - {"warm_start", *STAGES}
-    assert all(set(settings) == set(stages["training"]) for settings in stages.values())
-
-
-@pytest.mark.parametrize(
-    ("start", "stage"), [(None, "training"), ("pretrained", "fine_tuning"), (0, "next_elevation")]
-)
-def test_what_a_training_starts_from_decides_its_stage(start, stage):
-    assert stage_from(start) == stage
-
-
-@given(st.integers(1, 100), st.integers(1, 100), st.integers(1, 100))
-def test_stages_keep_their_proportion_where_epochs_are_fewer(whole, fewer, own):
-    estimator = {
-        "epochs": whole,
-        "learning_rate": 0.1,
-        "fine_tuning": {"epochs": own, "learning_rate": 0.2},
-    }
-    assert stage_settings(estimator, "training", fewer)["epochs"] == fewer
-    epochs = stage_settings(estimator, "fine_tuning", fewer)["epochs"]
-    assert epochs >= 1
-    assert abs(epochs - own * fewer / whole) <= max(0.5, 1 - own * fewer / whole)
 
 
 def test_a_training_starts_from_the_weights_given_and_leaves_them(rng):

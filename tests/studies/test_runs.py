@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from studies.runs import runs_table
+from studies.runs import files_by_run, runs_table
 
 from nbv.core.estimates import Estimates
 from nbv.errors import UserError
@@ -136,3 +136,11 @@ def test_runs_that_were_tested_on_other_objects_are_refused(estimates, evaluatio
     methods = {"cold": {("mug", 0): opposite}, "warm": {("mug", 0): other}}
     with pytest.raises(UserError, match="warm was evaluated on other images than cold"):
         side_by_side(of_unit(files, ("mug", 0)), methods)
+
+
+def test_files_are_told_apart_by_run():
+    keys = [("one", "mug", 1), ("two", "mug", 1), ("one", "mug", 2)]
+    assert files_by_run(keys, ["a", "b", "c"]) == {
+        "one": {("mug", 1): "a", ("mug", 2): "c"},
+        "two": {("mug", 1): "b"},
+    }

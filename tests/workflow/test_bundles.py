@@ -19,7 +19,7 @@ from nbv.robot.evaluation import evaluate
 from nbv.robot.recommender import Recommender
 from nbv.robot.recordings import read_manifest, run_network
 from nbv.robot.synthetic import example_frame
-from projects import TINY, Project, copy_of_project, finished_project
+from projects import STUDIES, TINY, Project, copy_of_project, finished_project
 
 pytestmark = pytest.mark.slow
 
@@ -164,7 +164,7 @@ def test_ingredients_are_left_out_of_training_and_not_of_the_test(made: Project)
         "++bundles.replicates=[0,2]",
         f"bundles.frames={manifest}",
     )
-    made.run("--cores", "2", "ingredients", overrides=left_out)
+    made.run("--cores", "2", *STUDIES, "ingredients", overrides=left_out)
     table = pd.read_csv(made.results / "tables/ingredients.csv")
     assert table["without"].tolist() == ["nothing", "size"]
     folders = [

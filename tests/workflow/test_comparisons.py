@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 import safetensors
 
-from projects import TINY, Project
+from projects import STUDIES, TINY, Project
 
 pytestmark = pytest.mark.slow
 
@@ -33,7 +33,9 @@ def other(finished: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of a cross-fitted classifier; the default run lies in the same folder."""
     folder = tmp_path_factory.mktemp("compared") / "project"
     shutil.copytree(finished.folder, folder, symlinks=True)
-    Project(folder).run("--cores", "2", "runs", overrides=(*OTHER, "compared_runs=[tiny]"))
+    Project(folder).run(
+        "--cores", "2", *STUDIES, "runs", overrides=(*OTHER, "compared_runs=[tiny]")
+    )
     return folder / "results/other"
 
 
@@ -94,7 +96,7 @@ def trained_on(path):
 
 def test_runs_that_calibrate_alike_are_compared_on_calibration_objects_too(scratch):
     overrides = (*TINY, "name=longer", "estimator.epochs=2", "compared_runs=[tiny]")
-    scratch.run("--cores", "2", "runs", overrides=overrides)
+    scratch.run("--cores", "2", *STUDIES, "runs", overrides=overrides)
     results = scratch.folder / "results"
     cells = pd.read_csv(results / "longer/tables/runs.csv").set_index(["row", "method"])
     for category, run in itertools.product(("mug", "chair"), ("longer", "tiny")):
@@ -112,6 +114,6 @@ def test_runs_that_calibrate_alike_are_compared_on_calibration_objects_too(scrat
 
 def test_a_compared_run_that_is_not_there_is_named(finished):
     settings = (*OTHER, "compared_runs=[nowhere]")
-    done = finished.run("--cores", "1", "runs", overrides=settings, fails=True)
+    done = finished.run("--cores", "1", *STUDIES, "runs", overrides=settings, fails=True)
     assert "nbv: error: results/nowhere/configuration.yaml does not exist" in done.stderr
     assert "Traceback" not in done.stderr

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from safetensors import safe_open
 
-from projects import TINY, Project, finished_project
+from projects import STUDIES, TINY, Project, finished_project
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +30,7 @@ TRAININGS = {(0, 0): "", (1, 0): "confirmation/shuffle1/replicate0/"}
 
 @pytest.fixture(scope="module")
 def confirmed(tmp_path_factory) -> Project:
-    return finished_project(tmp_path_factory, "confirmed", "confirm", overrides=SMALL)
+    return finished_project(tmp_path_factory, "confirmed", *STUDIES, "confirm", overrides=SMALL)
 
 
 def splits_of(project: Project, shuffle: int, category: str) -> pd.DataFrame:
@@ -75,9 +75,9 @@ def test_a_replicate_has_the_folds_of_its_shuffle_and_a_seed_of_its_own(confirme
     """Trained with one seed they would be the same, bit for bit."""
     place = "results/tiny/confirmation/shuffle0/replicate1/estimators/mug/el00/fold1"
     target = f"{place}/estimator.safetensors"
-    planned = confirmed.would_run(*SMALL[len(TINY) :], targets=(target,))
+    planned = confirmed.would_run(*SMALL[len(TINY) :], targets=(*STUDIES, target))
     assert planned == {"replicate_pretrain": 1, "replicate_train": 1}
-    confirmed.run("--cores", "2", target, overrides=SMALL)
+    confirmed.run("--cores", "2", *STUDIES, target, overrides=SMALL)
     own = confirmed.results / "estimators/mug/el00/fold1/estimator.safetensors"
     other = confirmed.folder / target
     assert history(other)["trained_on"] == history(own)["trained_on"]
@@ -111,7 +111,7 @@ def test_the_tables_are_of_every_object_in_every_training(confirmed):
 def test_the_kept_file_alone_gives_the_same_tables(confirmed, fresh):
     kept = confirmed.results / "confirmation/estimates.npz"
     again = ("name=again", f"confirmation.kept=[{kept}]")
-    done = fresh.run("--cores", "2", "statistics", overrides=(*TINY[:-1], *again))
+    done = fresh.run("--cores", "2", *STUDIES, "statistics", overrides=(*TINY[:-1], *again))
     # It makes no report.
     assert "read first" not in done.stderr
     made = fresh.folder / "results/again"
@@ -130,14 +130,14 @@ def test_runs_of_one_data_set_have_other_categories(confirmed, fresh):
     settings["confirmation"]["dataset"], settings["name"] = "tiny", "other"
     np.savez(fresh.folder / "other.npz", **arrays | {"settings": np.array(json.dumps(settings))})
     files = f"confirmation.kept=[{kept},other.npz]"
-    done = fresh.run("--cores", "1", "statistics", overrides=(*TINY, files), fails=True)
+    done = fresh.run("--cores", "1", *STUDIES, "statistics", overrides=(*TINY, files), fails=True)
     line = f"other.npz and {kept} have the same categories of the data set tiny"
     assert line in done.stdout + done.stderr
 
 
 def test_one_training_of_one_fold_can_be_asked_for_by_name(fresh):
     place = "results/tiny/confirmation/shuffle1/replicate2/estimators/mug/el00/fold2"
-    planned = fresh.would_run(targets=(f"{place}/estimator.safetensors",))
+    planned = fresh.would_run(targets=(*STUDIES, f"{place}/estimator.safetensors"))
     assert planned == {"meshes": 1, "render": 1, "shuffle_splits": 1, "replicate_train": 1}
 
 
@@ -149,6 +149,11 @@ def test_the_paper_needs_no_other_training(fresh):
 def test_a_file_that_keeps_nothing_is_named(fresh):
     (fresh.folder / "other.npz").write_bytes(b"not a file")
     done = fresh.run(
-        "--cores", "1", "statistics", overrides=(*TINY, "confirmation.kept=[other.npz]"), fails=True
+        "--cores",
+        "1",
+        *STUDIES,
+        "statistics",
+        overrides=(*TINY, "confirmation.kept=[other.npz]"),
+        fails=True,
     )
     assert "nbv: error: confirmation.kept: other.npz" in done.stdout + done.stderr

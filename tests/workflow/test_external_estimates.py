@@ -17,7 +17,7 @@ from nbv.core.fusion import product
 from nbv.core.logits import fit_temperature
 from nbv.core.lookup import LookupTable
 from nbv.core.selection import DENSITY
-from projects import TINY, Project, copy_of_project
+from projects import STUDIES, TINY, Project, copy_of_project
 
 pytestmark = pytest.mark.slow
 
@@ -108,7 +108,7 @@ def test_nothing_is_rendered_or_trained(foreign) -> None:
 def test_what_needs_images_or_trainings_is_refused_before_anything_runs(foreign, target) -> None:
     project, pairs = foreign
     chosen = (*TINY, "estimator=external", f"estimator.pairs={pairs}", "name=none")
-    done = project.run(target, "--cores", "1", overrides=chosen, fails=True)
+    done = project.run(*STUDIES, target, "--cores", "1", overrides=chosen, fails=True)
     (line,) = [one for one in done.stderr.splitlines() if one.startswith("nbv: error")]
     assert "estimator=external has no meshes, images or trainings" in line
     assert "Traceback" not in done.stderr
@@ -169,7 +169,7 @@ def given(tmp_path_factory) -> tuple[Project, pd.DataFrame]:
     shuffled.to_csv(folder / "pairs.csv", index=False)
     project = copy_of_project(folder)
     chosen = (*DISTRIBUTIONS, f"estimator.pairs={folder / 'pairs.csv'}")
-    project.run("--cores", "2", "all", "extensions", overrides=chosen)
+    project.run("--cores", "2", *STUDIES, "all", "extensions", overrides=chosen)
     return project, table
 
 

@@ -10,7 +10,7 @@ import sys
 import pytest
 import trimesh
 
-from projects import ROOT, TINY
+from projects import ROOT, STUDIES, TINY
 
 # Each starts Snakemake.
 pytestmark = pytest.mark.slow
@@ -84,7 +84,7 @@ def test_a_damaged_configuration_of_another_run(fresh, target, key, content, mes
     path.parent.mkdir(parents=True)
     path.write_bytes(content)
     settings = (*TINY, f"{key}=[other]")
-    done = fresh.run("--cores", "1", target, overrides=settings, fails=True)
+    done = fresh.run("--cores", "1", *STUDIES, target, overrides=settings, fails=True)
     assert "nbv: error: results/other/configuration.yaml" in done.stderr
     assert message in done.stderr
     assert complaints(done.stderr) == 1
@@ -170,9 +170,10 @@ def test_a_log_says_how_far_the_run_is_and_an_error_once_more_at_the_end(scratch
     assert "Traceback" not in done.stderr
 
 
-def test_the_workflow_is_lint_clean(fresh):
+@pytest.mark.parametrize("snakefile", [(), STUDIES])
+def test_the_workflow_is_lint_clean(fresh, snakefile):
     done = subprocess.run(
-        [sys.executable, "-m", "snakemake", "--lint"],
+        [sys.executable, "-m", "snakemake", *snakefile, "--lint"],
         cwd=fresh.folder,
         env=fresh.environment,
         capture_output=True,
@@ -183,5 +184,5 @@ def test_the_workflow_is_lint_clean(fresh):
 
 def test_the_rules_are_formatted():
     snakefmt = shutil.which("snakefmt") or f"{sys.prefix}/bin/snakefmt"
-    done = subprocess.run([snakefmt, "--check", "Snakefile", "workflow"], cwd=ROOT)
+    done = subprocess.run([snakefmt, "--check", "Snakefile", "workflow", "studies"], cwd=ROOT)
     assert done.returncode == 0

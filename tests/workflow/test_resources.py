@@ -7,14 +7,14 @@ import re
 import pytest
 import yaml
 
-from projects import ROOT
+from projects import ROOT, STUDIES
 
 pytestmark = pytest.mark.slow
 
 
 def asked(project, attempt: int) -> dict[str, tuple[int, int]]:
     """Return the memory in MB and the minutes that each rule asks for at that attempt."""
-    targets = ("report", "leaderboard", "more_views", "travel", "ablation")
+    targets = (*STUDIES, "report", "leaderboard", "more_views", "travel", "ablation")
     dry = ("--cores", "2", "--dry-run", "--quiet", "host", "--attempt", str(attempt))
     printed = project.run(*targets, *dry).stdout
     found = {}
@@ -33,7 +33,7 @@ def test_every_rule_asks_for_memory_and_time_and_for_more_when_it_is_tried_again
 
 def test_the_slurm_profile_groups_every_rule_of_the_paper_and_no_other_name(fresh):
     profile = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text("utf-8"))
-    rules = set(fresh.run("--list-rules").stdout.split())
+    rules = set(fresh.run(*STUDIES, "--list-rules").stdout.split())
     grouped = set(profile["groups"])
     assert grouped <= rules
     assert set(fresh.would_run()) <= grouped

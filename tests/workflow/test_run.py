@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import subprocess
-import sys
 import time
 
 import numpy as np
@@ -13,7 +12,7 @@ import pytest
 from snakemake.utils import Paramspace
 from studies.ablation import ablation_space
 
-from projects import TINY
+from projects import STUDIES, TINY
 
 pytestmark = pytest.mark.slow
 
@@ -146,7 +145,7 @@ def test_an_edit_of_a_metric_reruns_what_reads_errors(scratch):
 
 
 def test_an_edit_of_a_criterion_leaves_training_alone(scratch):
-    criteria = scratch.folder / "src/nbv/core/criteria/pose_ambiguity.py"
+    criteria = scratch.folder / "src/nbv/core/criteria.py"
     criteria.write_text(criteria.read_text() + "\n\nEDITED = True\n")
     jobs = scratch.would_run()
     assert jobs["lookup"] == 4
@@ -156,6 +155,10 @@ def test_an_edit_of_a_criterion_leaves_training_alone(scratch):
 
 def test_the_explorer_is_made_on_request_of_what_a_finished_run_has(finished):
     assert finished.would_run(targets=("explorer",)) == {"explorer": 1}
+
+
+def test_the_studies_find_the_run_finished_too(finished):
+    assert finished.would_run(targets=(*STUDIES, "all")) == {}
 
 
 def test_a_comment_elsewhere_reruns_nothing(scratch):
@@ -168,7 +171,9 @@ def test_a_comment_elsewhere_reruns_nothing(scratch):
 def test_more_views_name_the_extension_that_they_need(scratch):
     for missing in ("random", "opposite"):
         overrides = (*TINY, f"~extensions.{missing}_posterior")
-        done = scratch.run("-n", "--cores", "1", "more_views", overrides=overrides, fails=True)
+        done = scratch.run(
+            "-n", "--cores", "1", *STUDIES, "more_views", overrides=overrides, fails=True
+        )
         assert f"needs {{policy: {missing}, fusion: posterior}}" in done.stderr
         assert "Traceback" not in done.stderr
 
@@ -217,35 +222,8 @@ def test_an_interrupted_run_continues_to_the_same_bytes(finished, fresh):
     assert fresh.outcome() == finished.outcome()
 
 
-def test_a_finished_job_and_not_a_clock_makes_snakemake_schedule_again(scratch):
-    """Snakemake's timers, one more for every job, would cost a fifth of a core in a long run."""
-    driver = (
-        "import sys\n"
-        "from snakemake.cli import main\n"
-        "from snakemake.scheduling.job_scheduler import JobScheduler\n"
-        "calls = []\n"
-        "JobScheduler._schedule_reevalutation = lambda self, delay: calls.append(delay)\n"
-        "try:\n"
-        "    main(sys.argv[1:])\n"
-        "finally:\n"
-        "    print('timers', len(calls))\n"
-    )
-    target = "results/tiny/configuration.yaml"
-    arguments = scratch.command("--cores", "1", "--force", target)[3:]
-    done = subprocess.run(
-        [sys.executable, "-c", driver, *arguments],
-        cwd=scratch.folder,
-        env=scratch.environment,
-        capture_output=True,
-        text=True,
-        timeout=100,
-    )
-    assert "nbv: finished" in done.stderr
-    assert "timers 0" in done.stdout
-
-
 def test_extensions_are_made_and_leave_the_paper_alone(scratch):
-    targets = ("extensions",)
+    targets = (*STUDIES, "extensions")
     assert not {"meshes", "render", "train"} & set(scratch.would_run(targets=targets))
     before = scratch.outcome()
     scratch.run("--cores", "2", *targets)
@@ -270,17 +248,17 @@ def test_extensions_are_made_and_leave_the_paper_alone(scratch):
 
 def test_a_new_extension_trains_nothing(finished):
     jobs = finished.would_run(
-        "extensions.mine={policy: bayes_error,fusion: average}", targets=("leaderboard",)
+        "extensions.mine={policy: bayes_error,fusion: average}", targets=(*STUDIES, "leaderboard")
     )
     assert jobs == {"evaluate_extensions": 4, "leaderboard": 1}
 
 
 def test_the_ablation_trains_nothing_and_each_of_its_settings_is_a_file(scratch):
-    jobs = scratch.would_run(targets=("ablation",))
+    jobs = scratch.would_run(targets=(*STUDIES, "ablation"))
     assert jobs == {"evaluate_ablation": len(ablation_space()), "ablation": 1}
     patterns = Paramspace(ablation_space(), filename_params="*", filename_sep=",").instance_patterns
     target = f"results/tiny/ablation/{next(iter(patterns))}.csv"
-    scratch.run("--cores", "1", target)
+    scratch.run("--cores", "1", *STUDIES, target)
     found = pd.read_csv(scratch.folder / target)
     plain = pd.concat(
         pd.read_csv(path).assign(fold=fold)

@@ -1,4 +1,4 @@
-"""The target `transfer` of the real Snakefile, run small."""
+"""The target `transfer` of the studies' Snakefile, run small."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from projects import TINY
+from projects import STUDIES, TINY
 
 pytestmark = pytest.mark.slow
 
@@ -21,7 +21,7 @@ PLACE = "mug/el00/fold2"
 
 
 def test_trained_on_and_tested_on(scratch):
-    scratch.run("--cores", "2", "transfer", overrides=(*TINY, *MORE))
+    scratch.run("--cores", "2", *STUDIES, "transfer", overrides=(*TINY, *MORE))
     results = scratch.results
     made = sorted(
         str(path.relative_to(results)) for path in results.glob("transfer/*/depth/*/*.npy")

@@ -1,47 +1,18 @@
-# What a robot needs of a category, in one file. Its network sees all elevations, as a camera would.
-
-BUNDLE_FOLD = 1
-# Neither the paper's images nor its estimators: those know their elevation.
-BUNDLE_UNIT = ("{category}", "{elevation}")
-# What is left out of the randomisation, one after the other, to see what it brings.
-INGREDIENTS = CONFIG["bundles"]["ingredients"]
-REPLICATES = CONFIG["bundles"]["replicates"]
-FRAMES = CONFIG["bundles"]["frames"]
-# By their folders: what each training is without, and its replicate.
-VARIANTS = {
-    bundle_variant(without, replicate): (without, replicate)
-    for without in ("", *INGREDIENTS)
-    for replicate in {0, *REPLICATES}
-}
-# Replicates learn from the same images.
-RENDERED = [folder for folder, (_, replicate) in VARIANTS.items() if replicate == 0]
-# What the ingredients' table compares.
-COMPARED = [
-    (category, without, replicate)
-    for category in CATEGORIES
-    for without in ("", *INGREDIENTS)
-    for replicate in REPLICATES
-]
-
-
-# In brackets: where nothing is left out, the only name is empty.
-wildcard_constraints:
-    variant="(" + "|".join(map(re.escape, VARIANTS)) + ")",
+# What a robot needs of a category, in one file. Its network sees all elevations, as a camera would:
+# neither the paper's images nor its estimators, which know their elevation.
 
 
 rule render_bundle:
     input:
         sources("render_bundle"),
-        meshes=rules.meshes.output[0],
+        meshes="<results>/meshes/{category}.npz",
     output:
-        depth=LAYOUT.bundle_depth(*BUNDLE_UNIT, "{variant}"),
-        objects=LAYOUT.bundle_objects(*BUNDLE_UNIT, "{variant}"),
+        depth="<results>/bundles/depth/{category}/el{elevation}.npy",
+        objects="<results>/bundles/depth/{category}/el{elevation}_objects.json",
     log:
-        LAYOUT.log("render_bundle{variant}/{category}/el{elevation}"),
+        "<logs>/render_bundle/{category}/el{elevation}.log",
     benchmark:
-        LAYOUT.benchmark("render_bundle{variant}/{category}/el{elevation}")
-    wildcard_constraints:
-        variant="(" + "|".join(map(re.escape, RENDERED)) + ")",
+        "<benchmarks>/render_bundle/{category}/el{elevation}.tsv"
     conda:
         ENVIRONMENT
     resources:
@@ -49,104 +20,84 @@ rule render_bundle:
     params:
         renderer=CONFIG["renderer"],
         camera=CONFIG["camera"],
-        randomisation=randomisation_of,
+        randomisation=CONFIG["randomisation"],
         sensor=CONFIG["sensor"],
         seed=CONFIG["seed"],
     script:
-        f"{SCRIPTS}/render_bundle.py"
+        "../scripts/render_bundle.py"
 
 
 rule train_bundle:
     input:
         sources("train_bundle"),
-        splits=rules.splits.output[0],
-        depth=elevations_of_bundle(LAYOUT.bundle_depth),
-        objects=elevations_of_bundle(LAYOUT.bundle_objects),
+        splits="<results>/splits/{category}.csv",
+        depth=lambda wildcards: bundle_elevations(
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}.npy"
+        ),
+        objects=lambda wildcards: bundle_elevations(
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}_objects.json"
+        ),
     output:
-        LAYOUT.bundle_estimator("{category}", "{variant}"),
+        "<results>/bundles/estimators/{category}.safetensors",
     log:
-        LAYOUT.log("train_bundle{variant}/{category}"),
+        "<logs>/train_bundle/{category}.log",
     benchmark:
-        LAYOUT.benchmark("train_bundle{variant}/{category}")
+        "<benchmarks>/train_bundle/{category}.tsv"
     conda:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(9000),
         runtime=per_attempt(120),
     params:
-        fold=BUNDLE_FOLD,
-        estimator=STAGE_SETTINGS["training"],
+        fold=1,
+        estimator=PLAN.stage("training"),
         seed=CONFIG["seed"],
-        replicate=lambda wildcards: VARIANTS[wildcards.variant][1],
+        replicate=0,
     script:
-        f"{SCRIPTS}/train_bundle.py"
+        "../scripts/train_bundle.py"
 
 
 rule bundle:
     input:
         sources("make_bundle"),
-        splits=rules.splits.output[0],
-        depth=elevations_of_bundle(LAYOUT.bundle_depth),
-        objects=elevations_of_bundle(LAYOUT.bundle_objects),
-        # What is tested on is always as random as the configuration says.
-        test_depth=elevations_of_bundle(LAYOUT.bundle_depth, of_ingredient=False),
-        test_objects=elevations_of_bundle(LAYOUT.bundle_objects, of_ingredient=False),
-        estimator=rules.train_bundle.output[0],
-        provenance=LAYOUT.provenance,
+        splits="<results>/splits/{category}.csv",
+        depth=lambda wildcards: bundle_elevations(
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}.npy"
+        ),
+        objects=lambda wildcards: bundle_elevations(
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}_objects.json"
+        ),
+        test_depth=lambda wildcards: bundle_elevations(
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}.npy"
+        ),
+        test_objects=lambda wildcards: bundle_elevations(
+            wildcards, "<results>/bundles/depth/{category}/el{elevation}_objects.json"
+        ),
+        estimator="<results>/bundles/estimators/{category}.safetensors",
+        provenance="<results>/provenance.json",
     output:
-        bundle=LAYOUT.bundle("{category}", "safetensors", "{variant}"),
-        evaluation=LAYOUT.bundle("{category}", "csv", "{variant}"),
+        bundle="<results>/bundles/{category}.safetensors",
+        evaluation="<results>/bundles/{category}.csv",
     log:
-        LAYOUT.log("bundle{variant}/{category}"),
+        "<logs>/bundle/{category}.log",
     benchmark:
-        LAYOUT.benchmark("bundle{variant}/{category}")
+        "<benchmarks>/bundle/{category}.tsv"
     conda:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(4000),
         runtime=per_attempt(30),
     params:
-        fold=BUNDLE_FOLD,
+        fold=1,
         elevations=lambda wildcards: CONFIG["elevations_deg"][wildcards.category],
         camera=CONFIG["camera"],
         sensor=CONFIG["sensor"],
         affinity=CONFIG["affinity"],
-        settings=bundle_settings,
+        settings=PLAN.bundle_settings,
     script:
-        f"{SCRIPTS}/make_bundle.py"
-
-
-rule ingredients:
-    input:
-        sources("tabulate_ingredients"),
-        frames=lambda wildcards: files_of_manifest(FRAMES) if FRAMES else [],
-        bundles=[
-            LAYOUT.bundle(category, "safetensors", bundle_variant(*variant))
-            for category, *variant in COMPARED
-        ],
-        evaluations=[
-            LAYOUT.bundle(category, "csv", bundle_variant(*variant))
-            for category, *variant in COMPARED
-        ],
-    output:
-        csv=LAYOUT.table("ingredients", "csv"),
-        md=LAYOUT.table("ingredients", "md"),
-    log:
-        LAYOUT.log("ingredients"),
-    benchmark:
-        LAYOUT.benchmark("ingredients")
-    conda:
-        ENVIRONMENT
-    resources:
-        mem_mb=per_attempt(4000),
-        runtime=per_attempt(60),
-    params:
-        compared=COMPARED,
-        caution=CAUTION,
-    script:
-        f"{SCRIPTS}/tabulate_ingredients.py"
+        "../scripts/make_bundle.py"
 
 
 rule bundles:
     input:
-        [LAYOUT.bundle(category, "safetensors") for category in CATEGORIES],
+        paths("<results>/bundles/{category}.safetensors", zip(CONFIG["categories"])),

@@ -3,32 +3,38 @@
 
 rule settings:
     input:
-        all_sources(),
+        sorted(
+            {
+                file
+                for script in ROOT.glob("workflow/scripts/*.py")
+                for file in sources(script.stem)
+            }
+        ),
     output:
-        configuration=LAYOUT.configuration,
-        provenance=LAYOUT.provenance,
+        configuration="<results>/configuration.yaml",
+        provenance="<results>/provenance.json",
     log:
-        LAYOUT.log("settings"),
+        "<logs>/settings.log",
     benchmark:
-        LAYOUT.benchmark("settings")
+        "<benchmarks>/settings.tsv"
     priority: 80
     conda:
         ENVIRONMENT
     params:
         configuration=CONFIG,
     script:
-        f"{SCRIPTS}/record_settings.py"
+        "../scripts/record_settings.py"
 
 
 rule meshes:
     input:
         mesh_sources,
     output:
-        LAYOUT.meshes("{category}"),
+        "<results>/meshes/{category}.npz",
     log:
-        LAYOUT.log("meshes/{category}"),
+        "<logs>/meshes/{category}.log",
     benchmark:
-        LAYOUT.benchmark("meshes/{category}")
+        "<benchmarks>/meshes/{category}.tsv"
     # First of all: a bad file stops the run before much is spent.
     priority: 1000
     conda:
@@ -37,52 +43,52 @@ rule meshes:
         mem_mb=per_attempt(1500),
         runtime=per_attempt(30),
     params:
-        dataset=lambda wildcards: dataset_of(wildcards.category),
-        objects=lambda wildcards: OBJECTS[wildcards.category],
+        dataset=lambda wildcards: PLAN.dataset_of(wildcards.category),
+        objects=lambda wildcards: PLAN.objects[wildcards.category],
         seed=CONFIG["seed"],
     script:
-        f"{SCRIPTS}/prepare_meshes.py"
+        "../scripts/prepare_meshes.py"
 
 
 rule splits:
     input:
         sources("split_objects"),
-        meshes=[] if EXTERNAL else rules.meshes.output[0],
+        meshes=[] if PLAN.external else "<results>/meshes/{category}.npz",
     output:
-        LAYOUT.splits("{category}"),
+        "<results>/splits/{category}.csv",
     log:
-        LAYOUT.log("splits/{category}"),
+        "<logs>/splits/{category}.log",
     benchmark:
-        LAYOUT.benchmark("splits/{category}")
+        "<benchmarks>/splits/{category}.tsv"
     priority: 90
     conda:
         ENVIRONMENT
     params:
-        **({"crossfit_parts": len(PARTS)} if CROSSFIT else {}),
+        **({"crossfit_parts": len(PLAN.parts)} if PLAN.crossfit else {}),
         **(
-            {"objects": lambda wildcards: OBJECTS[wildcards.category]}
-            if EXTERNAL
+            {"objects": lambda wildcards: PLAN.objects[wildcards.category]}
+            if PLAN.external
             else {}
         ),
         n_folds=CONFIG["n_folds"],
         # What another program estimated needs no training.
-        calibration_fraction=1.0 if EXTERNAL else CONFIG["calibration_fraction"],
+        calibration_fraction=1.0 if PLAN.external else CONFIG["calibration_fraction"],
         seed=CONFIG["seed"],
     script:
-        f"{SCRIPTS}/split_objects.py"
+        "../scripts/split_objects.py"
 
 
 rule render:
     input:
         sources("render_depth"),
-        meshes=rules.meshes.output[0],
+        meshes="<results>/meshes/{category}.npz",
     output:
-        depth=LAYOUT.depth(*UNIT),
-        objects=LAYOUT.depth_objects(*UNIT),
+        depth="<results>/depth/{category}/el{elevation}.npy",
+        objects="<results>/depth/{category}/el{elevation}_objects.json",
     log:
-        LAYOUT.log("render/{category}/el{elevation}"),
+        "<logs>/render/{category}/el{elevation}.log",
     benchmark:
-        LAYOUT.benchmark("render/{category}/el{elevation}")
+        "<benchmarks>/render/{category}/el{elevation}.tsv"
     priority: 60
     conda:
         ENVIRONMENT
@@ -95,9 +101,9 @@ rule render:
             CONFIG["sensor"], wildcards.category, CONFIG["seed"]
         ),
     script:
-        f"{SCRIPTS}/render_depth.py"
+        "../scripts/render_depth.py"
 
 
 rule renders:
     input:
-        paths(LAYOUT.depth, UNITS),
+        paths("<results>/depth/{category}/el{elevation}.npy", UNITS),

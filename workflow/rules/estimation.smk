@@ -5,54 +5,56 @@
 rule pretrain:
     input:
         sources("pretrain_network"),
-        splits=paths(LAYOUT.splits, [(category,) for category in CATEGORIES]),
-        depth=paths(LAYOUT.depth, LOWEST_UNITS),
-        objects=paths(LAYOUT.depth_objects, LOWEST_UNITS),
+        splits=paths("<results>/splits/{category}.csv", zip(CONFIG["categories"])),
+        depth=paths("<results>/depth/{category}/el{elevation}.npy", PLAN.lowest_units),
+        objects=paths(
+            "<results>/depth/{category}/el{elevation}_objects.json", PLAN.lowest_units
+        ),
     output:
-        LAYOUT.pretrained("{fold}"),
+        "<results>/estimators/pretrained/fold{fold}/estimator.safetensors",
     log:
-        LAYOUT.log("pretrain/fold{fold}"),
+        "<logs>/pretrain/fold{fold}.log",
     benchmark:
-        LAYOUT.benchmark("pretrain/fold{fold}")
+        "<benchmarks>/pretrain/fold{fold}.tsv"
     # Everything else waits for it.
     priority: 60
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=per_attempt(2500 + 500 * len(CATEGORIES)),
+        mem_mb=per_attempt(2500 + 500 * len(CONFIG["categories"])),
         runtime=per_attempt(30),
     params:
-        categories=CATEGORIES,
-        estimator=STAGE_SETTINGS["pretraining"],
+        categories=CONFIG["categories"],
+        estimator=PLAN.stage("pretraining"),
         seed=CONFIG["seed"],
     script:
-        f"{SCRIPTS}/pretrain_network.py"
+        "../scripts/pretrain_network.py"
 
 
 use rule pretrain as pretrain_part with:
     output:
-        LAYOUT.pretrained("{fold}", "{part}"),
+        "<results>/estimators/pretrained/fold{fold}/without_part{part}.safetensors",
     log:
-        LAYOUT.log("pretrain_part/fold{fold}/{part}"),
+        "<logs>/pretrain_part/fold{fold}/{part}.log",
     benchmark:
-        LAYOUT.benchmark("pretrain_part/fold{fold}/{part}")
+        "<benchmarks>/pretrain_part/fold{fold}/{part}.tsv"
 
 
 # It estimates, too, what its estimator has not seen: a job of its own would load torch once more.
 rule train:
     input:
         sources("train_estimator"),
-        splits=rules.splits.output[0],
-        depth=rules.render.output.depth,
-        objects=rules.render.output.objects,
+        splits="<results>/splits/{category}.csv",
+        depth="<results>/depth/{category}/el{elevation}.npy",
+        objects="<results>/depth/{category}/el{elevation}_objects.json",
         start=training_start,
     output:
         **estimates_of_training(),
-        estimator=LAYOUT.estimator(*FOLD),
+        estimator="<results>/estimators/{category}/el{elevation}/fold{fold}/estimator.safetensors",
     log:
-        LAYOUT.log(f"train/{fold_folder(*FOLD)}"),
+        "<logs>/train/{category}/el{elevation}/fold{fold}.log",
     benchmark:
-        LAYOUT.benchmark(f"train/{fold_folder(*FOLD)}")
+        "<benchmarks>/train/{category}/el{elevation}/fold{fold}.tsv"
     # Longest jobs first: short ones fill the gaps at the end, when cores would stand idle.
     priority: 50
     conda:
@@ -64,32 +66,32 @@ rule train:
         estimator=stage_of,
         seed=CONFIG["seed"],
     script:
-        f"{SCRIPTS}/train_estimator.py"
+        "../scripts/train_estimator.py"
 
 
 # One estimator for each part: it trains on all other parts, and its part calibrates it.
 use rule train as train_part with:
     output:
-        estimator=LAYOUT.part_estimator(*FOLD, "{part}"),
+        estimator="<results>/estimators/{category}/el{elevation}/fold{fold}/without_part{part}.safetensors",
     log:
-        LAYOUT.log(f"train_part/{fold_folder(*FOLD)}/{{part}}"),
+        "<logs>/train_part/{category}/el{elevation}/fold{fold}/{part}.log",
     benchmark:
-        LAYOUT.benchmark(f"train_part/{fold_folder(*FOLD)}/{{part}}")
+        "<benchmarks>/train_part/{category}/el{elevation}/fold{fold}/{part}.tsv"
 
 
-if EXTERNAL:
+if PLAN.external:
 
     rule estimate:
         input:
             sources("take_estimates"),
-            splits=rules.splits.output[0],
+            splits="<results>/splits/{category}.csv",
             pairs=CONFIG["estimator"]["pairs"],
         output:
             **estimates_of_fold(),
         log:
-            LAYOUT.log(f"estimate/{fold_folder(*FOLD)}"),
+            "<logs>/estimate/{category}/el{elevation}/fold{fold}.log",
         benchmark:
-            LAYOUT.benchmark(f"estimate/{fold_folder(*FOLD)}")
+            "<benchmarks>/estimate/{category}/el{elevation}/fold{fold}.tsv"
         conda:
             ENVIRONMENT
         resources:
@@ -99,7 +101,7 @@ if EXTERNAL:
             ),
             runtime=per_attempt(10),
         script:
-            f"{SCRIPTS}/take_estimates.py"
+            "../scripts/take_estimates.py"
 
 else:
 
@@ -109,17 +111,21 @@ else:
     rule estimate:
         input:
             sources("estimate_views"),
-            splits=rules.splits.output[0],
-            depth=rules.render.output.depth,
-            objects=rules.render.output.objects,
-            estimator=rules.train.output.estimator,
-            of_parts=[LAYOUT.part_estimator(*FOLD, part) for part in PARTS],
+            splits="<results>/splits/{category}.csv",
+            depth="<results>/depth/{category}/el{elevation}.npy",
+            objects="<results>/depth/{category}/el{elevation}_objects.json",
+            estimator="<results>/estimators/{category}/el{elevation}/fold{fold}/estimator.safetensors",
+            of_parts=expand(
+                "<results>/estimators/{category}/el{elevation}/fold{fold}/without_part{part}.safetensors",
+                part=PLAN.parts,
+                allow_missing=True,
+            ),
         output:
             **estimates_of_fold(),
         log:
-            LAYOUT.log(f"estimate/{fold_folder(*FOLD)}"),
+            "<logs>/estimate/{category}/el{elevation}/fold{fold}.log",
         benchmark:
-            LAYOUT.benchmark(f"estimate/{fold_folder(*FOLD)}")
+            "<benchmarks>/estimate/{category}/el{elevation}/fold{fold}.tsv"
         conda:
             ENVIRONMENT
         resources:
@@ -128,18 +134,21 @@ else:
             device=CONFIG["estimator"]["device"],
             precision=CONFIG["estimator"]["precision"],
         script:
-            f"{SCRIPTS}/estimate_views.py"
+            "../scripts/estimate_views.py"
 
 
 rule estimators:
     input:
-        paths(LAYOUT.estimator, folds_of(UNITS)),
+        paths(
+            "<results>/estimators/{category}/el{elevation}/fold{fold}/estimator.safetensors",
+            PLAN.folds_of(UNITS),
+        ),
 
 
 rule estimates:
     input:
         [
-            LAYOUT.estimates(*fold, role)
-            for fold in folds_of(UNITS)
-            for role in ("calibration", "test")
+            path
+            for role in ESTIMATED_ROLES
+            for path in paths(estimates_of_fold()[role], PLAN.folds_of(UNITS))
         ],

@@ -1,28 +1,38 @@
 # The page to play with: every object and first view of a finished run. On request only.
 
-EXPLORED_LOOKUPS = [
-    (*fold, criterion) for fold in folds_of(UNITS) for criterion in LOOKUP_CRITERIA
-]
-
 
 rule explorer:
     input:
         sources("build_explorer"),
-        evaluations=paths(LAYOUT.evaluation, evaluations_of(UNITS)),
-        lookups=paths(LAYOUT.lookup, EXPLORED_LOOKUPS),
-        depth=[] if EXTERNAL else paths(LAYOUT.depth, UNITS),
-        objects=[] if EXTERNAL else paths(LAYOUT.depth_objects, UNITS),
+        evaluations=paths(
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            PLAN.evaluations_of(UNITS),
+        ),
+        lookups=paths(
+            "<results>/lookup/{category}/el{elevation}/fold{fold}/{criterion}.npz",
+            PLAN.lookups,
+        ),
+        depth=(
+            []
+            if PLAN.external
+            else paths("<results>/depth/{category}/el{elevation}.npy", UNITS)
+        ),
+        objects=(
+            []
+            if PLAN.external
+            else paths("<results>/depth/{category}/el{elevation}_objects.json", UNITS)
+        ),
         posteriors=(
-            [LAYOUT.posteriors(*fold, "test") for fold in folds_of(UNITS)]
+            paths(estimates_of_fold()["test_posteriors"], PLAN.folds_of(UNITS))
             if CONFIG["gives_distributions"]
             else []
         ),
     output:
-        LAYOUT.explorer,
+        "<results>/explorer.html",
     log:
-        LAYOUT.log("explorer"),
+        "<logs>/explorer.log",
     benchmark:
-        LAYOUT.benchmark("explorer")
+        "<benchmarks>/explorer.tsv"
     conda:
         ENVIRONMENT
     resources:
@@ -31,11 +41,11 @@ rule explorer:
     params:
         name=CONFIG["name"],
         policies={name: method["policy"] for name, method in METHODS.items()},
-        evaluations=evaluations_of(UNITS),
-        lookups=EXPLORED_LOOKUPS,
+        evaluations=PLAN.evaluations_of(UNITS),
+        lookups=PLAN.lookups,
         units=UNITS,
-        folds=folds_of(UNITS),
+        folds=PLAN.folds_of(UNITS),
         more_views=CONFIG["more_views"],
-        caution=CAUTION,
+        caution=PLAN.caution,
     script:
-        f"{SCRIPTS}/build_explorer.py"
+        "../scripts/build_explorer.py"

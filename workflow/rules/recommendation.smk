@@ -4,77 +4,81 @@
 rule lookup:
     input:
         sources("build_lookup"),
-        splits=rules.splits.output[0],
-        calibration=LAYOUT.estimates(*FOLD, "calibration"),
+        splits="<results>/splits/{category}.csv",
+        calibration="<results>/estimates/{category}/el{elevation}/fold{fold}/calibration.csv",
     output:
-        LAYOUT.lookup(*FOLD, "{criterion}"),
+        "<results>/lookup/{category}/el{elevation}/fold{fold}/{criterion}.npz",
     log:
-        LAYOUT.log(f"lookup/{fold_folder(*FOLD)}/{{criterion}}"),
+        "<logs>/lookup/{category}/el{elevation}/fold{fold}/{criterion}.log",
     benchmark:
-        LAYOUT.benchmark(f"lookup/{fold_folder(*FOLD)}/{{criterion}}")
+        "<benchmarks>/lookup/{category}/el{elevation}/fold{fold}/{criterion}.tsv"
     conda:
         ENVIRONMENT
     params:
-        density=DECISION,
+        density=PLAN.decision,
     script:
-        f"{SCRIPTS}/build_lookup.py"
+        "../scripts/build_lookup.py"
 
 
 rule evaluate_baselines:
     input:
         sources("evaluate_baselines"),
-        splits=rules.splits.output[0],
-        test=LAYOUT.estimates(*FOLD, "test"),
+        splits="<results>/splits/{category}.csv",
+        test="<results>/estimates/{category}/el{elevation}/fold{fold}/test.csv",
     output:
-        [LAYOUT.evaluation(*FOLD, method) for method in BASELINE_METHODS],
+        expand(
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            method=PLAN.baseline_methods,
+            allow_missing=True,
+        ),
     log:
-        LAYOUT.log(f"evaluate_baselines/{fold_folder(*FOLD)}"),
+        "<logs>/evaluate_baselines/{category}/el{elevation}/fold{fold}.log",
     benchmark:
-        LAYOUT.benchmark(f"evaluate_baselines/{fold_folder(*FOLD)}")
+        "<benchmarks>/evaluate_baselines/{category}/el{elevation}/fold{fold}.tsv"
     conda:
         ENVIRONMENT
     params:
-        methods={name: METHODS[name] for name in BASELINE_METHODS},
+        methods={name: METHODS[name] for name in PLAN.baseline_methods},
         seed=CONFIG["seed"],
     script:
-        f"{SCRIPTS}/evaluate_baselines.py"
+        "../scripts/evaluate_baselines.py"
 
 
 rule evaluate_recommended:
     input:
         sources("evaluate_recommended"),
-        splits=rules.splits.output[0],
-        test=LAYOUT.estimates(*FOLD, "test"),
-        lookup=lambda wildcards: LAYOUT.lookup(
-            wildcards.category,
-            wildcards.elevation,
-            wildcards.fold,
-            METHODS[wildcards.method]["policy"],
+        splits="<results>/splits/{category}.csv",
+        test="<results>/estimates/{category}/el{elevation}/fold{fold}/test.csv",
+        lookup=lambda wildcards: (
+            "<results>/lookup/{category}/el{elevation}/fold{fold}/"
+            f"{METHODS[wildcards.method]['policy']}.npz"
         ),
     output:
-        LAYOUT.evaluation(*FOLD, "{method}"),
+        "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
     log:
-        LAYOUT.log(f"evaluate_recommended/{fold_folder(*FOLD)}/{{method}}"),
+        "<logs>/evaluate_recommended/{category}/el{elevation}/fold{fold}/{method}.log",
     benchmark:
-        LAYOUT.benchmark(f"evaluate_recommended/{fold_folder(*FOLD)}/{{method}}")
+        "<benchmarks>/evaluate_recommended/{category}/el{elevation}/fold{fold}/{method}.tsv"
     conda:
         ENVIRONMENT
     params:
         method=lambda wildcards: METHODS[wildcards.method],
     script:
-        f"{SCRIPTS}/evaluate_recommended.py"
+        "../scripts/evaluate_recommended.py"
 
 
 rule lookups:
     input:
-        [
-            LAYOUT.lookup(*fold, criterion)
-            for fold in folds_of(UNITS)
-            for criterion in LOOKUP_CRITERIA
-        ],
+        paths(
+            "<results>/lookup/{category}/el{elevation}/fold{fold}/{criterion}.npz",
+            PLAN.lookups,
+        ),
 
 
 rule evaluation:
     input:
         rules.settings.output,
-        paths(LAYOUT.evaluation, evaluations_of(UNITS)),
+        paths(
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            PLAN.evaluations_of(UNITS),
+        ),

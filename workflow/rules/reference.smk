@@ -1,38 +1,32 @@
 # Reference results under version control: one rule compares a run with them, one makes them.
 # Both run only where somebody asks for them.
 
-import os
-
-from nbv.experiment.reference import find_reference
-
-REFERENCES = Path(os.path.relpath(BASE / "docs/reference"))
-
 
 rule compare:
     input:
         sources("compare_with_reference"),
         reference=reference_of_run,
-        report=rules.report.output[0],
+        report="<results>/report.html",
     log:
-        LAYOUT.log("compare"),
+        "<logs>/compare.log",
     conda:
         ENVIRONMENT
     params:
         run=lambda wildcards, input: str(Path(input.report).parent),
     script:
-        f"{SCRIPTS}/compare_with_reference.py"
+        "../scripts/compare_with_reference.py"
 
 
 rule reference:
     input:
         sources("keep_reference"),
-        report=rules.report.output[0],
+        report="<results>/report.html",
     log:
-        LAYOUT.log("reference"),
+        "<logs>/reference.log",
     conda:
         ENVIRONMENT
     params:
         run=lambda wildcards, input: str(Path(input.report).parent),
         reference=str(REFERENCES / CONFIG["name"]),
     script:
-        f"{SCRIPTS}/keep_reference.py"
+        "../scripts/keep_reference.py"

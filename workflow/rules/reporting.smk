@@ -2,70 +2,49 @@
 
 from nbv.experiment.report.figures import FIGURES
 from nbv.experiment.report.tables import TABLES
-from nbv.experiment.report.settings import (
-    ReportSettings,
-    focus_category,
-    focus_unit,
-    reference_units,
-)
 
-SETTINGS = ReportSettings(focus_category=CONFIG["focus_category"])
-FOCUS = focus_category(UNITS, SETTINGS)
-FOCUS_UNIT = focus_unit(UNITS, SETTINGS)
-REFERENCE_UNITS = reference_units(UNITS, SETTINGS)
-# Of the focus category at every elevation, or at the reference elevation alone. All other tables
-# and figures compare the categories.
-OF_ELEVATIONS = {"table2", "table4", "figure6"}
-OF_FOCUS = {
-    *("table5", "table6", "table7"),
-    *("steps", "figure2", "figure3", "figure7", "figure8", "heatmaps"),
-}
-# Figures show no intervals.
-SHOWN = {"methods": list(METHODS)}
-RESAMPLED = SHOWN | {"n_resamples": CONFIG["n_resamples"], "seed": CONFIG["seed"]}
 # Some figures show the lookup table of Proposed, which another policy does not have; some show
 # depth images, which an external estimator does not have.
-PROPOSED_LOOKUP = METHODS.get(SETTINGS.subject, {}).get("policy")
+PROPOSED_LOOKUP = METHODS.get(PLAN.report_settings.subject, {}).get("policy")
 SHOWN_FIGURES = [
     name
     for name, kind in FIGURES.items()
-    if PROPOSED_LOOKUP in LOOKUP_CRITERIA or "lookups" not in kind.needs
-    if not (EXTERNAL and {"depth", "objects"} & set(kind.needs))
+    if PROPOSED_LOOKUP in PLAN.lookup_criteria or "lookups" not in kind.needs
+    if not (PLAN.external and {"depth", "objects"} & set(kind.needs))
 ]
+JOBS = PLAN.jobs(TABLES, SHOWN_FIGURES)
 
 
-include: "captions.smk"
-
-
-JOBS = sorted(counted_jobs(), key=lambda job: Path(job[1]).parts)
+include: "shown.smk"
 
 
 rule table:
     input:
         sources("tabulate_paper"),
         evaluations=lambda wildcards: paths(
-            LAYOUT.evaluation, evaluations_of(units_of(wildcards.table))
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            evaluations_for(wildcards.table),
         ),
     output:
         csv=table_in_report("csv", "numbers"),
-        md=LAYOUT.table("{table}", "md"),
-        tex=LAYOUT.table("{table}", "tex"),
+        md="<results>/tables/{table}.md",
+        tex="<results>/tables/{table}.tex",
         html=table_in_report("html", "as in the paper"),
     log:
-        LAYOUT.log("table/{table}"),
+        "<logs>/table/{table}.log",
     benchmark:
-        LAYOUT.benchmark("table/{table}")
+        "<benchmarks>/table/{table}.tsv"
     wildcard_constraints:
         table="|".join(TABLES),
     conda:
         ENVIRONMENT
     params:
-        settings=lambda wildcards: settings_of(RESAMPLED, wildcards.table),
-        evaluations=lambda wildcards: evaluations_of(units_of(wildcards.table)),
-        caution=CAUTION,
+        settings=lambda wildcards: PLAN.settings_of(wildcards.table),
+        evaluations=lambda wildcards: evaluations_for(wildcards.table),
+        caution=PLAN.caution,
         caption=caption_of_table,
     script:
-        f"{SCRIPTS}/tabulate_paper.py"
+        "../scripts/tabulate_paper.py"
 
 
 rule figure:
@@ -74,78 +53,81 @@ rule figure:
         unpack(figure_inputs),
     output:
         png=in_report(
-            LAYOUT.figure("{figure}", "png"),
+            "<results>/figures/{figure}.png",
             "Figures",
             "result",
             {"figure": "{figure}"},
         ),
-        pdf=LAYOUT.figure("{figure}", "pdf"),
-        svg=LAYOUT.figure("{figure}", "svg"),
+        pdf="<results>/figures/{figure}.pdf",
+        svg="<results>/figures/{figure}.svg",
     log:
-        LAYOUT.log("figure/{figure}"),
+        "<logs>/figure/{figure}.log",
     benchmark:
-        LAYOUT.benchmark("figure/{figure}")
+        "<benchmarks>/figure/{figure}.tsv"
     wildcard_constraints:
         figure="|".join(FIGURES),
     conda:
         ENVIRONMENT
     params:
-        settings=lambda wildcards: settings_of(SHOWN, wildcards.figure),
-        evaluations=lambda wildcards: evaluations_of(units_of(wildcards.figure)),
-        units=lambda wildcards: units_of(wildcards.figure),
-        folds=lambda wildcards: folds_of(units_of(wildcards.figure)),
+        settings=lambda wildcards: PLAN.settings_of(wildcards.figure),
+        evaluations=lambda wildcards: evaluations_for(wildcards.figure),
+        units=lambda wildcards: PLAN.units_of(wildcards.figure),
+        folds=lambda wildcards: PLAN.folds_of(PLAN.units_of(wildcards.figure)),
         caption=caption_of_figure,
     script:
-        f"{SCRIPTS}/plot_paper.py"
+        "../scripts/plot_paper.py"
 
 
 rule claims:
     input:
         sources("judge_claims"),
-        evaluations=paths(LAYOUT.evaluation, evaluations_of(UNITS)),
+        evaluations=paths(
+            "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
+            PLAN.evaluations_of(UNITS),
+        ),
     output:
-        csv=in_report(LAYOUT.claims("csv"), "Claims", "result", {"form": "numbers"}),
-        md=LAYOUT.claims("md"),
+        csv=in_report("<results>/claims.csv", "Claims", "result", {"form": "numbers"}),
+        md="<results>/claims.md",
     log:
-        LAYOUT.log("claims"),
+        "<logs>/claims.log",
     benchmark:
-        LAYOUT.benchmark("claims")
+        "<benchmarks>/claims.tsv"
     conda:
         ENVIRONMENT
     resources:
         mem_mb=per_attempt(2000),
     params:
-        evaluations=evaluations_of(UNITS),
+        evaluations=PLAN.evaluations_of(UNITS),
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
-        caution=CAUTION,
+        caution=PLAN.caution,
         caption=caption_of(PAGES_SHOW["claims"], UNITS),
     script:
-        f"{SCRIPTS}/judge_claims.py"
+        "../scripts/judge_claims.py"
 
 
 rule runtime:
     input:
         sources("tabulate_runtime"),
-        benchmarks=[LAYOUT.benchmark(job) for _, job in JOBS],
-        logs=[LAYOUT.log(job) for _, job in JOBS],
+        benchmarks=[f"<benchmarks>/{job}.tsv" for _, job in JOBS],
+        logs=[f"<logs>/{job}.log" for _, job in JOBS],
     output:
-        csv=LAYOUT.table("runtime", "csv"),
-        md=LAYOUT.table("runtime", "md"),
+        csv="<results>/tables/runtime.csv",
+        md="<results>/tables/runtime.md",
         html=in_report(
-            LAYOUT.table("runtime", "html"), "Running time", "page", {"form": "table"}
+            "<results>/tables/runtime.html", "Running time", "page", {"form": "table"}
         ),
     log:
-        LAYOUT.log("runtime"),
+        "<logs>/runtime.log",
     benchmark:
-        LAYOUT.benchmark("runtime")
+        "<benchmarks>/runtime.tsv"
     conda:
         ENVIRONMENT
     params:
         rules=[rule for rule, _ in JOBS],
         caption=caption_of(PAGES_SHOW["runtime"], UNITS),
     script:
-        f"{SCRIPTS}/tabulate_runtime.py"
+        "../scripts/tabulate_runtime.py"
 
 
 rule report:
@@ -155,26 +137,26 @@ rule report:
         provenance=rules.settings.output.provenance,
         claims=rules.claims.output.csv,
         runtime=rules.runtime.output.html,
-        splits=[LAYOUT.splits(category) for category in CATEGORIES],
-        tables=[LAYOUT.table(name, "html") for name in TABLES],
-        table1=LAYOUT.table("table1", "csv"),
-        figures=[LAYOUT.figure(name, "svg") for name in SHOWN_FIGURES],
+        splits=paths("<results>/splits/{category}.csv", zip(CONFIG["categories"])),
+        tables=[f"<results>/tables/{name}.html" for name in TABLES],
+        table1="<results>/tables/table1.csv",
+        figures=[f"<results>/figures/{name}.svg" for name in SHOWN_FIGURES],
     output:
-        in_report(LAYOUT.report, "Report", "page", {"form": "page"}),
+        in_report("<results>/report.html", "Report", "page", {"form": "page"}),
     log:
-        LAYOUT.log("report"),
+        "<logs>/report.log",
     benchmark:
-        LAYOUT.benchmark("report")
+        "<benchmarks>/report.tsv"
     conda:
         ENVIRONMENT
     params:
-        categories=CATEGORIES,
+        categories=CONFIG["categories"],
         tables=list(TABLES),
         figures=SHOWN_FIGURES,
-        caution=CAUTION,
+        caution=PLAN.caution,
         caption=caption_of(PAGES_SHOW["report"], UNITS),
     script:
-        f"{SCRIPTS}/build_report.py"
+        "../scripts/build_report.py"
 
 
 rule tables:
@@ -189,19 +171,15 @@ rule figures:
 
 use rule figure as animate with:
     output:
-        gif=LAYOUT.figure("{figure}", "gif"),
+        gif="<results>/figures/{figure}.gif",
     log:
-        LAYOUT.log("animate/{figure}"),
+        "<logs>/animate/{figure}.log",
     benchmark:
-        LAYOUT.benchmark("animate/{figure}")
+        "<benchmarks>/animate/{figure}.tsv"
     wildcard_constraints:
         figure="steps",
 
 
 rule animation:
     input:
-        lambda wildcards: (
-            LAYOUT.figure("steps", "gif")
-            if "steps" in SHOWN_FIGURES
-            else stop("animation needs depth images and a lookup table of proposed")
-        ),
+        steps_animation,

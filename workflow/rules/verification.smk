@@ -3,13 +3,13 @@
 
 rule verify:
     log:
-        LAYOUT.log("verify"),
+        "<logs>/verify.log",
     conda:
         ENVIRONMENT
     resources:
         runtime=per_attempt(30),
     params:
-        run=LAYOUT.root,
+        run=PLAN.results,
         options=[word for word in sys.argv[1:] if word != "verify"],
     script:
-        f"{SCRIPTS}/verify_results.py"
+        "../scripts/verify_results.py"

@@ -3,11 +3,10 @@
 import logging
 from pathlib import Path
 
-from nbv.experiment.jobs import job
+from nbv.experiment.jobs import job, need_intact
 
 with job(snakemake):
     from nbv.errors import UserError
-    from nbv.experiment.checksums import need_intact
     from nbv.experiment.compare import compare_runs
 
     reference, run = Path(snakemake.input.reference).parent, Path(snakemake.params.run)

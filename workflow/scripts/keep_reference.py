@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from nbv.experiment.jobs import job
+from nbv.experiment.jobs import job, need_intact
 
 with job(snakemake):
-    from nbv.experiment.checksums import need_intact
     from nbv.experiment.reference import collect_reference
 
     need_intact(snakemake.params.run)

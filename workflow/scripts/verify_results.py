@@ -1,13 +1,12 @@
 """Hold every file of a run to the checksum that it had when it was written."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.jobs import job, states_of_files
 
 with job(snakemake):
     import logging
     import shlex
 
     from nbv.errors import UserError
-    from nbv.experiment.checksums import states_of_files
 
     params = snakemake.params
     states = states_of_files(params.run)

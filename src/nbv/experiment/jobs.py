@@ -7,24 +7,32 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import gc
 import logging
 import os
 import re
+import signal
 import sys
+import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PurePath
+from typing import IO, Any, Literal
+
+import psutil
 
 from nbv.errors import UserError
-from nbv.experiment import checksums
-from nbv.experiment.processes import end_with_snakemake
+from nbv.files import sha256_of, write_text
 
 log = logging.getLogger(__name__)
 
+State = Literal["intact", "damaged", "missing", "without checksum"]
+
 _SECONDS_BETWEEN_MESSAGES = 60
+# An orphan works on for no longer than this while the next run works.
+_SECONDS_BETWEEN_CHECKS = 0.5
 _FINISHED, _FAILED, _STOPPED = "processor time", "error: ", "stopped"
 LAST_ERROR = "last_error.txt"
 """In the folder of a run's logs: the line of the job that failed last."""
@@ -70,10 +78,10 @@ def job(snakemake: Any) -> Iterator[None]:
     os.environ.pop("MPLBACKEND", None)
     try:
         for file in snakemake.input:
-            checksums.check(file)
+            check(file)
         yield
         for file in snakemake.output:
-            checksums.write_checksum(file)
+            write_checksum(file)
     except UserError as error:
         _fail(f"{error}", path)
     except Exception as error:
@@ -126,6 +134,29 @@ def why_stopped(
         f"{_FAILED}killed from outside: {', '.join(killed)}",
         "most often memory ran out: use fewer --cores, or smaller settings",
     ]
+
+
+def import_from(folder: Path) -> None:
+    """Let this process, and the jobs that it starts, import the packages in a folder."""
+    sys.path.insert(0, str(folder))
+    before = os.environ.get("PYTHONPATH", "")
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(folder), before]))
+
+
+def forget_last_error(results: str) -> None:
+    """Begin a run with no error: the first thing that it writes.
+
+    Raises
+    ------
+    UserError
+        If the folder of its results cannot be written.
+    """
+    logs = Path(results, "logs")
+    try:
+        logs.mkdir(parents=True, exist_ok=True)
+        (logs / LAST_ERROR).unlink(missing_ok=True)
+    except OSError as error:
+        raise UserError(f"{results} cannot be written: {error.strerror}") from error
 
 
 def _killed_jobs(logs: Path, since: float) -> list[str]:
@@ -212,3 +243,149 @@ def _fail(message: str, log_file: Path) -> None:
 def _fail_unexpectedly(error: Exception, path: Path) -> None:
     log.error("traceback", exc_info=error, extra={"log_only": True})
     _fail(f"{type(error).__name__}: {error} (traceback in {path})", path)
+
+
+def write_checksum(path: str) -> None:
+    """Write the SHA-256 of a run's file, in the format of ``sha256sum``.
+
+    Parameters
+    ----------
+    path : str
+        Relative to the project's folder: ``results/<name>/…``. Other files have no checksum.
+    """
+    record = _checksum_of(path)
+    if record is not None:
+        write_text(record, f"{sha256_of(path)}  {path}\n")
+
+
+def state_of(path: str) -> State:
+    """Return whether a file is what it was when its checksum was written."""
+    record = _checksum_of(path)
+    if not Path(path).is_file():
+        return "missing"
+    if record is None or not Path(record).is_file():
+        return "without checksum"
+    return "intact" if sha256_of(path) == _written(record) else "damaged"
+
+
+def check(path: str) -> None:
+    """Set a damaged file aside.
+
+    Raises
+    ------
+    UserError
+        Naming the file. It has the suffix ``.damaged`` now, and the same command makes it again.
+    """
+    if state_of(path) != "damaged":
+        return
+    # Another job may have found it at the same time, and moved it.
+    with contextlib.suppress(FileNotFoundError):
+        Path(path).replace(f"{path}.damaged")
+    raise UserError(
+        f"{path} changed after it was written: its checksum differs. It is now "
+        f"{Path(path).name}.damaged; run the same command again, which makes the file again"
+    )
+
+
+def states_of_files(root: str) -> dict[str, State]:
+    """Return the state of every file of a run that has a checksum.
+
+    Parameters
+    ----------
+    root : str
+        ``results/<name>``.
+    """
+    folder = Path(root, "checksums")
+    inside = (path.relative_to(folder).with_suffix("") for path in folder.rglob("*.sha256"))
+    return {path: state_of(path) for path in sorted(f"{root}/{each.as_posix()}" for each in inside)}
+
+
+def need_intact(root: str) -> None:
+    """Raise UserError where a file of a run is damaged, naming the first."""
+    damaged = [path for path, state in states_of_files(root).items() if state == "damaged"]
+    if damaged:
+        raise UserError(
+            f"{damaged[0]} changed after it was written, {len(damaged)} files in all: "
+            "the target verify says how to make them again"
+        )
+
+
+def _written(record: str) -> str:
+    return Path(record).read_text(encoding="ascii", errors="replace").partition(" ")[0]
+
+
+def _checksum_of(path: str) -> str | None:
+    """Return where the checksum of a run's file lies; None for a file that is of no run."""
+    results, *inside = PurePath(path).parts
+    if results != "results" or len(inside) < 2:
+        return None
+    run, *rest = inside
+    return f"results/{run}/checksums/{'/'.join(rest)}.sha256"
+
+
+def end_with_snakemake() -> None:
+    """Let this process end soon after the Snakemake that started it; where there is none, not.
+
+    A termination signal becomes an exception, so that a job removes its temporary file.
+    """
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
+    starter, parent = _snakemake_above(), os.getppid()
+    if starter is not None:
+        threading.Thread(target=_watch, args=(starter, parent), daemon=True).start()
+
+
+def _snakemake_above() -> psutil.Process | None:
+    for process in psutil.Process().parents():
+        with contextlib.suppress(psutil.Error):
+            if _runs_snakemake(process.cmdline()):
+                return process
+    return None
+
+
+def _runs_snakemake(arguments: Iterable[str]) -> bool:
+    return any(Path(argument).name == "snakemake" for argument in arguments)
+
+
+def _watch(starter: psutil.Process, parent: int) -> None:
+    while os.getppid() == parent and _is_alive(starter):
+        time.sleep(_SECONDS_BETWEEN_CHECKS)
+    # Nobody waits for this job any more, and the next run starts another one.
+    os._exit(1)
+
+
+def _is_alive(process: psutil.Process) -> bool:
+    try:
+        return bool(process.is_running() and process.status() != psutil.STATUS_ZOMBIE)
+    except psutil.Error:
+        return False
+
+
+def hold_lock(folder: Path) -> IO[bytes] | None:
+    """Remove Snakemake's locks where the runs that took them are dead, and mark this one as alive.
+
+    Snakemake's lock is a file, which a killed run leaves behind. Every run of this project also
+    holds a lock of the operating system, which ends with its process: exclusive for a moment where
+    no other run is alive, to remove those files; shared as long as it runs.
+
+    Parameters
+    ----------
+    folder : Path
+        ``.snakemake``.
+
+    Returns
+    -------
+    file or None
+        The lock, held until the file is closed. None where the folder cannot be written or its file
+        system has no such locks; then nothing is removed.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        held = (folder / "nbv.lock").open("ab")
+        with contextlib.suppress(BlockingIOError):
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            for lock in (folder / "locks").glob("*.lock"):
+                lock.unlink()
+        fcntl.flock(held, fcntl.LOCK_SH)
+    except OSError:
+        return None
+    return held

@@ -9,7 +9,7 @@ import importlib.util
 import json
 import platform
 import subprocess
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,8 @@ PACKAGES = (
 )
 
 
-def source_files(script: str | Path, chosen: Iterable[str] = ()) -> list[str]:
+@functools.cache
+def source_files(script: str | Path, chosen: tuple[str, ...] = ()) -> list[str]:
     """Return the modules of nbv that a script imports, directly or not, wherever it does so.
 
     Files are parsed and not run; imports for type checkers alone do not count. A registry names

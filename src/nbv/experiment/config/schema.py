@@ -156,7 +156,7 @@ class Sensor(Section):
 
 
 class Schedule(Section):
-    """Epochs and peak rate of a stage of `nbv.experiment.estimation.warm_start`."""
+    """Epochs and peak rate of a stage of training; see `nbv.experiment.plan`."""
 
     epochs: Epochs
     learning_rate: LearningRate

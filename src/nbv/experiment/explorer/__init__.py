@@ -66,7 +66,7 @@ class ExplorerInputs:
     posteriors : mapping of (category, elevation_deg, fold) to Path
         Distributions of test images, if the estimator gives them.
     caution : sequence of str
-        Warnings that precede all numbers; see `nbv.experiment.run_size`.
+        Warnings that precede all numbers; see `nbv.experiment.plan`.
     """
 
     name: str

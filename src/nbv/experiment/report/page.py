@@ -181,7 +181,7 @@ def build_report(
     runtime : path
         HTML fragment of `nbv.experiment.report.runtime.runtime_table`.
     caution : sequence of str
-        Warnings that precede all numbers; see `nbv.experiment.run_size`.
+        Warnings that precede all numbers; see `nbv.experiment.plan`.
 
     Raises
     ------
@@ -319,7 +319,7 @@ def _repairs(density: Mapping[str, Any]) -> str:
     if not repairs:
         return "Proposed is the paper's method as it is printed."
     return (
-        f"Proposed is the paper's method, repaired: {'; '.join(repairs)}. The command snakemake "
+        f"Proposed is the paper's method, repaired: {'; '.join(repairs)}. The study "
         "confirm compares it with the method as it is printed."
     )
 

@@ -5,8 +5,8 @@ from nbv.experiment.jobs import job
 with job(snakemake):
     import numpy as np
     from studies.leaderboard import blocks_of, leaderboard_table
+    from studies.runs import files_by_run
 
-    from nbv.experiment.layout import files_by_run
     from nbv.experiment.report.table import write_table
     from nbv.experiment.statistics.paired import Resampler, load_folds
 

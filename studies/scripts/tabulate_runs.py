@@ -3,9 +3,8 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from studies.runs import runs_table
+    from studies.runs import files_by_run, runs_table
 
-    from nbv.experiment.layout import files_by_run
     from nbv.experiment.report.settings import ReportSettings
     from nbv.experiment.report.table import write_table
     from nbv.experiment.results import load_estimate_errors, load_evaluations

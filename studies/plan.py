@@ -1,0 +1,321 @@
+"""What the studies make, from the plan of the run and what other runs have left."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nbv.core.criteria import CRITERIA
+from nbv.data.sensors import check_sensor
+from nbv.errors import UserError
+from nbv.experiment.config import load_condition, read_configuration
+from nbv.experiment.plan import Fold, Plan
+from nbv.experiment.results import ESTIMATED_ROLES, Unit
+from studies.kept_estimates import kept_settings
+
+Training = tuple[int, int]
+"""A shuffle of the objects into folds, and a replicate of its trainings."""
+
+
+@dataclass(frozen=True)
+class KeptRun:
+    """A run whose estimates the statistics are made of.
+
+    Attributes
+    ----------
+    path : str or None
+        The file that they are kept in; None for this run's own.
+    keys : sequence of (shuffle, replicate, category, elevation in degrees)
+    dataset : str
+        The name of its data set.
+    """
+
+    path: str | None
+    keys: Sequence[tuple[int, int, str, int]]
+    dataset: str
+
+
+@dataclass(frozen=True, eq=False)
+class Studies:
+    """What the studies of one run make.
+
+    Folders are relative to the run's folder: empty, or with a slash in front.
+    """
+
+    run: Plan
+
+    # Extensions
+
+    @property
+    def decision(self) -> dict[str, Any]:
+        """What decides on a rotation where distributions are fused."""
+        return self.run.decision | {"affinity": self.run.config["affinity"]}
+
+    @property
+    def extension_lookups(self) -> list[str]:
+        """The extensions that have a lookup table."""
+        return [
+            name
+            for name, method in self.run.config["extensions"].items()
+            if method["policy"] in CRITERIA and method["fusion"] != "product"
+        ]
+
+    def check_posterior(self, *policies: str) -> None:
+        """Raise UserError where no extension with the fusion posterior has one of the policies."""
+        methods = self.run.config["extensions"].values()
+        known = {method["policy"] for method in methods if method["fusion"] == "posterior"}
+        for policy in policies:
+            if policy not in known:
+                raise UserError(
+                    f"extensions: this target needs {{policy: {policy}, fusion: posterior}}"
+                )
+
+    # Other runs
+
+    def settings_of(self, run: str) -> Mapping[str, Any]:
+        """Return the configuration of a finished run."""
+        return self.run.config if run == self.run.config["name"] else _settings_of(run)
+
+    def check_file(self, run: str, path: str, key: str) -> None:
+        """Raise UserError where a file of another run is missing; `key` names that run."""
+        if run != self.run.config["name"] and not Path(path).exists():
+            raise UserError(f"{key}: {path} does not exist; finish the run {run} first")
+
+    @property
+    def leaderboard_folds(self) -> list[tuple[str, str, int, int]]:
+        """Run, category, elevation and fold of everything that the leaderboard ranks."""
+        runs = self.run.config["leaderboard_runs"] or [self.run.config["name"]]
+        settings = {run: self.settings_of(run) for run in runs}
+        return [
+            (run, category, elevation, fold)
+            for run in runs
+            for category in settings[run]["categories"]
+            for elevation in settings[run]["elevations_deg"][category]
+            for fold in range(1, settings[run]["n_folds"] + 1)
+        ]
+
+    @property
+    def compared_runs(self) -> list[str]:
+        """The run's name, then those that it is compared with."""
+        return list(dict.fromkeys([self.run.config["name"], *self.run.config["compared_runs"]]))
+
+    def two_view_methods(self, run: str) -> list[str]:
+        """Return a run's methods of two views, and those that multiply its distributions."""
+        settings = self.settings_of(run)
+        products = settings["extensions"].items()
+        return [
+            *(name for name, one in settings["methods"].items() if one["policy"] != "none"),
+            *(name for name, one in products if one.get("fusion") == "product"),
+        ]
+
+    def compared_roles(self, run: str) -> Sequence[str]:
+        """Return the roles to compare: the calibration objects where all runs have the same."""
+        runs = self.compared_runs
+        ways = {self.settings_of(one).get("calibration", "holdout") for one in runs}
+        return ESTIMATED_ROLES if len(ways) == 1 else ("test",)
+
+    def compared(
+        self, names_of: Callable[[str], Iterable[str]]
+    ) -> list[tuple[str, str, int, int, str]]:
+        """Return run, category, elevation, fold, and each name that `names_of` gives the run."""
+        return [
+            (run, *fold, name)
+            for run in self.compared_runs
+            for fold in self.run.folds_of(self.run.units)
+            for name in names_of(run)
+        ]
+
+    # Trained on × tested on
+
+    @property
+    def transfer_unit(self) -> Unit:
+        """The category and elevation of the transfer."""
+        transfer = self.run.config["transfer"]
+        return transfer["category"] or self.run.focus, transfer["elevation_deg"]
+
+    @property
+    def transfer_folds(self) -> list[int]:
+        """The folds of the transfer."""
+        return self.run.config["transfer"]["folds"] or list(self.run.folds)
+
+    def condition(self, name: str) -> Mapping[str, Any]:
+        """Return the run's configuration under a condition of the transfer."""
+        settings = _under_condition(self.run, name)
+        check_sensor(settings["sensor"], [self.transfer_unit[0]])
+        return settings
+
+    def condition_folder(self, name: str) -> str:
+        """Return the folder of a condition: the run's own where it was made under that very one."""
+        settings, config = self.condition(name), self.run.config
+        is_run = self.transfer_unit in self.run.units and all(
+            settings[key] == config[key] for key in ("camera", "sensor")
+        )
+        return "" if is_run else f"/transfer/{name}"
+
+    def estimator_folder(self, name: str) -> str:
+        """Return the folder of a condition's estimators.
+
+        The run's own are taken only where they too were trained from random weights.
+        """
+        if self.run.crossfit:
+            raise UserError("transfer calibrates with objects held out: needs calibration=holdout")
+        own = self.run.start(*self.transfer_unit) is None
+        return self.condition_folder(name) if own else f"/transfer/{name}"
+
+    # Trainings beyond the run's own
+
+    @property
+    def trainings(self) -> list[Training]:
+        """Shuffle and replicate of every training."""
+        replicates = self.run.config["confirmation"]["replicates"]
+        return [(shuffle, one) for shuffle, of_it in enumerate(replicates) for one in of_it]
+
+    @property
+    def held_out(self) -> list[tuple[str, int, int, str]]:
+        """Category, elevation, fold and role of what is kept of a training."""
+        folds: list[Fold] = self.run.folds_of(self.run.lowest_units)
+        return [(*fold, role) for fold in folds for role in ESTIMATED_ROLES]
+
+    @functools.cached_property
+    def kept_runs(self) -> dict[str, KeptRun]:
+        """What the statistics are made of, by run.
+
+        Raises
+        ------
+        UserError
+            Where two files are of one run, or of the same categories of one data set.
+        """
+        config = self.run.config
+        if not config["confirmation"]["kept"]:
+            units = self.run.lowest_units
+            own = [(*training, *unit) for training in self.trainings for unit in units]
+            return {config["name"]: KeptRun(None, own, _dataset(config))}
+        found: dict[str, KeptRun] = {}
+        for path in config["confirmation"]["kept"]:
+            settings, keys = _kept_settings(path)
+            run, dataset = settings["name"], _dataset(settings)
+            if run in found:
+                other = found[run].path
+                raise UserError(f"confirmation.kept: {path} is of the run {run}, as {other} is")
+            categories = {key[2] for key in keys}
+            for one in found.values():
+                if one.dataset == dataset and categories & {key[2] for key in one.keys}:
+                    raise UserError(
+                        f"confirmation.kept: {path} and {one.path} have the same categories of "
+                        f"the data set {dataset}"
+                    )
+            found[run] = KeptRun(path, keys, dataset)
+        return found
+
+    @property
+    def kept_trainings(self) -> list[dict[str, Any]]:
+        """Data set, shuffle, replicate and category of each of the runs' keys, in their order."""
+        return [
+            {"dataset": run.dataset, "shuffle": key[0], "replicate": key[1], "category": key[2]}
+            for run in self.kept_runs.values()
+            for key in run.keys
+        ]
+
+    # Bundles without an ingredient of the randomisation
+
+    @property
+    def variants(self) -> dict[str, tuple[str, int]]:
+        """By their folder: what each training is without, and its replicate; not the bundle's."""
+        bundles = self.run.config["bundles"]
+        found = {
+            variant_folder(without, replicate): (without, replicate)
+            for without in ("", *bundles["ingredients"])
+            for replicate in {0, *bundles["replicates"]}
+        }
+        return {folder: variant for folder, variant in found.items() if folder}
+
+    @property
+    def rendered_variants(self) -> list[str]:
+        """The folders of those that have images of their own: replicates share theirs."""
+        return [folder for folder, (_, replicate) in self.variants.items() if not replicate]
+
+    @property
+    def compared_variants(self) -> list[tuple[str, str, int]]:
+        """Category, what is left out, and replicate of each bundle in the table."""
+        bundles = self.run.config["bundles"]
+        return [
+            (category, without, replicate)
+            for category in self.run.config["categories"]
+            for without in ("", *bundles["ingredients"])
+            for replicate in bundles["replicates"]
+        ]
+
+    def randomisation(self, variant: str) -> dict[str, Any]:
+        """Return the randomisation of a variant's images."""
+        config, (without, _) = self.run.config, self.variants[variant]
+        left_out = config["bundles"]["ingredients"].get(without, {})
+        return {**config["randomisation"], **left_out}
+
+    def bundle_settings(self, variant: str) -> dict[str, Any]:
+        """Return what a variant's bundle says of its training."""
+        _, replicate = self.variants[variant]
+        said = self.run.bundle_settings | {"randomisation": self.randomisation(variant)}
+        return said | ({"replicate": replicate} if replicate else {})
+
+
+def training_folder(shuffle: int | str, replicate: int | str) -> str:
+    """Return the folder of a training, relative to the run's; 0 and 0 are the run's own."""
+    own = (str(shuffle), str(replicate)) == ("0", "0")
+    return "" if own else f"/confirmation/shuffle{shuffle}/replicate{replicate}"
+
+
+def shuffle_folder(shuffle: int | str) -> str:
+    """Return the folder of a shuffle, relative to the run's; 0 is the run's own."""
+    return "" if str(shuffle) == "0" else f"/confirmation/shuffle{shuffle}"
+
+
+def variant_folder(without: str = "", replicate: int = 0) -> str:
+    """Return the folder below ``bundles`` of a training without an ingredient, or of a replicate.
+
+    Replicate 0 with all ingredients is the bundle itself, whose folder is ``bundles``.
+    """
+    named = f"/without_{without}" if without else ""
+    return f"{named}/replicate{replicate}" if replicate else named
+
+
+def files_of_manifest(path: str) -> list[str]:
+    """Return a manifest, and the frames and masks that it names."""
+    from nbv.robot.recordings import read_manifest  # only here: it is slow
+
+    try:
+        recordings = read_manifest(path)
+    except UserError as error:
+        raise UserError(f"bundles.frames: {error}") from error
+    columns = [
+        one.frames[name] for one in recordings for name in ("path", "mask") if name in one.frames
+    ]
+    return [path, *(file for column in columns for file in column if file)]
+
+
+@functools.cache
+def _settings_of(run: str) -> Mapping[str, Any]:
+    needed = ("categories", "elevations_deg", "methods", "extensions")
+    return read_configuration(Path("results") / run, needed)
+
+
+@functools.cache
+def _under_condition(run: Plan, name: str) -> Mapping[str, Any]:
+    conditions = run.config["transfer"]["conditions"]
+    if name not in conditions:
+        raise UserError(f"transfer.conditions has no {name}")
+    return load_condition(run.folder, run.overrides, run.config, conditions[name])
+
+
+def _kept_settings(path: str) -> tuple[dict[str, Any], list[tuple[int, int, str, int]]]:
+    try:
+        settings, keys = kept_settings(path)
+    except UserError as error:
+        raise UserError(f"confirmation.kept: {error}") from error
+    return settings, list(dict.fromkeys(key[:4] for key in keys))
+
+
+def _dataset(settings: Mapping[str, Any]) -> str:
+    return str(settings["confirmation"]["dataset"] or settings["name"])
