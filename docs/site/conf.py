@@ -31,7 +31,7 @@ extensions = [
 ]
 
 root_doc = "README"
-DOCUMENTS = {"README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs"}
+DOCUMENTS = {"README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "studies"}
 exclude_patterns = [path.name for path in ROOT.iterdir() if path.name not in DOCUMENTS]
 
 myst_enable_extensions = ["dollarmath"]

@@ -19,7 +19,7 @@ SECTIONS = {
         "docs/bundles",
     ),
     "Understand it": ("docs/method", "docs/paper", "docs/glossary"),
-    "Run it": ("docs/guide", "docs/data", "docs/scale", "docs/cluster"),
+    "Run it": ("docs/guide", "studies/README", "docs/data", "docs/scale", "docs/cluster"),
     "Results": (f"{RESULTS}/README", "docs/protocol"),
     "Change it": (
         "docs/extending",
