@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nbv.data.meshes import prepare_meshes, save_meshes
-from nbv.data.sources import open_source
+from nbv.data.meshes import save_meshes
+from nbv.data.sources import open_source, prepare_meshes
 from nbv.errors import UserError
 from nbv.experiment.config import load_config
 from nbv.experiment.plan import (
