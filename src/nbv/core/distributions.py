@@ -9,7 +9,6 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -27,10 +26,8 @@ def rotated(rows: NDArray[np.floating], rotation_deg: ArrayLike) -> Floats:
     """Return p(theta + rotation) as a function of theta, (..., B), for distributions (..., B).
 
     Exact for whole bins, linear in between. `rotation_deg` is a number, or an array with one
-    rotation for each row. For the float 0.0 the result may be the argument itself.
+    rotation for each row.
     """
-    if isinstance(rotation_deg, float) and rotation_deg == 0.0:  # the usual case: one frame
-        return np.asarray(rows, dtype=np.float64)
     n_bins = rows.shape[-1]
     rotation_bins = np.asarray(rotation_deg, dtype=np.float64) * (n_bins / 360.0)
     whole = np.floor(rotation_bins)
@@ -101,14 +98,7 @@ def log_bayes_factor(distributions: NDArray[np.floating], rotations_deg: Sequenc
 
     It is log(B^(n - 1) sum_theta prod_i p_i(theta + rotation_i)), 0 for one view. With calibrated
     distributions and correct rotations it is below log t with a probability of at most t (Markov's
-    inequality).
-
-    Parameters
-    ----------
-    distributions : ndarray (n, B)
-        Above 0.
-    rotations_deg : sequence of float
-        The rotation from the first view to each view.
+    inequality). The distributions (n, B) are above 0.
     """
     n, n_bins = distributions.shape
     if n == 1:
@@ -150,33 +140,21 @@ def direction_and_spread_deg(belief: NDArray[np.floating]) -> tuple[float, float
     The direction is in [-180, 180]. The standard deviation is sqrt(-2 log R) with the resultant
     length R.
     """
-    moment = complex(belief @ _unit_vectors(len(belief)))
+    n_bins = len(belief)
+    moment = complex(belief @ np.exp(2j * np.pi * np.arange(n_bins) / n_bins))
     length = max(abs(moment), NEGLIGIBLE_PROBABILITY)
     spread = math.sqrt(max(-2.0 * math.log(length), 0.0))
     return math.degrees(cmath.phase(moment)), math.degrees(spread)
 
 
-@cache
-def _unit_vectors(n_bins: int) -> NDArray[np.complex128]:
-    return np.asarray(np.exp(2j * np.pi * np.arange(n_bins) / n_bins))
-
-
 def region_coverage(
     probabilities: NDArray[np.floating], bins: NDArray[np.integer], level: float
 ) -> Floats:
-    """Return whether the highest-density region contains the truth, (n,) in [0, 1].
+    """Return whether the highest-density region contains the truth `bins` (n,), in [0, 1].
 
-    The region is the smallest set of bins with the probability `level`. Bins at its threshold
-    belong to it in part, so that truths drawn from the distributions are inside with exactly the
-    probability `level`.
-
-    Parameters
-    ----------
-    probabilities : ndarray (n, B)
-    bins : ndarray (n,) int
-        Bins of the truth.
-    level : float
-        In (0, 1).
+    The region is the smallest set of bins (B) with the probability `level`, in (0, 1). Bins at its
+    threshold belong to it in part, so that truths drawn from the distributions are inside with
+    exactly the probability `level`.
     """
     own = np.take_along_axis(probabilities, bins[:, None], axis=1)
     denser = np.where(probabilities > own, probabilities, 0.0).sum(axis=1, dtype=np.float64)

@@ -20,40 +20,15 @@ ZERO_CODE = 128
 """The code of the reference depth itself."""
 
 
-def reference_depth(depth: Depths, camera: Camera) -> NDArray[np.float32]:
-    """Return the depth of code 128 for each image.
-
-    With ``framing="silhouette"`` it is the median of the visible pixels, which a detector's crop
-    provides. With ``framing="axis"`` it is the known distance of the object's origin.
-
-    Parameters
-    ----------
-    depth : (k, side, side) float32
-        Object diagonals, 0 for background.
-    camera : Camera
-
-    Returns
-    -------
-    (k,) float32
-        Object diagonals. Images without a visible pixel get the camera's distance.
-    """
-    return np.array([_reference(image[image > 0], camera) for image in depth], dtype=np.float32)
-
-
 def _reference(visible: Depths, camera: Camera) -> np.float32:
+    """Return the depth of code 128 for an image with some visible depths (n,), object diagonals.
+
+    With ``framing="silhouette"`` it is their median, which a detector's crop provides. With
+    ``framing="axis"``, or without a visible pixel, it is the camera's distance.
+    """
     if camera.framing != "silhouette" or not len(visible):
         return np.float32(camera.distance)
-    return median_depth(visible)
-
-
-def median_depth(visible: Depths) -> np.float32:
-    """Return numpy.median of depths (n,), more than three times as fast."""
-    middle = len(visible) // 2
-    ordered = visible.copy()
-    ordered.partition(middle)
-    # For an even number, the lower of the two middle depths is the largest before the middle.
-    lower = ordered[middle] if len(visible) % 2 else ordered[:middle].max()
-    return np.float32((lower + ordered[middle]) / 2)
+    return np.float32(np.median(visible))
 
 
 def encode_depth(depth: Depths, camera: Camera) -> Codes:
@@ -64,7 +39,8 @@ def encode_depth(depth: Depths, camera: Camera) -> Codes:
     depth : (k, side, side) float32
         Object diagonals, 0 for background.
     camera : Camera
-        Its framing decides the reference depth (see `reference_depth`).
+        With ``framing="silhouette"`` the reference depth is the median of the visible pixels, with
+        ``framing="axis"`` the known distance of the object's origin.
 
     Returns
     -------
@@ -87,18 +63,10 @@ def encode_depth(depth: Depths, camera: Camera) -> Codes:
 
 
 def decode_depth(codes: Codes) -> Depths:
-    """Return the offset of each pixel from its image's reference depth.
+    """Return the offset of each pixel of `encode_depth` from its image's reference depth.
 
-    Parameters
-    ----------
-    codes : (...) uint8
-        Codes of `encode_depth`.
-
-    Returns
-    -------
-    (...) float32
-        Object diagonals, positive towards the camera, NaN for background. The error is at most half
-        a step, unless the code saturated.
+    In object diagonals, positive towards the camera, NaN for background. The error is at most half
+    a step, unless the code saturated.
     """
     offsets = (codes.astype(np.float32) - ZERO_CODE) * np.float32(STEP)
     return np.where(codes > 0, offsets, np.float32(np.nan))
@@ -114,20 +82,10 @@ def sensor_camera(camera: Camera) -> Camera:
 
 
 def crop_measured(depth: Depths, camera: Camera) -> Depths:
-    """Centre measured images on their measured pixels.
+    """Centre measured images (k, side, side) on their measured pixels, which are not 0.
 
-    Parameters
-    ----------
-    depth : (k, side, side) float32
-        Measured depth; 0 without a measurement.
-    camera : Camera
-        With ``framing="axis"`` the images stay as they are.
-
-    Returns
-    -------
-    (k, side, side) float32
-        The bounding box of the nonzero pixels is in the middle, or half a pixel to the left of
-        (above) it if the number of free columns (rows) is odd.
+    Their bounding box is in the middle, or half a pixel to the left of (above) it if the number of
+    free columns (rows) is odd. With ``framing="axis"`` the images stay as they are.
     """
     if camera.framing == "axis":
         return depth

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nbv.data.camera import Camera
-from nbv.data.depth_codes import encode_depth, median_depth
+from nbv.data.depth_codes import encode_depth
 from nbv.errors import FrameError, UserError, check_number
 from nbv.robot.depth_files import DepthImage
 from nbv.robot.intrinsics import Intrinsics
@@ -114,7 +113,7 @@ def crop_frame(
     middle = (left + right + 1) / 2, (top + bottom + 1) / 2
     axes, principal = _facing(intrinsics, *middle)
     towards = axes[2]
-    distance_m = float(median_depth(depth_m[window][mask[window]])) / towards[2]
+    distance_m = float(np.median(depth_m[window][mask[window]])) / towards[2]
     width_m = (right - left + 1) * distance_m / intrinsics.fx
     height_m = (bottom - top + 1) * distance_m / intrinsics.fy
     extent = math.hypot(width_m, height_m)
@@ -142,27 +141,20 @@ def crop_frame(
     return Crop(codes, distance_m, extent, centre_m, intrinsics.doubts(rows, columns))
 
 
-@cache
 def _pixel_centres(side: int) -> NDArray[np.float64]:
     """Return the centres of a crop's pixels relative to the centre of the crop, pixels.
 
     The result holds homogeneous coordinates (3, side²): columns, rows and ones.
     """
     along = np.arange(side, dtype=np.float64) + 0.5 - side / 2
-    centres = np.stack([np.tile(along, side), np.repeat(along, side), np.ones(side**2)])
-    centres.flags.writeable = False
-    return centres
+    return np.stack([np.tile(along, side), np.repeat(along, side), np.ones(side**2)])
 
 
 def _window_indices(pixels: NDArray[np.float64], rows: slice, columns: slice) -> NDArray[np.intp]:
     """Return indices (n,) into the flattened window with its border.
 
-    Parameters
-    ----------
-    pixels : ndarray (3, n)
-        Homogeneous coordinates in the frame with a border of one pixel.
-    rows, columns : slice
-        The window. Pixels outside are moved to its border.
+    `pixels` (3, n) are homogeneous coordinates in the frame with a border of one pixel. Pixels
+    outside the window are moved to its border.
     """
     positions = pixels[:2] / pixels[2]
     np.maximum(positions, [[columns.start], [rows.start]], out=positions)
@@ -199,14 +191,7 @@ def _facing(
 
 
 def check_depth_limits(near_m: float | None, far_m: float | None, diagonal_m: float) -> None:
-    """Check that limits of depth are metres.
-
-    Parameters
-    ----------
-    near_m, far_m : float, optional
-        See `nbv.robot.masks.object_mask`.
-    diagonal_m : float
-        Diagonal of the object's bounding box, metres.
+    """Check that the depth limits of an object with a diagonal are metres.
 
     Raises
     ------
@@ -233,16 +218,8 @@ def check_plausible_nearest(
     """Check that the nearest surface of a frame is at a plausible distance for the object.
 
     In another unit `reach_m` would cut the object to pieces or include everything behind it, and
-    the mask would not reveal the mistake.
-
-    Parameters
-    ----------
-    depth_m : (rows, columns) float32
-        Metres; 0 where nothing was measured.
-    reach_m, near_m : float
-        See `nbv.robot.masks.object_mask`.
-    diagonal_m : float
-        Diagonal of the object's bounding box, metres.
+    the mask would not reveal the mistake. The other parameters are those of
+    `nbv.robot.masks.object_mask`, and the diagonal of the object's bounding box.
 
     Raises
     ------

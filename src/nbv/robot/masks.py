@@ -122,19 +122,17 @@ def object_mask(
 
 
 def _without_islands(inside: Mask) -> Mask:
-    # As indices, which need no conversion below.
-    parts = np.empty(inside.shape, dtype=np.int64)
-    if ndimage.label(inside, _EIGHT, output=parts) == 1:
+    parts, n_parts = ndimage.label(inside, _EIGHT)
+    if n_parts == 1:
         return inside
-    # In Python, which is faster than numpy for a few numbers.
-    _, *sizes = np.bincount(parts.ravel()).tolist()
-    second, largest = sorted(sizes)[-2:]
+    sizes = np.bincount(parts.ravel())[1:]
+    second, largest = np.sort(sizes)[-2:]
     if second >= SECOND_OBJECT * largest:
         raise FrameError(
             "two-objects",
             f"two separate parts of {largest} and {second} pixels: mask one of them",
         )
-    return np.asarray(np.array([False, *(size >= ISLAND * largest for size in sizes)])[parts])
+    return np.asarray(np.append(False, sizes >= ISLAND * largest)[parts])
 
 
 def _limits(depth_m: DepthImage, near: float, far: float) -> str:

@@ -22,7 +22,6 @@ from nbv.errors import FrameError, UserError
 from nbv.labels import counted
 from nbv.robot.rotations import (
     MIN_SEPARATION_DEG,
-    are_neighbours,
     as_allowed,
     as_travel,
     at_rotations,
@@ -212,12 +211,10 @@ def next_view(
     last = rotations_deg[-1]
     taken = tuple(rotation - last for rotation in rotations_deg)
     n_steps = len(expected.total)
-    if allowed_deg is None:
-        allowed = _allowed_bins(n_bins, n_steps, taken, max_travel_deg)
-    else:
-        allowed = _allowed(as_allowed(allowed_deg), width, n_steps, taken, max_travel_deg)
-    rotation_deg = allowed.rotation_deg
-    if not rotation_deg.size and _allowed_bins(n_bins, n_steps, taken, 180.0).rotation_deg.size:
+    rotation_deg = bins_deg(n_bins) if allowed_deg is None else as_allowed(allowed_deg)
+    is_allowed, is_choice = _admissible(rotation_deg, n_steps, taken, max_travel_deg)
+    rotation_deg = rotation_deg[is_allowed]
+    if not rotation_deg.size and _admissible(bins_deg(n_bins), n_steps, taken)[0].any():
         raise UserError(
             "no admissible rotation; relax `allowed_deg` or `max_travel_deg`: a view is "
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
@@ -231,21 +228,18 @@ def next_view(
         now_deg += _optimism_deg(before, rotations_deg[:-1], n_bins)
     error = expected.after_deg
     if rotation_deg.size:
-        error = error + expected.optimism_deg(allowed.is_choice)
+        error = error + expected.optimism_deg(is_choice)
     # Rotations from the first view become rotations from the last one.
     error = np.roll(error, -round(last / width)) if last else error
     if allowed_deg is None:
-        cost, error_after_deg = (
-            error[allowed.is_allowed],
-            np.where(allowed.is_allowed, error, np.inf),
-        )
+        cost, error_after_deg = error[is_allowed], np.where(is_allowed, error, np.inf)
     else:
         cost, nearest = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
         error_after_deg = np.full(n_bins, np.inf)
         error_after_deg[nearest] = error[nearest]
     moves = [
         Move(rotation, abs(rotation), error_deg)
-        for rotation, error_deg in best_rotations(allowed.rotations, cost, allowed.near)
+        for rotation, error_deg in best_rotations(rotation_deg, cost, width)
     ]
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
@@ -269,7 +263,7 @@ def next_view(
 def _optimism_deg(before: Expected, rotations_deg: Sequence[float], n_bins: int) -> float:
     """Return the optimism of choosing a view after `rotations_deg`, degrees."""
     taken = tuple(rotation - rotations_deg[-1] for rotation in rotations_deg)
-    is_choice = _allowed_bins(n_bins, len(before.total), taken, 180.0).is_choice
+    _, is_choice = _admissible(bins_deg(n_bins), len(before.total), taken)
     return before.optimism_deg(is_choice) if is_choice.any() else 0.0
 
 
@@ -313,53 +307,19 @@ def as_rotation_list(
     return rotations
 
 
-@dataclass(frozen=True)
-class _Allowed:
-    """Admissible rotations from the last view.
-
-    Attributes
-    ----------
-    is_allowed : ndarray (n,)
-        Whether each requested rotation is admissible.
-    rotation_deg : ndarray (m,)
-        The admissible rotations.
-    rotations, near : list (m,)
-        The same rotations and their neighbourhood, for `best_rotations`.
-    is_choice : ndarray (n_steps,)
-        Whether each of n evenly spaced rotations from the first view is nearest to one of them.
-    """
-
-    is_allowed: NDArray[np.bool_]
-    rotation_deg: NDArray[np.float64]
-    rotations: list[float]
-    near: list[bool]
-    is_choice: NDArray[np.bool_]
-
-
-def _allowed(
+def _admissible(
     rotation_deg: NDArray[np.float64],
-    width: float,
     n_steps: int,
     taken: tuple[float, ...],
-    max_travel_deg: float,
-) -> _Allowed:
+    max_travel_deg: float = 180.0,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which rotations (n,) are within the travel and not too close to views `taken` so far.
 
-    The first of `taken` is the first view.
+    Also whether each of `n_steps` evenly spaced rotations from the first view, which is the first
+    of `taken`, is nearest to one of them.
     """
     apart = circular_distance_deg(rotation_deg[:, None], taken).min(axis=1)
     is_allowed = (apart >= MIN_SEPARATION_DEG) & (np.abs(rotation_deg) <= max_travel_deg)
-    left = rotation_deg[is_allowed]
     is_choice = np.zeros(n_steps, dtype=bool)
-    is_choice[nearest_bin(left - taken[0], n_steps)] = True
-    return _Allowed(is_allowed, left, left.tolist(), are_neighbours(left, width), is_choice)
-
-
-@lru_cache(maxsize=N_KEPT)
-def _allowed_bins(
-    n_bins: int, n_steps: int, taken: tuple[float, ...], max_travel_deg: float
-) -> _Allowed:
-    allowed = _allowed(bins_deg(n_bins), 360.0 / n_bins, n_steps, taken, max_travel_deg)
-    for array in (allowed.is_allowed, allowed.rotation_deg, allowed.is_choice):
-        array.flags.writeable = False
-    return allowed
+    is_choice[nearest_bin(rotation_deg[is_allowed] - taken[0], n_steps)] = True
+    return is_allowed, is_choice

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +69,6 @@ def crop_features(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
     return features.reshape(n, -1)
 
 
-@cache
 def _cells(side: int, n_cells: int) -> NDArray[np.float32]:
     """Return a matrix (side, n_cells) of 0 and 1 that sums pixels over cells when multiplied.
 
@@ -83,10 +82,6 @@ def fit_ood(sweeps: Sequence[Sweep]) -> OodModel:
     """Fit the score to calibration sweeps.
 
     With two objects or more, distances are to crops of other objects.
-
-    Parameters
-    ----------
-    sweeps : sequence of Sweep
     """
     every = max(1, sum(len(sweep.codes) for sweep in sweeps) // (3 * MOST_REFERENCES))
     features = np.concatenate([crop_features(sweep.codes[::every]) for sweep in sweeps])

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import cache
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import circular_distance_deg, nearest_bin, wrap_deg
 from nbv.core.lookup import LookupTable
-from nbv.errors import UserError
+from nbv.errors import UserError, check_number
 from nbv.robot.moves import as_rotations
 
 MIN_SEPARATION_DEG = 15.0
@@ -24,21 +21,15 @@ def signed_deg(rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(rotation_deg > 180.0, rotation_deg - 360.0, rotation_deg)
 
 
-@cache
 def bins_deg(n_bins: int) -> NDArray[np.float64]:
     """Return the rotations (n_bins,) of all bins of the circle, in (-180, 180]."""
-    rotation_deg = signed_deg(np.arange(n_bins, dtype=np.float64) * (360.0 / n_bins))
-    rotation_deg.flags.writeable = False
-    return rotation_deg
+    return signed_deg(np.arange(n_bins, dtype=np.float64) * (360.0 / n_bins))
 
 
 def as_allowed(allowed_deg: ArrayLike) -> NDArray[np.float64]:
     """Return the unique allowed rotations (m,) in (-180, 180], ordered by their angle in [0, 360).
 
-    Raises
-    ------
-    UserError
-        See `nbv.robot.moves.as_rotations`.
+    Same errors as `nbv.robot.moves.as_rotations`.
     """
     given = as_rotations(allowed_deg)
     rotation_deg = given[np.unique(wrap_deg(given), return_index=True)[1]]
@@ -49,13 +40,10 @@ def as_allowed(allowed_deg: ArrayLike) -> NDArray[np.float64]:
 
 def as_travel(max_travel_deg: float) -> float:
     """Return a maximum travel; raise UserError unless it is 0 or more."""
-    try:
-        given = float(max_travel_deg)
-    except (TypeError, ValueError):
-        given = float("nan")
-    if not given >= 0:
+    check_number("`max_travel_deg`", max_travel_deg)
+    if not max_travel_deg >= 0:
         raise UserError(f"`max_travel_deg`={max_travel_deg}: give degrees, 0 or more")
-    return given
+    return float(max_travel_deg)
 
 
 def at_rotations(
@@ -66,50 +54,36 @@ def at_rotations(
     return np.asarray(np.interp(rotation_deg, bins, cost, period=360.0))
 
 
-def are_neighbours(rotation_deg: NDArray[np.float64], width: float) -> list[bool]:
-    """Return whether each rotation (m,) and the next one on the circle are at most `width` apart.
-
-    The rotations are in (-180, 180], ordered by their angle in [0, 360); `width` is that of a bin.
-    """
-    gap = np.concatenate([rotation_deg[1:], rotation_deg[:1]]) - rotation_deg
-    is_near: list[bool] = (gap % 360.0 <= width + 1e-9).tolist()
-    return is_near
-
-
 def best_rotations(
-    rotation_deg: Sequence[float], cost: NDArray[np.floating], near: Sequence[bool]
+    rotation_deg: NDArray[np.float64], cost: NDArray[np.floating], width: float
 ) -> list[tuple[float, float]]:
     """Return the local minima of the cost, best first.
 
     Parameters
     ----------
-    rotation_deg : sequence of float (m,)
+    rotation_deg : ndarray (m,)
         In (-180, 180], ordered by their angle in [0, 360).
     cost : ndarray (m,)
         Without NaN.
-    near : sequence of bool (m,)
-        From `are_neighbours`.
+    width : float
+        Width of a bin, degrees. Rotations farther apart are not neighbours.
 
     Returns
     -------
     list of (rotation, cost)
-        Rotations with no better neighbour within a bin's width. Equal costs are ordered by travel.
-        All are `MIN_SEPARATION_DEG` or more apart; at most `N_ALTERNATIVES` follow the first.
+        Rotations with no better neighbour. Equal costs are ordered by travel. All are
+        `MIN_SEPARATION_DEG` or more apart; at most `N_ALTERNATIVES` follow the first.
     """
-    # In Python, which is faster than numpy for a hundred numbers.
-    costs = cost.tolist()
-    left = [
-        (own, rotation)
-        for own, after, before, is_near, was_near, rotation in zip(
-            *(costs, costs[1:] + costs[:1], costs[-1:] + costs[:-1]),
-            *(near, [*near[-1:], *near[:-1]], rotation_deg),
-            strict=True,
-        )
-        if not ((is_near and after < own) or (was_near and before < own))
-    ]
+    is_near = (np.roll(rotation_deg, -1) - rotation_deg) % 360.0 <= width + 1e-9
+    better_after = is_near & (np.roll(cost, -1) < cost)
+    better_before = np.roll(is_near, 1) & (np.roll(cost, 1) < cost)
+    is_minimum = ~(better_after | better_before)
+    minima = zip(cost[is_minimum].tolist(), rotation_deg[is_minimum].tolist(), strict=True)
     least, most = MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG
     ranked: list[tuple[float, float]] = []
-    for minimum, rotation in sorted(left, key=lambda pair: (pair[0], abs(pair[1]), pair[1] % 360)):
+    for minimum, rotation in sorted(
+        minima, key=lambda pair: (pair[0], abs(pair[1]), pair[1] % 360)
+    ):
         if all(least <= abs(rotation - other) <= most for other, _ in ranked):
             ranked.append((rotation, minimum))
         if len(ranked) > N_ALTERNATIVES:
@@ -127,13 +101,7 @@ def ranked_rotations(
 
     As in `LookupTable.recommend`, a rotation travels more than a bin. Without limits the table's
     recommendation is the first, because it includes the table's settings, such as a cost of travel.
-
-    Parameters
-    ----------
-    lookup : LookupTable
-    estimate_deg : float
-    allowed_deg, max_travel_deg
-        See `nbv.Recommender.recommend`.
+    The limits are those of `nbv.Recommender.recommend`.
 
     Raises
     ------
@@ -154,8 +122,7 @@ def ranked_rotations(
             f"than {width:g}°"
         )
     rotation_deg = rotation_deg[is_allowed]
-    near = are_neighbours(rotation_deg, width)
-    ranked = best_rotations(rotation_deg.tolist(), at_rotations(bin_costs, rotation_deg), near)
+    ranked = best_rotations(rotation_deg, at_rotations(bin_costs, rotation_deg), width)
     if allowed_deg is not None or max_travel_deg < all_deg.max():
         return ranked
     best = float(signed_deg(np.asarray(lookup.recommend(estimate_deg), dtype=np.float64)))
