@@ -6,12 +6,10 @@ computes only the beliefs after several views (``explorer_beliefs.js``).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from nbv.core.criteria import CRITERIA
 from nbv.core.lookup import LookupTable
@@ -21,14 +19,11 @@ from nbv.experiment.estimates import read_posteriors
 from nbv.experiment.explorer.data import (
     COLUMNS,
     Outcomes,
-    cost_error,
     methods_of,
     outcomes_of,
     outcomes_text,
     own_distributions_text,
-    own_error,
     page_table,
-    probability_error,
     ring_of,
     unit_facts,
 )
@@ -81,19 +76,6 @@ class ExplorerInputs:
     caution: Sequence[str] = ()
 
 
-class _Chunks:
-    """The texts of a page by name, and their quantisation errors by kind."""
-
-    def __init__(self) -> None:
-        self.texts: dict[str, str] = {}
-        self.errors: dict[str, list[float]] = {}
-
-    def add(self, name: str, text: str, **errors: float) -> None:
-        self.texts[name] = text
-        for kind, error in errors.items():
-            self.errors.setdefault(kind, []).append(error)
-
-
 def build_explorer(inputs: ExplorerInputs) -> str:
     """Return the page of a finished run.
 
@@ -108,11 +90,11 @@ def build_explorer(inputs: ExplorerInputs) -> str:
     frames = load_evaluations(inputs.evaluations)
     methods = methods_of(frames)
     criteria = list(dict.fromkeys(criterion for *_, criterion in inputs.lookups))
-    chunks = _Chunks()
+    chunks: dict[str, str] = {}
     units = []
     for index, (unit, frame) in enumerate(frames.items()):
         outcomes = outcomes_of(unit, frame)
-        chunks.add(f"unit-{index}", outcomes_text(outcomes))
+        chunks[f"unit-{index}"] = outcomes_text(outcomes)
         tables = _add_tables(chunks, inputs, criteria, index, unit, outcomes)
         images = _add_images(chunks, inputs, index, unit, outcomes)
         own = _add_own(chunks, inputs, index, unit, outcomes)
@@ -144,15 +126,8 @@ def build_explorer(inputs: ExplorerInputs) -> str:
         criteria=[name.replace("_", " ") for name in criteria],
         n_first_views=sum(len(unit["objects"]) * unit["views"] for unit in units),
         most_views=inputs.n_views,
-        chunks=chunks.texts,
-        errors={kind: _worst_error(kind, errors) for kind, errors in chunks.errors.items()},
-        cost_units=sorted({unit["tables"][0]["unit"] for unit in units}),
+        chunks=chunks,
     )
-
-
-def _worst_error(kind: str, errors: Iterable[float]) -> float:
-    """Return the mean of image errors, and the largest of all others."""
-    return float(np.mean(list(errors))) if kind == "grey" else max(errors)
 
 
 def _method_facts(name: str, methods: tuple[str, ...], policy: str) -> dict[str, Any]:
@@ -166,7 +141,7 @@ def _method_facts(name: str, methods: tuple[str, ...], policy: str) -> dict[str,
 
 
 def _add_tables(
-    chunks: _Chunks,
+    chunks: dict[str, str],
     inputs: ExplorerInputs,
     criteria: list[str],
     index: int,
@@ -177,12 +152,7 @@ def _add_tables(
     for i, (fold, criterion) in enumerate(_each_table(criteria, outcomes)):
         table = LookupTable.load(existing(inputs.lookups[*unit, fold, criterion]))
         stored = page_table(table)
-        chunks.add(
-            f"table-{index}-{i}",
-            stored.text,
-            probability=probability_error(stored, table),
-            cost=cost_error(stored, table),
-        )
+        chunks[f"table-{index}-{i}"] = stored.text
         coarse = coarse_bins(len(table.cost), outcomes.n_views)
         facts.append({"fold": fold, "criterion": criterion, "coarse": coarse, **stored.facts})
     return facts
@@ -208,19 +178,19 @@ def coarse_bins(n_bins: int, n_views: int) -> int:
 
 
 def _add_images(
-    chunks: _Chunks, inputs: ExplorerInputs, index: int, unit: Unit, outcomes: Outcomes
+    chunks: dict[str, str], inputs: ExplorerInputs, index: int, unit: Unit, outcomes: Outcomes
 ) -> dict[str, int] | None:
     if not inputs.depth:
         return None
     images = open_depth(existing(inputs.depth[unit]), existing(inputs.objects[unit]))
     for i, object_id in enumerate(outcomes.object_ids):
         ring = ring_of(images.of([object_id])[0])
-        chunks.add(f"ring-{index}-{i}", ring.data, grey=ring.grey_error)
+        chunks[f"ring-{index}-{i}"] = ring.data
     return {"count": ring.n_images, "side": ring.side, "columns": COLUMNS}
 
 
 def _add_own(
-    chunks: _Chunks, inputs: ExplorerInputs, index: int, unit: Unit, outcomes: Outcomes
+    chunks: dict[str, str], inputs: ExplorerInputs, index: int, unit: Unit, outcomes: Outcomes
 ) -> dict[str, int] | None:
     if not inputs.posteriors:
         return None
@@ -228,6 +198,5 @@ def _add_own(
         tested = zip(outcomes.object_ids, outcomes.folds, strict=True)
         ids = [name for name, tested_in in tested if tested_in == fold]
         posteriors = read_posteriors(existing(inputs.posteriors[*unit, fold]), ids)
-        text = own_distributions_text(posteriors)
-        chunks.add(f"own-{index}-{fold}", text, own=own_error(posteriors))
+        chunks[f"own-{index}-{fold}"] = own_distributions_text(posteriors)
     return {"classes": posteriors.log_posterior.shape[2]}

@@ -81,11 +81,6 @@ class Quantised:
     low: float
     high: float
 
-    @property
-    def restored(self) -> NDArray[np.float64]:
-        """The table as the page decodes it."""
-        return self.low + self.codes.astype(np.float64) * ((self.high - self.low) / 255.0)
-
 
 def quantised(table: NDArray[np.floating[Any]]) -> Quantised:
     """Quantise a table in equal steps from its least to its largest value."""
@@ -124,14 +119,11 @@ class Ring:
         A WebP picture in base64.
     n_images, side : int
         Number of images, evenly spaced from azimuth 0 on, and their side in pixels.
-    grey_error : float
-        The mean difference to the grey levels of the figures, in [0, 255].
     """
 
     data: str
     n_images: int
     side: int
-    grey_error: float
 
 
 def ring_of(codes: Codes) -> Ring:
@@ -151,12 +143,7 @@ def ring_of(codes: Codes) -> Ring:
     picture = grid.reshape(rows * side, COLUMNS * side)
     stored = io.BytesIO()
     Image.fromarray(picture).save(stored, "webp", quality=_QUALITY, method=6)
-    seen = np.asarray(Image.open(stored).convert("L"), dtype=np.float64)
-    data = base64.b64encode(stored.getvalue()).decode("ascii")
-    return Ring(data, n_images, side, float(np.abs(seen - picture).mean()))
-
-
-Floats = NDArray[np.float64]
+    return Ring(base64.b64encode(stored.getvalue()).decode("ascii"), n_images, side)
 
 
 @dataclass(frozen=True)
@@ -179,18 +166,6 @@ class PageTable:
     logs: Quantised
     cost: Quantised
     unit: str
-
-    @property
-    def estimate_likelihood(self) -> Floats:
-        """L[viewpoint, estimate]."""
-        weights = np.exp(self.logs.restored)
-        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-    @property
-    def viewpoint_likelihood(self) -> Floats:
-        """V[estimate, viewpoint]."""
-        weights = self.estimate_likelihood.T
-        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -219,45 +194,16 @@ def page_table(table: LookupTable) -> PageTable:
     )
 
 
-def probability_error(stored: PageTable, table: LookupTable) -> float:
-    """Return the largest error of the page's probabilities p(viewpoint | estimate).
-
-    Relative to the largest probability of the same row.
-    """
-    exact = table.viewpoint_likelihood.astype(np.float64)
-    off = np.abs(stored.viewpoint_likelihood - exact)
-    return float((off.max(axis=1) / exact.max(axis=1)).max())
-
-
-def cost_error(stored: PageTable, table: LookupTable) -> float:
-    """Return the largest error of the page's costs, in the cost's unit."""
-    return float(np.abs(stored.cost.restored - table.cost).max())
-
-
 def own_distributions_text(posteriors: Posteriors) -> str:
     """Return the distributions of the images at the azimuths of the classes, as text.
 
     Square roots in 256 steps, relative to the largest of the distribution; (n_objects, k, k) bytes.
     """
-    return as_text(own_codes(posteriors).tobytes())
-
-
-def own_codes(posteriors: Posteriors) -> NDArray[np.uint8]:
-    """Return the codes (n_objects, k, k) of `own_distributions_text`."""
     rows = posteriors.distributions
     n_views, n_classes = rows.shape[1:]
     shown = rows[:, :: n_views // n_classes]
     roots = np.sqrt(shown / shown.max(axis=-1, keepdims=True))
-    return np.asarray(np.rint(255.0 * roots).astype(np.uint8))
-
-
-def own_error(posteriors: Posteriors) -> float:
-    """Return the largest error of the stored distributions, relative to each one's largest."""
-    rows = posteriors.distributions
-    shown = rows[:, :: rows.shape[1] // rows.shape[2]]
-    kept = own_codes(posteriors).astype(np.float64) ** 2
-    kept /= kept.sum(axis=-1, keepdims=True)
-    return float((np.abs(kept - shown).max(axis=-1) / shown.max(axis=-1)).max())
+    return as_text(np.rint(255.0 * roots).astype(np.uint8).tobytes())
 
 
 @dataclass(frozen=True)
