@@ -119,8 +119,6 @@ def test_an_unknown_centre_is_refused():
     ("vertices", "faces", "named"),
     [
         (np.eye(4, 3), np.empty((0, 3), int), "no faces"),
-        (np.eye(4, 3), [[0, 1, 9]], "vertex 9, of 4"),
-        (np.eye(4, 3), [[0, 1, -1]], "vertex -1, of 4"),
         ([[0, 0, 0], [1, np.nan, 0], [0, 1, 0]], [[0, 1, 2]], "vertex 1 is not finite, 1 of 3"),
         ([[0, 0, 0], [1, 0, 0], [0, np.inf, 0]], [[0, 1, 2]], "vertex 2 is not finite"),
         (np.ones((3, 3)), [[0, 1, 2]], "in one point"),

@@ -140,13 +140,6 @@ def test_images_of_other_objects_than_the_splits_are_refused():
             folds.check_objects(frame, others)
 
 
-def test_an_object_with_two_roles_is_refused():
-    frame = split(10)
-    frame.loc[1, "object_id"] = frame.loc[0, "object_id"]
-    with pytest.raises(UserError, match="'000' more than one role"):
-        folds.objects_with_role(frame, 1, "train")
-
-
 def test_reading_objects_of_another_role_is_refused():
     frame = split(10)
     train = folds.objects_with_role(frame, 1, "train")

@@ -36,15 +36,10 @@ _LEAST_AREA = 1e-12
 
 
 def direction(axis: str, key: str) -> NDArray[np.float64]:
-    """Return the unit vector of an axis of the file.
+    """Return the unit vector of an axis of the file, the value of the setting `key`.
 
-    Parameters
-    ----------
-    axis : str
-        One of ±x, ±y, ±z (a missing sign is +), or three numbers such as "0,-1,0". Backslashes
-        before the commas, which occur in ShapeNetSem's metadata, are ignored.
-    key : str
-        Name of the setting, for the error.
+    It is one of ±x, ±y, ±z (a missing sign is +), or three numbers such as "0,-1,0". Backslashes
+    before the commas, which occur in ShapeNetSem's metadata, are ignored.
 
     Raises
     ------
@@ -101,27 +96,16 @@ def frame_rotation(up: str, front: str, turn_deg: float) -> NDArray[np.float64]:
 
 
 def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
-    """Check that a mesh can be rendered.
-
-    Parameters
-    ----------
-    mesh : trimesh.Trimesh
-    origin : str
-        The mesh's source, for the error.
+    """Check that a mesh with valid indices can be rendered; `origin` is its source, for the error.
 
     Raises
     ------
     UserError
-        If it has no face, an invalid index, a used vertex that is not finite, an implausible
-        extent, or no area.
+        If it has no face, a used vertex that is not finite, an implausible extent, or no area.
     """
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     if len(faces) == 0:
         raise UserError(f"{origin}: the mesh has no faces; at least 1 triangle expected")
-    lowest, highest = int(faces.min()), int(faces.max())
-    if lowest < 0 or highest >= len(vertices):
-        wrong = lowest if lowest < 0 else highest
-        raise UserError(f"{origin}: a face refers to vertex {wrong}, of {len(vertices)} vertices")
     used = np.unique(faces)
     broken = used[~np.isfinite(vertices[used]).all(axis=1)]
     if len(broken):
@@ -252,11 +236,6 @@ def save_meshes(path: str | Path, meshes: Mapping[str, Surface]) -> None:
         "face_offsets": np.concatenate([[0], np.cumsum(face_counts)]).astype(np.int64),
     }
     write_arrays(path, arrays)
-
-
-def stored_ids(path: str | Path) -> list[str]:
-    """Return the ids in a file of `save_meshes`, with the errors of `load_meshes`."""
-    return list(load_meshes(path))
 
 
 def load_meshes(path: str | Path) -> dict[str, Mesh]:

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 
 from nbv.core.policies import needs_lookup
 from nbv.core.selection import check_methods
-from nbv.data.meshes import stored_ids
+from nbv.data.meshes import load_meshes
 from nbv.data.render import RENDERERS
 from nbv.data.sensors import SENSORS, check_sensor
 from nbv.data.sources import SOURCES, open_source, select_objects
@@ -339,7 +339,7 @@ def _objects(config: Mapping[str, Any]) -> dict[str, Sequence[str]]:
     for category in categories:
         prepared = Path("results", config["name"], "meshes", f"{category}.npz")
         if gone and prepared.exists():
-            objects[category] = stored_ids(prepared)
+            objects[category] = list(load_meshes(prepared))
             continue
         try:
             source = open_source(config["dataset"], config["seed"])

@@ -167,12 +167,10 @@ def read_cells(path: Path) -> dict[tuple[str, ...], CellRecord]:
     Raises
     ------
     UserError
-        If a column is missing.
+        If a column is missing, or there are no cells.
     """
     frame = read_csv(path)
-    absent = [name for name in CELL_COLUMNS if name not in frame.columns]
-    if absent:
-        raise UserError(f"{path}: no column {absent[0]!r}; delete the file and make it again")
+    check_columns(path, frame, CELL_COLUMNS)
     frame = frame.astype(dict.fromkeys(CELL_COLUMNS[:4], str))
     cells = [{name: cell[name] for name in CELL_COLUMNS} for cell in frame.to_dict("records")]
     return {tuple(cell[name] for name in CELL_KEY): cell for cell in cells}

@@ -32,16 +32,8 @@ def make_splits(
 
     Of a fold's remaining objects, `calibration_fraction` (at least one, and at least one is left
     to train on) calibrate and the others train; or they are divided into parts. A fraction of 1
-    leaves none to train on. The test objects of a fold do not depend on this.
-
-    Parameters
-    ----------
-    object_ids : sequence of str, distinct
-    n_folds : int, 2 or more
-    calibration_fraction : float in (0, 1]
-    rng : numpy.random.Generator
-    crossfit_parts : int, 2 or more, optional
-        Parts of equal size (to within one object) for cross-fitting; None for held-out calibration.
+    leaves none to train on. The test objects of a fold do not depend on this. `crossfit_parts` is
+    the number of parts for cross-fitting, of equal size (to within one object).
 
     Returns
     -------
@@ -136,14 +128,11 @@ def objects_with_role(splits: pd.DataFrame, fold: int, *roles: str) -> list[str]
     Raises
     ------
     UserError
-        Where the fold is absent or an object has more than one role in it.
+        Where the fold is absent.
     """
     in_fold = splits[splits["fold"] == fold]
     if in_fold.empty:
         raise UserError(f"fold {fold} is not in the splits: they have {splits['fold'].nunique()}")
-    repeated = in_fold.loc[in_fold["object_id"].duplicated(), "object_id"]
-    if len(repeated):
-        raise UserError(f"fold {fold} gives object {repeated.iloc[0]!r} more than one role")
     return [str(name) for name in in_fold.loc[in_fold["role"].isin(roles), "object_id"]]
 
 
