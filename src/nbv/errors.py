@@ -136,20 +136,7 @@ class BundleError(NamedError):
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """Suggest what a misspelt name probably means.
-
-    Parameters
-    ----------
-    name : str
-        The name that the user gave.
-    valid : iterable of str
-        All valid names.
-
-    Returns
-    -------
-    str
-        ``"did you mean 'x'?"`` if a valid name is close, else ``"choose from: a, b, c"``.
-    """
+    """Return ``did you mean 'x'?`` if a valid name is close, else ``choose from: a, b, c``."""
     choices = sorted(valid)
     close = difflib.get_close_matches(name, choices, n=1, cutoff=0.6)
     return f"did you mean {close[0]!r}?" if close else f"choose from: {', '.join(choices)}"

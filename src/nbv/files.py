@@ -81,13 +81,7 @@ def write_csv(path: str | Path, frame: pd.DataFrame, decimals: int = 4) -> None:
 
 @contextmanager
 def readable(path: str | Path, remedy: str = RUN_AGAIN) -> Iterator[None]:
-    """Convert any error of a reader into a UserError that names the file.
-
-    Parameters
-    ----------
-    path : path
-    remedy : str
-        The remedy for a damaged file.
+    """Convert any error of a reader into a UserError that names the file, and a remedy.
 
     Raises
     ------
@@ -255,20 +249,12 @@ def read_numbers(path: Path) -> NDArray[Any]:
 def read_arrays(
     path: str | Path, names: Iterable[str] = (), remedy: str = RUN_AGAIN
 ) -> dict[str, NDArray[Any]]:
-    """Read an `.npz` of `write_arrays`.
-
-    Parameters
-    ----------
-    path : path
-    names : iterable of str
-        Required arrays.
-    remedy : str
-        The remedy for a damaged file.
+    """Read an `.npz` of `write_arrays`, with the errors of `readable`.
 
     Raises
     ------
     UserError
-        If an array is missing, and the errors of `readable`.
+        If one of the arrays `names` is missing.
     """
     with readable(path, remedy), np.load(path, allow_pickle=False) as stored:
         arrays = {name: stored[name] for name in stored.files}

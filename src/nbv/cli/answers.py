@@ -115,17 +115,9 @@ def recommendation_as_json(
     targets: Sequence[NDArray[np.float64]] | None,
     assumed_focal_px: float | None = None,
 ) -> dict[str, Any]:
-    """Return a recommendation for JSON.
+    """Return a recommendation for JSON, with all warnings and the camera's poses after its moves.
 
-    Parameters
-    ----------
-    answer : Recommendation
-    warnings : iterable of str
-        Warnings of the answer and of the camera's pose.
-    targets : sequence of ndarray (4, 4), optional
-        The camera's pose after the move and after each alternative.
-    assumed_focal_px : float, optional
-        Pixels; None if intrinsics were given.
+    `assumed_focal_px` is None if intrinsics were given.
     """
     known = {
         "azimuth_deg": answer.azimuth_deg,
@@ -202,12 +194,7 @@ def print_offset(name: str, number: str, offset: Offset, *, is_added: bool = Fal
 def print_evaluation(errors: pd.DataFrame, ood: pd.DataFrame) -> None:
     """Print the errors of every recording, one line for each way to choose views.
 
-    Parameters
-    ----------
-    errors : DataFrame
-        From `nbv.robot.evaluation.evaluate`.
-    ood : DataFrame
-        From `nbv.robot.evaluation.count_ood`.
+    The frames are those of `evaluate` and `count_ood` in `nbv.robot.evaluation`.
     """
     for about in ood.to_dict("records"):
         is_recording = (errors["object_id"] == about["object_id"]) & (

@@ -139,16 +139,9 @@ def allowed_rotations(given: list[float] | Path | None) -> Any:
 
 
 def check_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:
-    """Check that a file can be written, before anything is computed.
+    """Check that the file of an option can be written, before anything is computed.
 
-    Parameters
-    ----------
-    option : str
-        Such as ``--plot``.
-    path : path
-        Missing folders are made later.
-    kinds : sequence of str
-        Allowed suffixes; all without it.
+    Missing folders are made later. Without `kinds`, all suffixes are allowed.
 
     Raises
     ------

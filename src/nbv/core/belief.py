@@ -58,15 +58,8 @@ def updated(
 ) -> Belief:
     """Update a belief by the estimate of another view, by Bayes' rule.
 
-    Views are assumed to be independent given the pose.
-
-    Parameters
-    ----------
-    belief : Belief
-    estimate_deg, delta_deg : ndarray (n,)
-        The estimate of that view, and the rotation from the first view to it, degrees.
-    evidence : Evidence
-        The estimator that took it, with B bins.
+    Views are assumed to be independent given the pose. `delta_deg` (n,) is the rotation from the
+    first view to that one, and the evidence that of the estimator that took it.
     """
     n_bins = evidence.n_bins
     rotated = nearest_bin(delta_deg, n_bins)[:, None] + np.arange(n_bins)
@@ -79,15 +72,9 @@ def updated(
 def multiplied(
     belief: Belief, distributions: NDArray[np.floating[Any]], delta_deg: NDArray[np.int64]
 ) -> Belief:
-    """Update a belief by the distribution of another view; see `product_of`.
+    """Update a belief by the distribution (n, B) of another view, in its frame; see `product_of`.
 
-    Parameters
-    ----------
-    belief : Belief
-    distributions : ndarray (n, B)
-        p(azimuth | image) in the frame of that view.
-    delta_deg : ndarray (n,)
-        The rotation from the first view to it, a multiple of 360 / B.
+    `delta_deg` (n,) is the rotation from the first view to it, a multiple of 360 / B.
     """
     product = product_of(belief.probabilities, distributions, delta_deg)
     rows = (product / product.sum(axis=1, keepdims=True)).astype(np.float32)

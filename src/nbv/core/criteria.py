@@ -85,21 +85,10 @@ def pose_likelihood(conditionals: Conditionals, name: str) -> Float32Array:
 
 
 def two_view_poses(viewpoint: Float32Array, pose: Float32Array, delta_bins: int) -> Float32Array:
-    """Return p(theta | estimate, delta) for one rotation (Eqs. 3 and 6).
+    """Return p(theta | estimate, delta) for one rotation in bins (Eqs. 3 and 6), (n, B).
 
-    Parameters
-    ----------
-    viewpoint : ndarray (n, B) float32
-        V[estimate, viewpoint].
-    pose : ndarray (B, B) float32
-        T[viewpoint, pose] of the estimator that takes both views.
-    delta_bins : int
-        The rotation, in bins.
-
-    Returns
-    -------
-    ndarray (n, B) float32
-        Rows are distributions; a row is uniform if the two factors exclude each other.
+    It is a mixture by V[estimate, viewpoint] (n, B) of products of T[viewpoint, pose] (B, B), that
+    of the estimator that takes both views. A product of factors that exclude each other is uniform.
     """
     return _mixed(viewpoint, pose, np.roll(pose, (-delta_bins, -delta_bins), axis=(0, 1)))
 

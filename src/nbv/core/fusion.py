@@ -26,16 +26,8 @@ Rotations = NDArray[np.int64]
 def at_second_view(outputs: NDArray[np.float64], delta_deg: Rotations) -> NDArray[np.float64]:
     """Return the outputs of an estimator at the views that rotations lead to.
 
-    Parameters
-    ----------
-    outputs : ndarray (n_objects, n_views, ...)
-        The estimate or distribution of each view; view k of n has the azimuth 360 k / n.
-    delta_deg : ndarray (n_objects, n_views) int
-        The rotation from each view, a multiple of 360 / n.
-
-    Returns
-    -------
-    ndarray (n_objects, n_views, ...)
+    Outputs (n_objects, n_views, ...) are the estimates or distributions of all views; view k of n
+    has the azimuth 360 k / n. Rotations (n_objects, n_views) are multiples of 360 / n.
     """
     n_objects, n_views = delta_deg.shape
     views = np.arange(n_views) + np.rint(delta_deg * (n_views / 360.0)).astype(np.intp)

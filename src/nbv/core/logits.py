@@ -56,11 +56,7 @@ def on_degrees(posterior: Floats, n_bins: int = 360) -> Floats:
 def log_likelihood(log_posterior: NDArray[np.floating], azimuth_deg: ArrayLike) -> Floats:
     """Return the log densities (...) at azimuths, in nats per degree.
 
-    Parameters
-    ----------
-    log_posterior : ndarray (..., k)
-        Logs of distributions over classes.
-    azimuth_deg : array-like, broadcasting to (...)
+    `log_posterior` (..., k) are logs of distributions over classes; azimuths broadcast to (...).
     """
     n_classes = log_posterior.shape[-1]
     below, part = _neighbours(np.broadcast_to(azimuth_deg, log_posterior.shape[:-1]), n_classes)

@@ -44,18 +44,8 @@ def spaced_errors_deg(
 ) -> Float32Array:
     """Return the error of the product of n views at each spacing, from every view.
 
-    Parameters
-    ----------
-    distributions : ndarray (n_objects, B, B)
-        p(azimuth | image) of sweeps of views one bin apart.
-    n_views : int
-    spacings : ndarray (S,) int
-        In bins.
-
-    Returns
-    -------
-    ndarray (S, n_objects, B) float32
-        In degrees.
+    In degrees, (S, n_objects, B), for the distributions (n_objects, B, B) of sweeps of views one
+    bin apart, and spacings (S,) in bins.
     """
     n_objects, n_bins, _ = distributions.shape
     logs = np.log(np.maximum(distributions, NEGLIGIBLE_PROBABILITY)).astype(np.float32)
@@ -182,23 +172,8 @@ def excess_of_plans(
     It is a kernel regression on the first view's distribution, as in `nbv.core.criteria`, plus
     `caution` standard errors over calibration objects: few objects contain few of the rare large
     errors, so the least of many means is too optimistic. With a single object, only the first plan
-    is finite.
-
-    Parameters
-    ----------
-    belief : Belief
-        Beliefs after n first views by the estimator of `evidence`.
-    evidence : Evidence
-        Evidence from distributions, with the settings ``affinity``.
-    errors : ndarray (P, n_objects, B)
-        The error of each plan from each view of the calibration objects, degrees.
-    caution : float
-        Number of standard errors.
-
-    Returns
-    -------
-    ndarray (n, P) float32
-        In degrees.
+    is finite. In degrees, (n, P), for beliefs after n first views, and errors (P, n_objects, B) of
+    each plan from each view of the calibration objects.
 
     Raises
     ------

@@ -150,13 +150,8 @@ def needs_lookup(policy: str) -> bool:
 def two_views(policy: str, fusion: str, views: TestViews) -> TwoViews:
     """Choose a second view for every first view and fuse the two.
 
-    Parameters
-    ----------
-    policy : str
-        ``none`` (a single view) or a name in `POLICIES`.
-    fusion : str
-        A name in `nbv.core.fusion.FUSIONS`.
-    views : TestViews
+    The policy is ``none`` (a single view) or a name in `POLICIES`, the fusion one in
+    `nbv.core.fusion.FUSIONS`.
 
     Raises
     ------

@@ -259,14 +259,7 @@ class SelectedMethod:
 
 
 def check_methods(methods: Methods, extensions: Methods, gives_distributions: bool) -> None:
-    """Check a configuration's methods of the paper and its extensions.
-
-    Parameters
-    ----------
-    methods, extensions : mapping
-        ``policy`` and ``fusion`` of each method.
-    gives_distributions : bool
-        Whether the estimator gives p(azimuth | image).
+    """Check a configuration's methods of the paper and its extensions, a policy and a fusion each.
 
     Raises
     ------

@@ -76,19 +76,9 @@ def shortest_walk_deg(
 ) -> NDArray[np.float64]:
     """Return an upper bound of the travel after each next rotation, (n, B) degrees.
 
-    The remaining views are taken in one direction around the circle, each as soon as it is far
-    enough from all others. The bound is infinite if there is no room for them.
-
-    Parameters
-    ----------
-    taken_deg : ndarray (n, t)
-        Rotations of the views so far.
-    n_bins : int
-        B; rotations are multiples of 360 / B.
-    n_more : int
-        Number of views after the next one.
-    min_separation_deg : float
-        Smallest distance between views.
+    The `n_more` views after the next one are taken in one direction around the circle, each as soon
+    as it is far enough from all others, the views so far (n, t) included. The bound is infinite if
+    there is no room for them.
     """
     different, row_of = np.unique(taken_deg, axis=0, return_inverse=True)
     rotations = np.arange(n_bins) * (360.0 / n_bins)

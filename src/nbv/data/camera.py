@@ -124,19 +124,10 @@ class Views:
 def viewpoint_frames(
     elevation_deg: float, azimuths_deg: ArrayLike
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the image axes (right, up, forward) of cameras directed at the origin, z up.
+    """Return the image axes right, up and forward, (k, 3) each, of cameras directed at the origin.
 
-    Parameters
-    ----------
-    elevation_deg : float
-        In [-90, 90]; at ±90° the image's up is away from (towards) the azimuth.
-    azimuths_deg : (k,) float
-        Counter-clockwise about +z from +x.
-
-    Returns
-    -------
-    right, up, forward : (k, 3) float
-        Orthonormal; the camera is at −distance · forward.
+    Azimuths (k,) are counter-clockwise about +z, which points up, from +x. At elevations of ±90°
+    the image's up is away from (towards) the azimuth. The camera is at −distance · forward.
     """
     azimuth = np.radians(np.atleast_1d(np.asarray(azimuths_deg, dtype=np.float64)))
     elevation = np.radians(elevation_deg)
@@ -176,11 +167,8 @@ def object_views(
     ----------
     vertices : (n, 3) float
         Object frame, in object diagonals.
-    faces : (m, 3) int
     elevation_deg : float
         In [-90, 90].
-    azimuths_deg : (k,) float
-    camera : Camera
 
     Raises
     ------
@@ -216,11 +204,7 @@ def object_views(
 def principal_shift(outline: Floats, camera: Camera) -> Floats:
     """Return the normalised coordinates (x, y) of the middle of each image, (k, 2).
 
-    Parameters
-    ----------
-    outline : (k, 4) float
-        x_min, x_max, y_min, y_max of the projected object.
-    camera : Camera
+    `outline` (k, 4) is that of `Views`.
     """
     if camera.framing == "axis":
         return np.zeros((len(outline), 2))

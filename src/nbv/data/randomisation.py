@@ -90,14 +90,10 @@ def randomised_sweep(
         A mesh of unit diagonal.
     elevation_deg : float
         Centre of the random elevation, in [0, `HIGHEST_DEG`].
-    azimuths_deg : (k,) float
     camera : Camera
         Its distance and focal length define the size of a pixel on the object.
-    renderer : Renderer
-    sensor : Sensor or None
     diagonal_m : float
         Metres per object diagonal, for the sensor.
-    randomisation : Randomisation
     rng : numpy.random.Generator
         A generator for this object and elevation alone.
 

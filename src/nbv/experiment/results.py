@@ -93,10 +93,6 @@ ESTIMATED_ROLES = ("calibration", "test")
 def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.DataFrame]:
     """Read the errors of methods by unit.
 
-    Parameters
-    ----------
-    files : mapping of (category, elevation_deg, fold, method) to path
-
     Returns
     -------
     dict of (category, elevation_deg) to pandas.DataFrame

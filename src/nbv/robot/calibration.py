@@ -141,8 +141,6 @@ def recalibrated(
 
     Parameters
     ----------
-    bundle : Bundle
-    sweeps : sequence of Sweep
     origin : str
         Source of the sweeps, for the provenance.
     density : mapping

@@ -83,12 +83,7 @@ def fixed_errors_deg(views: LookAlikes, n_views: int) -> NDArray[np.float64]:
 def best_fixed_deg(errors_deg: NDArray[np.float64], sweep_weights: NDArray[np.float64]) -> float:
     """Return the step of least mean error on calibration sweeps, degrees.
 
-    Parameters
-    ----------
-    errors_deg : ndarray (S, B)
-        From `fixed_errors_deg`.
-    sweep_weights : ndarray (S,)
-        Weights of the calibration sweeps, above 0.
+    `errors_deg` (S, B) are those of `fixed_errors_deg`; the sweeps' weights (S,) are above 0.
     """
     return float((sweep_weights @ errors_deg).argmin() * (360.0 / errors_deg.shape[1]))
 
@@ -100,12 +95,8 @@ Chooser = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float6
 def replay(predictions: Predictions, choose: Chooser, n_views: int) -> NDArray[np.float64]:
     """Return the signed pose error after each number of views, from every first frame.
 
-    Each next view is the unused frame nearest to the chosen rotation.
-
-    Returns
-    -------
-    ndarray (n, n_views)
-        Degrees in [-180, 180).
+    In degrees, (n, n_views), in [-180, 180). Each next view is the unused frame nearest to the
+    chosen rotation.
     """
     azimuth_deg, distributions = predictions.azimuth_deg, predictions.distributions
     n = len(azimuth_deg)
@@ -197,15 +188,8 @@ def paper_errors(
     """Return the signed error (n,) of the paper's method from every first frame, degrees.
 
     The paper takes two views. For more, the table recommends the next rotation from each newest
-    estimate, and all estimates are averaged as directions.
-
-    Parameters
-    ----------
-    predictions : Predictions
-    tables : PaperTables
-    elevation_deg : float
-        NaN where it is unknown.
-    n_views : int
+    estimate, and all estimates are averaged as directions. `elevation_deg` is NaN where it is
+    unknown.
     """
     azimuth_deg = predictions.azimuth_deg
     estimates = mean_direction_deg(predictions.distributions)

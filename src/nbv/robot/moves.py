@@ -356,13 +356,7 @@ def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[
 
 
 def read_rotations(path: str | Path) -> NDArray[np.float64]:
-    """Read rotations in degrees, or a mask of them, from ``.npy``.
-
-    Raises
-    ------
-    UserError
-        Where the file cannot be read, and as in `as_rotations`.
-    """
+    """Read rotations in degrees, or a mask of them, from ``.npy``; errors as in `as_rotations`."""
     path = Path(path)
     if path.suffix.lower() != ".npy":
         raise UserError(f"{path}: give rotations in degrees, or a .npy file")
@@ -370,12 +364,6 @@ def read_rotations(path: str | Path) -> NDArray[np.float64]:
 
 
 def read_pose(path: str | Path) -> Pose:
-    """Read a pose from ``.npy``, ``.json``, or text with 16 numbers.
-
-    Raises
-    ------
-    UserError
-        Where the file cannot be read, and as in `as_pose`.
-    """
+    """Read a pose from ``.npy``, ``.json``, or text with 16 numbers; errors as in `as_pose`."""
     path = Path(path)
     return as_pose(read_numbers(path), str(path))

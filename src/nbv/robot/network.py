@@ -77,14 +77,6 @@ def open_session(model: bytes) -> onnxruntime.InferenceSession:
 def open_network(model: bytes, image_side: int, n_classes: int) -> Network:
     """Return the network of an ONNX model of `nbv.experiment.estimation.make_bundle.onnx_model`.
 
-    Parameters
-    ----------
-    model : bytes
-    image_side : int
-        Side of the crops, pixels.
-    n_classes : int
-        Number of logits.
-
     Raises
     ------
     BundleError
@@ -114,11 +106,6 @@ def mirrored_classes(n_classes: int, plane_deg: float) -> NDArray[np.intp]:
     """Return the class (n_classes,) that each class becomes in a mirror image.
 
     `plane_deg` is the azimuth of the mirror plane; twice that azimuth has to be a class.
-
-    Examples
-    --------
-    >>> mirrored_classes(4, 90.0).tolist()
-    [2, 1, 0, 3]
     """
     return (round(2 * plane_deg * n_classes / 360) - np.arange(n_classes)) % n_classes
 

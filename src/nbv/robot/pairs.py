@@ -135,12 +135,7 @@ class PairTable:
         return Offset.of(azimuth_deg, estimate_deg, FOR_PAIRS)
 
     def objects(self, elevations_deg: Mapping[str, Sequence[int]]) -> dict[str, list[str]]:
-        """Return the ids of the objects in each category.
-
-        Parameters
-        ----------
-        elevations_deg : mapping of str to sequence of int
-            The elevations in each category.
+        """Return the ids of the objects in each category, given its elevations.
 
         Raises
         ------

@@ -162,8 +162,6 @@ def run_network(
 
     Parameters
     ----------
-    recommender : Recommender
-    recording : Recording
     intrinsics : str or None
         Intrinsics of frames without any in the manifest; see `nbv.robot.intrinsics.camera_of`.
     depth_scale : float or None

@@ -68,20 +68,9 @@ class Sensor(Protocol):
 
 
 def sensor_settings(sensor: Mapping[str, Any], category: str, seed: int) -> dict[str, Any]:
-    """Return the settings of ``sensor`` for the images of a category.
+    """Return the settings of ``sensor`` for the images of a category, which `open_sensor` takes.
 
-    Parameters
-    ----------
-    sensor : mapping
-        ``name, parameters, diagonal_m``, the last with an entry for each category.
-    category : str
-    seed : int
-        Seed of the run.
-
-    Returns
-    -------
-    dict
-        The argument of `open_sensor`; for `IDEAL` without size and seed.
+    The sensor's ``diagonal_m`` has an entry for each category, unless it is `IDEAL`.
 
     Raises
     ------

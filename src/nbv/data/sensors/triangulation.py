@@ -146,18 +146,8 @@ def displaced(
     """Return measured depth with a normal error of position at edges.
 
     Within a surface the published axial noise includes such errors. The position of an edge between
-    two pixel centres is unknown, so displacements are rounded at random without bias.
-
-    Parameters
-    ----------
-    measured : (k, rows, columns) float32
-        Measured depth of each pixel, 0 without a measurement.
-    z : (k, rows, columns) float32
-        True depth.
-    sigma_px : (k, rows, columns) float32
-        Standard deviation of the displacement along rows and along columns.
-    focal_px, rng
-        See the module.
+    two pixel centres is unknown, so displacements are rounded at random without bias. `sigma_px`
+    (k, rows, columns) is their standard deviation along rows and along columns.
     """
     shifts = []
     for _ in range(2):

@@ -72,14 +72,7 @@ class MeshSource(Protocol):
 
 
 def open_source(settings: Mapping[str, Any], seed: int) -> MeshSource:
-    """Return the source named in the configuration.
-
-    Parameters
-    ----------
-    settings : mapping
-        The configuration's group ``dataset``.
-    seed : int
-        See `MeshSource`.
+    """Return the source named in the configuration's group ``dataset``.
 
     Raises
     ------
@@ -94,22 +87,10 @@ def open_source(settings: Mapping[str, Any], seed: int) -> MeshSource:
 
 
 def select_objects(source: MeshSource, category: str, n_objects: int | None) -> list[str]:
-    """Select objects of a category.
+    """Select objects of a category, all if `n_objects` is None; return their sorted ids.
 
     The selection depends only on the seed and the ids. A new file in a folder replaces at most one
     selected object.
-
-    Parameters
-    ----------
-    source : MeshSource
-    category : str
-    n_objects : int or None
-        None selects all.
-
-    Returns
-    -------
-    list of str
-        Sorted ids.
 
     Raises
     ------
@@ -146,18 +127,7 @@ _SECONDS_BETWEEN_LINES = 5.0
 
 
 def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str]) -> dict[str, Mesh]:
-    """Load, check and normalise meshes.
-
-    Parameters
-    ----------
-    source : MeshSource
-    category : str
-    object_ids : sequence of str
-
-    Returns
-    -------
-    dict of str to Mesh
-        In the order of `object_ids`.
+    """Load, check and normalise meshes, in the order of `object_ids`.
 
     Raises
     ------

@@ -29,23 +29,7 @@ def outputs_of_parts(
     parts: Sequence[Sequence[str]],
     hardware: Hardware,
 ) -> tuple[list[str], Outputs]:
-    """Return the outputs for objects that are divided among estimators.
-
-    Parameters
-    ----------
-    estimators : sequence of Estimator
-        One for each part.
-    images : DepthImages
-        All objects of a category.
-    parts : sequence of sequence of str
-        Object ids by part.
-    hardware : Hardware
-
-    Returns
-    -------
-    object_ids : list of str
-        n objects, part by part.
-    outputs : ndarray (n, n_views, k) float64
+    """Return the ids of n objects, divided in parts among estimators, and outputs (n, n_views, k).
 
     Raises
     ------
@@ -71,19 +55,7 @@ def network_outputs(
     hardware: Hardware,
     batch_size: int = INFERENCE_BATCH,
 ) -> Outputs:
-    """Return the network's outputs for images.
-
-    Parameters
-    ----------
-    estimator : Estimator
-    codes : ndarray (..., side, side) uint8
-        Depth codes.
-    hardware : Hardware
-    batch_size : int
-
-    Returns
-    -------
-    ndarray (..., k) float64
+    """Return the network's outputs (..., k) for depth codes (..., side, side).
 
     Raises
     ------
@@ -138,12 +110,10 @@ def estimate_fold(
         All objects of a category.
     splits : DataFrame
         From `nbv.experiment.splits.read_splits`.
-    fold : int
     tested : Estimator
         The estimator of test objects.
     part_estimators : sequence of Estimator
         For cross-fitted calibration: the estimators that have not seen each part.
-    hardware : Hardware
     distributions : bool
         Whether outputs are logits of distributions. Calibration objects then choose one
         temperature (`nbv.core.logits.fit_temperature`).
@@ -182,12 +152,8 @@ def estimate_fold(
 def write_fold(paths: Mapping[str, str], fold_estimates: FoldEstimates) -> None:
     """Write a fold's estimates.
 
-    Parameters
-    ----------
-    paths : mapping
-        The files of ``calibration`` and ``test``, and where there are posteriors those of
-        ``calibration_posteriors`` and ``test_posteriors``.
-    fold_estimates : FoldEstimates
+    Paths are those of ``calibration`` and ``test``, and where there are posteriors those of
+    ``calibration_posteriors`` and ``test_posteriors``.
     """
     for role, (estimates, posteriors) in fold_estimates.items():
         write_estimates(paths[role], estimates)
