@@ -64,7 +64,7 @@ def _outward(vertices: Points, faces: NDArray[np.intp]) -> trimesh.Trimesh:
 def superellipse(
     half_width: float, half_height: float, exponent: float = 2.0, n: int = 24
 ) -> Points:
-    """Return an oval between ellipse and rectangle, counter-clockwise.
+    """Return an oval (n, 2) between ellipse and rectangle, counter-clockwise.
 
     Parameters
     ----------
@@ -74,11 +74,6 @@ def superellipse(
         2 is an ellipse, 4 to 8 a rectangle with rounded corners.
     n : int
         Number of points; a multiple of 4 keeps both mirror symmetries.
-
-    Returns
-    -------
-    numpy.ndarray
-        (n, 2).
     """
     angle = 2 * np.pi * np.arange(n) / n
     unit = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -98,11 +93,6 @@ def stack_outlines(outlines: ArrayLike, heights: ArrayLike, axis: Axis = "z") ->
         (m,), strictly monotonic where neighbouring outlines are equal.
     axis : {"x", "y", "z"}
         Direction of the heights.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        The solid.
     """
     level = np.asarray(heights, dtype=np.float64)
     outline = np.asarray(outlines, dtype=np.float64)
@@ -128,11 +118,6 @@ def slab(
         Depth of the bevel along the axis; the end outlines shrink by about as much.
     axis : {"x", "y", "z"}
         The prism's direction.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        The solid.
     """
     flat = np.asarray(outline, dtype=np.float64)
     if bevel <= 0.0:
@@ -156,11 +141,6 @@ def box(
         Roundness in plan, see :func:`superellipse`.
     bevel : float
         Of the top and bottom edges.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        The solid.
     """
     x, y, z = np.asarray(centre, dtype=np.float64)
     width, depth, height = np.asarray(extents, dtype=np.float64)
@@ -183,11 +163,6 @@ def revolve(
         Direction of the axis of revolution.
     centre : array_like
         (3,): point of height 0 on the axis.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        The solid.
     """
     curve = np.asarray(profile, dtype=np.float64)
     outlines = curve[:, :1, None] * superellipse(1.0, 1.0, n=n)
@@ -227,7 +202,7 @@ def fillet(corners: ArrayLike, radius: float, n: int = 5) -> Points:
 def sweep(
     path: ArrayLike, outline: ArrayLike, normal: ArrayLike, *, scale: ArrayLike = 1.0
 ) -> trimesh.Trimesh:
-    """Carry an outline along a path.
+    """Carry an outline along a path and close its ends.
 
     Parameters
     ----------
@@ -239,11 +214,6 @@ def sweep(
         (3,), nowhere parallel to the path.
     scale : array_like
         Scalar or (m,): the outline's size along the path.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        The solid, its ends closed.
     """
     points, flat = np.asarray(path, dtype=np.float64), np.asarray(outline, dtype=np.float64)
     steps = np.diff(points, axis=0)
@@ -261,7 +231,7 @@ def sweep(
 
 
 def tube(path: ArrayLike, radius: float, *, n: int = 12, taper: float = 1.0) -> trimesh.Trimesh:
-    """Return a round tube along a path that bends in one plane or not at all.
+    """Return a closed round tube along a path that bends in one plane or not at all.
 
     Parameters
     ----------
@@ -273,11 +243,6 @@ def tube(path: ArrayLike, radius: float, *, n: int = 12, taper: float = 1.0) -> 
         Points around.
     taper : float
         Radius at the end divided by that at the start.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        The solid, its ends closed.
     """
     points = np.asarray(path, dtype=np.float64)
     # From the edges by hand: for a straight path a decomposition would return a normal that depends
