@@ -307,33 +307,21 @@ def test_an_ood_frame_gives_a_warning(here, bundle, capsys, limit, is_told):
     ("arguments", "message"),
     [
         ([], "give a depth frame"),
-        (["f0.npy", "--rotations", "0", "x"], "x: unknown kind of file"),
         (["f0.npy", "--rotations", "zero"], "--rotations: 'zero' is not a number"),
         (["f0.npy", "--rotations="], "give a number"),
         (["--mask", "m.npy", "f0.npy"], "give frames before --mask"),
         (["f0.npy", "--max-travel", "3"], "relax --allowed or --max-travel"),
-        (["f0.npy", "--max-travel", "-5"], "--max-travel=-5.0: give degrees, 0 or more"),
         (["f0.npy", "--allowed", "left"], "left: give rotations in degrees, or a .npy file"),
-        (["f0.npy", "--allowed="], "give a number"),
         (["f0.npy", "--far", "0.1"], "have a depth between --near=0 and --far=0.1, of 0."),
         (["f0.npy", "--near", "300"], "--near=300: give metres"),
-        (["f0.npy", "--plot", "x.jpg"], "--plot=x.jpg: give a name that ends in .png or .pdf"),
-        (["f0.npy", "--plot", "m.npy/x.png"], "--plot=m.npy/x.png: m.npy is a file; give a path"),
-        (["f0.npy", "--plot", "."], "--plot=.: give a name"),
         (["f0.npy", "--depth-scale", "0.001"], "depths 1000 times as large would fit"),
-        (["f0.npy", "--depth-scale", "-1"], "--depth-scale=-1"),
         (["f0.npy", "--intrinsics", "wide"], "--intrinsics=wide"),
-        (["f0.npy", "--elevation", "nan"], "--elevation=nan"),
         (["f0.npy", "--camera-pose", "pose.json"], "--camera-pose and --axis belong together"),
-        (["f0.npy", "--axis", "0", "0", "0"], "--camera-pose and --axis belong together"),
-        (["f0.npy", "--camera-pose", "pose.json", "--axis", "0", "0"], "--axis has 2 numbers"),
         (["f0.npy", "--gravity", "0", "1"], "--gravity has 2 numbers; give three"),
-        (["f0.npy", "--gravity", "0", "9.81", "a"], "--gravity has 2 numbers; give three"),
         (
             ["f0.npy", "--gravity", "0,1,0", "--elevation", "0"],
             "--gravity and --elevation: give one",
         ),
-        (["f0.npy", "--nearest", "2"], "--nearest"),
     ],
 )
 def test_what_cannot_be_recommended_is_one_line(here, capsys, arguments, message):
@@ -409,15 +397,15 @@ def test_the_help_names_every_criterion(here, capsys):
 
 def test_pairs_may_begin_with_a_byte_order_mark(pairs, capsys):
     text = pairs.read_text()
-    run(capsys, "calibrate", "pairs.csv", "--output", "plain.npz")
+    options = ("calibrate", "pairs.csv", "--criterion", "expected_error", "--output")
+    run(capsys, *options, "plain.npz")
     pairs.write_text(text, encoding="utf-8-sig")
-    run(capsys, "calibrate", "pairs.csv", "--output", "marked.npz")
+    run(capsys, *options, "marked.npz")
     assert Path("marked.npz").read_bytes() == Path("plain.npz").read_bytes()
 
 
 def test_a_table_is_made_of_pairs_alone(pairs, capsys):
     for arguments, message in (
-        (("no.csv", "--output", "t.npz"), "no.csv does not exist"),
         (("pairs.csv", "--output", "t.dat"), "--output=t.dat: give a name that ends in .npz"),
         (
             ("pairs.csv", "--output", "t.safetensors"),
@@ -509,17 +497,18 @@ def test_the_camera_is_assumed_where_neither_manifest_nor_option_has_it(manifest
     rows.assign(fx=[FOCAL_PX] * 20 + [np.nan] * 4).to_csv("some.csv")
     rows.assign(fx=FOCAL_PX).to_csv("all.csv")
     options = ("--bundle", "b.safetensors")
-    commands = {
-        "evaluate": ("--views", "2"),
-        "calibrate": ("--output", "own.safetensors"),
-    }
-    for command, more in commands.items():
-        for file, intrinsics, wanted in (
-            ("manifest.csv", (), ASSUMED),
-            ("some.csv", (), ASSUMED.replace("24 frames", "4 frames")),
-            ("all.csv", (), None),
-            ("manifest.csv", ("--intrinsics", FOCAL_PX), None),
-        ):
+    cases = (
+        ("some.csv", (), ASSUMED.replace("24 frames", "4 frames")),
+        ("all.csv", (), None),
+        ("manifest.csv", (), ASSUMED),
+        ("manifest.csv", ("--intrinsics", FOCAL_PX), None),
+    )
+    # A calibration takes seconds.
+    for command, more, some in (
+        ("evaluate", ("--views", "2"), cases),
+        ("calibrate", ("--output", "own.safetensors"), cases[:2]),
+    ):
+        for file, intrinsics, wanted in some:
             arguments = (capsys, command, file, *options, *more, *intrinsics)
             told = [line for line in run(*arguments).splitlines() if line.startswith("camera")]
             assert told == ([] if wanted is None else [wanted])
@@ -550,10 +539,8 @@ def test_near_and_far_hold_for_every_frame_of_a_recording(manifest, capsys, comm
         (lambda azimuth, estimate: estimate - 20, "offset -19.8°: azimuth origins"),
         (lambda azimuth, estimate: estimate + 180, "origins probably differ"),
         (lambda azimuth, estimate: -estimate, "estimates run opposite to azimuths"),
-        (lambda azimuth, estimate: 70 - estimate, "estimates run opposite to azimuths"),
         (lambda azimuth, estimate: np.radians(estimate), "estimates are radians"),
         (lambda azimuth, estimate: 7.0 * azimuth, "estimates do not follow azimuths"),
-        (lambda azimuth, estimate: 0.0 * azimuth + 80.0, "estimates do not follow azimuths"),
     ],
 )
 def test_pairs_in_another_frame_are_told(pairs, capsys, change, warning):
@@ -673,10 +660,8 @@ def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
     ("arguments", "message"),
     [
         (["masks.csv"], "turn/2.npy: the mask has 3 × 4 pixels and the frame"),
-        (["manifest.csv", "--views", "two"], "two"),
         (["manifest.csv", "--views", "2.5"], "--views: '2.5' is not an integer"),
         (["manifest.csv", "--output", "x.json"], "--output=x.json: give a name that ends in .csv"),
-        (["manifest.csv", "--output", "pairs.csv/x.csv"], "pairs.csv is a file; give a path"),
         (["manifest.csv", "--intrinsics", "30"], "every frame"),
     ],
 )
@@ -731,14 +716,6 @@ def test_export_writes_the_network(here, bundle, capsys, rng):
     }
 
 
-def test_a_network_that_cannot_be_run_is_one_line(here, bundle, capsys):
-    replace(bundle, network=b"no model").save("bad.safetensors")
-    for command in (("export", "bad.safetensors", "--onnx", "x.onnx"), ("recommend", "f0.npy")):
-        more = ("--bundle", "bad.safetensors") if command[0] == "recommend" else ()
-        assert "the bundle's network cannot be run" in fails(capsys, *command, *more)
-    assert not (here / "x.onnx").exists()
-
-
 def test_a_file_that_cannot_be_written_is_one_line(here, pairs, capsys):
     (here / "file").write_text("")
     assert "file" in fails(capsys, "export", "b.safetensors", "--onnx", "file/x.onnx")
@@ -785,7 +762,6 @@ def test_an_axis_of_a_mesh_file_may_begin_with_a_hyphen(here, capsys):
     [
         (("--output", "x.jpg"), "--output=x.jpg: give a name that ends in .npy or .png"),
         (("--output", "x.npy", "--front", "-z"), "--up and --front are for a mesh file"),
-        (("--output", "x.npy", "--azimuth", "nan"), "--azimuth=nan"),
         (
             ("--output", "x.npy", "--diagonal", "5"),
             "--distance=0.8 from an object with --diagonal=5: 7.5 to 100 m are plausible",
@@ -808,9 +784,7 @@ def test_what_cannot_be_rendered_is_one_line(here, capsys, more, message):
         ["--rotations", "0", "-90"],
         ["--rotations", "0,-90"],
         ["--rotations=0,-90"],
-        ["--rotations", "0,", "-90"],
         ["--rotations", " 0, -90 "],
-        ["--rotations=0", "-90"],
         ["--rotations", "0", "--rotations", "-90"],
     ],
 )
@@ -820,18 +794,6 @@ def test_numbers_stand_between_commas_or_spaces(here, capsys, rotations):
     assert run(capsys, "recommend", "f0.npy", "f1.npy", *options, *rotations) == wanted
     assert run(capsys, "recommend", *rotations, "f0.npy", "f1.npy", *options) == wanted
     assert run(capsys, "recommend", "f0.npy", *rotations, "f1.npy", *options) == wanted
-
-
-def test_a_list_of_numbers_takes_no_frame(here, capsys):
-    more = ("--bundle", "b.safetensors", "--json", "--camera-pose", "pose.json")
-    wanted = run(
-        *(capsys, "recommend", "f0.npy", *more, "--allowed", "-60,45", "--axis", "0,0,0.1"),
-        *("--intrinsics", "150,150,60,45"),
-    )
-    assert wanted == run(
-        *(capsys, "recommend", *more, "--allowed", "-60", "45", "--axis", "0", "0", "0.1"),
-        *("--intrinsics", "150", "150", "60", "45", "f0.npy"),
-    )
 
 
 @pytest.mark.parametrize("command", [["recommend", "f0.npy", "--json"], ["inspect"]])
@@ -987,7 +949,6 @@ def test_help_imports_nothing_heavy():
     [
         (("recommend", "f0.npy", "--far", "0.1", "--bundle", "b.safetensors"), "empty-mask"),
         (("inspect", "no-such"), "no-bundle"),
-        (("recommend", "no.npy"), None),
         (("recommend", "--near", "x"), None),
         (("export", "b.safetensors", "--onnx", "locked/x.onnx"), None),
     ],
@@ -1052,12 +1013,8 @@ def test_a_robot_needs_no_package_of_the_experiment(manifest, pairs, arguments):
     [
         ("f0.npy",),
         ("--plot", "x.png"),
-        ("--intrinsics", "500"),
-        ("--far", "1"),
         ("--elevation", "10"),
-        ("--gravity", "0", "1", "0"),
         ("--bundle", "b.safetensors"),
-        ("--rotations", "0"),
         ("--not-followed",),
     ],
 )

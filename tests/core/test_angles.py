@@ -72,11 +72,6 @@ def test_midpoint_is_the_direction_of_the_sum(a, b):
         assert abs(total / abs(total) - unit(middle)) < 1e-9
 
 
-def test_midpoint_across_zero_where_the_printed_formula_breaks():
-    assert angles.midpoint_deg(350, 20) == pytest.approx(5.0)
-    assert angles.midpoint_deg(20, 350) == pytest.approx(5.0)
-
-
 @given(whole, st.sampled_from([36, 120, 360, 720]))
 def test_bins_are_centred_and_roll_with_the_angle(k, n_bins):
     width = 360.0 / n_bins

@@ -6,7 +6,6 @@ import numpy as np
 from tests.core.made import (
     N_BINS,
     direction_by_loops,
-    estimates,
     evidence_of,
     product_by_loops,
 )
@@ -62,20 +61,3 @@ def test_the_beliefs_of_all_estimates_are_those_of_each():
     one = first_belief(np.arange(N_BINS) * 15.0, evidence)
     np.testing.assert_array_equal(every.probabilities, one.probabilities)
     np.testing.assert_array_equal(every.first_bin, one.first_bin)
-
-
-def test_more_views_of_an_honest_estimator_err_less():
-    """Answers drawn anew for every view, as the model says."""
-    evidence = evidence_of(estimates(30, 360), bandwidth_deg=6.0, n_bins=120)
-    unseen = estimates(30, 360, seed=8)
-    objects, starts = np.repeat(np.arange(30), 12), np.tile(np.arange(0, 360, 30), 30)
-    belief = first_belief(unseen[objects, starts], evidence)
-    errors = []
-    for delta in (None, 180, 90, 270):
-        if delta is not None:
-            turn = np.full(len(starts), delta)
-            belief = updated(belief, unseen[objects, (starts + turn) % 360], turn, evidence)
-        pose = mean_direction_deg(belief.probabilities)
-        errors.append(circular_distance_deg(pose, starts).mean())
-    assert errors == sorted(errors, reverse=True)
-    assert errors[-1] < 0.5 * errors[0]

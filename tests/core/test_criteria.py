@@ -20,7 +20,6 @@ from nbv.core.criteria import (
     pose_likelihood,
     rotation_groups,
     tabulate,
-    two_view_poses,
 )
 from nbv.core.density import Conditionals, conditionals
 from nbv.core.evidence import Evidence, gather_evidence
@@ -107,20 +106,6 @@ def test_the_pose_ambiguity_is_the_triple_loop(interpretation, spread, plain):
     table = ambiguity_table(pair, {"pose_likelihood": interpretation, "spread": spread})
     expected = plain_loops(pair.viewpoint.tolist(), T, T, plain)
     np.testing.assert_allclose(table, expected, atol=2e-5)
-
-
-@pytest.mark.parametrize("delta", [0, 1, 5, 11])
-def test_the_poses_after_one_rotation_are_the_mixture_of_products(delta):
-    pair = random_conditionals(12)
-    V, T = pair.viewpoint.astype(np.float32), pair.estimate.astype(np.float32)
-    expected = np.zeros((12, 12))
-    for row in range(12):
-        for phi in range(12):
-            terms = [T[phi, t] * T[(phi + delta) % 12, (t + delta) % 12] for t in range(12)]
-            expected[row] += V[row, phi] * np.array(terms) / sum(terms)
-    found = two_view_poses(V, T, delta)
-    np.testing.assert_allclose(found, expected, atol=1e-6)
-    np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-5)
 
 
 @pytest.mark.parametrize("spread", SPREADS)
@@ -315,46 +300,12 @@ def test_turning_the_belief_and_the_object_together_changes_nothing(criterion, b
     )
 
 
-def test_a_view_that_says_nothing_gains_nothing():
-    """From uniform answers the posterior is the prior, whatever the rotation."""
-    rng = np.random.default_rng(0)
-    evidence = evidence_of(rng.uniform(0, 360, (200, 48)), pseudo_observations=1e9)
-    table = tabulate("information_gain", evidence, "average")
-    np.testing.assert_allclose(table, np.log(N_BINS), atol=1e-4)
-
-
-def test_an_estimator_that_knows_nothing_is_maximally_ambiguous_everywhere():
-    uniform = np.full((36, 36), 1 / 36)
-    table = ambiguity_table(Conditionals(uniform, uniform), SETTINGS)
-    np.testing.assert_allclose(table, math.log(36), rtol=1e-5)
-
-
-def test_a_perfect_estimator_leaves_no_ambiguity():
-    table = ambiguity_table(Conditionals(np.eye(36), np.eye(36)), SETTINGS)
-    np.testing.assert_allclose(table, 0.0, atol=1e-6)
-
-
 def test_answers_that_exclude_each_other_say_nothing():
     T = np.roll(np.eye(5), 1, axis=1)
     T[1] = [1, 0, 0, 0, 0]  # disagrees with the view from bin 0, turned by 1
     table = ambiguity_table(Conditionals(T, T), SETTINGS)
     expected = plain_loops(T.tolist(), T.tolist(), T.tolist(), plain_entropy)
     np.testing.assert_allclose(table, expected, atol=1e-6)
-
-
-def test_where_the_pose_is_hidden_the_way_out_is_the_least_ambiguous():
-    """Answers between 45 and 135 degrees say nothing more than that; all others are sharp."""
-    rng = np.random.default_rng(0)
-    truth = np.tile(np.arange(360.0), 40)
-    hidden = np.abs(truth - 90) < 45
-    answer = np.where(
-        hidden, rng.uniform(45, 135, len(truth)), truth + rng.normal(0, 3, len(truth))
-    )
-    pair = conditionals(answer % 360, truth, bandwidth_deg=6, pseudo_observations=10)
-    table = ambiguity_table(pair, SETTINGS)
-    best = int(table[90].argmin())
-    assert table[90, best] < table[90, 0]
-    assert not 45 < 90 + best < 135
 
 
 def test_each_cost_has_its_unit():

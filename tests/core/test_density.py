@@ -58,12 +58,6 @@ def test_rows_are_distributions(seed, bandwidth, alpha):
         np.testing.assert_allclose(rows.sum(axis=1), 1.0)
 
 
-def test_smoothing_keeps_the_number_of_pairs():
-    counts = density.pair_counts(*random_pairs(1), 360)
-    assert counts.sum() == 300
-    assert density.smooth(counts, 8.0).sum() == pytest.approx(300)
-
-
 def test_kernel_is_von_mises_by_its_entropy():
     """Against the closed form of the entropy, log(2 pi I0(k)) - k I1(k)/I0(k)."""
     sigma = 20.0

@@ -94,15 +94,6 @@ def test_without_trust_in_likeness_it_is_the_best_fixed_rotation():
     np.testing.assert_allclose(cautious, fixed, rtol=1e-4)
 
 
-def test_an_image_that_calibration_knows_gets_the_errors_that_it_led_to():
-    """With a high power only the image itself is like it."""
-    views = distributions(0)
-    evidence = evidence_of(views, power=1e4, pseudo_observations=0.0)
-    errors = rotation_errors_deg(evidence.distributions, evidence, "product")
-    found = cost_of("expected_error", views[1, ::2], evidence)
-    np.testing.assert_allclose(found, errors[:, 1, ::2].T, atol=0.02)
-
-
 @given(st.integers(0, 99), st.integers(1, N_BINS - 1))
 def test_turning_every_object_leaves_the_recommended_rotations(seed, k):
     views, rows = distributions(seed), distributions(seed + 100)[0]
@@ -125,34 +116,11 @@ def test_the_affinity_is_1_of_equals_and_0_of_those_that_exclude_each_other(seed
 
 
 @pytest.mark.parametrize("criterion", ["expected_error", "fixed"])
-def test_more_views_or_another_estimator_are_refused(criterion):
-    evidence = evidence_of(distributions(0))
-    belief = Belief(distributions(1)[0].astype(np.float32), evidence)
-    for unknown, other in (
-        (replace(belief, n_views=2), evidence),
-        (belief, evidence_of(distributions(0))),
-    ):
-        with pytest.raises(ValueError, match=r"^errors of two views need one first view"):
-            CRITERIA[criterion](unknown, other, "product")
-
-
-@pytest.mark.parametrize("criterion", ["expected_error", "fixed"])
 def test_evidence_of_estimates_does_not_serve_the_product(criterion):
     views = distributions(0)
     evidence = replace(evidence_of(views), distributions=None)
     with pytest.raises(ValueError, match="'product' needs evidence of distributions"):
         cost_of(criterion, views[0], evidence)
-
-
-def test_errors_after_every_rotation_are_those_of_each_pair():
-    views = distributions(2)
-    errors = rotation_errors_deg(views, evidence_of(views), "product")
-    assert errors.shape == (N_BINS, 3, N_VIEWS)
-    for delta, one, view in [(0, 0, 0), (5, 1, 23), (11, 2, 7)]:
-        second = views[one, (view + 2 * delta) % N_VIEWS]
-        pose = product(views[one, view][None], second[None], np.array([delta * 30]))
-        expected = circular_distance_deg(pose, view * 15)[0]
-        assert errors[delta, one, view] == pytest.approx(float(expected), abs=0.01)
 
 
 def test_no_policy_is_better_than_the_oracle_of_products():

@@ -8,9 +8,7 @@ from tests.core.made import N_BINS, direction_by_loops, estimates, evidence_of, 
 
 from nbv.core import fusion
 from nbv.core.angles import circular_distance_deg
-from nbv.core.fusion import ESTIMATE_FUSIONS, average, posterior, product
-from nbv.core.policies import TestViews as Views
-from nbv.core.policies import take_second_views
+from nbv.core.fusion import ESTIMATE_FUSIONS, posterior, product
 
 angle = st.integers(0, 3599).map(lambda tenths: tenths / 10)
 turn = st.integers(0, 359)
@@ -22,11 +20,6 @@ def test_averaging_turns_with_the_object(first, second, delta, k):
     after = fusion.average(first + k, second + k, delta)
     antipodal = circular_distance_deg(first, second - delta) > 180 - 1e-6
     assert antipodal or circular_distance_deg(before + k, after) < 1e-6
-
-
-@given(angle, turn)
-def test_two_right_answers_give_the_right_pose(pose, delta):
-    assert circular_distance_deg(fusion.average(pose, pose + delta, delta), pose) < 1e-9
 
 
 @given(angle, angle, turn)
@@ -87,30 +80,9 @@ def test_many_pairs_at_once_are_fused_like_few():
     assert circular_distance_deg(at_once, few)[told].max() < 0.01
 
 
-def test_posterior_fusion_trusts_the_view_that_can_be_trusted():
-    """Near 90 degrees this estimator guesses; the other view decides there."""
-    calibration, unseen = estimates(20, 360), estimates(20, 360, seed=1)
-    evidence = evidence_of(calibration, bandwidth_deg=6.0, n_bins=120)
-    opposite = np.full(unseen.shape, 180)
-    views = Views(unseen, evidence)
-    by_average, by_posterior = (
-        take_second_views(opposite, name, views).error_deg for name in ESTIMATE_FUSIONS
-    )
-    hidden = slice(60, 120)
-    assert by_posterior[:, hidden].mean() < 0.6 * by_average[:, hidden].mean()
-
-
 def test_posterior_fusion_needs_evidence():
     with pytest.raises(ValueError, match=r"^posterior fusion needs evidence$"):
         posterior(0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize("delta", [0.0, 90.0])
-def test_both_fusions_agree_where_both_views_are_right(delta):
-    evidence = evidence_of(np.tile(np.arange(48) * 7.5, (5, 1)), pseudo_observations=0.1)
-    pose = np.arange(N_BINS) * (360.0 / N_BINS)
-    fused = posterior(pose, pose + delta, delta, evidence)
-    assert circular_distance_deg(fused, average(pose, pose + delta, delta)).max() < 1.0
 
 
 def random_rows(seed, n):

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import log_softmax
 
@@ -32,13 +32,6 @@ def test_the_log_likelihood_reads_the_density_at_the_azimuth(seed, k):
     np.testing.assert_allclose(found, np.log(np.diag(spread)))
 
 
-@pytest.mark.parametrize("k", [8, 72, 360])
-def test_a_uniform_density_has_minus_log_360_nats_per_degree(k):
-    logs = np.full((5, k), -np.log(k))
-    found = log_likelihood(logs, [0, 1, 99.5, 180, 359])
-    np.testing.assert_allclose(found, -np.log(360))
-
-
 PROBABILITIES = st.lists(st.integers(0, 6), min_size=1, max_size=9).filter(any)
 
 
@@ -57,6 +50,7 @@ def test_regions_hold_just_their_share_of_truths_drawn_from_the_distribution(cou
     assert inside.sum() == pytest.approx(size)
 
 
+@settings(max_examples=20)
 @given(st.integers(0, 19), st.sampled_from([0.3, 1.0, 3.0]))
 def test_the_temperature_is_the_best_of_a_grid(seed, scale):
     rng = np.random.default_rng(seed)
@@ -72,14 +66,6 @@ def test_the_temperature_is_the_best_of_a_grid(seed, scale):
     found = fit_temperature(logits, azimuth)
     grid = np.geomspace(*TEMPERATURES, 200)
     assert loss(found) <= min(map(loss, grid)) + 1e-6
-
-
-def test_a_hotter_network_has_a_proportionally_higher_temperature():
-    azimuth = np.arange(0, 360, 3)
-    wrong = np.random.default_rng(0).normal(0, 25, 120)
-    logits = 5 * np.cos(np.radians(np.arange(0, 360, 15) - (azimuth + wrong)[:, None]))
-    cold, hot = (fit_temperature(s * logits, azimuth) for s in (1, 4))
-    assert hot == pytest.approx(4 * cold, rel=1e-3)
 
 
 def test_answers_are_the_mean_distribution_of_each_viewpoint():

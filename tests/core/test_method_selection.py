@@ -46,10 +46,8 @@ def choice(*object_error_deg):
     [
         ((1.0, 2.0, 3.0), (2.0, 3.1, 4.0), True),
         ((1.0, 2.0, 3.0), (1.0, 2.0, 3.0), False),
-        ((1.0, 9.0, 1.0), (2.0, 2.0, 8.0), False),
         ((1.0,), (9.0,), False),
         ((1.0, 2.0), (2.0, 6.0), False),  # -2.5 on average, but from two objects: t = 1.67 < 1.84
-        ((1.0, 2.0), (2.0, 5.0), True),
     ],
 )
 def test_surely_better_needs_more_than_one_standard_error(one, other, sure):
@@ -67,9 +65,7 @@ def test_where_no_method_is_surely_better_the_papers_opposite_is_taken():
     ("name", "policy", "fusion", "message"),
     [
         ("x", "oposite", "average", "did you mean 'opposite'"),
-        ("x", "fixed", "posterio", r"extensions\.x\.fusion=posterio"),
         ("single", "fixed", "average", "name is taken"),
-        ("x", "none", "posterior", "takes no second view"),
         ("x", "selected", "selected", "no extension can be selected"),
         ("x", "oracle", "posterior", "no other extension fuses by posterior"),
         ("x", "opposite", "product", "choose estimator=classifier"),
@@ -91,9 +87,7 @@ def test_policies_that_need_estimates_are_refused_for_distributions(policy):
     ("policy", "fusion", "message"),
     [
         ("oracle", "average", "belong under extensions"),
-        ("opposite", "posterior", "belong under extensions"),
         ("none", "averge", r"methods\.x\.fusion=averge is unknown: did you mean"),
-        ("selected", "average", "policy 'selected' is unknown"),
     ],
 )
 def test_a_method_of_the_paper_that_cannot_be(policy, fusion, message):

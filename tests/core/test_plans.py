@@ -19,7 +19,6 @@ from tests.core.test_errors_given_distributions import (
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
 from nbv.core.criteria import CRITERIA, affinity
-from nbv.core.fusion import rotation_errors_deg
 from nbv.core.plans import (
     Plans,
     at_spacing,
@@ -62,13 +61,6 @@ def test_errors_are_those_of_multiplying_the_views_one_by_one(n_views):
         product = product_by_loops(views[o, (start + rotations) % N_BINS], rotations)
         expected = circular_distance_deg(direction_by_loops(product), start * 360 / N_BINS)
         assert found[i, o, start] == pytest.approx(float(expected), abs=0.01)
-
-
-def test_two_views_have_the_errors_of_the_product_after_each_rotation():
-    views = distributions(1)[:, ::2]
-    spacings = np.arange(N_BINS)
-    pairs = rotation_errors_deg(views, evidence_of(distributions(1)), "product")
-    np.testing.assert_allclose(spaced_errors_deg(views, 2, spacings), pairs, atol=0.02)
 
 
 def first_views(seed, evidence):

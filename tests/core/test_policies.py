@@ -79,9 +79,7 @@ def test_a_criterion_goes_by_the_distribution_of_each_image_where_there_is_one()
     ("policy", "fusion", "missing"),
     [
         ("random", "average", "needs a generator"),
-        ("oracle", "average", "needs evidence"),
         ("pose_ambiguity", "average", "needs a lookup table or evidence"),
-        ("opposite", "posterior", "needs evidence"),
         ("opposite", "product", "needs distributions"),
     ],
 )

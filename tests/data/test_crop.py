@@ -23,7 +23,6 @@ DEPTHS = arrays(
     elements=st.one_of(st.just(0.0), st.floats(2.0, 3.0, width=32)),
     fill=st.just(0.0),
 )
-N_AZIMUTHS = 12
 
 
 def box_of(image):
@@ -112,10 +111,3 @@ def test_the_crop_follows_the_rest_where_the_sensor_loses_a_thin_part(measure):
 def test_a_sensor_that_measures_everything_gives_the_crop_of_the_true_object():
     ideal, measured = measured_image(None), measured_image(lambda depth, object_id: depth)
     assert np.abs(np.array(box_of(ideal)) - box_of(measured)).max() <= 1
-
-
-def test_a_view_without_a_measurement_is_all_background():
-    def loses_the_first(depth, object_id):
-        return np.where(np.arange(len(depth))[:, None, None] == 0, np.float32(0), depth)
-
-    assert not measured_image(loses_the_first).any()

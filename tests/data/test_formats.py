@@ -54,18 +54,12 @@ def test_a_byte_order_mark_and_another_encoding_lose_no_vertex(tmp_path):
 @pytest.mark.parametrize(
     ("content", "named"),
     [
-        ("hello\nworld\n", "no line is a vertex, 'v x y z'; is it an OBJ file?"),
         (OBJ + "f 0 1 2\n", "line 5: a face refers to vertex 0"),
-        (OBJ + "f 1 2 5\n", "vertex 5, of 4"),
         (OBJ + "f -1 -2 -5\n", "line 5: a face refers to vertex -5, of 4 so far"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -3\nv 5 5 5\n", "relative indices"),
         (OBJ + "f 1 2\nf 1 2 3\n", "line 5: not a face"),
-        (OBJ + "f 1 2 x\n", "line 5: not a face"),
-        (OBJ + "f 1 2 3.5\n", "line 5: not a face"),
-        (OBJ + "f 1/1/1 2 3/3\n", "line 5: not a face"),
         (OBJ + "vt 0 0\nf 1/1 2/1 3/1\nf 1 2 3 4 1 2\n", "two forms are mixed"),
         ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "line 1: a vertex of 2 coordinates, not 3"),
-        ("v 0 0 0\nv 1 0 0\nv 0 1\nf 1 2 3\n", "line 3: a vertex of 2 coordinates"),
         ("v 0 0 0 1\nv 1 0 0\nv 0 1 0 1 1\nf 1 2 3\n", "different numbers of coordinates"),
         (b"v 0 0 0\nv 1 0\xff1 0\nv 0 1 0\nf 1 2 3\n", "cannot be read as a mesh"),
     ],
@@ -79,10 +73,7 @@ def test_an_obj_that_trimesh_would_misread_is_refused(tmp_path, content, named):
     [
         (OFF + "3 0 1 3\n", "7 lines are there, the header announces 6"),
         (OFF.replace("3 0 1 2", "3 0 1"), "a face was cut short"),
-        (OFF.replace("3 0 1 2", "2 0 1 2"), "not a face of 3"),
-        (OFF.replace("OFF", "4OFF"), "4OFF is not a kind"),
         ("hello\nworld\n", "it does not begin with OFF; is it an OFF file?"),
-        (OFF.replace("4 2 0", "-1 2 0"), "announces -1"),
         ("bell \x07 \x9f" + OFF, "bell ? ?OFF is not a kind"),
     ],
 )
@@ -97,11 +88,8 @@ def test_an_off_that_trimesh_would_misread_is_refused(tmp_path, content, named):
     [
         (PLY + "3 0 1 3\n", "7 lines are there, the header announces 6"),
         (PLY.replace("3 0 2 3", "4 0 2 3"), "not a face as the header"),
-        (PLY.replace("3 0 2 3", "3 0 2 3 1"), "not a face as the header"),
-        (PLY.replace("3 0 2 3", "3 0 2 260"), "not a face as the header"),
         (PLY.replace("1 1 0\n", "1 1 0 7\n"), "not a vertex as the header"),
         (PLY.replace("1 1 0\n", "1 1 x\n"), "cannot be read as a mesh"),
-        (PLY.replace("1 1 0\n", "1 1 0\n\n"), "7 lines are there"),
     ],
 )
 def test_an_ascii_ply_that_trimesh_would_misread_is_refused(tmp_path, content, named):
@@ -118,12 +106,8 @@ def test_a_binary_ply_whose_lists_differ_in_length_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        (
-            "endloop",
-            "",
-        ),
+        ("endloop", ""),
         ("vertex", "vertez"),
-        ("facet normal", "facet normal 1"),
         ("endsolid", ""),
     ],
 )

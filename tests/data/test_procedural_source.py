@@ -49,13 +49,6 @@ def test_the_share_of_square_mugs_reaches_the_generator():
     assert to_corner[1] > 1.05 * to_corner[0]
 
 
-def test_the_handle_is_at_270_degrees():
-    vertices = np.asarray(source_of("procedural").load("mug", "mug-0000").vertices)
-    radius = np.linalg.norm(vertices[:, :2], axis=1)
-    farthest = vertices[radius.argmax()]
-    assert abs(np.degrees(np.arctan2(farthest[1], farthest[0])) + 90) < 10
-
-
 def test_what_it_cannot_make_is_refused():
     source = source_of("procedural")
     refused(lambda: source.object_ids("mugg"), "no category mugg", "did you mean 'mug'")

@@ -52,12 +52,6 @@ def test_an_object_that_does_not_fit_is_named(embree, meshes):
     assert "\n" not in str(caught.value)
 
 
-def sliver():
-    """A triangle that is 1e-6 wide: it has an area, and lies between the centres of pixels."""
-    vertices = np.array([[-0.5, 0.0, 0.001], [0.5, 0.0, 0.001], [0.0, 0.0, 0.001001]], np.float32)
-    return vertices, np.array([[0, 1, 2]], np.int32)
-
-
 @pytest.mark.parametrize(
     ("camera", "elevation_deg"),
     [
@@ -70,13 +64,6 @@ def test_an_object_too_small_to_be_seen_stops_with_its_name(embree, meshes, came
     with pytest.raises(UserError, match=message) as caught:
         list(render_objects(meshes, elevation_deg, camera, embree, n_azimuths=8))
     assert "\n" not in str(caught.value)
-
-
-def test_a_surface_too_thin_to_be_seen_stops_with_its_name(embree, meshes):
-    flat = meshes | {"thin": type(meshes["box"])(*sliver())}
-    images = render_objects(flat, 0.0, CAMERA, embree, n_azimuths=8)
-    with pytest.raises(UserError, match=r"^thin: the object covers no pixel in"):
-        list(images)
 
 
 def test_a_sensor_that_measures_nothing_stops_and_a_gap_is_logged(embree, meshes, caplog):

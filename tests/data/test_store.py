@@ -70,15 +70,10 @@ def at(place, value):
     [
         (lambda arrays: arrays.pop("faces"), "holds no array 'faces'"),
         (changed("vertices", lambda array: array[:, :2]), "'vertices' has another form"),
-        (changed("faces", lambda array: array.astype(float)), "'faces' has another form"),
         (changed("ids", at(1, "ball")), "an id is duplicate"),
-        (changed("vertices", lambda array: array[:-1]), "'vertex_offsets' does not fit"),
         (changed("face_offsets", at(1, 0)), "'face_offsets' does not fit"),
-        (changed("face_offsets", lambda array: array[:-1]), "'face_offsets' does not fit"),
         (changed("vertices", at((0, 0), np.nan)), "the mesh of 'ball' is not sound"),
-        (changed("vertices", at((0, 0), 1e30)), "the mesh of 'ball' is not sound"),
         (changed("faces", at((0, 0), 10_000)), "the mesh of 'ball' is not sound"),
-        (changed("faces", at((0, 0), -1)), "the mesh of 'ball' is not sound"),
     ],
 )
 def test_damage_is_named_with_the_file(tmp_path, meshes, damage, named):

@@ -110,38 +110,26 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
     ("override", "message"),
     [
         ("estimator.epocs=3", "'estimator.epocs' is unknown: did you mean 'estimator.epochs'?"),
-        ("estimator.epochs.more=3", "'estimator.epochs.more' is unknown: a value has no keys"),
         ("renderer=pyrendr", "renderer=pyrendr is unknown: did you mean 'pyrender'?"),
-        ("camera.framing=axs", "camera.framing=axs is unknown: did you mean 'axis'?"),
-        ("transfer.conditions.stereo.sensor=sterio", "did you mean 'stereo'?"),
         ("categories=[mgu]", "'mgu' is unknown: did you mean 'mug'?"),
         ("dataset.turn_deg.mgu=270", "dataset.turn_deg.mgu: unknown category; did you mean 'mug'"),
         ("estimator.epochs=many", "estimator.epochs=many: input should be a valid integer"),
-        ("density.bandwidths_deg=4", "density.bandwidths_deg=4: input should be a valid list"),
-        ("camera=near", "camera=near: input should be a valid dict"),
         ("~seed", "seed is missing"),
-        ("camera.distance=1", "camera.distance=1: input should be greater than 1"),
         ("elevations_deg.mug=[95]", "elevations_deg.mug[0]=95: input should be less than or"),
-        ("density.bandwidths_deg=[8,nan]", "bandwidths_deg[1]=nan: input should be a finite"),
         ("density.bandwidths_deg=[8,8.0]", "density.bandwidths_deg=[8, 8.0]: 8.0 occurs twice"),
-        ("n_objects=3", "n_objects=3 is out of range"),
         ("transfer.folds=[6]", "transfer.folds=[6] is out of range: 1 to n_folds=5"),
         ("camera.distance=900", "camera.distance=900 with camera.fov_deg=25 and camera."),
         ("estimator.kind=classifier", "it needs both"),
         ("estimator.n_classes=72", "a classifier has n_classes"),
-        ("name='a b'", "name=a b: use letters"),
-        ("transfer.conditions={a b: {sensor: ideal, framing: axis}}", "a b: use letters"),
         ("dataset.root=a\nb", r"dataset.root=a\nb: use one line of text"),
         ("dataset.root=~nobody-of-that-name/x", "~nobody-of-that-name/x: unknown user"),
         ("dataset.categories.mug=../../etc", "mug=../../etc: not below dataset.root"),
         ("dataset.up=up", "dataset.up=up: use an axis such as +y, a vector such as 0,0,1, or auto"),
         ("estimator", "is not of the form key=value"),
         ("methods={}", "methods={} changes nothing; ~methods.<key> leaves a key out"),
-        ("categories=[a{b}c]", "override 'categories=[a{b}c]' cannot be read: "),
         ("seed=1,2", "override 'seed=1,2' holds several values; write a list as [1,2]"),
         ("seed=" + "9" * 5000, "cannot be read: "),
         ("dataset.root=???", "configuration key 'dataset.root': Missing mandatory value"),
-        ("seed=${seed}", "configuration key 'seed': Recursive interpolation"),
     ],
 )
 def test_a_mistake_is_one_line_with_its_key(override, message):
@@ -174,14 +162,10 @@ def test_only_generated_mugs_have_settings_of_mugs(dataset, reach, share):
 @pytest.mark.parametrize(
     ("key", "default"),
     [
-        ("calibration", "holdout"),
-        ("compared_runs", []),
         ("dataset.centre", "box"),
-        ("methods.any.fusion", "average"),
         ("seed", "none"),
         ("density.spread", "none"),
         ("packages.numpy", "none"),
-        ("sensor.parameters.focal_px", "none"),
         ("estimator.pretraining", {"epochs": 2, "learning_rate": 9e-3}),
     ],
 )
@@ -197,7 +181,7 @@ def test_a_category_of_ones_own(override):
     assert config["elevations_deg"]["bottle"] == [0, 30]
 
 
-BAD_NAMES = ("..", ".", "", "-a", ".a", "_a", "a/b", "a{b}c", "a b", "a\nb", "é", "a" * 101, "${x}")
+BAD_NAMES = ("..", "", "-a", "a/b", "a{b}c", "a\nb", "é", "a" * 101)
 
 
 NAMED = {
@@ -333,7 +317,6 @@ def test_the_epochs_of_cross_fitting_are_written_down():
         ({"n_objects": None}, ["n_objects=null"]),
         ({"overrides": ["a=1", "b=2"]}, ["a=1", "b=2"]),
         ({"overrides": "[a=[1,2],b={c:[3,4]},d=5]"}, ["a=[1,2]", "b={c:[3,4]}", "d=5"]),
-        ({"overrides": "a=[1,2]"}, ["a=[1,2]"]),
         ({"overrides": ["a='0", 0, "1'", "b=2"]}, ["a='0,0,1'", "b=2"]),
         ({}, []),
     ],
@@ -351,7 +334,6 @@ def test_overrides_are_a_list_or_text(given):
 @pytest.mark.parametrize(
     ("file", "content", "message"),
     [
-        ("config.yaml", b"seed: [1", "cannot be read as YAML"),
         ("config.yaml", b"", "config.yaml holds no settings"),
         ("experiment/paper.yaml", b"\xff\xfe\x00", "cannot be read as YAML"),
         ("estimator/regressor.yaml", b"kind: a\nkind: b\n", "YAML in line 2: found duplicate key"),
@@ -373,15 +355,10 @@ KEPT = (ROOT / "docs/reference/paper/configuration.yaml").read_bytes()
     ("content", "message"),
     [
         (b"", "holds no settings"),
-        (b"- 5", "holds no settings"),
-        (b"n_folds: [5", "cannot be read as YAML"),
         (b"a: !!python/object/apply:os.system [true]\nn_folds: 5", "cannot be read as YAML"),
-        (KEPT.replace(b"n_folds: 5", b""), "n_folds is missing"),
         (KEPT.replace(b"n_folds: 5", b"n_folds: x"), "n_folds=x: input should be a valid integer"),
         (KEPT.replace(b"- mug", b"- ../mug"), "categories[3]=../mug: use letters"),
-        (KEPT.replace(b"- mug", b"- cup"), "elevations_deg.cup is missing"),
         (b"n_folds: 5\ncategories: [mug]\nelevations_deg: {}", "elevations_deg.mug is missing"),
-        (b"n_folds: 5\nmethods: 7", "methods=7: input should be a valid dict"),
     ],
 )
 def test_a_damaged_kept_configuration_is_named(tmp_path, content, message):

@@ -121,27 +121,10 @@ def test_an_estimator_comes_back_from_its_file_with_its_history(tmp_path):
     np.testing.assert_array_equal(*(network_outputs(e, faces, CPU) for e in (trained, read)))
 
 
-def test_each_part_is_asked_of_its_own_estimator():
-    torch.manual_seed(0)
-    faces = clock_faces(3, 8)
-    estimators = [untrained(seen=("b",)), untrained(seen=("a", "c"))]
-    parts = [["c", "a"], ["b"]]
-    names, outputs = outputs_of_parts(estimators, named(faces), parts, CPU)
-    assert names == ["c", "a", "b"]
-    for name, found in zip(names, outputs, strict=True):
-        asked = estimators[1] if name == "b" else estimators[0]
-        np.testing.assert_allclose(found, network_outputs(asked, faces["abc".index(name)], CPU))
-
-
 def test_objects_that_were_trained_on_are_refused():
     estimators = [untrained(seen=("a", "b")), untrained(seen=("c",))]
     with pytest.raises(UserError, match="'c' is a training object"):
         outputs_of_parts(estimators, named(clock_faces(3, 8)), [["c"], ["b", "c"]], CPU)
-
-
-def test_an_object_without_images_is_named():
-    with pytest.raises(UserError, match="'d' has no depth images"):
-        outputs_of_parts([untrained()], named(clock_faces(3, 8)), [["a", "d"]], CPU)
 
 
 @pytest.mark.parametrize(

@@ -88,12 +88,6 @@ def test_a_run_whose_methods_follow_no_table_is_refused(given_files):
         build_explorer(ExplorerInputs(**given_files | {"lookups": {}}))
 
 
-def test_a_missing_table_is_named(given_files, tmp_path):
-    lookups = given_files["lookups"] | {("mug", 0, 1, "pose_ambiguity"): tmp_path / "gone.npz"}
-    with pytest.raises(UserError, match=r"gone\.npz does not exist"):
-        build_explorer(ExplorerInputs(**given_files | {"lookups": lookups}))
-
-
 @pytest.mark.parametrize("column", ["initial_estimate_deg", "next_estimate_deg"])
 def test_methods_that_disagree_about_an_estimate_are_refused(evaluations, column):
     frame = evaluations["mug", 30].copy()

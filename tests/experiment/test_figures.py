@@ -281,7 +281,6 @@ def test_the_spread_drawn_is_the_one_that_the_table_stores(drawn_from, pose_like
         ("pose_ambiguity", "circular_variance", "Ambiguity", "Ambiguity (0–1)", "Circular v"),
         ("expected_error", "entropy", "Expected error", "Cost (degrees)", "Expected error: cost A"),
         ("information_gain", "circular_variance", "Information gain", "Cost (nats)", "Information"),
-        ("expected_dispersion", "entropy", "Expected dispersion", "Cost (0–1)", "Expected d"),
         ("fixed", "entropy", "Fixed", "Cost (degrees)", "Fixed: cost A"),
     ],
 )

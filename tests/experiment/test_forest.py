@@ -44,22 +44,6 @@ def test_every_claim_that_was_run_has_one_mark_by_its_verdict(judged):
         assert (mark.get_color(), mark.get_marker()) == MARKS[run.loc[claim.id, "verdict"]]
 
 
-def test_an_interval_lies_on_the_side_of_the_verdict(judged):
-    (axes,) = claims_forest(judged).axes
-    colors = {color: verdict for verdict, (color, _) in MARKS.items()}
-    intervals = [
-        line for line in axes.lines if len(line.get_xdata()) == 2 and line.get_color() in colors
-    ]
-    assert intervals
-    for line in intervals:
-        low, high = line.get_xdata()
-        verdict = colors[line.get_color()]
-        if verdict == "holds":
-            assert low > 0
-        elif verdict == "does not hold":
-            assert high < 0
-
-
 def test_claims_have_short_titles_of_their_own():
     titles = [claim.title for claim in CLAIMS]
     assert len(set(titles)) == len(titles)

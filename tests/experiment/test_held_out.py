@@ -9,7 +9,6 @@ import torch
 
 from nbv.core.logits import fit_temperature
 from nbv.data.depth_images import DepthImages
-from nbv.errors import UserError
 from nbv.experiment.estimation.hardware import Hardware
 from nbv.experiment.estimation.inference import (
     decode,
@@ -86,9 +85,3 @@ def test_calibration_objects_alone_choose_the_temperature_of_all(images):
         np.testing.assert_allclose(posteriors.distributions.sum(axis=-1), 1.0, atol=1e-6)
         expected = decode(tested, network_outputs(tested, images.of(names), CPU), temperature)
         np.testing.assert_allclose(estimates.estimate_deg, expected, atol=0.05)
-
-
-def test_an_estimator_that_has_seen_a_test_object_is_refused(images):
-    roles = splits("test", "train", "calibration", "train", "calibration")
-    with pytest.raises(UserError, match="'a' is a training object"):
-        estimate_fold(images, roles, 1, estimator(("a",)), [], CPU, distributions=False)

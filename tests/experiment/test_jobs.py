@@ -49,10 +49,6 @@ def snakemake(tmp_path):
             "error: out.csv: no space left on the disk; free some and run the same command again",
         ),
         (
-            OSError(errno.ENOSPC, "No space left on device", "a.npy"),
-            "error: a.npy: no space left on the disk; free some and run the same command again",
-        ),
-        (
             OSError(errno.EROFS, "Read-only file system", "a.npy"),
             "error: a.npy: cannot be written, the file system is read-only",
         ),
@@ -66,7 +62,6 @@ def snakemake(tmp_path):
             "error: memory ran out ([enforce fail] DefaultCPUAllocator: can't allocate memory: 9 "
             "bytes): use fewer --cores, or smaller settings",
         ),
-        (UserError("two\nlines"), "error: two\\nlines"),
     ],
 )
 def test_a_mistake_is_one_line_everywhere(snakemake, tmp_path, capsys, error, line):

@@ -190,13 +190,6 @@ def test_draws_by_fold_keep_each_folds_size(unit_frames):
         assert (drawn[:, members].sum(axis=1) == members.size).all()
 
 
-def test_a_fold_of_one_object_always_draws_it():
-    sample = paired.pair_methods(evaluated(2, n_objects=4), "mug")  # in folds of 2, 1 and 1
-    drawn = paired.Resampler(3, 20).multiplicities_by_fold(sample)
-    assert (drawn[:, [1, 2]] == 1).all()
-    assert set(np.unique(drawn[:, 0])) == {0, 1, 2}
-
-
 @pytest.mark.parametrize(
     ("statistic", "expected"),
     [
@@ -222,15 +215,6 @@ def test_no_images_have_no_statistic(unit_frames, statistic):
     nothing = sample.select(sample.folds == 9)
     with pytest.raises(ValueError, match="no errors"):
         paired.estimate(statistic, nothing, "single", paired.Resampler(0, 10))
-
-
-def test_sigma_is_over_fold_means(unit_frames):
-    frame = unit_frames["mug", 0]
-    means = frame[frame["method"] == "proposed"].groupby("fold")["error_deg"].mean()
-    sample = paired.pair_methods(frame, "mug")
-    found = paired.estimate("mae_sigma", sample, "proposed", paired.Resampler(0, 200))
-    assert found.value == pytest.approx(metrics.fold_std(means))
-    assert paired.fold_sigma("mae", sample, "proposed") == pytest.approx(means.std())
 
 
 @pytest.mark.parametrize("n_folds", [2, 3])

@@ -119,13 +119,6 @@ def test_it_needs_nothing_but_itself(page, html):
     assert "http" not in html
 
 
-def test_names_inside_drawings_lead_somewhere(page, html):
-    named = set(re.findall(r"url\(#([^)]+)\)", html))
-    named |= {attrs["href"][1:] for tag, attrs in page.tags if tag == "use"}
-    assert named
-    assert named <= page.ids
-
-
 def test_the_contents_lead_somewhere(page):
     targets = [attrs["href"][1:] for tag, attrs in page.tags if tag == "a"]
     assert targets

@@ -19,7 +19,6 @@ from nbv.experiment.report.runtime import (
     summarise_jobs,
 )
 from nbv.experiment.report.table import table_markdown
-from nbv.files import write_csv
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 START_S = 1_700_000_000.0
@@ -162,13 +161,6 @@ def test_nothing_is_called_a_sample_where_every_job_told_its_time(tmp_path):
     assert "at least" not in text
     assert "1 h 7 min" in text
     assert "1 job ran at once" in text
-
-
-def test_it_is_written_as_it_is_read(root, tmp_path):
-    runtime = load_runtime(root)
-    write_csv(tmp_path / "runtime.csv", runtime)
-    again = pd.read_csv(tmp_path / "runtime.csv").astype({"side_by_side": "Int64"})
-    pd.testing.assert_frame_equal(again, runtime, atol=1e-4, check_dtype=False)
 
 
 def test_no_benchmarks_is_an_empty_table(tmp_path):

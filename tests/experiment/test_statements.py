@@ -32,9 +32,6 @@ TERMS = [Term(method, (("mug", 0),)) for method in ("proposed", "opposite")]
 @pytest.mark.parametrize(
     ("count", "verdicts", "expected"),
     [
-        (2, [HOLDS, HOLDS, FAILS], HOLDS),
-        (2, [HOLDS, FAILS, FAILS], FAILS),
-        (2, [HOLDS, UNDECIDED, FAILS], UNDECIDED),
         (2, [HOLDS, HOLDS, NOT_RUN], HOLDS),
         (2, [NOT_RUN, FAILS, FAILS], FAILS),
         (2, [HOLDS, NOT_RUN, FAILS], NOT_RUN),

@@ -127,12 +127,6 @@ def test_extensions_come_with_their_choices_tables_and_travel(evaluated):
     assert with_tables < set(evaluated.travel["method"])
 
 
-def test_no_method_is_better_than_the_oracle_with_its_density(evaluated):
-    oracle = evaluated.frames["oracle_posterior"]["error_deg"].mean()
-    for name in ("random_posterior", "opposite_posterior", "gain_posterior"):
-        assert evaluated.frames[name]["error_deg"].mean() > oracle
-
-
 N_CLASSES = 36
 PRODUCTS = {
     "gain_product": {"policy": "information_gain", "fusion": "product"},

@@ -2,14 +2,13 @@ from __future__ import annotations
 
 import hashlib
 
-import numpy as np
 import pytest
 import torch
 
 from clock_faces import CPU, SETTINGS, clock_faces, named, untrained
 from nbv.errors import UserError
 from nbv.experiment.estimation.training import train_estimator, train_network
-from nbv.experiment.estimation.weights import Estimator, read_start, save_estimator, with_category
+from nbv.experiment.estimation.weights import read_start, save_estimator, with_category
 
 
 def test_a_training_starts_from_the_weights_given_and_leaves_them(rng):
@@ -48,8 +47,6 @@ def test_an_estimator_says_what_it_started_from(tmp_path):
     [
         ["a", "b"],
         ["a"],
-        ["a", "c", "b"],
-        with_category("mug", ["a", "b", "c"]),
         with_category("mug", ["a"]) + with_category("car", ["c"]),
         [],
     ],
@@ -72,17 +69,3 @@ def test_a_start_of_another_size_is_refused(tmp_path):
     start = read_start(path, "mug", list("abc"), path, CPU)
     with pytest.raises(UserError, match="network to start from has another size"):
         train_network(clock_faces(3), SETTINGS, CPU, 0, start.network)
-
-
-def test_the_same_start_and_seed_give_the_same_bits():
-    faces = clock_faces(3, 24)
-    settings = SETTINGS | {"epochs": 1}
-    start = train_network(faces, settings, CPU, 0)
-    first, again = (
-        Estimator(train_network(faces, settings, CPU, 1, start), settings, 16, "abc")
-        for _ in range(2)
-    )
-    for one, other in zip(
-        first.network.state_dict().values(), again.network.state_dict().values(), strict=True
-    ):
-        np.testing.assert_array_equal(one.numpy(), other.numpy())

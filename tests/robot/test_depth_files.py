@@ -88,14 +88,6 @@ def test_tiff_images_may_hold_metres(tmp_path):
     assert np.array_equal(read_depth(image(tmp_path / "a.tif", metres)), [[0.5, 0], [2, 0]])
 
 
-@pytest.mark.parametrize("largest", [65535, 10000, 4095])
-@pytest.mark.parametrize("comment", ["", "# CREATOR: a camera of 1999\n"])
-def test_pgm_numbers_do_not_depend_on_the_largest_that_the_file_names(tmp_path, largest, comment):
-    values = np.array([[0, 1, 2], [999, 4000, 4095]], dtype=np.uint16)
-    found = read_depth(pgm(tmp_path / "a.pgm", values, largest, comment))
-    assert np.array_equal(found, values.astype(np.float32) * np.float32(0.001))
-
-
 def test_pgm_may_be_text(tmp_path):
     path = tmp_path / "a.pgm"
     path.write_text("P2 # plain\n2 1 # columns, rows\n3000\n1500 3000\n")
@@ -105,9 +97,10 @@ def test_pgm_may_be_text(tmp_path):
 @given(
     values=arrays(np.uint16, (2, 3), elements=st.integers(0, 300)),
     largest=st.integers(300, 65535),
+    comment=st.sampled_from(["", "# CREATOR: a camera of 1999\n"]),
 )
-def test_every_number_of_a_pgm_comes_back(tmp_path_factory, values, largest):
-    path = pgm(tmp_path_factory.mktemp("pgm") / "a.pgm", values, largest)
+def test_every_number_of_a_pgm_comes_back(tmp_path_factory, values, largest, comment):
+    path = pgm(tmp_path_factory.mktemp("pgm") / "a.pgm", values, largest, comment)
     assert np.array_equal(np.rint(read_depth(path, depth_scale=1.0)), values)
 
 
@@ -161,12 +154,6 @@ def test_the_scale_is_metres_per_unit(tmp_path):
 @given(scale=st.floats(1e-5, 10.0), values=arrays(np.uint16, (3, 4)))
 def test_whole_numbers_are_multiplied_by_the_scale(scale, values):
     assert to_metres(values, scale) == pytest.approx(values.astype(np.float64) * scale, rel=1e-6)
-
-
-@pytest.mark.parametrize("scale", [0.0, -0.001, float("nan"), float("inf")])
-def test_a_scale_is_above_0(scale):
-    with pytest.raises(UserError, match="`depth_scale`"):
-        to_metres(MILLIMETRES, scale)
 
 
 @given(arrays(np.float32, (2, 3), elements=st.floats(0, 50, width=32)))
@@ -229,23 +216,15 @@ def damaged_files() -> dict[str, bytes]:
         write(buffer)
         return buffer.getvalue()
 
-    png = stored(lambda file: Image.fromarray(MILLIMETRES).save(file, "png"))
     npy = stored(lambda file: np.save(file, MILLIMETRES))
     npz = stored(lambda file: np.savez(file, depth=MILLIMETRES))
     pickled = stored(lambda file: np.save(file, np.array([[{}]], object)))
     other = stored(lambda file: zipfile.ZipFile(file, "w").writestr("depth.txt", "1 2 3"))
     return {
         "empty.npy": b"",
-        "empty.npz": b"",
-        "empty.png": b"",
         "cut.npy": npy[:-3],
-        "head.npy": npy[:40],
         "cut.npz": npz[: len(npz) // 2],
-        "cut.png": png[: len(png) // 2],
-        "text.npy": b"0.5 0.6\n0.7 0.8\n",
-        "text.png": b"not an image",
         "text.tif": b"II*\0",
-        "text.pgm": b"P5\n3 2\n",
         "objects.npy": pickled,
         "none.npz": stored(lambda file: np.savez(file)),
         "other.npz": other,
@@ -264,32 +243,6 @@ def test_a_damaged_file_is_named_in_one_line(tmp_path, name, read):
     assert "\n" not in str(error.value)
     # numpy's own words tell to load what may hold code.
     assert "pickle" not in str(error.value)
-
-
-@pytest.mark.filterwarnings("ignore:.*:UserWarning:PIL")
-@given(data=st.data())
-def test_no_byte_makes_more_than_one_line(tmp_path_factory, data):
-    name = data.draw(st.sampled_from(["a.png", "a.npy", "a.npz", "a.tif", "a.pgm"]))
-    path = tmp_path_factory.mktemp("damage") / name
-    if path.suffix == ".npy":
-        np.save(path, MILLIMETRES)
-    elif path.suffix == ".npz":
-        np.savez(path, depth=MILLIMETRES)
-    else:
-        image(path, MILLIMETRES.astype(np.int32) if path.suffix == ".pgm" else MILLIMETRES)
-    content = bytearray(path.read_bytes())
-    for _ in range(data.draw(st.integers(1, 3))):
-        content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
-    path.write_bytes(content)
-    message, found = "", np.zeros((1, 1), np.float32)
-    try:
-        found = read_depth(path)
-    except UserError as error:
-        message = str(error)
-    assert "\n" not in message
-    assert found.dtype == np.float32
-    assert np.isfinite(found).all()
-    assert (found >= 0).all()
 
 
 @pytest.mark.parametrize("read", [read_depth, read_mask])

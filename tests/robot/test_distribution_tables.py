@@ -156,15 +156,11 @@ def test_what_does_not_fit_is_one_line(table):
     p = turns()["o0"][1][0]
     for probabilities, rotations, kind, message in (
         (p[:12] / p[:12].sum(), [0.0], UserError, "12 probabilities; calibration objects have 24"),
-        (p[:3], [0.0], UserError, "8 classes or more"),
         (2 * p, [0.0], UserError, "row 1: probabilities sum to 2 "),
         ([p, -p], [0.0, 90.0], UserError, "row 2, p0: a probability is negative"),
         (p, [0.0, 90.0], FrameError, "1 view and 2 rotations"),
-        ([p, p], [0.0], FrameError, "2 views and 1 rotation"),
-        ([["a"] * 24], [0.0], UserError, "give probabilities as numbers"),
         (p + 0j, [0.0], UserError, "give probabilities as numbers"),
         ([p, p[:5]], [0.0, 90.0], UserError, "rows of different lengths"),
-        (100 * p, [0.0], UserError, "sum to 100 instead of 1"),
         (np.log(p), [0.0], UserError, "give probabilities, not their logarithms"),
     ):
         with pytest.raises(kind, match=message):
@@ -285,12 +281,9 @@ def test_a_damaged_table_is_one_line(here, capsys):
     stored = dict(np.load("t.npz"))
     for name, value in (
         ("temperature", np.array(0.0)),
-        ("temperature", np.array(np.nan)),
-        ("of_views", np.zeros((3, BINS, BINS), dtype=np.float32)),
         ("of_views", stored["distribution.of_views"][:0]),
         ("object_ids", stored["distribution.object_ids"][:2]),
         ("n_classes", np.array(40)),
-        ("n_classes", np.array([24, 24])),
     ):
         np.savez("d.npz", **(stored | {f"distribution.{name}": value}))
         message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "d.npz")
@@ -322,13 +315,10 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
     run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     both = ("--distribution", "views.csv", "--table", "t.npz")
     Path("bad.npy").write_bytes(b"PK\3\4 not a zip")
-    Path("empty.npy").touch()
     for arguments, message in (
         (("--distribution", "views.csv"), "--distribution and --table belong together"),
         ((*both, "--estimate", "3"), "give one of them"),
         ((*both, "--plot", "p.png"), "--plot does not go with --distribution"),
-        ((*both, "--elevation", "3"), "--elevation does not go with --distribution"),
-        (both, "2 views and 1 rotation"),
         (
             (
                 *both,
@@ -347,9 +337,6 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
             ),
             "does the direction point up",
         ),
-        ((*both, "--rotations", "5", "90"), "the first is 5"),
-        (("--distribution", "no.csv", "--table", "t.npz"), "no.csv does not exist"),
-        (("--distribution", "no.npy", "--table", "t.npz"), "no.npy does not exist"),
         (("--distribution", "views.csv", "--table", "no.npz"), "no.npz does not exist"),
         (("--distribution", "pose.json", "--table", "t.npz"), "pose.json"),
         (
@@ -357,8 +344,6 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
             "--table=pairs.csv: not a table of distributions; give the .npz file",
         ),
         (("--distribution", "bad.npy", "--table", "t.npz"), "bad.npy cannot be read"),
-        (("--distribution", "empty.npy", "--table", "t.npz"), "empty.npy cannot be read"),
-        (("--table", "t.npz"), "or --distribution and --table"),
     ):
         assert message in fails(capsys, "recommend", *arguments)
 
@@ -370,12 +355,8 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
             lambda t: t.drop(columns="p3"),
             "23 columns of probabilities are not p0 to p22: rename 'p23'",
         ),
-        (lambda t: t.assign(p3=2.0), "row 2: probabilities sum to"),
-        (lambda t: t.assign(p3=["x", *t["p3"][1:]]), "row 2, p3: a probability is negative or not"),
         (lambda t: t.assign(p3=[*t["p3"][:-1], -0.5]), "row 73, p3: a probability is negative"),
         (lambda t: t.rename(columns={"p3": "P3"}), "rename 'P3'"),
-        (lambda t: t.rename(columns={"p3": "p_3"}), "rename 'p_3'"),
-        (lambda t: t.iloc[:, :3].assign(p1=0.5), "rename 'p1'"),
         (lambda t: pd.concat([t, t[:1]]), "object 'o0' has 2 views at 0°"),
         (lambda t: t[[*t.columns[:7]]], "8 classes or more"),
     ],

@@ -113,8 +113,6 @@ def test_a_mesh_file_is_read_with_its_axes(tmp_path):
     [
         ("cup.npy", "", "unknown kind of mesh file; give .obj, .ply, .off, .stl, .glb"),
         ("cup.obj", "a cup\n", "no line is a vertex, 'v x y z'; is it an OBJ file?"),
-        ("cup.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "the mesh has no faces"),
-        ("cup.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "all faces lie in one point"),
     ],
 )
 def test_a_file_without_a_mesh_is_one_line(tmp_path, name, content, message):
@@ -129,13 +127,8 @@ def test_a_file_without_a_mesh_is_one_line(tmp_path, name, content, message):
     ("view", "message"),
     [
         ((np.nan, 10.0, 0.9), "`azimuth_deg`=nan"),
-        ((np.inf, 10.0, 0.9), "`azimuth_deg`=inf"),
-        ((0.0, np.nan, 0.9), "`elevation_deg`=nan"),
         ((0.0, 91.0, 0.9), "`elevation_deg`=91"),
         ((0.0, 10.0, 0.0), "`distance_m`=0"),
-        ((0.0, 10.0, -1.0), "`distance_m`=-1"),
-        ((0.0, 10.0, np.nan), "`distance_m`=nan"),
-        ((0.0, 10.0, 800.0), "0.3 to 4 m are plausible"),
         ((0.0, 10.0, 0.2), "0.3 to 4 m are plausible"),
     ],
 )

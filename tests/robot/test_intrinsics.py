@@ -92,8 +92,8 @@ def test_numbers_a_matrix_and_a_text_say_the_same(fx, fy, cx, cy):
 
 @pytest.mark.parametrize(
     "matrix",
-    [np.reshape(K, (3, 3)).T, np.reshape(K, (3, 3)) / 2, np.arange(1.0, 10.0), np.ones((3, 3))],
-    ids=["transposed", "scaled", "counted", "ones"],
+    [np.reshape(K, (3, 3)).T, np.reshape(K, (3, 3)) / 2],
+    ids=["transposed", "scaled"],
 )
 def test_what_is_no_camera_matrix_is_refused(matrix):
     with pytest.raises(UserError, match="0 0 1"):
@@ -185,23 +185,12 @@ def test_a_missing_camera_file_is_said_to_be_missing(tmp_path, monkeypatch, text
 BAD_FILES = {
     "scene.json": '{"0": [1, 2], "1": {}}',
     "empty.json": "",
-    "empty.yaml": "",
-    "list.json": "[1, 2, 3, 4]",
     "number.yaml": "575",
-    "cut.json": '{"cam_K": [1, 0,',
-    "tabs.yaml": "k:\n\t- 1\n",
     "other.json": '{"camera": "head"}',
     "half.json": '{"fx": 1, "fy": 1, "cx": 1}',
-    "short.json": '{"cam_K": [1, 2, 3]}',
     "text.json": '{"cam_K": "wide"}',
-    "null.json": '{"fx": null, "fy": 1, "cx": 1, "cy": 1}',
-    "names.json": '{"cam_K": {"fx": 1}}',
-    "zero.yaml": f"k: {[0.0] * 9}",
     "infinite.json": as_json({"cam_K": K}).replace("}", ', "width": Infinity, "height": 480}'),
-    "nan.yaml": f"k: {K}\nwidth: .nan\nheight: 480\n",
-    "transposed.json": as_json({"cam_K": np.reshape(K, (3, 3)).T.tolist()}),
     "nodata.yaml": "camera_matrix: {rows: 3}",
-    "deep.json": "[" * 100_000,
     "code.yaml": "!!python/object/apply:os.getcwd []",
 }
 
@@ -242,13 +231,6 @@ def test_an_image_has_a_size(tmp_path, side, value):
             camera_of(str(tmp_path / name))
 
 
-def test_bytes_that_are_no_text_are_one_line(tmp_path):
-    for name in ("a.json", "a.yaml"):
-        (tmp_path / name).write_bytes(b"\xff\xfe\x00\x01{")
-        with pytest.raises(UserError, match=rf"{name}, line 1: this is not UTF-8; save the file"):
-            camera_of(str(tmp_path / name))
-
-
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
@@ -263,12 +245,6 @@ def test_where_a_camera_file_is_broken_is_said(tmp_path, name, text, message):
     with pytest.raises(UserError) as error:
         camera_of(str(tmp_path / name))
     assert str(error.value) == f"{tmp_path / name} cannot be read ({message})"
-
-
-@pytest.mark.parametrize("text", ["", "camera", "575,575", "1,2,3,x", "no/file.json", "x" * 5000])
-def test_text_that_is_neither_numbers_nor_a_file_is_one_line(text):
-    with pytest.raises(UserError):
-        camera_of(text)
 
 
 def test_intrinsics_of_another_resolution_are_refused():

@@ -83,10 +83,6 @@ def test_neither_frame_nor_mask_is_changed():
     assert np.array_equal(mask, before[1])
 
 
-def test_an_empty_mask_is_refused():
-    refused("empty-mask", scene(), REACH, np.zeros((ROWS, COLUMNS)))
-
-
 def test_a_mask_of_a_few_pixels_is_refused():
     assert "29 pixels" in refused("empty-mask", scene(), REACH, box(np.s_[5:6, 5:34]))
     assert object_mask(scene(), REACH, box(np.s_[5:6, 5:35])).sum() == 30
@@ -207,10 +203,6 @@ def test_a_few_near_pixels_are_no_object():
     assert "28 pixels" in refused("empty-mask", depth, REACH)
     depth[8, 4:6] = NEAR
     assert object_mask(depth, REACH).sum() == 30
-
-
-def test_a_frame_without_depth_is_an_empty_mask():
-    refused("empty-mask", np.zeros((ROWS, COLUMNS), np.float32), REACH)
 
 
 # Parts

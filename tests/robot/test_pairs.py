@@ -110,14 +110,6 @@ def test_whole_turns_do_not_matter(tmp_path_factory, base, shift):
     )
 
 
-def test_a_perfect_estimator_stays_perfect(tmp_path):
-    views = np.arange(0, 360, 12) + 0.25
-    found = PairTable.load(
-        written(tmp_path / "p.csv", {"a": (views, views)})
-    ).estimates.estimate_deg
-    assert circular_distance_deg(found[0], np.arange(360)).max() < 1e-9
-
-
 def test_objects_may_have_other_views_and_any_names(tmp_path):
     views = np.arange(0, 360, 15), np.arange(0, 360, 4)
     objects = {"NA": (views[0], views[0] + 5.0), "007": (views[1], views[1] - 3.0)}
@@ -141,10 +133,8 @@ def test_further_columns_are_ignored(tmp_path):
 @pytest.mark.parametrize(
     ("views", "gap"),
     [
-        ([0], 360),
         ([0, 90, 180, 270], 90),
         (range(0, 345, 5), 20),
-        (range(10, 351, 10), 20),
         (np.arange(0, 352, WIDEST_GAP_DEG + 1), 24),
     ],
 )
@@ -194,13 +184,10 @@ def test_a_missing_column_is_named(tmp_path, column):
     ("content", "message"),
     [
         (b"", "p.csv is empty; it needs object_id, azimuth_deg, estimate_deg"),
-        (b"\n\n", "p.csv is empty"),
         (b"object_id,azimuth_deg,estimate_deg\n", "p.csv has no rows"),
-        (b"\xff\xfe\x00", "p.csv, line 1: this is not UTF-8; save the file as UTF-8"),
         ("a,b\r\ncup,1\r\nTässchen,2".encode("latin-1"), "p.csv, line 3: this is not UTF-8"),
         (b"a,b\n1,2\n1,2,3\n", "line 3 has 3 columns instead of 2: is there an extra comma"),
         (b'a,b\n"1,2\n3', "a cell has an opening quote and no closing one"),
-        (b"\0", "no column 'object_id'"),
     ],
 )
 def test_a_file_that_is_no_table_is_one_line(tmp_path, content, message):

@@ -61,7 +61,6 @@ def points(path: ElementTree.Element) -> np.ndarray:
     [
         (1, ["Network input"]),
         (2, ["Frame 1", "Frame 2"]),
-        (4, ["Frame 1", "Frame 2", "Frame 3", "Frame 4"]),
         (6, ["Frame 3 of 6", "Frame 4 of 6", "Frame 5 of 6", "Frame 6 of 6"]),
     ],
 )

@@ -397,9 +397,7 @@ ALL_ROUND = np.arange(BINS) * WIDTH
     ("azimuths_deg", "warning"),
     [
         (ALL_ROUND, ""),
-        (ALL_ROUND + 130.0, ""),
         (360.0 - ALL_ROUND, "estimates run opposite to azimuths"),
-        (np.radians(ALL_ROUND), "azimuths are radians"),
         (np.roll(ALL_ROUND, 12)[np.argsort(np.sin(7 * np.arange(BINS)))], "do not follow azimuths"),
     ],
 )

@@ -259,13 +259,6 @@ def test_the_travel_table_holds_every_point_to_six_decimals(tmp_path):
     assert read["setting"].tolist() == pytest.approx([0.333333] * 14, abs=1e-12)
 
 
-def test_curves_have_the_style_of_every_figure():
-    """Wherever they are called from: the spines that the style takes away are gone."""
-    axes = more_views_figure(cells_of(["random"])).axes[0]
-    assert not axes.spines["top"].get_visible()
-    assert not axes.spines["right"].get_visible()
-
-
 def test_the_legend_of_a_single_panel_stays_inside_the_figure():
     names = ["random", "bisecting", "evenly_spaced", "information_gain", "expected_dispersion"]
     figure = more_views_figure(cells_of([*names, "bayes_error", "pose_ambiguity"]))

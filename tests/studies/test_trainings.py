@@ -27,7 +27,7 @@ def simulated(rng, n_trainings, n_objects, of_training=0.1, remainder=1.0):
     )
 
 
-@pytest.mark.parametrize("n_objects", [15, 50, 125])
+@pytest.mark.parametrize("n_objects", [15, 125])
 @pytest.mark.parametrize("of_training", [0.0, 0.1, 0.3])
 def test_intervals_cover_the_truth_about_as_often_as_they_say(n_objects, of_training):
     """95 %, on skewed errors; intervals over the objects of one training do not."""
@@ -112,7 +112,7 @@ def test_what_is_no_table_of_finite_values_is_refused(values):
 @pytest.mark.parametrize("n_trainings", [3, 5])
 @pytest.mark.parametrize("sizes", [(8,), (6, 15)])
 def test_the_other_trainings_predict_a_training_as_often_as_they_say(n_trainings, sizes):
-    rng, inside, n = np.random.default_rng(3), 0, 3000
+    rng, inside, n = np.random.default_rng(3), 0, 1500
     for _ in range(n):
         objects = [rng.gamma(0.5, 1.0, size) for size in sizes]
         tables = [each + rng.normal(0.0, 0.3, (n_trainings, each.size)) for each in objects]
