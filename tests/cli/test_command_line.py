@@ -716,6 +716,14 @@ def test_export_writes_the_network(here, bundle, capsys, rng):
     }
 
 
+def test_a_network_that_cannot_be_run_is_one_line(here, bundle, capsys):
+    replace(bundle, network=b"no model").save("bad.safetensors")
+    for command in (("export", "bad.safetensors", "--onnx", "x.onnx"), ("recommend", "f0.npy")):
+        more = ("--bundle", "bad.safetensors") if command[0] == "recommend" else ()
+        assert "the bundle's network cannot be run" in fails(capsys, *command, *more)
+    assert not (here / "x.onnx").exists()
+
+
 def test_a_file_that_cannot_be_written_is_one_line(here, pairs, capsys):
     (here / "file").write_text("")
     assert "file" in fails(capsys, "export", "b.safetensors", "--onnx", "file/x.onnx")
@@ -864,18 +872,17 @@ def test_a_full_disk_is_one_line(here, unbuffered):
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize("kind", ["png", "pdf"])
-def test_a_picture_that_has_no_space_is_one_line(here, kind):
+def test_a_picture_that_has_no_space_is_one_line(here):
     # The limit holds for matplotlib's cache of fonts, too.
     cache = {"MPLCONFIGDIR": str(here / "cache")}
-    command = f"nbv recommend f0.npy --bundle b.safetensors --plot x.{kind}"
-    assert program(command, **cache).returncode == 0
-    (here / f"x.{kind}").unlink()
-    done = program(f"ulimit -f 2; {command}", **cache)
-    assert done.returncode == 2
-    assert done.stderr == f"nbv: error: x.{kind}: File too large\n"
-    assert not list(here.glob("*.partial*"))
-    assert not (here / f"x.{kind}").exists()
+    command = "nbv recommend f0.npy --bundle b.safetensors --plot"
+    assert program(f"{command} first.png", **cache).returncode == 0
+    for name in ("x.png", "x.pdf"):
+        done = program(f"ulimit -f 2; {command} {name}", **cache)
+        assert done.returncode == 2
+        assert done.stderr == f"nbv: error: {name}: File too large\n"
+        assert not list(here.glob("*.partial*"))
+        assert not (here / name).exists()
 
 
 def test_paths_are_checked_before_a_network_runs(here, capsys, monkeypatch):

@@ -69,6 +69,17 @@ def test_depths_are_those_of_a_brute_force_caster(embree, shape, elevation, fram
     assert 0.05 < (depth > 0).mean() < 0.95
 
 
+def test_a_sphere_has_the_same_image_from_everywhere_and_the_right_size(embree):
+    sphere = shape_of(trimesh.creation.icosphere(subdivisions=5))
+    radius = 0.5 / np.sqrt(3.0)
+    for framing in ("silhouette", "axis"):
+        camera = Camera(framing=framing, image_side=65)
+        depth = embree.render(*sphere, 30.0, np.arange(0, 360, 40), camera)
+        assert np.allclose(depth[:, 32, 32], camera.distance - radius, atol=1e-3)
+        seen_px = camera.focal_px * np.tan(np.arcsin(radius / camera.distance))
+        assert np.allclose((depth > 0).sum(axis=(1, 2)), np.pi * seen_px**2, rtol=0.01)
+
+
 @pytest.mark.parametrize("category", ["mug", "chair"])
 def test_turning_the_object_rolls_the_azimuths(embree, category):
     shape = procedural(category)

@@ -121,6 +121,11 @@ def test_a_list_for_other_categories_is_none_of_this_one_s_business(root, caplog
     assert not caplog.records
 
 
+def test_a_missing_list_is_named(root):
+    path = root / "no.txt"
+    refused(lambda: source_of("folder", root=str(root), exclude_file=str(path)), path)
+
+
 @pytest.mark.parametrize("name", [b"two\nlines", b"return\r", b"tab\t", b"latin \xe9", b"bell\x07"])
 def test_names_that_would_break_a_table_or_a_line_are_refused(tmp_path, name):
     put(tmp_path / "mug" / "one.ply")

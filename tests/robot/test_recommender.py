@@ -678,6 +678,13 @@ def test_a_recommender_is_of_a_bundle(bundle):
         Recommender("mug")
 
 
+def test_crops_are_bytes(recommender):
+    codes = recommender.crop(FRAMES[0]).codes
+    for wrong in ("crop", codes, codes[None] / 255):
+        with pytest.raises(UserError, match=r"`codes`: .*; give \(n, side, side\) uint8"):
+            recommender.recommend_crops(wrong)
+
+
 def test_masks_are_as_many_as_frames(recommender):
     mask = FRAMES[0] > 0
     with pytest.raises(UserError, match="2 frames and 1 mask:"):
