@@ -10,7 +10,7 @@ import pandas as pd
 from nbv.core.criteria import CRITERIA
 from nbv.core.estimates import Estimates
 from nbv.core.fusion import ESTIMATE_FUSIONS
-from nbv.core.policies import TestViews, two_views
+from nbv.core.policies import HeldOutViews, two_views
 from nbv.core.selection import DensityParams, choose_densities, chosen_evidence, most_likely_density
 from nbv.experiment.report.table import DECIDED, Cell, Table, difference_cell
 from nbv.experiment.statistics.paired import Resampler, mae_difference, mae_interval, paired_objects
@@ -94,7 +94,7 @@ def ablate(
     else:
         density = choose_densities(estimate_deg, {"ablated": method}, own)["ablated"]
     evidence = chosen_evidence(estimate_deg, density, own, instance["n_bins"])
-    error = two_views(**method, views=TestViews(test.estimate_deg, evidence)).error_deg
+    error = two_views(**method, views=HeldOutViews(test.estimate_deg, evidence)).error_deg
     return pd.DataFrame({"object_id": test.object_ids, "error_deg": error.mean(axis=1)})
 
 

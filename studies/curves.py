@@ -22,7 +22,7 @@ from nbv.core.plans import (
     plans_of,
     step_by_step,
 )
-from nbv.core.policies import TestViews, take_second_views
+from nbv.core.policies import HeldOutViews, take_second_views
 from nbv.core.selection import SelectedMethod
 from nbv.core.simulation import (
     DistributionViews,
@@ -178,7 +178,7 @@ def travel_rows(selected: Mapping[str, SelectedMethod], test: Estimates) -> pd.D
             by_fusion.setdefault(method.fusion, method)
         if method.lookup is None:
             continue
-        views = TestViews(test.estimate_deg, method.evidence)
+        views = HeldOutViews(test.estimate_deg, method.evidence)
         for rule, setting, by_bin in _restricted(method.lookup.cost):
             delta = by_bin[nearest_bin(test.estimate_deg, len(by_bin))]
             error = take_second_views(delta, method.fusion, views).error_deg

@@ -13,8 +13,7 @@ from tests.core.made import (
 )
 
 from nbv.core.lookup import build_lookup
-from nbv.core.policies import TestViews as Views
-from nbv.core.policies import take_second_views
+from nbv.core.policies import HeldOutViews, take_second_views
 from nbv.core.selection import choose_densities, chosen_lookup, most_likely_density
 from nbv.errors import UserError
 
@@ -25,7 +24,7 @@ def choose_density(estimate_deg, **grid):
 
 
 def two_view_error_deg(estimate_deg, delta_deg):
-    return take_second_views(delta_deg, "average", Views(estimate_deg)).error_deg
+    return take_second_views(delta_deg, "average", HeldOutViews(estimate_deg)).error_deg
 
 
 def test_the_chosen_density_decides_best_on_objects_it_has_not_seen():

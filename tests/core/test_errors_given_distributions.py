@@ -14,8 +14,7 @@ from nbv.core.belief import Belief
 from nbv.core.criteria import CRITERIA, affinity
 from nbv.core.evidence import evidence_of_distributions
 from nbv.core.fusion import product, rotation_errors_deg
-from nbv.core.policies import TestViews as Views
-from nbv.core.policies import two_views
+from nbv.core.policies import HeldOutViews, two_views
 
 N_BINS, N_VIEWS = 12, 24
 AFFINITY = {"power": 4.0, "pseudo_observations": 5.0}
@@ -127,7 +126,7 @@ def test_no_policy_is_better_than_the_oracle_of_products():
     views, evidence = distributions(3), evidence_of(distributions(0, n_objects=6))
     centres = np.exp(1j * np.radians(np.arange(N_BINS) * 30))
     estimate_deg = np.degrees(np.angle(views @ centres)) % 360
-    views = Views(estimate_deg, evidence, np.random.default_rng(0), distributions=views)
+    views = HeldOutViews(estimate_deg, evidence, np.random.default_rng(0), distributions=views)
     errors = {
         policy: two_views(policy, "product", views).error_deg
         for policy in ("oracle", "fixed", "expected_error", "information_gain", "opposite")

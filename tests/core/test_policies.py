@@ -11,8 +11,7 @@ from nbv.core.belief import Belief
 from nbv.core.criteria import CRITERIA
 from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS, rotation_errors_deg
 from nbv.core.lookup import build_lookup
-from nbv.core.policies import TestViews as Views
-from nbv.core.policies import needs_lookup, take_second_views, two_views
+from nbv.core.policies import HeldOutViews, needs_lookup, take_second_views, two_views
 from nbv.errors import UserError
 
 
@@ -20,7 +19,7 @@ def test_two_view_error_is_that_of_a_plain_loop():
     rng = np.random.default_rng(1)
     estimate = rng.uniform(0, 360, (3, 36))
     delta = rng.integers(0, 36, (3, 36)) * 10
-    made = take_second_views(delta, "average", Views(estimate))
+    made = take_second_views(delta, "average", HeldOutViews(estimate))
     for o in range(3):
         for v in range(36):
             second = estimate[o, (v + delta[o, v] // 10) % 36]
@@ -33,7 +32,7 @@ def test_two_view_error_is_that_of_a_plain_loop():
 
 @pytest.mark.parametrize("fusion", ESTIMATE_FUSIONS)
 def test_the_oracle_is_the_least_of_all_rotations(fusion):
-    views = Views(estimates(2, seed=6), evidence_of())
+    views = HeldOutViews(estimates(2, seed=6), evidence_of())
     every = rotation_errors_deg(views.estimate_deg, views.evidence, fusion)
     reached = two_views("oracle", fusion, views).error_deg
     np.testing.assert_allclose(reached, every.min(axis=0), atol=1e-4)
@@ -44,7 +43,7 @@ def test_the_oracle_is_the_least_of_all_rotations(fusion):
 
 
 def test_policies_by_name():
-    views = Views(estimates(2, seed=6), evidence_of(), np.random.default_rng(0))
+    views = HeldOutViews(estimates(2, seed=6), evidence_of(), np.random.default_rng(0))
     assert (two_views("opposite", "average", views).delta_deg == 180).all()
     alone = two_views("none", "average", views)
     assert alone.delta_deg is None
@@ -52,7 +51,7 @@ def test_policies_by_name():
     table = build_lookup(views.evidence, "information_gain")
     followed = two_views("information_gain", "average", views).delta_deg
     np.testing.assert_array_equal(followed, table.least_cost(views.estimate_deg))
-    given = two_views("information_gain", "average", Views(views.estimate_deg, lookup=table))
+    given = two_views("information_gain", "average", HeldOutViews(views.estimate_deg, lookup=table))
     np.testing.assert_array_equal(given.delta_deg, followed)
 
 
@@ -60,7 +59,7 @@ def test_a_criterion_goes_by_the_distribution_of_each_image_where_there_is_one()
     rng, evidence = np.random.default_rng(0), evidence_of()
     unseen = estimates(2, seed=6)
     distributions = rng.dirichlet(np.full(24, 0.3), unseen.shape)
-    views = Views(unseen, evidence, distributions=distributions)
+    views = HeldOutViews(unseen, evidence, distributions=distributions)
     made = two_views("information_gain", "product", views)
     belief = Belief(distributions.reshape(-1, 24).astype(np.float32), evidence)
     cost = CRITERIA["information_gain"](belief, evidence, "product").reshape(2, 48, 24)
@@ -85,7 +84,7 @@ def test_a_criterion_goes_by_the_distribution_of_each_image_where_there_is_one()
 )
 def test_what_is_missing_is_named(policy, fusion, missing):
     with pytest.raises(ValueError, match=missing):
-        two_views(policy, fusion, Views(estimates()))
+        two_views(policy, fusion, HeldOutViews(estimates()))
 
 
 def test_what_needs_a_lookup_table():

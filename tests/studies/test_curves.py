@@ -17,7 +17,7 @@ from nbv.core.angles import circular_distance_deg
 from nbv.core.estimates import Posteriors
 from nbv.core.evidence import evidence_of_distributions
 from nbv.core.logits import log_likelihood
-from nbv.core.policies import TestViews, two_views
+from nbv.core.policies import HeldOutViews, two_views
 from nbv.core.selection import select_methods
 from nbv.errors import UserError
 from nbv.experiment.report.table import write_table
@@ -121,7 +121,7 @@ def test_travel_curves_start_at_the_table_and_end_by_staying():
     first, last = gain.iloc[0], gain.iloc[-1]
     # The first extension with posterior fusion gives the density of the fixed rotations.
     turns, fixed = (
-        TestViews(test.estimate_deg, selected[name].evidence)
+        HeldOutViews(test.estimate_deg, selected[name].evidence)
         for name in ("gain_posterior", "random_posterior")
     )
     error = two_views("information_gain", "posterior", turns).error_deg.mean()

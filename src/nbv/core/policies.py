@@ -30,7 +30,7 @@ ORACLE = "oracle"
 
 
 @dataclass(frozen=True)
-class TestViews:
+class HeldOutViews:
     """Estimates for full sweeps of objects, and the data that policies and fusion rules use.
 
     Attributes
@@ -80,7 +80,7 @@ class TwoViews:
         return circular_distance_deg(self.pose_deg, np.arange(n_views) * (360.0 / n_views))
 
 
-def _random(views: TestViews, fusion: str) -> Rotations:
+def _random(views: HeldOutViews, fusion: str) -> Rotations:
     """Draw any other view, all equally likely; distributions are rotated by whole classes."""
     if views.rng is None:
         raise ValueError("policy 'random' needs a generator")
@@ -91,11 +91,11 @@ def _random(views: TestViews, fusion: str) -> Rotations:
     return np.asarray(views.rng.integers(1, n, shape) * (360 // n))
 
 
-def _opposite(views: TestViews, fusion: str) -> Rotations:
+def _opposite(views: HeldOutViews, fusion: str) -> Rotations:
     return np.full(views.estimate_deg.shape, 180, dtype=np.int64)
 
 
-def _oracle(views: TestViews, fusion: str) -> Rotations:
+def _oracle(views: HeldOutViews, fusion: str) -> Rotations:
     """Return the rotation of least true error from each view; among equals, the shortest travel.
 
     It bounds all methods with the same fusion.
@@ -110,7 +110,7 @@ def _oracle(views: TestViews, fusion: str) -> Rotations:
     return least_cost_delta(by_view).reshape(views.estimate_deg.shape)
 
 
-def _recommended(criterion: str, views: TestViews, fusion: str) -> Rotations:
+def _recommended(criterion: str, views: HeldOutViews, fusion: str) -> Rotations:
     """Return the rotation of least cost for each image's distribution, or for each estimate."""
     if views.lookup is not None:
         return views.lookup.least_cost(views.estimate_deg)
@@ -123,7 +123,7 @@ def _recommended(criterion: str, views: TestViews, fusion: str) -> Rotations:
     return recommended_delta(cost, views.evidence.settings).reshape(views.estimate_deg.shape)
 
 
-Policy = Callable[[TestViews, str], Rotations]
+Policy = Callable[[HeldOutViews, str], Rotations]
 POLICIES: dict[str, Policy] = {
     "random": _random,
     "opposite": _opposite,
@@ -147,7 +147,7 @@ def needs_lookup(policy: str) -> bool:
     return policy in CRITERIA
 
 
-def two_views(policy: str, fusion: str, views: TestViews) -> TwoViews:
+def two_views(policy: str, fusion: str, views: HeldOutViews) -> TwoViews:
     """Choose a second view for every first view and fuse the two.
 
     The policy is ``none`` (a single view) or a name in `POLICIES`, the fusion one in
@@ -163,7 +163,7 @@ def two_views(policy: str, fusion: str, views: TestViews) -> TwoViews:
     return take_second_views(POLICIES[policy](views, fusion), fusion, views)
 
 
-def take_second_views(delta_deg: Rotations, fusion: str, views: TestViews) -> TwoViews:
+def take_second_views(delta_deg: Rotations, fusion: str, views: HeldOutViews) -> TwoViews:
     """Fuse every first view with the view after its rotation, (n_objects, n_views) degrees."""
     second_deg = at_second_view(views.estimate_deg, delta_deg)
     first, second = views.estimate_deg, second_deg

@@ -28,7 +28,7 @@ from nbv.core.evidence import (
 )
 from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
 from nbv.core.lookup import LookupTable, build_lookup
-from nbv.core.policies import ORACLE, POLICIES, SINGLE, TestViews, needs_lookup, two_views
+from nbv.core.policies import ORACLE, POLICIES, SINGLE, HeldOutViews, needs_lookup, two_views
 from nbv.errors import UserError, nearest
 
 log = logging.getLogger(__name__)
@@ -144,7 +144,7 @@ def choose_densities(
     for candidate, part, held_out, evidence in _trials(estimate_deg, settings, n_bins, shared):
         for name, method in methods.items():
             # Every candidate gets the same random numbers.
-            views = TestViews(estimate_deg[held_out], evidence, np.random.default_rng(part))
+            views = HeldOutViews(estimate_deg[held_out], evidence, np.random.default_rng(part))
             error = two_views(method["policy"], method["fusion"], views).error_deg
             object_errors = errors[name].setdefault(candidate, np.empty(len(estimate_deg)))
             object_errors[held_out] = error.mean(axis=1)

@@ -13,7 +13,7 @@ from nbv.core.angles import circular_distance_deg
 from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
 from nbv.core.lookup import LookupTable
-from nbv.core.policies import TestViews, two_views
+from nbv.core.policies import HeldOutViews, two_views
 from nbv.errors import UserError
 from nbv.experiment.estimates import check_azimuths, objects_of_full_turns, read_estimates
 from nbv.experiment.splits import read_splits
@@ -47,7 +47,7 @@ def evaluate_method(
     test : Estimates
         360 / n_views must be a whole number of degrees.
     rng, lookup, evidence : optional
-        Inputs of the policy or the fusion; see `nbv.core.policies.TestViews`.
+        Inputs of the policy or the fusion; see `nbv.core.policies.HeldOutViews`.
     posteriors : Posteriors, optional
         The distributions of the test objects, where the fusion needs them.
 
@@ -57,7 +57,7 @@ def evaluate_method(
         Columns `COLUMNS`; ``delta_deg`` and ``next_estimate_deg`` are absent for ``none``.
     """
     distributions = None if posteriors is None else posteriors.distributions
-    views = TestViews(test.estimate_deg, evidence, rng, lookup, distributions)
+    views = HeldOutViews(test.estimate_deg, evidence, rng, lookup, distributions)
     made = two_views(method["policy"], method["fusion"], views)
     n_objects, n_views = test.estimate_deg.shape
     # Rounded before the error is taken, so that the columns of a row agree with each other.
