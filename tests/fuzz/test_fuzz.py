@@ -23,8 +23,8 @@ def campaign(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def outcomes(campaign):
-    """Eleven damaged files of each kind: 220 in all."""
-    return list(campaign.run(cases(11 * len(READERS))))
+    """Five damaged files of each kind."""
+    return list(campaign.run(cases(5 * len(READERS))))
 
 
 def test_undamaged_files_are_read(campaign):
@@ -34,7 +34,7 @@ def test_undamaged_files_are_read(campaign):
 @pytest.mark.parametrize("kind", READERS)
 def test_damaged_files_give_a_right_result_or_one_line(outcomes, kind):
     of_kind = [outcome for outcome in outcomes if outcome.case.reader == kind]
-    assert len(of_kind) == 11
+    assert len(of_kind) == 5
     assert [outcome for outcome in of_kind if outcome.outcome == "failed"] == []
 
 

@@ -44,34 +44,9 @@ def made(tmp_path_factory) -> Project:
     return finished_project(tmp_path_factory, "bundles", "bundles", overrides=CAMERA)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (("camera.framing=axis",), "camera.framing=axis: a bundle's frames are centred"),
-        (
-            ("calibration=crossfit", "crossfit_epochs=1"),
-            "calibration=crossfit: a bundle needs calibration=holdout",
-        ),
-        (("~sensor.diagonal_m.mug",), "sensor.diagonal_m.mug: a bundle needs"),
-    ],
-)
-def test_settings_that_make_no_bundle_are_one_line(fresh: Project, wrong, message) -> None:
-    overrides = (*CAMERA, *wrong)
-    done = fresh.run("-n", "--cores", "1", "bundles", overrides=overrides, fails=True)
-    assert f"nbv: error: {message}" in done.stderr
-    assert "Traceback" not in done.stderr
-
-
-def test_a_bundle_needs_a_classifier(fresh: Project) -> None:
-    overrides = (*TINY, "categories=[mug]")
-    done = fresh.run("-n", "--cores", "1", "bundles", overrides=overrides, fails=True)
-    assert "nbv: error: estimator=regressor: a bundle needs estimator=classifier" in done.stderr
-
-
 def test_an_edit_of_the_renderer_renders_a_bundles_images_again(made: Project) -> None:
     path = made.folder / "src/nbv/data/embree.py"
     text = path.read_text()
-    assert made.would_run(*CAMERA[len(TINY) :], targets=("bundles",)) == {}
     path.write_text(text + "\n\nEDITED = True\n")
     jobs = made.would_run(*CAMERA[len(TINY) :], targets=("bundles",))
     path.write_text(text)
@@ -142,13 +117,6 @@ def assert_tested_with_all(made: Project, folder: Path) -> None:
             assert np.minimum(apart, 360 - apart).mean() == pytest.approx(mae_deg, abs=1e-3)
 
 
-def test_the_same_settings_give_the_same_bytes(made: Project, tmp_path) -> None:
-    again = copy_of_project(tmp_path)
-    again.run("--cores", "1", "bundles", overrides=CAMERA)
-    path = "bundles/mug.safetensors"
-    assert (again.results / path).read_bytes() == (made.results / path).read_bytes()
-
-
 def test_ingredients_are_left_out_of_training_and_not_of_the_test(made: Project) -> None:
     frames = made.folder / "frames"
     frames.mkdir()
@@ -213,7 +181,7 @@ def test_a_folder_of_meshes_becomes_a_bundle_that_answers(tmp_path, capsys, monk
     chosen = (
         *own,
         "categories=[jug]",
-        "++elevations_deg.jug=[0,30]",
+        "++elevations_deg.jug=[0]",
         "++sensor.diagonal_m.jug=0.17",
         "dataset=folder",
         f"dataset.root={folder.parent}",

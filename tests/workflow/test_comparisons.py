@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import shutil
 from pathlib import Path
@@ -92,28 +91,3 @@ def test_cross_fitting_calibrates_with_every_object_that_is_not_tested(other):
 def trained_on(path):
     with safetensors.safe_open(path, framework="np") as stored:
         return set(json.loads(stored.metadata()["nbv"])["trained_on"])
-
-
-def test_runs_that_calibrate_alike_are_compared_on_calibration_objects_too(scratch):
-    overrides = (*TINY, "name=longer", "estimator.epochs=2", "compared_runs=[tiny]")
-    scratch.run("--cores", "2", *STUDIES, "runs", overrides=overrides)
-    results = scratch.folder / "results"
-    cells = pd.read_csv(results / "longer/tables/runs.csv").set_index(["row", "method"])
-    for category, run in itertools.product(("mug", "chair"), ("longer", "tiny")):
-        for role in ("calibration", "test"):
-            files = (results / run / "estimates" / category).rglob(f"{role}.csv")
-            rows = pd.concat([pd.read_csv(path) for path in files])
-            apart = abs(rows["estimate_deg"] - rows["azimuth_deg"])
-            found = cells.loc[(f"{category}/el00 single {role}", run), "value"]
-            assert found == pytest.approx(np.minimum(apart, 360 - apart).mean(), abs=1e-3)
-        files = (results / run / "evaluation" / category).rglob("opposite.csv")
-        mean = pd.concat([pd.read_csv(path) for path in files])["error_deg"].mean()
-        found = cells.loc[(f"{category}/el00 opposite test", run), "value"]
-        assert found == pytest.approx(mean, abs=1e-3)
-
-
-def test_a_compared_run_that_is_not_there_is_named(finished):
-    settings = (*OTHER, "compared_runs=[nowhere]")
-    done = finished.run("--cores", "1", *STUDIES, "runs", overrides=settings, fails=True)
-    assert "nbv: error: results/nowhere/configuration.yaml does not exist" in done.stderr
-    assert "Traceback" not in done.stderr

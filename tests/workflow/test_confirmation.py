@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 from safetensors import safe_open
@@ -75,8 +74,6 @@ def test_a_replicate_has_the_folds_of_its_shuffle_and_a_seed_of_its_own(confirme
     """Trained with one seed they would be the same, bit for bit."""
     place = "results/tiny/confirmation/shuffle0/replicate1/estimators/mug/el00/fold1"
     target = f"{place}/estimator.safetensors"
-    planned = confirmed.would_run(*SMALL[len(TINY) :], targets=(*STUDIES, target))
-    assert planned == {"replicate_pretrain": 1, "replicate_train": 1}
     confirmed.run("--cores", "2", *STUDIES, target, overrides=SMALL)
     own = confirmed.results / "estimators/mug/el00/fold1/estimator.safetensors"
     other = confirmed.folder / target
@@ -122,38 +119,7 @@ def test_the_kept_file_alone_gives_the_same_tables(confirmed, fresh):
         assert (made / "confirmation" / name).read_bytes() == before
 
 
-def test_runs_of_one_data_set_have_other_categories(confirmed, fresh):
-    kept = confirmed.results / "confirmation/estimates.npz"
-    with np.load(kept) as stored:
-        arrays = dict(stored)
-    settings = json.loads(str(arrays["settings"]))
-    settings["confirmation"]["dataset"], settings["name"] = "tiny", "other"
-    np.savez(fresh.folder / "other.npz", **arrays | {"settings": np.array(json.dumps(settings))})
-    files = f"confirmation.kept=[{kept},other.npz]"
-    done = fresh.run("--cores", "1", *STUDIES, "statistics", overrides=(*TINY, files), fails=True)
-    line = f"other.npz and {kept} have the same categories of the data set tiny"
-    assert line in done.stdout + done.stderr
-
-
 def test_one_training_of_one_fold_can_be_asked_for_by_name(fresh):
     place = "results/tiny/confirmation/shuffle1/replicate2/estimators/mug/el00/fold2"
     planned = fresh.would_run(targets=(*STUDIES, f"{place}/estimator.safetensors"))
     assert planned == {"meshes": 1, "render": 1, "shuffle_splits": 1, "replicate_train": 1}
-
-
-def test_the_paper_needs_no_other_training(fresh):
-    planned = fresh.would_run("confirmation.replicates=[[0,1,2],[],[1]]")
-    assert not [name for name in planned if "replicate" in name or "shuffle" in name]
-
-
-def test_a_file_that_keeps_nothing_is_named(fresh):
-    (fresh.folder / "other.npz").write_bytes(b"not a file")
-    done = fresh.run(
-        "--cores",
-        "1",
-        *STUDIES,
-        "statistics",
-        overrides=(*TINY, "confirmation.kept=[other.npz]"),
-        fails=True,
-    )
-    assert "nbv: error: confirmation.kept: other.npz" in done.stdout + done.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from nbv.core.fusion import product
 from nbv.core.logits import fit_temperature
 from nbv.core.lookup import LookupTable
 from nbv.core.selection import DENSITY
+from nbv.errors import UserError
+from nbv.robot.pairs import PairTable
 from projects import STUDIES, TINY, Project, copy_of_project
 
 pytestmark = pytest.mark.slow
@@ -104,32 +107,14 @@ def test_nothing_is_rendered_or_trained(foreign) -> None:
     assert "figure9.png" in {path.name for path in (project.results / "figures").iterdir()}
 
 
-@pytest.mark.parametrize("target", ["confirm", "statistics", "estimators", "bundles"])
-def test_what_needs_images_or_trainings_is_refused_before_anything_runs(foreign, target) -> None:
+def test_what_needs_images_or_trainings_is_refused_before_anything_runs(foreign) -> None:
     project, pairs = foreign
     chosen = (*TINY, "estimator=external", f"estimator.pairs={pairs}", "name=none")
-    done = project.run(*STUDIES, target, "--cores", "1", overrides=chosen, fails=True)
+    done = project.run(*STUDIES, "confirm", "--cores", "1", overrides=chosen, fails=True)
     (line,) = [one for one in done.stderr.splitlines() if one.startswith("nbv: error")]
     assert "estimator=external has no meshes, images or trainings" in line
     assert "Traceback" not in done.stderr
     assert not (project.folder / "results" / "none").exists()
-
-
-@pytest.mark.parametrize(
-    ("columns", "message"),
-    [
-        (["object_id", "azimuth_deg", "estimate_deg"], "no column 'category', and the run has 2"),
-        (["category", "azimuth_deg", "estimate_deg"], "no column 'object_id'"),
-    ],
-)
-def test_a_file_that_does_not_fit_is_one_line(foreign, columns, message) -> None:
-    project, pairs = foreign
-    other = pairs.with_name("other.csv")
-    pd.read_csv(pairs)[columns].to_csv(other, index=False)
-    chosen = (*TINY, "estimator=external", f"estimator.pairs={other}", "name=other")
-    done = project.run("--cores", "1", overrides=chosen, fails=True)
-    (line,) = [one for one in done.stderr.splitlines() if one.startswith("nbv: error")]
-    assert message in line
 
 
 N_CLASSES = 24
@@ -210,22 +195,14 @@ def test_methods_of_distributions_are_in_the_tables(given) -> None:
 
 
 @pytest.mark.parametrize(
-    ("chosen", "message"),
+    ("n_classes", "message"),
     [
-        (
-            ["estimator=external_distributions", "estimator.n_classes=72"],
-            "has 24 columns of probabilities (p0, p1, …), and estimator.n_classes=72: set it to 24",
-        ),
-        (
-            ["estimator=external"],
-            "choose estimator=external_distributions with estimator.n_classes=24",
-        ),
+        (72, "has 24 columns of probabilities (p0, p1, …), but estimator.n_classes=72: set it to"),
+        (None, "choose estimator=external_distributions with estimator.n_classes=24"),
     ],
 )
-def test_the_number_of_classes_is_that_of_the_file(given, chosen, message) -> None:
-    project, _ = given
-    own = [one for one in DISTRIBUTIONS if not one.startswith(("estimator=", "estimator.n_c"))]
-    pairs = f"estimator.pairs={project.folder / 'pairs.csv'}"
-    done = project.run("--cores", "1", overrides=(*own, *chosen, pairs, "name=no"), fails=True)
-    (line,) = [one for one in done.stderr.splitlines() if one.startswith("nbv: error")]
-    assert message in line
+def test_the_number_of_classes_is_that_of_the_file(tmp_path, n_classes, message) -> None:
+    path = tmp_path / "pairs.csv"
+    foreign_distributions().to_csv(path, index=False)
+    with pytest.raises(UserError, match=re.escape(message)):
+        PairTable.load(path).check_classes(n_classes)

@@ -89,16 +89,8 @@ def test_one_estimator_can_be_asked_for_by_name_and_brings_what_it_starts_from(f
     target = "results/tiny/estimators/mug/el15/fold2/estimator.safetensors"
     planned = fresh.would_run(*MORE, targets=(target,))
     assert planned == {"meshes": 2, "render": 3, "splits": 2, "pretrain": 1, "train": 2}
-    fresh.run(
-        "--cores", "2", target, overrides=(*TINY, *MORE[1:], "estimator.warm_start=elevations")
-    )
-    made = sorted(
-        str(path.relative_to(fresh.results / "estimators"))
-        for path in (fresh.results / "estimators").rglob("*.safetensors")
-    )
-    assert made == [f"mug/el{e}/fold2/estimator.safetensors" for e in ("00", "15")]
-    epochs = [history(fresh.results / "estimators" / name)["settings"]["epochs"] for name in made]
-    assert epochs == [1, 4]
+    alone = fresh.would_run(MORE[1], "estimator.warm_start=elevations", targets=(target,))
+    assert alone == {"meshes": 1, "render": 2, "splits": 1, "train": 2}
 
 
 def test_a_changed_start_trains_what_follows_again(warm):
@@ -108,7 +100,6 @@ def test_a_changed_start_trains_what_follows_again(warm):
         return warm.would_run(*more, targets=("estimators",))
 
     made_again = {"train": 8, "estimators": 1}
-    assert planned(*MORE) == {}
     assert planned(*MORE, "estimator.epochs=2") == {}
     assert planned(*MORE, "estimator.next_elevation.epochs=2") == made_again | {"train": 4}
     assert planned(*MORE, "estimator.fine_tuning.epochs=2") == made_again
