@@ -31,8 +31,7 @@ def main() -> int:
         done = list(campaign.run([Case(kind, int(number))]))
         say(*done[0])
         return int(done[0].outcome == "failed")
-    start, done = time.monotonic(), list(campaign.check_valid())
-    failures = [outcome for outcome in done if outcome.outcome == "failed"]
+    start, done, failures = time.monotonic(), [], []
     for outcome in campaign.run(cases(given.cases), start + 60 * given.minutes):
         done.append(outcome)
         failures += [outcome] if outcome.outcome == "failed" else []

@@ -25,7 +25,7 @@ OUTCOMES = ("result", "refused", "failed")
 
 
 class Case(NamedTuple):
-    """One damaged file: its reader's name and its number decide what is damaged."""
+    """One file: its reader's name and its number decide what is damaged; below 0 nothing is."""
 
     reader: str
     number: int
@@ -39,10 +39,11 @@ class Outcome(NamedTuple):
     detail: str
 
 
-def cases(n: int, first: int = 0) -> list[Case]:
-    """Return n cases, as many for each reader as for any other, to within one."""
+def cases(n: int) -> list[Case]:
+    """Return each reader's valid file and n damaged ones, to within one as many for each reader."""
     names = list(READERS)
-    return [Case(names[i % len(names)], first + i // len(names)) for i in range(n)]
+    valid = [Case(name, -1) for name in names]
+    return [*valid, *(Case(names[i % len(names)], i // len(names)) for i in range(n))]
 
 
 class Campaign:
@@ -91,23 +92,21 @@ class Campaign:
         """Write a case's damaged file, and what reading it needs, below a folder."""
         reader = READERS[case.reader]
         shutil.copytree(self._folder / "valid" / case.reader, folder)
+        path = folder / reader.file
+        if case.number < 0:
+            return path
         rng = np.random.default_rng([self._seed, zlib.crc32(case.reader.encode()), case.number])
         others = [data for name, data in self._valid.items() if name != case.reader]
-        path = folder / reader.file
         path.write_bytes(mutate(self._valid[case.reader], others, rng))
         return path
-
-    def check_valid(self) -> Iterator[Outcome]:
-        """Yield the outcome of each reader's valid file, which has to be a result."""
-        with Worker(self._folder / "check") as worker:
-            for name, reader in READERS.items():
-                path = self._folder / "valid" / name / reader.file
-                yield Outcome(Case(name, -1), *worker.ask(name, path))
 
     def _outcome(self, worker: Worker, case: Case) -> Outcome:
         folder = worker.folder / "case"
         path = self.write_case(case, folder)
-        outcome = Outcome(case, *worker.ask(case.reader, path))
+        found, detail = worker.ask(case.reader, path)
+        if case.number < 0 and found == "refused":
+            found = "failed"
+        outcome = Outcome(case, found, detail)
         if outcome.outcome == "failed":
             kept = f"seed{self._seed}-{case.reader}-{case.number}".replace(" ", "-")
             (self._folder / "failed").mkdir(exist_ok=True)

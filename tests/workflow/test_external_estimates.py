@@ -154,7 +154,7 @@ def given(tmp_path_factory) -> tuple[Project, pd.DataFrame]:
     shuffled.to_csv(folder / "pairs.csv", index=False)
     project = copy_of_project(folder)
     chosen = (*DISTRIBUTIONS, f"estimator.pairs={folder / 'pairs.csv'}")
-    project.run("--cores", "2", *STUDIES, "all", "extensions", overrides=chosen)
+    project.run("--cores", "2", *STUDIES, "evaluation", "leaderboard", overrides=chosen)
     return project, table
 
 
