@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,27 +107,38 @@ def copy_of_project(folder: Path) -> Project:
 
 
 def finished_project(
-    factory: pytest.TempPathFactory, name: str, *targets: str, overrides: tuple[str, ...] = TINY
+    factory: pytest.TempPathFactory,
+    name: str,
+    *targets: str,
+    overrides: tuple[str, ...] = TINY,
+    prepare: Callable[[Path], object] | None = None,
 ) -> Project:
     """Return an own copy of a project after a run on two cores.
 
     One of the processes that share the tests runs it. The others wait: it takes both cores.
+    `prepare` gets the project's folder before the run.
     """
+
+    def run(folder: Path) -> None:
+        project = copy_of_project(folder)
+        if prepare is not None:
+            prepare(folder)
+        project.run("--cores", "2", *targets, overrides=overrides)
+
     own = factory.mktemp(name)
     if "PYTEST_XDIST_WORKER" not in os.environ:
-        project = copy_of_project(own)
-        project.run("--cores", "2", *targets, overrides=overrides)
-        return project
+        run(own)
+        return Project(own)
     # The folders of all processes are in one, which is of this run of the tests alone.
     of_all = factory.getbasetemp().parent
     with (of_all / f"{name}.lock").open("w") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
         if not (of_all / name).exists():
+            partial = of_all / f"{name}.partial"
             # What is left where another process failed to make it.
-            shutil.rmtree(of_all / f"{name}.partial", ignore_errors=True)
-            (of_all / f"{name}.partial").mkdir()
-            project = copy_of_project(of_all / f"{name}.partial")
-            project.run("--cores", "2", *targets, overrides=overrides)
-            project.folder.rename(of_all / name)
+            shutil.rmtree(partial, ignore_errors=True)
+            partial.mkdir()
+            run(partial)
+            partial.rename(of_all / name)
     shutil.copytree(of_all / name, own, symlinks=True, dirs_exist_ok=True)
     return Project(own)

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 import safetensors
 
-from projects import STUDIES, TINY, Project
+from projects import STUDIES, TINY, Project, finished_project
 
 pytestmark = pytest.mark.slow
 
@@ -30,12 +30,16 @@ PLACES = [f"mug/el00/fold{fold}" for fold in (1, 2)]
 @pytest.fixture(scope="module")
 def other(finished: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of a cross-fitted classifier; the default run lies in the same folder."""
-    folder = tmp_path_factory.mktemp("compared") / "project"
-    shutil.copytree(finished.folder, folder, symlinks=True)
-    Project(folder).run(
-        "--cores", "2", *STUDIES, "runs", overrides=(*OTHER, "compared_runs=[tiny]")
+    made = finished_project(
+        tmp_path_factory,
+        "other",
+        *(*STUDIES, "runs"),
+        overrides=(*OTHER, "compared_runs=[tiny]"),
+        prepare=lambda folder: shutil.copytree(
+            finished.folder, folder, symlinks=True, dirs_exist_ok=True
+        ),
     )
-    return folder / "results/other"
+    return made.folder / "results/other"
 
 
 def test_a_classifier_says_how_likely_each_azimuth_is(other):

@@ -20,25 +20,27 @@ from nbv.core.lookup import LookupTable
 from nbv.core.selection import DENSITY
 from nbv.errors import UserError
 from nbv.robot.pairs import PairTable
-from projects import STUDIES, TINY, Project, copy_of_project
+from projects import STUDIES, TINY, Project, copy_of_project, finished_project
 
 pytestmark = pytest.mark.slow
 
 
+FOREIGN = (*TINY, "estimator=external", "estimator.pairs=pairs.csv")
+
+
 @pytest.fixture(scope="module")
-def foreign(finished: Project, tmp_path_factory) -> tuple[Project, Path]:
+def foreign(finished: Project, tmp_path_factory) -> Project:
     """A run on the tiny run's own test estimates, written as another program would."""
-    folder = tmp_path_factory.mktemp("foreign")
-    turns = []
-    for category in ("mug", "chair"):
-        for path in sorted((finished.results / "estimates" / category).rglob("test.csv")):
-            turns.append(pd.read_csv(path).assign(category=category, elevation_deg=0))
-    table = pd.concat(turns).sample(frac=1.0, random_state=0)
-    table.to_csv(folder / "pairs.csv", index=False)
-    project = copy_of_project(folder)
-    chosen = (*TINY, "estimator=external", f"estimator.pairs={folder / 'pairs.csv'}")
-    project.run("--cores", "2", overrides=chosen)
-    return project, folder / "pairs.csv"
+
+    def write_pairs(folder: Path) -> None:
+        turns = []
+        for category in ("mug", "chair"):
+            for path in sorted((finished.results / "estimates" / category).rglob("test.csv")):
+                turns.append(pd.read_csv(path).assign(category=category, elevation_deg=0))
+        table = pd.concat(turns).sample(frac=1.0, random_state=0)
+        table.to_csv(folder / "pairs.csv", index=False)
+
+    return finished_project(tmp_path_factory, "foreign", overrides=FOREIGN, prepare=write_pairs)
 
 
 def errors_of(project: Project, category: str, method: str) -> pd.Series:
@@ -52,8 +54,7 @@ def errors_of(project: Project, category: str, method: str) -> pd.Series:
 def test_methods_without_calibration_get_the_errors_of_the_run_itself(
     foreign, finished: Project, category: str, method: str
 ) -> None:
-    project, _ = foreign
-    found = errors_of(project, category, method)
+    found = errors_of(foreign, category, method)
     wanted = errors_of(finished, category, method)
     pd.testing.assert_series_equal(found, wanted)
 
@@ -82,12 +83,11 @@ def test_the_estimates_of_a_classifier_give_its_own_lookup_table(tmp_path, monke
 
 
 def test_all_objects_that_are_not_tested_calibrate(foreign) -> None:
-    project, pairs = foreign
-    splits = pd.read_csv(project.results / "splits/mug.csv", dtype={"object_id": str})
+    splits = pd.read_csv(foreign.results / "splits/mug.csv", dtype={"object_id": str})
     assert set(splits["role"]) == {"calibration", "test"}
     of_fold = splits[splits["fold"] == 1].groupby("role")["object_id"].agg(set)
-    table = LookupTable.load(project.results / "lookup/mug/el00/fold1/pose_ambiguity.npz")
-    rows = pd.read_csv(pairs, dtype={"object_id": str})
+    table = LookupTable.load(foreign.results / "lookup/mug/el00/fold1/pose_ambiguity.npz")
+    rows = pd.read_csv(foreign.folder / "pairs.csv", dtype={"object_id": str})
     rows = rows[(rows["category"] == "mug") & rows["object_id"].isin(of_fold["calibration"])]
     wanted = conditionals(
         rows["estimate_deg"],
@@ -99,22 +99,20 @@ def test_all_objects_that_are_not_tested_calibrate(foreign) -> None:
 
 
 def test_nothing_is_rendered_or_trained(foreign) -> None:
-    project, pairs = foreign
-    present = {path.name for path in project.results.iterdir()}
+    present = {path.name for path in foreign.results.iterdir()}
     assert not present & {"meshes", "depth", "estimators"}
-    report = (project.results / "report.html").read_text()
-    assert f"of another program, from {pairs}" in report
-    assert "figure9.png" in {path.name for path in (project.results / "figures").iterdir()}
+    report = (foreign.results / "report.html").read_text()
+    assert "of another program, from pairs.csv" in report
+    assert "figure9.png" in {path.name for path in (foreign.results / "figures").iterdir()}
 
 
 def test_what_needs_images_or_trainings_is_refused_before_anything_runs(foreign) -> None:
-    project, pairs = foreign
-    chosen = (*TINY, "estimator=external", f"estimator.pairs={pairs}", "name=none")
-    done = project.run(*STUDIES, "confirm", "--cores", "1", overrides=chosen, fails=True)
+    chosen = (*FOREIGN, "name=none")
+    done = foreign.run(*STUDIES, "confirm", "--cores", "1", overrides=chosen, fails=True)
     (line,) = [one for one in done.stderr.splitlines() if one.startswith("nbv: error")]
     assert "estimator=external has no meshes, images or trainings" in line
     assert "Traceback" not in done.stderr
-    assert not (project.folder / "results" / "none").exists()
+    assert not (foreign.folder / "results" / "none").exists()
 
 
 N_CLASSES = 24
@@ -143,18 +141,22 @@ DISTRIBUTIONS = (
     "categories=[mug]",
     "estimator=external_distributions",
     f"estimator.n_classes={N_CLASSES}",
+    "estimator.pairs=pairs.csv",
 )
 
 
 @pytest.fixture(scope="module")
 def given(tmp_path_factory) -> tuple[Project, pd.DataFrame]:
     """A run with extensions on distributions of another program."""
-    folder, table = tmp_path_factory.mktemp("distributions"), foreign_distributions()
+    table = foreign_distributions()
     shuffled = table.sample(frac=1.0, random_state=0)
-    shuffled.to_csv(folder / "pairs.csv", index=False)
-    project = copy_of_project(folder)
-    chosen = (*DISTRIBUTIONS, f"estimator.pairs={folder / 'pairs.csv'}")
-    project.run("--cores", "2", *STUDIES, "evaluation", "leaderboard", overrides=chosen)
+    project = finished_project(
+        tmp_path_factory,
+        "distributions",
+        *(*STUDIES, "evaluation", "leaderboard"),
+        overrides=DISTRIBUTIONS,
+        prepare=lambda folder: shuffled.to_csv(folder / "pairs.csv", index=False),
+    )
     return project, table
 
 

@@ -127,7 +127,13 @@ def test_an_edit_reruns_what_runs_that_code_and_what_follows(scratch):
     metrics.write_text(metrics.read_text() + "\n\nEDITED = True\n")
     assert scratch.would_run() == {"settings": 1, **SHOWN}
     criteria.write_text(criteria.read_text() + "\n\nEDITED = True\n")
-    assert scratch.would_run() == {"lookup": 4, "evaluate_recommended": 4, "settings": 1, **SHOWN}
+    assert scratch.would_run() == {
+        "evaluate_baselines": 4,
+        "lookup": 4,
+        "evaluate_recommended": 4,
+        "settings": 1,
+        **SHOWN,
+    }
 
 
 def test_another_criterion_for_proposed_is_a_run_like_any_other(finished):
