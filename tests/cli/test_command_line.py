@@ -427,6 +427,7 @@ def sweeps_of(manifest):
     return [run_network(recommender, one, None, None, print) for one in read_manifest(manifest)]
 
 
+@pytest.mark.slow
 def test_a_manifest_gives_the_bundle_of_that_camera(manifest, capsys):
     out = run(
         *(capsys, "calibrate", "manifest.csv"),
@@ -492,6 +493,7 @@ def test_what_does_not_go_with_frames_is_refused(manifest, capsys):
     assert "row 2: estimate_deg is not a number" in message
 
 
+@pytest.mark.slow
 def test_the_camera_is_assumed_where_neither_manifest_nor_option_has_it(manifest, capsys):
     rows = pd.read_csv(manifest)
     rows.assign(fx=[FOCAL_PX] * 20 + [np.nan] * 4).to_csv("some.csv")
@@ -872,6 +874,7 @@ def test_a_full_disk_is_one_line(here, unbuffered):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_picture_that_has_no_space_is_one_line(here):
     # The limit holds for matplotlib's cache of fonts, too.
     cache = {"MPLCONFIGDIR": str(here / "cache")}

@@ -122,6 +122,7 @@ def test_damaged_files_are_one_line_or_an_answer(here, capsys, name, option):
         one_line_or_an_answer(capsys, *used)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_odd_frames_are_one_line_or_an_answer(here, capsys, rng):
     answers = 0

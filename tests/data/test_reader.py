@@ -36,6 +36,7 @@ def test_what_is_no_regular_file_is_refused_before_it_is_opened(tmp_path):
     refused(lambda: READER.read(tmp_path / "none.obj"), "does not exist")
 
 
+@pytest.mark.slow
 def test_a_file_that_takes_too_long_is_named_with_the_limit(tmp_path):
     path = tmp_path / "slow.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 1_000_000)

@@ -414,6 +414,7 @@ def result_or_one_line(function, *arguments):
     return None
 
 
+@pytest.mark.slow
 @FUZZED
 @given(st.lists(OVERRIDES, max_size=3))
 def test_any_override_gives_a_configuration_or_one_line(overrides):

@@ -364,6 +364,7 @@ def test_steps_show_the_row_of_the_table_and_both_distributions(inputs):
     np.testing.assert_allclose(two.lines[0].get_ydata(), both / both.sum(), rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_animation_turns_from_the_first_view_to_the_recommended_one(inputs):
     shown, table = example_view(inputs), stored(inputs)
     delta = int(table.recommended_delta_deg[round(shown.estimate_deg) % 360])
@@ -379,6 +380,7 @@ def test_the_animation_turns_from_the_first_view_to_the_recommended_one(inputs):
     assert all(duration > 0 for _, duration in frames)
 
 
+@pytest.mark.slow
 def test_an_animation_is_written_the_same_twice(inputs, tmp_path, monkeypatch):
     few = list(steps.animation_frames(inputs))[::25]
     monkeypatch.setattr(steps, "animation_frames", lambda _: iter(few))

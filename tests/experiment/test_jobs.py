@@ -233,6 +233,7 @@ for beat in range(600):
 """
 
 
+@pytest.mark.slow
 def test_a_job_ends_soon_after_its_snakemake_was_killed(tmp_path):
     (tmp_path / "snakemake").write_text(STARTER)
     (tmp_path / "job.py").write_text(JOB)

@@ -93,6 +93,7 @@ def test_the_second_output_is_the_hidden_layer_of_the_crop(kind, plane_deg, rng)
     assert hidden == pytest.approx(wanted, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_the_same_weights_give_the_same_bytes_in_any_folder_and_process(tmp_path):
     estimator = estimator_of("small", is_rounded=False)
     script = (

@@ -234,6 +234,7 @@ def test_pairs_with_distributions_come_back_as_they_are(here):
     assert np.array_equal(read_distributions("views.csv"), read_distributions("views.npy"))
 
 
+@pytest.mark.slow
 def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     wanted = DistributionTable.from_pairs(PairTable.load("pairs.csv").distributions)
