@@ -248,8 +248,9 @@ def test_a_finger_on_the_ring_turns_the_camera_and_in_its_middle_scrolls(visit, 
 
 def page_evidence(table) -> tuple[Evidence, Evidence]:
     """What the page knows of a table, in its bins and in fewer, for the package's own functions."""
-    stored = page_table(table)
-    of_fine = stored.estimate_likelihood
+    logs = page_table(table).logs
+    weights = np.exp(logs.low + logs.codes.astype(np.float64) * ((logs.high - logs.low) / 255.0))
+    of_fine = weights / weights.sum(axis=1, keepdims=True)
     # Bins of 3°, each about its centre: the mean over viewpoints, the sum over estimates.
     turned = np.roll(of_fine, (1, 1), axis=(0, 1)).reshape(120, 3, 120, 3)
     of_coarse = turned.mean(axis=1).sum(axis=2)
