@@ -20,7 +20,6 @@ BENCHMARKS = (
     "lookup",
     "evaluation",
     "frames",
-    "extensions",
     "workflow",
 )
 

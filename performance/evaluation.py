@@ -44,13 +44,13 @@ def run(quick: bool) -> list[Figure]:
     looped, own = (work() for work in works)
     # A last decimal may be rounded the other way.
     pd.testing.assert_frame_equal(looped, own, check_dtype=False, rtol=0, atol=2e-4)
-    turns = take_turns(works, 2 if quick else 9)
+    times = take_turns(works, 2 if quick else 9)
     return [
         Figure(
             "evaluation of a method: loop over images",
-            turns.ratio(0, 1),
+            times.ratio(0, 1),
             TARGET,
-            f"{1e3 * turns.typical(1):.2f} ms against {1e3 * turns.typical(0):,.0f} ms for "
+            f"{1e3 * times.typical(1):.2f} ms against {1e3 * times.typical(0):,.0f} ms for "
             f"{test.estimate_deg.size:,} images",
         ),
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import subprocess
 import sys
 import tempfile
@@ -25,12 +24,9 @@ ONE = Target(1.0, at_most=True)
 # Of the forward pass with torch, over all images of a frame: crop, network, fusion and choice.
 FORWARD = Target(1.5, at_most=True)
 FRAME_MS = 2.0
-NEW_ROTATION_MS = 5.0
 START_S = 1.0
 HELP_S = 0.3
 IN_A_ROW = 20
-# More than are kept; the first one is always known.
-_ROTATIONS_DEG = [*range(20, 340, 20)]
 
 _START = """
 import sys, numpy as np
@@ -48,8 +44,7 @@ def run(quick: bool) -> list[Figure]:
         path = Path(folder, "frame.npy")
         np.save(path, frame.depth_m)
         n_rounds = 2 if quick else 40
-        figures = [*_in_memory(bundle, frame, n_rounds), _at_new_rotations(bundle, n_rounds)]
-        return [*figures, *_starts(path, 1 if quick else 7)]
+        return [*_in_memory(bundle, frame, n_rounds), *_starts(path, 1 if quick else 7)]
 
 
 def _in_memory(bundle: Bundle, frame: Frame, n_rounds: int) -> list[Figure]:
@@ -69,14 +64,14 @@ def _in_memory(bundle: Bundle, frame: Frame, n_rounds: int) -> list[Figure]:
         recommender.recommend(frame.depth_m, mask=frame.mask, intrinsics=frame.intrinsics)
 
     # In turn, they push each other out of the processor's cache.
-    turns = take_turns([answer, forward], n_rounds, in_a_row=IN_A_ROW)
-    ms, forward_ms = (1e3 * turns.typical(column) for column in (0, 1))
+    times = take_turns([answer, forward], n_rounds, in_a_row=IN_A_ROW)
+    ms, forward_ms = (1e3 * times.typical(column) for column in (0, 1))
     detail = f"{n_rounds} times {IN_A_ROW} frames of 640 × 480 in a row, one thread"
     of_torch = f"{forward_ms:.2f} ms for {counted(n_images, 'image')} with torch"
     return [
         Figure(
             "frame to next view / forward pass",
-            turns.ratio(0, 1),
+            times.ratio(0, 1),
             FORWARD,
             f"{ms:.2f} ms against {of_torch}; {detail}",
         ),
@@ -86,46 +81,19 @@ def _in_memory(bundle: Bundle, frame: Frame, n_rounds: int) -> list[Figure]:
     ]
 
 
-def _at_new_rotations(bundle: Bundle, n_rounds: int) -> Figure:
-    """Two frames, at a rotation that is not kept, and at one that is."""
-    recommender, first = Recommender(bundle), example_frame()
-    frames = {turn: example_frame(first.azimuth_deg + turn) for turn in _ROTATIONS_DEG}
-    rotations = itertools.cycle(_ROTATIONS_DEG[1:])
-
-    def answer(rotation_deg: float) -> None:
-        both = first, frames[rotation_deg]
-        recommender.recommend(
-            [frame.depth_m for frame in both],
-            rotations_deg=[0.0, rotation_deg],
-            mask=[frame.mask for frame in both],
-            intrinsics=first.intrinsics,
-        )
-
-    turns = take_turns(
-        [lambda: answer(next(rotations)), lambda: answer(_ROTATIONS_DEG[0])], n_rounds
-    )
-    new_ms, known_ms = (1e3 * turns.typical(column) for column in (0, 1))
-    return Figure(
-        f"two frames at a new rotation / {NEW_ROTATION_MS:g} ms",
-        new_ms / NEW_ROTATION_MS,
-        ONE,
-        f"{new_ms:.1f} ms, at a known rotation {known_ms:.1f} ms; {n_rounds} in turn, one thread",
-    )
-
-
 def _starts(frame: Path, n_rounds: int) -> list[Figure]:
     def start(*arguments: str) -> Callable[[], object]:
         return lambda: subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
 
     help_ = start("-c", "import sys; from nbv.cli import run; sys.argv[1:] = ['--help']; run()")
-    turns = take_turns([start("-c", _START, str(frame)), help_], n_rounds)
+    times = take_turns([start("-c", _START, str(frame)), help_], n_rounds)
     bounds = {"start to answer": START_S, "nbv --help": HELP_S}
     return [
         Figure(
             f"{name} / {bound:g} s",
-            turns.typical(column) / bound,
+            times.typical(column) / bound,
             ONE,
-            f"{turns.typical(column):.2f} s; {n_rounds} starts",
+            f"{times.typical(column):.2f} s; {n_rounds} starts",
         )
         for column, (name, bound) in enumerate(bounds.items())
     ]

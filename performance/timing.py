@@ -22,7 +22,7 @@ def seconds(work: Work) -> float:
 
 
 @dataclass(frozen=True)
-class Turns:
+class Times:
     """Times of several works that took turns, one row a round, one column a work, in seconds."""
 
     rounds: NDArray[np.float64]
@@ -43,7 +43,7 @@ def median_ratio(numerators: ArrayLike, denominators: ArrayLike) -> float:
 
 def take_turns(
     works: Sequence[Work], n_rounds: int, warm_up: bool = True, in_a_row: int = 1
-) -> Turns:
+) -> Times:
     """Time works in turn: A B A B ...; unless `warm_up` is false, each is called once before.
 
     Works of a millisecond push each other out of the processor's cache. With `in_a_row` a round has
@@ -56,7 +56,7 @@ def take_turns(
         [np.median([seconds(work) for _ in range(in_a_row)]) for work in works]
         for _ in range(n_rounds)
     ]
-    return Turns(np.array(rounds))
+    return Times(np.array(rounds))
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.estimation.training import train_network
 from performance.figures import Figure, Target
 from performance.settings import configuration
-from performance.timing import Turns, Work, take_turns
+from performance.timing import Times, Work, take_turns
 
 TARGET = Target(0.90)
 N_VIEWS, SIDE = 360, 64
@@ -26,20 +26,20 @@ def run(quick: bool) -> list[Figure]:
     settings = {**configuration()["estimator"], "epochs": 1 if quick else 2}
     hardware = choose_hardware("cpu", settings["precision"])
     n_objects = 3 if quick else 20
-    turns = bare_and_own(settings, hardware, SIDE, n_objects, 1 if quick else 8)
+    times = bare_and_own(settings, hardware, SIDE, n_objects, 1 if quick else 8)
     n_images = n_objects * N_VIEWS
     steps = n_images // settings["batch_size"] * settings["epochs"]
-    bare, own = (steps * settings["batch_size"] / turns.typical(column) for column in (0, 1))
+    bare, own = (steps * settings["batch_size"] / times.typical(column) for column in (0, 1))
     detail = (
         f"{own:,.0f} against {bare:,.0f} images/s ({hardware}, one thread); "
         f"{settings['epochs']} epochs of {n_images:,} images in batches of {settings['batch_size']}"
     )
-    return [Figure("training: own loop / bare steps", turns.ratio(0, 1), TARGET, detail)]
+    return [Figure("training: own loop / bare steps", times.ratio(0, 1), TARGET, detail)]
 
 
 def bare_and_own(
     settings: Mapping[str, Any], hardware: Hardware, side: int, n_objects: int, n_rounds: int
-) -> Turns:
+) -> Times:
     """Return the times of as many bare steps as a training takes, and of the training.
 
     20 objects are more than processors' caches hold: images must come from memory, as they do in

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from performance.__main__ import BENCHMARKS, main
 from performance.figures import Figure, Target, summary_line, table_line
-from performance.solids import object_with_faces
-from performance.timing import Turns, median_ratio, take_turns
+from performance.timing import Times, median_ratio, take_turns
 from performance.workflow import utilisation
 
 from nbv.experiment.report.runtime import load_jobs, summarise_jobs
@@ -41,32 +40,32 @@ def test_an_unknown_name_is_refused_with_those_there_are(capsys):
 
 def test_the_ratio_is_the_median_of_neighbours_not_the_ratio_of_medians():
     # The machine was ten times slower in the second and third round, for both alike.
-    turns = Turns(np.array([[2.0, 1.0], [20.0, 10.0], [20.0, 10.0], [2.0, 1.0], [9.0, 1.0]]))
-    assert turns.ratio(0, 1) == 2.0
+    times = Times(np.array([[2.0, 1.0], [20.0, 10.0], [20.0, 10.0], [2.0, 1.0], [9.0, 1.0]]))
+    assert times.ratio(0, 1) == 2.0
     assert median_ratio([2, 20, 9], [1, 10, 1]) == 2.0
 
 
 def test_works_take_turns():
     calls = []
-    turns = take_turns([lambda: calls.append("a"), lambda: calls.append("b")], 3)
+    times = take_turns([lambda: calls.append("a"), lambda: calls.append("b")], 3)
     assert "".join(calls) == "ab" * 4
-    assert turns.rounds.shape == (3, 2)
-    assert (turns.rounds > 0).all()
+    assert times.rounds.shape == (3, 2)
+    assert (times.rounds > 0).all()
     calls.clear()
     take_turns([lambda: calls.append("a"), lambda: calls.append("b")], 2, False, in_a_row=3)
     assert "".join(calls) == "aaabbb" * 2
 
 
 def test_of_calls_in_a_row_the_median_counts(monkeypatch):
-    times = iter([1.0, 9.0, 2.0, 5.0, 5.0, 50.0])
-    monkeypatch.setattr("performance.timing.seconds", lambda work: next(times))
-    turns = take_turns([lambda: None, lambda: None], 1, False, in_a_row=3)
-    assert turns.rounds.tolist() == [[2.0, 5.0]]
+    clock = iter([1.0, 9.0, 2.0, 5.0, 5.0, 50.0])
+    monkeypatch.setattr("performance.timing.seconds", lambda work: next(clock))
+    times = take_turns([lambda: None, lambda: None], 1, False, in_a_row=3)
+    assert times.rounds.tolist() == [[2.0, 5.0]]
 
 
 def test_time_is_measured_in_seconds():
-    turns = take_turns([lambda: time.sleep(0.02), lambda: time.sleep(0.01)], 2, warm_up=False)
-    assert (turns.rounds.min(axis=0) >= [0.02, 0.01]).all()
+    times = take_turns([lambda: time.sleep(0.02), lambda: time.sleep(0.01)], 2, warm_up=False)
+    assert (times.rounds.min(axis=0) >= [0.02, 0.01]).all()
 
 
 @pytest.mark.parametrize(
@@ -94,14 +93,6 @@ def test_what_was_not_measured_counts_neither_way():
         Figure("d", 1.0, None, ""),
     ]
     assert summary_line(figures) == "1 of 2 targets reached"
-
-
-@pytest.mark.parametrize("category", ["chair", "mug"])
-@pytest.mark.parametrize("n_faces", [1_000, 12_345])
-def test_objects_have_the_faces_they_say(category, n_faces):
-    mesh = object_with_faces(category, n_faces)
-    assert n_faces - 2 <= len(mesh.faces) <= n_faces
-    assert np.linalg.norm(np.ptp(mesh.vertices, axis=0)) == pytest.approx(1.0)
 
 
 def job(results, name, start, seconds, cpu_time, told=None):
