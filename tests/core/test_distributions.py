@@ -28,7 +28,6 @@ from nbv.core.distributions import (
 )
 from nbv.core.estimates import posteriors_of
 from nbv.core.logits import LEAST_PROBABILITY, from_logits, on_degrees
-from nbv.robot.bundle import ELEVATION_BANDWIDTH_DEG, elevation_weights
 
 BINS = 24
 WIDTH = 360.0 / BINS
@@ -222,38 +221,6 @@ def test_the_spread_of_one_bin_is_0_and_of_all_is_finite():
     assert 360 < spread_deg(uniform) < math.inf
     opposite = (np.eye(BINS)[0] + np.eye(BINS)[12]) / 2
     assert math.isfinite(spread_deg(opposite))
-
-
-# Elevation
-
-
-@given(
-    known=arrays(np.float64, (5,), elements=st.floats(0, 60)),
-    elevation=st.floats(-10, 80),
-)
-def test_turns_count_by_how_near_their_elevation_is(known, elevation):
-    share = elevation_weights(known, elevation)
-    apart = np.abs(known - elevation)
-    assert share.max() == share[apart.argmin()] == 1.0
-    kernel = np.exp(-0.5 * (apart / ELEVATION_BANDWIDTH_DEG) ** 2)
-    nearest = kernel.max()
-    if nearest > 1e-300:
-        assert share == pytest.approx(kernel / nearest, abs=1e-9)
-    order = np.argsort(apart)
-    assert (np.diff(share[order]) <= 1e-12).all()
-
-
-def test_a_frame_from_far_above_takes_the_nearest_turns():
-    """There the kernel itself is 0 in double precision."""
-    assert elevation_weights(np.array([0.0, 30.0, 30.0]), 800.0) == pytest.approx([0.0, 1.0, 1.0])
-    assert elevation_weights(np.full(4, 20.0), -75.0) == pytest.approx(1.0)
-
-
-def test_what_has_no_known_elevation_counts_whole():
-    known = np.array([0.0, np.nan, 40.0])
-    assert elevation_weights(known, 40.0) == pytest.approx([np.exp(-8.0), 1.0, 1.0])
-    assert elevation_weights(known, np.nan).tolist() == [1.0, 1.0, 1.0]
-    assert elevation_weights(np.full(3, np.nan), 40.0).tolist() == [1.0, 1.0, 1.0]
 
 
 # Whether views fit together

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.core.angles import circular_distance_deg
@@ -15,6 +16,7 @@ from nbv.core.distributions import mean_direction_deg, rotated
 from nbv.core.logits import from_logits
 from nbv.core.selection import chosen_lookup
 from nbv.errors import UserError
+from nbv.robot.bundle import ELEVATION_BANDWIDTH_DEG, elevation_weights
 from nbv.robot.calibration import (
     DENSITY,
     LEAST_LIMIT,
@@ -301,3 +303,32 @@ def test_the_cameras_focal_length_is_kept_where_it_is_known(bundle):
     )
     assert recalibrated(bundle, [unknown], "r", ONE_DENSITY).focal_px == bundle.focal_px
     assert recalibrated(bundle, [unknown, *known], "r", ONE_DENSITY).focal_px == 615
+
+
+@given(
+    known=arrays(np.float64, (5,), elements=st.floats(0, 60)),
+    elevation=st.floats(-10, 80),
+)
+def test_sweeps_count_by_how_near_their_elevation_is(known, elevation):
+    share = elevation_weights(known, elevation)
+    apart = np.abs(known - elevation)
+    assert share.max() == share[apart.argmin()] == 1.0
+    kernel = np.exp(-0.5 * (apart / ELEVATION_BANDWIDTH_DEG) ** 2)
+    nearest = kernel.max()
+    if nearest > 1e-300:
+        assert share == pytest.approx(kernel / nearest, abs=1e-9)
+    order = np.argsort(apart)
+    assert (np.diff(share[order]) <= 1e-12).all()
+
+
+def test_a_frame_from_far_above_takes_the_nearest_sweeps():
+    """There the kernel itself is 0 in double precision."""
+    assert elevation_weights(np.array([0.0, 30.0, 30.0]), 800.0) == pytest.approx([0.0, 1.0, 1.0])
+    assert elevation_weights(np.full(4, 20.0), -75.0) == pytest.approx(1.0)
+
+
+def test_what_has_no_known_elevation_counts_whole():
+    known = np.array([0.0, np.nan, 40.0])
+    assert elevation_weights(known, 40.0) == pytest.approx([np.exp(-8.0), 1.0, 1.0])
+    assert elevation_weights(known, np.nan).tolist() == [1.0, 1.0, 1.0]
+    assert elevation_weights(np.full(3, np.nan), 40.0).tolist() == [1.0, 1.0, 1.0]

@@ -17,7 +17,7 @@ from nbv.data.depth_images import DepthImages
 from nbv.errors import BundleError, UserError
 from nbv.experiment.estimation.hardware import choose_hardware
 from nbv.experiment.estimation.inference import network_outputs
-from nbv.experiment.estimation.make_bundle import bundled_model, bundled_network, turns_of
+from nbv.experiment.estimation.make_bundle import bundled_model, bundled_network, sweeps_of
 from nbv.experiment.estimation.networks import decode_classes
 from nbv.experiment.estimation.weights import Estimator, save_estimator
 from nbv.robot.network import open_network, open_session
@@ -150,7 +150,7 @@ def test_an_image_does_not_depend_on_those_next_to_it(rng, plane_deg):
 def test_calibration_sees_the_weights_that_a_bundle_keeps(rng):
     estimator = estimator_of("small", is_rounded=False)
     codes = random_codes(rng, 12)
-    ((turn,), _, _) = turns_of(
+    ((turn,), _, _) = sweeps_of(
         bundled_network(estimator), [DepthImages(("a",), codes[None])], [0.0], ["a"]
     )
     rounded = averaged_by_torch(estimator_of("small"), codes, None)
@@ -162,8 +162,8 @@ def test_calibration_sees_the_weights_that_a_bundle_keeps(rng):
 @pytest.mark.parametrize("step", [1, 5, 7])
 def test_a_step_leaves_views_out_of_a_turn_and_nothing_else(recommender, rng, step):
     images = DepthImages(("a", "b"), random_codes(rng, 70).reshape(2, 35, SIDE, SIDE))
-    whole, *_ = turns_of(recommender.network, [images], [30.0], ["b", "a"])
-    some, *_ = turns_of(recommender.network, [images], [30.0], ["b", "a"], step)
+    whole, *_ = sweeps_of(recommender.network, [images], [30.0], ["b", "a"])
+    some, *_ = sweeps_of(recommender.network, [images], [30.0], ["b", "a"], step)
     for all_of_it, part in zip(whole, some, strict=True):
         assert part.object_id == all_of_it.object_id
         assert np.array_equal(part.azimuth_deg, all_of_it.azimuth_deg[::step])

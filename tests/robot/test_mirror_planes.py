@@ -47,7 +47,7 @@ def network_of_templates(mesh: trimesh.Trimesh, seed: int = 0):
     return network
 
 
-def turns_of(network, meshes) -> list[Sweep]:
+def sweeps_of(network, meshes) -> list[Sweep]:
     azimuth_deg = np.arange(48) * 7.5
     codes = [images_of(mesh, azimuth_deg) for mesh in meshes]
     return [Sweep(str(i), "", 30.0, azimuth_deg, network(c), c) for i, c in enumerate(codes)]
@@ -68,7 +68,7 @@ def symmetry_plane_deg(mesh: trimesh.Trimesh) -> float:
 def test_the_plane_of_a_category_is_found(category):
     (mesh,) = objects(category, 1)
     network = network_of_templates(mesh)
-    found = find_mirror_plane(network, turns_of(network, [mesh]))
+    found = find_mirror_plane(network, sweeps_of(network, [mesh]))
     assert found == symmetry_plane_deg(mesh)
 
 
@@ -78,4 +78,4 @@ def test_objects_that_are_not_their_own_mirror_image_have_no_plane():
     lump.apply_translation((0.15, 0.25, 0.1))
     both = trimesh.util.concatenate([mug, lump])
     network = network_of_templates(both)
-    assert find_mirror_plane(network, turns_of(network, [both])) is None
+    assert find_mirror_plane(network, sweeps_of(network, [both])) is None

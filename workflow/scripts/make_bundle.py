@@ -10,7 +10,7 @@ with job(snakemake):
     from nbv.data.camera import Camera
     from nbv.data.depth_images import open_depth
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
-    from nbv.experiment.estimation.make_bundle import bundled_network, make_bundle, turns_of
+    from nbv.experiment.estimation.make_bundle import bundled_network, make_bundle, sweeps_of
     from nbv.experiment.estimation.weights import load_estimator
     from nbv.experiment.splits import objects_with_role, read_splits
     from nbv.files import write_csv
@@ -35,16 +35,16 @@ with job(snakemake):
     network = bundled_network(estimator)
     # Of 360 views one every 15 degrees, as on a turntable.
     of_turntable = 15
-    plain, *_ = turns_of(network, images, params.elevations, calibration, of_turntable)
+    plain, *_ = sweeps_of(network, images, params.elevations, calibration, of_turntable)
     plane_deg = find_mirror_plane(network, plain)
     where = "none" if plane_deg is None else f"at an azimuth of {plane_deg:g}°"
     logging.getLogger("nbv").info("mirror plane of the objects: %s", where)
     network = bundled_network(estimator, plane_deg)
-    turns, *extent_px = turns_of(network, images, params.elevations, calibration)
+    sweeps, *extent_px = sweeps_of(network, images, params.elevations, calibration)
     bundle = make_bundle(
         wildcards.category,
         estimator,
-        turns,
+        sweeps,
         tuple(extent_px),
         mirror_plane_deg=plane_deg,
         camera=Camera(**params.camera),
@@ -54,5 +54,5 @@ with job(snakemake):
         | {"settings": params.settings},
     )
     bundle.save(snakemake.output.bundle)
-    tested, *_ = turns_of(network, test_images, params.elevations, test, of_turntable)
+    tested, *_ = sweeps_of(network, test_images, params.elevations, test, of_turntable)
     write_csv(snakemake.output.evaluation, evaluate(bundle, tested, n_views=(2, 3)))

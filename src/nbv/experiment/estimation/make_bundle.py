@@ -54,16 +54,16 @@ def bundled_network(estimator: Estimator, mirror_plane_deg: float | None = None)
     return open_network(model, estimator.image_side, estimator.settings["n_classes"])
 
 
-def turns_of(
+def sweeps_of(
     network: Network,
     images: Sequence[DepthImages],
     elevations_deg: Sequence[float],
     object_ids: Sequence[str],
     step: int = 1,
 ) -> tuple[list[Sweep], float, float]:
-    """Return the turns of objects at every elevation, and their extent in the images.
+    """Return the sweeps of objects at every elevation, and the objects' extent in the images.
 
-    A turn has every `step`-th view, from the first on.
+    A sweep has every `step`-th view, from the first on.
 
     Returns
     -------
@@ -71,18 +71,18 @@ def turns_of(
     float, float
         The 1 % and 99 % quantiles of the diagonal of an object's box in an image, pixels.
     """
-    turns, extents = [], []
+    sweeps, extents = [], []
     for elevation, elevation_images in zip(elevations_deg, images, strict=True):
         for object_id, whole in zip(object_ids, elevation_images.of(object_ids), strict=True):
             codes = whole[::step]
             logits = network(codes)
             azimuth_deg = np.arange(0, len(whole), step, dtype=np.float64) * (360.0 / len(whole))
-            turns.append(
+            sweeps.append(
                 Sweep(object_id, f"{elevation:g}", float(elevation), azimuth_deg, logits, codes)
             )
             extents.append(_extents(codes))
     low, high = np.quantile(np.concatenate(extents), (0.01, 0.99))
-    return turns, float(low), float(high)
+    return sweeps, float(low), float(high)
 
 
 def _extents(codes: NDArray[np.uint8]) -> NDArray[np.float64]:
@@ -100,7 +100,7 @@ def _length(visible: NDArray[np.bool_]) -> NDArray[np.float64]:
 def make_bundle(
     category: str,
     estimator: Estimator,
-    turns: Sequence[Sweep],
+    sweeps: Sequence[Sweep],
     extent_px: tuple[float, float],
     *,
     mirror_plane_deg: float | None,
@@ -116,11 +116,11 @@ def make_bundle(
     category : str
     estimator : Estimator
         A classifier, trained on ``<object id>/<elevation>``.
-    turns : sequence of Sweep
-        Turns of calibration objects, which the estimator has not seen, by its `bundled_network`
+    sweeps : sequence of Sweep
+        Of calibration objects, which the estimator has not seen, by its `bundled_network`
         with the mirror plane.
     extent_px : (float, float)
-        From `turns_of`.
+        From `sweeps_of`.
     mirror_plane_deg : float or None
         From `nbv.robot.network.find_mirror_plane`.
     camera : Camera
@@ -131,12 +131,12 @@ def make_bundle(
         The configuration's ``affinity``.
     provenance : mapping
     """
-    temperature = temperature_of(turns)
+    temperature = temperature_of(sweeps)
     # The estimator lists each object once for every elevation.
     n_objects = len({name.rpartition("/")[0] for name in estimator.trained_on})
-    elevation_deg = np.array([turn.elevation_deg for turn in turns], dtype=np.float32)
+    elevation_deg = np.array([sweep.elevation_deg for sweep in sweeps], dtype=np.float32)
     distributions = np.stack(
-        [bin_apart(t.azimuth_deg, from_logits(t.logits, temperature)) for t in turns]
+        [bin_apart(s.azimuth_deg, from_logits(s.logits, temperature)) for s in sweeps]
     )
     diagonal_m = float(sensor["diagonal_m"][category])
     length_m = pixel_step(camera) * diagonal_m
@@ -151,12 +151,12 @@ def make_bundle(
         focal_px=float(sensor["parameters"].get("focal_px", DEFAULT_FOCAL_PX)),
         mirror_plane_deg=mirror_plane_deg,
         temperature=temperature,
-        object_ids=tuple(turn.object_id for turn in turns),
+        object_ids=tuple(sweep.object_id for sweep in sweeps),
         elevation_deg=elevation_deg,
-        sweep_weights=np.ones(len(turns), dtype=np.float32),
+        sweep_weights=np.ones(len(sweeps), dtype=np.float32),
         distributions=distributions,
         affinity={key: affinity[key] for key in ("power", "pseudo_observations")},
-        ood=fit_ood(turns),
+        ood=fit_ood(sweeps),
         paper=paper_tables(elevation_deg, distributions),
         provenance=dict(provenance) | {"training_objects": n_objects},
     )
