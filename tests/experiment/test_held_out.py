@@ -10,17 +10,14 @@ import torch
 from nbv.core.logits import fit_temperature
 from nbv.data.depth_images import DepthImages
 from nbv.experiment.estimation.hardware import Hardware
-from nbv.experiment.estimation.inference import (
-    decode,
-    estimate_fold,
-    network_outputs,
-)
+from nbv.experiment.estimation.inference import estimate_fold, network_outputs
 from nbv.experiment.estimation.networks import build_network
+from nbv.experiment.estimation.outputs import decode_classes, decode_directions
 from nbv.experiment.estimation.weights import Estimator
 
 
 def azimuth_of(estimator, codes, hardware):
-    return decode(estimator, network_outputs(estimator, codes, hardware))
+    return decode_directions(network_outputs(estimator, codes, hardware))
 
 
 CPU = Hardware(torch.device("cpu"), torch.float32)
@@ -83,5 +80,5 @@ def test_calibration_objects_alone_choose_the_temperature_of_all(images):
         assert posteriors is not None
         assert posteriors.temperature == pytest.approx(temperature, rel=1e-3)
         np.testing.assert_allclose(posteriors.distributions.sum(axis=-1), 1.0, atol=1e-6)
-        expected = decode(tested, network_outputs(tested, images.of(names), CPU), temperature)
+        expected = decode_classes(network_outputs(tested, images.of(names), CPU) / temperature)
         np.testing.assert_allclose(estimates.estimate_deg, expected, atol=0.05)

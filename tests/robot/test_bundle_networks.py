@@ -18,7 +18,7 @@ from nbv.errors import BundleError, UserError
 from nbv.experiment.estimation.hardware import choose_hardware
 from nbv.experiment.estimation.inference import network_outputs
 from nbv.experiment.estimation.make_bundle import bundled_model, bundled_network, sweeps_of
-from nbv.experiment.estimation.networks import decode_classes
+from nbv.experiment.estimation.outputs import decode_classes
 from nbv.experiment.estimation.weights import Estimator, save_estimator
 from nbv.robot.network import open_network, open_session
 

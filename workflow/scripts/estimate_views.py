@@ -4,8 +4,9 @@ from nbv.experiment.jobs import job
 
 with job(snakemake):
     from nbv.data.depth_images import open_depth
+    from nbv.experiment.estimates import write_fold
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
-    from nbv.experiment.estimation.inference import estimate_fold, write_fold
+    from nbv.experiment.estimation.inference import estimate_fold
     from nbv.experiment.estimation.weights import load_estimator
     from nbv.experiment.splits import read_splits
 

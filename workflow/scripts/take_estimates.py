@@ -3,7 +3,7 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.experiment.estimation.inference import write_fold
+    from nbv.experiment.estimates import write_fold
     from nbv.experiment.external import take_fold
     from nbv.experiment.splits import read_splits
     from nbv.robot.pairs import PairTable

@@ -9,8 +9,9 @@ from nbv.experiment.jobs import job
 with job(snakemake):
     from nbv.core.seeds import seed_for
     from nbv.data.depth_images import open_depth
+    from nbv.experiment.estimates import write_fold
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
-    from nbv.experiment.estimation.inference import estimate_fold, write_fold
+    from nbv.experiment.estimation.inference import estimate_fold
     from nbv.experiment.estimation.training import train_estimator
     from nbv.experiment.estimation.weights import load_estimator, read_start, save_estimator
     from nbv.experiment.splits import check_objects, objects_with_role, read_splits, training_roles

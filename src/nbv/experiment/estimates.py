@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,9 @@ from nbv.files import (
     write_arrays,
     write_csv,
 )
+
+FoldEstimates = Mapping[str, tuple[Estimates, Posteriors | None]]
+"""Estimates by role, ``calibration`` and ``test``; posteriors only of estimators that give them."""
 
 
 def write_estimates(path: str | Path, estimates: Estimates) -> None:
@@ -117,3 +120,17 @@ def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
         if not 0.0 < posteriors.temperature < np.inf:
             raise damaged(path, f"the temperature {posteriors.temperature} is not positive")
     return posteriors
+
+
+def write_fold(
+    paths: Mapping[str, str], estimates: Mapping[str, tuple[Estimates, Posteriors | None]]
+) -> None:
+    """Write a fold's estimates by role, with posteriors where there are any.
+
+    Paths are those of ``calibration`` and ``test``, and where there are posteriors those of
+    ``calibration_posteriors`` and ``test_posteriors``.
+    """
+    for role, (azimuths, posteriors) in estimates.items():
+        write_estimates(paths[role], azimuths)
+        if posteriors is not None:
+            write_posteriors(paths[f"{role}_posteriors"], posteriors)

@@ -1,8 +1,4 @@
-"""Estimates of another program for the objects of a fold.
-
-Trainings depend on `estimation.inference` but not on this module, so that an edit here retrains
-nothing.
-"""
+"""Estimates of another program for the objects of a fold."""
 
 from __future__ import annotations
 
@@ -11,7 +7,7 @@ import pandas as pd
 
 from nbv.core.estimates import Estimates, Posteriors, posteriors_of
 from nbv.core.logits import fit_temperature
-from nbv.experiment.estimation.inference import FoldEstimates
+from nbv.experiment.estimates import FoldEstimates
 from nbv.experiment.splits import check_objects, objects_with_role
 from nbv.robot.pairs import Sweeps, evenly_apart
 
@@ -44,7 +40,7 @@ def take_fold(
     if sweeps:
         azimuths, given = zip(*(sweeps[name] for name in names["calibration"]), strict=True)
         temperature = fit_temperature(np.log(np.concatenate(given)), np.concatenate(azimuths))
-    taken: FoldEstimates = {}
+    taken: dict[str, tuple[Estimates, Posteriors | None]] = {}
     for role, object_ids in names.items():
         estimate_deg = estimates.estimate_deg[
             [estimates.object_ids.index(name) for name in object_ids]

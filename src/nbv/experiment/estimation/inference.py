@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 import torch
 from numpy.typing import NDArray
 
-from nbv.core.estimates import Estimates, Posteriors, posteriors_of
-from nbv.core.logits import fit_temperature
 from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
-from nbv.experiment.estimates import write_estimates, write_posteriors
+from nbv.experiment.estimates import FoldEstimates
 from nbv.experiment.estimation.hardware import Hardware, to_input
-from nbv.experiment.estimation.networks import Outputs, kind_of
+from nbv.experiment.estimation.outputs import Outputs, estimates_of
 from nbv.experiment.estimation.weights import Estimator
 from nbv.experiment.splits import calibration_roles, check_objects, objects_with_role
 
@@ -80,18 +78,6 @@ def network_outputs(
     return joined
 
 
-def decode(estimator: Estimator, outputs: Outputs, temperature: float = 1.0) -> NDArray[np.float64]:
-    """Decode an estimator's outputs (..., k) to azimuths in [0, 360) (Eq. 4).
-
-    `temperature` divides the outputs; a regressor's angle does not depend on it.
-    """
-    return kind_of(estimator.settings).decode(outputs / temperature)
-
-
-FoldEstimates = dict[str, tuple[Estimates, Posteriors | None]]
-"""Estimates by role, ``calibration`` and ``test``; posteriors only where outputs are logits."""
-
-
 def estimate_fold(
     images: DepthImages,
     splits: pd.DataFrame,
@@ -134,28 +120,4 @@ def estimate_fold(
         "calibration": outputs_of_parts(part_estimators or [tested], images, parts, hardware),
         "test": outputs_of_parts([tested], images, test, hardware),
     }
-    temperature, posteriors = 1.0, None
-    if distributions:
-        azimuth_deg = np.linspace(0, 360, images.codes.shape[1], endpoint=False)
-        temperature = fit_temperature(outputs["calibration"][1], azimuth_deg)
-    estimates = {}
-    for role, (object_ids, output) in outputs.items():
-        if distributions:
-            posteriors = posteriors_of(object_ids, output, temperature)
-        estimates[role] = (
-            Estimates(tuple(object_ids), decode(tested, output, temperature)),
-            posteriors,
-        )
-    return estimates
-
-
-def write_fold(paths: Mapping[str, str], fold_estimates: FoldEstimates) -> None:
-    """Write a fold's estimates.
-
-    Paths are those of ``calibration`` and ``test``, and where there are posteriors those of
-    ``calibration_posteriors`` and ``test_posteriors``.
-    """
-    for role, (estimates, posteriors) in fold_estimates.items():
-        write_estimates(paths[role], estimates)
-        if posteriors is not None:
-            write_posteriors(paths[f"{role}_posteriors"], posteriors)
+    return estimates_of(outputs, distributions=distributions)

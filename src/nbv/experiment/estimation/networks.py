@@ -1,69 +1,24 @@
-"""The kinds of estimators: networks, training targets and the decoding of outputs to angles.
+"""The kinds of networks, each with the targets and the loss of its training.
 
-A network maps images (n, 1, side, side) to outputs (n, k). View k of n has the azimuth 360 k / n.
+A network maps images (n, 1, side, side) to outputs (n, k).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import nn
 
-from nbv.core.angles import direction_deg
-from nbv.core.logits import softmax
 from nbv.errors import UserError, nearest
-
-Settings = Mapping[str, Any]
-Targets = NDArray[np.float32]
-Outputs = NDArray[np.float64]
-
-
-def direction_targets(settings: Settings, n_views: int) -> Targets:
-    """Return (cos, sin) of the azimuth of every view, (n_views, 2)."""
-    angles = 2 * np.pi * np.arange(n_views) / n_views
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1).astype(np.float32)
-
-
-def class_targets(settings: Settings, n_views: int) -> Targets:
-    """Return a distribution over classes for every view, (n_views, n_classes), rows summing to 1.
-
-    Class c of k is centred on 360 c / k degrees. The target is a von Mises density about the
-    azimuth instead of a single class, so that nearby classes are nearly right and the circle has
-    no seam.
-
-    Parameters
-    ----------
-    settings : mapping
-        ``n_classes`` and ``target_bandwidth_deg``, the standard deviation of a narrow target.
-    n_views : int
-    """
-    n_classes = settings["n_classes"]
-    centres = 2 * np.pi * np.arange(n_classes) / n_classes
-    apart = centres - 2 * np.pi * np.arange(n_views)[:, None] / n_views
-    narrowness = 1.0 / np.radians(settings["target_bandwidth_deg"]) ** 2
-    return np.asarray(softmax(narrowness * (np.cos(apart) - 1.0)), dtype=np.float32)
-
-
-def decode_directions(outputs: Outputs) -> Outputs:
-    """Return the direction of (cos, sin) outputs (..., 2), degrees in [0, 360)."""
-    return direction_deg(outputs[..., 0], outputs[..., 1])
-
-
-def decode_classes(outputs: Outputs) -> Outputs:
-    """Return the mean direction of the softmax of logits (..., k), degrees in [0, 360).
-
-    It is the direction of the mean of exp(i theta), which minimises the expected 1 - cos(error).
-    """
-    n_classes = outputs.shape[-1]
-    angles = 2 * np.pi * np.arange(n_classes) / n_classes
-    unit = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return decode_directions(softmax(outputs) @ unit)
+from nbv.experiment.estimation.outputs import (
+    Settings,
+    Targets,
+    class_targets,
+    direction_targets,
+)
 
 
 def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.Module:
@@ -123,19 +78,16 @@ class Kind:
         ``targets(settings, n_views)``: the targets of the views of a full turn, (n_views, k).
     loss : callable
         ``loss(outputs, targets)``, a scalar tensor.
-    decode : callable
-        ``decode(outputs)``: the angles of outputs (..., k), degrees in [0, 360).
     """
 
     network: Callable[[Settings, int], nn.Module]
     targets: Callable[[Settings, int], Targets]
     loss: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
-    decode: Callable[[Outputs], Outputs]
 
 
 KINDS: dict[str, Kind] = {
-    "regressor": Kind(regressor, direction_targets, nn.functional.mse_loss, decode_directions),
-    "classifier": Kind(classifier, class_targets, nn.functional.cross_entropy, decode_classes),
+    "regressor": Kind(regressor, direction_targets, nn.functional.mse_loss),
+    "classifier": Kind(classifier, class_targets, nn.functional.cross_entropy),
 }
 
 
