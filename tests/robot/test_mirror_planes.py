@@ -8,12 +8,13 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nbv.core.angles import mirrored_bins
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import encode_depth
 from nbv.data.meshes import normalise
 from nbv.data.procedural import generate
 from nbv.data.render import open_renderer
-from nbv.robot.network import Sweep, find_mirror_plane, mirrored_classes
+from nbv.robot.network import Sweep, find_mirror_plane
 
 CAMERA = Camera(image_side=32)
 N_CLASSES = 60
@@ -22,7 +23,7 @@ N_CLASSES = 60
 @given(st.integers(1, 180), st.integers(0, 359))
 def test_a_class_and_its_mirror_image_lie_on_both_sides_of_the_plane(n_classes, place):
     plane_deg = place % n_classes * 180 / n_classes
-    mirrored = mirrored_classes(n_classes, plane_deg)
+    mirrored = mirrored_bins(n_classes, plane_deg)
     assert np.array_equal(mirrored[mirrored], np.arange(n_classes))
     middle_deg = (np.arange(n_classes) + mirrored) * 180 / n_classes - plane_deg
     assert np.allclose(middle_deg / 180, np.rint(middle_deg / 180))

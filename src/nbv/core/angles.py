@@ -54,3 +54,11 @@ def nearest_bin(angle_deg: ArrayLike, n_bins: int) -> NDArray[np.intp]:
     """Return the bin of each angle: bin k of width w = 360/n_bins covers [kw - w/2, kw + w/2)."""
     width = 360.0 / n_bins
     return (np.floor(wrap_deg(angle_deg) / width + 0.5)).astype(np.intp) % n_bins
+
+
+def mirrored_bins(n_bins: int, plane_deg: float) -> NDArray[np.intp]:
+    """Return the bin (n_bins,) that each bin becomes in a mirror image; see `nbv.robot.network`.
+
+    `plane_deg` is the azimuth of the mirror plane; twice that azimuth has to be a bin's centre.
+    """
+    return (round(2 * plane_deg * n_bins / 360) - np.arange(n_bins)) % n_bins

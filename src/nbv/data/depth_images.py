@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.files import damaged, open_array, read_json, replacing, write_json
+from nbv.files import damaged, open_array, read_json, write_json, write_rows
 
 Codes = NDArray[np.uint8]
 
@@ -76,18 +76,8 @@ def write_depth(
     shape : tuple of int
         (n_views, side, side).
     """
-    header = {
-        "descr": np.lib.format.dtype_to_descr(np.dtype(np.uint8)),
-        "fortran_order": False,
-        "shape": (len(object_ids), *shape),
-    }
     progress = _Progress(str(path), len(object_ids), shape[0])
-    # Not memory-mapped: a full disk then raises an error instead of a fatal signal.
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        np.lib.format.write_array_header_1_0(file, header)
-        for index, codes in enumerate(images):
-            file.write(codes.tobytes())
-            progress.advance(index + 1)
+    write_rows(path, progress.of(images), (len(object_ids), *shape), np.uint8)
     write_json(objects_path, list(object_ids))
 
 
@@ -117,6 +107,11 @@ class _Progress:
         self._name, self._n_objects, self._images_each = name, n_objects, images_each
         self._start = self._last = time.monotonic()
         self._tenth = 0
+
+    def of(self, images: Iterable[Codes]) -> Iterator[Codes]:
+        for index, codes in enumerate(images):
+            yield codes
+            self.advance(index + 1)
 
     def advance(self, done: int) -> None:
         now = time.monotonic()

@@ -16,6 +16,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
+from nbv.core.angles import mirrored_bins
 from nbv.core.logits import fit_temperature, mean_log_likelihood
 from nbv.errors import BundleError, UserError
 
@@ -102,14 +103,6 @@ def open_network(model: bytes, image_side: int, n_classes: int) -> Network:
     return network
 
 
-def mirrored_classes(n_classes: int, plane_deg: float) -> NDArray[np.intp]:
-    """Return the class (n_classes,) that each class becomes in a mirror image.
-
-    `plane_deg` is the azimuth of the mirror plane; twice that azimuth has to be a class.
-    """
-    return (round(2 * plane_deg * n_classes / 360) - np.arange(n_classes)) % n_classes
-
-
 def find_mirror_plane(network: Network, sweeps: Sequence[Sweep]) -> float | None:
     """Return the azimuth of the mirror plane under which the true azimuths are likeliest.
 
@@ -133,7 +126,7 @@ def find_mirror_plane(network: Network, sweeps: Sequence[Sweep]) -> float | None
     planes = np.arange(n_classes) * (180.0 / n_classes)
 
     def averaged(plane_deg: float) -> NDArray[np.float64]:
-        return np.asarray((plain + mirrored[:, mirrored_classes(n_classes, plane_deg)]) / 2)
+        return np.asarray((plain + mirrored[:, mirrored_bins(n_classes, plane_deg)]) / 2)
 
     def likelihood(logits: NDArray[np.float64], temperature: float) -> float:
         return mean_log_likelihood(logits, azimuth_deg, temperature)

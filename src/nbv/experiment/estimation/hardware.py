@@ -102,5 +102,9 @@ def to_input(codes: NDArray[np.uint8], hardware: Hardware) -> torch.Tensor:
     """
     side = codes.shape[-1]
     flat = torch.from_numpy(np.ascontiguousarray(codes).reshape(-1, 1, side, side))
-    scaled = flat.to(hardware.device).to(hardware.dtype).mul_(1 / 128)
-    return scaled.contiguous(memory_format=torch.channels_last)
+    return scaled(flat.to(hardware.device), hardware)
+
+
+def scaled(codes: torch.Tensor, hardware: Hardware) -> torch.Tensor:
+    """Return what `to_input` does, for codes (n, 1, side, side) that lie on the device."""
+    return codes.to(hardware.dtype).mul_(1 / 128).contiguous(memory_format=torch.channels_last)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import nn
 from torch.nn.utils import parametrize
 
+from nbv.core.angles import mirrored_bins
 from nbv.core.logits import from_logits
 from nbv.data.camera import Camera
 from nbv.data.depth_images import DepthImages
@@ -21,7 +22,7 @@ from nbv.experiment.estimation.weights import Estimator
 from nbv.robot.bundle import Bundle
 from nbv.robot.calibration import paper_tables, temperature_of
 from nbv.robot.crop import pixel_step
-from nbv.robot.network import Network, Sweep, mirrored_classes, open_network
+from nbv.robot.network import Network, Sweep, open_network
 from nbv.robot.ood import fit_ood
 from nbv.robot.pairs import bin_apart
 
@@ -43,9 +44,7 @@ def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -
     """
     if mirror_plane_deg is None:
         return onnx_model(estimator)
-    return onnx_model(
-        estimator, mirrored_classes(estimator.settings["n_classes"], mirror_plane_deg)
-    )
+    return onnx_model(estimator, mirrored_bins(estimator.settings["n_classes"], mirror_plane_deg))
 
 
 def bundled_network(estimator: Estimator, mirror_plane_deg: float | None = None) -> Network:

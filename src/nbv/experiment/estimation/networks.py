@@ -66,6 +66,9 @@ def classifier(settings: Settings, image_side: int) -> nn.Module:
     return _strided_network(settings, image_side, settings["n_classes"])
 
 
+Loss = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+
+
 @dataclass(frozen=True)
 class Kind:
     """A kind of estimator.
@@ -82,7 +85,7 @@ class Kind:
 
     network: Callable[[Settings, int], nn.Module]
     targets: Callable[[Settings, int], Targets]
-    loss: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+    loss: Loss
 
 
 KINDS: dict[str, Kind] = {
