@@ -1,7 +1,7 @@
 # Best next-viewpoint recommendation: meshes to tables.
 #
 #   snakemake --cores 2                                                  the paper
-#   snakemake --cores 2 --config experiment=quick                        the same graph, small
+#   snakemake --cores 2 --config experiment=quick                        the paper, in minutes
 #   snakemake --cores 2 tables                                           one stage
 #   snakemake --cores 2 results/paper/evaluation/mug/el00/fold3/proposed.csv   one file
 #   snakemake --cores 2 explorer                                         a page to play with
@@ -49,3 +49,8 @@ include: "workflow/rules/explorer.smk"
 include: "workflow/rules/verification.smk"
 include: "workflow/rules/reference.smk"
 include: "workflow/rules/bundles.smk"
+
+
+if CONFIG["experiment"] == "features":
+
+    include: "workflow/rules/features.smk"

@@ -47,7 +47,7 @@ class Project:
     def command(self, *arguments: str, overrides: tuple[str, ...] = TINY) -> list[str]:
         joined = ",".join(overrides)
         base = [sys.executable, "-m", "snakemake", *arguments]
-        return [*base, "--config", "experiment=quick", f"overrides=[{joined}]"]
+        return [*base, "--config", "experiment=small", f"overrides=[{joined}]"]
 
     @property
     def environment(self) -> dict[str, str]:

@@ -45,7 +45,7 @@ use rule train from paper as transfer_train with:
     benchmark:
         "<benchmarks>/transfer/train/{trained}/{category}/el{elevation}/fold{fold}.tsv"
     params:
-        estimator=PLAN.stage("training"),
+        estimator=lambda wildcards: settings_of("training"),
 
 
 use rule estimate from paper as transfer_estimate with:

@@ -22,7 +22,7 @@ from nbv.experiment.config import (
     read_configuration,
     snakemake_overrides,
 )
-from nbv.experiment.config.schema import NAME_RULE, Dataset
+from nbv.experiment.config.schema import LINEAR, NAME_RULE, Dataset
 from nbv.experiment.estimation import networks
 
 ROOT = Path(__file__).parents[2]
@@ -80,6 +80,7 @@ def test_every_layout_in_the_schema_is_one_of_shapenet(tmp_path):
 def test_every_kind_of_estimator_has_its_file():
     assert {path.stem for path in (CONFIG / "estimator").glob("*.yaml")} == {
         *networks.KINDS,
+        *LINEAR,
         "external",
         "external_distributions",
     }
@@ -240,7 +241,7 @@ def test_conditions_can_be_left_out_and_added():
 
 
 def test_a_condition_is_the_run_but_for_sensor_and_framing():
-    overrides = ["experiment=quick", "camera.framing=axis", "camera.image_side=16", "seed=3"]
+    overrides = ["experiment=small", "camera.framing=axis", "camera.image_side=16", "seed=3"]
     run = load_config(CONFIG, overrides)
     for name, condition in run["transfer"]["conditions"].items():
         found = load_condition(CONFIG, overrides, run, condition)
@@ -271,11 +272,28 @@ def test_parameters_belong_to_the_sensor_that_they_were_given_for():
         (["estimator=classifier"], "paper-classifier"),
         (["calibration=crossfit"], "paper-crossfit"),
         (["dataset=shapenet", "estimator=classifier"], "paper-shapenet-classifier"),
-        (["experiment=quick", "calibration=crossfit", "name=mine"], "mine"),
+        (["experiment=small", "calibration=crossfit", "name=mine"], "mine"),
+        (["estimator=linear"], "paper-linear"),
+        (["experiment=quick"], "quick"),
+        (["experiment=quick", "estimator=regressor"], "quick-regressor"),
     ],
 )
 def test_another_data_set_estimator_or_calibration_gets_its_own_folder(overrides, name):
     assert load_config(CONFIG, overrides)["name"] == name
+
+
+def test_a_linear_estimator_has_no_settings_of_a_training():
+    settings = load_config(CONFIG, ["experiment=small", "estimator=linear", "estimator.epochs=3"])
+    assert settings["estimator"] == {"kind": "linear"}
+    classes = load_config(CONFIG, ["estimator=linear_classifier"])
+    assert set(classes["estimator"]) == {"kind", "n_classes", "target_bandwidth_deg"}
+    assert classes["gives_distributions"]
+
+
+def test_the_quick_experiment_is_the_paper_with_another_estimator_and_a_fixed_density():
+    paper, quick = (load_config(CONFIG, [f"experiment={name}"]) for name in ("paper", "quick"))
+    differs = {key for key in paper if paper[key] != quick[key]}
+    assert differs == {"experiment", "name", "estimator", "density"}
 
 
 @pytest.mark.parametrize("n_classes", [45, 50])
@@ -313,7 +331,7 @@ def test_the_epochs_of_cross_fitting_are_written_down():
 @pytest.mark.parametrize(
     ("handed", "expected"),
     [
-        ({"experiment": "quick"}, ["experiment=quick"]),
+        ({"experiment": "small"}, ["experiment=small"]),
         ({"n_objects": None}, ["n_objects=null"]),
         ({"overrides": ["a=1", "b=2"]}, ["a=1", "b=2"]),
         ({"overrides": "[a=[1,2],b={c:[3,4]},d=5]"}, ["a=[1,2]", "b={c:[3,4]}", "d=5"]),

@@ -16,7 +16,7 @@ from projects import ROOT, TINY
 
 
 def studies_of(*overrides: str) -> Studies:
-    return Studies(Plan.load(ROOT / "config", ("experiment=quick", *TINY, *overrides)))
+    return Studies(Plan.load(ROOT / "config", ("experiment=small", *TINY, *overrides)))
 
 
 @pytest.fixture

@@ -50,7 +50,7 @@ rule train_bundle:
         runtime=per_attempt(120),
     params:
         fold=1,
-        estimator=PLAN.stage("training"),
+        estimator=lambda wildcards: settings_of("training"),
         seed=CONFIG["seed"],
         replicate=0,
     script:

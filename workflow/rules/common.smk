@@ -119,10 +119,16 @@ def training_start(wildcards, below="<results>"):
     return [f"{below}/estimators/{unit}/fold{wildcards.fold}/{name}.safetensors"]
 
 
+@one_line()
+def settings_of(stage):
+    """The settings of a stage of training."""
+    return PLAN.stage(stage)
+
+
 def stage_of(wildcards):
     """The settings of a training."""
     start = PLAN.start(wildcards.category, int(wildcards.elevation))
-    return PLAN.stage(stage_from(start))
+    return settings_of(stage_from(start))
 
 
 @one_line()

@@ -25,7 +25,7 @@ rule pretrain:
         runtime=per_attempt(30),
     params:
         categories=CONFIG["categories"],
-        estimator=PLAN.stage("pretraining"),
+        estimator=lambda wildcards: settings_of("pretraining"),
         seed=CONFIG["seed"],
     script:
         "../scripts/pretrain_network.py"
@@ -131,8 +131,8 @@ else:
         resources:
             mem_mb=per_attempt(2000),
         params:
-            device=CONFIG["estimator"]["device"],
-            precision=CONFIG["estimator"]["precision"],
+            device=CONFIG["estimator"].get("device"),
+            precision=CONFIG["estimator"].get("precision"),
         script:
             "../scripts/estimate_views.py"
 
@@ -152,3 +152,8 @@ rule estimates:
             for role in ESTIMATED_ROLES
             for path in paths(estimates_of_fold()[role], PLAN.folds_of(UNITS))
         ],
+
+
+if PLAN.linear:
+
+    include: "linear.smk"

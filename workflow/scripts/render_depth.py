@@ -12,12 +12,14 @@ with job(snakemake):
     params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
     camera = Camera(**params.camera)
     meshes = load_meshes(snakemake.input.meshes)
+    n_azimuths = params.get("n_azimuths", N_AZIMUTHS)
     images = render_objects(
         meshes,
         float(wildcards.elevation),
         camera,
         open_renderer(params.renderer["name"]),
         open_sensor(params.sensor, camera, wildcards.category, int(wildcards.elevation)),
+        n_azimuths,
     )
-    shape = N_AZIMUTHS, camera.image_side, camera.image_side
+    shape = n_azimuths, camera.image_side, camera.image_side
     write_depth(output.depth, output.objects, meshes, images, shape)

@@ -6,6 +6,9 @@ import zlib
 
 import numpy as np
 
+FIRST_FEATURE_SEED = 9000
+"""Depth features are trained on objects of the seeds from here on; no other run may have one."""
+
 
 def seed_for(seed: int, *labels: str | int) -> int:
     """Derive a 32-bit seed from the run's seed and labels, such as a category and a fold."""

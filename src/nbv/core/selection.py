@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from nbv.core.angles import nearest_bin
 from nbv.core.criteria import CRITERIA, FOR_ESTIMATES
@@ -421,5 +420,8 @@ def surely_better(density: DensityParams, other: DensityParams) -> bool:
     gaps = np.subtract(density.object_error_deg, other.object_error_deg)
     if gaps.size < 2:
         return False
+    # An import of half a second, which only a choice among densities needs.
+    from scipy import stats
+
     quantile = stats.t.ppf(stats.norm.cdf(1.0), gaps.size - 1)
     return bool(gaps.mean() < -quantile * gaps.std(ddof=1) / np.sqrt(gaps.size))

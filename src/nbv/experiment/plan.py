@@ -18,6 +18,7 @@ from nbv.data.sources import SOURCES, open_source, select_objects
 from nbv.errors import UserError
 from nbv.experiment import provenance
 from nbv.experiment.config import load_config
+from nbv.experiment.config.schema import LINEAR
 from nbv.experiment.report import settings as report
 from nbv.experiment.results import Unit
 from nbv.robot.pairs import PairTable
@@ -97,6 +98,11 @@ class Plan:
         return "pairs" in self.config["estimator"]
 
     @property
+    def linear(self) -> bool:
+        """Whether the estimators are linear in depth features, and no network is trained."""
+        return self.config["estimator"]["kind"] in LINEAR
+
+    @property
     def crossfit(self) -> bool:
         """Whether calibration is cross-fitted."""
         return bool(self.config["calibration"] == "crossfit")
@@ -166,18 +172,32 @@ class Plan:
     @property
     def caution(self) -> tuple[str, ...]:
         """What has to be said wherever there are numbers; see `too_small`."""
-        epochs = None if self.external else self.config["estimator"]["epochs"]
+        epochs = None if self.external else self.config["estimator"].get("epochs")
         return too_small({name: len(ids) for name, ids in self.objects.items()}, epochs)
 
     # Trainings
 
     def start(self, category: str, elevation: int) -> Start:
         """Return what the trainings of a unit start from; see `start_of`."""
+        if self.linear:
+            return None
         elevations = self.config["elevations_deg"][category]
         return start_of(self.config["estimator"]["warm_start"], elevations, elevation)
 
     def stage(self, stage: Stage) -> dict[str, Any]:
-        """Return the settings of a stage. Cross-fitting trains each estimator in fewer epochs."""
+        """Return the settings of a stage. Cross-fitting trains each estimator in fewer epochs.
+
+        Raises
+        ------
+        UserError
+            Where the estimator is not trained.
+        """
+        if self.linear:
+            kind = self.config["estimator"]["kind"]
+            raise UserError(
+                f"estimator={kind} trains no network, which this target needs; give "
+                "estimator=regressor or classifier"
+            )
         epochs = self.config["crossfit_epochs"] if self.crossfit else None
         return stage_settings(self.config["estimator"], stage, epochs)
 
@@ -220,8 +240,8 @@ class Plan:
             )
         if calibration != "holdout":
             raise UserError(f"calibration={calibration}: a bundle needs calibration=holdout")
-        if not self.config["gives_distributions"]:
-            raise UserError("estimator=regressor: a bundle needs estimator=classifier")
+        if (kind := self.config["estimator"]["kind"]) != "classifier":
+            raise UserError(f"estimator={kind}: a bundle needs estimator=classifier")
         if category not in self.config["sensor"]["diagonal_m"]:
             raise UserError(
                 f"sensor.diagonal_m.{category}: a bundle needs the object's diagonal, metres"
@@ -276,18 +296,21 @@ class Plan:
         """
         units, categories = ([], []) if self.external else (self.units, self.config["categories"])
         folds, trained = self.folds_of(self.units), self.folds_of(units)
-        pretrains = self.config["estimator"]["warm_start"] in ("categories", "both")
+        pretrains = self.config["estimator"].get("warm_start") in ("categories", "both")
         pretrained = self.folds if pretrains else ()
-        estimated = folds if self.crossfit or self.external else []
+        parts = () if self.linear else self.parts
+        estimated = folds if parts or self.external else []
         fold = "{category}/el{elevation}/fold{fold}"
         logs = {
             "meshes": paths("{category}", zip(categories)),
             "splits": paths("{category}", zip(self.config["categories"])),
             "render": paths("{category}/el{elevation}", units),
             "pretrain": paths("fold{fold}", zip(pretrained)),
-            "pretrain_part": [f"fold{k}/{part}" for k in pretrained for part in self.parts],
-            "train": paths(fold, trained),
-            "train_part": [f"{one}/{k}" for one in paths(fold, folds) for k in self.parts],
+            "pretrain_part": [f"fold{k}/{part}" for k in pretrained for part in parts],
+            "extract": paths("{category}/el{elevation}", units if self.linear else ()),
+            "train": [] if self.linear else paths(fold, trained),
+            "fit": paths(fold, trained) if self.linear else [],
+            "train_part": [f"{one}/{k}" for one in paths(fold, folds) for k in parts],
             "estimate": paths(fold, estimated),
             "lookup": paths(f"{fold}/{{criterion}}", self.lookups),
             "evaluate_baselines": paths(fold, folds),

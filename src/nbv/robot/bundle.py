@@ -70,7 +70,7 @@ class Bundle:
     ----------
     category : str
     network : bytes
-        From `nbv.experiment.estimation.make_bundle.onnx_model`.
+        From `nbv.experiment.estimation.export.onnx_model`.
     estimator : mapping
         Settings of the network.
     camera : Camera

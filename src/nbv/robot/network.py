@@ -4,7 +4,7 @@ Mugs, cars and chairs are nearly their own mirror images. Take objects with a ve
 symmetry at the azimuth m: a camera at the azimuth a sees the mirror image of what it sees from
 2 m - a. A trained network knows this only roughly. The mean of its logits for an image and for the
 mirror image, with the classes reversed, knows it exactly. Where there is a plane,
-`nbv.experiment.estimation.make_bundle.onnx_model` writes this mean as the network.
+`nbv.experiment.estimation.export.onnx_model` writes this mean as the network.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def open_session(model: bytes) -> onnxruntime.InferenceSession:
 
 
 def open_network(model: bytes, image_side: int, n_classes: int) -> Network:
-    """Return the network of an ONNX model of `nbv.experiment.estimation.make_bundle.onnx_model`.
+    """Return the network of an ONNX model of `nbv.experiment.estimation.export.onnx_model`.
 
     Raises
     ------

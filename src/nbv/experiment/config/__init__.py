@@ -20,6 +20,9 @@ GROUPS = ("experiment", "dataset", "renderer", "sensor", "randomisation", "estim
 # The key of a group that names one of its files.
 _FILE_NAMES = {"dataset": "source", "renderer": "name", "sensor": "name", "estimator": "kind"}
 
+# The estimator of an experiment where it is not the regressor.
+_ESTIMATORS = {"quick": "linear"}
+
 _LONGEST = 80
 """Characters of a value that a message repeats."""
 
@@ -102,7 +105,8 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
     for name, condition in settings["transfer"]["conditions"].items():
         _check_choice(folder, "sensor", condition["sensor"], f"transfer.conditions.{name}.sensor")
     settings["name"] = settings["name"] or _run_name(settings)
-    if settings["calibration"] == "crossfit" and settings["crossfit_epochs"] is None:
+    is_trained = "epochs" in estimator
+    if settings["calibration"] == "crossfit" and settings["crossfit_epochs"] is None and is_trained:
         settings["crossfit_epochs"] = equal_cost_epochs(
             estimator["epochs"], settings["calibration_fraction"], settings["crossfit_parts"]
         )
@@ -200,7 +204,7 @@ def _read_mapping(path: Path) -> dict[str, Any]:
 
 def _run_name(settings: Mapping[str, Any]) -> str:
     """Return the experiment's name, followed by the choices that differ from the experiment's."""
-    own = ("procedural", "regressor", "holdout")
+    own = ("procedural", _ESTIMATORS.get(settings["experiment"], "regressor"), "holdout")
     names = (settings["dataset"]["source"], settings["estimator"]["kind"], settings["calibration"])
     return "-".join([settings["experiment"], *(name for name in names if name not in own)])
 

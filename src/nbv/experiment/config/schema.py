@@ -17,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 
+from nbv.core.seeds import FIRST_FEATURE_SEED
 from nbv.errors import UserError, nearest
 from nbv.experiment.splits import enough_objects
 
@@ -162,25 +163,42 @@ class Schedule(Section):
     learning_rate: LearningRate
 
 
+LINEAR = ("linear", "linear_classifier")
+"""Estimators on depth features, which are not trained; see `nbv.experiment.estimation.linear`."""
+
+_OF_OUTPUTS = ("kind", "n_classes", "target_bandwidth_deg", "pairs")
+
+
 class Estimator(Section):
     """The single-view estimator; each kind has only the keys that it uses."""
 
     kind: str
-    channels: Annotated[list[Count], AtLeastOne]
-    hidden: Count
-    epochs: Epochs
-    batch_size: Annotated[Whole, Field(ge=2, le=10**12)]
-    learning_rate: LearningRate
-    weight_decay: Annotated[Number, Field(ge=0, le=10)]
-    device: Literal["auto", "cpu", "cuda", "mps"]
-    precision: Literal["auto", "bfloat16", "float32"]
-    warm_start: Literal["none", "elevations", "categories", "both"] = "none"
-    pretraining: Schedule = Schedule(epochs=2, learning_rate=9e-3)
-    fine_tuning: Schedule = Schedule(epochs=5, learning_rate=4e-3)
-    next_elevation: Schedule = Schedule(epochs=4, learning_rate=4e-3)
+    channels: Annotated[list[Count], AtLeastOne] | None = None
+    hidden: Count | None = None
+    epochs: Epochs | None = None
+    batch_size: Annotated[Whole, Field(ge=2, le=10**12)] | None = None
+    learning_rate: LearningRate | None = None
+    weight_decay: Annotated[Number, Field(ge=0, le=10)] | None = None
+    device: Literal["auto", "cpu", "cuda", "mps"] | None = None
+    precision: Literal["auto", "bfloat16", "float32"] | None = None
+    warm_start: Literal["none", "elevations", "categories", "both"] | None = "none"
+    pretraining: Schedule | None = Schedule(epochs=2, learning_rate=9e-3)
+    fine_tuning: Schedule | None = Schedule(epochs=5, learning_rate=4e-3)
+    next_elevation: Schedule | None = Schedule(epochs=4, learning_rate=4e-3)
     n_classes: Annotated[Whole, Field(ge=8, le=360)] | None = None
     target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
     pairs: str | None = None
+
+    @model_validator(mode="after")
+    def _check_training(self) -> Self:
+        trained = [name for name in type(self).model_fields if name not in _OF_OUTPUTS]
+        if self.kind in LINEAR:
+            # An experiment sets them for any estimator, but a run must record what applies to it.
+            for name in trained:
+                setattr(self, name, None)
+        elif missing := [name for name in trained if getattr(self, name) is None]:
+            raise UserError(f"estimator.{missing[0]} is missing: estimator={self.kind} is trained")
+        return self
 
     @model_validator(mode="after")
     def _check_pairs(self) -> Self:
@@ -196,7 +214,12 @@ class Estimator(Section):
     @model_validator(mode="after")
     def _check_classes(self) -> Self:
         has = self.n_classes is not None, self.target_bandwidth_deg is not None
-        needs = {"classifier": (True, True), "external_distributions": (True, False)}
+        both = True, True
+        needs = {
+            "classifier": both,
+            "linear_classifier": both,
+            "external_distributions": (True, False),
+        }
         if has != needs.get(self.kind, (False, False)):
             raise UserError(
                 f"estimator.kind={self.kind}: a classifier has n_classes and target_bandwidth_deg, "
@@ -353,6 +376,7 @@ class Config(Section):
     dataset: Dataset
     renderer: Renderer
     camera: Camera
+    mirror_plane_deg: dict[Name, Annotated[Number, Field(ge=0, lt=180, multiple_of=0.5)]] = {}
     sensor: Sensor
     estimator: Estimator
     density: Density
@@ -382,12 +406,23 @@ class Config(Section):
         by_category: dict[str, Collection[str]] = {
             "dataset.turn_deg": self.dataset.turn_deg,
             "dataset.categories": self.dataset.categories,
+            "mirror_plane_deg": self.mirror_plane_deg,
             "sensor.diagonal_m": self.sensor.diagonal_m,
         }
         for key, values in by_category.items():
             for named in values:
                 if named not in known:
                     raise UserError(f"{key}.{named}: unknown category; {nearest(named, known)}")
+        return self
+
+    @model_validator(mode="after")
+    def _check_seed(self) -> Self:
+        is_features = self.experiment == "features" and self.estimator.kind not in LINEAR
+        if self.seed >= FIRST_FEATURE_SEED and not is_features:
+            raise UserError(
+                f"seed={self.seed}: the depth features have seen objects of the seeds from "
+                f"{FIRST_FEATURE_SEED} on; give a smaller one"
+            )
         return self
 
     @model_validator(mode="after")

@@ -301,8 +301,10 @@ def _run_facts(
     estimator = settings["estimator"]
     if pairs := estimator.get("pairs"):
         yield "Estimates", f"of another program, from {pairs}"
+    elif start := estimator.get("warm_start"):
+        yield "Training", _STARTS[start]
     else:
-        yield "Training", _STARTS[estimator["warm_start"]]
+        yield "Training", "none: linear in depth features that were trained on other objects"
 
 
 def _repairs(density: Mapping[str, Any]) -> str:

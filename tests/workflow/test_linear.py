@@ -1,0 +1,81 @@
+"""Linear estimators on depth features, by the real Snakefile, run small."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from safetensors import safe_open
+
+from nbv.core.angles import circular_distance_deg
+from nbv.experiment.splits import objects_with_role, read_splits
+from projects import STUDIES, TINY, Project, finished_project
+
+pytestmark = pytest.mark.slow
+
+LINEAR = ("estimator=linear", "camera.image_side=64")
+CLASSES = ("estimator=linear_classifier", "estimator.n_classes=24", "camera.image_side=64")
+FOLD = "results/tiny/estimators/mug/el00/fold2/estimator.safetensors"
+
+
+@pytest.fixture(scope="module")
+def linear(tmp_path_factory) -> Project:
+    """A whole run."""
+    return finished_project(tmp_path_factory, "linear", overrides=(*TINY, *LINEAR))
+
+
+def error_deg(project: Project, category: str, role: str = "test") -> float:
+    found = project.results.glob(f"estimates/{category}/el00/fold*/{role}.csv")
+    estimates = pd.concat([pd.read_csv(path) for path in found])
+    return float(circular_distance_deg(estimates["estimate_deg"], estimates["azimuth_deg"]).mean())
+
+
+def test_a_run_makes_the_report_from_estimates_that_mean_something(linear):
+    assert (linear.results / "report.html").is_file()
+    # Six training objects of each category are enough for this, and chance is 90.
+    assert error_deg(linear, "mug") < 25
+    assert error_deg(linear, "chair") < 25
+
+
+def test_no_job_imports_torch(linear):
+    costs = (linear.results / "tables/runtime.md").read_text()
+    assert "| fit |" in costs
+    assert "| train |" not in costs
+
+
+def test_a_fold_says_what_it_was_fitted_to(linear):
+    for fold in (1, 2):
+        path = linear.results / f"estimators/mug/el00/fold{fold}/estimator.safetensors"
+        with safe_open(path, framework="np") as stored:
+            history = json.loads(stored.metadata()["nbv"])
+        splits = read_splits(linear.results / "splits/mug.csv")
+        assert history["trained_on"] == objects_with_role(splits, fold, "train")
+
+
+def test_a_single_fold_is_made_again_by_its_name(linear):
+    assert linear.would_run(*LINEAR, targets=(FOLD,)) == {}
+    assert linear.would_run(*LINEAR, targets=(FOLD, "--forcerun", "fit")) == {"fit": 1}
+
+
+def test_the_features_are_even_and_odd_parts_of_every_view(linear):
+    features = np.load(linear.results / "features/mug/el00.npy", mmap_mode="r")
+    assert features.shape == (8, 360, 1024)
+    assert features.dtype == np.float16
+
+
+def test_a_study_that_trains_networks_says_so(linear):
+    done = linear.run(
+        *("--cores", "1", "--dry-run", *STUDIES, "confirm"), overrides=(*TINY, *LINEAR), fails=True
+    )
+    assert "estimator=linear trains no network, which this target needs" in done.stderr
+
+
+def test_cross_fitted_distributions_come_from_a_classifier(fresh):
+    overrides = (*TINY, *CLASSES, "calibration=crossfit", "categories=[mug]", "n_objects=6")
+    fresh.run("--cores", "2", "estimates", overrides=overrides)
+    assert error_deg(fresh, "mug") < 30
+    assert error_deg(fresh, "mug", "calibration") < 30
+    stored = np.load(fresh.results / "estimates/mug/el00/fold1/test_posteriors.npz")
+    assert stored["log_posterior"].shape[1:] == (360, 24)

@@ -1,0 +1,52 @@
+# Linear estimators: the depth features of a unit's images, and a fit for each fold.
+
+from nbv.experiment.estimation.features import SHIPPED
+
+
+ruleorder: fit > train > estimate
+
+
+rule extract:
+    input:
+        sources("extract_features"),
+        os.path.relpath(SHIPPED),
+        depth="<results>/depth/{category}/el{elevation}.npy",
+        objects="<results>/depth/{category}/el{elevation}_objects.json",
+    output:
+        "<results>/features/{category}/el{elevation}.npy",
+    log:
+        "<logs>/extract/{category}/el{elevation}.log",
+    benchmark:
+        "<benchmarks>/extract/{category}/el{elevation}.tsv"
+    priority: 55
+    conda:
+        ENVIRONMENT
+    params:
+        mirrored=lambda wildcards: wildcards.category in CONFIG["mirror_plane_deg"],
+    script:
+        "../scripts/extract_features.py"
+
+
+rule fit:
+    input:
+        sources("fit_linear"),
+        splits="<results>/splits/{category}.csv",
+        features="<results>/features/{category}/el{elevation}.npy",
+        objects="<results>/depth/{category}/el{elevation}_objects.json",
+    output:
+        **estimates_of_fold(),
+        estimator="<results>/estimators/{category}/el{elevation}/fold{fold}/estimator.safetensors",
+    log:
+        "<logs>/fit/{category}/el{elevation}/fold{fold}.log",
+    benchmark:
+        "<benchmarks>/fit/{category}/el{elevation}/fold{fold}.tsv"
+    priority: 50
+    conda:
+        ENVIRONMENT
+    params:
+        estimator=CONFIG["estimator"],
+        mirror_plane_deg=lambda wildcards: CONFIG["mirror_plane_deg"].get(
+            wildcards.category
+        ),
+    script:
+        "../scripts/fit_linear.py"
