@@ -112,7 +112,7 @@ def test_the_python_of_a_document_takes_public_names_alone(name: str) -> None:
 def test_the_readme_begins_with_the_two_commands() -> None:
     first_block = (ROOT / "README.md").read_text("utf-8").split("```")[1]
     commands = [line.split("  ")[0] for line in first_block.splitlines()]
-    assert commands == ["sh", "make reproduce", "make test"]
+    assert commands == ["sh", "make quick", "make test"]
 
 
 def test_the_tables_of_numbers_are_those_of_the_reference() -> None:

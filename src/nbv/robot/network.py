@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import onnxruntime
@@ -21,7 +22,7 @@ from nbv.core.logits import fit_temperature, mean_log_likelihood
 from nbv.errors import BundleError, UserError
 
 Network = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
-"""Maps codes (n, side, side) to logits (n, B)."""
+"""Maps codes (n, side, side) to logits (n, B), or to another output."""
 
 _FATAL = 4
 
@@ -75,8 +76,10 @@ def open_session(model: bytes) -> onnxruntime.InferenceSession:
         ) from error
 
 
-def open_network(model: bytes, image_side: int, n_classes: int) -> Network:
-    """Return the network of an ONNX model of `nbv.experiment.estimation.export.onnx_model`.
+def open_network(
+    model: bytes, image_side: int, n_outputs: int, output: Literal["logits", "hidden"] = "logits"
+) -> Network:
+    """Return one output of an ONNX model of `nbv.experiment.estimation.export.onnx_model`.
 
     Raises
     ------
@@ -87,7 +90,7 @@ def open_network(model: bytes, image_side: int, n_classes: int) -> Network:
     """
     session = open_session(model)
     ends = {end.name: end.shape for end in (*session.get_inputs(), *session.get_outputs())}
-    wanted = {"codes": ["n", 1, image_side, image_side], "logits": ["n", n_classes]}
+    wanted = {"codes": ["n", 1, image_side, image_side], output: ["n", n_outputs]}
     if {name: ends.get(name) for name in wanted} != wanted:
         raise BundleError(
             "damaged-bundle",
@@ -97,8 +100,8 @@ def open_network(model: bytes, image_side: int, n_classes: int) -> Network:
     def network(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
         if codes.ndim != 3 or codes.shape[1:] != (image_side, image_side):
             raise UserError(f"crops of shape {codes.shape}: give (n, {image_side}, {image_side})")
-        (logits,) = session.run(["logits"], {"codes": codes[:, None].astype(np.float32)})
-        return np.asarray(logits)
+        (found,) = session.run([output], {"codes": codes[:, None].astype(np.float32)})
+        return np.asarray(found)
 
     return network
 

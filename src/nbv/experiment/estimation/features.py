@@ -7,18 +7,18 @@ The package ships that network, trained on procedural objects of the seeds from
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import onnxruntime
 import safetensors
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
 from nbv.files import damaged, readable
-from nbv.robot.network import open_session
+from nbv.robot.network import Network, open_network
 
 SHIPPED: Final = Path(__file__).with_name("features.safetensors")
 
@@ -28,25 +28,26 @@ BATCH = 256
 
 @dataclass(frozen=True)
 class Features:
-    """The network in onnxruntime, and how it was trained.
+    """The network, and how it was trained.
 
     Attributes
     ----------
-    session : onnxruntime.InferenceSession
+    network : callable
+        Maps codes (n, side, side) to features (n, n_features).
     n_features : int
     image_side : int
         Pixels.
-    provenance : dict
+    provenance : mapping
     """
 
-    session: onnxruntime.InferenceSession
+    network: Network
     n_features: int
     image_side: int
-    provenance: dict[str, Any]
+    provenance: Mapping[str, Any]
 
     @staticmethod
     def load(path: Path = SHIPPED) -> Features:
-        """Read a file of `nbv.experiment.estimation.weights.save_features`.
+        """Read a file of `nbv.experiment.estimation.features_network.save_features`.
 
         Raises
         ------
@@ -57,10 +58,12 @@ class Features:
             history = (stored.metadata() or {}).get("nbv")
             if history is None or "onnx" not in stored.keys():  # noqa: SIM118
                 raise damaged(path, "holds no features of nbv")
-            session = open_session(stored.get_tensor("onnx").tobytes())
             provenance = json.loads(history)
-        ends = {end.name: end.shape for end in (*session.get_inputs(), *session.get_outputs())}
-        return Features(session, ends["hidden"][1], ends["codes"][2], provenance)
+            side, n_features = provenance["image_side"], provenance["n_features"]
+            model = stored.get_tensor("onnx").tobytes()
+            return Features(
+                open_network(model, side, n_features, "hidden"), n_features, side, provenance
+            )
 
     def of(self, codes: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Return the features (n, n_features) of depth codes (n, side, side).
@@ -76,11 +79,8 @@ class Features:
                 f"camera.image_side={codes.shape[-1]}: the depth features are of images of {side} "
                 f"pixels a side; give {side}, or an estimator that is trained"
             )
-        batches = [
-            self.session.run(["hidden"], {"codes": codes[i : i + BATCH, None].astype(np.float32)})
-            for i in range(0, len(codes), BATCH)
-        ]
-        return np.concatenate([hidden for (hidden,) in batches])
+        batches = range(0, len(codes), BATCH)
+        return np.concatenate([self.network(codes[i : i + BATCH]) for i in batches])
 
     def of_both(self, codes: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Return the even and the odd part of the features of images, (n, 2 n_features).

@@ -90,6 +90,7 @@ def save_features(path: str, trained: Estimator, provenance: Mapping[str, Any]) 
     }
     model = np.frombuffer(onnx_model(trained), dtype=np.uint8)
     tensors["onnx"] = torch.from_numpy(model.copy())
-    metadata = {"nbv": json.dumps(dict(provenance), sort_keys=True)}
+    sizes = {"image_side": trained.image_side, "n_features": trained.settings["hidden"]}
+    metadata = {"nbv": json.dumps({**provenance, **sizes}, sort_keys=True)}
     with replacing(path) as temporary:
         temporary.write_bytes(safetensors.torch.save(tensors, metadata=metadata))
