@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -39,13 +41,20 @@ def test_one_thread_computes_and_deterministically():
     assert torch.is_deterministic_algorithms_warn_only_enabled()
 
 
-def test_a_training_is_torchs_adamw_and_one_cycle_schedule_to_the_last_bit():
+@pytest.mark.parametrize("planes_deg", [None, [90.0, 0.0]])
+def test_a_training_is_torchs_adamw_and_one_cycle_schedule_to_the_last_bit(planes_deg):
     faces = clock_faces(2)
-    trained = train_network(faces, SETTINGS | {"epochs": 2, "weight_decay": 0.1}, CPU, 3)
+    settings = SETTINGS | {"epochs": 2, "weight_decay": 0.1}
+    trained = train_network(faces, settings, CPU, 3, mirror_planes_deg=planes_deg)
     torch.manual_seed(3)
     network = build_network(SETTINGS, 16).train()
     images = to_input(faces, CPU)
     targets = torch.from_numpy(np.tile(direction_targets(SETTINGS, 72), (2, 1)))
+    mirrored = targets.clone()
+    # View k of 72 is at 5 k degrees: in the mirror, 90 + x degrees become 90 - x.
+    for view in range(72):
+        mirrored[view] = targets[(36 - view) % 72]
+        mirrored[72 + view] = targets[-view % 72]
     size, rate = SETTINGS["batch_size"], SETTINGS["learning_rate"]
     batches = len(images) // size
     optimiser = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=0.1, fused=True)
@@ -54,11 +63,34 @@ def test_a_training_is_torchs_adamw_and_one_cycle_schedule_to_the_last_bit():
     for _ in range(2):
         for chosen in torch.randperm(len(images), generator=order)[: batches * size].split(size):
             optimiser.zero_grad()
-            torch.nn.functional.mse_loss(network(images[chosen]), targets[chosen]).backward()
+            shown, wanted = images[chosen], targets[chosen]
+            if planes_deg is not None:
+                half = size // 2
+                shown = torch.cat([shown[:half].flip(-1), shown[half:]])
+                wanted = torch.cat([mirrored[chosen[:half]], wanted[half:]])
+            torch.nn.functional.mse_loss(network(shown), wanted).backward()
             optimiser.step()
             schedule.step()
     expected = network.state_dict()
     assert all(torch.equal(value, expected[name]) for name, value in trained.state_dict().items())
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, CLASSES])
+def test_a_mirror_image_has_the_mirrored_azimuth_where_both_are_averaged(settings):
+    codes = clock_faces(2)
+    mirrored = replace(untrained(settings), mirror_plane_deg=97.5)
+    estimate, other = (azimuth_of(mirrored, each, CPU) for each in (codes, codes[..., ::-1]))
+    assert circular_distance_deg(other, 195.0 - estimate).max() < 1e-3
+    plain = azimuth_of(replace(mirrored, mirror_plane_deg=None), codes, CPU)
+    assert circular_distance_deg(estimate, plain).max() > 1
+
+
+def test_an_estimator_keeps_the_plane_of_its_mirror_images(tmp_path):
+    images = named(clock_faces(2))
+    settings = SETTINGS | {"epochs": 1}
+    trained = train_estimator(images, images.object_ids, settings, CPU, 0, mirror_plane_deg=90.0)
+    save_estimator(tmp_path / "e.safetensors", trained, CPU)
+    assert load_estimator(tmp_path / "e.safetensors", CPU).mirror_plane_deg == 90.0
 
 
 def test_a_regressor_learns_to_read_a_clock_and_the_seed_decides_every_bit():

@@ -189,7 +189,7 @@ def test_a_stage_has_its_own_epochs_and_rate_and_nothing_of_the_others(kind):
             own["learning_rate"],
         )
     # What a training from random weights is recorded with: the same keys as ever.
-    assert set(stages["training"]) == set(estimator) - {"warm_start", *STAGES}
+    assert set(stages["training"]) == set(estimator) - {"warm_start", "mirror_images", *STAGES}
     assert all(set(settings) == set(stages["training"]) for settings in stages.values())
 
 

@@ -51,6 +51,7 @@ rule train_bundle:
     params:
         fold=1,
         estimator=lambda wildcards: settings_of("training"),
+        mirror_plane_deg=lambda wildcards: PLAN.mirror_plane_deg(wildcards.category),
         seed=CONFIG["seed"],
         replicate=0,
     script:

@@ -64,6 +64,7 @@ rule train:
         runtime=per_attempt(30),
     params:
         estimator=stage_of,
+        mirror_plane_deg=lambda wildcards: PLAN.mirror_plane_deg(wildcards.category),
         seed=CONFIG["seed"],
     script:
         "../scripts/train_estimator.py"

@@ -22,7 +22,7 @@ rule extract:
     conda:
         ENVIRONMENT
     params:
-        mirrored=lambda wildcards: wildcards.category in CONFIG["mirror_plane_deg"],
+        mirrored=lambda wildcards: PLAN.mirror_plane_deg(wildcards.category) is not None,
     script:
         "../scripts/extract_features.py"
 
@@ -45,8 +45,6 @@ rule fit:
         ENVIRONMENT
     params:
         estimator=CONFIG["estimator"],
-        mirror_plane_deg=lambda wildcards: CONFIG["mirror_plane_deg"].get(
-            wildcards.category
-        ),
+        mirror_plane_deg=lambda wildcards: PLAN.mirror_plane_deg(wildcards.category),
     script:
         "../scripts/fit_linear.py"

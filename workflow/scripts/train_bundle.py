@@ -25,11 +25,14 @@ with job(snakemake):
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
     # Replicate 0 is the bundle itself.
     own = [params.replicate] if params.replicate else []
+    images = codes.reshape(-1, *codes.shape[2:])
+    plane_deg = params.mirror_plane_deg
     network = train_network(
-        codes.reshape(-1, *codes.shape[2:]),
+        images,
         params.estimator,
         hardware,
         seed_for(params.seed, "bundle", wildcards.category, *own),
+        mirror_planes_deg=None if plane_deg is None else [plane_deg] * len(images),
     )
     names = [f"{name}/{place}" for place in range(len(opened)) for name in object_ids]
     estimator = Estimator(network, params.estimator, codes.shape[-1], names)

@@ -36,6 +36,7 @@ with job(snakemake):
         hardware,
         seed_for(params.seed, "train", *wildcards),
         start=starts[0] if starts else None,
+        mirror_plane_deg=params.mirror_plane_deg,
     )
     save_estimator(output.estimator, estimator, hardware)
     if output.get("test"):

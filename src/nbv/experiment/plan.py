@@ -201,6 +201,13 @@ class Plan:
         epochs = self.config["crossfit_epochs"] if self.crossfit else None
         return stage_settings(self.config["estimator"], stage, epochs)
 
+    def mirror_plane_deg(self, category: str) -> float | None:
+        """Return the plane of symmetry whose mirror images a category's estimators learn from."""
+        if not self.config["estimator"]["mirror_images"]:
+            return None
+        plane: float | None = self.config["mirror_plane_deg"].get(category)
+        return plane
+
     def dataset_of(self, category: str) -> dict[str, Any]:
         """Return the data set's settings that concern one category.
 
@@ -464,7 +471,7 @@ def stage_settings(
     """
     own: Mapping[str, Any] = estimator if stage == "training" else estimator[stage]
     share = 1.0 if epochs is None else epochs / estimator["epochs"]
-    others = ("warm_start", *STAGES)
+    others = ("warm_start", "mirror_images", *STAGES)
     return {key: value for key, value in estimator.items() if key not in others} | {
         "epochs": max(round(own["epochs"] * share), 1),
         "learning_rate": own["learning_rate"],

@@ -166,7 +166,7 @@ class Schedule(Section):
 LINEAR = ("linear", "linear_classifier")
 """Estimators on depth features, which are not trained; see `nbv.experiment.estimation.linear`."""
 
-_OF_OUTPUTS = ("kind", "n_classes", "target_bandwidth_deg", "pairs")
+_OF_OUTPUTS = ("kind", "mirror_images", "n_classes", "target_bandwidth_deg", "pairs")
 
 
 class Estimator(Section):
@@ -185,6 +185,7 @@ class Estimator(Section):
     pretraining: Schedule | None = Schedule(epochs=2, learning_rate=9e-3)
     fine_tuning: Schedule | None = Schedule(epochs=5, learning_rate=4e-3)
     next_elevation: Schedule | None = Schedule(epochs=4, learning_rate=4e-3)
+    mirror_images: bool = False
     n_classes: Annotated[Whole, Field(ge=8, le=360)] | None = None
     target_bandwidth_deg: Annotated[Number, Field(ge=0.1, le=180)] | None = None
     pairs: str | None = None

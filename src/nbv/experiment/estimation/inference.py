@@ -13,7 +13,7 @@ from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.experiment.estimates import FoldEstimates
 from nbv.experiment.estimation.hardware import Hardware, to_input
-from nbv.experiment.estimation.outputs import Outputs, estimates_of
+from nbv.experiment.estimation.outputs import Outputs, estimates_of, mirrored_outputs
 from nbv.experiment.estimation.weights import Estimator
 from nbv.experiment.splits import calibration_roles, check_objects, objects_with_role
 
@@ -55,6 +55,9 @@ def network_outputs(
 ) -> Outputs:
     """Return the network's outputs (..., k) for depth codes (..., side, side).
 
+    Where the estimator was trained on mirror images, they are the mean of those for an image and
+    for its mirror image.
+
     Raises
     ------
     UserError
@@ -68,14 +71,23 @@ def network_outputs(
         )
     flat = codes.reshape(-1, side, side)
     outputs = []
-    with torch.inference_mode(), hardware.autocast():
-        for start in range(0, len(flat), batch_size):
-            output = estimator.network(to_input(flat[start : start + batch_size], hardware))
-            outputs.append(output.float().cpu().numpy().astype(np.float64))
+    for start in range(0, len(flat), batch_size):
+        batch = flat[start : start + batch_size]
+        output = _forward(estimator, batch, hardware)
+        if (plane_deg := estimator.mirror_plane_deg) is not None:
+            mirrored = _forward(estimator, batch[..., ::-1], hardware)
+            output = (output + mirrored_outputs(mirrored, plane_deg)) / 2
+        outputs.append(output)
     joined = np.concatenate(outputs).reshape(*codes.shape[:-2], -1)
     if not np.isfinite(joined).all():
         raise UserError("the estimator's outputs are not finite; train it again")
     return joined
+
+
+def _forward(estimator: Estimator, codes: NDArray[np.uint8], hardware: Hardware) -> Outputs:
+    with torch.inference_mode(), hardware.autocast():
+        output = estimator.network(to_input(codes, hardware))
+    return np.asarray(output.float().cpu().numpy(), dtype=np.float64)
 
 
 def estimate_fold(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.angles import direction_deg
+from nbv.core.angles import direction_deg, mirrored_bins
 from nbv.core.estimates import Estimates, posteriors_of
 from nbv.core.logits import fit_temperature, softmax
 from nbv.experiment.estimates import FoldEstimates
@@ -48,8 +48,20 @@ def class_targets(settings: Settings, n_views: int) -> Targets:
     return np.asarray(softmax(narrowness * (np.cos(apart) - 1.0)), dtype=np.float32)
 
 
+def mirrored_outputs(outputs: Outputs, plane_deg: float) -> Outputs:
+    """Return outputs (..., k) for mirror images as outputs for the images themselves.
+
+    `plane_deg` is the azimuth m of the objects' plane of symmetry: a mirror image of the azimuth
+    2 m - a stands for a.
+    """
+    if outputs.shape[-1] > 2:
+        return outputs[..., mirrored_bins(outputs.shape[-1], plane_deg)]
+    cos, sin = np.cos(np.radians(2 * plane_deg)), np.sin(np.radians(2 * plane_deg))
+    return np.asarray(outputs @ np.array([[cos, sin], [sin, -cos]]))
+
+
 def decode_directions(outputs: Outputs) -> Outputs:
-    """Return the direction of (cos, sin) outputs (..., 2), degrees in [0, 360)."""
+    """Return the direction of (cos, sin) outputs (..., 2), degrees in [0, 360) (Eq. 4)."""
     return direction_deg(outputs[..., 0], outputs[..., 1])
 
 

@@ -58,15 +58,19 @@ def train_estimator(
     hardware: Hardware,
     seed: int,
     start: Start | None = None,
+    mirror_plane_deg: float | None = None,
 ) -> Estimator:
     """Train an estimator on some objects, whose ids are kept with the weights.
 
-    Same parameters and errors as `train_network`; also raises as
+    With the azimuth of the objects' plane of symmetry, it is trained on mirror images too. Same
+    other parameters and errors as `train_network`; also raises as
     `nbv.data.depth_images.DepthImages.of` does.
     """
     weights, origin = (start.network, start.origin) if start else (None, None)
-    network = train_network(images.of(object_ids), settings, hardware, seed, weights)
-    return Estimator(network, settings, images.codes.shape[-1], object_ids, origin)
+    planes = None if mirror_plane_deg is None else [mirror_plane_deg] * len(object_ids)
+    network = train_network(images.of(object_ids), settings, hardware, seed, weights, planes)
+    side = images.codes.shape[-1]
+    return Estimator(network, settings, side, object_ids, origin, mirror_plane_deg)
 
 
 def train_network(

@@ -35,6 +35,9 @@ class Estimator:
     started_from : mapping, optional
         ``path`` (relative to the estimator's folder) and ``sha256`` of the estimator whose weights
         it started from.
+    mirror_plane_deg : float, optional
+        The azimuth of its objects' plane of symmetry, where it was trained on mirror images too. An
+        estimate is then the mean of an image's and its mirror image's.
     """
 
     network: nn.Module
@@ -42,6 +45,7 @@ class Estimator:
     image_side: int
     trained_on: Sequence[str]
     started_from: Mapping[str, str] | None = None
+    mirror_plane_deg: float | None = None
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,8 @@ def save_estimator(path: str | Path, estimator: Estimator, hardware: Hardware) -
     }
     if estimator.started_from is not None:
         history["started_from"] = dict(estimator.started_from)
+    if estimator.mirror_plane_deg is not None:
+        history["mirror_plane_deg"] = estimator.mirror_plane_deg
     tensors = {
         name: tensor.detach().cpu().contiguous()
         for name, tensor in estimator.network.state_dict().items()
@@ -101,6 +107,7 @@ def load_estimator(path: str | Path, hardware: Hardware) -> Estimator:
             history["image_side"],
             history["trained_on"],
             history.get("started_from"),
+            history.get("mirror_plane_deg"),
         )
         if not all(bool(values.isfinite().all()) for values in network.state_dict().values()):
             raise damaged(path, "a weight is not finite")
