@@ -20,7 +20,8 @@ from nbv.data.sensors import sensor_settings
 from nbv.errors import UserError
 from nbv.experiment.config import snakemake_overrides
 from nbv.experiment.jobs import forget_last_error, hold_lock, why_stopped
-from nbv.experiment.plan import PRETRAINED, Plan, paths, stage_from
+from nbv.experiment.estimation.features import SHIPPED
+from nbv.experiment.plan import FEATURES, PRETRAINED, Plan, paths, stage_from
 from nbv.experiment.reference import find_reference
 from nbv.experiment.results import ESTIMATED_ROLES
 
@@ -111,6 +112,8 @@ def training_start(wildcards, below="<results>"):
     start = PLAN.start(wildcards.category, int(wildcards.elevation))
     if start is None:
         return []
+    if start == FEATURES:
+        return [os.path.relpath(SHIPPED)]
     unit = (
         "pretrained" if start == PRETRAINED else f"{wildcards.category}/el{start:02d}"
     )

@@ -1,7 +1,5 @@
 # Linear estimators: the depth features of a unit's images, and a fit for each fold.
 
-from nbv.experiment.estimation.features import SHIPPED
-
 
 ruleorder: fit > train > estimate
 

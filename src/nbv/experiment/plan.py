@@ -27,8 +27,10 @@ Fold = tuple[str, int, int]
 """Category, elevation in degrees, and fold, from 1."""
 
 PRETRAINED: Final = "pretrained"
-Start = int | Literal["pretrained"] | None
-"""The elevation whose estimator a training starts from, the network of all categories, or None."""
+FEATURES: Final = "features"
+Start = int | Literal["pretrained", "features"] | None
+"""What a training starts from: the estimator of an elevation, the network of all categories, that
+of the depth features, or None."""
 
 Stage = Literal["training", "pretraining", "fine_tuning", "next_elevation"]
 STAGES: tuple[Stage, ...] = ("training", "pretraining", "fine_tuning", "next_elevation")
@@ -423,12 +425,13 @@ def start_of(warm_start: str, elevations_deg: Collection[int], elevation: int) -
 
     A category's elevation can start from the estimator one elevation lower, and its lowest
     elevation from a network that was pretrained with all categories of the fold. A training that
-    starts so takes fewer epochs. No calibration or test object of the fold is seen on the way.
+    starts so takes fewer epochs. No calibration or test object of the fold is seen on the way. The
+    network of the depth features has seen no object of any experiment.
 
     Parameters
     ----------
     warm_start : str
-        ``estimator.warm_start``: none, elevations, categories or both.
+        ``estimator.warm_start``: none, elevations, categories, both or features.
     elevations_deg : collection of int
         All elevations of the category, degrees.
     elevation : int
@@ -436,10 +439,12 @@ def start_of(warm_start: str, elevations_deg: Collection[int], elevation: int) -
 
     Returns
     -------
-    int, "pretrained" or None
+    int, "pretrained", "features" or None
         The elevation whose estimator it starts from (the nearest lower one, degrees), the network
-        of all categories, or random weights.
+        of all categories, that of the depth features, or random weights.
     """
+    if warm_start == "features":
+        return FEATURES
     lower = [other for other in elevations_deg if other < elevation]
     if lower and warm_start in ("elevations", "both"):
         return max(lower)
@@ -450,7 +455,7 @@ def stage_from(start: Start) -> Stage:
     """Return the stage of a training by what it starts from; see `start_of`."""
     if start is None:
         return "training"
-    return "fine_tuning" if start == PRETRAINED else "next_elevation"
+    return "fine_tuning" if start in (PRETRAINED, FEATURES) else "next_elevation"
 
 
 def stage_settings(
@@ -464,7 +469,7 @@ def stage_settings(
         The section ``estimator`` of a configuration.
     stage : str
         ``training`` from random weights, ``pretraining`` of all categories together,
-        ``fine_tuning`` of the pretrained network, or ``next_elevation``.
+        ``fine_tuning`` of the pretrained network or that of the features, or ``next_elevation``.
     epochs : int, optional
         Those of a training from random weights, where they are not ``estimator.epochs``. Each
         other stage takes its own in the same proportion, and one at the least.

@@ -14,6 +14,7 @@ from pydantic_core import ErrorDetails
 
 from nbv.errors import UserError, nearest
 from nbv.experiment.config.schema import Config
+from nbv.experiment.estimation.features import read_features_provenance
 from nbv.files import existing
 
 GROUPS = ("experiment", "dataset", "renderer", "sensor", "randomisation", "estimator", "density")
@@ -105,6 +106,10 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
     for name, condition in settings["transfer"]["conditions"].items():
         _check_choice(folder, "sensor", condition["sensor"], f"transfer.conditions.{name}.sensor")
     settings["name"] = settings["name"] or _run_name(settings)
+    if estimator.get("warm_start") == "features":
+        # Whose weights a network takes, its size it takes too.
+        made_with = read_features_provenance()["settings"]["estimator"]
+        estimator |= {key: made_with[key] for key in ("channels", "hidden")}
     is_trained = "epochs" in estimator
     if settings["calibration"] == "crossfit" and settings["crossfit_epochs"] is None and is_trained:
         settings["crossfit_epochs"] = equal_cost_epochs(

@@ -181,7 +181,7 @@ class Estimator(Section):
     weight_decay: Annotated[Number, Field(ge=0, le=10)] | None = None
     device: Literal["auto", "cpu", "cuda", "mps"] | None = None
     precision: Literal["auto", "bfloat16", "float32"] | None = None
-    warm_start: Literal["none", "elevations", "categories", "both"] | None = "none"
+    warm_start: Literal["none", "elevations", "categories", "both", "features"] | None = "none"
     pretraining: Schedule | None = Schedule(epochs=2, learning_rate=9e-3)
     fine_tuning: Schedule | None = Schedule(epochs=5, learning_rate=4e-3)
     next_elevation: Schedule | None = Schedule(epochs=4, learning_rate=4e-3)
@@ -418,7 +418,8 @@ class Config(Section):
 
     @model_validator(mode="after")
     def _check_seed(self) -> Self:
-        is_features = self.experiment == "features" and self.estimator.kind not in LINEAR
+        uses_features = self.estimator.kind in LINEAR or self.estimator.warm_start == "features"
+        is_features = self.experiment == "features" and not uses_features
         if self.seed >= FIRST_FEATURE_SEED and not is_features:
             raise UserError(
                 f"seed={self.seed}: the depth features have seen objects of the seeds from "

@@ -26,6 +26,21 @@ BATCH = 256
 """Images per batch: with 1,024, onnxruntime leaves the processor's cache."""
 
 
+def read_features_provenance(path: Path = SHIPPED) -> dict[str, Any]:
+    """Return how the network was trained: ``settings``, versions, ``image_side``, ``n_features``.
+
+    Raises
+    ------
+    UserError
+        Where the file is missing, damaged or no file of features.
+    """
+    with readable(path), safetensors.safe_open(path, framework="numpy") as stored:
+        provenance = json.loads((stored.metadata() or {}).get("nbv", "{}"))
+    if "n_features" not in provenance:
+        raise damaged(path, "holds no depth features")
+    return dict(provenance)
+
+
 @dataclass(frozen=True)
 class Features:
     """The network, and how it was trained.
@@ -54,16 +69,12 @@ class Features:
         UserError
             Where the file is missing or damaged.
         """
+        provenance = read_features_provenance(path)
+        side, n_features = provenance["image_side"], provenance["n_features"]
         with readable(path), safetensors.safe_open(path, framework="numpy") as stored:
-            history = (stored.metadata() or {}).get("nbv")
-            if history is None or "onnx" not in stored.keys():  # noqa: SIM118
-                raise damaged(path, "holds no features of nbv")
-            provenance = json.loads(history)
-            side, n_features = provenance["image_side"], provenance["n_features"]
             model = stored.get_tensor("onnx").tobytes()
-            return Features(
-                open_network(model, side, n_features, "hidden"), n_features, side, provenance
-            )
+        network = open_network(model, side, n_features, "hidden")
+        return Features(network, n_features, side, provenance)
 
     def of(self, codes: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Return the features (n, n_features) of depth codes (n, side, side).

@@ -66,7 +66,7 @@ def train_estimator(
     other parameters and errors as `train_network`; also raises as
     `nbv.data.depth_images.DepthImages.of` does.
     """
-    weights, origin = (start.network, start.origin) if start else (None, None)
+    weights, origin = (start.weights, start.origin) if start else (None, None)
     planes = None if mirror_plane_deg is None else [mirror_plane_deg] * len(object_ids)
     network = train_network(images.of(object_ids), settings, hardware, seed, weights, planes)
     side = images.codes.shape[-1]
@@ -78,7 +78,7 @@ def train_network(
     settings: Mapping[str, Any],
     hardware: Hardware,
     seed: int,
-    start: nn.Module | None = None,
+    start: Mapping[str, torch.Tensor] | None = None,
     mirror_planes_deg: Sequence[float] | None = None,
 ) -> nn.Module:
     """Train a network on its kind's targets and loss, with AdamW and a one-cycle schedule.
@@ -94,9 +94,9 @@ def train_network(
     seed : int
         Seeds the weights and the order of the images: the same seed on the same machine gives the
         same bits.
-    start : torch.nn.Module, optional
-        A network of the same kind and size whose weights the training starts from. By default it
-        starts from random weights.
+    start : mapping of str to Tensor, optional
+        Weights of a network of the same size that the training starts from. What it does not name,
+        such as the last layer's, starts from random weights.
     mirror_planes_deg : sequence of float, optional
         The azimuth of each object's plane of symmetry, a multiple of half a view's step. With them,
         half of each batch is mirrored.
@@ -212,9 +212,9 @@ def fit_network(
     return network.eval()
 
 
-def _set_weights(network: nn.Module, start: nn.Module) -> None:
+def _set_weights(network: nn.Module, start: Mapping[str, torch.Tensor]) -> None:
     try:
-        network.load_state_dict(start.state_dict())
+        network.load_state_dict({**network.state_dict(), **start})
     except RuntimeError as error:
         raise UserError(
             "training: the network to start from has another size: train it again with the "

@@ -11,6 +11,7 @@ from typing import Any
 
 import safetensors
 import safetensors.torch
+import torch
 from torch import nn
 
 from nbv.experiment.estimation.hardware import Hardware
@@ -54,12 +55,13 @@ class Start:
 
     Attributes
     ----------
-    network : torch.nn.Module
+    weights : mapping of str to Tensor
+        Of all layers, or of all but the last.
     origin : mapping
         See `Estimator.started_from`.
     """
 
-    network: nn.Module
+    weights: Mapping[str, torch.Tensor]
     origin: Mapping[str, str]
 
 
@@ -123,7 +125,8 @@ def read_start(
     Parameters
     ----------
     path : str
-        An estimator of the same category, or a network that was pretrained on all categories.
+        An estimator of the same category, a network that was pretrained on all categories, or the
+        depth features, whose last layer the training does not take.
     category : str
     object_ids : sequence of str
         The training objects.
@@ -137,13 +140,19 @@ def read_start(
         Where it was trained on other objects of the category, which may be calibration or test
         objects. Also as `load_estimator` raises.
     """
+    origin = {"path": os.path.relpath(path, Path(output).parent), "sha256": sha256_of(path)}
+    with readable(path):
+        tensors = safetensors.torch.load_file(path)
+    if tensors.pop("onnx", None) is not None:
+        last = max(tensors).partition(".")[0]
+        kept = {k: tensor for k, tensor in tensors.items() if not k.startswith(f"{last}.")}
+        return Start(kept, origin)
     stored = load_estimator(path, hardware)
     seen, own = set(stored.trained_on), set(object_ids)
     qualified = set(with_category(category, object_ids))
     if seen != own and {name for name in seen if name.startswith(f"{category}/")} != qualified:
         raise damaged(path, f"it was trained on other objects of {category}")
-    relative = os.path.relpath(path, Path(output).parent)
-    return Start(stored.network, {"path": relative, "sha256": sha256_of(path)})
+    return Start(stored.network.state_dict(), origin)
 
 
 def with_category(category: str, object_ids: Sequence[str]) -> list[str]:

@@ -146,6 +146,8 @@ _STARTS = {
     "category alone",
     "both": "the lowest elevation starts from a network of all categories, each other one from the "
     "elevation below; the paper trains each category alone",
+    "features": "each estimator starts from the network of the depth features, which other objects "
+    "of all categories have trained",
 }
 
 
