@@ -86,3 +86,15 @@ def test_bin_edges_are_half_open():
 
 def test_travel_goes_the_shorter_way():
     np.testing.assert_array_equal(angles.travel_deg([0, 90, 180, 270, 359]), [0, 90, 180, 90, 1])
+
+
+@given(st.integers(0, 59), st.sampled_from([12, 24, 60, 360]))
+def test_a_mirrored_bin_is_as_far_from_the_plane_on_its_other_side(half_bins, n_bins):
+    width = 360.0 / n_bins
+    plane_deg = (half_bins * width / 2) % 180
+    mirrored = angles.mirrored_bins(n_bins, plane_deg)
+    centres = np.arange(n_bins) * width
+    offset = angles.signed_difference_deg(centres, plane_deg)
+    other = angles.signed_difference_deg(centres[mirrored], plane_deg)
+    assert angles.circular_distance_deg(offset, -other).max() < 1e-9
+    assert (mirrored[mirrored] == np.arange(n_bins)).all()
