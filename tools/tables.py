@@ -54,14 +54,32 @@ def bold_least(values: Iterable[float | None], decimals: int) -> list[str]:
     return [f"**{text}**" if text == least else text for text in texts]
 
 
+def mae_cells(run: str, table: str) -> pd.DataFrame:
+    """The mean absolute errors in a table of a reference run."""
+    return pd.read_csv(REFERENCE / run / f"tables/{table}.csv").query("metric == 'mae'")
+
+
 def table1() -> pd.DataFrame:
     """Table 1 of the paper: our value, and the published one in brackets."""
-    cells = pd.read_csv(REFERENCE / "paper/tables/table1.csv").query("metric == 'mae'")
+    cells = mae_cells("quick", "table1")
     rows = {}
     for label, row in cells.groupby("row_label", sort=False):
         both = zip(bold_least(row["value"], 2), row["published"], strict=True)
         rows[label] = [f"{ours} [{published:.2f}]" for ours, published in both]
     return pd.DataFrame(rows, index=["Single", "Random", "Opposite", "Proposed"]).T
+
+
+def linear() -> pd.DataFrame:
+    """MAE of every unit with a network for every fold, and with linear estimators, degrees."""
+    columns = {}
+    for method in ("single", "opposite", "proposed"):
+        for label, run in {"network": "paper", "linear": "quick"}.items():
+            tables = mae_cells(run, "table1"), mae_cells(run, "table2").query("row != 0")
+            cells = pd.concat(tables).query("method == @method")
+            names = cells["row_label"].where(cells["table"] == "table1", "Mug, " + cells["row_label"])
+            rows = dict(zip(names, cells["value"].map("{:.1f}".format), strict=True))
+            columns[f"{method.capitalize()}, {label}"] = rows
+    return pd.DataFrame(columns)
 
 
 def confirmation() -> pd.DataFrame:
@@ -101,7 +119,9 @@ def views() -> pd.DataFrame:
     return pd.DataFrame(plain, index=["one view", "two views"]).T
 
 
-TABLES = {"table1": table1, "confirmation": confirmation, "bundle": bundle, "views": views}
+TABLES = {
+    "table1": table1,
+    "linear": linear, "confirmation": confirmation, "bundle": bundle, "views": views}
 
 
 def markdown(table: pd.DataFrame) -> str:
