@@ -55,7 +55,7 @@ def bold_least(values: Iterable[float | None], decimals: int) -> list[str]:
 
 
 def mae_cells(run: str, table: str) -> pd.DataFrame:
-    """The mean absolute errors in a table of a reference run."""
+    """Return the mean absolute errors in a table of a reference run."""
     return pd.read_csv(REFERENCE / run / f"tables/{table}.csv").query("metric == 'mae'")
 
 
@@ -76,7 +76,8 @@ def linear() -> pd.DataFrame:
         for label, run in {"network": "paper", "linear": "quick"}.items():
             tables = mae_cells(run, "table1"), mae_cells(run, "table2").query("row != 0")
             cells = pd.concat(tables).query("method == @method")
-            names = cells["row_label"].where(cells["table"] == "table1", "Mug, " + cells["row_label"])
+            of_mug = "Mug, " + cells["row_label"]
+            names = cells["row_label"].where(cells["table"] == "table1", of_mug)
             rows = dict(zip(names, cells["value"].map("{:.1f}".format), strict=True))
             columns[f"{method.capitalize()}, {label}"] = rows
     return pd.DataFrame(columns)
@@ -121,7 +122,11 @@ def views() -> pd.DataFrame:
 
 TABLES = {
     "table1": table1,
-    "linear": linear, "confirmation": confirmation, "bundle": bundle, "views": views}
+    "linear": linear,
+    "confirmation": confirmation,
+    "bundle": bundle,
+    "views": views,
+}
 
 
 def markdown(table: pd.DataFrame) -> str:
