@@ -306,7 +306,11 @@ def _run_facts(
     elif start := estimator.get("warm_start"):
         yield "Training", _STARTS[start]
     else:
-        yield "Training", "none: linear in depth features that were trained on other objects"
+        yield (
+            "Training",
+            "none: estimators are linear in depth features that were trained on other objects; the "
+            "paper trains a network for every fold",
+        )
 
 
 def _repairs(density: Mapping[str, Any]) -> str:
