@@ -45,6 +45,9 @@ def test_angles_in_single_precision_are_computed_in_double():
     narrow = np.float32([0.1, 359.9, 725.3])
     np.testing.assert_array_equal(angles.wrap_deg(narrow), np.mod(narrow.astype(np.float64), 360))
     assert angles.wrap_deg(narrow).dtype == np.float64
+    wide, other = narrow.astype(np.float64), np.float32([359.7, 0.3, 5.1])
+    for function in (angles.signed_difference_deg, angles.midpoint_deg):
+        np.testing.assert_array_equal(function(narrow, other), function(wide, other.astype("f8")))
 
 
 @given(degrees, degrees)

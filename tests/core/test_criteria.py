@@ -20,6 +20,7 @@ from nbv.core.criteria import (
     pose_likelihood,
     rotation_groups,
     tabulate,
+    two_view_poses,
 )
 from nbv.core.density import Conditionals, conditionals
 from nbv.core.evidence import Evidence, gather_evidence
@@ -106,6 +107,21 @@ def test_the_pose_ambiguity_is_the_triple_loop(interpretation, spread, plain):
     table = ambiguity_table(pair, {"pose_likelihood": interpretation, "spread": spread})
     expected = plain_loops(pair.viewpoint.tolist(), T, T, plain)
     np.testing.assert_allclose(table, expected, atol=2e-5)
+
+
+@pytest.mark.parametrize("delta", [0, 1, 11])
+def test_poses_of_two_views_are_the_mixture_whose_spread_is_tabulated(delta):
+    pair = random_conditionals(12)
+    shown: list[list[float]] = []
+
+    def kept(p):
+        shown.append(list(p))
+        return 0.0
+
+    plain_loops(pair.viewpoint.tolist(), pair.estimate.tolist(), pair.estimate.tolist(), kept)
+    found = two_view_poses(pair.viewpoint.astype("f4"), pair.estimate.astype("f4"), delta)
+    # One row after the other, each at every rotation.
+    np.testing.assert_allclose(found, np.array(shown).reshape(12, 12, 12)[:, delta], atol=1e-5)
 
 
 @pytest.mark.parametrize("spread", SPREADS)

@@ -175,3 +175,4 @@ def test_resampled_medians_equal_a_naive_loop_to_within_the_grid(rng):
 
 def test_half_turned_images_are_those_above_90_degrees():
     assert half_turned([0.0, 90.0, 90.1, 180.0]).tolist() == [0.0, 0.0, 100.0, 100.0]
+    assert metrics.above_90_percent([0.0, 90.0, 90.1, 180.0]) == 50.0

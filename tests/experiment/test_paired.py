@@ -389,6 +389,13 @@ def test_what_cannot_be_told_from_the_best(sample):
     assert indistinct_from_best(sample, ["worse"], resampler) == ["worse"]
 
 
+def test_the_same_errors_cannot_be_told_apart_and_a_constant_excess_can():
+    errors = np.random.default_rng(0).random(8)
+    methods = {"best": errors, "same": errors, "worse": errors + 0.5}
+    sample = PairedErrors(methods, np.arange(8), np.ones(8, int), np.zeros(8), ("mug",) * 8)
+    assert indistinct_from_best(sample, list(methods), Resampler(0, 100)) == ["best", "same"]
+
+
 def test_methods_that_an_object_lacks_are_left_out():
     rows = [("all", "a", 1, 1.0), ("all", "b", 1, 2.0), ("some", "a", 1, 3.0)]
     means = pd.DataFrame(rows, columns=["method", "object_id", "fold", "error_deg"])
