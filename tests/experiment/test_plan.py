@@ -248,3 +248,16 @@ def test_both_reasons_are_given():
     (sentence,) = too_small({"mug": 9}, 2)
     assert "9 objects of mug" in sentence
     assert "2 epochs" in sentence
+
+
+def test_a_linear_estimator_has_no_stage_of_training():
+    linear = plan_of("estimator=linear")
+    assert linear.start("mug", 0) is None
+    with pytest.raises(UserError, match="estimator=linear trains no network, which this target"):
+        linear.stage("training")
+
+
+def test_linear_estimators_learn_from_mirror_images_where_a_category_has_a_plane():
+    planes = [plan_of(*each).mirror_plane_deg("mug") for each in (("estimator=linear",), ())]
+    assert planes == [90.0, None]
+    assert plan_of("estimator=linear", "~mirror_plane_deg.mug").mirror_plane_deg("mug") is None

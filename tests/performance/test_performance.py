@@ -3,11 +3,12 @@ import os
 import time
 
 import numpy as np
+import pandas as pd
 import pytest
 from performance.__main__ import BENCHMARKS, main
 from performance.figures import Figure, Target, summary_line, table_line
 from performance.timing import Times, median_ratio, take_turns
-from performance.workflow import utilisation
+from performance.workflow import linear_estimators, shared_work, utilisation
 
 from nbv.experiment.report.runtime import load_jobs, summarise_jobs
 from nbv.files import write_csv
@@ -129,6 +130,23 @@ def test_incomplete_processor_times_are_no_verdict_unless_they_suffice(tmp_path)
     assert figure.detail.startswith("at least 0.68: processor times of 1 jobs are incomplete")
     job(tmp_path, "train/a", 1000, 40, 39)
     assert utilisation(tmp_path).reached is True
+
+
+def test_linear_estimators_are_compared_with_networks_by_time_and_error(tmp_path):
+    columns = ["rule", "cpu_s"]
+    for name, rows, error_deg in (
+        ("quick", [("extract", 30), ("fit", 10), ("render", 15), ("lookup", 5), ("all", 80)], 4.0),
+        ("paper", [("train", 400), ("all", 500)], 8.0),
+    ):
+        tables = tmp_path / name / "tables"
+        tables.mkdir(parents=True)
+        write_csv(tables / "runtime.csv", pd.DataFrame(rows, columns=columns))
+        cells = [("single", "mae", error_deg), ("single", "pauc", 1.0), ("random", "mae", 1.0)]
+        write_csv(tables / "table1.csv", pd.DataFrame(cells, columns=["method", "metric", "value"]))
+    assert shared_work(tmp_path / "quick").ratio == 80 / 20
+    figures = linear_estimators(tmp_path / "quick", tmp_path / "paper")
+    assert [figure.ratio for figure in figures] == [40 / 400, 4.0 / 8.0]
+    assert [f.ratio for f in linear_estimators(tmp_path / "none", tmp_path / "paper")] == [None] * 2
 
 
 def test_a_run_that_never_was_has_no_figure(tmp_path):

@@ -157,7 +157,11 @@ def test_the_studies_find_the_run_finished_too(finished):
 
 
 def test_an_interrupted_run_on_one_core_continues_to_the_bytes_of_two(finished, fresh):
-    command = fresh.command("--cores", "1")
+    targets = (
+        "evaluation",
+        *(f"results/tiny/{name}" for name in ("claims.md", "tables/table1.md")),
+    )
+    command = fresh.command("--cores", "1", *targets)
     running = subprocess.Popen(
         command,
         cwd=fresh.folder,
@@ -176,12 +180,14 @@ def test_an_interrupted_run_on_one_core_continues_to_the_bytes_of_two(finished, 
     _, printed = running.communicate(timeout=120)
     assert running.returncode != 0
     assert "the same command goes on from there" in printed
-    assert not (fresh.results / "report.html").exists()
-    again = fresh.run("--cores", "1")
+    assert not (fresh.results / "claims.md").exists()
+    again = fresh.run("--cores", "1", *targets)
     assert re.search(r"\d+ of \d+ steps \(\d+%\) done", again.stderr)
     assert "nbv: finished" in again.stderr
     assert "too small for its numbers to mean anything" in again.stderr
-    assert fresh.outcome() == finished.outcome()
+    found, of_two = fresh.outcome(), finished.outcome()
+    assert {"claims.csv", "tables/table1.csv"} < set(found)
+    assert found == {name: of_two[name] for name in found}
 
 
 def test_extensions_are_made_and_leave_the_paper_alone(scratch):
