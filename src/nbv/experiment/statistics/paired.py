@@ -93,7 +93,7 @@ def pair_methods(frame: pd.DataFrame, category: str) -> PairedErrors:
     errors: dict[str, Floats] = {}
     images: pd.DataFrame | None = None
     for method, part in frame.groupby("method", observed=True, sort=False):
-        ordered = part.sort_values(key, kind="stable", ignore_index=True)
+        ordered = part.sort_values(key, ignore_index=True)
         if images is None:
             images = ordered[key]
         elif not images.equals(ordered[key]):
@@ -290,7 +290,7 @@ def object_means(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
             pauc_percent=accuracy_area(frame["error_deg"]),
             above_90_percent=half_turned(frame["error_deg"]),
             travel_deg=travel,
-        ).groupby("object_id", sort=True)
+        ).groupby("object_id")
         means = rows[list(MEAN_COLUMNS)].mean()
         means.insert(0, "n_images", rows.size())
         parts.append(means.reset_index().assign(method=method))
