@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.core import angles
+from nbv.errors import UserError
 
 degrees = st.floats(-1e4, 1e4, allow_nan=False)
 whole = st.integers(-1440, 1440)
@@ -101,3 +102,8 @@ def test_a_mirrored_bin_is_as_far_from_the_plane_on_its_other_side(half_bins, n_
     other = angles.signed_difference_deg(centres[mirrored], plane_deg)
     assert angles.circular_distance_deg(offset, -other).max() < 1e-9
     assert (mirrored[mirrored] == np.arange(n_bins)).all()
+
+
+def test_a_plane_between_half_bins_is_refused():
+    with pytest.raises(UserError, match=r"mirror_plane_deg=10: with 120 bins .* multiple of 1\.5"):
+        angles.mirrored_bins(120, 10.0)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nbv.errors import UserError
+
 Angles = NDArray[np.float64]
 
 
@@ -59,6 +61,15 @@ def nearest_bin(angle_deg: ArrayLike, n_bins: int) -> NDArray[np.intp]:
 def mirrored_bins(n_bins: int, plane_deg: float) -> NDArray[np.intp]:
     """Return the bin (n_bins,) that each bin becomes in a mirror image; see `nbv.robot.network`.
 
-    `plane_deg` is the azimuth of the mirror plane; twice that azimuth has to be a bin's centre.
+    Raises
+    ------
+    UserError
+        Where twice `plane_deg`, the azimuth of the mirror plane, is not the centre of a bin.
     """
-    return (round(2 * plane_deg * n_bins / 360) - np.arange(n_bins)) % n_bins
+    shift = 2 * plane_deg * n_bins / 360
+    if abs(shift - round(shift)) > 1e-6:
+        raise UserError(
+            f"mirror_plane_deg={plane_deg:g}: with {n_bins} bins it has to be a multiple of "
+            f"{180 / n_bins:g} degrees"
+        )
+    return (round(shift) - np.arange(n_bins)) % n_bins

@@ -56,7 +56,7 @@ class LinearEstimator:
     weights : ndarray (D, k)
     bias : ndarray (k,)
     penalty : float
-        The penalty that the training objects chose.
+        The penalty of the fit.
     """
 
     weights: Floats
