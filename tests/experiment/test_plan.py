@@ -15,16 +15,13 @@ from nbv.experiment.config import load_config
 from nbv.experiment.plan import (
     FEWEST_EPOCHS,
     FEWEST_OBJECTS,
-    STAGES,
     Plan,
     paths,
-    stage_from,
-    stage_settings,
-    start_of,
     too_small,
 )
 from nbv.experiment.report.figures import FIGURES
 from nbv.experiment.report.tables import TABLES
+from nbv.experiment.stages import STAGES, stage_from, stage_settings, start_of
 from projects import ROOT, TINY
 
 ELEVATIONS = st.sets(st.integers(0, 89), min_size=1)

@@ -13,7 +13,7 @@ from nbv.experiment.estimation.features import read_features_provenance
 from nbv.experiment.estimation.features_network import save_features, train_features
 from nbv.experiment.estimation.training import train_estimator, train_network
 from nbv.experiment.estimation.weights import read_start, save_estimator, with_category
-from nbv.experiment.plan import FEATURES, stage_from, start_of
+from nbv.experiment.stages import FEATURES, stage_from, start_of
 from projects import ROOT
 
 

@@ -21,9 +21,10 @@ from nbv.errors import UserError
 from nbv.experiment.config import snakemake_overrides
 from nbv.experiment.jobs import forget_last_error, hold_lock, why_stopped
 from nbv.experiment.estimation.features import SHIPPED
-from nbv.experiment.plan import FEATURES, PRETRAINED, Plan, paths, stage_from
+from nbv.experiment.plan import Plan, paths
 from nbv.experiment.reference import find_reference
 from nbv.experiment.results import ESTIMATED_ROLES
+from nbv.experiment.stages import FEATURES, PRETRAINED, stage_from
 
 STARTED = time.time()
 # Held until this process ends, so it has a name.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any
 
 from nbv.core.policies import needs_lookup
 from nbv.core.selection import check_methods
@@ -21,19 +21,11 @@ from nbv.experiment.config import load_config
 from nbv.experiment.config.schema import LINEAR
 from nbv.experiment.report import settings as report
 from nbv.experiment.results import Unit
+from nbv.experiment.stages import Stage, Start, stage_settings, start_of
 from nbv.robot.pairs import PairTable
 
 Fold = tuple[str, int, int]
 """Category, elevation in degrees, and fold, from 1."""
-
-PRETRAINED: Final = "pretrained"
-FEATURES: Final = "features"
-Start = int | Literal["pretrained", "features"] | None
-"""What a training starts from: the estimator of an elevation, the network of all categories, that
-of the depth features, or None."""
-
-Stage = Literal["training", "pretraining", "fine_tuning", "next_elevation"]
-STAGES: tuple[Stage, ...] = ("training", "pretraining", "fine_tuning", "next_elevation")
 
 FEWEST_OBJECTS = 50
 """Test objects of a category. With 125, the intervals of Table 1's differences reach 0.2 to 1.7
@@ -418,66 +410,3 @@ def too_small(n_objects: Mapping[str, int], epochs: int | None) -> tuple[str, ..
     if not reasons:
         return ()
     return (f"This run is too small for its numbers to mean anything: {'; '.join(reasons)}.",)
-
-
-def start_of(warm_start: str, elevations_deg: Collection[int], elevation: int) -> Start:
-    """Return what the estimator of one elevation starts from.
-
-    A category's elevation can start from the estimator one elevation lower, and its lowest
-    elevation from a network that was pretrained with all categories of the fold. A training that
-    starts so takes fewer epochs. No calibration or test object of the fold is seen on the way. The
-    network of the depth features has seen no object of any experiment.
-
-    Parameters
-    ----------
-    warm_start : str
-        ``estimator.warm_start``: none, elevations, categories, both or features.
-    elevations_deg : collection of int
-        All elevations of the category, degrees.
-    elevation : int
-        One of them.
-
-    Returns
-    -------
-    int, "pretrained", "features" or None
-        The elevation whose estimator it starts from (the nearest lower one, degrees), the network
-        of all categories, that of the depth features, or random weights.
-    """
-    if warm_start == "features":
-        return FEATURES
-    lower = [other for other in elevations_deg if other < elevation]
-    if lower and warm_start in ("elevations", "both"):
-        return max(lower)
-    return PRETRAINED if warm_start in ("categories", "both") else None
-
-
-def stage_from(start: Start) -> Stage:
-    """Return the stage of a training by what it starts from; see `start_of`."""
-    if start is None:
-        return "training"
-    return "fine_tuning" if start in (PRETRAINED, FEATURES) else "next_elevation"
-
-
-def stage_settings(
-    estimator: Mapping[str, Any], stage: Stage, epochs: int | None = None
-) -> dict[str, Any]:
-    """Return the settings of one stage of training, without those of the other stages.
-
-    Parameters
-    ----------
-    estimator : mapping
-        The section ``estimator`` of a configuration.
-    stage : str
-        ``training`` from random weights, ``pretraining`` of all categories together,
-        ``fine_tuning`` of the pretrained network or that of the features, or ``next_elevation``.
-    epochs : int, optional
-        Those of a training from random weights, where they are not ``estimator.epochs``. Each
-        other stage takes its own in the same proportion, and one at the least.
-    """
-    own: Mapping[str, Any] = estimator if stage == "training" else estimator[stage]
-    share = 1.0 if epochs is None else epochs / estimator["epochs"]
-    others = ("warm_start", "mirror_images", *STAGES)
-    return {key: value for key, value in estimator.items() if key not in others} | {
-        "epochs": max(round(own["epochs"] * share), 1),
-        "learning_rate": own["learning_rate"],
-    }

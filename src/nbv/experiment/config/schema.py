@@ -157,7 +157,7 @@ class Sensor(Section):
 
 
 class Schedule(Section):
-    """Epochs and peak rate of a stage of training; see `nbv.experiment.plan`."""
+    """Epochs and peak rate of a stage of training; see `nbv.experiment.stages`."""
 
     epochs: Epochs
     learning_rate: LearningRate
