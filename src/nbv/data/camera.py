@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from nbv.errors import UserError, nearest
 
@@ -144,6 +143,9 @@ def hull_vertices(vertices: ArrayLike, faces: ArrayLike) -> Floats:
 
     Unused vertices are left out. A flat surface keeps all others.
     """
+    # Its import takes longer than what most commands do, and they need no hull.
+    from scipy.spatial import ConvexHull, QhullError
+
     points = np.asarray(vertices, dtype=np.float64)
     is_used = np.zeros(len(points), dtype=bool)
     is_used[np.asarray(faces)] = True

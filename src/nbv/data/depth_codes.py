@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from nbv.data.camera import Camera
 from nbv.data.depth_images import Codes
@@ -89,6 +88,9 @@ def crop_measured(depth: Depths, camera: Camera) -> Depths:
     """
     if camera.framing == "axis":
         return depth
+    # Its import takes longer than all others of this module, which most commands import.
+    from scipy import ndimage
+
     cropped = np.zeros_like(depth)
     for image, out in zip(depth, cropped, strict=True):
         for box in ndimage.find_objects((image > 0).astype(np.uint8)):
