@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
 import random
 import re
@@ -19,8 +18,8 @@ from projects import TINY
 
 pytestmark = pytest.mark.slow
 
-KILLS = 5
 COMMAND = ("--cores", "2")
+ONE_CORE = ("--cores", "1")
 # A job of every kind in one category, because a run is made many times.
 TARGETS = (
     "evaluation",
@@ -31,14 +30,20 @@ SMALL = tuple("categories=[mug]" if "categories=" in one else one for one in TIN
 
 def start(project) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        project.command(*COMMAND, *TARGETS, overrides=SMALL),
+        project.command(*ONE_CORE, *TARGETS, overrides=SMALL),
         cwd=project.folder,
         env=project.environment,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # What a script starts in the background ignores Ctrl-C, and so would this.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
+
+
+def interrupt(running, rng) -> None:
+    running.send_signal(signal.SIGINT)
 
 
 def kill_snakemake(running, rng) -> None:
@@ -61,32 +66,37 @@ def kill_job(running, rng) -> None:
         time.sleep(0.02)
 
 
-def test_kills_at_any_moment_change_no_byte(fresh):
-    """No lock has to be removed by hand, and no orphan spoils what the next run writes."""
+SAID = {interrupt: "the same command goes on from there", kill_job: "killed from outside: "}
+
+
+def test_a_run_that_was_stopped_goes_on_to_the_bytes_of_a_whole_one(fresh):
+    """On one core, to what two cores made; no lock is in the way, and no orphan writes."""
     started = time.monotonic()
     fresh.run(*COMMAND, *TARGETS, overrides=SMALL)
     whole_s = time.monotonic() - started
     expected, rng = fresh.outcome(), random.Random(10)
     shutil.rmtree(fresh.results)
-    kinds = itertools.cycle([kill_snakemake, kill_group, kill_job])
-    n_killed = 0
-    while n_killed < KILLS:
+    stops = [interrupt, kill_snakemake, kill_group, kill_job]
+    while stops:
         running = start(fresh)
         try:
-            _, printed = running.communicate(timeout=rng.uniform(0.1, 0.4) * whole_s)
+            _, printed = running.communicate(timeout=rng.uniform(0.2, 0.5) * whole_s)
         except subprocess.TimeoutExpired:
-            kill = next(kinds)
-            kill(running, rng)
-            _, printed = running.communicate()
-            n_killed += running.returncode != 0
-            if kill is kill_job and running.returncode != 0:
-                assert "killed from outside: " in printed
+            stop = stops[0]
+            stop(running, rng)
+            _, printed = running.communicate(timeout=120)
+            if running.returncode != 0:
+                assert SAID.get(stop, "") in printed
+                stops.remove(stop)
         assert "--unlock" not in printed
         assert "Traceback" not in printed
         if running.returncode == 0:
             assert fresh.outcome() == expected
             shutil.rmtree(fresh.results)
-    fresh.run(*COMMAND, *TARGETS, overrides=SMALL)
+    last = fresh.run(*ONE_CORE, *TARGETS, overrides=SMALL)
+    assert re.search(r"\d+ of \d+ steps \(\d+%\) done", last.stderr)
+    assert "nbv: finished" in last.stderr
+    assert "too small for its numbers to mean anything" in last.stderr
     assert fresh.outcome() == expected
     assert not list(fresh.results.rglob("*.partial*"))
     fresh.run("verify", "--cores", "1", overrides=SMALL)

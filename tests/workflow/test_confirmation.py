@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -18,7 +19,6 @@ SMALL = (
     *TINY,
     "estimator=classifier",
     f"estimator.n_classes={N_CLASSES}",
-    "estimator.warm_start=categories",
     "more_views.n_views=3",
     "more_views.start_every_deg=90",
     "confirmation.replicates=[[0],[0]]",
@@ -43,25 +43,18 @@ def history(path: Path) -> dict:
         return json.loads(stored.metadata()["nbv"])
 
 
+def training_objects(project: Project, shuffle: int, category: str, fold: int) -> set[str]:
+    splits = splits_of(project, shuffle, category)
+    return set(splits.query("fold == @fold and role == 'train'")["object_id"])
+
+
 @pytest.mark.parametrize("training", TRAININGS)
 def test_every_training_has_seen_the_training_objects_of_its_own_folds(confirmed, training):
     estimators = confirmed.results / f"{TRAININGS[training]}estimators"
-    seen = {}
-    for category in ("mug", "chair"):
-        splits = splits_of(confirmed, training[0], category)
-        for fold in (1, 2):
-            of_fold = splits[(splits["fold"] == fold) & (splits["role"] == "train")]
-            seen[category, fold] = set(of_fold["object_id"])
-            found = history(estimators / f"{category}/el00/fold{fold}/estimator.safetensors")
-            assert set(found["trained_on"]) == seen[category, fold]
-            start = found["started_from"]["path"]
-            assert start.endswith(f"pretrained/fold{fold}/estimator.safetensors")
-    for fold in (1, 2):
-        found = history(estimators / f"pretrained/fold{fold}/estimator.safetensors")
-        together = {
-            f"{category}/{each}" for (category, k), ids in seen.items() if k == fold for each in ids
-        }
-        assert set(found["trained_on"]) == together
+    for category, fold in itertools.product(("mug", "chair"), (1, 2)):
+        found = history(estimators / f"{category}/el00/fold{fold}/estimator.safetensors")
+        own = training_objects(confirmed, training[0], category, fold)
+        assert set(found["trained_on"]) == own
 
 
 def test_a_shuffle_divides_the_same_objects_anew(confirmed):
@@ -71,14 +64,20 @@ def test_a_shuffle_divides_the_same_objects_anew(confirmed):
 
 
 def test_a_replicate_has_the_folds_of_its_shuffle_and_a_seed_of_its_own(confirmed):
-    """Trained with one seed they would be the same, bit for bit."""
-    place = "results/tiny/confirmation/shuffle0/replicate1/estimators/mug/el00/fold1"
-    target = f"{place}/estimator.safetensors"
-    confirmed.run("--cores", "2", *STUDIES, target, overrides=SMALL)
-    own = confirmed.results / "estimators/mug/el00/fold1/estimator.safetensors"
-    other = confirmed.folder / target
-    assert history(other)["trained_on"] == history(own)["trained_on"]
-    assert other.read_bytes() != own.read_bytes()
+    """Trained with one seed they would be the same, bit for bit; so is what they start from."""
+    folders = [f"results/tiny/confirmation/shuffle1/replicate{k}/estimators" for k in (1, 2)]
+    targets = [f"{folder}/mug/el00/fold1/estimator.safetensors" for folder in folders]
+    start = ("estimator.warm_start=categories",)
+    confirmed.run("--cores", "2", *STUDIES, *targets, overrides=(*SMALL, *start))
+    own = {name: training_objects(confirmed, 1, name, 1) for name in ("mug", "chair")}
+    together = {f"{category}/{each}" for category, ids in own.items() for each in ids}
+    trained = [confirmed.folder / target for target in targets]
+    starts = [
+        confirmed.folder / each / "pretrained/fold1/estimator.safetensors" for each in folders
+    ]
+    assert all(set(history(path)["trained_on"]) == own["mug"] for path in trained)
+    assert all(set(history(path)["trained_on"]) == together for path in starts)
+    assert len({path.read_bytes() for path in (*trained, *starts)}) == 4
 
 
 def test_the_tables_are_of_every_object_in_every_training(confirmed):

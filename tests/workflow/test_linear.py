@@ -15,7 +15,7 @@ from projects import TINY, Project, finished_project
 
 pytestmark = pytest.mark.slow
 
-LINEAR = ("estimator=linear", "camera.image_side=64")
+LINEAR = ("estimator=linear", "camera.image_side=64", "categories=[mug]")
 CLASSES = ("estimator=linear_classifier", "estimator.n_classes=24", "camera.image_side=64")
 FOLD = "results/tiny/estimators/mug/el00/fold2/estimator.safetensors"
 
@@ -26,16 +26,15 @@ def linear(tmp_path_factory) -> Project:
     return finished_project(tmp_path_factory, "linear", "evaluation", overrides=(*TINY, *LINEAR))
 
 
-def error_deg(project: Project, category: str, role: str = "test") -> float:
-    found = project.results.glob(f"estimates/{category}/el00/fold*/{role}.csv")
+def error_deg(project: Project, role: str = "test") -> float:
+    found = project.results.glob(f"estimates/mug/el00/fold*/{role}.csv")
     estimates = pd.concat([pd.read_csv(path) for path in found])
     return float(circular_distance_deg(estimates["estimate_deg"], estimates["azimuth_deg"]).mean())
 
 
 def test_estimates_mean_something(linear):
-    # Six training objects of each category are enough for this, and chance is 90.
-    assert error_deg(linear, "mug") < 25
-    assert error_deg(linear, "chair") < 25
+    # Two training objects are enough for this, and chance is 90.
+    assert error_deg(linear) < 30
 
 
 def test_no_network_is_trained(linear):
@@ -66,7 +65,7 @@ def test_the_features_are_even_and_odd_parts_of_every_view(linear):
 def test_cross_fitted_distributions_come_from_a_classifier(fresh):
     overrides = (*TINY, *CLASSES, "calibration=crossfit", "categories=[mug]", "n_objects=6")
     fresh.run("--cores", "2", "estimates", overrides=overrides)
-    assert error_deg(fresh, "mug") < 30
-    assert error_deg(fresh, "mug", "calibration") < 30
+    assert error_deg(fresh) < 30
+    assert error_deg(fresh, "calibration") < 30
     stored = np.load(fresh.results / "estimates/mug/el00/fold1/test_posteriors.npz")
     assert stored["log_posterior"].shape[1:] == (360, 24)

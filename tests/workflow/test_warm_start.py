@@ -19,13 +19,20 @@ def overrides(*elevations: int) -> tuple[str, ...]:
     return ("estimator.warm_start=both", f"elevations_deg.mug=[{','.join(map(str, elevations))}]")
 
 
-MORE = overrides(0, 15, 60)
+MORE = (
+    *overrides(0, 60),
+    "calibration=crossfit",
+    "crossfit_epochs=1",
+    "estimator=classifier",
+    "estimator.n_classes=24",
+)
+TARGET = "results/tiny/estimates/mug/el60/fold1/test.csv"
 
 
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory) -> Project:
-    """The estimators of two categories; mugs are seen from three elevations."""
-    return finished_project(tmp_path_factory, "warm", "estimators", overrides=(*TINY, *MORE))
+    """What the cross-fitted estimates of one fold at 60° need."""
+    return finished_project(tmp_path_factory, "warm", TARGET, overrides=(*TINY, *MORE))
 
 
 def history(path: Path) -> dict:
@@ -50,46 +57,29 @@ def ancestors(path: Path) -> list[Path]:
     return found
 
 
-def check_fold(results: Path, fold: int, units: dict[str, tuple], part: str | None) -> None:
-    """Check what each estimator of a fold, or of all parts but one, has seen and started from."""
+@pytest.mark.parametrize("part", [None, "part1", "part2"])
+def test_ancestors_have_seen_the_training_objects_and_no_others(warm, part):
+    """Of an estimator that calibrates one part of the training objects: none of that part."""
     name = "estimator" if part is None else f"without_{part}"
-    estimators = results / "estimators"
-    own = {name: training_objects(results, name, fold, part) for name in ("mug", "chair")}
-    pretrained = estimators / f"pretrained/fold{fold}/{name}.safetensors"
+    estimators = warm.results / "estimators"
+    own = {name: training_objects(warm.results, name, 1, part) for name in ("mug", "chair")}
+    pretrained = estimators / f"pretrained/fold1/{name}.safetensors"
     assert ancestors(pretrained) == []
     assert set(history(pretrained)["trained_on"]) == {
         f"{category}/{each}" for category, ids in own.items() for each in ids
     }
-    for category, of_category in units.items():
-        chain = [
-            estimators / f"{category}/el{elevation:02d}/fold{fold}/{name}.safetensors"
-            for elevation in of_category
-        ]
-        for place, path in enumerate(chain):
-            assert ancestors(path) == [*reversed(chain[:place]), pretrained]
-            assert set(history(path)["trained_on"]) == own[category]
-
-
-@pytest.mark.parametrize("fold", [1, 2])
-def test_ancestors_have_seen_the_training_objects_and_no_others(warm, fold):
-    check_fold(warm.results, fold, {"mug": (0, 15, 60), "chair": (0,)}, None)
-
-
-def test_ancestors_of_a_classifier_of_some_parts_have_not_seen_the_others(fresh):
-    target = "results/tiny/estimates/mug/el60/fold1/test.csv"
-    crossfit = ("calibration=crossfit", "crossfit_epochs=1")
-    classifier = ("estimator=classifier", "estimator.n_classes=24")
-    fresh.run("--cores", "2", target, overrides=(*TINY, *overrides(0, 60), *crossfit, *classifier))
-    # A lower elevation's parts are made for what starts from them.
-    for part in (None, "part1", "part2"):
-        check_fold(fresh.results, 1, {"mug": (0, 60)}, part)
+    low, high = (estimators / f"mug/el{el}/fold1/{name}.safetensors" for el in ("00", "60"))
+    assert ancestors(low) == [pretrained]
+    assert ancestors(high) == [low, pretrained]
+    assert set(history(low)["trained_on"]) == set(history(high)["trained_on"]) == own["mug"]
 
 
 def test_one_estimator_can_be_asked_for_by_name_and_brings_what_it_starts_from(fresh):
     target = "results/tiny/estimators/mug/el15/fold2/estimator.safetensors"
-    planned = fresh.would_run(*MORE, targets=(target,))
+    more = overrides(0, 15, 60)
+    planned = fresh.would_run(*more, targets=(target,))
     assert planned == {"meshes": 2, "render": 3, "splits": 2, "pretrain": 1, "train": 2}
-    alone = fresh.would_run(MORE[1], "estimator.warm_start=elevations", targets=(target,))
+    alone = fresh.would_run(more[1], "estimator.warm_start=elevations", targets=(target,))
     assert alone == {"meshes": 1, "render": 2, "splits": 1, "train": 2}
 
 
@@ -97,12 +87,15 @@ def test_a_changed_start_trains_what_follows_again(warm):
     """The settings of no stage can change unnoticed."""
 
     def planned(*more: str) -> dict[str, int]:
-        return warm.would_run(*more, targets=("estimators",))
+        return warm.would_run(*MORE, *more, targets=(TARGET,))
 
-    made_again = {"train": 8, "estimators": 1}
-    assert planned(*MORE, "estimator.epochs=2") == {}
-    assert planned(*MORE, "estimator.next_elevation.epochs=2") == made_again | {"train": 4}
-    assert planned(*MORE, "estimator.fine_tuning.epochs=2") == made_again
-    assert planned(*MORE, "estimator.pretraining.epochs=1") == made_again | {"pretrain": 2}
+    made_again = {"train": 2, "train_part": 4, "estimate": 1}
+    highest = {"train": 1, "train_part": 2, "estimate": 1}
+    assert planned("estimator.next_elevation.learning_rate=1e-3") == highest
+    assert planned("estimator.fine_tuning.learning_rate=1e-3") == made_again
+    assert planned("estimator.pretraining.learning_rate=1e-3") == made_again | {
+        "pretrain": 1,
+        "pretrain_part": 2,
+    }
     # From random weights.
-    assert planned(*MORE[1:]) == made_again
+    assert planned("estimator.warm_start=elevations") == made_again
