@@ -6,6 +6,7 @@
 # make features    the depth features that the package ships, for half an hour
 # make test-slurm  the workflow on a real SLURM of one node, where root may install it
 # make test-browser the pages in a real browser, where there is one or root may install it
+# make test-site    the documentation site: every link, equation and name in it
 # make coverage    branches that tests reach    make mutation whether tests notice changed code
 # make audit       known vulnerabilities        make licences the licences of what is locked
 # make lock        the locks again              UPGRADE=--upgrade takes the newest versions
@@ -27,7 +28,7 @@ PYTEST := $(BIN)/pytest --numprocesses $(CORES) --dist worksteal
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
 
-.PHONY: reproduce quick confirm bundles features compare reference bench test test-quick test-slurm test-browser soak coverage mutation \
+.PHONY: reproduce quick confirm bundles features compare reference bench test test-quick test-slurm test-browser test-site soak coverage mutation \
 	check lock audit licences docs tables clean
 
 reproduce: $(READY)
@@ -61,7 +62,7 @@ reference: $(READY)
 bench: $(READY)
 	$(BIN)/python -m performance
 
-test: $(READY) $(DOCS)
+test: $(READY)
 	$(PYTEST)
 
 test-quick: $(READY)
@@ -76,6 +77,9 @@ test-slurm: $(READY)
 test-browser: $(READY)
 	tests/browser/install.sh
 	$(BIN)/pytest -rs tests/browser
+
+test-site: $(READY) $(DOCS)
+	$(BIN)/pytest tests/website
 
 coverage: $(READY)
 	$(PYTEST) -m "not slow" --cov --cov-report=term

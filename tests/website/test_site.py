@@ -17,9 +17,7 @@ import pytest
 
 import nbv
 
-pytestmark = pytest.mark.slow
-
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 METHOD = ROOT / "docs/method.md"
 
 # What a browser fetches by itself when it shows a page.
