@@ -20,6 +20,8 @@ log = logging.getLogger(__name__)
 
 # Ask sooner and more often than on a cluster that others use as well.
 COMMAND = ("--workflow-profile", "profiles/slurm", "--slurm-init-seconds-before-status-checks", "3")
+# A job of every group.
+TARGETS = ("evaluation", "results/tiny/claims.md", "results/tiny/figures/figure2.png")
 # Enough for a machine that has much else to do: a quiet one takes a tenth.
 RUN_S = 1800
 # Two folds are enough: one is cancelled, the node is lost below one, slurmd restarts below one.
@@ -52,7 +54,7 @@ def test_a_cancelled_job_a_restarted_daemon_and_a_lost_node_leave_the_same_bytes
     (tmp_path / "local").mkdir()
     local = copy_of_project(tmp_path / "local")
     here = subprocess.run(
-        local.command("--cores", "2", overrides=LONGER),
+        local.command("--cores", "2", *TARGETS, overrides=LONGER),
         cwd=local.folder,
         env=local.environment,
         capture_output=True,
@@ -62,7 +64,7 @@ def test_a_cancelled_job_a_restarted_daemon_and_a_lost_node_leave_the_same_bytes
     assert here.returncode == 0, here.stderr
     with (fresh.folder / "printed").open("w") as printed:
         run = subprocess.Popen(
-            fresh.command(*COMMAND, overrides=LONGER),
+            fresh.command(*COMMAND, *TARGETS, overrides=LONGER),
             cwd=fresh.folder,
             env=cluster.environment | {"PYTHONPATH": str(fresh.folder / "src")},
             stdout=printed,
