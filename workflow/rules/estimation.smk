@@ -25,6 +25,7 @@ rule pretrain:
         runtime=per_attempt(30),
     params:
         categories=CONFIG["categories"],
+        mirror_planes_deg=[PLAN.mirror_plane_deg(name) for name in CONFIG["categories"]],
         estimator=lambda wildcards: settings_of("pretraining"),
         seed=CONFIG["seed"],
     script:
