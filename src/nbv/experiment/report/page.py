@@ -327,8 +327,8 @@ def _repairs(density: Mapping[str, Any]) -> str:
     if not repairs:
         return "Proposed is the paper's method as it is printed."
     return (
-        f"Proposed is the paper's method, repaired: {'; '.join(repairs)}. The study "
-        "confirm compares it with the method as it is printed."
+        f"Proposed is the paper's method, repaired: {'; '.join(repairs)}. docs/method.md gives the "
+        "reasons."
     )
 
 
