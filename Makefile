@@ -90,6 +90,7 @@ mutation: $(AUDIT)
 
 lock: $(AUDIT)
 	$(LOCK) $(UPGRADE) pyproject.toml --extra experiment --group dev --no-emit-package torch --output-file requirements.lock
+	$(subst 3.11,3.10,$(LOCK)) $(UPGRADE) pyproject.toml --fork-strategy fewest --output-file requirements-robot.lock
 	$(LOCK) $(UPGRADE) --group audit --constraints requirements.lock --output-file requirements-audit.lock
 	$(LOCK) $(UPGRADE) --group docs --constraints requirements.lock --constraints requirements-audit.lock --output-file requirements-docs.lock
 	$(BIN)/python tools/extra.py slurm | $(LOCK) --no-deps --output-file requirements-slurm.lock -
@@ -97,6 +98,7 @@ lock: $(AUDIT)
 audit: $(AUDIT)
 	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements.lock
 	$(BIN)/pip-audit --strict --disable-pip --no-deps --requirement requirements-torch.lock
+	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements-robot.lock
 	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements-slurm.lock
 	$(BIN)/pip-audit --strict --disable-pip --require-hashes --requirement requirements-docs.lock
 
@@ -118,6 +120,7 @@ check: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy --python-version 3.10 --no-warn-return-any --package nbv.core --package nbv.data --package nbv.robot
 	$(BIN)/lint-imports
 	$(BIN)/snakefmt --check Snakefile workflow studies
 	$(BIN)/snakemake --lint

@@ -6,7 +6,11 @@ import difflib
 import json
 import re
 from collections.abc import Iterable
-from typing import Self
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    # In `typing` from Python 3.11 on.
+    from typing_extensions import Self
 
 # Messages of libraries about a file, and what they mean for its author; `{…}` is a group.
 _REASONS = (

@@ -12,6 +12,9 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
+if sys.version_info < (3, 11):
+    sys.exit("nbv: error: the command line needs Python 3.11; with 3.10, import nbv in Python")
+
 from cyclopts import App, CycloptsError
 
 from nbv import __version__

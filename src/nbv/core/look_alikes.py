@@ -444,7 +444,8 @@ def _started_at(rows: Table, places: NDArray[np.intp]) -> Table:
     """Return rows (..., B) that go round, each started at its place (...), 0 to B - 1."""
     windows = _windows(_doubled(rows))
     # Whole rows are copied; single indices for all numbers take five times as long.
-    return np.asarray(windows[(*np.ogrid[*(slice(n) for n in places.shape)], places)])
+    index = (*np.ogrid[tuple(slice(n) for n in places.shape)], places)
+    return np.asarray(windows[index])
 
 
 def _doubled(rows: Table) -> Table:

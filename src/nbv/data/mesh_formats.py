@@ -353,7 +353,3 @@ def _send(stream: BinaryIO, answer: dict[str, Any], arrays: list[Any]) -> None:
     for array in arrays:
         stream.write(array.tobytes())
     stream.flush()
-
-
-if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))

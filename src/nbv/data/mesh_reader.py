@@ -32,6 +32,12 @@ CLOCK_S = 600
 MAX_BYTES = 4 * 2**30
 """Limit of memory, libraries included. A million faces as text take less than half of it."""
 
+# No module is imported from the current folder, which is "": Python 3.10 has no option -P.
+_START = (
+    "import sys; sys.path[:] = filter(None, sys.path); "
+    "from nbv.data.mesh_formats import main; main(*map(int, sys.argv[1:]))"
+)
+
 
 class MeshReader:
     """Reads mesh files, one after the other, in one process.
@@ -81,11 +87,10 @@ class MeshReader:
     def _running(self) -> subprocess.Popen[bytes]:
         if self._process is None:
             # The import makes it one of the sources that a result depends on.
-            from nbv.data import mesh_formats
+            from nbv.data import mesh_formats  # noqa: F401
 
             self._process = subprocess.Popen(
-                # -P: no module is imported from the current folder.
-                [sys.executable, "-P", "-m", mesh_formats.__name__, *map(str, self._limits)],
+                [sys.executable, "-c", _START, *map(str, self._limits)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 # The user gets a single line, not the output of libraries.
