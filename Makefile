@@ -90,7 +90,7 @@ mutation: $(AUDIT)
 
 lock: $(AUDIT)
 	$(LOCK) $(UPGRADE) pyproject.toml --extra experiment --group dev --no-emit-package torch --output-file requirements.lock
-	$(subst 3.11,3.10,$(LOCK)) $(UPGRADE) pyproject.toml --fork-strategy fewest --output-file requirements-robot.lock
+	echo "numpy<2" | $(subst 3.11,3.10,$(LOCK)) $(UPGRADE) pyproject.toml - --fork-strategy fewest --output-file requirements-robot.lock
 	$(LOCK) $(UPGRADE) --group audit --constraints requirements.lock --output-file requirements-audit.lock
 	$(LOCK) $(UPGRADE) --group docs --constraints requirements.lock --constraints requirements-audit.lock --output-file requirements-docs.lock
 	$(BIN)/python tools/extra.py slurm | $(LOCK) --no-deps --output-file requirements-slurm.lock -

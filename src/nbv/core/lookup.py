@@ -212,8 +212,8 @@ def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") ->
     ...     estimates[None], density, bandwidth_deg=8, pseudo_observations=3
     ... )
     >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
-    >>> 60 < table.recommend(90.0) < 300  # it leaves the blind range
-    np.True_
+    >>> bool(60 < table.recommend(90.0) < 300)  # it leaves the blind range
+    True
     """
     cost = tabulate(criterion, evidence, fusion)
     return LookupTable(
