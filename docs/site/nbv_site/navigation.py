@@ -16,6 +16,7 @@ SECTIONS = {
         "docs/camera",
         "docs/turntable",
         "docs/your-estimator",
+        "docs/own-category",
         "docs/bundles",
     ),
     "Understand it": ("docs/method", "docs/paper", "docs/glossary"),
