@@ -55,6 +55,48 @@ def whole_millimetres(frame: Frame) -> np.ndarray:
     return np.round(frame.depth_m / MILLIMETRE).astype(np.uint16)
 
 
+def on_a_table(frame: Frame) -> np.ndarray:
+    """The depth of a frame whose object stands on a table, with half a millimetre of noise."""
+    camera, elevation = frame.intrinsics, np.radians(frame.elevation_deg)
+    up = np.array([0, -np.cos(elevation), -np.sin(elevation)])
+    v, u = np.indices(frame.depth_m.shape)
+    rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1 + 0 * u], axis=-1)
+    below = np.percentile((rays * frame.depth_m[..., None])[frame.mask] @ up, 0.5)
+    table = below / np.minimum(rays @ up, -1e-6)
+    table += np.random.default_rng(0).normal(0, 0.0005, table.shape)
+    return np.where(frame.mask, frame.depth_m, np.where(table < 3, table, 0.0))
+
+
+def test_plane_removal(frame, run) -> None:
+    """What is left of an object on a table is the object, but for what touches the table."""
+    camera = frame.intrinsics
+    given = {name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")}
+    names = run("off_plane", {}, depth_m=on_a_table(frame), **given)
+    assert not (names["mask"] & ~frame.mask).any()
+    assert names["mask"].sum() > 0.85 * frame.mask.sum()
+    wanted = nbv.Recommender.load("mug").recommend(
+        frame.depth_m, mask=frame.mask, intrinsics=camera
+    )
+    assert names["answer"].azimuth_deg == pytest.approx(wanted.azimuth_deg, abs=10)
+
+
+def test_segment_anything(frame, run) -> None:
+    """The mask with the highest score is the one that is taken."""
+    masks = np.stack([frame.mask & False, frame.mask, ~frame.mask])
+    predictor = MagicMock()
+    predictor.predict.return_value = masks, np.array([0.2, 0.9, 0.5]), None
+    module = ModuleType("segment_anything")
+    module.SamPredictor = lambda model: predictor
+    camera = frame.intrinsics
+    given = {name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")}
+    given |= {"depth_m": frame.depth_m, "model": None, "colour": None, "u": 320, "v": 240}
+    names = run("segment_anything", {"segment_anything": module}, **given)
+    wanted = nbv.Recommender.load("mug").recommend(
+        frame.depth_m, mask=frame.mask, intrinsics=camera
+    )
+    assert names["answer"].azimuth_deg == pytest.approx(wanted.azimuth_deg)
+
+
 def test_realsense(frame, run) -> None:
     """Frames in units of the device, intrinsics of the depth stream."""
     depth_mm, camera = whole_millimetres(frame), frame.intrinsics
