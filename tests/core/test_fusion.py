@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,7 +10,8 @@ from tests.core.made import N_BINS, direction_by_loops, estimates, evidence_of, 
 
 from nbv.core import fusion
 from nbv.core.angles import circular_distance_deg
-from nbv.core.fusion import ESTIMATE_FUSIONS, posterior, product
+from nbv.core.density import Conditionals
+from nbv.core.fusion import ESTIMATE_FUSIONS, average, posterior, product
 
 angle = st.integers(0, 3599).map(lambda tenths: tenths / 10)
 turn = st.integers(0, 359)
@@ -116,6 +119,45 @@ def test_distributions_of_several_objects_are_fused_each_by_its_own_rotation():
     for one in np.ndindex(2, 3):
         alone = product(first[one][None], second[one][None], delta[one][None])
         assert found[one] == pytest.approx(alone[0], abs=1e-9)
+
+
+def half_turned(rows):
+    return (rows + np.roll(rows, rows.shape[-1] // 2, axis=-1)) / 2
+
+
+@pytest.mark.parametrize("n_pairs", [1, 2000])
+def test_without_a_resultant_the_posterior_is_the_first_estimate(n_pairs):
+    """Front and back look the same: few pairs and many."""
+    density = evidence_of().conditionals
+    pair = [half_turned(half_turned(rows.T).T) for rows in (density.viewpoint, density.estimate)]
+    evidence = replace(evidence_of(), conditionals=Conditionals(*pair))
+    rng = np.random.default_rng(0)
+    first, second = rng.uniform(-360, 720, (2, n_pairs))
+    delta = 15.0 * rng.integers(0, N_BINS, n_pairs)
+    found = posterior(first, second, delta, evidence)
+    assert circular_distance_deg(found, average(first, first, 0.0)).max() < 1e-9
+
+
+@given(st.integers(0, 99), st.integers(0, 11))
+def test_without_a_resultant_the_product_is_the_first_estimate(seed, delta):
+    first, second = random_rows(seed, 1), half_turned(random_rows(seed + 1, 1))
+    periodic = half_turned(first)
+    second = half_turned(second)
+    found = product(periodic, second, np.array([delta * 30]))
+    # An estimate that is as likely as its opposite is the first of the two.
+    assert found[0] == 30 * (periodic[0] > periodic[0].max() - 1e-9).argmax()
+    turned = (np.roll(rows, 6, axis=1) for rows in (periodic, second))
+    assert product(*turned, np.array([delta * 30]))[0] == found[0]
+
+
+def test_errors_without_a_resultant_are_those_of_fusing_each_pair():
+    views = half_turned(random_rows(3, 12))[None]
+    errors = fusion.rotation_errors_deg(views, evidence_of(), "product")
+    for delta, view in np.ndindex(12, 12):
+        other = views[0, (view + delta) % 12]
+        fused = product(views[0, view][None], other[None], np.array([delta * 30]))
+        wanted = circular_distance_deg(fused[0], view * 30)
+        assert errors[delta, 0, view] == pytest.approx(float(wanted), abs=1e-4)
 
 
 @pytest.mark.parametrize("name", ESTIMATE_FUSIONS)

@@ -51,6 +51,17 @@ def test_after_one_view_it_is_the_criterion(rng: np.random.Generator, n_turns: i
     assert found == pytest.approx(wanted, rel=1e-4)
 
 
+@pytest.mark.parametrize("n_views", [1, 2])
+def test_where_nothing_is_alike_and_nothing_is_added_the_mean_of_all_is_expected(rng, n_views):
+    """A power so large that all weights are 0: no NaN."""
+    alike = LookAlikes.of_views(turns(rng))
+    alike = alike if n_views == 1 else alike.after(7)
+    (now,), (after,) = expected_of(alike, turns(rng)[0][:1], 1e5, 0.0)
+    (wanted_now,), (wanted,) = expected_of(alike, turns(rng)[0][:1], 5.0, 1e12)
+    assert now == pytest.approx(wanted_now, rel=1e-5)
+    assert after == pytest.approx(wanted, rel=1e-5)
+
+
 def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Generator) -> None:
     distributions, bins, first = turns(rng), 24, 5
     alike = LookAlikes.of_views(distributions).after(3).after(10)

@@ -324,7 +324,7 @@ def _shrunk(weights: NDArray[np.floating[Any]], errors: Float32Array, alpha: flo
 
     `weights` are (n, n_views), `errors` (B, n_views).
     """
-    alpha = max(alpha, np.finfo(float).tiny)
+    alpha = max(alpha, float(np.finfo(np.float32).tiny))
     total = weights.astype(np.float32) @ errors.T + np.float32(alpha) * errors.mean(axis=1)
     total_weight = weights.sum(axis=1, dtype=np.float64) + alpha
     return np.asarray(total / total_weight[:, None], dtype=np.float32)

@@ -18,6 +18,9 @@ from nbv.core.angles import direction_deg, nearest_bin
 
 Floats = NDArray[np.float64]
 
+FLAT = 1e-5
+"""Share of a distribution: a mean direction of a shorter resultant is rounding."""
+
 NEGLIGIBLE_PROBABILITY = 1e-12
 """Floor before a logarithm: a smaller probability would be lost in rounding."""
 
@@ -128,10 +131,22 @@ def products_at_spacing(
     return np.asarray(np.exp(total - total.max(axis=-1, keepdims=True)))
 
 
-def mean_direction_deg(probabilities: NDArray[np.floating[Any]]) -> Floats:
-    """Return the mean directions (n,) of distributions (n, B), in [0, 360)."""
-    angles = 2 * np.pi * np.arange(probabilities.shape[1]) / probabilities.shape[1]
-    return direction_deg(probabilities @ np.cos(angles), probabilities @ np.sin(angles))
+def mean_direction_deg(
+    probabilities: NDArray[np.floating[Any]], otherwise_deg: Floats | None = None
+) -> Floats:
+    """Return the mean directions (n,) of distributions (n, B), in [0, 360).
+
+    Where the resultant is shorter than `FLAT`, it is `otherwise_deg` (n,); without it the likeliest
+    bin, the first of those that differ by rounding alone.
+    """
+    n_bins = probabilities.shape[1]
+    angles = 2 * np.pi * np.arange(n_bins) / n_bins
+    cosine, sine = probabilities @ np.cos(angles), probabilities @ np.sin(angles)
+    if otherwise_deg is None:
+        is_likeliest = probabilities >= (1 - FLAT) * probabilities.max(axis=1, keepdims=True)
+        otherwise_deg = is_likeliest.argmax(axis=1) * (360.0 / n_bins)
+    is_flat = np.hypot(cosine, sine) <= FLAT * probabilities.sum(axis=1)
+    return np.where(is_flat, otherwise_deg, direction_deg(cosine, sine))
 
 
 def direction_and_spread_deg(belief: NDArray[np.floating]) -> tuple[float, float]:

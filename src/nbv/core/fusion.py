@@ -15,7 +15,7 @@ from nbv.core.angles import (
     nearest_bin,
     wrap_deg,
 )
-from nbv.core.distributions import in_object_frame, mean_direction_deg, product_of
+from nbv.core.distributions import FLAT, in_object_frame, mean_direction_deg, product_of
 from nbv.core.evidence import Evidence
 
 Angles = NDArray[np.float64]
@@ -86,7 +86,8 @@ def posterior(
     Returns
     -------
     ndarray
-        In [0, 360), in the frame of the first view.
+        In [0, 360), in the frame of the first view; the first estimate if the resultant is 0 up to
+        rounding, as of evidence that is the same after half a turn.
 
     Raises
     ------
@@ -113,28 +114,35 @@ def posterior(
     )
     # The moments of all pairs of bins cost as much as those of 2 B² single pairs.
     if first.size > 2 * n_bins**2:
-        moments = evidence.moments
-        return direction_deg(moments[delta, 0, first, second], moments[delta, 1, first, second])
-    return _posterior_of_pairs(first, second, delta, evidence)
+        cosine, sine = (evidence.moments[delta, part, first, second] for part in (0, 1))
+    else:
+        cosine, sine = _moments_of_pairs(first, second, delta, evidence)
+    # L bounds the posterior's sum from above.
+    is_flat = np.hypot(cosine, sine) <= _ROUNDING * evidence.second.max(axis=0)[second]
+    return np.where(is_flat, wrap_deg(first_deg), direction_deg(cosine, sine))
 
 
 # Pairs of views fused at once, to stay within the processor's cache.
 _PAIRS_AT_ONCE = 1024
 
+_ROUNDING = 1e-6
+"""Rounding of a moment in single precision, as a share of its largest term."""
 
-def _posterior_of_pairs(first: Bins, second: Bins, delta: Bins, evidence: Evidence) -> Angles:
+
+def _moments_of_pairs(
+    first: Bins, second: Bins, delta: Bins, evidence: Evidence
+) -> NDArray[np.float32]:
     n_bins = evidence.n_bins
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
     unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1).astype(np.float32)
-    fused = np.empty(first.size)
+    moments = np.empty((2, first.size), dtype=np.float32)
     flat = first.ravel(), second.ravel(), delta.ravel()
     for start in range(0, first.size, _PAIRS_AT_ONCE):
         end = start + _PAIRS_AT_ONCE
         e1, e2, d = (bins[start:end] for bins in flat)
         likelihood = evidence.second[d[:, None] + np.arange(n_bins), e2[:, None]]
-        moment = (evidence.viewpoint[e1] * likelihood) @ unit
-        fused[start:end] = direction_deg(moment[:, 0], moment[:, 1])
-    return fused.reshape(first.shape)
+        moments[:, start:end] = ((evidence.viewpoint[e1] * likelihood) @ unit).T
+    return moments.reshape(2, *first.shape)
 
 
 def product(
@@ -163,14 +171,15 @@ def product(
     -------
     ndarray (...)
         In [0, 360), in the frame of the first view; the mean direction of `first` if the two
-        distributions exclude each other.
+        distributions exclude each other, or their product has a resultant of 0 up to rounding.
     """
     delta = np.asarray(delta_deg)
     own, other = (
         np.asarray(rows, dtype=np.float64).reshape(-1, np.shape(rows)[-1])
         for rows in (first, second)
     )
-    return mean_direction_deg(product_of(own, other, delta)).reshape(delta.shape)
+    own_deg = mean_direction_deg(own)
+    return mean_direction_deg(product_of(own, other, delta), own_deg).reshape(delta.shape)
 
 
 Fusion = Callable[[ArrayLike, ArrayLike, ArrayLike, Evidence | None], Angles]
@@ -244,15 +253,15 @@ def _product_errors_deg(distributions: NDArray[np.floating[Any]]) -> NDArray[np.
     width_deg = 360.0 / n_bins
     errors = np.empty((n_bins, n_objects, n_bins, n_sweeps), dtype=np.float32)
     for i, start in np.ndindex(n_objects, n_sweeps):
-        rows = in_object_frame(np.asarray(sweeps[i, start], dtype=np.float64))
+        sweep = np.asarray(sweeps[i, start], dtype=np.float64)
+        rows = in_object_frame(sweep)
         cosine, sine = (rows * part @ rows.T for part in (np.cos(angles), np.sin(angles)))
-        excluded = rows @ rows.T <= 0
-        if excluded.any():
-            own = rows @ np.stack([np.cos(angles), np.sin(angles)], axis=1)
-            cosine, sine = (
-                np.where(excluded, own[:, [axis]], both) for axis, both in enumerate((cosine, sine))
-            )
+        both_deg = direction_deg(cosine, sine)
+        is_flat = np.hypot(cosine, sine) <= FLAT * (rows @ rows.T)
+        if is_flat.any():
+            own_deg = wrap_deg(mean_direction_deg(sweep) - np.arange(n_bins) * width_deg)
+            both_deg = np.where(is_flat, own_deg[:, None], both_deg)
         # From [view, view] to [view, rotation].
-        pose_deg = in_object_frame(direction_deg(cosine, sine))
+        pose_deg = in_object_frame(both_deg)
         errors[:, i, :, start] = circular_distance_deg(pose_deg, start * width_deg / n_sweeps).T
     return errors.reshape(n_bins, n_objects, n_views)

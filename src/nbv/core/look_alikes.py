@@ -15,6 +15,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nbv.core.distributions import FLAT
 from nbv.core.evidence import Float32Array as Table
 
 COMPARED_DEG = 6.0
@@ -40,9 +41,6 @@ One of each turn, where there are more turns.
 
 NEGLIGIBLE = 1e-5
 """Of all that counts, pseudo-observations too: after more views, what counts less is left out."""
-
-FLAT = 1e-5
-"""Of distributions: below this resultant length the mean direction is rounding, and errs by 90°."""
 
 
 def in_object_frame(distributions: Table) -> Table:
@@ -358,6 +356,8 @@ class LookAlikes:
         of_turn = np.ones(n_turns) if share is None else np.asarray(share)
         # A first view stands for the degrees that it is apart from the next one.
         of_view = of_turn * (360.0 / n_first)
+        # So that the mean of all counts where no view is like the belief.
+        pseudo_observations = max(pseudo_observations, float(np.finfo(np.float32).tiny))
         affinity = self._affinities(belief)
         # Processors take much longer for a weight below the least normal number. It counts nothing.
         affinity[affinity < float(np.finfo(np.float32).tiny) ** (1.0 / max(power, 1.0))] = 0.0
