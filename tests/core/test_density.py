@@ -113,6 +113,15 @@ def test_a_row_of_little_mass_keeps_its_shape():
     np.testing.assert_allclose(density.conditional(joint, 0.0), [[0.25, 0.75], [0.5, 0.5]])
 
 
+def test_a_row_without_an_observation_is_uniform_after_smoothing_too():
+    """Transforms leave rounding in rows that no kernel reaches."""
+    azimuths = np.arange(100.0, 120.0)
+    pair = density.conditionals(azimuths, azimuths, bandwidth_deg=4, pseudo_observations=0)
+    assert np.all(pair.viewpoint[290] == 1 / 360)
+    assert np.all(pair.estimate[290] == 1 / 360)
+    assert pair.viewpoint[110].argmax() == 110
+
+
 def test_pseudo_observations_are_counted_in_rows_of_360_bins():
     """One pair, not smoothed: ten observations of 360 rows are a hundred of 36."""
     pair = density.conditionals([10.0], [20.0], bandwidth_deg=0, pseudo_observations=10, n_bins=36)

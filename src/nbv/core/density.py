@@ -14,6 +14,9 @@ from nbv.core.angles import nearest_bin
 
 Matrix = NDArray[np.float64]
 
+_ROUNDING = 1e-12
+"""Share of a density that the Fourier transforms of `smooth` may put anywhere."""
+
 
 @dataclass(frozen=True)
 class Conditionals:
@@ -88,7 +91,8 @@ def conditional(joint: Matrix, pseudo_observations: float) -> Matrix:
     """Return the rows of a joint density (B, B) as distributions.
 
     `pseudo_observations` (0 or more) uniform observations are added to every row, so that rows
-    with few observations are wide rather than sharp. A row without any observation is uniform.
+    with few observations are wide rather than sharp. A row without any observation is uniform,
+    also without pseudo-observations, where smoothing leaves it the rounding of other rows.
     """
     if not 0 <= pseudo_observations < np.inf:
         raise ValueError(
@@ -98,7 +102,7 @@ def conditional(joint: Matrix, pseudo_observations: float) -> Matrix:
     mass = joint.sum(axis=1, keepdims=True) + pseudo_observations
     filled = joint + pseudo_observations / n_bins
     rows = np.full_like(joint, 1.0 / n_bins)
-    np.divide(filled, mass, out=rows, where=mass > 0)
+    np.divide(filled, mass, out=rows, where=mass > _ROUNDING * joint.sum())
     return rows
 
 
