@@ -7,6 +7,7 @@ from tests.core.made import evidence_of, hidden_range_estimates
 from nbv.core import lookup
 from nbv.errors import UserError
 from nbv.files import read_arrays, write_arrays
+from nbv.robot.rotations import ranked_rotations
 
 
 def test_ties_go_to_the_smallest_travel_and_then_to_the_smaller_delta():
@@ -45,7 +46,7 @@ def test_recommendations_are_read_at_the_nearest_bin():
         ]
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, "123", None])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300, "123", None])
 def test_an_estimate_that_is_no_number_has_no_rotation(bad):
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     for rotations in (table.recommend, table.least_cost):
@@ -94,40 +95,79 @@ def test_travel_that_costs_is_avoided_and_limits_are_kept():
     assert (lookup.least_cost_delta(table, max_travel_deg=0) == 0).all()
 
 
-def without_a_density(arrays):
-    arrays["viewpoint_likelihood"] *= 1.1
-
-
-def with_a_cost_that_is_no_number(arrays):
-    arrays["cost"][1, 2] = np.nan
-
-
-def with_a_rotation_out_of_range(arrays):
-    arrays["recommended_delta_deg"][0] = 360
-
-
-def without_an_array(arrays):
-    del arrays["cost"]
+@pytest.mark.parametrize(("max_travel_deg", "travel_cost"), [(30.0, 0.0), (180.0, 0.1), (20, 0.02)])
+def test_the_next_view_obeys_the_limits_of_its_table(rng, tmp_path, max_travel_deg, travel_cost):
+    """Rows that stay, too, also after the table was stored."""
+    cost = rng.uniform(1, 2, (36, 36)).astype(np.float32)
+    cost[::2, 0] = 0
+    limits = {"travel_cost": travel_cost, "max_travel_deg": max_travel_deg}
+    deltas = lookup.least_cost_delta(cost, **limits)
+    assert (deltas == 0).sum() >= 18
+    rows = np.full((36, 36), 1 / 36, np.float32)
+    names = "given_estimate", "entropy", "pose_ambiguity"
+    lookup.LookupTable(rows, rows, cost, deltas, 8, 3, *names, **limits).save(tmp_path / "t.npz")
+    table = lookup.LookupTable.load(tmp_path / "t.npz")
+    turns = np.arange(36) * 10
+    travel = np.minimum(turns, 360 - turns)
+    may = (travel > 10) & (travel <= max_travel_deg)
+    total = np.where(may, cost + travel_cost * travel, np.inf)
+    assert table.recommend(turns).tolist() == turns[total.argmin(axis=1)].tolist()
+    for estimate, row in enumerate(total):
+        (best, found), *_ = ranked_rotations(table, estimate * 10.0)[0]
+        assert best % 360 == turns[row.argmin()]
+        assert found == pytest.approx(cost[estimate, row.argmin()])
 
 
 @pytest.mark.parametrize(
-    "damage",
+    ("name", "value"),
     [
-        without_a_density,
-        with_a_cost_that_is_no_number,
-        with_a_rotation_out_of_range,
-        without_an_array,
+        ("viewpoint_likelihood", np.full((36, 36), 1.1 / 36)),
+        ("cost", None),
+        ("cost", (np.s_[1, 2], np.nan)),
+        ("cost", (np.s_[:, 5], -1e30)),
+        ("cost", (np.s_[:, 5], 4.0)),  # above log 36
+        ("cost", np.zeros((36, 36), dtype=bool)),
+        ("cost", np.zeros((36, 35), dtype=np.float32)),
+        ("cost", np.zeros((0, 0), dtype=np.float32)),
+        ("recommended_delta_deg", (np.s_[:1], 360)),
+        ("recommended_delta_deg", (np.s_[3:4], 170)),
+        ("recommended_delta_deg", np.array(170)),
+        ("criterion", np.array("best")),
+        ("criterion", np.array(["pose_ambiguity"])),
+        ("spread", np.array("width")),
+        ("pose_likelihood", np.array(3)),
+        ("bandwidth_deg", np.array(np.nan)),
+        ("pseudo_observations", np.array(np.nan)),
+        ("pseudo_observations", np.array(-1.0)),
+        ("max_travel_deg", np.array("far")),
+        ("travel_cost", np.array(np.inf)),
     ],
+    ids=str,
 )
-def test_a_table_that_cannot_be_is_refused(tmp_path, damage):
+def test_a_table_that_cannot_be_is_refused(tmp_path, name, value):
     path = tmp_path / "pose_ambiguity.npz"
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     table.save(path)
     arrays = read_arrays(path)
-    damage(arrays)
+    if value is None:
+        del arrays[name]
+    elif isinstance(value, tuple):
+        arrays[name][value[0]] = value[1]
+    else:
+        arrays[name] = value
     write_arrays(path, arrays)
     with pytest.raises(UserError, match=r"pose_ambiguity\.npz: .*; make it again with nbv calib"):
         lookup.LookupTable.load(path)
+
+
+def test_a_table_without_limits_has_none(tmp_path):
+    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    table.save(tmp_path / "t.npz")
+    arrays = read_arrays(tmp_path / "t.npz")
+    del arrays["travel_cost"], arrays["max_travel_deg"]
+    write_arrays(tmp_path / "t.npz", arrays)
+    loaded = lookup.LookupTable.load(tmp_path / "t.npz")
+    assert (loaded.travel_cost, loaded.max_travel_deg) == (0, 180)
 
 
 @pytest.mark.parametrize(

@@ -257,7 +257,7 @@ def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
         capsys, "recommend", "--estimate", "20", "--table", "plain.npz"
     )
     message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "plain.npz")
-    assert "--table=plain.npz: not a table of distributions" in message
+    assert "plain.npz holds no distributions: make it with nbv calibrate" in message
 
 
 @pytest.mark.parametrize(
@@ -280,15 +280,18 @@ def test_distributions_that_count_otherwise_than_azimuths_are_doubted(
 def test_a_damaged_table_is_one_line(here, capsys):
     run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     stored = dict(np.load("t.npz"))
-    for name, value in (
-        ("temperature", np.array(0.0)),
-        ("of_views", stored["distribution.of_views"][:0]),
-        ("object_ids", stored["distribution.object_ids"][:2]),
-        ("n_classes", np.array(40)),
+    for name, value, reason in (
+        ("temperature", np.array(0.0), "temperature"),
+        ("temperature", np.array(np.nan), "temperature"),
+        ("of_views", stored["distribution.of_views"][:0], "shape"),
+        ("object_ids", stored["distribution.object_ids"][:2], "shape"),
+        ("n_classes", np.array(40), "number of classes"),
+        ("n_classes", np.array(BINS + 0.5), "number of classes"),
     ):
         np.savez("d.npz", **(stored | {f"distribution.{name}": value}))
         message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "d.npz")
-        assert "--table=d.npz: not a table of distributions" in message
+        assert "d.npz: " in message
+        assert reason in message
 
 
 @pytest.mark.parametrize("file", ["views.csv", "views.npy"])
@@ -342,7 +345,7 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
         (("--distribution", "pose.json", "--table", "t.npz"), "pose.json"),
         (
             ("--distribution", "views.csv", "--table", "pairs.csv"),
-            "--table=pairs.csv: not a table of distributions; give the .npz file",
+            "pairs.csv: cannot be read (it is not an array of numbers)",
         ),
         (("--distribution", "bad.npy", "--table", "t.npz"), "bad.npy cannot be read"),
     ):

@@ -159,7 +159,7 @@ def test_azimuths_in_radians_are_named(tmp_path, first):
         assert "180/π" not in refused(path)
 
 
-@pytest.mark.parametrize("value", ["", "nan", "inf", "north", "1e999", "NA", "12°"])
+@pytest.mark.parametrize("value", ["", "nan", "inf", "north", "1e999", "1e300", "2,4", "12°"])
 @pytest.mark.parametrize("column", ["azimuth_deg", "estimate_deg"])
 def test_what_is_no_number_is_named_with_its_row(tmp_path, value, column):
     views = np.arange(0, 360, 10)
@@ -167,7 +167,8 @@ def test_what_is_no_number_is_named_with_its_row(tmp_path, value, column):
     table.loc[7, column] = value
     table.to_csv(tmp_path / "p.csv", index=False)
     # Row 1 has the names of the columns.
-    assert f"row 9: {column} is not a number" in refused(tmp_path / "p.csv")
+    wanted = f"row 9: {column} {value!r} is not a number of degrees"
+    assert wanted in refused(tmp_path / "p.csv")
 
 
 @pytest.mark.parametrize("column", ["object_id", "azimuth_deg", "estimate_deg"])
@@ -193,6 +194,13 @@ def test_a_missing_column_is_named(tmp_path, column):
 def test_a_file_that_is_no_table_is_one_line(tmp_path, content, message):
     (tmp_path / "p.csv").write_bytes(content)
     assert message in refused(tmp_path / "p.csv")
+
+
+@pytest.mark.parametrize("name", ["", "  "])
+def test_an_object_without_a_name_is_told_with_its_row(tmp_path, name):
+    views = np.arange(0, 360, 10)
+    path = written(tmp_path / "p.csv", {"a": (views, views), name: (views, views)})
+    assert "row 38: object_id is empty" in refused(path)
 
 
 def test_a_missing_file_is_named(tmp_path):

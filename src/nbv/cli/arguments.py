@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import os
 import re
 from collections.abc import Callable, Sequence
@@ -39,10 +40,20 @@ def as_numbers(kind: Any, tokens: Sequence[Token]) -> list[Any]:
 
 
 def as_rotations_or_file(_kind: Any, tokens: Sequence[Token]) -> list[float] | Path:
-    """Return the numbers of an option, or the file that its only value names."""
+    """Return the numbers and ranges of an option, or the file that its only value names.
+
+    A range ``a:b`` becomes the rotations from a in steps of a degree, and b.
+    """
     if len(tokens) == 1 and tokens[0].value and not _is_numbers(tokens[0].value):
         return Path(tokens[0].value)
-    return as_numbers(list[float], tokens)
+    rotations: list[float] = []
+    for text in (text for token in tokens for text in token.value.replace(",", " ").split()):
+        low, _, high = text.partition(":")
+        first, last = _number(float, low), _number(float, high or low)
+        if not 0 <= last - first <= 360:
+            raise ValueError(f"{text!r}: give the lower end first, and at most a full turn")
+        rotations += [first + step for step in range(math.ceil(last - first))] + [last]
+    return rotations
 
 
 def _list_parameter(converter: Callable[..., Any], metavar: str) -> Parameter:
@@ -55,7 +66,7 @@ FileAxis = Annotated[str, Parameter(allow_leading_hyphen=True)]
 WholeNumbers = Annotated[list[int] | None, _list_parameter(as_numbers, "NUMBER...")]
 WholeNumber = Annotated[int, Parameter(converter=as_whole_number, n_tokens=1, metavar="INT")]
 Rotations = Annotated[
-    list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FILE")
+    list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FROM:TO|FILE")
 ]
 
 Json = Annotated[bool, Parameter(negative=())]
@@ -66,6 +77,7 @@ SHIPPED = "mug"
 
 _FLAGS = {
     "allowed_deg": "--allowed",
+    "estimate_deg": "--estimate",
     "bundle": "--bundle",
     "depth_scale": "--depth-scale",
     "diagonal_m": "--diagonal",
@@ -124,7 +136,7 @@ def joined_numbers(arguments: Sequence[str]) -> list[str]:
 
 
 def _is_numbers(text: str) -> bool:
-    parts = text.replace(",", " ").split()
+    parts = re.sub(r"(?<=\d):(?=[-+.\d])", " ", text).replace(",", " ").split()
     try:
         return bool([float(part) for part in parts])
     except ValueError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -99,8 +98,8 @@ def recommend(
         Instead of the elevation: the direction down in the camera's optical frame, x,y,z (x right,
         y down, z forward). An accelerometer at rest reports the opposite direction.
     allowed
-        Admissible rotations from the last frame: degrees, or a .npy file of degrees or of n
-        booleans, where entry k selects the rotation 360 k / n.
+        Admissible rotations from the last frame: degrees, ranges such as -60:60, or a .npy file of
+        degrees or of n booleans, where entry k selects the rotation 360 k / n.
     max_travel
         Largest rotation of the camera, degrees.
     followed
@@ -240,11 +239,9 @@ def _recommend_by_table(
         raise UserError(
             "--estimate and --table belong together; give both, or --distribution and --table"
         )
-    if not math.isfinite(estimate):
-        raise UserError(f"--estimate={estimate:g}: give an azimuth in degrees")
     from nbv.core.criteria import cost_unit
     from nbv.core.lookup import LookupTable
-    from nbv.files import calibrated_file
+    from nbv.files import CALIBRATE_AGAIN, calibrated_file
     from nbv.robot.moves import check_axis
     from nbv.robot.rotations import ranked_rotations
 
@@ -252,12 +249,13 @@ def _recommend_by_table(
     try:
         lookup = LookupTable.load(path)
     except UserError as error:
-        raise UserError(
-            f"--table={table}: not a lookup table; give the .npz file that nbv calibrate wrote"
-        ) from error
-    warnings = () if placement is None else check_axis(*placement)
+        # A robot's user has no run to start again.
+        reason = str(error).removesuffix(f"; {CALIBRATE_AGAIN}")
+        raise UserError(f"{reason}; give the .npz file that nbv calibrate wrote") from error
     unit = cost_unit(lookup.criterion, {"spread": lookup.spread})
-    ranked = ranked_rotations(lookup, estimate, allowed_rotations(allowed), max_travel)
+    allowed_deg = allowed_rotations(allowed)
+    ranked, warnings = ranked_rotations(lookup, estimate, allowed_deg, max_travel)
+    warnings += () if placement is None else check_axis(*placement)
     targets = target_poses((rotation for rotation, _ in ranked), placement)
     if as_json:
         print_json(
@@ -289,22 +287,13 @@ def _recommend_by_distributions(
     as_json: bool,
 ) -> None:
     """Print the answer of ``nbv recommend`` for distributions."""
-    from nbv.files import calibrated_file
     from nbv.robot.distribution_table import DistributionTable
     from nbv.robot.moves import check_axis
     from nbv.robot.pairs import read_distributions
 
     if table is None:
         raise UserError("--distribution and --table belong together; give both")
-    path = calibrated_file(table)
-    try:
-        loaded = DistributionTable.load(path)
-    except UserError as error:
-        raise UserError(
-            f"--table={table}: not a table of distributions; give the .npz file that nbv calibrate "
-            "made from pairs with columns p0, p1, …"
-        ) from error
-    answer = loaded.recommend(
+    answer = DistributionTable.load(table).recommend(
         read_distributions(distribution),
         rotations if rotations is not None else [0.0],
         allowed_deg=allowed_rotations(allowed),

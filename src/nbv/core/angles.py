@@ -9,6 +9,17 @@ from nbv.errors import UserError
 
 Angles = NDArray[np.float64]
 
+MOST_DEG = 1e6
+"""A larger angle is a mistake: its direction would be lost in rounding."""
+
+
+def is_angle(angle_deg: ArrayLike) -> NDArray[np.bool_]:
+    """Return whether each value is a number of degrees, at most `MOST_DEG` either way."""
+    angle = np.asarray(angle_deg)
+    if angle.dtype.kind not in "iuf":
+        return np.zeros(angle.shape, dtype=bool)
+    return np.asarray(np.abs(angle.astype(np.float64)) <= MOST_DEG)
+
 
 def wrap_deg(angle_deg: ArrayLike) -> Angles:
     """Return the same directions in [0, 360)."""

@@ -159,8 +159,9 @@ def evidence_of_distributions(
     """Build evidence from distributions (n_objects, n_views, B) of calibration images.
 
     Bins are the classifier's classes. The conditionals are not smoothed: distributions are smooth.
+    So the bandwidth is 0, without pseudo-observations.
     """
     estimates = estimate_likelihood(distributions)
     pair = Conditionals(estimates.T / estimates.sum(axis=0)[:, None], estimates)
     views = distributions.astype(np.float32)
-    return Evidence(np.empty((0, len(estimates))), pair, np.nan, np.nan, settings, views)
+    return Evidence(np.empty((0, len(estimates))), pair, 0.0, 0.0, settings, views)

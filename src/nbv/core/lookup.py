@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -11,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.angles import nearest_bin, travel_deg
-from nbv.core.criteria import tabulate
+from nbv.core.angles import is_angle, nearest_bin, travel_deg
+from nbv.core.criteria import CRITERIA, POSE_LIKELIHOODS, SPREADS, cost_unit, tabulate
 from nbv.core.evidence import Evidence
 from nbv.errors import UserError
 from nbv.files import (
@@ -46,6 +47,8 @@ class LookupTable:
         A name in `nbv.core.criteria.CRITERIA`.
     pose_likelihood, spread : str
         Parameters of the criterion; see `nbv.core.criteria`.
+    travel_cost, max_travel_deg : float
+        Parameters of the recommended rotations; see `least_cost_delta`.
 
     Examples
     --------
@@ -68,6 +71,8 @@ class LookupTable:
     pose_likelihood: str
     spread: str
     criterion: str
+    travel_cost: float = 0.0
+    max_travel_deg: float = 180.0
 
     @classmethod
     def load(cls, path: str | Path) -> LookupTable:
@@ -76,30 +81,50 @@ class LookupTable:
         Raises
         ------
         UserError
-            If the file cannot be read, a row of V or L is not a distribution, a cost is not finite,
-            or a recommended rotation is not a whole number of degrees in [0, 360).
+            If the file cannot be read, or a value is not one that `build_lookup` makes. A file
+            without `travel_cost` and `max_travel_deg` has no such limits.
         """
         names = [item.name for item in fields(cls)]
-        stored = read_arrays(calibrated_file(path), names, CALIBRATE_AGAIN)
+        stored = read_arrays(calibrated_file(path), names[: -len(_LIMITS)], CALIBRATE_AGAIN)
         with readable(path, CALIBRATE_AGAIN):
             # An array without axes holds a number or a text.
             values: dict[str, Any] = {
-                name: stored[name] if stored[name].ndim else stored[name].item() for name in names
+                name: stored[name] if stored[name].ndim else stored[name].item()
+                for name in names
+                if name in stored
             }
             table = cls(**values)
             n_bins = len(table.cost)
             for density in (table.viewpoint_likelihood, table.estimate_likelihood):
                 check_distributions(path, density, (n_bins, n_bins), CALIBRATE_AGAIN)
-            if table.cost.shape != (n_bins, n_bins) or not np.isfinite(table.cost).all():
-                raise damaged(path, "a cost is not finite", CALIBRATE_AGAIN)
-            delta_deg = table.recommended_delta_deg
-            if delta_deg.shape != (n_bins,) or not np.issubdtype(delta_deg.dtype, np.integer):
-                raise damaged(
-                    path, "the recommended rotations are not whole degrees", CALIBRATE_AGAIN
-                )
-            if ((delta_deg < 0) | (delta_deg >= 360)).any():
-                raise damaged(path, "a recommended rotation is not in [0, 360)", CALIBRATE_AGAIN)
+            if problem := table._problem():
+                raise damaged(path, problem, CALIBRATE_AGAIN)
         return table
+
+    def _problem(self) -> str | None:
+        """Return what `build_lookup` does not make, or None."""
+        known: dict[str, Container[str]]
+        known = {"criterion": CRITERIA, "spread": SPREADS, "pose_likelihood": POSE_LIKELIHOODS}
+        wrong = [name for name, choices in known.items() if str(getattr(self, name)) not in choices]
+        for name in ("bandwidth_deg", "pseudo_observations", *_LIMITS):
+            value = getattr(self, name)
+            if type(value) not in (int, float) or not 0 <= value < math.inf:
+                wrong.append(name)
+        if wrong:
+            return f"{wrong[0]} is {getattr(self, wrong[0])!r}"
+        n_bins = len(self.cost)
+        if self.cost.dtype.kind != "f" or self.cost.shape != (n_bins, n_bins) or n_bins < 4:
+            return f"costs are {self.cost.dtype} of shape {self.cost.shape}"
+        unit = cost_unit(self.criterion, {"spread": self.spread})
+        # A cost without a unit may be that of a user's criterion.
+        most = {"nats": math.log(n_bins), "degrees": 180.0}.get(unit, 1e6)
+        least = -most if unit == "1" else 0.0
+        # Beyond the rounding of single precision; NaN is wrong too.
+        if not ((self.cost > least - 1e-3) & (self.cost < most + 1e-3)).all():
+            return f"a cost is not between {least:g} and {most:.4g}"
+        best_deg = recommended_delta(self.cost, vars(self))
+        is_least = np.array_equal(self.recommended_delta_deg, best_deg)
+        return None if is_least else "a recommended rotation is not that of least cost"
 
     def save(self, path: str | Path, further: Mapping[str, NDArray[Any]] | None = None) -> None:
         """Write the attributes, and `further` arrays, as ``.npz``."""
@@ -109,9 +134,10 @@ class LookupTable:
     def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
         """Return the rotation to the next view for each estimate, degrees in [0, 360).
 
-        It is the rotation of least cost that travels more than a bin: the same view again repeats
-        the same error. With few calibration objects its cost may still be least, because criteria
-        assume that views are independent.
+        It is the rotation of least cost, travel included, that travels more than a bin: the same
+        view again repeats the same error. With few calibration objects its cost may still be least,
+        because criteria assume that views are independent. A table whose `max_travel_deg` allows no
+        more than a bin gives `least_cost`.
 
         Raises
         ------
@@ -131,21 +157,25 @@ class LookupTable:
         return np.asarray(self.recommended_delta_deg[self._bins(estimate_deg)])
 
     def _bins(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
-        values = np.asarray(estimate_deg)
-        if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
-            raise UserError("an estimate is not a finite number of degrees")
+        if not is_angle(estimate_deg).all():
+            raise UserError("an estimate is not a finite number of degrees, or beyond 1e6")
         return np.asarray(nearest_bin(estimate_deg, len(self.cost)), dtype=np.int64)
 
     @cached_property
     def _next_view_deg(self) -> NDArray[np.int64]:
         n_bins = len(self.cost)
         width = 360.0 / n_bins
+        if self.max_travel_deg <= width:
+            return self.recommended_delta_deg
         stays = travel_deg(self.recommended_delta_deg) <= width
-        is_far = travel_deg(np.arange(n_bins) * width) > width
-        moving = np.where(is_far, self.cost[stays], np.inf)
+        travel = travel_deg(np.arange(n_bins) * width)
+        moving = np.where(travel > width, self.cost[stays], np.inf)
         delta_deg = self.recommended_delta_deg.copy()
-        delta_deg[stays] = least_cost_delta(moving)
+        delta_deg[stays] = recommended_delta(moving, vars(self))
         return delta_deg
+
+
+_LIMITS = ("travel_cost", "max_travel_deg")
 
 
 def least_cost_delta(
@@ -193,8 +223,7 @@ def recommended_delta(
     cost: NDArray[np.floating[Any]], settings: Mapping[str, Any]
 ) -> NDArray[np.int64]:
     """Return `least_cost_delta` with the ``travel_cost`` and ``max_travel_deg`` of `settings`."""
-    limits = {key: settings[key] for key in ("travel_cost", "max_travel_deg") if key in settings}
-    return least_cost_delta(cost, **limits)
+    return least_cost_delta(cost, **{key: settings[key] for key in _LIMITS if key in settings})
 
 
 def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") -> LookupTable:
@@ -226,4 +255,5 @@ def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") ->
         pose_likelihood=evidence.settings["pose_likelihood"],
         spread=evidence.settings["spread"],
         criterion=criterion,
+        **{key: float(evidence.settings[key]) for key in _LIMITS if key in evidence.settings},
     )

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nbv.core.angles import is_angle
 from nbv.core.logits import TEMPERATURES, fit_temperature, from_logits, on_degrees
 from nbv.core.lookup import LookupTable
 from nbv.core.selection import AFFINITY
@@ -193,7 +194,8 @@ class DistributionTable:
             if not len(rows) or not (rows > 0).all() or not least <= float(temperature) <= most:
                 what = "its distributions or their temperature are out of range"
                 raise damaged(path, what, _AGAIN)
-            if n_classes.shape or n_classes < FEWEST_CLASSES or _n_bins(int(n_classes)) != n_bins:
+            is_number = n_classes.shape == () and n_classes.dtype.kind in "iu"
+            if not is_number or n_classes < FEWEST_CLASSES or _n_bins(int(n_classes)) != n_bins:
                 what = "its number of classes does not fit its distributions"
                 raise damaged(path, what, _AGAIN)
             return cls(tuple(map(str, object_ids)), float(temperature), rows, int(n_classes))
@@ -227,7 +229,7 @@ def _as_sweep(
         azimuths = np.asarray(azimuth_deg, dtype=np.float64)
     except (TypeError, ValueError):
         raise UserError(f"object {name!r}: azimuths are not numbers") from None
-    if azimuths.shape != (len(rows),) or not np.isfinite(azimuths).all():
+    if azimuths.shape != (len(rows),) or not is_angle(azimuths).all():
         raise UserError(
             f"object {name!r}: azimuths of shape {azimuths.shape} for "
             f"{counted(len(rows), 'view')}; give one number of degrees for each"

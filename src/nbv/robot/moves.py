@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nbv.core.angles import is_angle
 from nbv.errors import FrameError, UserError
 from nbv.files import read_numbers
 
@@ -333,7 +334,7 @@ def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[
     Raises
     ------
     UserError
-        Where values are neither, one is not finite, or there are none.
+        Where values are neither, one is not an angle, or there are none.
     """
     try:
         given = np.asarray(values)
@@ -350,8 +351,8 @@ def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[
     rotations = given.astype(np.float64).ravel()
     if not rotations.size:
         raise UserError(f"{name}: none; give at least one, in degrees")
-    if not np.isfinite(rotations).all():
-        raise UserError(f"{name}: one is not finite; give degrees")
+    if not is_angle(rotations).all():
+        raise UserError(f"{name}: one is not finite, or beyond 1e6; give degrees")
     return rotations
 
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.angles import circular_distance_deg, nearest_bin, wrap_deg
+from nbv.core.angles import circular_distance_deg, is_angle, nearest_bin, wrap_deg
 from nbv.core.distributions import (
     direction_and_spread_deg,
     log_bayes_factor,
@@ -27,6 +27,7 @@ from nbv.robot.rotations import (
     at_rotations,
     best_rotations,
     bins_deg,
+    flat_warnings,
 )
 
 LEAST_BAYES_FACTOR = 0.05
@@ -97,7 +98,7 @@ class Recommendation:
         Likelihood of one pose for all frames at their rotations, relative to unrelated poses; 1
         for one frame.
     warnings : tuple of str
-        Likely mistakes in the frames, a sentence each.
+        Likely mistakes in the frames, and whether no view is better than another; a sentence each.
     n_views : int
         Number of views whose product is the belief.
     crops : tuple of ndarray (side, side) uint8
@@ -241,6 +242,8 @@ def next_view(
         Move(rotation, abs(rotation), error_deg)
         for rotation, error_deg in best_rotations(rotation_deg, cost, width)
     ]
+    if moves:
+        warnings += flat_warnings(moves[0].expected_error_deg, cost)
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
     return Recommendation(
@@ -298,8 +301,8 @@ def as_rotation_list(
             f"{counted(n, noun)} and {counted(len(rotations), 'rotation')}; give one for each "
             f"{noun}, counted from the first {noun}: 0, …",
         )
-    if not all(math.isfinite(rotation) for rotation in rotations):
-        raise FrameError("rotations", "one is not finite; give degrees")
+    if not is_angle(rotations).all():
+        raise FrameError("rotations", "one is not finite, or beyond 1e6; give degrees")
     if rotations[0] != 0:
         raise FrameError(
             "rotations", f"the first is {rotations[0]:g}; give 0, from which all count"

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.angles import signed_difference_deg, wrap_deg
+from nbv.core.angles import is_angle, signed_difference_deg, wrap_deg
 from nbv.core.distributions import rotated
 from nbv.core.estimates import COLUMNS, Estimates
 from nbv.core.logits import LEAST_PROBABILITY
@@ -59,16 +59,23 @@ class PairTable:
         Raises
         ------
         UserError
-            Where the file cannot be read, a column is missing, or a value is not a number.
+            Where the file cannot be read, a column is missing, or a value is empty or not an angle.
         """
         path = Path(path)
         rows = read_rows(path, COLUMNS, _OF_FRAMES)
+        if (is_empty := rows["object_id"].str.strip() == "").any():
+            raise UserError(
+                f"{path}, row {int(is_empty.argmax()) + 2}: object_id is empty; give it"
+            )
         for name in COLUMNS[1:]:
-            rows[name] = pd.to_numeric(rows[name], errors="coerce")
-            if not (finite := np.isfinite(rows[name].to_numpy(dtype=np.float64))).all():
+            numbers = pd.to_numeric(rows[name], errors="coerce").astype(np.float64)
+            if not (known := is_angle(numbers)).all():
+                row = int((~known).argmax())
                 raise UserError(
-                    f"{path}, row {int((~finite).argmax()) + 2}: {name} is not a number"
+                    f"{path}, row {row + 2}: {name} {rows[name][row]!r} is not a number of "
+                    "degrees, such as 2.5"
                 )
+            rows[name] = numbers
         if "elevation_deg" in rows:
             rows["elevation_deg"] = pd.to_numeric(rows["elevation_deg"], errors="coerce")
         return cls(path, rows)

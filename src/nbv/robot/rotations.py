@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.angles import circular_distance_deg, nearest_bin, wrap_deg
+from nbv.core.angles import is_angle, nearest_bin, wrap_deg
+from nbv.core.criteria import IN_DEGREES
 from nbv.core.lookup import LookupTable
 from nbv.errors import UserError, check_number
 from nbv.robot.moves import as_rotations
@@ -14,6 +15,19 @@ MIN_SEPARATION_DEG = 15.0
 """Least rotation from every view so far: nearby views have nearly the same error."""
 
 N_ALTERNATIVES = 5
+
+GUESS = (
+    "no view is better than another: the pose stays a guess, as of an object that looks the same "
+    "from all round"
+)
+GUESS_DEG = 81.0
+"""A guess errs by 90° on average; the least of many uncertain errors is a few per cent lower."""
+
+ANY_VIEW_SHARE = 0.99
+"""Share of the mean expected error of all views; 1 % less is worth no move."""
+
+LEAST_AGREEMENT = 0.2
+"""Estimates of 24 views or more that are guesses agree less with their azimuths."""
 
 
 def signed_deg(rotation_deg: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -96,40 +110,64 @@ def ranked_rotations(
     estimate_deg: float,
     allowed_deg: ArrayLike | None = None,
     max_travel_deg: float = 180.0,
-) -> list[tuple[float, float]]:
-    """Return a lookup table's rotations for an estimate and their costs, best first.
+) -> tuple[list[tuple[float, float]], tuple[str, ...]]:
+    """Return a lookup table's rotations for an estimate and their costs, best first; and warnings.
 
-    As in `LookupTable.recommend`, a rotation travels more than a bin. Without limits the table's
-    recommendation is the first, because it includes the table's settings, such as a cost of travel.
-    The limits are those of `nbv.Recommender.recommend`.
+    As in `LookupTable.recommend`, a rotation travels more than a bin, at most the table's
+    `max_travel_deg`, and the table's cost of travel counts in the order. The limits are those of
+    `nbv.Recommender.recommend`. Warnings are those of `flat_warnings`, and one where calibration
+    estimates do not follow azimuths.
 
     Raises
     ------
     UserError
-        Where no rotation is admissible.
+        Where the estimate is not an angle, or no rotation is admissible.
     """
-    max_travel_deg = as_travel(max_travel_deg)
+    max_travel_deg = min(as_travel(max_travel_deg), lookup.max_travel_deg)
     n_bins = len(lookup.cost)
     width = 360.0 / n_bins
+    if not is_angle(estimate_deg):
+        raise UserError(f"`estimate_deg`={estimate_deg}: give an azimuth in degrees")
     bin_costs = lookup.cost[nearest_bin(estimate_deg, n_bins)]
-    all_deg = bins_deg(n_bins)
-    rotation_deg = all_deg if allowed_deg is None else as_allowed(allowed_deg)
+    rotation_deg = bins_deg(n_bins) if allowed_deg is None else as_allowed(allowed_deg)
     travel = np.abs(rotation_deg)
     is_allowed = (travel > width) & (travel <= max_travel_deg)
     if not is_allowed.any():
         raise UserError(
             "no admissible rotation; relax `allowed_deg` or `max_travel_deg`: a rotation is more "
-            f"than {width:g}°"
+            f"than {width:g}°, and at most the {lookup.max_travel_deg:g}° of the table"
         )
     rotation_deg = rotation_deg[is_allowed]
-    ranked = best_rotations(rotation_deg, at_rotations(bin_costs, rotation_deg), width)
-    if allowed_deg is not None or max_travel_deg < all_deg.max():
-        return ranked
-    best = float(signed_deg(np.asarray(lookup.recommend(estimate_deg), dtype=np.float64)))
-    best_cost = float(bin_costs[nearest_bin(best, n_bins)])
-    others = [
-        (rotation, cost)
-        for rotation, cost in ranked
-        if circular_distance_deg(rotation, best) >= MIN_SEPARATION_DEG
-    ]
-    return [(best, best_cost), *others]
+    cost = at_rotations(bin_costs, rotation_deg)
+    ranked = best_rotations(rotation_deg, cost + lookup.travel_cost * travel[is_allowed], width)
+    best = [(rotation, total - lookup.travel_cost * abs(rotation)) for rotation, total in ranked]
+    if _agreement(lookup) < LEAST_AGREEMENT:
+        return best, (GUESS,)
+    is_error = lookup.criterion in IN_DEGREES
+    return best, flat_warnings(best[0][1], cost) if is_error else ()
+
+
+def _agreement(lookup: LookupTable) -> float:
+    """Return how well calibration estimates followed azimuths, either way round, in about [0, 1].
+
+    It is the resultant length of their differences by L, freed of the uniform pseudo-observations,
+    which are all that L has where it is least. They hide it in costs: all are near log B nats.
+    """
+    likelihood = np.asarray(lookup.estimate_likelihood, dtype=np.float64)
+    n_bins = len(likelihood)
+    unit = np.exp(2j * np.pi * np.arange(n_bins) / n_bins)
+    directions = likelihood @ unit
+    length = max(abs(directions @ unit.conj()), abs(directions @ unit)) / n_bins
+    return float(length / max(1.0 - n_bins * likelihood.min(), 1e-9))
+
+
+def flat_warnings(best_deg: float, error_deg: NDArray[np.floating]) -> tuple[str, ...]:
+    """Return a warning where the best expected error is that of a guess, or of any view.
+
+    `error_deg` (m,) are the expected errors after all admissible rotations.
+    """
+    if best_deg > GUESS_DEG:
+        return (GUESS,)
+    if len(error_deg) > 1 and best_deg > ANY_VIEW_SHARE * error_deg.mean():
+        return ("no view is better than another: any admissible one is as good",)
+    return ()
