@@ -65,6 +65,11 @@ def check_number(name: str, value: object) -> None:
     raise UserError(f"{name}: {value!r} is not a number")
 
 
+def printable(text: str) -> str:
+    """Return a text with unprintable characters, such as line breaks, escaped."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 class UserError(Exception):
     """A mistake in the input: one line that names the file, key or value, and the remedy.
 
@@ -81,8 +86,7 @@ class UserError(Exception):
     """
 
     def __init__(self, message: str) -> None:
-        shown = (c if c.isprintable() else ascii(c)[1:-1] for c in message)
-        super().__init__("".join(shown))
+        super().__init__(printable(message))
 
     def about(self, what: str) -> Self:
         """Return the same error with its subject in front of the message."""

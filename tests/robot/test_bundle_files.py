@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import onnx
 import pytest
 import safetensors
 import safetensors.numpy
@@ -278,7 +279,27 @@ def test_a_bundle_without_its_digest_is_refused(bundle_file, tmp_path):
         {"affinity": {"power": 16}},
         {"affinity": {"power": "much", "pseudo_observations": 90}},
         {"affinity": {"power": float("nan"), "pseudo_observations": 90}},
+        {"affinity": {"power": 1e300, "pseudo_observations": 90}},
+        {"affinity": {"power": True, "pseudo_observations": 90}},
         {"provenance": [1]},
+        {"provenance": {"seed": float("nan")}},
+        {"provenance": {"turns_made_with": "many"}},
+        {"provenance": {"turns_made_with": 0}},
+        {"format": -1},
+        {"format": 4.0},
+        {"format": True},
+        {"category": 3},
+        {"object_ids": [1, 2, 3, 4, 5, 6]},
+        {"diagonal_m": True},
+        {"diagonal_m": 1e300},
+        {"focal_px": 1e300},
+        {"temperature": 1e-300},
+        {"temperature": 1e300},
+        {"familiar_within": 1e300},
+        {"camera": {"image_side": 32, "distance": 1e300}},
+        {"camera": {"image_side": 32, "roll_deg": 1e300}},
+        {"camera": {"image_side": 32.5}},
+        {"camera": {"image_side": 8}},
     ],
     ids=str,
 )
@@ -287,15 +308,42 @@ def test_metadata_that_makes_no_sense_is_one_line(bundle_file, tmp_path, changes
     assert "is damaged" in refused(path)
 
 
-@pytest.mark.parametrize("name", ["ood", "elevation_deg", "sweep_weights"])
-def test_numbers_that_are_not_finite_are_one_line(bundle, tmp_path, name):
-    changed = {
-        "ood": replace(bundle.ood, mean=np.full(512, np.inf, np.float32)),
-        "elevation_deg": bundle.elevation_deg + np.float32(np.inf),
-        "sweep_weights": bundle.sweep_weights * np.float32(np.inf),
-    }
-    replace(bundle, **{name: changed[name]}).save(tmp_path / "a.safetensors")
-    assert "not finite" in refused(tmp_path / "a.safetensors")
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("calibration.elevation_deg", np.float32(np.inf)),
+        ("calibration.elevation_deg", np.float32(91)),
+        ("calibration.weight", np.float32(np.inf)),
+        ("calibration.weight", np.float32(0)),
+        ("calibration.weight", np.float32(1e38)),
+        ("calibration.distributions", np.int16(-5)),
+        ("familiarity.mean", np.float32(np.inf)),
+        ("familiarity.references", np.float16(np.nan)),
+        ("familiarity.scales", np.float32(0)),
+        ("familiarity.scales", np.float32(1e38)),
+        ("paper.elevation_deg", np.float32(np.nan)),
+        ("paper.rotation_deg", np.int16(360)),
+        ("paper.rotation_deg", np.int16(-1)),
+        ("paper.rotation_deg", np.float32(np.nan)),
+    ],
+    ids=str,
+)
+def test_numbers_out_of_range_are_one_line(bundle_file, tmp_path, name, values):
+    with safetensors.safe_open(bundle_file, framework="numpy") as stored:
+        array = np.full(stored.get_tensor(name).shape, values)
+    path = with_about(bundle_file, tmp_path / "a.safetensors", {name: array})
+    assert "is damaged" in refused(path)
+
+
+def test_a_network_that_gives_no_numbers_gives_no_answer(bundle, rng):
+    weights = onnx.load_from_string(bundle.network)
+    for constant in weights.graph.initializer:
+        values = onnx.numpy_helper.to_array(constant)
+        if values.dtype.kind == "f":
+            constant.CopyFrom(onnx.numpy_helper.from_array(values * np.nan, constant.name))
+    damaged = Recommender(replace(bundle, network=weights.SerializeToString()))
+    with pytest.raises(BundleError, match="not finite"):
+        damaged.recommend_crops(random_codes(rng, 1))
 
 
 def test_arrays_that_do_not_fit_are_one_line(bundle, tmp_path):

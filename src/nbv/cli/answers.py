@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from nbv.errors import printable
 from nbv.labels import counted
 
 if TYPE_CHECKING:
@@ -23,13 +24,13 @@ Placement = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
 
 
 def print_line(line: str) -> None:
-    """Print a line."""
-    print(line)  # noqa: T201
+    """Print a line; what a file says, such as a bundle's category, is escaped."""
+    print(printable(line))  # noqa: T201
 
 
 def print_json(value: Any) -> None:
     """Print indented ASCII JSON."""
-    print_line(json.dumps(value, indent=2))
+    print(json.dumps(value, indent=2))  # noqa: T201
 
 
 def print_assumed_camera(focal_px: float, n_frames: int | None = None) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import operator
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -21,10 +22,11 @@ import safetensors.numpy
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import nearest_bin
+from nbv.core.logits import TEMPERATURES
 from nbv.data.camera import Camera
 from nbv.errors import BundleError
 from nbv.files import missing, replacing
-from nbv.robot.ood import OodModel
+from nbv.robot.ood import CELLS, OodModel
 
 FORMAT = 4
 """Increased when the file changes; a program reads only its own format."""
@@ -32,6 +34,9 @@ FORMAT = 4
 PROBABILITY_STEP = 0.054
 """Step of stored log probabilities, nats: 256 steps reach down to 1e-6."""
 
+
+_LEAST, _MOST = 1e-9, 1e6
+"""Bounds of a bundle's positive numbers, between which single precision stays finite."""
 
 ELEVATION_BANDWIDTH_DEG = 10.0
 """Width of the kernel by which calibration sweeps count for frames at another elevation."""
@@ -235,14 +240,16 @@ def dequantize_logp(steps: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 def _digest(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
     """Return the SHA-256 of a bundle's content, which detects damaged numbers."""
-    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True, allow_nan=False).encode())
     for name, array in sorted(arrays.items()):
         digest.update(f"{name} {array.dtype} {array.shape}".encode())
         digest.update(array.tobytes())
     return digest.hexdigest()
 
 
-def _check_format(path: Path, version: int) -> None:
+def _check_format(path: Path, version: Any) -> None:
+    if type(version) is not int or version < 1:
+        raise ValueError(f"format {version!r}")
     if version > FORMAT:
         raise BundleError(
             "newer-bundle",
@@ -286,8 +293,10 @@ def _bundle_of(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> 
         object_ids=tuple(about["object_ids"]),
         elevation_deg=arrays["calibration.elevation_deg"],
         sweep_weights=arrays["calibration.weight"],
-        distributions=dequantize_logp(arrays["calibration.distributions"]),
-        affinity=about["affinity"],
+        distributions=dequantize_logp(
+            arrays["calibration.distributions"].astype(np.uint8, casting="safe")
+        ),
+        affinity={key: about["affinity"][key] for key in ("power", "pseudo_observations")},
         ood=OodModel(
             arrays["familiarity.mean"],
             arrays["familiarity.basis"].astype(np.float32),
@@ -301,47 +310,54 @@ def _bundle_of(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> 
 
 
 def _check_sound(bundle: Bundle) -> None:
+    """Raise ValueError for what `make_bundle` and `recalibrated` do not make."""
     n_sweeps, n_bins = len(bundle.object_ids), bundle.n_bins
-    if bundle.distributions.shape != (n_sweeps, n_bins, n_bins) or not n_sweeps:
-        raise ValueError(f"calibration of {bundle.distributions.shape} for {n_sweeps} sweeps")
-    if not bundle.elevation_deg.shape == bundle.sweep_weights.shape == (n_sweeps,):
-        raise ValueError("the elevation or the weight of a sweep is missing")
-    if not (bundle.sweep_weights > 0).all():
-        raise ValueError("the weight of a sweep is not above 0")
-    n_tables = len(bundle.paper.elevation_deg)
-    if not n_tables or bundle.paper.rotation_deg.shape != (n_tables, 360):
-        raise ValueError("the paper's tables have another shape")
+    model, paper, camera = bundle.ood, bundle.paper, bundle.camera
+    n_features = 2 * min(CELLS, operator.index(camera.image_side)) ** 2
+    shapes: dict[str, tuple[NDArray[Any], tuple[int, ...]]] = {
+        "calibration.distributions": (bundle.distributions, (n_sweeps, n_bins, n_bins)),
+        "calibration.elevation_deg": (bundle.elevation_deg, (n_sweeps,)),
+        "calibration.weight": (bundle.sweep_weights, (n_sweeps,)),
+        "familiarity.mean": (model.mean, (n_features,)),
+        "familiarity.basis": (model.basis.T[:1], (1, n_features)),
+        "familiarity.references": (model.references[:1], (1, model.basis.shape[-1])),
+        "familiarity.scales": (model.scales, (2, 2)),
+        "paper.rotation_deg": (paper.rotation_deg, (len(paper.elevation_deg), 360)),
+    }
+    for name, (array, shape) in shapes.items():
+        if array.shape != shape or not array.size:
+            raise ValueError(f"{name} of shape {array.shape} instead of {shape}")
+    plane = bundle.mirror_plane_deg
+    ranges: dict[str, tuple[Any, float, float]] = {
+        "calibration.elevation_deg": (np.nan_to_num(bundle.elevation_deg), -90, 90),
+        "calibration.weight": (bundle.sweep_weights, _LEAST, _MOST),
+        "familiarity.mean": (model.mean, -_MOST, _MOST),
+        "familiarity.basis": (model.basis, -_MOST, _MOST),
+        "familiarity.references": (model.references, -_MOST, _MOST),
+        "familiarity.scales": (model.scales, -_MOST, _MOST),
+        "familiarity.scales, the deviations": (model.scales[:, 1], _LEAST, _MOST),
+        "familiar_within": (model.threshold, _LEAST, _MOST),
+        "paper.elevation_deg": (paper.elevation_deg, -90, 90),
+        "paper.rotation_deg": (paper.rotation_deg, 0, 359),
+        "mirror_plane_deg": (0 if plane is None else plane, 0, 180 - 180 / n_bins),
+        "temperature": (bundle.temperature, *TEMPERATURES),
+        "camera.distance": (camera.distance, _LEAST, _MOST),
+        "camera.roll_deg": (camera.roll_deg, -360, 360),
+        "diagonal_m": (bundle.diagonal_m, _LEAST, _MOST),
+        "focal_px": (bundle.focal_px, _LEAST, _MOST),
+        "extent_m[0]": (bundle.extent_m[0], _LEAST, _MOST),
+        "extent_m[1]": (bundle.extent_m[1], bundle.extent_m[0], _MOST),
+        "affinity.power": (bundle.affinity["power"], 0, _MOST),
+        "affinity.pseudo_observations": (bundle.affinity["pseudo_observations"], 0, _MOST),
+        "provenance.turns_made_with": (bundle.provenance.get("turns_made_with", 1), 1, _MOST),
+    }
+    for name, (values, least, most) in ranges.items():
+        array = np.asarray(values)
+        if array.dtype.kind not in "iuf" or not ((array >= least) & (array <= most)).all():
+            raise ValueError(f"{name} is not in {least:g} to {most:g}")
     if bundle.estimator["n_classes"] != n_bins or 360 % n_bins:
         raise ValueError(f"{n_bins} bins for {bundle.estimator['n_classes']} classes")
-    plane = bundle.mirror_plane_deg
-    if plane is not None and not (0 <= plane < 180 and (2 * plane * n_bins / 360).is_integer()):
+    if plane is not None and 2 * plane * n_bins % 360:
         raise ValueError(f"a mirror plane at {plane}°")
-    numbers = [bundle.diagonal_m, bundle.focal_px, bundle.temperature, bundle.ood.threshold]
-    if not all(math.isfinite(number) and number > 0 for number in numbers):
-        raise ValueError("a size, focal length, temperature or threshold is not above 0")
-    arrays = [bundle.sweep_weights, bundle.paper.elevation_deg]
-    model = bundle.ood
-    arrays += [model.mean, model.basis, model.references, model.scales]
-    if (
-        not all(np.isfinite(array).all() for array in arrays)
-        or np.isinf(bundle.elevation_deg).any()
-    ):
-        raise ValueError("a number is not finite")
-    if not 0 < bundle.extent_m[0] < bundle.extent_m[1]:
-        raise ValueError("the plausible extents are not a range")
-    if (np.abs(bundle.paper.rotation_deg.astype(np.int64)) > 360).any():
-        raise ValueError("a rotation of the paper's tables is more than a full turn")
-    n_features, n_components = model.basis.shape
-    if not (
-        model.mean.shape == (n_features,)
-        and model.references.shape[1:] == (n_components,)
-        and len(model.references)
-        and model.scales.shape == (2, 2)
-    ):
-        raise ValueError("arrays of the OOD score do not fit each other")
-    if set(bundle.affinity) != {"power", "pseudo_observations"} or not all(
-        math.isfinite(value) and value >= 0 for value in bundle.affinity.values()
-    ):
-        raise ValueError(f"an affinity of {dict(bundle.affinity)}")
-    if not isinstance(bundle.provenance, dict):
-        raise ValueError("the provenance is not an object")
+    if not all(isinstance(text, str) for text in (bundle.category, *bundle.object_ids)):
+        raise ValueError("a name is not a text")

@@ -101,6 +101,11 @@ def open_network(
         if codes.ndim != 3 or codes.shape[1:] != (image_side, image_side):
             raise UserError(f"crops of shape {codes.shape}: give (n, {image_side}, {image_side})")
         (found,) = session.run([output], {"codes": codes[:, None].astype(np.float32)})
+        if not np.isfinite(found).all():
+            raise BundleError(
+                "damaged-bundle",
+                "the bundle's network gives numbers that are not finite; get it again",
+            )
         return np.asarray(found)
 
     return network
