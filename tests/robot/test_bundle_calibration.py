@@ -19,7 +19,6 @@ from nbv.errors import UserError
 from nbv.robot.bundle import ELEVATION_BANDWIDTH_DEG, elevation_weights
 from nbv.robot.calibration import (
     DENSITY,
-    LEAST_LIMIT,
     PRIOR_SWEEPS,
     paper_tables,
     recalibrated,
@@ -178,7 +177,7 @@ def test_a_bundle_is_calibrated_again(bundle):
         assert row == pytest.approx(from_logits(own, found.temperature), rel=1e-5)
     known = bundle.ood
     scores = np.concatenate([ood_score(known, one.codes, one.logits) for one in sweeps])
-    limit = max(np.quantile(scores, 0.95), LEAST_LIMIT)
+    limit = max(np.quantile(scores, 0.95), 1.0)
     assert found.ood.threshold == pytest.approx(limit * known.threshold)
     assert np.array_equal(found.ood.references, known.references)
     # Each sweep counts for the nearest table; without an elevation, for the lowest.
@@ -190,6 +189,14 @@ def test_a_bundle_is_calibrated_again(bundle):
     more = {"calibrated_by": "recording.csv", "turns_made_with": len(bundle.object_ids)}
     assert found.provenance == {**bundle.provenance, **more}
     assert "calibrated_by" not in bundle.provenance
+
+
+def test_the_same_frames_keep_their_flag_after_a_calibration(bundle):
+    """Of one object, clean frames say little of other objects before the same camera."""
+    model = replace(bundle.ood, threshold=1e3 * bundle.ood.threshold)
+    familiar = replace(bundle, ood=model)
+    found = recalibrated(familiar, [sweep("x")], "recording.csv", ONE_DENSITY)
+    assert found.ood.threshold == model.threshold
 
 
 @pytest.mark.parametrize("zero", [1.0, -9.0, 90.0])

@@ -23,9 +23,6 @@ from nbv.robot.pairs import bin_apart, full_turn
 ENOUGH_VIEWS = 24
 """Views of a sweep that suffice to fit one temperature, because neighbouring views are alike."""
 
-LEAST_LIMIT = 0.5
-"""Least OOD score that becomes the new threshold, where all frames of a camera score lower."""
-
 PRIOR_SWEEPS = 30.0
 """Number of a camera's sweeps that count as much as all sweeps that a bundle was made with.
 
@@ -127,9 +124,10 @@ def recalibrated(
 ) -> Bundle:
     """Return a bundle with the same network, calibrated on further sweeps, such as a camera's.
 
-    Sweeps are used `without_offset`. The OOD threshold is theirs, and so is the focal length of
-    frames without intrinsics where it is known. A sweep of unknown elevation counts for all
-    elevations.
+    Sweeps are used `without_offset`. The focal length of frames without intrinsics is theirs where
+    it is known. The OOD threshold rises to theirs, but never falls: a few objects differ less from
+    each other than from those of the category that a robot meets next. A sweep of unknown elevation
+    counts for all elevations.
 
     One sweep or two are too few alone. So the bundle's own calibration sweeps stay, for the
     temperature too, and count together as much as `PRIOR_SWEEPS` of the new ones. Each of them
@@ -163,7 +161,7 @@ def recalibrated(
         rotations[table] = _paper_rotations(distributions[tables == table], density)
     scores = [ood_score(bundle.ood, sweep.codes, sweep.logits) for sweep in sweeps]
     focal_px = [sweep.focal_px for sweep in sweeps if np.isfinite(sweep.focal_px)]
-    limit = max(float(np.quantile(np.concatenate(scores), IN_DISTRIBUTION_SHARE)), LEAST_LIMIT)
+    limit = max(float(np.quantile(np.concatenate(scores), IN_DISTRIBUTION_SHARE)), 1.0)
     return replace(
         bundle,
         focal_px=float(np.median(focal_px)) if focal_px else bundle.focal_px,
