@@ -29,12 +29,13 @@ from nbv.core.selection import DENSITY, chosen_lookup
 from nbv.robot.bundle import FORMAT, Bundle
 from nbv.robot.calibration import recalibrated
 from nbv.robot.depth_files import read_depth
-from nbv.robot.evaluation import count_ood, evaluate
+from nbv.robot.evaluation import calibration_errors_deg, count_ood, evaluate
 from nbv.robot.moves import elevation_from_gravity, moved_camera
 from nbv.robot.pairs import PairTable
 from nbv.robot.recommender import Recommender
 from nbv.robot.recordings import read_manifest, run_network
 
+OWN = ("--bundle", "b.safetensors")
 POSE = [[0.0, 0.0, 1.0, -0.6], [-1.0, 0.0, 0.0, 0.1], [0.0, -1.0, 0.0, 0.2], [0.0, 0.0, 0.0, 1.0]]
 
 
@@ -490,7 +491,7 @@ def test_what_does_not_go_with_frames_is_refused(manifest, capsys):
     # Pairs may have the columns of a manifest too.
     pd.read_csv(manifest).assign(estimate_deg="north").to_csv("both.csv")
     message = fails(capsys, "calibrate", "both.csv", "--output", "own.npz")
-    assert "row 2: estimate_deg is not a number" in message
+    assert "row 2: estimate_deg 'north' is not a number" in message
 
 
 @pytest.mark.slow
@@ -699,10 +700,27 @@ def test_inspect_shows_what_a_bundle_holds(here, bundle, capsys):
     assert about["ood_threshold"] == bundle.ood.threshold
     assert about["extent_m"] == list(bundle.extent_m)
     assert {key: about[key] for key in bundle.provenance} == bundle.provenance
+    assert about["calibration_error_deg"] == pytest.approx(calibration_errors_deg(bundle), abs=0.1)
     lines = run(capsys, "inspect", "b.safetensors").splitlines()
+    assert lines[0].split() == [
+        "calibration_error_deg.one_view",
+        str(about["calibration_error_deg"]["one_view"]),
+    ]
     # Names within names have a dot, and a line each.
     assert {line.split()[0].partition(".")[0] for line in lines} == set(about)
     assert all("{" not in line for line in lines)
+
+
+def test_control_characters_of_a_bundle_are_escaped(here, bundle, capsys):
+    named = replace(bundle, category="mug\x1b[2J", provenance={"run": "a\x1b]0;b\n"})
+    named.save("c.safetensors")
+    for arguments in (
+        ("inspect", "c.safetensors"),
+        ("recommend", "f0.npy", *OWN[:-1], "c.safetensors"),
+    ):
+        out = run(capsys, *arguments)
+        assert "\\x1b" in out
+        assert "\x1b" not in out
 
 
 def test_export_writes_the_network(here, bundle, capsys, rng):
@@ -1088,7 +1106,62 @@ def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, crite
         assert "no admissible rotation" in fails(capsys, *options, *limits)
 
 
+def test_a_range_allows_every_degree_between_its_ends(pairs, capsys):
+    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    for given, wanted in (
+        (("-60:60",), range(-60, 61)),
+        (("-60:-20,", "30:60"), [*range(-60, -19), *range(30, 61)]),
+        (("150:210",), range(150, 211)),
+        (("-3.5:0",), (-3.5, -2.5, -1.5, -0.5, 0)),
+    ):
+        for of_what in (("--estimate", "90", "--table", "t.npz"), ("f0.npy", *OWN)):
+            if of_what[0] == "f0.npy" and len(wanted) == 5:
+                continue
+            options = ("recommend", *of_what, "--json", "--allowed")
+            assert run(capsys, *options, *given) == run(capsys, *options, *map(str, wanted))
+    for given in ("60:-60", "0:361", "5:nan"):
+        message = fails(
+            capsys, "recommend", "--estimate", "90", "--table", "t.npz", "--allowed", given
+        )
+        assert given in message
+
+
+def test_estimates_that_follow_no_azimuth_recommend_nothing_without_a_word(pairs, capsys):
+    def warned(*options):
+        answer = run(capsys, "recommend", *options)
+        printed = json.loads(run(capsys, "recommend", *options, "--json"))
+        for warning in printed["warnings"]:
+            assert f"warning: {warning}" in answer.splitlines()
+        return any("no view is better than another" in one for one in printed["warnings"])
+
+    known = pd.read_csv(pairs)
+    guesses = np.random.default_rng(1).uniform(0, 360, len(known)).round(1)
+    known.assign(estimate_deg=guesses).to_csv("guesses.csv", index=False)
+    for criterion in ("pose_ambiguity", "expected_error"):
+        for name, is_flat in (("pairs", False), ("guesses", True)):
+            run(capsys, "calibrate", f"{name}.csv", "--output", "t.npz", "--criterion", criterion)
+            assert warned("--estimate", "90", "--table", "t.npz") == is_flat
+
+
+def test_angles_beyond_all_turns_are_one_line(pairs, capsys):
+    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    table = ("recommend", "--table", "t.npz", "--estimate")
+    assert "--estimate=1e+300" in fails(capsys, *table, "1e300")
+    assert "allowed rotations" in fails(capsys, *table, "3", "--allowed", "1e300")
+    frames = ("recommend", "f0.npy", "f1.npy", *OWN, "--rotations", "0", "1e300")
+    assert "rotations" in fails(capsys, *frames)
+
+
+def test_the_reason_why_a_table_is_refused_is_told(pairs, capsys):
+    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    with np.load("t.npz") as stored:
+        np.savez("d.npz", **(dict(stored) | {"spread": np.array("width")}))
+    message = fails(capsys, "recommend", "--estimate", "90", "--table", "d.npz")
+    assert "d.npz: spread is 'width'; give the .npz file that nbv calibrate wrote" in message
+
+
 def test_what_is_no_lookup_table_is_not_to_be_deleted(pairs, capsys):
     message = fails(capsys, "recommend", "--estimate", "90", "--table", "pairs.csv")
-    assert "not a lookup table; give the .npz file that nbv calibrate wrote" in message
+    assert "pairs.csv: cannot be read (it is not an array of numbers)" in message
+    assert "give the .npz file that nbv calibrate wrote" in message
     assert "delete" not in message

@@ -92,7 +92,7 @@ def render(
 
 @as_paragraphs
 def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
-    """Show the content and the provenance of a bundle.
+    """Show how good a bundle is, its content and its provenance.
 
     Example: nbv inspect mug
 
@@ -104,11 +104,14 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
         Print JSON.
     """
     from nbv.robot.bundle import FORMAT, Bundle
+    from nbv.robot.evaluation import calibration_errors_deg
     from nbv.robot.recommender import bundle_path
 
     path = bundle_path(bundle)
     content = Bundle.load(path)
+    errors_deg = calibration_errors_deg(content)
     about: dict[str, Any] = {
+        "calibration_error_deg": {name: round(error, 1) for name, error in errors_deg.items()},
         "file": str(path),
         "bytes": path.stat().st_size,
         "format": FORMAT,

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.core.angles import circular_distance_deg, signed_difference_deg, travel_deg
+from nbv.core.angles import circular_distance_deg, signed_difference_deg, travel_deg, wrap_deg
 from nbv.core.distributions import mean_direction_deg, rotated
 from nbv.core.logits import from_logits
 from nbv.core.look_alikes import LookAlikes, error_after_deg, in_object_frame
@@ -275,6 +275,27 @@ def evaluate(
             rows.append(_row(predictions, RECOMMENDED, number, errors[:, number - 1], offset))
         report(n_done)
     return pd.DataFrame(rows)
+
+
+def calibration_errors_deg(bundle: Bundle, most: int = 30) -> dict[str, float]:
+    """Return the mean errors of up to `most` calibration sweeps, whose objects are not trained on.
+
+    The keys are ``one_view``, ``two_views`` (recommended) and ``opposite``. Frames are 15° apart.
+    The sweeps of an object do not recommend its own second view, unless there is only one object.
+    """
+    names, step = np.asarray(bundle.object_ids), max(1, bundle.n_bins // 24)
+    azimuth_deg = wrap_deg(np.arange(0, bundle.n_bins, step) * (360.0 / bundle.n_bins))
+    calibrated = after_rotations(bundle.distributions, bundle.object_ids)
+    rng, errors = np.random.default_rng(0), []
+    opposite = baselines(2, 0.0, rng)[OPPOSITE]
+    for i in rng.permutation(len(names))[:most]:
+        others = names != names[i]
+        weights = bundle.weights_at(None) * (others if others.any() else 1.0)
+        rows = bundle.distributions[i, ::step].astype(np.float64)
+        views = Predictions(bundle.object_ids[i], "", azimuth_deg, rows, weights)
+        best = replay(views, recommended(calibrated, views, bundle.affinity), 2)
+        errors.append(np.abs([*best.T, replay(views, opposite, 2)[:, 1]]).mean(axis=1))
+    return dict(zip(("one_view", "two_views", "opposite"), np.mean(errors, axis=0), strict=True))
 
 
 def count_ood(bundle: Bundle, sweeps: Sequence[Sweep]) -> pd.DataFrame:
