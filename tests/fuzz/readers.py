@@ -231,11 +231,11 @@ def densities(n_bins: int) -> np.ndarray:
 
 
 def make_lookup(path: Path) -> None:
-    from nbv.core.lookup import LookupTable
+    from nbv.core.lookup import LookupTable, least_cost_delta
 
-    table, delta = densities(36).astype(np.float32), np.arange(0, 360, 10, dtype=np.int64)
-    settings = 8.0, 10.0, "mixture", "entropy", "pose_ambiguity"
-    LookupTable(table, table, table, delta, *settings).save(path)
+    table = densities(36).astype(np.float32)
+    settings = 8.0, 10.0, "given_estimate", "entropy", "pose_ambiguity"
+    LookupTable(table, table, table, least_cost_delta(table), *settings).save(path)
 
 
 def read_lookup(path: Path) -> Any:

@@ -225,6 +225,21 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
+def test_an_object_that_looks_the_same_from_all_round_is_told(rng):
+    """A bottle: each distribution is as sharp as that of a mug, and anywhere."""
+    azimuths = np.arange(72) * 5.0
+    sweeps = {
+        name: (azimuths, sharp(rng.uniform(0, 360, 72)[:, None] - azimuths)) for name in "abcdefgh"
+    }
+    (warning,) = DistributionTable.from_pairs(sweeps).recommend(sweeps["a"][1][7]).warnings
+    assert "looks the same from all round" in warning
+
+
+def sharp(apart_deg):
+    rows = np.exp(20 * np.cos(np.radians(apart_deg)))
+    return rows / rows.sum(axis=1, keepdims=True)
+
+
 def test_pairs_with_distributions_come_back_as_they_are(here):
     found = PairTable.load("pairs.csv").distributions
     for (name, (azimuth, rows)), (own, wanted) in zip(found.items(), turns().items(), strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import runpy
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,19 @@ def snippet(tmp_path_factory) -> str:
     path = tmp_path_factory.mktemp("page") / "snippet.py"
     path.write_text(text, "utf-8")
     return str(path)
+
+
+def test_hypotheses_become_the_mixture_of_their_kernels(tmp_path):
+    """A log-likelihood of 1 more is e times as likely."""
+    (block,) = re.findall(
+        r"\n\n((?:    .*\n)*    bins = .*\n(?:    .*\n)+)", PAGE.read_text("utf-8")
+    )
+    names = {"np": np, "azimuth_deg": np.array([40.0, 220.0]), "score": np.array([-1.0, -2.0])}
+    (tmp_path / "snippet.py").write_text(textwrap.dedent(block), "utf-8")
+    found = runpy.run_path(str(tmp_path / "snippet.py"), init_globals=names)["p"]
+    assert found.sum() == pytest.approx(1)
+    assert found.argmax() == 8
+    assert found[8] / found[44] == pytest.approx(np.e)
 
 
 @given(azimuth=st.floats(0, 359.99), elevation=st.floats(0, 80), seed=st.integers(0, 2**32 - 1))
