@@ -142,11 +142,14 @@ def mean_direction_deg(
     n_bins = probabilities.shape[1]
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
     cosine, sine = probabilities @ np.cos(angles), probabilities @ np.sin(angles)
-    if otherwise_deg is None:
-        is_likeliest = probabilities >= (1 - FLAT) * probabilities.max(axis=1, keepdims=True)
-        otherwise_deg = is_likeliest.argmax(axis=1) * (360.0 / n_bins)
+    found_deg = direction_deg(cosine, sine)
     is_flat = np.hypot(cosine, sine) <= FLAT * probabilities.sum(axis=1)
-    return np.where(is_flat, otherwise_deg, direction_deg(cosine, sine))
+    if is_flat.any():
+        if otherwise_deg is None:
+            is_likeliest = probabilities >= (1 - FLAT) * probabilities.max(axis=1, keepdims=True)
+            otherwise_deg = is_likeliest.argmax(axis=1) * (360.0 / n_bins)
+        found_deg = np.where(is_flat, otherwise_deg, found_deg)
+    return found_deg
 
 
 def direction_and_spread_deg(belief: NDArray[np.floating]) -> tuple[float, float]:

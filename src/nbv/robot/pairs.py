@@ -72,7 +72,7 @@ class PairTable:
             if not (known := is_angle(numbers)).all():
                 row = int((~known).argmax())
                 raise UserError(
-                    f"{path}, row {row + 2}: {name} {rows[name][row]!r} is not a number of "
+                    f"{path}, row {row + 2}: {name} {rows[name].iloc[row]!r} is not a number of "
                     "degrees, such as 2.5"
                 )
             rows[name] = numbers
