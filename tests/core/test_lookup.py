@@ -160,6 +160,22 @@ def test_a_table_that_cannot_be_is_refused(tmp_path, name, value):
         lookup.LookupTable.load(path)
 
 
+@pytest.mark.parametrize("pseudo_observations", [1, 1000])
+@pytest.mark.parametrize("criterion", ["pose_ambiguity", "information_gain", "expected_error"])
+def test_a_table_that_knows_nothing_is_told_from_one_that_is_cautious(
+    rng, criterion, pseudo_observations
+):
+    """With many pseudo-observations all entropies are near that of a guess."""
+    for estimates, is_guess in (
+        (hidden_range_estimates(8), False),
+        (rng.uniform(0, 360, (8, 360)), True),
+        (np.tile(rng.normal(100, 5, 360), (8, 1)), True),
+    ):
+        evidence = evidence_of(estimates, 8, pseudo_observations, 36)
+        _, warnings = ranked_rotations(lookup.build_lookup(evidence, criterion), 90.0)
+        assert any("a guess" in warning for warning in warnings) == is_guess
+
+
 def test_a_table_without_limits_has_none(tmp_path):
     table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     table.save(tmp_path / "t.npz")
