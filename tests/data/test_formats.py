@@ -38,6 +38,8 @@ def read(path, content):
         "usemtl a#1\nf 1/1 2/1 3/1\nusemtl b\nf 1/1 3/1 4/1\nvt 0 0\n",
         "vn 0 0 1\nf 1//1 2//1 3//1\nf 1//1 3//1 4//1",
         "f 1 2 \\\n3\nf 1 3 4\n",
+        "f -4 -3 -2\nv 5 5 5\nf 1 3 4\n",
+        "vt 0 0\nf 1/1 2/1 3/1\nf 1 3 4\n",
     ],
 )
 def test_a_square_is_a_square_in_every_way_of_writing_it(tmp_path, faces):
@@ -56,11 +58,11 @@ def test_a_byte_order_mark_and_another_encoding_lose_no_vertex(tmp_path):
     [
         (OBJ + "f 0 1 2\n", "line 5: a face refers to vertex 0"),
         (OBJ + "f -1 -2 -5\n", "line 5: a face refers to vertex -5, of 4 so far"),
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -3\nv 5 5 5\n", "relative indices"),
         (OBJ + "f 1 2\nf 1 2 3\n", "line 5: not a face"),
-        (OBJ + "vt 0 0\nf 1/1 2/1 3/1\nf 1 2 3 4 1 2\n", "two forms are mixed"),
+        (OBJ + "f 1 2/x 3\n", "line 5: not a face"),
+        (OBJ + "f 1 2 4 3\n", "crosses itself"),
+        (OBJ + "f 1 2 9\n", "a face refers to vertex 8, of 4 vertices"),
         ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "line 1: a vertex of 2 coordinates, not 3"),
-        ("v 0 0 0 1\nv 1 0 0\nv 0 1 0 1 1\nf 1 2 3\n", "different numbers of coordinates"),
         (b"v 0 0 0\nv 1 0\xff1 0\nv 0 1 0\nf 1 2 3\n", "cannot be read as a mesh"),
     ],
 )
@@ -97,10 +99,105 @@ def test_an_ascii_ply_that_trimesh_would_misread_is_refused(tmp_path, content, n
     refused(lambda: read(tmp_path / "bad.ply", content), tmp_path / "bad.ply", named)
 
 
-def test_a_binary_ply_whose_lists_differ_in_length_is_refused(tmp_path):
+@pytest.mark.parametrize("n_corners", [0, 2, 5])
+def test_a_binary_ply_with_a_wrong_number_of_corners_is_refused(tmp_path, n_corners):
     content = bytearray(trimesh.creation.box().export(file_type="ply"))
-    content[-13] = 5  # the last face's number of corners
-    refused(lambda: read(tmp_path / "bad.ply", bytes(content)), "another length than the first")
+    content[-13] = n_corners  # of the last face
+    refused(lambda: read(tmp_path / "bad.ply", bytes(content)), tmp_path / "bad.ply")
+
+
+def as_obj(vertices, polygons):
+    rows = [f"v {x} {y} {z}" for x, y, z in vertices]
+    rows += ["f " + " ".join(f"{i + 1}/1" for i in polygon) for polygon in polygons]
+    return "\n".join([*rows, "vt 0 0"])
+
+
+def as_off(vertices, polygons):
+    rows = [f"OFF {len(vertices)} {len(polygons)} 0", *(f"{x} {y} {z}" for x, y, z in vertices)]
+    return "\n".join([*rows, *(" ".join(map(str, (len(p), *p))) for p in polygons)])
+
+
+def as_ply(vertices, polygons, order="ascii"):
+    """Return a PLY file with a colour of each vertex, and lists besides the corners."""
+    form = {"ascii": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    head = (
+        f"ply\nformat {form} 1.0\ncomment made here\nelement vertex {len(vertices)}\n"
+        "property double x\nproperty double y\nproperty double z\nproperty uchar red\n"
+        f"element face {len(polygons)}\nproperty list uchar float texcoord\n"
+        "property list uchar uint vertex_indices\nend_header\n"
+    )
+    if order == "ascii":
+        rows = [f"{x} {y} {z} 7" for x, y, z in vertices]
+        rows += [" ".join(map(str, (1, 0.5, len(p), *p))) for p in polygons]
+        return head + "\n".join(rows)
+    body = b"".join(struct.pack(f"{order}3dB", *vertex, 7) for vertex in vertices)
+    for p in polygons:
+        body += struct.pack(f"{order}Bf", 1, 0.5) + struct.pack(f"{order}B{len(p)}I", len(p), *p)
+    return head.encode() + body
+
+
+WRITERS = {
+    "a.obj": as_obj,
+    "a.off": as_off,
+    "a.ply": as_ply,
+    "little.ply": lambda *shape: as_ply(*shape, "<"),
+    "big.ply": lambda *shape: as_ply(*shape, ">"),
+}
+
+# Each with its area: of one polygon, and of the mesh.
+ARROW = np.array([(0, 0, 0), (2, 1, 0), (0, 2, 0), (0.5, 1, 0)])
+ANGLES = np.radians([0, 90, 180, 270, 270, 180, 90, 0])
+HANDLE = np.c_[0.0 * ANGLES, np.cos(ANGLES), np.sin(ANGLES)] * np.repeat([2.0, 1.0], 4)[:, None]
+FRAME = np.array([(0, 0, 1), (4, 0, 1), (4, 4, 1), (0, 4, 1), (1, 1, 1), (1, 3, 1), (3, 3, 1)])
+
+
+@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize(
+    ("vertices", "polygon", "area"),
+    [
+        (ARROW, (0, 1, 2, 3), 1.5),
+        (ARROW, (2, 1, 0, 3), 1.5),
+        (ARROW, (1, 2, 3, 0), 1.5),
+        (HANDLE, range(8), 4.5),
+        (np.vstack([FRAME, (3, 1, 1)]), (0, 1, 2, 3, 0, 4, 5, 6, 7, 4), 12.0),
+        (np.vstack([ARROW[:3], (1.0, 0.5, 0)]), (0, 3, 1, 2), 2.0),
+        (np.vstack([ARROW, ARROW[:1]]), (0, 4, 1, 2, 3), 1.5),
+    ],
+    ids=["arrow", "backwards", "from its side", "handle", "hole", "straight", "twice"],
+)
+def test_a_polygon_beside_others_covers_what_it_covers(tmp_path, name, vertices, polygon, area):
+    rotation = trimesh.transformations.random_rotation_matrix(np.array([0.1, 0.5, 0.9]))[:3, :3]
+    vertices = np.vstack([vertices @ rotation.T, np.eye(3) + 9.0])
+    n = len(vertices)
+    mesh = read(tmp_path / name, WRITERS[name](vertices, [(n - 3, n - 2, n - 1), polygon]))
+    assert np.isclose(mesh.area, area + np.sqrt(0.75))
+    # One side looks the same way everywhere.
+    assert np.isclose(
+        np.linalg.norm((mesh.area_faces[:, None] * mesh.face_normals)[1:].sum(0)), area
+    )
+
+
+@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize(
+    "vertices",
+    [
+        [(0, 0, 0), (1, 1, 0), (1, 0, 0), (0, 1, 0)],
+        [(0, 0, 0), (2, 2, 0), (2, 0, 0), (0, 1, 0)],
+        [(np.cos(a), 0, np.sin(a)) for a in np.arange(5) * 2.4 * np.pi / 3],
+        [(np.cos(a) * (1 + a), np.sin(a) * (1 + a), 0) for a in np.arange(12)],
+    ],
+    ids=["bow tie", "uneven bow tie", "star", "spiral"],
+)
+def test_a_polygon_that_crosses_itself_is_refused(tmp_path, name, vertices):
+    content = WRITERS[name](vertices, [range(len(vertices))])
+    refused(lambda: read(tmp_path / name, content), tmp_path / name, "crosses itself")
+
+
+def test_polygons_with_no_dent_are_fans(tmp_path):
+    """The triangles that the meshes of earlier results had."""
+    vertices = [(0, 0, 0), (1, 0, 0), (1.5, 1, 0), (0.5, 1.7, 0), (-0.5, 1, 0.2)]
+    mesh = read(tmp_path / "fan.off", as_off(vertices, [range(5)]))
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3], [0, 3, 4]]
 
 
 @pytest.mark.parametrize(

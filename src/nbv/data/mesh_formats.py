@@ -1,4 +1,7 @@
-"""Strict readers of mesh files: trimesh, after checks for damage that it silently ignores.
+"""Strict readers of mesh files.
+
+OBJ, OFF and PLY, whose faces may be polygons, are read here. STL and GLB are read by trimesh, after
+checks for damage that it silently ignores.
 
 A file is read into memory and cannot refer to another file, such as a texture or an external
 buffer. As a program, ``python -m nbv.data.mesh_formats``, it is the process of
@@ -8,18 +11,21 @@ buffer. As a program, ``python -m nbv.data.mesh_formats``, it is the process of
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import re
 import signal
 import struct
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 import trimesh
+
+from nbv.data.polygons import triangulate
 
 
 class _OnlyThisFile(trimesh.resolvers.Resolver):
@@ -61,14 +67,28 @@ def parse_mesh(path: Path) -> trimesh.Trimesh:
     Exception
         Of any type, with the reason, if the file is damaged or has another format.
     """
-    extension = path.suffix.lower()
+    extension, data = path.suffix.lower(), path.read_bytes()
+    if not data:
+        raise ValueError("the file is empty; at least 1 triangle expected")
+    if extension in _POLYGON_READERS:
+        vertices, polygons = _POLYGON_READERS[extension](data)
+        if not polygons:
+            raise ValueError("it holds no mesh; at least 1 triangle expected")
+        points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+        indices = np.fromiter(itertools.chain.from_iterable(polygons), dtype=np.int64)
+        _check_indices(indices, len(points))
+        return trimesh.Trimesh(points, triangulate(points, polygons), process=False)
+    if extension == ".stl" and len(data) != _binary_stl_size(data):
+        _check_ascii_stl(_decoded(data))
+    elif extension == ".glb":
+        _check_glb(data)
     # skip_materials: a texture of a few kilobytes may decompress to gigabytes.
     options: dict[str, Any] = {"process": False, "skip_materials": True}
     with warnings.catch_warnings():
         # Before numpy 2.3, text that is not a number only raised a warning and ended the array.
         warnings.filterwarnings("error", message="string or file could not be read")
         scene = trimesh.load_scene(
-            _checked_file(path.read_bytes(), extension),
+            io.BytesIO(data),
             file_type=extension.removeprefix("."),
             resolver=_OnlyThisFile(),
             **options,
@@ -77,28 +97,14 @@ def parse_mesh(path: Path) -> trimesh.Trimesh:
         if isinstance(part, trimesh.Trimesh):
             # After joining, an invalid index would refer to the next part.
             _check_indices(part.faces, len(part.vertices))
-            _check_list_lengths(part.metadata.get("_ply_raw", {}))
     mesh = scene.to_mesh()
     if not isinstance(mesh, trimesh.Trimesh):
         raise ValueError("it holds no mesh; at least 1 triangle expected")
     return mesh
 
 
-def _checked_file(data: bytes, extension: str) -> io.StringIO | io.BytesIO:
-    """Return a file's content for trimesh; raise ValueError for damage that trimesh accepts."""
-    if not data:
-        raise ValueError("the file is empty; at least 1 triangle expected")
-    if extension == ".obj":
-        return io.StringIO(_checked_obj(_decoded(data)))
-    if extension == ".off":
-        _check_off(_decoded(data))
-    elif extension == ".ply" and b"ascii" in b"".join(data.split(b"\n", 2)[1:2]):
-        _check_ascii_ply(data.decode("utf-8"))
-    elif extension == ".stl" and len(data) != _binary_stl_size(data):
-        _check_ascii_stl(_decoded(data))
-    elif extension == ".glb":
-        _check_glb(data)
-    return io.BytesIO(data)
+# Vertices, and the corners of each polygon.
+_Polygons = tuple[list[Sequence[float]], list[Sequence[int]]]
 
 
 def _decoded(data: bytes) -> str:
@@ -116,144 +122,155 @@ def _check_indices(indices: Any, n_vertices: int) -> None:
         raise ValueError(f"a face refers to vertex {wrong}, of {n_vertices} vertices")
 
 
-_OBJ_INDEX = r"[ \t]+-?\d+"
-# All corners of a face have the same form: v, v/t, v//n or v/t/n.
-_OBJ_FACE = re.compile(
-    "f(?:"
-    + "|".join(
-        f"(?:{_OBJ_INDEX}{rest}){{3,}}" for rest in ("", r"/-?\d+/?", r"//-?\d+", r"/-?\d+/-?\d+")
-    )
-    + r")[ \t]*"
-)
-_OBJ_FIRST_INDEX = re.compile(r"[ \t](-?\d+)")
-
-
-def _checked_obj(text: str) -> str:
-    """Return the text of an OBJ file with lines of vertices and faces that trimesh recognises."""
-    text = text.replace("\r\n", "\n").replace("\\\n", "")
-    # Trimesh ignores indented lines of vertices and faces.
-    text = re.sub(r"^[ \t]*([vf])[ \t]+", r"\1 ", text, flags=re.MULTILINE)
-    n_vertices, n_coordinates, first_coordinates, is_mixed = 0, 0, 0, False
-    relative_at, indices = -1, [1]
-    corners_of: dict[int, int] = {}
+def _read_obj(data: bytes) -> _Polygons:
+    """Return the vertices and the polygons of an OBJ file."""
+    vertices: list[Sequence[float]] = []
+    polygons: list[Sequence[int]] = []
+    text = _decoded(data).replace("\r\n", "\n").replace("\\\n", "")
     for number, line in enumerate(text.split("\n"), 1):
-        if line.startswith("v "):
-            coordinates = len(line.split()) - 1
-            if coordinates < 3:
-                raise ValueError(f"line {number}: a vertex of {coordinates} coordinates, not 3")
-            first_coordinates = first_coordinates or coordinates
-            is_mixed = is_mixed or coordinates != first_coordinates
-            n_vertices += 1
-            n_coordinates += coordinates
-        elif line.startswith("f "):
-            if not _OBJ_FACE.fullmatch(line):
-                raise ValueError(f"line {number}: not a face of 3 vertices or more: {line[:60]!r}")
-            face = [int(index) for index in _OBJ_FIRST_INDEX.findall(line)]
-            # Trimesh takes the number of corners from the first face with as many numbers.
-            n_numbers = len(line.replace("/", " ").split())
-            if corners_of.setdefault(n_numbers, len(face)) != len(face):
-                raise ValueError(f"line {number}: faces of two forms are mixed")
-            if min(face) < 1:
-                if 0 in face or min(face) < -n_vertices:
-                    wrong = 0 if 0 in face else min(face)
-                    raise ValueError(
-                        f"line {number}: a face refers to vertex {wrong}, of {n_vertices} so far"
-                    )
-                relative_at = n_vertices if relative_at < 0 else relative_at
-            indices += (min(face), max(face))
-    if not n_vertices:
+        match line.split():
+            case ["v", *coordinates]:
+                if len(coordinates) < 3:
+                    what = f"a vertex of {len(coordinates)} coordinates, not 3"
+                    raise ValueError(f"line {number}: {what}")
+                vertices.append([float(coordinate) for coordinate in coordinates[:3]])
+            case ["f", *corners]:
+                if len(corners) < 3 or not all(map(_OBJ_CORNER.fullmatch, corners)):
+                    what = f"not a face of 3 vertices or more: {line[:60]!r}"
+                    raise ValueError(f"line {number}: {what}")
+                face = [int(corner.partition("/")[0]) for corner in corners]
+                # From 1, or back from the last vertex so far.
+                face = [i + len(vertices) if i < 0 else i - 1 for i in face]
+                if min(face) < 0:
+                    wrong = corners[face.index(min(face))]
+                    what = f"a face refers to vertex {wrong}, of {len(vertices)} so far"
+                    raise ValueError(f"line {number}: {what}")
+                polygons.append(face)
+    if not vertices:
         raise ValueError("no line is a vertex, 'v x y z'; is it an OBJ file?")
-    if is_mixed and n_coordinates == n_vertices * first_coordinates:
-        # Trimesh would split the numbers of all vertices into rows as long as the first.
-        raise ValueError("vertices have different numbers of coordinates")
-    if max(indices) > n_vertices:
-        raise ValueError(f"a face refers to vertex {max(indices)}, of {n_vertices} vertices")
-    if 0 <= relative_at < n_vertices:
-        # Trimesh would count from the end of the file instead.
-        raise ValueError("relative indices of faces before the last vertex; write absolute ones")
-    return text
+    return vertices, polygons
 
 
-def _check_off(text: str) -> None:
-    kind, has_kind, text = text.partition("OFF")
+# v, v/t, v//n or v/t/n; some programs write v/.
+_OBJ_CORNER = re.compile(r"-?\d+(?:/(?:-?\d+)?(?:/-?\d+)?)?")
+
+
+def _read_off(data: bytes) -> _Polygons:
+    """Return the vertices and the polygons of an OFF file."""
+    kind, has_kind, text = _decoded(data).partition("OFF")
     if not has_kind:
         raise ValueError("it does not begin with OFF; is it an OFF file?")
     kind = "".join(line.partition("#")[0] for line in kind.splitlines()).strip()
     if kind not in ("", "C", "N", "CN", "ST"):
         raise ValueError(f"{kind[:20]}OFF is not a kind of OFF with three coordinates")
-    (n_vertices, n_faces, *_), *body = _tokens(text) or [["0", "0"]]
+    lines = (line.partition("#")[0].split() for line in text.splitlines())
+    (n_vertices, n_faces, *_), *body = [line for line in lines if line] or [["0", "0"]]
     _check_lines(len(body), int(n_vertices), int(n_faces))
+    polygons: list[Sequence[int]] = []
     for row in body[int(n_vertices) :]:
         if int(row[0]) < 3:
             raise ValueError(f"not a face of 3 vertices or more: {' '.join(row)[:60]!r}")
         if len(row) <= int(row[0]):
             raise ValueError(f"a face was cut short: {' '.join(row)[:60]!r}")
-
-
-def _tokens(text: str) -> list[list[str]]:
-    lines = (line.partition("#")[0].split() for line in text.splitlines())
-    return [line for line in lines if line]
+        polygons.append([int(index) for index in row[1 : int(row[0]) + 1]])
+    return [[float(x) for x in row[:3]] for row in body[: int(n_vertices)]], polygons
 
 
 def _check_lines(n_lines: int, *expected: int) -> None:
-    """Raise ValueError for missing lines, which trimesh ignores, and for surplus lines."""
-    if min(expected) < 0:
-        raise ValueError(f"the header announces {min(expected)} lines")
-    if n_lines < sum(expected):
-        raise ValueError(f"{n_lines} of {sum(expected)} lines are there: the file was cut short")
-    if n_lines > sum(expected):
-        raise ValueError(f"{n_lines} lines are there, the header announces {sum(expected)}")
+    """Raise ValueError unless a text has as many lines as its header announces."""
+    if n_lines != sum(expected) or min(expected) < 0:
+        cut = ": the file was cut short" if n_lines < sum(expected) else ""
+        raise ValueError(f"{n_lines} lines are there, the header announces {sum(expected)}{cut}")
 
 
-def _check_ascii_ply(text: str) -> None:
-    header, _, text = text.partition("end_header")
-    # Name, number of rows and properties of each element.
-    elements: list[tuple[str, int, list[list[str]]]] = []
-    for line in header.splitlines():
+# The format characters of `struct`.
+_PLY_KINDS = {
+    **{"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I"},
+    **{"int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"},
+    **{"int64": "q", "uint64": "Q", "float16": "e", "float32": "f", "float64": "d"},
+    **{"float": "f", "double": "d"},
+}
+
+
+# Name, number of rows, and name, kind and kind of the length (empty: no list) of each property.
+_Element = tuple[str, int, list[tuple[str, str, str]]]
+_Row = tuple[str, Mapping[str, Sequence[Any]]]
+
+
+def _read_ply(data: bytes) -> _Polygons:
+    """Return the vertices and the polygons of a PLY file."""
+    header, has_end, rest = data.partition(b"end_header")
+    if not (header.startswith(b"ply") and has_end):
+        raise ValueError("it has no header from ply to end_header; is it a PLY file?")
+    order, elements = "", list[_Element]()
+    for line in header.decode("utf-8").splitlines():
         match line.split():
-            case ["element", element, length]:
-                elements.append((element, int(length), []))
-            case ["property", *words] if elements:
-                elements[-1][2].append(words)
-    rows = [line.split() for line in text.partition("\n")[2].rstrip().splitlines()]
-    _check_lines(len(rows), *(count for _, count, _ in elements))
-    n_vertices = sum(count for name, count, _ in elements if name == "vertex")
-    start = 0
-    for name, count, properties in elements:
-        for row in rows[start : start + count]:
-            if not _fits(row, properties, n_vertices if name == "face" else None):
-                raise ValueError(f"not a {name} as the header describes it: {' '.join(row)[:60]!r}")
-        start += count
+            case ["format", form, *_]:
+                order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[form]
+            case ["element", name, count]:
+                elements.append((name, int(count), []))
+            case ["property", "list", length, kind, name] if elements:
+                elements[-1][2].append((name, _PLY_KINDS[kind], _PLY_KINDS[length]))
+            case ["property", kind, name] if elements:
+                elements[-1][2].append((name, _PLY_KINDS[kind], ""))
+    body = rest.partition(b"\n")[2]
+    vertices: list[Sequence[float]] = []
+    polygons: list[Sequence[int]] = []
+    for name, row in _ply_bytes(body, elements, order) if order else _ply_text(body, elements):
+        if name == "vertex":
+            vertices.append([row[axis][0] for axis in "xyz"])
+        elif name == "face":
+            face = row.get("vertex_indices") or row.get("vertex_index") or ()
+            if len(face) < 3:
+                what = f"face {len(polygons)} has {len(face)} vertex_indices, not 3 or more"
+                raise ValueError(what)
+            polygons.append(face)
+    return vertices, polygons
 
 
-def _fits(row: list[str], properties: list[list[str]], n_vertices: int | None) -> bool:
-    """Return whether a line has the values that its properties require, with valid indices."""
+def _ply_text(body: bytes, elements: list[_Element]) -> Iterator[_Row]:
+    """Yield the rows of a text: the name of the element, and the values of each property."""
+    lines = body.decode("utf-8").rstrip().splitlines()
+    _check_lines(len(lines), *(count for _, count, _ in elements))
+    described = ((name, properties) for name, n, properties in elements for _ in range(n))
+    for line, (name, properties) in zip(lines, described, strict=True):
+        words, row, is_short = line.split()[::-1], {}, False
+        try:
+            for key, kind, length in properties:
+                number = float if kind in "efd" else int
+                row[key] = [number(words.pop()) for _ in range(int(words.pop()) if length else 1)]
+        except IndexError:
+            is_short = True
+        if words or is_short:
+            raise ValueError(f"not a {name} as the header describes it: {line[:60]!r}")
+        yield name, row
+
+
+def _ply_bytes(body: bytes, elements: list[_Element], order: str) -> Iterator[_Row]:
+    """Yield the rows of a binary file, as `_ply_text` does."""
     at = 0
-    for words in properties:
-        length = 1
-        if words[0] == "list":
-            if at >= len(row):
-                return False
-            length = int(row[at])
-            at += 1
-            is_index = n_vertices is not None and words[-1] in ("vertex_index", "vertex_indices")
-            if is_index and not all(0 <= int(i) < (n_vertices or 0) for i in row[at : at + length]):
-                return False
-        at += length
-    return at == len(row)
+
+    def take(form: str) -> tuple[Any, ...]:
+        nonlocal at
+        at += struct.calcsize(form)
+        if at > len(body):
+            raise ValueError("the file was cut short, or a list has another length than it says")
+        return struct.unpack_from(form, body, at - struct.calcsize(form))
+
+    for name, count, properties in elements:
+        for _ in range(count):
+            yield (
+                name,
+                {
+                    key: take(f"{order}{take(order + length)[0] if length else 1}{kind}")
+                    for key, kind, length in properties
+                },
+            )
+    if at != len(body):
+        raise ValueError(f"{len(body)} bytes are there, the header and the lists announce {at}")
 
 
-def _check_list_lengths(elements: Mapping[str, Any]) -> None:
-    """Raise ValueError if the lists of a binary PLY element differ in length.
-
-    Trimesh would apply the first length to all.
-    """
-    for name, element in elements.items():
-        data = element.get("data")
-        for field in (data.dtype.names or ()) if isinstance(data, np.ndarray) else ():
-            values = data[field]
-            if values.dtype.names and (values["f0"] != values["f1"].shape[1]).any():
-                raise ValueError(f"lists of element {name} have another length than the first")
+_POLYGON_READERS = {".obj": _read_obj, ".off": _read_off, ".ply": _read_ply}
 
 
 def _binary_stl_size(data: bytes) -> int:
