@@ -2,8 +2,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
-from nbv.experiment.jobs import hold_lock
+import pytest
+
+from nbv.errors import UserError
+from nbv.experiment.jobs import check_folder, hold_lock
 
 HOLDER = """
 import sys
@@ -40,6 +44,18 @@ def test_locks_are_removed_only_when_no_run_is_alive(tmp_path):
     held.close()
 
 
-def test_a_folder_that_cannot_be_written_has_no_lock(tmp_path):
+@pytest.mark.parametrize("below", ["", "/.snakemake"])
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, below):
     (tmp_path / "file").write_text("")
-    assert hold_lock(tmp_path / "file" / ".snakemake") is None
+    folder = Path(f"{tmp_path}/file{below}")
+    with pytest.raises(UserError, match=f"{folder} cannot be written: "):
+        hold_lock(folder)
+    with pytest.raises(UserError, match=f"{tmp_path}/file is not a folder"):
+        check_folder(str(folder))
+
+
+def test_what_another_user_made_in_the_folder_is_named(tmp_path, monkeypatch):
+    (tmp_path / "locks").mkdir()
+    monkeypatch.setattr("os.access", lambda path, mode: Path(path).name != "locks")
+    with pytest.raises(UserError, match=f"{tmp_path}/locks cannot be written: Permission denied"):
+        hold_lock(tmp_path)

@@ -19,16 +19,17 @@ except ModuleNotFoundError:
 from nbv.data.sensors import sensor_settings
 from nbv.errors import UserError
 from nbv.experiment.config import snakemake_overrides
-from nbv.experiment.jobs import forget_last_error, hold_lock, why_stopped
+from nbv.experiment.jobs import check_folder, forget_last_error, hold_lock, why_stopped
 from nbv.experiment.estimation.features import SHIPPED
 from nbv.experiment.plan import Plan, paths
 from nbv.experiment.reference import find_reference
 from nbv.experiment.results import ESTIMATED_ROLES
 from nbv.experiment.stages import FEATURES, PRETRAINED, stage_from
 
+# Figures need no backend, and one that is unknown here, such as Jupyter's, ends the import of
+# matplotlib, in this process and in its jobs.
+os.environ.pop("MPLBACKEND", None)
 STARTED = time.time()
-# Held until this process ends, so it has a name.
-RUN_LOCK = hold_lock(Path(".snakemake"))
 # The Snakefile that was started lies in the project's folder, or below it.
 ROOT = next(
     folder
@@ -47,7 +48,10 @@ def one_line():
 
 
 with one_line():
+    # Held until this process ends, so it has a name.
+    RUN_LOCK = hold_lock(Path(".snakemake"))
     PLAN = Plan.load(ROOT / "config", tuple(snakemake_overrides(config)))
+    check_folder(PLAN.results)
 
 CONFIG, UNITS = PLAN.config, PLAN.units
 METHODS = CONFIG["methods"]

@@ -74,8 +74,6 @@ def job(snakemake: Any) -> Iterator[None]:
     end_with_snakemake()
     # Imports make 200,000 objects and no garbage: the search for it took an eighth of their time.
     gc.set_threshold(100_000)
-    # Figures need none, and an unknown one ends the import of matplotlib.
-    os.environ.pop("MPLBACKEND", None)
     try:
         for file in snakemake.input:
             check(file)
@@ -141,6 +139,13 @@ def import_from(folder: Path) -> None:
     sys.path.insert(0, str(folder))
     before = os.environ.get("PYTHONPATH", "")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(folder), before]))
+
+
+def check_folder(path: str) -> None:
+    """Raise UserError if a part of the path of a folder is a file."""
+    for part in (Path(path), *Path(path).parents):
+        if os.path.lexists(part) and not part.is_dir():
+            raise UserError(f"{part} is not a folder, which a run needs there; move it away")
 
 
 def forget_last_error(results: str) -> None:
@@ -375,12 +380,24 @@ def hold_lock(folder: Path) -> IO[bytes] | None:
     Returns
     -------
     file or None
-        The lock, held until the file is closed. None where the folder cannot be written or its file
-        system has no such locks; then nothing is removed.
+        The lock, held until the file is closed. None where the file system has no such locks; then
+        nothing is removed.
+
+    Raises
+    ------
+    UserError
+        If the folder cannot be written, which Snakemake tells in a traceback.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         held = (folder / "nbv.lock").open("ab")
+        # Those of Snakemake, which another user may have made.
+        for each in (folder, *folder.iterdir()):
+            if not os.access(each, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(each))
+    except OSError as error:
+        raise UserError(f"{error.filename} cannot be written: {error.strerror}") from error
+    try:
         with contextlib.suppress(BlockingIOError):
             fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
             for lock in (folder / "locks").glob("*.lock"):
