@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 
@@ -27,9 +28,17 @@ def flipped(content):
     return content[:100] + bytes([content[100] ^ 1]) + content[101:]
 
 
+def _is_refused(state):
+    assert jobs.states_of_files("results/tiny")[PATH].startswith(state)
+    with pytest.raises(UserError, match=f"{PATH} {state}.* 1 files in all"):
+        jobs.need_intact("results/tiny")
+    with pytest.raises(UserError, match=f"{PATH} {state}.* run the same command again"):
+        jobs.check(PATH)
+
+
 def test_what_was_written_is_read_again(written):
     jobs.check(PATH)
-    assert jobs.states_of_files("results/tiny") == {PATH: "intact"}
+    assert jobs.states_of_files("results/tiny") == {PATH: "is as written"}
     assert written.read_bytes() == CONTENT
 
 
@@ -46,14 +55,10 @@ def test_damage_is_noticed_whatever_the_time_of_the_file_and_the_file_is_set_asi
     times = written.stat()
     written.write_bytes(damage(CONTENT))
     os.utime(written, ns=(times.st_atime_ns, times.st_mtime_ns))
-    assert jobs.states_of_files("results/tiny") == {PATH: "damaged"}
-    with pytest.raises(UserError, match=rf"{PATH} changed after it was written"):
-        jobs.need_intact("results/tiny")
-    with pytest.raises(UserError, match=rf"{PATH} changed after .* run the same command again"):
-        jobs.check(PATH)
+    _is_refused("differs from its checksum")
     assert not written.exists()
     assert written.with_name("test.csv.damaged").read_bytes() == damage(CONTENT)
-    assert jobs.states_of_files("results/tiny") == {PATH: "missing"}
+    assert jobs.states_of_files("results/tiny") == {PATH: "is missing"}
     jobs.need_intact("results/tiny")
 
 
@@ -61,11 +66,27 @@ def test_files_of_no_run_have_no_checksum(tmp_path):
     for path in ("src/nbv/files.py", "results/loose.csv", str(tmp_path / "elsewhere.csv")):
         jobs.write_checksum(path)
         jobs.check(path)
-    assert jobs.states_of_files("results/tiny") == {PATH: "intact"}
+    assert jobs.states_of_files("results/tiny") == {PATH: "is as written"}
 
 
-def test_a_file_of_an_earlier_version_is_read(written):
-    shutil.rmtree("results/tiny/checksums")
-    written.write_bytes(b"anything")
-    jobs.check(PATH)
-    assert jobs.state_of(PATH) == "without checksum"
+@pytest.mark.parametrize("content", [CONTENT, CONTENT[:50]])
+@pytest.mark.parametrize(
+    "record", [None, "", "00", f"{'x' * 64}  {PATH}\n", f"{'0' * 64}  b.csv\n"]
+)
+def test_a_file_without_a_sound_checksum_is_noticed_and_only_the_checksum_is_blamed(
+    written, record, content
+):
+    written.write_bytes(content)
+    checksum = written.parents[4] / f"checksums/{PATH.removeprefix('results/tiny/')}.sha256"
+    checksum.unlink()
+    if record is not None:
+        checksum.write_text(record)
+    _is_refused("has no checksum" if record is None else "has a checksum that is damaged")
+
+
+def test_logs_and_hidden_files_need_no_checksum():
+    for name in ("logs/a.log", "benchmarks/a.tsv", ".DS_Store", "tables/.a.partial.csv"):
+        path = Path("results/tiny", name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    assert jobs.states_of_files("results/tiny") == {PATH: "is as written"}

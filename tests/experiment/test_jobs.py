@@ -123,7 +123,7 @@ def test_inputs_are_held_to_their_checksums_and_outputs_get_theirs(
     Path("results/a/in.csv").write_text("wholf")
     with pytest.raises(SystemExit), job(snakemake):
         raise AssertionError("a damaged input was read")
-    assert "results/a/in.csv changed" in Path("logs/last_error.txt").read_text()
+    assert "results/a/in.csv differs" in Path("logs/last_error.txt").read_text()
 
 
 def test_a_log_that_cannot_be_written_is_named(snakemake, tmp_path, capsys):

@@ -61,7 +61,7 @@ def test_verify_names_one_damaged_file_of_each_kind(scratch):
     for name in ONE_OF_EACH_KIND:
         damage(scratch.results / name, next(changes))
     printed = scratch.run("verify", "--cores", "1", fails=True).stderr
-    named = re.findall(r"results/tiny/(\S+) is not what was written", printed)
+    named = re.findall(r"results/tiny/(\S+) differs from its checksum", printed)
     assert sorted(named) == sorted(ONE_OF_EACH_KIND)
     assert f"{len(ONE_OF_EACH_KIND)} of " in printed
     assert "Traceback" not in printed
@@ -86,7 +86,7 @@ def test_a_job_notices_what_it_reads_and_the_same_command_makes_it_again(scratch
     target = "results/tiny/lookup/mug/el00/fold1/pose_ambiguity.npz"
     (scratch.folder / target).unlink()
     printed = scratch.run(target, "--cores", "2", fails=True).stderr
-    assert f"error: {read} changed after it was written" in printed
+    assert f"error: {read} differs from its checksum" in printed
     assert "Traceback" not in printed
     assert not (scratch.folder / read).exists()
     scratch.run(target, "--cores", "2")

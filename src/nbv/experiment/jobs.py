@@ -28,12 +28,19 @@ from nbv.files import sha256_of, write_text
 
 log = logging.getLogger(__name__)
 
-State = Literal["intact", "damaged", "missing", "without checksum"]
+State = Literal[
+    "is as written",
+    "is missing",
+    "differs from its checksum: one of them changed after it was written",
+    "has no checksum, so a change would go unnoticed",
+    "has a checksum that is damaged",
+]
 
 _SECONDS_BETWEEN_MESSAGES = 60
 # An orphan works on for no longer than this while the next run works.
 _SECONDS_BETWEEN_CHECKS = 0.5
 _FINISHED, _FAILED, _STOPPED = "processor time", "error: ", "stopped"
+_NOT_RESULTS = ("logs", "benchmarks", "checksums")
 LAST_ERROR = "last_error.txt"
 """In the folder of a run's logs: the line of the job that failed last."""
 NO_SPACE = "no space left on the disk; free some and run the same command again"
@@ -44,6 +51,8 @@ _FOR_THE_USER: dict[int | None, str] = {
     errno.EACCES: "permission denied",
     errno.ENAMETOOLONG: "the name is too long for this file system",
 }
+
+SOUND: tuple[State, ...] = ("is as written", "is missing")
 
 
 @contextmanager
@@ -264,65 +273,79 @@ def write_checksum(path: str) -> None:
 
 
 def state_of(path: str) -> State:
-    """Return whether a file is what it was when its checksum was written."""
+    """Return whether a file is what it was when its checksum was written.
+
+    Files that are of no run are as written.
+    """
     record = _checksum_of(path)
     if not Path(path).is_file():
-        return "missing"
-    if record is None or not Path(record).is_file():
-        return "without checksum"
-    return "intact" if sha256_of(path) == _written(record) else "damaged"
+        return "is missing"
+    if record is None:
+        return "is as written"
+    if not Path(record).is_file():
+        return "has no checksum, so a change would go unnoticed"
+    written = Path(record).read_text(encoding="ascii", errors="replace")
+    if not re.fullmatch(rf"[0-9a-f]{{64}}  {re.escape(path)}\n", written):
+        return "has a checksum that is damaged"
+    if sha256_of(path) != written[:64]:
+        return "differs from its checksum: one of them changed after it was written"
+    return "is as written"
 
 
 def check(path: str) -> None:
-    """Set a damaged file aside.
+    """Set aside a file that is not known to be as written.
 
     Raises
     ------
     UserError
         Naming the file. It has the suffix ``.damaged`` now, and the same command makes it again.
     """
-    if state_of(path) != "damaged":
+    state = state_of(path)
+    if state in SOUND:
         return
     # Another job may have found it at the same time, and moved it.
     with contextlib.suppress(FileNotFoundError):
         Path(path).replace(f"{path}.damaged")
     raise UserError(
-        f"{path} changed after it was written: its checksum differs. It is now "
-        f"{Path(path).name}.damaged; run the same command again, which makes the file again"
+        f"{path} {state}. It is now {Path(path).name}.damaged; run the same command again, which "
+        "makes the file again"
     )
 
 
 def states_of_files(root: str) -> dict[str, State]:
-    """Return the state of every file of a run that has a checksum.
+    """Return the state of every file of a run, and of those that are gone and have a checksum.
 
     Parameters
     ----------
     root : str
         ``results/<name>``.
     """
-    folder = Path(root, "checksums")
-    inside = (path.relative_to(folder).with_suffix("") for path in folder.rglob("*.sha256"))
-    return {path: state_of(path) for path in sorted(f"{root}/{each.as_posix()}" for each in inside)}
+    checksums = Path(root, "checksums")
+    recorded = (file.relative_to(checksums) for file in checksums.rglob("*.sha256"))
+    files = {f"{root}/{each.with_suffix('').as_posix()}" for each in recorded}
+    files |= {path.as_posix() for path in Path(root).rglob("[!.]*") if path.suffix != ".damaged"}
+    return {
+        path: state_of(path)
+        for path in sorted(files)
+        if _checksum_of(path) is not None and not Path(path).is_dir()
+    }
 
 
 def need_intact(root: str) -> None:
-    """Raise UserError where a file of a run is damaged, naming the first."""
-    damaged = [path for path, state in states_of_files(root).items() if state == "damaged"]
-    if damaged:
+    """Raise UserError where a file of a run is not known to be as written, naming the first."""
+    faults = [(path, state) for path, state in states_of_files(root).items() if state not in SOUND]
+    if faults:
+        path, state = faults[0]
         raise UserError(
-            f"{damaged[0]} changed after it was written, {len(damaged)} files in all: "
-            "the target verify says how to make them again"
+            f"{path} {state}, {len(faults)} files in all: the target verify says how to make them "
+            "again"
         )
 
 
-def _written(record: str) -> str:
-    return Path(record).read_text(encoding="ascii", errors="replace").partition(" ")[0]
-
-
 def _checksum_of(path: str) -> str | None:
-    """Return where the checksum of a run's file lies; None for a file that is of no run."""
+    """Return where the checksum of a run's file lies; None for logs and files of no run."""
     results, *inside = PurePath(path).parts
-    if results != "results" or len(inside) < 2:
+    if results != "results" or len(inside) < 2 or inside[1] in _NOT_RESULTS:
         return None
     run, *rest = inside
     return f"results/{run}/checksums/{'/'.join(rest)}.sha256"
