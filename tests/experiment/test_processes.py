@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nbv.errors import UserError
-from nbv.experiment.jobs import check_folder, hold_lock
+from nbv.experiment.jobs import check_folder, hold_lock, warn_of_copy
 
 HOLDER = """
 import sys
@@ -59,3 +59,15 @@ def test_what_another_user_made_in_the_folder_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("os.access", lambda path, mode: Path(path).name != "locks")
     with pytest.raises(UserError, match=f"{tmp_path}/locks cannot be written: Permission denied"):
         hold_lock(tmp_path)
+
+
+def test_a_copied_run_is_told_that_times_decide(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("results/own").mkdir(parents=True)
+    warn_of_copy("results/own")
+    Path("results/own/provenance.json").write_text("{}")
+    warn_of_copy.cache_clear()
+    warn_of_copy("results/own")
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "results/own was not made in this folder" in line
+    assert "--touch" in line

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -111,6 +112,14 @@ def test_versions_name_every_package_results_depend_on():
 
 def test_outside_a_checkout_the_commit_is_unknown(tmp_path):
     assert provenance.git_commit(tmp_path) == "unknown"
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="no git here")
+def test_the_checkout_of_another_user_is_told_with_the_remedy(tmp_path, monkeypatch, caplog):
+    subprocess.run(["git", "init", "--quiet", tmp_path], check=True)
+    monkeypatch.setenv("GIT_TEST_ASSUME_DIFFERENT_OWNER", "1")
+    assert provenance.git_commit(tmp_path) == "unknown"
+    assert f"safe.directory {tmp_path}" in caplog.text
 
 
 def test_the_version_stands_in_the_package_alone_and_the_citation_agrees():

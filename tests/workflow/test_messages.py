@@ -38,3 +38,20 @@ def test_a_bad_mesh_stops_the_run_before_anything_is_rendered(fresh):
     assert "vertex 1 is not finite" in last_words
     assert "Traceback" not in done.stderr
     assert not (fresh.results / "depth").exists()
+
+
+def test_the_settings_of_a_users_environment_do_not_matter(fresh, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
+    monkeypatch.setenv("HOME", "/dev/null")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    fresh.results.mkdir(parents=True)
+    (fresh.results / "provenance.json").write_text("{}")
+    done = fresh.run("--cores", "1", "--dry-run")
+    assert done.stderr.count("results/tiny was not made in this folder") == 1
+
+
+def test_a_file_where_the_results_should_be_is_one_line(fresh):
+    fresh.results.parent.write_text("")
+    done = fresh.run("--cores", "1", fails=True)
+    assert "nbv: error: results is not a folder" in done.stderr
+    assert "Traceback" not in done.stderr

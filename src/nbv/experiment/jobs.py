@@ -5,9 +5,11 @@ A job reads nothing that changed after it was written, and does not outlive its 
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import errno
 import fcntl
+import functools
 import gc
 import logging
 import os
@@ -148,6 +150,19 @@ def import_from(folder: Path) -> None:
     sys.path.insert(0, str(folder))
     before = os.environ.get("PYTHONPATH", "")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(folder), before]))
+
+
+@functools.cache
+def warn_of_copy(results: str) -> None:
+    """Warn where Snakemake has no record of a run's results and goes by the times of files."""
+    made = f"{results}/provenance.json"
+    record = base64.urlsafe_b64encode(made.encode()).decode()
+    if Path(made).is_file() and not Path(".snakemake/metadata", record).is_file():
+        sys.stderr.write(
+            f"nbv: warning: {results} was not made in this folder, so the times of its files "
+            "decide what runs again; for a copy of what this version made, run the same command "
+            "with --touch --forceall first\n"
+        )
 
 
 def check_folder(path: str) -> None:

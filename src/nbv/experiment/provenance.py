@@ -7,11 +7,15 @@ import functools
 import importlib.metadata
 import importlib.util
 import json
+import logging
+import os
 import platform
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+logger = logging.getLogger(__name__)
 
 UNRELATED = {"nbv.experiment.jobs"}
 """Modules that change no result: logs, checksums and the messages of jobs that fail."""
@@ -91,7 +95,8 @@ def _files_of(module: str) -> Iterator[str]:
 def git_commit(directory: str | Path = Path(__file__).parent) -> str:
     """Return the commit checked out in a folder, this package's own unless another is given.
 
-    It is marked ``-dirty`` where files differ from it, and ``unknown`` outside a checkout.
+    It is marked ``-dirty`` where files differ from it, and ``unknown`` outside a checkout and, with
+    a warning, where git refuses to answer, such as for the checkout of another user.
     """
     try:
         described = subprocess.run(
@@ -99,8 +104,13 @@ def git_commit(directory: str | Path = Path(__file__).parent) -> str:
             capture_output=True,
             text=True,
             check=True,
+            env=os.environ | {"LC_ALL": "C"},
         )
-    except (OSError, subprocess.CalledProcessError):
+    except (OSError, subprocess.CalledProcessError) as error:
+        # Of another user's checkout, git names the command that allows it.
+        reason = " ".join((getattr(error, "stderr", "") or str(error)).split())
+        if "not a git repository" not in reason:
+            logger.warning("the commit is unknown: %s", reason)
         return "unknown"
     return described.stdout.strip()
 
