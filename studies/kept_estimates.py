@@ -24,6 +24,8 @@ from nbv.experiment.estimates import read_estimates, read_posteriors
 from nbv.files import damaged, readable, write_arrays
 
 FORMAT = 2
+# The file may be anything that a user names.
+_AGAIN = "name a file of kept estimates, or keep them again"
 _SETTINGS = "settings"
 
 KeptKey = tuple[int, int, str, int, int, str]
@@ -125,9 +127,9 @@ def kept_settings(path: str | Path) -> tuple[dict[str, Any], list[KeptKey]]:
     UserError
         Where the file does not hold kept estimates of this format.
     """
-    with readable(path), np.load(path, allow_pickle=False) as stored:
+    with readable(path, _AGAIN), np.load(path, allow_pickle=False) as stored:
         if "format" not in stored.files or int(stored["format"]) != FORMAT:
-            raise damaged(path, f"not a file of kept estimates of format {FORMAT}")
+            raise damaged(path, f"not a file of kept estimates of format {FORMAT}", _AGAIN)
         settings = json.loads(str(stored[_SETTINGS]))
         suffix = "/residual"
         names = [name.removesuffix(suffix) for name in stored.files if name.endswith(suffix)]
@@ -148,7 +150,7 @@ def read_kept(path: str | Path, keys: Iterable[KeptKey] | None = None) -> dict[K
         if key not in held:
             raise UserError(f"{path}: holds no estimates of {_name(key)}; keep them again")
     kept = {}
-    with readable(path), np.load(path, allow_pickle=False) as stored:
+    with readable(path, _AGAIN), np.load(path, allow_pickle=False) as stored:
         for key in wanted:
             name = _name(key)
             surprisal = f"{name}/surprisal"

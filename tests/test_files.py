@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from pathlib import Path
 
 import numpy as np
@@ -108,3 +109,14 @@ def test_a_missing_array_is_named(tmp_path):
         files.read_arrays(tmp_path / "a.npz", ("x", "y"))
     with pytest.raises(UserError, match=r"b\.npz does not exist"):
         files.read_arrays(tmp_path / "b.npz")
+
+
+def test_a_pipe_exists_and_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "folder.csv").mkdir()
+    kinds = {"pipe": "is not a regular file", "folder": "is a folder", "none": "does not exist"}
+    for name, what in kinds.items():
+        path = tmp_path / f"{name}.csv"
+        for read in (files.read_numbers, files.existing, lambda path: files.read_rows(path, ["a"])):
+            with pytest.raises(UserError, match=rf"{path} {what}"):
+                read(path)

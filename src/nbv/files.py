@@ -101,7 +101,9 @@ def readable(path: str | Path, remedy: str = RUN_AGAIN) -> Iterator[None]:
 
 def missing(path: str | Path) -> str:
     """Return why a path is not a file."""
-    return "is a folder" if Path(path).is_dir() else "does not exist"
+    if Path(path).is_dir():
+        return "is a folder"
+    return "is not a regular file" if Path(path).exists() else "does not exist"
 
 
 def damaged(path: str | Path, what: str, remedy: str = RUN_AGAIN) -> UserError:
@@ -246,6 +248,8 @@ def read_numbers(path: Path) -> NDArray[Any]:
     UserError
         If the file does not exist or cannot be read.
     """
+    if not path.is_file():
+        raise UserError(f"{path} {missing(path)}")
     try:
         if path.suffix.lower() == ".npy":
             return np.asarray(np.load(path, allow_pickle=False))
@@ -255,8 +259,6 @@ def read_numbers(path: Path) -> NDArray[Any]:
         return np.array([float(number) for number in text.replace(",", " ").split()])
     except UserError:
         raise
-    except FileNotFoundError as error:
-        raise UserError(f"{path} does not exist") from error
     # A reader may raise any exception on arbitrary bytes.
     except Exception as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
@@ -309,7 +311,7 @@ def read_json(path: str | Path) -> Any:
 def existing(path: str | Path) -> Path:
     """Return `path`; raise UserError if it is not a file."""
     if not Path(path).is_file():
-        raise UserError(f"{path} does not exist; finish the run first, or is it another folder?")
+        raise UserError(f"{path} {missing(path)}; finish the run first, or is it another folder?")
     return Path(path)
 
 

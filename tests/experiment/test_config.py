@@ -329,8 +329,8 @@ def test_the_epochs_of_cross_fitting_are_written_down():
     config = load_config(CONFIG, ["calibration=crossfit", "estimator.epochs=20"])
     assert config["crossfit_epochs"] == 8
     assert load_config(CONFIG)["crossfit_epochs"] is None
-    with pytest.raises(UserError, match="crossfit_epochs=0 is out of range: 1 or more"):
-        load_config(CONFIG, ["calibration=crossfit", "estimator.epochs=2"])
+    with pytest.raises(UserError, match=r"crossfit_parts=99: estimator\.epochs=20 leaves"):
+        load_config(CONFIG, ["calibration=crossfit", "estimator.epochs=20", "crossfit_parts=99"])
 
 
 @pytest.mark.parametrize(

@@ -126,6 +126,20 @@ def test_inputs_are_held_to_their_checksums_and_outputs_get_theirs(
     assert "results/a/in.csv differs" in Path("logs/last_error.txt").read_text()
 
 
+@pytest.mark.parametrize("named", ["", "results/a/in.csv: "])
+def test_an_error_names_the_files_that_the_job_read(snakemake, tmp_path, monkeypatch, named):
+    monkeypatch.chdir(tmp_path)
+    snakemake.input, snakemake.output = ["src/code.py", "results/a/in.csv"], []
+    Path("results/a").mkdir(parents=True)
+    Path("results/a/in.csv").write_text("whole")
+    write_checksum("results/a/in.csv")
+    with pytest.raises(SystemExit), job(snakemake):
+        raise UserError(f"{named}object 'mug-0019' is missing")
+    line = Path("logs/last_error.txt").read_text()
+    assert line.count("results/a/in.csv") == 1
+    assert "code.py" not in line
+
+
 def test_a_log_that_cannot_be_written_is_named(snakemake, tmp_path, capsys):
     (tmp_path / "logs").write_text("a file where the folder should be")
     with pytest.raises(SystemExit), job(snakemake):

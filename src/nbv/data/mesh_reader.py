@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
+from nbv.files import missing
 
 if TYPE_CHECKING:
     import trimesh
@@ -70,8 +71,7 @@ class MeshReader:
         import trimesh
 
         if not path.is_file():
-            what = "is not a regular file" if path.exists() else "does not exist"
-            raise UserError(f"{path}: {what}; a mesh file expected")
+            raise UserError(f"{path} {missing(path)}; a mesh file expected")
         process = self._running()
         try:
             answer, vertices, faces = _ask(process, path)

@@ -92,7 +92,10 @@ def job(snakemake: Any) -> Iterator[None]:
         for file in snakemake.output:
             write_checksum(file)
     except UserError as error:
-        _fail(f"{error}", path)
+        read = [file for file in snakemake.input if _checksum_of(file)]
+        names_one = any(file in f"{error}" for file in (*read, *snakemake.output))
+        source = "" if names_one or not read else f" (this job read {', '.join(read[:3])})"
+        _fail(f"{error}{source}", path)
     except Exception as error:
         if (first := _first_for_the_user(error)) is not None:
             # An error from an open file names no file; only the job's own outputs are open.

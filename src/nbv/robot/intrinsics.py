@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nbv.errors import FrameError, UserError, check_number, reason_of
-from nbv.files import read_text
+from nbv.files import missing, read_text
 from nbv.robot.depth_files import MILLIMETRE
 
 OFF_CENTRE = 0.2
@@ -224,8 +224,8 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
 def _what_is_missing(path: Path) -> str:
     if path.is_dir():
         return "it is a folder; name a camera file in it, or give fx,fy,cx,cy"
-    if path.suffix or len(path.parts) > 1:
-        return "the file does not exist; name a camera file, or give fx,fy,cx,cy"
+    if path.exists() or path.suffix or len(path.parts) > 1:
+        return f"the file {missing(path)}; name a camera file, or give fx,fy,cx,cy"
     return "neither numbers nor a file; give fx,fy,cx,cy or a camera file"
 
 

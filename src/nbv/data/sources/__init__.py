@@ -98,20 +98,20 @@ def select_objects(source: MeshSource, category: str, n_objects: int | None) -> 
         If there are fewer than `n_objects`, or none.
     """
     available = source.object_ids(category)
+    if n_objects is None and source.endless:
+        raise UserError(f"dataset={source.name} makes any number of objects: set n_objects")
+    if not available:
+        raise UserError(
+            f"dataset={source.name}: {source.whereabouts(category)} holds no usable meshes: "
+            "add some, or correct dataset.root, dataset.categories or dataset.exclude"
+        )
     if n_objects is None:
-        if source.endless:
-            raise UserError(f"dataset={source.name} makes any number of objects: set n_objects")
-        if not available:
-            raise UserError(
-                f"dataset={source.name}: {source.whereabouts(category)} holds no usable meshes: "
-                "add some, or correct dataset.root, dataset.categories or dataset.exclude"
-            )
         return available
     if len(available) < n_objects:
         raise UserError(
             f"dataset={source.name}: {source.whereabouts(category)} holds {len(available)} "
-            f"usable meshes, n_objects={n_objects} asked for: add meshes or set "
-            f"n_objects={len(available)} (n_objects=null takes all)"
+            f"usable meshes, n_objects={n_objects} asked for: add meshes, or take all with "
+            "n_objects=null where they are enough for n_folds"
         )
     if source.endless:
         return available[:n_objects]

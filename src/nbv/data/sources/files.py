@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from nbv.data.mesh_reader import MeshReader
 from nbv.data.meshes import check_mesh, normalise
 from nbv.errors import UserError, nearest
+from nbv.files import missing
 
 if TYPE_CHECKING:
     import trimesh
@@ -76,11 +77,10 @@ class FileSource(ABC):
             absent = [object_id for object_id in ids if not files[object_id].is_file()]
         if absent:
             first = files[absent[0]]
-            what = "is not a regular file" if first.exists() else "does not exist"
             more = f" ({len(absent) - 1} more like it)" if len(absent) > 1 else ""
             raise UserError(
-                f"dataset={self.name}: {first} {what}{more}: put it there or list its id in "
-                "dataset.exclude"
+                f"dataset={self.name}: {first} {missing(first)}{more}: put it there or list its "
+                "id in dataset.exclude"
             )
         return ids
 

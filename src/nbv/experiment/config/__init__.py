@@ -115,10 +115,12 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
         settings["crossfit_epochs"] = equal_cost_epochs(
             estimator["epochs"], settings["calibration_fraction"], settings["crossfit_parts"]
         )
-    if settings["crossfit_epochs"] == 0:
-        raise UserError(
-            "crossfit_epochs=0 is out of range: 1 or more; null needs more estimator.epochs"
-        )
+        if settings["crossfit_epochs"] == 0:
+            raise UserError(
+                f"crossfit_parts={settings['crossfit_parts']}: estimator.epochs="
+                f"{estimator['epochs']} leaves less than one epoch for each part; give fewer "
+                "parts, more epochs, or crossfit_epochs"
+            )
     return settings | {"gives_distributions": "n_classes" in estimator}
 
 
