@@ -109,3 +109,17 @@ def test_the_picture_of_table_1_shows_its_cells(evaluations):
     ends = [list(line.get_xdata()) for line in axes.lines if len(line.get_xdata()) == 2]
     assert np.ravel(ends) == pytest.approx(shown[["ci_low", "ci_high"]].to_numpy().ravel())
     assert "degrees" in axes.get_xlabel()
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_the_share_of_outliers_is_not_cut_off(judged, side):
+    """Wherever the differences of the other claims lie."""
+    shifted = judged.copy()
+    for name in ("difference", "ci_low", "ci_high"):
+        shifted[name] = side * np.abs(shifted[name]) * 10
+    for changed in (judged, shifted):
+        figure = claims_forest(changed)
+        figure.draw_without_rendering()
+        (text,) = figure.axes[0].texts
+        box, whole = text.get_window_extent(), figure.bbox
+        assert whole.x0 <= box.x0 < box.x1 <= whole.x1

@@ -244,6 +244,8 @@ def test_it_says_first_that_a_run_is_too_small(wordy, html):
     warned = build_report(**wordy | {"caution": caution})
     assert 'class="caution" role="note"' not in html
     header = warned[: warned.index("</header>")]
+    assert not re.search("Here this|checkable sentences", header)
+    assert re.search("Of the paper's|does not have", html)
     assert "too small for its numbers to mean anything: 9 objects of mug" in header
 
 

@@ -98,6 +98,10 @@ def claims_forest(judged: pd.DataFrame) -> Figure:
         for claim in members:
             _draw_decided(axes, claim, len(labels), color, marker)
             labels.append(claim.title)
+    # Where there is more room: half of the axes is enough.
+    right = sum(axes.get_xlim()) > 0
+    for text in axes.texts:
+        text.set(position=(5 if right else -5, 0), ha="left" if right else "right")
     axes.axvline(0, color=INK, linewidth=0.9)
     label_rows(axes, labels, headings)
     for row, (_, color, _) in zip(headings, map(_VERDICTS.__getitem__, groups), strict=True):
@@ -211,7 +215,7 @@ def _decided(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> _Decided:
     part = deciding_comparison(claim, rows)
     verdict = rows[part]["verdict"]
     if isinstance(part, FreeOfOutliers):
-        text = f"{number(rows[part]['value'], 0)} % are outliers"
+        text = f"{number(rows[part]['value'], 0)} % outliers"
         return _Decided(claim.title, verdict, None, text)
     return _Decided(claim.title, verdict, _favour(part, rows[part]))
 

@@ -200,7 +200,7 @@ def build_report(
     return HTML.get_template("page.html.j2").render(
         title=f"Best next viewpoint: experiment {settings['name']}",
         caution=caution,
-        finding=_finding(rows),
+        finding=_finding(rows, bool(caution)),
         opening=[
             *_opening(judged, read_csv(table1)),
             *(figure for name, figure in shown.items() if name == _OPENING),
@@ -212,7 +212,7 @@ def build_report(
         claims_run=[_claim(claim, rows[claim.id], summary) for claim, summary in _with_claim(run)],
         claims_not_run=[_claim(claim, {}, summary) for claim, summary in _with_claim(not_run)],
         tally=_tally(each["verdict"]),
-        point_tally=_tally(each["point_verdict"]),
+        point_tally=_tally(run["point_verdict"]),
         verdict_rules=VERDICT_RULES,
         tables={name: _fragment(path) for name, path in tables.items()},
         absent_tables=[name for name in TABLES if name not in tables],
@@ -224,10 +224,12 @@ def build_report(
     )
 
 
-def _finding(rows: Mapping[str, Mapping[Comparison, ClaimRow]]) -> str:
+def _finding(rows: Mapping[str, Mapping[Comparison, ClaimRow]], too_small: bool) -> str:
     """Return one sentence on whether the paper's conclusion holds."""
     (claim,) = (claim for claim in CLAIMS if claim.id == _MAIN_CLAIM)
     conclusion = "The paper concludes that Proposed has a lower error than the three other methods"
+    if too_small:
+        return f"{conclusion}. This run is too small to judge that, whatever is said below."
     if _MAIN_CLAIM not in rows:
         return (
             f"{conclusion}. That is about its five categories together, which this run does not "
