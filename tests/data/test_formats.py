@@ -74,7 +74,8 @@ def test_an_obj_that_trimesh_would_misread_is_refused(tmp_path, content, named):
     ("content", "named"),
     [
         (OFF + "3 0 1 3\n", "7 lines are there, the header announces 6"),
-        (OFF.replace("3 0 1 2", "3 0 1"), "a face was cut short"),
+        (OFF.replace("3 0 1 2", "3 0 1"), "not a whole face"),
+        (OFF.replace("1 1 0", "1 1"), "not a vertex of 3 coordinates: '1 1'"),
         ("hello\nworld\n", "it does not begin with OFF; is it an OFF file?"),
         ("bell \x07 \x9f" + OFF, "bell ? ?OFF is not a kind"),
     ],
@@ -92,6 +93,8 @@ def test_an_off_that_trimesh_would_misread_is_refused(tmp_path, content, named):
         (PLY.replace("3 0 2 3", "4 0 2 3"), "not a face as the header"),
         (PLY.replace("1 1 0\n", "1 1 0 7\n"), "not a vertex as the header"),
         (PLY.replace("1 1 0\n", "1 1 x\n"), "cannot be read as a mesh"),
+        (PLY.replace("uchar int", "uchar float"), "face 0 has not 3"),
+        (PLY.replace("float z", "float w"), "no 'z'"),
     ],
 )
 def test_an_ascii_ply_that_trimesh_would_misread_is_refused(tmp_path, content, named):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nbv.errors import UserError
-from nbv.experiment.jobs import check_folder, hold_lock, warn_of_copy
+from nbv.experiment.jobs import check_results, hold_lock
 
 HOLDER = """
 import sys
@@ -51,7 +51,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, below):
     with pytest.raises(UserError, match=f"{folder} cannot be written: "):
         hold_lock(folder)
     with pytest.raises(UserError, match=f"{tmp_path}/file is not a folder"):
-        check_folder(str(folder))
+        check_results(str(folder))
 
 
 def test_what_another_user_made_in_the_folder_is_named(tmp_path, monkeypatch):
@@ -64,10 +64,10 @@ def test_what_another_user_made_in_the_folder_is_named(tmp_path, monkeypatch):
 def test_a_copied_run_is_told_that_times_decide(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("results/own").mkdir(parents=True)
-    warn_of_copy("results/own")
+    check_results("results/own")
     Path("results/own/provenance.json").write_text("{}")
-    warn_of_copy.cache_clear()
-    warn_of_copy("results/own")
+    check_results.cache_clear()
+    check_results("results/own")
     (line,) = capsys.readouterr().err.splitlines()
     assert "results/own was not made in this folder" in line
     assert "--touch" in line

@@ -19,13 +19,7 @@ except ModuleNotFoundError:
 from nbv.data.sensors import sensor_settings
 from nbv.errors import UserError
 from nbv.experiment.config import snakemake_overrides
-from nbv.experiment.jobs import (
-    check_folder,
-    forget_last_error,
-    hold_lock,
-    warn_of_copy,
-    why_stopped,
-)
+from nbv.experiment.jobs import check_results, forget_last_error, hold_lock, why_stopped
 from nbv.experiment.estimation.features import SHIPPED
 from nbv.experiment.plan import Plan, paths
 from nbv.experiment.reference import find_reference
@@ -57,9 +51,8 @@ with one_line():
     # Held until this process ends, so it has a name.
     RUN_LOCK = hold_lock(Path(".snakemake"))
     PLAN = Plan.load(ROOT / "config", tuple(snakemake_overrides(config)))
-    check_folder(PLAN.results)
-if workflow.is_main_process:
-    warn_of_copy(PLAN.results)
+    if workflow.is_main_process:
+        check_results(PLAN.results)
 
 CONFIG, UNITS = PLAN.config, PLAN.units
 METHODS = CONFIG["methods"]

@@ -104,7 +104,7 @@ def parse_mesh(path: Path) -> trimesh.Trimesh:
 
 
 # Vertices, and the corners of each polygon.
-_Polygons = tuple[list[Sequence[float]], list[Sequence[int]]]
+_Polygons = tuple[Sequence[Sequence[float]], Sequence[Sequence[int]]]
 
 
 def _decoded(data: bytes) -> str:
@@ -124,28 +124,26 @@ def _check_indices(indices: Any, n_vertices: int) -> None:
 
 def _read_obj(data: bytes) -> _Polygons:
     """Return the vertices and the polygons of an OBJ file."""
-    vertices: list[Sequence[float]] = []
-    polygons: list[Sequence[int]] = []
+    vertices, polygons = [], []
     text = _decoded(data).replace("\r\n", "\n").replace("\\\n", "")
     for number, line in enumerate(text.split("\n"), 1):
         match line.split():
             case ["v", *coordinates]:
-                if len(coordinates) < 3:
-                    what = f"a vertex of {len(coordinates)} coordinates, not 3"
-                    raise ValueError(f"line {number}: {what}")
+                if (n := len(coordinates)) < 3:
+                    raise ValueError(f"line {number}: a vertex of {n} coordinates, not 3")
                 vertices.append([float(coordinate) for coordinate in coordinates[:3]])
             case ["f", *corners]:
                 if len(corners) < 3 or not all(map(_OBJ_CORNER.fullmatch, corners)):
-                    what = f"not a face of 3 vertices or more: {line[:60]!r}"
-                    raise ValueError(f"line {number}: {what}")
+                    raise ValueError(
+                        f"line {number}: not a face of 3 vertices or more: {line[:60]!r}"
+                    )
                 face = [int(corner.partition("/")[0]) for corner in corners]
-                # From 1, or back from the last vertex so far.
-                face = [i + len(vertices) if i < 0 else i - 1 for i in face]
-                if min(face) < 0:
-                    wrong = corners[face.index(min(face))]
+                wrong = min((i for i in face if i < -len(vertices) or i == 0), default=1)
+                if wrong < 1:
                     what = f"a face refers to vertex {wrong}, of {len(vertices)} so far"
                     raise ValueError(f"line {number}: {what}")
-                polygons.append(face)
+                # From 1, or back from the last vertex so far.
+                polygons.append([i + len(vertices) if i < 0 else i - 1 for i in face])
     if not vertices:
         raise ValueError("no line is a vertex, 'v x y z'; is it an OBJ file?")
     return vertices, polygons
@@ -166,14 +164,13 @@ def _read_off(data: bytes) -> _Polygons:
     lines = (line.partition("#")[0].split() for line in text.splitlines())
     (n_vertices, n_faces, *_), *body = [line for line in lines if line] or [["0", "0"]]
     _check_lines(len(body), int(n_vertices), int(n_faces))
-    polygons: list[Sequence[int]] = []
-    for row in body[int(n_vertices) :]:
-        if int(row[0]) < 3:
-            raise ValueError(f"not a face of 3 vertices or more: {' '.join(row)[:60]!r}")
-        if len(row) <= int(row[0]):
-            raise ValueError(f"a face was cut short: {' '.join(row)[:60]!r}")
-        polygons.append([int(index) for index in row[1 : int(row[0]) + 1]])
-    return [[float(x) for x in row[:3]] for row in body[: int(n_vertices)]], polygons
+    vertices, faces = body[: int(n_vertices)], body[int(n_vertices) :]
+    for row in (row for row in vertices if len(row) < 3):
+        raise ValueError(f"not a vertex of 3 coordinates: {' '.join(row)[:60]!r}")
+    for row in (row for row in faces if not 3 <= int(row[0]) < len(row)):
+        raise ValueError(f"not a whole face of 3 vertices or more: {' '.join(row)[:60]!r}")
+    polygons = [[int(index) for index in row[1 : int(row[0]) + 1]] for row in faces]
+    return [[float(x) for x in row[:3]] for row in vertices], polygons
 
 
 def _check_lines(n_lines: int, *expected: int) -> None:
@@ -191,7 +188,6 @@ _PLY_KINDS = {
     **{"float": "f", "double": "d"},
 }
 
-
 # Name, number of rows, and name, kind and kind of the length (empty: no list) of each property.
 _Element = tuple[str, int, list[tuple[str, str, str]]]
 _Row = tuple[str, Mapping[str, Sequence[Any]]]
@@ -203,7 +199,7 @@ def _read_ply(data: bytes) -> _Polygons:
     if not (header.startswith(b"ply") and has_end):
         raise ValueError("it has no header from ply to end_header; is it a PLY file?")
     order, elements = "", list[_Element]()
-    for line in header.decode("utf-8").splitlines():
+    for line in _decoded(header).splitlines():
         match line.split():
             case ["format", form, *_]:
                 order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[form]
@@ -214,17 +210,13 @@ def _read_ply(data: bytes) -> _Polygons:
             case ["property", kind, name] if elements:
                 elements[-1][2].append((name, _PLY_KINDS[kind], ""))
     body = rest.partition(b"\n")[2]
-    vertices: list[Sequence[float]] = []
-    polygons: list[Sequence[int]] = []
-    for name, row in _ply_bytes(body, elements, order) if order else _ply_text(body, elements):
-        if name == "vertex":
-            vertices.append([row[axis][0] for axis in "xyz"])
-        elif name == "face":
-            face = row.get("vertex_indices") or row.get("vertex_index") or ()
-            if len(face) < 3:
-                what = f"face {len(polygons)} has {len(face)} vertex_indices, not 3 or more"
-                raise ValueError(what)
-            polygons.append(face)
+    rows = list(_ply_bytes(body, elements, order) if order else _ply_text(body, elements))
+    vertices = [[row[axis][0] for axis in "xyz"] for name, row in rows if name == "vertex"]
+    faces = (row for name, row in rows if name == "face")
+    polygons = [row.get("vertex_indices") or row.get("vertex_index") or () for row in faces]
+    for i, face in enumerate(polygons):
+        if len(face) < 3 or isinstance(face[0], float):
+            raise ValueError(f"face {i} has not 3 vertex_indices or more")
     return vertices, polygons
 
 
@@ -259,13 +251,10 @@ def _ply_bytes(body: bytes, elements: list[_Element], order: str) -> Iterator[_R
 
     for name, count, properties in elements:
         for _ in range(count):
-            yield (
-                name,
-                {
-                    key: take(f"{order}{take(order + length)[0] if length else 1}{kind}")
-                    for key, kind, length in properties
-                },
-            )
+            row = {}
+            for key, kind, length in properties:
+                row[key] = take(f"{order}{take(order + length)[0] if length else 1}{kind}")
+            yield name, row
     if at != len(body):
         raise ValueError(f"{len(body)} bytes are there, the header and the lists announce {at}")
 
@@ -359,7 +348,8 @@ def _answer(path: Path, max_bytes: int) -> tuple[dict[str, Any], list[Any]]:
     # A loader may raise any exception on arbitrary bytes.
     except Exception as error:
         # A reason may quote arbitrary content of the file.
-        quoted = "".join(c if c.isprintable() else "?" for c in " ".join(str(error).split()))
+        words = f"no {error}" if isinstance(error, KeyError) else str(error)
+        quoted = "".join(c if c.isprintable() else "?" for c in " ".join(words.split()))
         reason = quoted[:300] or type(error).__name__
         return {"refused": f"cannot be read as a mesh ({reason})"}, []
     return {"vertices": len(arrays[0]), "faces": len(arrays[1])}, arrays

@@ -63,11 +63,10 @@ def _holds_fan(points: Floats) -> NDArray[np.bool_]:
         length = np.linalg.norm(sums, axis=1)
         areas = np.einsum("mij,mj->mi", normals, sums) / length[:, None]
         angles = np.arctan2(areas, (spokes[:, :-1] * spokes[:, 1:]).sum(axis=2))
-        holds = (areas >= -_NO_DENT * sizes[:, None]).all(axis=1)
-        holds &= (angles.sum(axis=1) < 2 * np.pi) & (length > _NO_DENT * sizes)
+        turns_one_way = (areas >= -_NO_DENT * sizes[:, None]).all(axis=1)
+        is_simple = (angles.sum(axis=1) < 2 * np.pi) & (length > _NO_DENT * sizes)
         is_line = sizes <= _NO_AREA * (spokes**2).sum(axis=(1, 2))
-    result: NDArray[np.bool_] = holds | is_line | ~np.isfinite(sizes)
-    return result
+        return np.asarray((turns_one_way & is_simple) | is_line | ~np.isfinite(sizes))
 
 
 def _ears(points: Floats) -> list[tuple[int, int, int]]:

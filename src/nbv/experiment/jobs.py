@@ -156,8 +156,17 @@ def import_from(folder: Path) -> None:
 
 
 @functools.cache
-def warn_of_copy(results: str) -> None:
-    """Warn where Snakemake has no record of a run's results and goes by the times of files."""
+def check_results(results: str) -> None:
+    """Check the folder of a run's results, and warn where Snakemake has no record of them.
+
+    Raises
+    ------
+    UserError
+        If a part of its path is a file.
+    """
+    for part in (Path(results), *Path(results).parents):
+        if os.path.lexists(part) and not part.is_dir():
+            raise UserError(f"{part} is not a folder, which a run needs there; move it away")
     made = f"{results}/provenance.json"
     record = base64.urlsafe_b64encode(made.encode()).decode()
     if Path(made).is_file() and not Path(".snakemake/metadata", record).is_file():
@@ -166,13 +175,6 @@ def warn_of_copy(results: str) -> None:
             "decide what runs again; for a copy of what this version made, run the same command "
             "with --touch --forceall first\n"
         )
-
-
-def check_folder(path: str) -> None:
-    """Raise UserError if a part of the path of a folder is a file."""
-    for part in (Path(path), *Path(path).parents):
-        if os.path.lexists(part) and not part.is_dir():
-            raise UserError(f"{part} is not a folder, which a run needs there; move it away")
 
 
 def forget_last_error(results: str) -> None:
