@@ -114,7 +114,10 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
         ("estimator.epocs=3", "'estimator.epocs' is unknown: did you mean 'estimator.epochs'?"),
         ("renderer=pyrendr", "renderer=pyrendr is unknown: did you mean 'pyrender'?"),
         ("categories=[mgu]", "'mgu' is unknown: did you mean 'mug'?"),
-        ("dataset.turn_deg.mgu=270", "dataset.turn_deg.mgu: unknown category; did you mean 'mug'"),
+        (
+            "dataset.turn_deg.mgu=270",
+            "dataset.turn_deg.mgu: elevations_deg has no mgu; did you mean 'mug'",
+        ),
         ("estimator.epochs=many", "estimator.epochs=many: input should be a valid integer"),
         ("~seed", "seed is missing"),
         ("elevations_deg.mug=[95]", "elevations_deg.mug[0]=95: input should be less than or"),

@@ -192,7 +192,8 @@ class FolderSource(FileSource):
 
     def find(self, category: str) -> dict[str, Path]:
         """Return the mesh files of a category's folder."""
-        folder = self.check_folder(self.root / self.label(category), f"the {category} meshes")
+        meshes = f"the {category} meshes; or leave {category} out of categories"
+        folder = self.check_folder(self.root / self.label(category), meshes)
         return self.by_stem(p for p in folder.iterdir() if p.suffix.lower() in EXTENSIONS)
 
     def whereabouts(self, category: str) -> str:
@@ -211,7 +212,8 @@ class ModelNetSource(FileSource):
 
     def find(self, category: str) -> dict[str, Path]:
         """Return the OFF files of a category's parts."""
-        folder = self.check_folder(self.root / self.label(category), f"the {category} meshes")
+        meshes = f"the {category} meshes; or leave {category} out of categories"
+        folder = self.check_folder(self.root / self.label(category), meshes)
         parts = [folder / part for part in _PARTS if (folder / part).is_dir()]
         if not parts:
             raise UserError(

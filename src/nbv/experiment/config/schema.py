@@ -413,7 +413,9 @@ class Config(Section):
         for key, values in by_category.items():
             for named in values:
                 if named not in known:
-                    raise UserError(f"{key}.{named}: unknown category; {nearest(named, known)}")
+                    raise UserError(
+                        f"{key}.{named}: elevations_deg has no {named}; {nearest(named, known)}"
+                    )
         return self
 
     @model_validator(mode="after")
