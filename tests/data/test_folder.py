@@ -48,7 +48,8 @@ def test_missing_folders_are_named(tmp_path):
     source = source_of("folder", root=str(nowhere))
     refused(lambda: source.object_ids("mug"), nowhere, "does not exist", "dataset.root")
     source = source_of("folder", root=str(tmp_path))
-    refused(lambda: source.object_ids("mug"), tmp_path / "mug", "does not exist", "out of categories")
+    absent = (tmp_path / "mug", "does not exist", "out of categories")
+    refused(lambda: source.object_ids("mug"), *absent)
     (tmp_path / "mug").write_text("")
     refused(lambda: source.object_ids("mug"), tmp_path / "mug", "is not a folder")
 
