@@ -215,7 +215,8 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
     Raises
     ------
     UserError
-        If the file cannot be read, a column is missing, or there are no rows.
+        If the file cannot be read, a column is missing or occurs twice, there are no rows, or a
+        row has more or fewer values than the head.
     """
     import pandas as pd  # here, so that loading a lookup table costs no import of pandas
 
@@ -227,9 +228,20 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
             if not (text := read_text(path)).strip():
                 raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
             source = io.StringIO(text)
-        table = pd.read_csv(source, dtype=str, keep_default_na=False)
+        # Without a header, because pandas drops a surplus value or takes the first for an index.
+        table = pd.read_csv(source, dtype=str, keep_default_na=False, header=None)
     except (OSError, ValueError) as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
+    if (n_values := table.notna().sum(axis=1)).min() < table.shape[1]:
+        row = int(n_values.argmin())
+        raise UserError(
+            f"{path}, row {row + 1}: {n_values[row]} values and the head has {table.shape[1]}"
+        )
+    table.columns = table.iloc[0]
+    for name in table.columns[table.columns.duplicated()]:
+        if name:
+            raise UserError(f"{path}: two columns {name!r}; leave one of them out")
+    table = table[1:].reset_index(drop=True).rename_axis(columns=None)
     for name in needed:
         if name not in table:
             hint = "; separate columns by commas" if table.shape[1] == 1 else ""

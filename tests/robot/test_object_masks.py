@@ -113,7 +113,7 @@ def test_a_mask_of_another_size_is_refused(shape):
 
 @pytest.mark.parametrize("shape", [(ROWS,), (ROWS, COLUMNS, 3), (ROWS, COLUMNS, 4), (1, ROWS, 2)])
 def test_a_mask_has_one_channel(shape):
-    with pytest.raises(UserError, match=f"the mask has {len(shape)} axes; give rows and columns"):
+    with pytest.raises(UserError, match=f"mask: {len(shape)} axes; a mask has two, rows and columns"):
         object_mask(scene(), REACH, np.ones(shape))
     one = object_mask(scene(), REACH, box(SQUARE)[:, :, None])
     assert np.array_equal(one, box(SQUARE))

@@ -163,7 +163,7 @@ def test_a_manifest_without_rows_or_that_does_not_exist_is_one_line(tmp_path):
     ("columns", "message"),
     [
         ({"mask": ["", "m9.png", "", ""]}, "row 3: mask 'm9.png' does not exist"),
-        ({"azimuth_deg": [0, 10, "north", 30]}, "row 4: azimuth_deg is not a number"),
+        ({"azimuth_deg": [0, 10, "north", 30]}, "row 4: azimuth_deg=north is not a number"),
         ({"fx": [500, -500, "", 500]}, "row 3: intrinsics: fx=-500 must be above 0"),
         ({"fx": [500, "", "", ""], "cx": ["", "", "", 320]}, "row 5: cx without fx"),
         ({"fx": [500] * 4, "cx": [320, 320, 320, ""], "cy": [240, "", 240, ""]}, "cx without cy"),

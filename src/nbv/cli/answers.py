@@ -208,6 +208,9 @@ def print_evaluation(errors: pd.DataFrame, ood: pd.DataFrame) -> None:
             f"offset {rows['offset_deg'].iloc[0]:+.1f}°; {about['n_ood']} out of distribution, "
             f"{about['n_wrong']} wrong by more than 45°, {about['n_wrong_ood']} both"
         )
+        if about["wrong"]:
+            shown = [f"{frame['file']} ({frame['error_deg']:.0f}°)" for frame in about["wrong"]]
+            print_line(f"  wrong, worst first: {', '.join(shown)}")
         if about["warning"]:
             print_warnings([about["warning"]])
         numbers = sorted(rows["n_views"].unique())

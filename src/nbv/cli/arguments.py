@@ -117,6 +117,9 @@ def as_paragraphs(command: Command) -> Command:
     return command
 
 
+# Minus, hyphens and dashes that typesetting puts for the minus sign.
+_MINUS = re.compile("[\u2010-\u2015\u2212\ufe63\uff0d]")
+
 NUMBER_OPTIONS = ("--rotations", "--allowed", "--axis", "--gravity", "--views", "--intrinsics")
 
 
@@ -124,15 +127,23 @@ def joined_numbers(arguments: Sequence[str]) -> list[str]:
     """Return arguments in which the numbers after an option of `NUMBER_OPTIONS` are joined.
 
     The list ends at the first argument that is not a number, such as the frame in
-    ``--rotations 0 90 frame.npy``.
+    ``--rotations 0 90 frame.npy``. Typeset minus signs of numbers become ASCII ones.
     """
     joined: list[str] = []
-    for argument in arguments:
+    for given in arguments:
+        argument = _with_ascii_minus(given)
         if joined and joined[-1].split("=")[0] in NUMBER_OPTIONS and _is_numbers(argument):
             joined[-1] += ("," if "=" in joined[-1] else "=") + argument
         else:
             joined.append(argument)
     return joined
+
+
+def _with_ascii_minus(argument: str) -> str:
+    """Return an argument with the minus signs of pages in its numbers, if it holds numbers."""
+    option, equals, value = argument.rpartition("=")
+    plain = _MINUS.sub("-", value)
+    return option + equals + plain if _is_numbers(plain) else argument
 
 
 def _is_numbers(text: str) -> bool:

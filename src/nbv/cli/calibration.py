@@ -293,7 +293,10 @@ def _run_on_manifest(
 
     def report(path: str, error: FrameError) -> None:
         left_out[path] = error
-        line = f"skipping {path}: {in_flags(str(error))}"
+        say(f"skipping {path}: {error}")
+
+    def say(message: str) -> None:
+        line = in_flags(message)
         print(line, file=sys.stderr) if as_json else print_line(line)  # noqa: T201
 
     recommender, recordings = Recommender.load(bundle), read_manifest(manifest)
@@ -301,6 +304,9 @@ def _run_on_manifest(
         run_network(recommender, recording, intrinsics, depth_scale, report, near, far)
         for recording in recordings
     ]
+    for sweep in sweeps:
+        for warning in sweep.warnings:
+            say(f"warning: {warning}")
     n_assumed = sum(
         camera is None and intrinsics is None and path not in left_out
         for recording in recordings

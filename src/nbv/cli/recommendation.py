@@ -193,7 +193,8 @@ def recommend(
         followed=followed,
         names=[str(path) for path in frames],
     )
-    warnings = answer.warnings
+    camera_warnings = dict.fromkeys(text for camera in cameras for text in camera.warnings)
+    warnings = (*answer.warnings, *camera_warnings)
     if placement is not None:
         diagonal_m = recommender.bundle.diagonal_m
         warnings += check_axis(*placement, answer.object_position_m, diagonal_m)

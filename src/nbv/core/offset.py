@@ -66,16 +66,30 @@ def constant_offset_deg(error_deg: ArrayLike) -> float:
     return float(signed_difference_deg(median, 0.0))
 
 
-def frame_warning(azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]) -> str:
+def frame_warning(
+    azimuth_deg: NDArray[np.float64],
+    estimate_deg: NDArray[np.float64],
+    mirror_plane_deg: float | None = None,
+) -> str:
     """Return why estimates (n,) do not follow azimuths: radians, a flipped sign, or other views.
 
-    The text is empty if estimates follow azimuths up to a constant offset.
+    The text is empty if estimates follow azimuths up to a constant offset. An object with a mirror
+    plane at the azimuth m is estimated at 2 m - a from its mirrored image, and at -a if the sign of
+    azimuths with the right origin is wrong.
     """
     estimates_agree = _agreement(estimate_deg - azimuth_deg)
-    if _agreement(estimate_deg + azimuth_deg) > max(_LEAST_AGREEMENT, estimates_agree):
+    sum_deg = estimate_deg + azimuth_deg
+    if _agreement(sum_deg) > max(_LEAST_AGREEMENT, estimates_agree):
+        cause = "sign flipped, or frames mirrored?"
+        if mirror_plane_deg is not None:
+            middle_deg = constant_offset_deg(sum_deg)
+            origins_deg = np.array([0.0, 2 * mirror_plane_deg])
+            flipped, mirrored = np.abs(signed_difference_deg(middle_deg, origins_deg))
+            if 3 * min(flipped, mirrored) < max(flipped, mirrored):
+                cause = "sign flipped?" if flipped < mirrored else "frames mirrored?"
         return (
-            "estimates run opposite to azimuths (sign flipped?): both count counter-clockwise seen "
-            "from above"
+            f"estimates run opposite to azimuths ({cause}): both count counter-clockwise seen from "
+            "above"
         )
     if estimates_agree > _LEAST_AGREEMENT:
         return ""

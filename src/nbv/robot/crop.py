@@ -36,9 +36,14 @@ _Axis = tuple[float, float, float]
 # A limit of depth beyond this has no effect; diagonals.
 _NO_LIMIT = 100.0
 
-# Factors that correct a wrong unit, the likeliest first: millimetres, tenths and quarters of them,
-# centimetres, and back.
-_UNITS = (0.001, 1000.0, 0.1, 0.0001, 0.25, 0.01, 10.0, 100.0, 0.00025, 4000.0, 10000.0)
+# Units of depth, millimetres: metres, centimetres, 1 mm, 1/4 mm (L515), 1/5000 m (TUM), 1/6553.5 m
+# (Replica), 1/8 mm (SR300, R200), 1/10 mm (D405).
+_UNITS_MM = (1000.0, 10.0, 1.0, 0.25, 0.2, 1 / 6.5535, 0.125, 0.1)
+
+# Factors from each of them taken for millimetres or for metres, and back.
+_FACTORS = sorted(
+    {factor for u in _UNITS_MM for factor in (u, u / 1000, 1 / u, 1000 / u)} - {1.0}, reverse=True
+)
 
 
 @dataclass(frozen=True)
@@ -138,7 +143,19 @@ def crop_frame(
     codes = encode_depth(images, camera)[0]
     right_m, down_m, ahead_m = (away_m * part for part in towards)
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
-    return Crop(codes, distance_m, extent, centre_m, intrinsics.doubts(rows, columns))
+    doubts = (*intrinsics.doubts(rows, columns), *_size_doubts(extent, extent_m))
+    return Crop(codes, distance_m, extent, centre_m, doubts)
+
+
+def _size_doubts(extent: float, extent_m: tuple[float, float]) -> tuple[str, ...]:
+    """Return a sentence if a plausible size is within a factor of 1.4 from its limits."""
+    least, most = extent_m[0] * 1.4, extent_m[1] / 1.4
+    if least <= extent <= most or least > most:
+        return ()
+    return (
+        f"the object would be {extent:.2g} m across in the image; {least:.2g} to {most:.2g} m are "
+        "usual: check the unit of depth, the intrinsics and the mask",
+    )
 
 
 def _pixel_centres(side: int) -> NDArray[np.float64]:
@@ -232,29 +249,33 @@ def check_plausible_nearest(
     nearest_m = float(np.quantile(measured, NEAREST_SHARE))
     is_too_near = nearest_m + reach_m < NEAREST * diagonal_m
     if is_too_near or nearest_m > FARTHEST * diagonal_m:
-        unit = next((unit for unit in _UNITS if _is_near(unit * nearest_m, diagonal_m)), None)
-        raise _implausible_distance(nearest_m, diagonal_m, unit)
+        fitting = [factor for factor in _FACTORS if _is_near(factor * nearest_m, diagonal_m)]
+        raise _implausible_distance(nearest_m, diagonal_m, fitting)
 
 
 def _is_near(distance_m: float, diagonal_m: float) -> bool:
     return NEAREST * diagonal_m <= distance_m <= FARTHEST * diagonal_m
 
 
-def _implausible_distance(distance_m: float, diagonal_m: float, unit: float | None) -> FrameError:
+def _implausible_distance(distance_m: float, diagonal_m: float, factors: list[float]) -> FrameError:
     return FrameError(
         "implausible-distance",
         f"the object is {distance_m:.3g} m away; {NEAREST * diagonal_m:.2g} to "
-        f"{FARTHEST * diagonal_m:.2g} m are plausible; {_help(unit)}",
+        f"{FARTHEST * diagonal_m:.2g} m are plausible; {_help(factors)}",
     )
 
 
-def _help(unit: float | None) -> str:
-    if unit is None:
+def _help(factors: list[float]) -> str:
+    if not factors:
         return (
             "mask only the object; check the intrinsics, their resolution, and the object's "
             "category and size"
         )
-    return f"depths {unit:g} times as large would fit: multiply depths or `depth_scale` by it"
+    listed = " or ".join(f"{float(f'{factor:.4g}'):g}" for factor in factors)
+    return (
+        f"depths {listed} times as large would fit: look up the camera's unit, and multiply depths "
+        "or `depth_scale` by its factor"
+    )
 
 
 def _check_inside(
@@ -269,8 +290,10 @@ def _check_inside(
     if view >= CROPPED_DEG and (cut := [name for name, is_cut in sides.items() if is_cut]):
         raise FrameError(
             "mask-at-border",
-            f"the object touches the {' and '.join(cut)} border of the frame: part of it is cut "
-            "off; move the camera, or mask only the object",
+            f"the object touches the {' and '.join(cut)} border of the frame: it is cut off, or "
+            "what is behind it is taken for it, as for an object below "
+            f"{100 * NEAREST_SHARE:.0f} % of the frame; move the camera, give `far_m`, or mask "
+            "only the object",
         )
 
 
@@ -283,11 +306,11 @@ def _check_plausible(
 
     if is_plausible(1.0):
         return
-    unit = next((unit for unit in _UNITS if is_plausible(unit)), None)
+    factors = [factor for factor in _FACTORS if is_plausible(factor)]
     if not _is_near(distance_m, diagonal_m):
-        raise _implausible_distance(distance_m, diagonal_m, unit)
+        raise _implausible_distance(distance_m, diagonal_m, factors)
     raise FrameError(
         "implausible-size",
         f"the object would be {extent:.3g} m across in the image; {extent_m[0]:.2g} to "
-        f"{extent_m[1]:.2g} m are plausible; {_help(unit)}",
+        f"{extent_m[1]:.2g} m are plausible; {_help(factors)}",
     )

@@ -2,6 +2,7 @@
 
 Floating-point depth is in metres, NaN or 0 where nothing was measured; integer depth is in
 millimetres or in a scale's units, 0 where nothing was measured (ROS REP 118: 32FC1 and 16UC1).
+The largest integer of 16 bits or of the type, and 1e9 or more, are no measurement either.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ _MOST_PIXELS = 10**8
 _LARGEST_SCALE = 10.0
 _MOST_CHANNELS = 4
 _NUMBERS = "biuf"
+_LARGEST_16_BIT = 65535
+# Renderers write 1e10 where there is no surface.
+_NO_DEPTH = 1e9
 # Kind, columns, rows and the largest value, possibly with comments between them.
 _PGM_HEADER = re.compile(rb"P[25]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)")
 
@@ -55,7 +59,7 @@ def read_depth(
     FrameError
         ``colour-image`` or ``few-levels`` where the file is not a depth image.
     UserError
-        Where the file cannot be read.
+        Where the file cannot be read, or its integers are in the other byte order.
 
     Examples
     --------
@@ -98,18 +102,37 @@ def read_mask(path: str | Path) -> NDArray[np.bool_]:
     Raises
     ------
     UserError
-        Where the file cannot be read, or is not an image of numbers.
+        Where the file cannot be read, is not an image of numbers, or holds several masks.
     """
     values = _read_array(as_path(path), "mask")
     if values.dtype.kind not in _NUMBERS:
         raise UserError(f"{path} holds {values.dtype}; give a mask of numbers")
     mask = is_in_mask(values)
-    if mask.ndim == 3:
+    if mask.ndim == 3 and as_path(path).suffix.lower() in IMAGES:
         has_opacity = mask.shape[2] in (2, 4)
         colours = mask[:, :, :-1] if has_opacity else mask
         mask = np.asarray(colours.any(axis=2) & (mask[:, :, -1] if has_opacity else True))
+    return one_mask(mask, str(path))
+
+
+def one_mask(mask: NDArray[np.bool_], name: str) -> NDArray[np.bool_]:
+    """Return a mask (rows, columns), also from (rows, columns, n) or (n, rows, columns).
+
+    Raises
+    ------
+    UserError
+        Where the array has other axes, or the n masks differ.
+    """
+    if mask.ndim == 3:
+        layers = mask if len(mask) < mask.shape[2] else np.moveaxis(mask, 2, 0)
+        if (layers != layers[0]).any():
+            raise UserError(
+                f"{name}: {len(layers)} masks of {layers.shape[2]} × {layers.shape[1]} pixels; "
+                "which of them? give the object's alone, such as masks[0] or masks[:, :, 0]"
+            )
+        mask = layers[0]
     if mask.ndim != 2:
-        raise UserError(f"{path}: {mask.ndim} axes; a mask has two, rows and columns")
+        raise UserError(f"{name}: {mask.ndim} axes; a mask has two, rows and columns")
     return mask
 
 
@@ -154,14 +177,33 @@ def to_metres(
         if values.dtype.itemsize == 1:
             raise FrameError("few-levels", f"{name} has 8 bits per pixel; give 16")
         scale = unit_m if depth_scale is None else depth_scale
-    # Overflow is treated like infinite depth: nothing was measured.
+        largest = np.iinfo(values.dtype).max
+        values = np.where((values == _LARGEST_16_BIT) | (values == largest), 0, values)
+        _check_byte_order(values, name)
+    # Overflow is treated like no surface: nothing was measured.
     with np.errstate(invalid="ignore", over="ignore"):
         metres = values.astype(np.float32, copy=False)
         if scale != 1.0:
             metres = metres * np.float32(scale)
-        if metres.min(initial=0.0) >= 0 and metres.max(initial=0.0) < np.inf:
+        if metres.min(initial=0.0) >= 0 and metres.max(initial=0.0) < _NO_DEPTH:
             return metres
-        return np.where((metres >= 0) & (metres < np.inf), metres, np.float32(0))
+        return np.where((metres >= 0) & (metres < _NO_DEPTH), metres, np.float32(0))
+
+
+def _check_byte_order(values: NDArray[Any], name: str) -> None:
+    """Raise UserError if neighbouring integers of 16 bits are far more alike with bytes swapped."""
+    is_measured = (values[:, 1:] > 0) & (values[:, :-1] > 0)
+    given, swapped = (
+        np.abs(np.diff(values.astype("<u2").view(order).astype(int), axis=1)[is_measured])
+        for order in ("<u2", ">u2")
+    )
+    # Depth is up to 256 times as smooth in its own order. Multiples of 256 are smooth in both.
+    is_enough = given.size > 100 and values.max() <= _LARGEST_16_BIT and (values & 255).any()
+    if is_enough and given.sum() > 8 * swapped.sum():
+        raise UserError(
+            f"{name}: its integers look like the other byte order (16-bit PGM is big-endian, "
+            "libfreenect's record writes little-endian); swap the two bytes of each pixel"
+        )
 
 
 def _read_array(path: Path, name: str) -> NDArray[Any]:
@@ -198,6 +240,9 @@ def _read_numpy(path: Path, name: str) -> NDArray[Any]:
 def _read_image(path: Path) -> NDArray[Any]:
     from PIL import Image  # here, because reading an array does not need it
 
+    with Image.open(path) as image:
+        # Otherwise Pillow does not compare the checksums of a PNG's pixels.
+        image.verify()
     with Image.open(path) as image:
         if image.width * image.height > _MOST_PIXELS:
             raise UserError(

@@ -304,15 +304,18 @@ def count_ood(bundle: Bundle, sweeps: Sequence[Sweep]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``object_id, sequence, n_frames, n_ood, n_wrong, n_wrong_ood, warning`` for each recording.
-        An estimate is wrong if its error is above 45 degrees. The warning says why estimates do
+        ``object_id, sequence, n_frames, n_ood, n_wrong, n_wrong_ood, wrong, warning`` for each
+        recording. An estimate is wrong if its error is above 45 degrees; ``wrong`` lists the
+        ``file`` and ``error_deg`` of these frames, worst first. The warning says why estimates do
         not follow azimuths, or is empty.
     """
     rows = []
     for sweep in sweeps:
         predictions = predict(bundle, sweep)
         estimates = mean_direction_deg(predictions.distributions)
-        is_wrong = circular_distance_deg(estimates, sweep.azimuth_deg) > LARGE_ERROR_DEG
+        error_deg = circular_distance_deg(estimates, sweep.azimuth_deg)
+        is_wrong = error_deg > LARGE_ERROR_DEG
+        worst = sorted(zip(error_deg[is_wrong].tolist(), np.flatnonzero(is_wrong), strict=True))
         is_ood = ood_score(bundle.ood, sweep.codes, sweep.logits) > 1.0
         rows.append(
             {
@@ -322,7 +325,11 @@ def count_ood(bundle: Bundle, sweeps: Sequence[Sweep]) -> pd.DataFrame:
                 "n_ood": int(is_ood.sum()),
                 "n_wrong": int(is_wrong.sum()),
                 "n_wrong_ood": int((is_wrong & is_ood).sum()),
-                "warning": frame_warning(sweep.azimuth_deg, estimates),
+                "wrong": [
+                    {"file": sweep.files[i] if sweep.files else None, "error_deg": error}
+                    for error, i in reversed(worst)
+                ],
+                "warning": frame_warning(sweep.azimuth_deg, estimates, bundle.mirror_plane_deg),
             }
         )
     return pd.DataFrame(rows)

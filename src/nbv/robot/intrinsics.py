@@ -23,6 +23,11 @@ OFF_CENTRE = 0.2
 _SAME_SCALE = 0.03
 """Relative tolerance between the horizontal and the vertical scale of an image."""
 
+# Names of the coefficients in ROS's, OpenCV's and other files.
+_DISTORTION = re.compile(
+    r"d|[kp]\d|cam_d|coeffs|dist(ortion)?(_?(coeffs?|coefficients?|params|parameters))?", re.I
+)
+
 _LEAST_SCALE = 0.2
 """Below it a principal point is near a corner and cannot be the centre of a scaled image."""
 
@@ -176,10 +181,13 @@ class DepthCamera:
     intrinsics : Intrinsics, optional
     unit_m : float
         Metres per unit of integer depth.
+    warnings : tuple of str
+        Content of the camera file that has no effect, a sentence each.
     """
 
     intrinsics: Intrinsics | None = None
     unit_m: float = MILLIMETRE
+    warnings: tuple[str, ...] = ()
 
 
 def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
@@ -187,7 +195,8 @@ def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
 
     A camera file is JSON or YAML: BOP's ``camera.json`` (``fx, fy, cx, cy, width, height``) or
     ``cam_K``, each with or without ``depth_scale``; BOP's ``scene_camera.json``, with a camera for
-    each image; or ROS's ``CameraInfo`` (``k`` or ``K``, or ``camera_matrix.data``).
+    each image; ROS's ``CameraInfo`` (``k`` or ``K``); or ``camera_matrix`` of ROS or of OpenCV's
+    ``FileStorage``, with its numbers in ``data`` or nested.
 
     Parameters
     ----------
@@ -258,7 +267,9 @@ def _read_mapping(path: Path) -> Mapping[str, Any]:
     else:
         import yaml
 
-        # `ros2 topic echo --once` ends with a separator of documents.
+        # OpenCV's own directive and type are no YAML of others. `ros2 topic echo --once` ends with
+        # a separator of documents.
+        text = re.sub(r"^%YAML:.*|!!opencv-\w+", "", text)
         values = next(iter(yaml.safe_load_all(text)), None)
     if not isinstance(values, Mapping):
         raise UserError(f"{path} is not a camera file; give names with values, or fx,fy,cx,cy")
@@ -270,9 +281,7 @@ def _camera_of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
         values.get("width", values.get("image_width")),
         values.get("height", values.get("image_height")),
     )
-    matrix = next((values[key] for key in ("cam_K", "k", "K") if key in values), None)
-    if matrix is None and isinstance(values.get("camera_matrix"), Mapping):
-        matrix = values["camera_matrix"].get("data")
+    matrix = next((values[k] for k in ("cam_K", "k", "K", "camera_matrix") if k in values), None)
     if matrix is None:
         absent = [name for name in ("fx", "fy", "cx", "cy") if name not in values]
         if absent:
@@ -281,12 +290,29 @@ def _camera_of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
             )
         matrix = [values[name] for name in ("fx", "fy", "cx", "cy")]
     try:
-        given = as_intrinsics(matrix)
-        width, height = (int(side) if isinstance(side, int | float) else None for side in size)
+        given = as_intrinsics(_numbers_of(matrix))
+        width, height = (int(side) if isinstance(side, float) else side for side in size)
         intrinsics = Intrinsics(given.fx, given.fy, given.cx, given.cy, width, height)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
-    return DepthCamera(intrinsics, _unit_m(values.get("depth_scale"), path))
+    unit_m = _unit_m(values.get("depth_scale"), path)
+    return DepthCamera(intrinsics, unit_m, _distortion_warnings(values, path))
+
+
+def _numbers_of(matrix: Any) -> Any:
+    # ROS and OpenCV keep them with the number of rows and columns.
+    return matrix.get("data") if isinstance(matrix, Mapping) else matrix
+
+
+def _distortion_warnings(values: Mapping[str, Any], path: Path) -> tuple[str, ...]:
+    """Return a sentence for coefficients of distortion that are not 0."""
+    return tuple(
+        f"{path}: the lens distortion ({name}) is not corrected: give rectified depth frames (ROS: "
+        "image_rect, OpenCV: undistort) and their intrinsics"
+        for name, value in values.items()
+        if _DISTORTION.fullmatch(str(name)) and value is not None
+        if np.any(np.asarray(_numbers_of(value), dtype=object) != 0)
+    )[:1]
 
 
 def _unit_m(depth_scale: Any, path: Path) -> float:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from nbv.errors import FrameError, UserError
-from nbv.robot.depth_files import DepthImage, is_in_mask
+from nbv.robot.depth_files import DepthImage, is_in_mask, one_mask
 
 Mask = NDArray[np.bool_]
 
@@ -70,7 +70,8 @@ def object_mask(
     FrameError
         ``empty-mask``, ``little-depth`` or ``two-objects``.
     UserError
-        Where mask and frame have different sizes, or the limits are not a range.
+        Where mask and frame have different sizes, several masks are given, or the limits are not a
+        range.
     """
     inside = depth_m > 0
     if not np.count_nonzero(inside):
@@ -79,14 +80,7 @@ def object_mask(
             "the frame has no depth at all, no number above 0: is the sensor covered or too close?",
         )
     if mask is not None:
-        given = is_in_mask(mask)
-        if given.ndim == 3 and given.shape[2] == 1:
-            given = given[:, :, 0]
-        if given.ndim != 2:
-            raise UserError(
-                f"the mask has {given.ndim} axes; give rows and columns, such as one channel of a "
-                "colour image"
-            )
+        given = one_mask(is_in_mask(mask), "mask")
         if given.shape != depth_m.shape:
             raise UserError(
                 f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}: "

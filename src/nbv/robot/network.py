@@ -43,6 +43,10 @@ class Sweep:
         The crops.
     focal_px : float
         Focal length of the camera, pixels; NaN where it is unknown.
+    files : tuple of str
+        The views' files; () where there are none.
+    warnings : tuple of str
+        Likely mistakes in the frames, a sentence each.
     """
 
     object_id: str
@@ -52,6 +56,8 @@ class Sweep:
     logits: NDArray[np.float32]
     codes: NDArray[np.uint8]
     focal_px: float = float("nan")
+    files: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def open_session(model: bytes) -> onnxruntime.InferenceSession:

@@ -274,9 +274,9 @@ def _contradictions(bayes_factor: float) -> tuple[str, ...]:
     if bayes_factor >= LEAST_BAYES_FACTOR:
         return ()
     return (
-        f"the views contradict each other (Bayes factor {bayes_factor:.1g}): check the "
-        "rotations and their sign (counter-clockwise seen from above), and that all "
-        "show one object",
+        f"the views contradict each other (Bayes factor {bayes_factor:.1g}): check that "
+        "frames are not mirrored (mirrored ones and a wrong sign look alike), the rotations and "
+        "their sign (counter-clockwise seen from above), and that all show one object",
     )
 
 

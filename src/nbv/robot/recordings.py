@@ -11,8 +11,10 @@ from typing import NoReturn
 import numpy as np
 import pandas as pd
 
+from nbv.core.angles import is_angle
 from nbv.errors import FrameError, UserError
 from nbv.files import missing, read_rows
+from nbv.labels import counted
 from nbv.robot.depth_files import read_depth, read_mask
 from nbv.robot.intrinsics import Intrinsics, camera_of
 from nbv.robot.network import Sweep
@@ -71,14 +73,12 @@ def read_manifest(path: str | Path) -> list[Recording]:
     """
     path = Path(path)
     table = read_rows(path, REQUIRED)
-    for name in map(str, table):
-        if name != (known := name.strip().lower()) and known in OPTIONAL:
-            raise UserError(f"{path}: a column {name!r}; call it {known!r}")
     absent = [name for name in OPTIONAL if name not in table]
     for name in map(str, table):
+        plain = name.strip().lower()
         if name not in (*REQUIRED, *OPTIONAL) and (
-            alike := difflib.get_close_matches(name.lower(), absent, 1, _SIMILARITY)
-            or [known for known in absent if known == f"{name.lower()}_deg"]
+            alike := difflib.get_close_matches(plain, absent, 1, _SIMILARITY)
+            or [known for known in absent if known == f"{plain}_deg"]
         ):
             raise UserError(
                 f"{path}: a column {name!r}; call it {alike[0]!r} if it is that, or remove it"
@@ -116,7 +116,10 @@ def _numbers(path: Path, texts: pd.Series[str]) -> pd.Series[float]:
     for row, (text, number) in enumerate(zip(texts, numbers, strict=True)):
         is_absent = name in OPTIONAL and text.strip().lower() in ("", "nan")
         if not (np.isfinite(number) or is_absent):
-            _reject(path, row, f"{name} is not a number")
+            hint = "; write 0.5 and not 0,5" if "," in text else ""
+            _reject(path, row, f"{name}={text} is not a number{hint}")
+        if name == "azimuth_deg" and not is_angle(number):
+            _reject(path, row, f"azimuth_deg={text} is beyond 1e6; give degrees")
         if name == "elevation_deg" and abs(number) > 90:
             _reject(path, row, f"elevation_deg={text} is not between -90 and 90")
     return numbers
@@ -177,7 +180,9 @@ def run_network(
         Where a file cannot be read, or every frame is rejected.
     """
     codes, kept, focal_px = [], [], []
+    doubts: list[str] = []
     first: tuple[str, FrameError] | None = None
+    name = f"object {recording.object_id!r}, sequence {recording.sequence!r}"
     for i, (row, own_intrinsics) in enumerate(
         zip(recording.frames.to_dict("records"), recording.intrinsics, strict=True)
     ):
@@ -198,22 +203,27 @@ def run_network(
             report(row["path"], error)
             first = first or (row["path"], error)
             continue
+        if found := (*crop.doubts, *(() if own_intrinsics else camera.warnings)):
+            doubts.append(f"{row['path']}: {found[0]}")
         codes.append(crop.codes)
         kept.append(i)
         focal_px.append(known.fx if known else float("nan"))
     if first and not kept:
         path, rejection = first
-        raise rejection.about(
-            f"object {recording.object_id!r}, sequence {recording.sequence!r}: every frame is "
-            f"rejected; the first, {path}"
-        )
+        raise rejection.about(f"{name}: every frame is rejected; the first, {path}")
     crops = np.stack(codes)
+    logits = recommender.network(crops)
+    warnings = recommender.lying_warnings(crops, logits)
+    if doubts:
+        warnings += (f"{len(doubts)} of {counted(len(kept), 'frame')}, as {doubts[0]}",)
     return Sweep(
         recording.object_id,
         recording.sequence,
         recording.elevation_deg,
         recording.azimuth_deg[kept],
-        recommender.network(crops),
+        logits,
         crops,
         float(np.median(focal_px)),
+        tuple(recording.frames["path"].iloc[kept]),
+        tuple(f"{name}: {warning}" for warning in warnings),
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.core.angles import is_angle
 from nbv.data.camera import Camera
 from nbv.data.mesh_reader import MeshReader
 from nbv.data.meshes import Mesh, as_mesh, check_mesh, normalise
@@ -133,8 +134,8 @@ def _check_view(
 ) -> None:
     check_number("`azimuth_deg`", azimuth_deg)
     check_number("`elevation_deg`", elevation_deg)
-    if not math.isfinite(azimuth_deg):
-        raise UserError(f"`azimuth_deg`={azimuth_deg:g}: give a finite number of degrees")
+    if not is_angle(azimuth_deg):
+        raise UserError(f"`azimuth_deg`={azimuth_deg:g}: give degrees, at most 1e6")
     if not -90 <= elevation_deg <= 90:
         raise UserError(f"`elevation_deg`={elevation_deg:g}: give -90 to 90 degrees")
     if not (math.isfinite(diagonal_m) and diagonal_m > 0):
