@@ -22,11 +22,10 @@ _REASONS = (
     ("No columns to parse from file", "it is empty"),
     (
         r".*Expected (\d+) fields in line (\d+), saw (\d+)",
-        "line {1} has {2} values and the head {0}: separate columns by commas, write 0.5 and not "
-        "0,5, and quote a value that holds a comma",
+        "line {1} has {2} columns instead of {0}: is there an extra comma, or are quotes missing?",
     ),
     (
-        r".*EOF inside string starting at row \d+",
+        r".*EOF inside string starting at row \d+|unexpected end of data",
         "a cell has an opening quote and no closing one",
     ),
 )

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import bz2
+import csv
 import errno
+import gzip
 import hashlib
 import io
 import json
+import lzma
 import secrets
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -29,7 +33,7 @@ CALIBRATE_AGAIN = f"make it again with nbv calibrate, or for a file of a run, {R
 """Remedy for a damaged table of nbv calibrate or of a run."""
 
 
-_COMPRESSED = (".gz", ".bz2", ".xz", ".zip")
+_COMPRESSED: Mapping[str, Any] = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
 
 
 @contextmanager
@@ -223,25 +227,24 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
     if not path.is_file():
         raise UserError(f"{path} {missing(path)}; name a file with {', '.join(needed)}")
     try:
-        source: Path | io.StringIO = path
-        if path.suffix not in _COMPRESSED:
-            if not (text := read_text(path)).strip():
-                raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
-            source = io.StringIO(text)
-        # Without a header, because pandas drops a surplus value or takes the first for an index.
-        table = pd.read_csv(source, dtype=str, keep_default_na=False, header=None)
-    except (OSError, ValueError) as error:
+        opened = _COMPRESSED.get(path.suffix)
+        text = opened(path, "rt", encoding="utf-8-sig").read() if opened else read_text(path)
+        # Not by pandas, which pads a short row and takes the first of too many values for an index.
+        rows = list(filter(None, csv.reader(io.StringIO(text, newline=""), strict=True)))
+    except (OSError, ValueError, EOFError, csv.Error, lzma.LZMAError) as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
-    if (n_values := table.notna().sum(axis=1)).min() < table.shape[1]:
-        row = int(n_values.argmin())
-        raise UserError(
-            f"{path}, row {row + 1}: {n_values[row]} values and the head has {table.shape[1]}"
-        )
-    table.columns = table.iloc[0]
-    for name in table.columns[table.columns.duplicated()]:
-        if name:
-            raise UserError(f"{path}: two columns {name!r}; leave one of them out")
-    table = table[1:].reset_index(drop=True).rename_axis(columns=None)
+    if not rows:
+        raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
+    head = rows[0]
+    for i, row in enumerate(rows, start=1):
+        if len(row) != len(head):
+            raise UserError(
+                f"{path}, row {i}: {len(row)} values and the head has {len(head)}: separate them "
+                "by commas, write 0.5 and not 0,5, and quote a value that holds a comma"
+            )
+    if twice := [name for name in head if name and head.count(name) > 1]:
+        raise UserError(f"{path}: two columns {twice[0]!r}; leave one of them out")
+    table = pd.DataFrame(rows[1:], columns=head, dtype=str)
     for name in needed:
         if name not in table:
             hint = "; separate columns by commas" if table.shape[1] == 1 else ""

@@ -315,7 +315,7 @@ def test_an_ood_frame_gives_a_warning(here, bundle, capsys, limit, is_told):
         (["f0.npy", "--allowed", "left"], "left: give rotations in degrees, or a .npy file"),
         (["f0.npy", "--far", "0.1"], "have a depth between --near=0 and --far=0.1, of 0."),
         (["f0.npy", "--near", "300"], "--near=300: give metres"),
-        (["f0.npy", "--depth-scale", "0.001"], "depths 1000 times as large would fit"),
+        (["f0.npy", "--depth-scale", "0.001"], "1000 times as large would fit"),
         (["f0.npy", "--intrinsics", "wide"], "--intrinsics=wide"),
         (["f0.npy", "--camera-pose", "pose.json"], "--camera-pose and --axis belong together"),
         (["f0.npy", "--gravity", "0", "1"], "--gravity has 2 numbers; give three"),
@@ -608,16 +608,18 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
     )
     printed = json.loads(out)
     assert pd.DataFrame(printed["errors"]).equals(wanted)
-    ood = count_ood(Bundle.load("b.safetensors"), sweeps_of(manifest))
-    assert pd.DataFrame(printed["ood"]).equals(ood)
+    ood = count_ood(Bundle.load("b.safetensors"), sweeps_of("manifest.csv"))
+    assert printed["ood"] == ood.to_dict("records")
     written = pd.read_csv("table.csv", dtype={"object_id": str, "sequence": str})
     pd.testing.assert_frame_equal(written, wanted.round(4))
     text = run(
         *(capsys, "evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2", "3")
     )
-    camera, head, warning, numbers, *lines = text.splitlines()
+    camera, head, wrong, warning, numbers, *lines = text.splitlines()
     assert camera == ASSUMED
     assert head.startswith("cup, sequence 1: 24 frames; offset ")
+    worst = ood["wrong"][0][0]
+    assert wrong.startswith(f"  wrong, worst first: {worst['file']} ({worst['error_deg']:.0f}°), ")
     # The network of this bundle is random.
     assert warning == f"warning: {ood['warning'][0]}"
     assert "estimates do not follow azimuths" in warning
@@ -810,6 +812,8 @@ def test_what_cannot_be_rendered_is_one_line(here, capsys, more, message):
     "rotations",
     [
         ["--rotations", "0", "-90"],
+        ["--rotations", "0", "\N{MINUS SIGN}90"],
+        ["--rotations=0,\N{EN DASH}90"],
         ["--rotations", "0,-90"],
         ["--rotations=0,-90"],
         ["--rotations", " 0, -90 "],

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.core.angles import circular_distance_deg
-from nbv.core.offset import constant_offset_deg
+from nbv.core.offset import constant_offset_deg, frame_warning
 
 ERRORS = st.lists(st.floats(-1000.0, 1000.0), min_size=1, max_size=12)
 
@@ -33,3 +33,23 @@ def test_within_half_a_turn_it_is_the_median(errors):
 def test_it_turns_with_all_errors(errors, turn):
     moved = constant_offset_deg(np.array(errors) + turn)
     assert circular_distance_deg(moved, constant_offset_deg(errors) + turn) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("change", "plane_deg", "cause"),
+    [
+        (lambda azimuth: azimuth, 90.0, None),
+        (lambda azimuth: 180 - azimuth, 90.0, "(frames mirrored?)"),
+        (lambda azimuth: 20 - azimuth, 90.0, "(sign flipped?)"),
+        (lambda azimuth: 90 - azimuth, 90.0, "(sign flipped, or frames mirrored?)"),
+        (lambda azimuth: 180 - azimuth, None, "(sign flipped, or frames mirrored?)"),
+        # About a plane at 0 a mirrored image is that of the opposite sign.
+        (lambda azimuth: -azimuth, 180.0, "(sign flipped, or frames mirrored?)"),
+    ],
+)
+def test_mirrored_frames_and_a_wrong_sign_differ_where_the_origin_is_known(
+    change, plane_deg, cause
+):
+    azimuth_deg = np.arange(0.0, 360.0, 15.0)
+    warning = frame_warning(azimuth_deg, change(azimuth_deg), plane_deg)
+    assert cause in warning if cause else not warning

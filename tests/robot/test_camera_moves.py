@@ -303,7 +303,7 @@ def test_an_entry_of_a_mask_is_its_share_of_the_circle(mask):
     ("values", "message"),
     [
         ([], "give at least one"),
-        ([30.0, np.nan], "nan is not an angle"),
+        ([30.0, np.nan], "one is not an angle"),
         (np.ones((4, 4), dtype=bool), "a mask of 2 axes"),
         (["30", "60"], "give degrees or booleans"),
         ([[1.0], [2.0, 3.0]], "rows of different lengths"),

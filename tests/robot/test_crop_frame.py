@@ -258,6 +258,10 @@ def refused(name: str, *arguments, **options) -> str:
     return str(error.value)
 
 
+def factors_of(message: str) -> list[str]:
+    return message.partition("depths ")[2].partition(" times as large")[0].split(" or ")
+
+
 WIDE, NARROW = Intrinsics(150.0, 150.0), Intrinsics(200.0, 200.0)
 
 
@@ -316,7 +320,8 @@ EXTENT_M = (0.5 * DIAGONAL_M, 1.5 * DIAGONAL_M)
 
 
 @pytest.mark.parametrize(
-    "unit", [1000.0, 10_000.0, 4000.0, 100.0, 10.0, 0.1, 0.01, 0.001, 0.00025, 0.0001]
+    "unit",
+    [1000.0, 10_000.0, 5000.0, 4000.0, 100.0, 10.0, 8.0, 5.0, 0.1, 0.01, 0.001, 0.00025, 0.0001],
 )
 def test_a_wrong_unit_is_named(unit):
     """Depths in another unit than metres: the message says what to multiply them by."""
@@ -324,6 +329,15 @@ def test_a_wrong_unit_is_named(unit):
     cropped(depth, extent_m=EXTENT_M)
     message = refused("implausible-distance", depth * unit, extent_m=EXTENT_M)
     assert f"{1 / unit:g}" in factors_of(message)
+
+
+@pytest.mark.parametrize(("times", "is_told"), [(0.5, True), (0.8, False), (1, False), (2, True)])
+def test_a_size_near_its_limits_is_doubted(times, is_told):
+    """Half or twice the true unit gives a size that is plausible but unusual."""
+    depth = frame(20.0, 200.0, 5.0) * DIAGONAL_M
+    extent = cropped(depth).extent_m
+    found = cropped(depth * times, extent_m=(0.45 * extent, 2.2 * extent))
+    assert len(found.doubts) == is_told
 
 
 def test_quarters_of_a_millimetre_may_be_at_a_plausible_distance():

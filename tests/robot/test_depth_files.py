@@ -151,7 +151,9 @@ def test_the_scale_is_metres_per_unit(tmp_path):
     assert np.array_equal(read_depth(metres, unit_m=7.0), METRES)
 
 
-@given(scale=st.floats(1e-5, 10.0), values=arrays(np.uint16, (3, 4), elements=st.integers(0, 65534)))
+@given(
+    scale=st.floats(1e-5, 10.0), values=arrays(np.uint16, (3, 4), elements=st.integers(0, 65534))
+)
 def test_whole_numbers_are_multiplied_by_the_scale(scale, values):
     assert to_metres(values, scale) == pytest.approx(values.astype(np.float64) * scale, rel=1e-6)
 
@@ -168,6 +170,51 @@ def test_what_is_given_is_not_changed():
     to_metres(depth)
     assert np.isnan(depth[0, 0])
     assert depth[0, 1] == -1.0
+
+
+@pytest.mark.parametrize(
+    ("dtype", "value"),
+    [
+        (np.uint16, 65535),
+        (np.int16, 32767),
+        (np.int32, 65535),
+        (np.uint32, 2**32 - 1),
+        (np.float32, 1e10),
+    ],
+)
+def test_what_cameras_and_renderers_write_for_nothing_is_no_measurement(dtype, value):
+    assert (to_metres(np.array([[value, 1]], dtype=dtype)) > 0).tolist() == [[False, True]]
+
+
+def ramp(times: int = 1) -> np.ndarray:
+    return (np.add.outer(np.arange(12), np.arange(20)) % 30 + 740).astype(np.uint16) * times
+
+
+def test_the_other_byte_order_is_named(tmp_path):
+    right = pgm(tmp_path / "right.pgm", ramp(), 65535)
+    assert read_depth(right) == pytest.approx(ramp() * 0.001)
+    with pytest.raises(UserError, match=r"wrong\.pgm: .*other byte order"):
+        read_depth(pgm(tmp_path / "wrong.pgm", ramp().byteswap(), 65535))
+
+
+def test_coarse_depth_and_noise_have_no_wrong_byte_order(rng):
+    for values in (256 * (ramp() - 700), rng.integers(0, 65535, (12, 20)).astype(np.uint16)):
+        assert to_metres(values) == pytest.approx(values * 0.001)
+
+
+@pytest.mark.parametrize("read", [read_depth, read_mask])
+def test_a_flipped_bit_of_a_png_is_found_or_changes_nothing(tmp_path, read, rng):
+    content = image(tmp_path / "a.png", ramp()).read_bytes()
+    wanted = read(tmp_path / "a.png")
+    for bit in rng.integers(8 * len(content), size=200).tolist():
+        flipped = bytearray(content)
+        flipped[bit // 8] ^= 1 << bit % 8
+        (tmp_path / "b.png").write_bytes(flipped)
+        try:
+            found = read(tmp_path / "b.png")
+        except UserError:
+            continue
+        assert np.array_equal(found, wanted)
 
 
 # What is refused
@@ -291,6 +338,15 @@ def test_one_colour_is_enough(tmp_path):
     colours = np.zeros((*INSIDE.shape, 3), dtype=np.uint8)
     colours[INSIDE] = (0, 0, 1)
     assert np.array_equal(read_mask(image(tmp_path / "a.png", colours)), INSIDE)
+
+
+def test_instances_are_no_colours(tmp_path):
+    stack = np.stack([INSIDE, ~INSIDE])
+    for name, values in (("a.npy", stack), ("b.npy", np.moveaxis(stack, 0, 2))):
+        with pytest.raises(UserError, match=rf"{name}: 2 masks of 4 × 3 pixels; which"):
+            read_mask(saved(tmp_path / name, values))
+    for name, values in (("c.npy", INSIDE[None]), ("d.npy", INSIDE[:, :, None])):
+        assert np.array_equal(read_mask(saved(tmp_path / name, values)), INSIDE)
 
 
 def test_what_is_transparent_is_not_in_the_mask(tmp_path):

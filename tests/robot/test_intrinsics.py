@@ -45,7 +45,25 @@ CALIBRATION = {
     "camera_matrix": {"rows": 3, "cols": 3, "data": K},
     "distortion_coefficients": {"rows": 1, "cols": 5, "data": [0.0] * 5},
 }
+OPENCV = f"""\
+%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: {K}
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ 0., 0., 0., 0., 0. ]
+"""
 FILES = {
+    "opencv.yml": (OPENCV, SIZED),
+    "opencv-nested.yaml": (as_json({"camera_matrix": np.reshape(K, (3, 3)).tolist()}), WANTED),
     # BOP: one camera for all images, and one of scene_camera.json.
     "camera.json": (
         as_json({"cx": CX, "cy": CY, "depth_scale": 0.1, "fx": FX, "fy": FY}).replace(
@@ -70,6 +88,27 @@ def test_every_camera_file_gives_the_same_camera(tmp_path, name):
     for encoding in ("utf-8", "utf-8-sig"):
         (tmp_path / name).write_text(text, encoding=encoding)
         assert camera_of(str(tmp_path / name)).intrinsics == wanted
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("d", [0.1, 0, 0, 0, 0]),
+        ("D", [0, 0, 0, 0, -0.2]),
+        ("dist_coeff", [[0.0, 0.1]]),
+        ("dist_coeffs", [0.1]),
+        ("distortion_coefficients", {"rows": 1, "cols": 2, "data": [0.1, 0]}),
+        ("k1", 0.1),
+        ("k2", 0.0),
+        ("distortion_model", "plumb_bob"),
+    ],
+)
+def test_distortion_that_is_not_0_is_told(tmp_path, name, value):
+    (tmp_path / "a.yaml").write_text(yaml.safe_dump({"K": K, name: value}))
+    found = camera_of(str(tmp_path / "a.yaml"))
+    assert found.intrinsics == WANTED
+    is_told = name not in ("k2", "distortion_model")
+    assert [f"({name})" in warning for warning in found.warnings] == [True] * is_told
 
 
 @given(f=pixels)

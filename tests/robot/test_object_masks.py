@@ -111,12 +111,23 @@ def test_a_mask_of_another_size_is_refused(shape):
         object_mask(scene(), REACH, np.ones(shape))
 
 
-@pytest.mark.parametrize("shape", [(ROWS,), (ROWS, COLUMNS, 3), (ROWS, COLUMNS, 4), (1, ROWS, 2)])
-def test_a_mask_has_one_channel(shape):
-    with pytest.raises(UserError, match=f"mask: {len(shape)} axes; a mask has two, rows and columns"):
+@pytest.mark.parametrize("shape", [(ROWS,), (1, 1, ROWS, COLUMNS)])
+def test_a_mask_has_rows_and_columns(shape):
+    with pytest.raises(
+        UserError, match=f"mask: {len(shape)} axes; a mask has two, rows and columns"
+    ):
         object_mask(scene(), REACH, np.ones(shape))
-    one = object_mask(scene(), REACH, box(SQUARE)[:, :, None])
-    assert np.array_equal(one, box(SQUARE))
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+def test_of_several_masks_one_is_given_unless_all_are_alike(axis):
+    square = box(SQUARE)
+    for n in (1, 3):
+        alike = object_mask(scene(), REACH, np.stack([square] * n, axis=axis))
+        assert np.array_equal(alike, square)
+    instances = np.stack([square, ~square, square], axis=axis)
+    with pytest.raises(UserError, match="3 masks of 64 × 48 pixels; which of them"):
+        object_mask(scene(), REACH, instances)
 
 
 @pytest.mark.parametrize("options", [{}, {"far_m": 1.0}, {"mask": np.ones((ROWS, COLUMNS))}])

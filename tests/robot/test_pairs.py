@@ -187,7 +187,7 @@ def test_a_missing_column_is_named(tmp_path, column):
         (b"", "p.csv is empty; it needs object_id, azimuth_deg, estimate_deg"),
         (b"object_id,azimuth_deg,estimate_deg\n", "p.csv has no rows"),
         ("a,b\r\ncup,1\r\nTässchen,2".encode("latin-1"), "p.csv, line 3: this is not UTF-8"),
-        (b"a,b\n1,2\n1,2,3\n", "line 3 has 3 values and the head 2"),
+        (b"a,b\n1,2\n1,2,3\n", "row 3: 3 values and the head has 2"),
         (b'a,b\n"1,2\n3', "a cell has an opening quote and no closing one"),
     ],
 )

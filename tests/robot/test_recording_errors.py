@@ -383,7 +383,12 @@ def test_ood_and_wrong_frames_are_counted(bundle):
     apart = ood_score(limit, codes, sweep.logits)
     limit = replace(model, threshold=float(1e-6 * np.median([apart.min(), apart.max()])))
     changed = replace(bundle, ood=limit)
-    (row,) = count_ood(changed, [replace(sweep, codes=codes)]).to_dict("records")
+    files = tuple(f"{i}.npy" for i in frames)
+    (row,) = count_ood(changed, [replace(sweep, codes=codes, files=files)]).to_dict("records")
+    wrong = row.pop("wrong")
+    assert {one["file"] for one in wrong} == {f"{i}.npy" for i in frames if i % 4 == 0}
+    errors_deg = [one["error_deg"] for one in wrong]
+    assert errors_deg == sorted(errors_deg, reverse=True)
     assert row == {
         **{"object_id": "cup", "sequence": "1", "n_frames": 24},
         **{"n_ood": 8, "n_wrong": 6, "n_wrong_ood": 2, "warning": ""},

@@ -174,6 +174,28 @@ def test_a_cell_that_cannot_be_is_named_with_its_row(folder, columns, message):
     assert message in refused(manifest(folder, table(**columns)))
 
 
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("cup,1,f0.npy,0\ncup,1,f1.npy,10,5", "row 3: 5 values and the head has 4"),
+        ("cup,1,f0.npy,0,\ncup,1,f1.npy,10,", "row 2: 5 values and the head has 4"),
+        ("cup,1,f0.npy,0\ncup,1,f1.npy", "row 3: 3 values and the head has 4"),
+        ('cup,1,f0.npy,"0,5"', "row 2: azimuth_deg=0,5 is not a number; write 0.5"),
+        ("cup,1,f0.npy,1e300", "row 2: azimuth_deg=1e+300 is not an angle"),
+    ],
+)
+def test_a_row_has_a_value_for_each_column(folder, rows, message):
+    path = folder / "manifest.csv"
+    path.write_text(f"object_id,sequence,file,azimuth_deg\n{rows}\n")
+    assert message in refused(path)
+
+
+def test_a_column_occurs_once(folder):
+    path = folder / "manifest.csv"
+    path.write_text("object_id,sequence,file,azimuth_deg,file\ncup,1,f0.npy,0,f1.npy\n")
+    assert "two columns 'file'" in refused(path)
+
+
 # What the network makes of them
 
 
@@ -207,6 +229,18 @@ def test_a_refused_frame_is_told_and_left_out(recommender, folder):
     assert len(lines) == 2
     assert "f1.npy is left out: empty-mask" in lines[0]
     assert "f3.npy is left out: few-levels" in lines[1]
+
+
+def test_doubts_and_files_of_the_used_frames_are_kept(recommender, folder):
+    np.save(folder / "f1.npy", np.zeros_like(frame(1)))
+    (folder / "camera.yaml").write_text(
+        f"fx: {FOCAL_PX}\nfy: {FOCAL_PX}\ncx: 60\ncy: 45\nk1: 0.1\n"
+    )
+    sweep, _ = seen(recommender, manifest(folder, table()), str(folder / "camera.yaml"))
+    assert [Path(name).name for name in sweep.files] == ["f0.npy", "f2.npy", "f3.npy"]
+    (warning,) = sweep.warnings
+    assert "object 'cup', sequence '1': 3 of 3 frames" in warning
+    assert "distortion (k1) is not corrected" in warning
 
 
 def test_a_recording_without_a_usable_frame_is_one_line(recommender, folder):

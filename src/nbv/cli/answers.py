@@ -210,7 +210,8 @@ def print_evaluation(errors: pd.DataFrame, ood: pd.DataFrame) -> None:
         )
         if about["wrong"]:
             shown = [f"{frame['file']} ({frame['error_deg']:.0f}°)" for frame in about["wrong"]]
-            print_line(f"  wrong, worst first: {', '.join(shown)}")
+            named = shown[:10] + ["…"] * (len(shown) > 10)
+            print_line(f"  wrong, worst first: {', '.join(named)}")
         if about["warning"]:
             print_warnings([about["warning"]])
         numbers = sorted(rows["n_views"].unique())
