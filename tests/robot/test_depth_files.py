@@ -187,7 +187,7 @@ def test_what_cameras_and_renderers_write_for_nothing_is_no_measurement(dtype, v
 
 
 def ramp(times: int = 1) -> np.ndarray:
-    return (np.add.outer(np.arange(12), np.arange(20)) % 30 + 740).astype(np.uint16) * times
+    return (np.add.outer(np.arange(64), np.arange(40)) % 30 + 740).astype(np.uint16) * times
 
 
 def test_the_other_byte_order_is_named(tmp_path):
@@ -198,7 +198,7 @@ def test_the_other_byte_order_is_named(tmp_path):
 
 
 def test_coarse_depth_and_noise_have_no_wrong_byte_order(rng):
-    for values in (256 * (ramp() - 700), rng.integers(0, 65535, (12, 20)).astype(np.uint16)):
+    for values in (256 * (ramp() - 700), rng.integers(0, 65535, (64, 40)).astype(np.uint16)):
         assert to_metres(values) == pytest.approx(values * 0.001)
 
 
