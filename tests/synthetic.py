@@ -140,11 +140,16 @@ def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0, delta_s
         pose = viewpoint @ (both / both.sum(axis=1, keepdims=True))
         spread = -(pose * np.log(pose)).sum(axis=1)
         cost[:, delta : delta + delta_step] = spread[:, None]
+    cost = cost.astype(np.float32)
+    # Of equal costs the one that travels least, and of two such the first.
+    delta = np.arange(N_VIEWS)
+    rank = np.minimum(delta, N_VIEWS - delta) + delta / 1000
+    least = cost == cost.min(axis=1, keepdims=True)
     return {
         "viewpoint_likelihood": viewpoint.astype(np.float32),
         "estimate_likelihood": estimate.astype(np.float32),
-        "cost": cost.astype(np.float32),
-        "recommended_delta_deg": cost.argmin(axis=1),
+        "cost": cost,
+        "recommended_delta_deg": np.where(least, rank, np.inf).argmin(axis=1),
         "bandwidth_deg": np.array(bandwidth_deg),
         "pseudo_observations": np.array(pseudo_observations),
         "pose_likelihood": np.array("given_estimate"),

@@ -126,7 +126,7 @@ def test_a_file_without_a_mesh_is_one_line(tmp_path, name, content, message):
 @pytest.mark.parametrize(
     ("view", "message"),
     [
-        ((np.nan, 10.0, 0.9), "`azimuth_deg`=nan is not an angle"),
+        ((np.nan, 10.0, 0.9), "`azimuth_deg`=nan: give degrees"),
         ((0.0, 91.0, 0.9), "`elevation_deg`=91"),
         ((0.0, 10.0, 0.0), "`distance_m`=0"),
         ((0.0, 10.0, 0.2), "0.3 to 4 m are plausible"),

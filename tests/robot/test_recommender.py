@@ -488,8 +488,8 @@ def test_frames_all_round_have_a_pose_and_no_next_view(recommender, options):
         (2, [0.0], "2 frames and 1 rotation; give one for each frame"),
         (1, "here", "'here' are not numbers"),
         (2, [10.0, 20.0], "the first is 10"),
-        (2, [0.0, np.nan], "one is not an angle"),
-        (2, [0.0, 1e300], "one is not an angle"),
+        (2, [0.0, np.nan], "one is not finite, or beyond 1e6"),
+        (2, [0.0, 1e300], "one is not finite, or beyond 1e6"),
     ],
 )
 def test_rotations_that_do_not_fit_the_frames_are_refused(recommender, n, rotations, message):

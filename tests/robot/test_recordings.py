@@ -181,7 +181,7 @@ def test_a_cell_that_cannot_be_is_named_with_its_row(folder, columns, message):
         ("cup,1,f0.npy,0,\ncup,1,f1.npy,10,", "row 2: 5 values and the head has 4"),
         ("cup,1,f0.npy,0\ncup,1,f1.npy", "row 3: 3 values and the head has 4"),
         ('cup,1,f0.npy,"0,5"', "row 2: azimuth_deg=0,5 is not a number; write 0.5"),
-        ("cup,1,f0.npy,1e300", "row 2: azimuth_deg=1e+300 is not an angle"),
+        ("cup,1,f0.npy,1e300", "row 2: azimuth_deg=1e300 is beyond 1e6"),
     ],
 )
 def test_a_row_has_a_value_for_each_column(folder, rows, message):
