@@ -96,6 +96,14 @@ def belief():
     return Belief(np.concatenate([evidence.viewpoint[:3], drawn]), evidence)
 
 
+def pose_table(pair, interpretation):
+    V, L = pair.viewpoint.tolist(), pair.estimate.tolist()
+    if interpretation == "through_estimate":
+        n = range(len(V))
+        return [[sum(L[phi][e] * V[e][theta] for e in n) for theta in n] for phi in n]
+    return {"given_estimate": V, "given_truth": L}[interpretation]
+
+
 @pytest.mark.parametrize("interpretation", POSE_LIKELIHOODS)
 @pytest.mark.parametrize(
     ("spread", "plain"),
@@ -103,7 +111,7 @@ def belief():
 )
 def test_the_pose_ambiguity_is_the_triple_loop(interpretation, spread, plain):
     pair = random_conditionals(12)
-    T = (pair.viewpoint if interpretation == "given_estimate" else pair.estimate).tolist()
+    T = pose_table(pair, interpretation)
     table = ambiguity_table(pair, {"pose_likelihood": interpretation, "spread": spread})
     expected = plain_loops(pair.viewpoint.tolist(), T, T, plain)
     np.testing.assert_allclose(table, expected, atol=2e-5)

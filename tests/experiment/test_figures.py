@@ -253,7 +253,7 @@ def test_nearer_is_brighter_and_background_is_white():
     assert depth_limits(np.zeros((2, 2), np.uint8)) == (1, 255)
 
 
-@pytest.mark.parametrize("pose_likelihood", ["given_estimate", "given_truth"])
+@pytest.mark.parametrize("pose_likelihood", ["given_estimate", "through_estimate"])
 @pytest.mark.parametrize("spread", ["entropy", "circular_variance"])
 def test_the_spread_drawn_is_the_one_that_the_table_stores(drawn_from, pose_likelihood, spread):
     estimates = (np.arange(360) + np.random.default_rng(0).normal(0, 20, (5, 360))) % 360

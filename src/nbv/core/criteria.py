@@ -69,19 +69,24 @@ def rotation_groups(n_bins: int, numbers_each: int) -> Iterator[range]:
         yield range(start, min(start + at_once, n_bins))
 
 
-POSE_LIKELIHOODS = ("given_estimate", "given_truth")
+POSE_LIKELIHOODS: dict[str, Callable[[Conditionals], NDArray[np.floating[Any]]]] = {
+    "given_estimate": lambda pair: pair.viewpoint,
+    "given_truth": lambda pair: pair.estimate,
+    "through_estimate": lambda pair: pair.estimate @ pair.viewpoint,
+}
 
 
 def pose_likelihood(conditionals: Conditionals, name: str) -> Float32Array:
-    """Return T[viewpoint, pose] = p(pose | viewpoint) in one of its two interpretations.
+    """Return T[viewpoint, pose] = p(pose | viewpoint) in one of its three interpretations.
 
     ``given_estimate``: the spread of the truth if the viewpoint is the estimate (T = V).
     ``given_truth``: the spread of the estimates if the viewpoint is the truth (T = L).
+    ``through_estimate``: the belief about the pose that a true viewpoint leads to, through the
+    estimates of it: T = L V, sum_e p(e | viewpoint) p(pose | e).
     """
     if name not in POSE_LIKELIHOODS:
         raise UserError(f"density.pose_likelihood={name}: {nearest(name, POSE_LIKELIHOODS)}")
-    pose = conditionals.viewpoint if name == "given_estimate" else conditionals.estimate
-    return pose.astype(np.float32)
+    return POSE_LIKELIHOODS[name](conditionals).astype(np.float32)
 
 
 def two_view_poses(viewpoint: Float32Array, pose: Float32Array, delta_bins: int) -> Float32Array:

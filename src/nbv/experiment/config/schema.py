@@ -239,7 +239,7 @@ class Estimator(Section):
 class Density(Section):
     """The density of calibration pairs; see `nbv.core.selection`."""
 
-    pose_likelihood: Literal["given_estimate", "given_truth"]
+    pose_likelihood: Literal["given_estimate", "given_truth", "through_estimate"]
     spread: Literal["entropy", "circular_variance"]
     bandwidths_deg: Annotated[list[Bandwidth], AtLeastOne, Distinct]
     pseudo_observations: Annotated[list[PseudoObservations], AtLeastOne, Distinct]

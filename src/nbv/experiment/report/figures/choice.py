@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from nbv.core.angles import nearest_bin, wrap_deg
-from nbv.core.criteria import SPREADS, two_view_poses
+from nbv.core.criteria import SPREADS, pose_likelihood, two_view_poses
+from nbv.core.density import Conditionals
 from nbv.core.lookup import LookupTable
 from nbv.experiment.report.figures.inputs import (
     ExampleView,
@@ -94,7 +95,8 @@ def idea(inputs: FigureInputs) -> Figure:
     first = int(nearest_bin(shown.estimate_deg, n_bins))
     best = round(int(lookup.recommended_delta_deg[first]) / step)
     worst = int(np.argmax(lookup.cost[first]))
-    given = viewpoint if lookup.pose_likelihood == "given_estimate" else estimates
+    pair = Conditionals(viewpoint.astype(np.float64), estimates.astype(np.float64))
+    given = pose_likelihood(pair, lookup.pose_likelihood)
     one_view_color = method_style("single", ()).color
     two_view_color = inputs.style(inputs.settings.subject).color
     curves: list[list[tuple[Likelihood, str, str, str]]] = [
