@@ -1,4 +1,4 @@
-"""The Python of docs/camera.md, run with stand-ins for the programs of a robot.
+"""The Python of docs/drivers.md, run with stand-ins for the programs of a robot.
 
 What the stand-ins do is what the documents of librealsense, libfreenect, tf2 and MoveIt say. So a
 test finds what changes on our side, and not what changes on theirs.
@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 import nbv
 from nbv.robot.synthetic import Frame
 
-PAGE = Path(__file__).parents[2] / "docs/camera.md"
+PAGE = Path(__file__).parents[2] / "docs/drivers.md"
 SNIPPETS = re.findall(r"^```python\n(.*?)^```", PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE)
 MILLIMETRE = 0.001
 

@@ -14,6 +14,7 @@ SECTIONS = {
     "Use it": (
         "docs/five-minutes",
         "docs/camera",
+        "docs/drivers",
         "docs/turntable",
         "docs/your-estimator",
         "docs/own-category",
