@@ -242,7 +242,8 @@ from pathlib import Path
 from nbv.experiment.jobs import end_with_snakemake
 end_with_snakemake()
 for beat in range(600):
-    Path("beat.txt").write_text(str(beat))
+    Path("next.txt").write_text(str(beat))
+    Path("next.txt").replace("beat.txt")
     time.sleep(0.1)
 """
 
