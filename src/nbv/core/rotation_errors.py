@@ -1,0 +1,275 @@
+"""V and L of poses in three dimensions, from pairs of an estimate and the truth (docs/method.md).
+
+An estimator errs alike where it sees the object from alike directions, whatever the camera's roll.
+Pairs count by a kernel in this direction, in that of the estimate for V and of the truth for L. A
+pair whose error is small says that the estimate is right there. Any other, a flip, says where the
+pose is instead. Without small errors (`flip_deg` = 0) this is a kernel density, on the circle that
+of `nbv.core.density`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.core.rotations import (
+    ASYMMETRIC,
+    Array,
+    Rotations,
+    Symmetry,
+    spiral,
+    viewing_direction,
+)
+
+Given = Literal["estimate", "truth"]
+
+NEGLIGIBLE = 1e-3
+"""A flip of less weight than this is left out."""
+
+SPACING_DEG = 40.0
+"""Between other poses that are thought possible."""
+
+MOST_RATIO = 50.0
+"""A score never changes the odds of a flip by more than this factor."""
+
+
+@dataclass(frozen=True)
+class ScoreRatio:
+    """What an estimator's score says about its estimate being a flip.
+
+    Attributes
+    ----------
+    scores : ndarray (n,)
+        Sorted scores of calibration images. Only a score's rank among them counts.
+    slope, offset : float
+        log p(score | flip) / p(score | no flip) is ``offset + slope * logit(rank)``.
+    """
+
+    scores: Array
+    slope: float
+    offset: float
+
+    @classmethod
+    def fit(cls, scores: ArrayLike, is_flip: NDArray[np.bool_]) -> ScoreRatio:
+        """Fit by logistic regression on scores (n,) and flips (n,) of any objects."""
+        ordered = np.sort(np.asarray(scores, dtype=np.float64))
+        features = np.stack([_logit_rank(ordered, scores), np.ones(len(ordered))], axis=1)
+        n_flips = int(is_flip.sum())
+        if n_flips in (0, len(is_flip)):
+            return cls(ordered, 0.0, 0.0)
+        weights = np.array([0.0, np.log(n_flips / (len(is_flip) - n_flips))])
+        prior, ridge = weights[1], np.array([1e-3, 0.0])
+        for _ in range(50):
+            p = 1 / (1 + np.exp(-features @ weights))
+            hessian = (features * (p * (1 - p))[:, None]).T @ features + np.diag(ridge)
+            step = np.linalg.solve(hessian, features.T @ (is_flip - p) - ridge * weights)
+            weights = weights + step
+            if np.abs(step).max() < 1e-9:
+                break
+        return cls(ordered, float(weights[0]), float(weights[1] - prior))
+
+    def __call__(self, scores: ArrayLike) -> Array:
+        """Return the likelihood ratio of a flip for each score (n,)."""
+        log_ratio = self.offset + self.slope * _logit_rank(self.scores, scores)
+        return np.clip(np.exp(log_ratio), 1 / MOST_RATIO, MOST_RATIO)
+
+
+def _logit_rank(ordered: Array, scores: ArrayLike) -> Array:
+    sides = [np.searchsorted(ordered, scores, side) for side in ("left", "right")]
+    rank = (np.mean(sides, axis=0) + 0.5) / (len(ordered) + 1)
+    return np.asarray(np.log(rank / (1 - rank)))
+
+
+@dataclass(frozen=True)
+class RotationErrors:
+    """An estimator's errors on calibration images of one object or category.
+
+    Attributes
+    ----------
+    estimate, truth : ndarray (n, 3, 3)
+        Poses of the same image, object to camera.
+    symmetry : Symmetry
+    concentration : float
+        Of both kernels, exp(concentration (cos(angle) - 1)): 50 has a standard deviation of 8°.
+    pseudo_observations : float
+        Weight of what holds on average over all directions, against pairs that are seen from the
+        same one and weigh 1 each.
+    flip_deg : float
+        A larger error is a flip. Of 0: every pair is.
+    offsets : ndarray (m, 3, 3), optional
+        Poses that are thought possible, the estimate being the identity, which is the first. By
+        default the flips and about even poses `SPACING_DEG` apart.
+    ratio : ScoreRatio, optional
+        Needed where estimates have scores.
+    """
+
+    estimate: Rotations
+    truth: Rotations
+    symmetry: Symmetry = ASYMMETRIC
+    concentration: float = 50.0
+    pseudo_observations: float = 10.0
+    flip_deg: float = 20.0
+    offsets: Rotations = field(default=None)  # type: ignore[assignment]
+    ratio: ScoreRatio | None = None
+
+    def __post_init__(self) -> None:
+        if self.offsets is None:
+            object.__setattr__(self, "offsets", self._possible())
+
+    @cached_property
+    def error_deg(self) -> Array:
+        """The errors (n,) of the estimates modulo symmetry."""
+        return self.symmetry.distance_deg(self.estimate, self.truth)
+
+    @cached_property
+    def is_flip(self) -> NDArray[np.bool_]:
+        """Which pairs (n,) are flips."""
+        return np.asarray(self.error_deg > self.flip_deg) if self.flip_deg else self._every
+
+    @property
+    def _every(self) -> NDArray[np.bool_]:
+        return np.ones(len(self.estimate), dtype=bool)
+
+    @property
+    def share_of_flips(self) -> float:
+        """The probability of a flip over all directions, never 0."""
+        if not self.flip_deg:
+            return 1.0
+        return float((self.is_flip.sum() + 0.5) / (len(self.estimate) + 1))
+
+    def _possible(self) -> Rotations:
+        """Return the default offsets: the identity, each kind of flip, then others, all apart."""
+        flips = self.is_flip & (self.error_deg > SPACING_DEG / 2)
+        own = self.symmetry.canonical(self.estimate[flips])
+        seen = own.mT @ self.symmetry.nearest(self.truth[flips], own)
+        found = _apart(np.eye(3)[None], seen, SPACING_DEG / 2, self.symmetry)
+        return _apart(found, spiral(2000), SPACING_DEG, self.symmetry)
+
+    def possible_poses(self, estimate: Rotations) -> Rotations:
+        """Return the poses (m, 3, 3) that are thought possible after an estimate (3, 3)."""
+        return self.symmetry.canonical(estimate[None]) @ self.offsets
+
+    def flip_probability(self, rotations: Rotations, given: Given) -> Array:
+        """Return the probability of a flip for each estimated or true pose (n, 3, 3)."""
+        pairs = self.estimate if given == "estimate" else self.truth
+        weights = self._weights(rotations, pairs)
+        alpha = self.pseudo_observations
+        flips = weights[:, self.is_flip].sum(axis=1) + alpha * self.share_of_flips
+        return np.asarray(flips / (weights.sum(axis=1) + alpha))
+
+    def _weights(self, rotations: Rotations, pairs: Rotations) -> Array:
+        cosine = self.symmetry.direction_cosine(*map(viewing_direction, (rotations, pairs)))
+        return np.exp(self.concentration * (cosine - 1))
+
+    def conditional(
+        self,
+        given: Given,
+        support: Rotations,
+        moves: Rotations | None = None,
+        rows: Sequence[int] | NDArray[np.intp] | None = None,
+        ratio: ArrayLike = 1.0,
+    ) -> Array:
+        """Return V or L among the poses of a support, seen after moves of the camera.
+
+        Parameters
+        ----------
+        given : {"estimate", "truth"}
+            V, p(truth | estimate), or L, p(estimate | truth).
+        support : ndarray (m, 3, 3)
+            Possible poses in the first view.
+        moves : ndarray (k, 3, 3), optional
+            The view in which the estimator answers; the first one by default.
+        rows : (r,) int, optional
+            Indices of what is given, in the support; all by default.
+        ratio : float or ndarray (r,)
+            Likelihood ratio of a flip by the score, of what is given for V; for L see `beliefs`.
+
+        Returns
+        -------
+        ndarray (k, r, m)
+            Rows that sum to 1, of poses in the first view.
+        """
+        m = len(support)
+        moves = np.eye(3)[None] if moves is None else moves
+        own = np.arange(m) if rows is None else np.asarray(rows)
+        poses = (moves[:, None] @ support[own]).reshape(-1, 3, 3)
+        known, other = self.estimate, self.truth
+        if given == "truth":
+            known, other = other, known
+        weights = self._weights(poses, known)
+        alpha, share = self.pseudo_observations, self.share_of_flips
+        right = weights[:, ~self.is_flip].sum(axis=1) + alpha * (1 - share)
+        flips = np.flatnonzero(self.is_flip)
+        result = np.full((len(poses), m), alpha * share / m)
+        i, k = np.nonzero(weights[:, flips] > NEGLIGIBLE)
+        if len(i):
+            pair = flips[k]
+            turn = self.symmetry.towards(viewing_direction(poses[i]), known[pair])
+            roll = _roll(poses[i] @ (known[pair] @ turn).mT)
+            where = moves[i // len(own)].mT @ roll @ other[pair]
+            # Single precision halves the time.
+            kernel = self.symmetry.cosine(where.astype(np.float32), support.astype(np.float32))
+            kernel = np.exp(self.concentration * (kernel - kernel.max(axis=1, keepdims=True)))
+            kernel *= (weights[i, pair] / kernel.sum(axis=1))[:, None]
+            starts = np.flatnonzero(np.diff(i, prepend=-1))
+            result[i[starts]] += np.add.reduceat(kernel, starts)
+        result = result.reshape(len(moves), len(own), m) * np.reshape(ratio, (-1, 1))
+        result[:, np.arange(len(own)), own] += right.reshape(len(moves), -1)
+        total = result.sum(axis=2, keepdims=True)
+        np.divide(result, total, out=result, where=total > 0)
+        result[total[..., 0] <= 0] = 1 / m
+        return result
+
+    def subset(self, kept: NDArray[np.bool_]) -> RotationErrors:
+        """Return the same of some of the pairs, a mask (n,), with their own offsets."""
+        chosen = self.estimate[kept], self.truth[kept]
+        return replace(self, estimate=chosen[0], truth=chosen[1], offsets=None)
+
+    def direction_gain(self, groups: Sequence[Hashable] | NDArray[Any]) -> float:
+        """Return what the viewing direction tells about flips of pairs of other groups, in nats.
+
+        It is the mean log likelihood of flips by direction, less that by their share alone;
+        `groups` (n,) are what would be new: objects, or instances of one. It is not above 0 where
+        calibration shows no dependence on the view.
+        """
+        labels = np.unique(np.asarray(groups), return_inverse=True)[1]
+        gains = []
+        for label in range(labels.max() + 1):
+            own = labels == label
+            if own.all():
+                return 0.0
+            others = replace(
+                self, estimate=self.estimate[~own], truth=self.truth[~own], offsets=self.offsets
+            )
+            flips = self.is_flip[own]
+            by_view = others.flip_probability(self.estimate[own], "estimate")
+            by_share = np.full(len(flips), others.share_of_flips)
+            likelihoods = [np.log(np.where(flips, p, 1 - p)) for p in (by_view, by_share)]
+            gains.append(float(np.sum(likelihoods[0] - likelihoods[1])))
+        return sum(gains) / len(labels)
+
+
+def _apart(kept: Rotations, more: Rotations, spacing_deg: float, symmetry: Symmetry) -> Rotations:
+    """Return rotations and those of some more that are apart from all before."""
+    nearest = np.cos(np.radians(spacing_deg))
+    for rotation in more:
+        if symmetry.cosine(rotation[None], kept).max() < nearest:
+            kept = np.concatenate([kept, rotation[None]])
+    return kept
+
+
+def _roll(rotations: Rotations) -> Rotations:
+    """Return the turn about the optical axis nearest to each rotation (n, 3, 3)."""
+    a = rotations
+    angle = np.arctan2(a[:, 1, 0] - a[:, 0, 1], a[:, 0, 0] + a[:, 1, 1])
+    roll = np.zeros_like(a)
+    roll[:, 0, 0] = roll[:, 1, 1] = np.cos(angle)
+    roll[:, 1, 0] = np.sin(angle)
+    roll[:, 0, 1] = -roll[:, 1, 0]
+    roll[:, 2, 2] = 1
+    return roll

@@ -1,0 +1,268 @@
+"""Rotations, and what a symmetric object makes of them.
+
+A pose is a rotation R (3, 3) from the object's axes to the camera's, x right, y down, z forward
+(BOP's convention). A camera that moves by M sees the pose M R. An object looks the same in R and in
+R g for each element g of its symmetry group; every function here gives the same answer for both.
+Arrays of rotations are (..., 3, 3) float64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.errors import UserError
+
+Array = NDArray[np.float64]
+Rotations = NDArray[np.float64]
+
+MOST_ELEMENTS = 60
+"""Rotations of an icosahedron, the largest finite group that is not that of a prism."""
+
+NOT_A_ROTATION = 1e-3
+"""Most that an entry of R Rᵀ may differ from the identity: files have six digits."""
+
+_SAME = 1e-5  # Two elements of a group are one; of the trace: 0.2 degrees.
+
+
+def check_rotations(name: str, rotations: ArrayLike) -> Rotations:
+    """Return rotations (..., 3, 3) as float64.
+
+    Raises
+    ------
+    UserError
+        Names the first matrix that is not a rotation, and why.
+    """
+    try:
+        array = np.asarray(rotations, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise UserError(f"{name} has an entry that is not a number") from None
+    if array.shape[-2:] != (3, 3):
+        raise UserError(f"{name} is {array.shape} instead of (..., 3, 3)")
+    flat = array.reshape(-1, 3, 3)
+    skewed = ~(np.abs(flat @ flat.mT - np.eye(3)) <= NOT_A_ROTATION).all(axis=(1, 2))
+    reflected = ~skewed & (np.linalg.det(np.where(skewed[:, None, None], 0, flat)) < 0)
+    for bad, reason in (
+        (skewed, "no rotation: its rows are not perpendicular unit vectors"),
+        (reflected, "a reflection: its determinant is -1; give right-handed axes"),
+    ):
+        if bad.any():
+            row = f"[{np.argmax(bad)}]" if array.ndim > 2 else ""
+            raise UserError(f"{name}{row} is {reason}")
+    return array
+
+
+def viewing_direction(rotations: Rotations) -> Array:
+    """Return the direction (..., 3) from which the object is seen, a unit vector on its axes."""
+    return np.asarray(-rotations[..., 2, :])
+
+
+def along_ray(translation: ArrayLike) -> Rotations:
+    """Return the turn (..., 3, 3) of a camera that looks straight at an object, from where it is.
+
+    `translation` (..., 3) is the object's position in the camera, z > 0. The pose of an object off
+    the image's centre, multiplied by this from the left, depends on the direction from which the
+    object is seen and on the camera's roll alone.
+    """
+    ray = np.asarray(translation, dtype=np.float64)
+    ray = ray / np.linalg.norm(ray, axis=-1, keepdims=True)
+    x, y, z = np.moveaxis(ray, -1, 0)
+    # The smallest rotation that takes the ray to the optical axis.
+    k = 1 / (1 + z)
+    rows = [[1 - k * x * x, -k * x * y, -x], [-k * x * y, 1 - k * y * y, -y], [x, y, z]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def spiral(n: int) -> Rotations:
+    """Return n nearly uniform rotations (n, 3, 3): super-Fibonacci spirals (Alexa, 2022)."""
+    s = np.arange(n) + 0.5
+    inner, outer = np.sqrt(s / n), np.sqrt(1 - s / n)
+    alpha, beta = 2 * np.pi * s / np.sqrt(2), 2 * np.pi * s / 1.533751168755204288118041
+    parts = (inner * np.sin(alpha), inner * np.cos(alpha), outer * np.sin(beta))
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(np.stack([*parts, outer * np.cos(beta)], axis=-1)).as_matrix()
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """The rotations g under which an object looks the same: R and R g are one pose.
+
+    Attributes
+    ----------
+    discrete : ndarray (n, 3, 3)
+        A finite group; the first is the identity.
+    axis : ndarray (3,) or None
+        A unit vector. Every turn about it belongs to the group too; `discrete` then maps it to
+        itself or its opposite.
+    """
+
+    discrete: Rotations
+    axis: Array | None = None
+
+    @classmethod
+    def from_bop(cls, entry: Mapping[str, Any]) -> Symmetry:
+        """Return the symmetry of an object's entry in BOP's ``models_info.json``.
+
+        An entry without ``symmetries_discrete`` and ``symmetries_continuous`` is asymmetric.
+
+        Raises
+        ------
+        UserError
+            If a symmetry is no rotation, the rotations form no group of a solid, or the object
+            turns freely about more than one axis.
+        """
+        turns = [np.eye(3)]
+        for matrix in entry.get("symmetries_discrete", ()):
+            if np.size(matrix) != 16:
+                raise UserError("symmetries_discrete has a matrix without 16 numbers")
+            corner = np.reshape(matrix, (4, 4))[:3, :3]
+            turns.append(check_rotations("a matrix of symmetries_discrete", corner))
+        axes = entry.get("symmetries_continuous", ())
+        if len(axes) > 1:
+            raise UserError("symmetries_continuous has more than one axis: such a pose has no error")
+        group = _closed(turns)
+        if not axes:
+            return cls(group)
+        axis = np.asarray(axes[0].get("axis", ()), dtype=np.float64)
+        if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
+            raise UserError("symmetries_continuous has an axis without three numbers")
+        axis = axis / np.linalg.norm(axis)
+        images = group @ axis
+        if (np.abs(images @ axis) < 1 - NOT_A_ROTATION).any():
+            raise UserError("symmetries_discrete turns the axis of symmetries_continuous away")
+        # Of the rest only whether it turns the object upside down matters.
+        flips = images @ axis < 0
+        return cls(group[[0, np.argmax(flips)]] if flips.any() else group[:1], axis)
+
+    def cosine(self, first: Rotations, second: Rotations) -> Array:
+        """Return the cosine of the smallest angle between all poses (n, 3, 3) and (m, 3, 3)."""
+        if self.axis is not None:
+            images = [second @ (g @ self.axis) for g in self.discrete]
+            cosine = _largest(first @ self.axis, images)
+        else:
+            flat = first.reshape(len(first), 9)
+            cosine = _largest(flat, [(second @ g).reshape(len(second), 9) for g in self.discrete])
+            cosine -= 1
+            cosine /= 2
+        return np.clip(cosine, -1, 1, out=cosine)
+
+    def distance_deg(self, first: Rotations, second: Rotations) -> Array:
+        """Return the smallest angle between poses (..., 3, 3), in [0, 180], pair by pair."""
+        first, second = np.broadcast_arrays(first, second)
+        near = self.nearest(second.reshape(-1, 3, 3), first.reshape(-1, 3, 3))
+        return _angle_deg(first.reshape(-1, 3, 3).mT @ near).reshape(first.shape[:-2])
+
+    def nearest(self, rotations: Rotations, target: Rotations) -> Rotations:
+        """Return R g (n, 3, 3), of all g the one nearest to the target, pair by pair."""
+        turned = rotations[:, None] @ self.discrete
+        if self.axis is not None:
+            q = target.mT[:, None] @ turned
+            p1, p2 = _across(self.axis)
+            sine = np.einsum("i,ndij,j->nd", p1, q, p2) - np.einsum("i,ndij,j->nd", p2, q, p1)
+            cosine = np.einsum("i,ndij,j->nd", p1, q, p1) + np.einsum("i,ndij,j->nd", p2, q, p2)
+            turned = turned @ _turns(self.axis, np.arctan2(sine, cosine))
+        best = np.einsum("nij,ndij->nd", target, turned).argmax(axis=1)
+        return np.asarray(turned[np.arange(len(turned)), best])
+
+    def canonical(self, rotations: Rotations) -> Rotations:
+        """Return the same R g (n, 3, 3) for every R g of a pose: the nearest to the identity."""
+        return self.nearest(rotations, np.broadcast_to(np.eye(3), rotations.shape))
+
+    def direction_cosine(self, first: Array, second: Array) -> Array:
+        """Return the cosine of the smallest angle between all directions (n, 3) and (m, 3)."""
+        if self.axis is None:
+            return _largest(first, [second @ g for g in self.discrete])
+        along, images = first @ self.axis, second @ (self.discrete @ self.axis).T
+        across = np.sqrt(np.maximum(0, 1 - along**2))
+        images_across = np.sqrt(np.maximum(0, 1 - images**2))
+        products = along[:, None, None] * images + across[:, None, None] * images_across
+        return np.asarray(products.max(axis=-1))
+
+    def towards(self, directions: Array, rotations: Rotations) -> Rotations:
+        """Return the g (n, 3, 3) with which R g is seen from nearest to a direction (n, 3)."""
+        elements = np.broadcast_to(self.discrete, (len(rotations), *self.discrete.shape))
+        if self.axis is not None:
+            p1, p2 = _across(self.axis)
+            seen = viewing_direction(rotations[:, None] @ elements)
+            angle = np.arctan2(seen @ p2, seen @ p1)
+            angle = angle - np.arctan2(directions @ p2, directions @ p1)[:, None]
+            elements = elements @ _turns(self.axis, angle)
+        seen = viewing_direction(rotations[:, None] @ elements)
+        best = np.einsum("nj,ndj->nd", directions, seen).argmax(axis=1)
+        return np.asarray(elements[np.arange(len(elements)), best])
+
+    def mean(self, rotations: Rotations, weights: ArrayLike | None = None) -> Rotations:
+        """Return the mean pose (3, 3) of (n, 3, 3), each taken nearest to the first.
+
+        Of two it is the middle of the shortest way, the first where they are half a turn apart.
+        """
+        near = self.nearest(rotations, np.broadcast_to(rotations[0], rotations.shape))
+        return chordal_mean(near, weights)
+
+
+ASYMMETRIC = Symmetry(np.eye(3)[None])
+
+
+def chordal_mean(rotations: Rotations, weights: ArrayLike | None = None) -> Rotations:
+    """Return the rotation (3, 3) of least mean squared chord, the first where there is no one."""
+    share = np.ones(len(rotations)) if weights is None else np.asarray(weights)
+    u, size, vt = np.linalg.svd(np.tensordot(share / share.sum(), rotations, 1))
+    sign = np.linalg.det(u @ vt)
+    if size[1] + sign * size[2] < 1e-9:
+        return rotations[0]
+    return np.asarray(u @ np.diag([1.0, 1.0, sign]) @ vt)
+
+
+def _angle_deg(rotations: Rotations) -> Array:
+    """Return the angle of rotations (n, 3, 3): from sine and cosine, so that 0 is exact."""
+    sine = np.linalg.norm((rotations - rotations.mT).reshape(-1, 9), axis=1) / np.sqrt(2)
+    return np.degrees(np.arctan2(sine, np.trace(rotations, axis1=1, axis2=2) - 1))
+
+
+def _largest(first: Array, images: Sequence[Array]) -> Array:
+    """Return the largest of the products of rows (n, d) and each set of rows (m, d), (n, m)."""
+    best = first @ images[0].T
+    for image in images[1:]:
+        np.maximum(best, first @ image.T, out=best)
+    return np.asarray(best)
+
+
+def _across(axis: Array) -> tuple[Array, Array]:
+    """Return two unit vectors that form a right-handed frame with the axis."""
+    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def _turns(axis: Array, angle_rad: Array) -> Rotations:
+    """Return the turns (..., 3, 3) about an axis."""
+    p1, p2 = _across(axis)
+    cosine, sine = (part(angle_rad)[..., None, None] for part in (np.cos, np.sin))
+    flat = np.outer(p1, p1) + np.outer(p2, p2)
+    return np.asarray(
+        np.outer(axis, axis) + cosine * flat + sine * (np.outer(p2, p1) - np.outer(p1, p2))
+    )
+
+
+def _closed(turns: Sequence[Rotations]) -> Rotations:
+    """Return the group that rotations generate, the identity first."""
+    group = [turns[0]]
+    for generator in turns[1:]:
+        queue = [generator]
+        while queue:
+            new = queue.pop()
+            if max(np.trace(new @ g.T) for g in group) > 3 - _SAME:
+                continue
+            group.append(new)
+            if len(group) > MOST_ELEMENTS:
+                raise UserError(
+                    f"symmetries_discrete makes more than {MOST_ELEMENTS} rotations: a prism of "
+                    "so many sides turns freely, in symmetries_continuous"
+                )
+            queue += [product for g in list(group) for product in (new @ g, g @ new)]
+    return np.stack(group)
