@@ -125,7 +125,9 @@ def test_a_camera_that_looks_straight_sees_the_object_on_its_axis():
     position = np.array([[100.0, -250.0, 700.0], [0.0, 0.0, 1.0]])
     turns = along_ray(position)
     seen = (turns @ position[..., None])[..., 0]
-    np.testing.assert_allclose(seen, np.linalg.norm(position, axis=1)[:, None] * [0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(
+        seen, np.linalg.norm(position, axis=1)[:, None] * [0, 0, 1], atol=1e-9
+    )
     np.testing.assert_allclose(check_rotations("turns", turns)[1], np.eye(3))
 
 

@@ -160,7 +160,7 @@ def expected_error(first: RotationBelief, moves: Rotations) -> Array:
     joint = first.probability[:, None] * errors.conditional("truth", support, moves)
     if not errors.flip_deg:
         weights = np.swapaxes(joint, 1, 2).reshape(-1, len(support))
-        fused = np.stack([chordal_mean(support, row) for row in np.maximum(weights, 1e-300)])
+        fused = chordal_mean(support, np.maximum(weights, np.finfo(float).tiny))
         angles = np.degrees(np.arccos(errors.symmetry.cosine(fused, support)))
         return np.asarray((weights * angles).reshape(len(moves), -1).sum(axis=1))
     distance = np.degrees(np.arccos(errors.symmetry.cosine(support, support)))

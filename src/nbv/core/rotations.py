@@ -88,6 +88,9 @@ def spiral(n: int) -> Rotations:
     return Rotation.from_quat(np.stack([*parts, outer * np.cos(beta)], axis=-1)).as_matrix()
 
 
+_OBLIQUE = np.array([0.35, 0.55, 0.76])
+
+
 @dataclass(frozen=True)
 class Symmetry:
     """The rotations g under which an object looks the same: R and R g are one pose.
@@ -124,7 +127,9 @@ class Symmetry:
             turns.append(check_rotations("a matrix of symmetries_discrete", corner))
         axes = entry.get("symmetries_continuous", ())
         if len(axes) > 1:
-            raise UserError("symmetries_continuous has more than one axis: such a pose has no error")
+            raise UserError(
+                "symmetries_continuous has more than one axis: such a pose has no error"
+            )
         group = _closed(turns)
         if not axes:
             return cls(group)
@@ -170,8 +175,12 @@ class Symmetry:
         return np.asarray(turned[np.arange(len(turned)), best])
 
     def canonical(self, rotations: Rotations) -> Rotations:
-        """Return the same R g (n, 3, 3) for every R g of a pose: the nearest to the identity."""
-        return self.nearest(rotations, np.broadcast_to(np.eye(3), rotations.shape))
+        """Return the same R g (n, 3, 3) for every R g of a pose, whatever the camera's roll.
+
+        It is the one that is seen from nearest to a direction in which no group has a symmetry.
+        """
+        oblique = np.broadcast_to(_OBLIQUE, (len(rotations), 3))
+        return rotations @ self.towards(oblique, rotations)
 
     def direction_cosine(self, first: Array, second: Array) -> Array:
         """Return the cosine of the smallest angle between all directions (n, 3) and (m, 3)."""
@@ -209,13 +218,17 @@ ASYMMETRIC = Symmetry(np.eye(3)[None])
 
 
 def chordal_mean(rotations: Rotations, weights: ArrayLike | None = None) -> Rotations:
-    """Return the rotation (3, 3) of least mean squared chord, the first where there is no one."""
-    share = np.ones(len(rotations)) if weights is None else np.asarray(weights)
-    u, size, vt = np.linalg.svd(np.tensordot(share / share.sum(), rotations, 1))
+    """Return the rotations (..., 3, 3) of least mean squared chord to rotations (n, 3, 3).
+
+    `weights` are (..., n), 1 by default. Where there is no such one, it is the first.
+    """
+    share = np.ones(len(rotations)) if weights is None else np.asarray(weights, dtype=np.float64)
+    mean = (share / share.sum(axis=-1, keepdims=True)) @ rotations.reshape(-1, 9)
+    u, size, vt = np.linalg.svd(mean.reshape(*share.shape[:-1], 3, 3))
     sign = np.linalg.det(u @ vt)
-    if size[1] + sign * size[2] < 1e-9:
-        return rotations[0]
-    return np.asarray(u @ np.diag([1.0, 1.0, sign]) @ vt)
+    u[..., 2] *= sign[..., None]
+    undefined = size[..., 1] + sign * size[..., 2] < 1e-9
+    return np.where(undefined[..., None, None], rotations[0], u @ vt)
 
 
 def _angle_deg(rotations: Rotations) -> Array:
