@@ -7,7 +7,7 @@ view. The estimator's errors are those of other instances of the object.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,11 @@ from nbv.core.rotation_views import (
     CRITERIA,
     average,
     belief,
-    best_move,
     costs_of,
     posterior,
     turn_deg,
 )
-from nbv.core.rotations import Symmetry, along_ray, check_rotations, viewing_direction
+from nbv.core.rotations import Symmetry, along_ray, check_rotations
 
 Array = NDArray[np.float64]
 
@@ -56,12 +55,13 @@ def read_instances(path: Path, objects: Sequence[str]) -> list[Instance]:
     keys = ["object_id", "scene_id", "instance"]
     for key, rows in table[table["object_id"].isin(objects)].groupby(keys):
         ray = along_ray(_numbers(rows["t_true_mm"]))
-        poses = [
+        truth, estimate = (
             ray @ check_rotations(name, _numbers(rows[name]).reshape(-1, 3, 3))
             for name in ("R_true", "R_estimate")
-        ]
+        )
         score = rows["score"].to_numpy(dtype=np.float64)
-        instances.append(Instance(key[0], "_".join(map(str, key)), *poses, score))
+        name = "_".join(map(str, key))
+        instances.append(Instance(rows["object_id"].iloc[0], name, truth, estimate, score))
     return instances
 
 
@@ -96,41 +96,128 @@ def errors_of(
 
 
 FUSIONS = ("average", "posterior", "score")
-CHOICES = ("random", "opposite", *CRITERIA)
+"""Eq. 7, the posterior, and the posterior with the estimator's scores."""
+
+FIVE = 5
+"""So many of the best-ranked images are reported too: a robot may not reach the first."""
 
 
-def two_view_errors(
-    one: Instance, errors: RotationErrors
-) -> tuple[dict[str, Array], dict[str, Array], Array]:
-    """Return errors and costs of every second view of an instance after every first one.
+@dataclass(frozen=True)
+class TwoViews:
+    """Every pair of views of an instance with n images.
 
-    Returns
-    -------
-    dict of str to ndarray (n, n)
-        For each fusion the error, [first, second] view, degrees. The diagonal is of one view.
-    dict of str to ndarray (n, n)
-        For each criterion the cost.
-    ndarray (n, n)
-        By how much the camera turns, degrees.
+    Attributes
+    ----------
+    error_deg : dict of str to ndarray (n, n)
+        Of each fusion, [first, second view]; the diagonal is of one view.
+    cost : dict of str to ndarray (n, n)
+        Of each criterion.
+    turn_deg : ndarray (n, n)
+        The angle between the views.
+    depends_on_view : bool
+        Whether calibration shows that flips depend on the view.
     """
-    n, own = len(one.truth), errors.symmetry
-    error = {name: np.empty((n, n)) for name in FUSIONS}
+
+    error_deg: Mapping[str, Array]
+    cost: Mapping[str, Array]
+    turn_deg: Array
+    depends_on_view: bool
+
+
+def two_views(one: Instance, errors: RotationErrors, depends_on_view: bool) -> TwoViews:
+    """Evaluate every pair of views of an instance."""
+    n = len(one.truth)
+    fused = {name: np.empty((n, n, 3, 3)) for name in FUSIONS}
     cost = {name: np.empty((n, n)) for name in CRITERIA}
     turns = np.empty((n, n))
     for i in range(n):
         moves = one.truth @ one.truth[i].T
         turns[i] = turn_deg(moves)
-        first = belief(errors, one.estimate[i : i + 1], np.eye(3)[None])
+        first = belief(errors, one.estimate[[i]], np.eye(3)[None])
         for name in CRITERIA:
             cost[name][i] = costs_of(name, first, moves)
         for j in range(n):
             views = [i] if i == j else [i, j]
             given = errors, one.estimate[views], moves[views]
-            fused = {
-                "average": average(*given),
-                "posterior": posterior(*given),
-                "score": posterior(*given, one.score[views]),
-            }
-            for name, pose in fused.items():
-                error[name][i, j] = own.distance_deg(pose, one.truth[i])
-    return error, cost, turns
+            fused["average"][i, j] = average(*given)
+            fused["posterior"][i, j] = posterior(*given)
+            fused["score"][i, j] = posterior(*given, one.score[views])
+    distance = errors.symmetry.distance_deg
+    error = {name: distance(poses, one.truth[:, None]) for name, poses in fused.items()}
+    return TwoViews(error, cost, turns, depends_on_view)
+
+
+def chosen_views(found: TwoViews, fusion: str) -> dict[str, NDArray[np.intp]]:
+    """Return the second views (n, k) that each method takes after each first one.
+
+    Where a method takes several, their mean counts.
+    """
+    n = len(found.turn_deg)
+    first = np.arange(n)[:, None]
+    others = np.array([np.delete(np.arange(n), i) for i in range(n)])
+    error, turns = found.error_deg[fusion][first, others], found.turn_deg[first, others]
+    farthest = others[first, turns.argmax(axis=1)[:, None]]
+    chosen = {"single": first, "random": others, "opposite": farthest}
+    for name, cost in found.cost.items():
+        order = np.lexsort((turns, np.round(cost[first, others], 9)), axis=1)
+        ranked = np.take_along_axis(others, order, axis=1)
+        chosen[name] = ranked[:, :1]
+        chosen[f"{name}_five"] = ranked[:, :FIVE]
+    chosen["recommended"] = chosen["expected_error"] if found.depends_on_view else farthest
+    chosen["hindsight"] = others[first, error.argmin(axis=1)[:, None]]
+    chosen["oracle"] = np.concatenate(
+        [_oracle(error, turns, others, found.turn_deg, half) for half in (0, 1)], axis=1
+    )
+    return chosen
+
+
+def _oracle(
+    error: Array, turns: Array, others: NDArray[np.intp], between: Array, half: int
+) -> NDArray[np.intp]:
+    """Return views (n, 1) of one half that are nearest to the best ones of the other half."""
+    first = np.arange(len(others))[:, None]
+    own = np.arange(others.shape[1]) % 2 == half
+    best = np.where(own, np.inf, error).argmin(axis=1)[:, None]
+    away = np.where(own, between[others[first, best], others], np.inf)
+    return np.asarray(others[first, away.argmin(axis=1)[:, None]])
+
+
+def evaluate(
+    path: Path, symmetries: Mapping[str, Symmetry], settings: Mapping[str, Any]
+) -> pd.DataFrame:
+    """Return the figures of every instance, fusion and method.
+
+    ``settings`` has ``objects``, which are evaluated, and ``score_objects``, which say what a score
+    is worth; and those of `RotationErrors`.
+    """
+    instances = read_instances(path, settings["objects"])
+    scored = read_instances(path, settings["score_objects"])
+    model = {k: settings[k] for k in ("concentration", "pseudo_observations", "flip_deg")}
+    rows = []
+    for one in instances:
+        others = [o for o in instances if o.object_id == one.object_id and o is not one]
+        if not others:
+            continue
+        symmetry = symmetries[one.object_id]
+        ratio = score_ratio(scored, symmetries, one.object_id, model["flip_deg"])
+        errors = errors_of(others, symmetry, ratio, model)
+        groups = np.repeat([o.name for o in others], [len(o.truth) for o in others])
+        found = two_views(one, errors, errors.depends_on_view(groups))
+        for fusion, error_deg in found.error_deg.items():
+            for method, views in chosen_views(found, fusion).items():
+                error = np.take_along_axis(error_deg, views, axis=1)
+                rows.append(
+                    {
+                        "object_id": one.object_id,
+                        "instance": one.name,
+                        "n_images": len(one.truth),
+                        "depends_on_view": found.depends_on_view,
+                        "fusion": fusion,
+                        "method": method,
+                        "mean_deg": error.mean(),
+                        "median_deg": np.median(error),
+                        "above_30": (error > 30).mean(),
+                        "within_15": (error < 15).mean(),
+                    }
+                )
+    return pd.DataFrame(rows)

@@ -10,7 +10,7 @@ of `nbv.core.density`.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -114,12 +114,8 @@ class RotationErrors:
     concentration: float = 50.0
     pseudo_observations: float = 10.0
     flip_deg: float = 20.0
-    offsets: Rotations = field(default=None)  # type: ignore[assignment]
+    offsets: Rotations | None = None
     ratio: ScoreRatio | None = None
-
-    def __post_init__(self) -> None:
-        if self.offsets is None:
-            object.__setattr__(self, "offsets", self._possible())
 
     @cached_property
     def error_deg(self) -> Array:
@@ -129,11 +125,9 @@ class RotationErrors:
     @cached_property
     def is_flip(self) -> NDArray[np.bool_]:
         """Which pairs (n,) are flips."""
-        return np.asarray(self.error_deg > self.flip_deg) if self.flip_deg else self._every
-
-    @property
-    def _every(self) -> NDArray[np.bool_]:
-        return np.ones(len(self.estimate), dtype=bool)
+        if not self.flip_deg:
+            return np.ones(len(self.estimate), dtype=bool)
+        return np.asarray(self.error_deg > self.flip_deg)
 
     @property
     def share_of_flips(self) -> float:
@@ -142,8 +136,11 @@ class RotationErrors:
             return 1.0
         return float((self.is_flip.sum() + 0.5) / (len(self.estimate) + 1))
 
-    def _possible(self) -> Rotations:
-        """Return the default offsets: the identity, each kind of flip, then others, all apart."""
+    @cached_property
+    def possible(self) -> Rotations:
+        """The `offsets` (m, 3, 3): by default the identity, each kind of flip and others, apart."""
+        if self.offsets is not None:
+            return self.offsets
         flips = self.is_flip & (self.error_deg > SPACING_DEG / 2)
         own = self.symmetry.canonical(self.estimate[flips])
         seen = own.mT @ self.symmetry.nearest(self.truth[flips], own)
@@ -152,7 +149,7 @@ class RotationErrors:
 
     def possible_poses(self, estimate: Rotations) -> Rotations:
         """Return the poses (m, 3, 3) that are thought possible after an estimate (3, 3)."""
-        return self.symmetry.canonical(estimate[None]) @ self.offsets
+        return self.symmetry.canonical(estimate[None]) @ self.possible
 
     def flip_probability(self, rotations: Rotations, given: Given) -> Array:
         """Return the probability of a flip for each estimated or true pose (n, 3, 3)."""
@@ -164,7 +161,7 @@ class RotationErrors:
 
     def _weights(self, rotations: Rotations, pairs: Rotations) -> Array:
         cosine = self.symmetry.direction_cosine(*map(viewing_direction, (rotations, pairs)))
-        return np.exp(self.concentration * (cosine - 1))
+        return np.asarray(np.exp(self.concentration * (cosine - 1)))
 
     def conditional(
         self,
@@ -225,33 +222,27 @@ class RotationErrors:
         result[total[..., 0] <= 0] = 1 / m
         return result
 
-    def subset(self, kept: NDArray[np.bool_]) -> RotationErrors:
-        """Return the same of some of the pairs, a mask (n,), with their own offsets."""
-        chosen = self.estimate[kept], self.truth[kept]
-        return replace(self, estimate=chosen[0], truth=chosen[1], offsets=None)
+    def depends_on_view(self, groups: Sequence[Hashable] | NDArray[Any]) -> bool:
+        """Return whether the viewing direction says more about flips than their share does.
 
-    def direction_gain(self, groups: Sequence[Hashable] | NDArray[Any]) -> float:
-        """Return what the viewing direction tells about flips of pairs of other groups, in nats.
-
-        It is the mean log likelihood of flips by direction, less that by their share alone;
-        `groups` (n,) are what would be new: objects, or instances of one. It is not above 0 where
-        calibration shows no dependence on the view.
+        It compares the log likelihoods of the flips of each group, an instance or an object, given
+        the pairs of all others. A gain of more than a standard error over groups counts. Where
+        nothing depends on the view, the farthest is as good as any.
         """
         labels = np.unique(np.asarray(groups), return_inverse=True)[1]
-        gains = []
-        for label in range(labels.max() + 1):
+        n_groups = int(labels.max()) + 1
+        if n_groups < 2:
+            return False
+        gains = np.empty(n_groups)
+        for label in range(n_groups):
             own = labels == label
-            if own.all():
-                return 0.0
-            others = replace(
-                self, estimate=self.estimate[~own], truth=self.truth[~own], offsets=self.offsets
-            )
-            flips = self.is_flip[own]
+            others = replace(self, estimate=self.estimate[~own], truth=self.truth[~own])
             by_view = others.flip_probability(self.estimate[own], "estimate")
-            by_share = np.full(len(flips), others.share_of_flips)
-            likelihoods = [np.log(np.where(flips, p, 1 - p)) for p in (by_view, by_share)]
-            gains.append(float(np.sum(likelihoods[0] - likelihoods[1])))
-        return sum(gains) / len(labels)
+            shares = np.full_like(by_view, others.share_of_flips)
+            flips = self.is_flip[own]
+            by_view, shares = (np.where(flips, p, 1 - p) for p in (by_view, shares))
+            gains[label] = np.log(by_view / shares).sum()
+        return bool(gains.mean() > gains.std(ddof=1) / np.sqrt(n_groups))
 
 
 def _apart(kept: Rotations, more: Rotations, spacing_deg: float, symmetry: Symmetry) -> Rotations:

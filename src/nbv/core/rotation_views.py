@@ -51,7 +51,7 @@ class RotationBelief:
         if not self.errors.flip_deg:
             return chordal_mean(self.support, self.probability)
         voted = self.probability[self.votes]
-        return self.support[self.votes[np.argmax(voted)]]
+        return np.asarray(self.support[self.votes[np.argmax(voted)]])
 
     @property
     def expected_error_deg(self) -> float:
@@ -202,8 +202,8 @@ def costs_of(criterion: str, first: RotationBelief, moves: Rotations) -> Array:
 def best_move(costs: Array | None, moves: Rotations) -> int:
     """Return the index of the move of least cost, among equals that of the smallest turn.
 
-    Without costs, because calibration shows no dependence on the view (`direction_gain`), it is the
-    farthest.
+    Without costs, because calibration shows no dependence on the view, it is the farthest; see
+    `RotationErrors.depends_on_view`.
     """
     turns = turn_deg(moves)
     if costs is None:

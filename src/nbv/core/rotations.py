@@ -44,7 +44,8 @@ def check_rotations(name: str, rotations: ArrayLike) -> Rotations:
     if array.shape[-2:] != (3, 3):
         raise UserError(f"{name} is {array.shape} instead of (..., 3, 3)")
     flat = array.reshape(-1, 3, 3)
-    skewed = ~(np.abs(flat @ flat.mT - np.eye(3)) <= NOT_A_ROTATION).all(axis=(1, 2))
+    skewed = np.abs(flat @ flat.mT - np.eye(3)).max(axis=(1, 2))
+    skewed = np.asarray(~(skewed <= NOT_A_ROTATION))
     reflected = ~skewed & (np.linalg.det(np.where(skewed[:, None, None], 0, flat)) < 0)
     for bad, reason in (
         (skewed, "no rotation: its rows are not perpendicular unit vectors"),
@@ -142,7 +143,7 @@ class Symmetry:
             raise UserError("symmetries_discrete turns the axis of symmetries_continuous away")
         # Of the rest only whether it turns the object upside down matters.
         flips = images @ axis < 0
-        return cls(group[[0, np.argmax(flips)]] if flips.any() else group[:1], axis)
+        return cls(group[[0, int(np.argmax(flips))]] if flips.any() else group[:1], axis)
 
     def cosine(self, first: Rotations, second: Rotations) -> Array:
         """Return the cosine of the smallest angle between all poses (n, 3, 3) and (m, 3, 3)."""
@@ -228,13 +229,14 @@ def chordal_mean(rotations: Rotations, weights: ArrayLike | None = None) -> Rota
     sign = np.linalg.det(u @ vt)
     u[..., 2] *= sign[..., None]
     undefined = size[..., 1] + sign * size[..., 2] < 1e-9
-    return np.where(undefined[..., None, None], rotations[0], u @ vt)
+    return np.asarray(np.where(undefined[..., None, None], rotations[0], u @ vt))
 
 
 def _angle_deg(rotations: Rotations) -> Array:
     """Return the angle of rotations (n, 3, 3): from sine and cosine, so that 0 is exact."""
     sine = np.linalg.norm((rotations - rotations.mT).reshape(-1, 9), axis=1) / np.sqrt(2)
-    return np.degrees(np.arctan2(sine, np.trace(rotations, axis1=1, axis2=2) - 1))
+    cosine = np.trace(rotations, axis1=1, axis2=2) - 1
+    return np.asarray(np.degrees(np.arctan2(sine, cosine)))
 
 
 def _largest(first: Array, images: Sequence[Array]) -> Array:
