@@ -128,6 +128,17 @@ class Studies:
             for name in names_of(run)
         ]
 
+    # Three dimensions
+
+    @property
+    def rotation_files(self) -> dict[str, str]:
+        """The pairs and BOP's ``models_info`` of the study `rotations`."""
+        files = {key: self.run.config["rotations"][key] for key in ("pairs", "models_info")}
+        for key, path in files.items():
+            if path is None or not Path(path).exists():
+                raise UserError(f"rotations.{key}={path or 'null'}: this target needs a file there")
+        return files
+
     # Trained on × tested on
 
     @property

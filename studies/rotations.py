@@ -24,7 +24,9 @@ from nbv.core.rotation_views import (
     posterior,
     turn_deg,
 )
-from nbv.core.rotations import Symmetry, along_ray, check_rotations
+from nbv.core.rotations import ASYMMETRIC, Symmetry, along_ray, check_rotations
+from nbv.errors import UserError
+from nbv.files import check_columns, read_csv, read_json
 
 Array = NDArray[np.float64]
 
@@ -48,12 +50,33 @@ class Instance:
     score: Array
 
 
-def read_instances(path: Path, objects: Sequence[str]) -> list[Instance]:
-    """Read the instances of some objects from a table of pairs."""
-    table = pd.read_csv(path, dtype={"object_id": str})
+COLUMNS = ("scene_id", "instance", "R_true", "t_true_mm", "R_estimate", "score")
+
+
+def read_symmetries(path: str | Path) -> dict[str, Symmetry]:
+    """Read the symmetries of BOP's ``models_info.json``, by object."""
+    return {name: Symmetry.from_bop(entry) for name, entry in read_json(path).items()}
+
+
+def read_instances(path: str | Path, objects: Sequence[str]) -> list[Instance]:
+    """Read the instances of some objects, all by default, from a table of pairs.
+
+    The columns are ``object_id`` and `COLUMNS`: rotations row by row in BOP's convention.
+
+    Raises
+    ------
+    UserError
+        If a column or an object is missing, or a matrix is no rotation.
+    """
+    table = read_csv(path)
+    check_columns(path, table, COLUMNS)
+    for name in objects:
+        if name not in set(table["object_id"]):
+            raise UserError(f"{path}: no object {name}")
     instances = []
     keys = ["object_id", "scene_id", "instance"]
-    for key, rows in table[table["object_id"].isin(objects)].groupby(keys):
+    chosen = table[table["object_id"].isin(objects)] if objects else table
+    for key, rows in chosen.groupby(keys, sort=False):
         ray = along_ray(_numbers(rows["t_true_mm"]))
         truth, estimate = (
             ray @ check_rotations(name, _numbers(rows[name]).reshape(-1, 3, 3))
@@ -74,7 +97,9 @@ def score_ratio(
 ) -> ScoreRatio:
     """Fit what a score says about a flip on all objects but one."""
     others = [one for one in instances if one.object_id != without]
-    error = [symmetries[o.object_id].distance_deg(o.estimate, o.truth) for o in others]
+    error = [
+        symmetries.get(o.object_id, ASYMMETRIC).distance_deg(o.estimate, o.truth) for o in others
+    ]
     scores = np.concatenate([one.score for one in others])
     return ScoreRatio.fit(scores, np.concatenate(error) > flip_deg)
 
@@ -183,7 +208,7 @@ def _oracle(
 
 
 def evaluate(
-    path: Path, symmetries: Mapping[str, Symmetry], settings: Mapping[str, Any]
+    path: str | Path, symmetries: Mapping[str, Symmetry], settings: Mapping[str, Any]
 ) -> pd.DataFrame:
     """Return the figures of every instance, fusion and method.
 
@@ -198,7 +223,7 @@ def evaluate(
         others = [o for o in instances if o.object_id == one.object_id and o is not one]
         if not others:
             continue
-        symmetry = symmetries[one.object_id]
+        symmetry = symmetries.get(one.object_id, ASYMMETRIC)
         ratio = score_ratio(scored, symmetries, one.object_id, model["flip_deg"])
         errors = errors_of(others, symmetry, ratio, model)
         groups = np.repeat([o.name for o in others], [len(o.truth) for o in others])

@@ -148,3 +148,9 @@ def real_frames(wildcards):
     """The manifest of real frames and the files that it names, where there is one."""
     manifest = CONFIG["bundles"]["frames"]
     return files_of_manifest(manifest) if manifest else []
+
+
+@one_line()
+def rotation_file(key):
+    """A file that the study `rotations` reads."""
+    return STUDIES.rotation_files[key]

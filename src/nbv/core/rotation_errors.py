@@ -248,10 +248,12 @@ class RotationErrors:
 def _apart(kept: Rotations, more: Rotations, spacing_deg: float, symmetry: Symmetry) -> Rotations:
     """Return rotations and those of some more that are apart from all before."""
     nearest = np.cos(np.radians(spacing_deg))
-    for rotation in more:
-        if symmetry.cosine(rotation[None], kept).max() < nearest:
-            kept = np.concatenate([kept, rotation[None]])
-    return kept
+    free = symmetry.cosine(more, kept).max(axis=1) < nearest
+    chosen: list[int] = []
+    while free.any():
+        chosen.append(int(np.argmax(free)))
+        free &= symmetry.cosine(more, more[chosen[-1:]])[:, 0] < nearest
+    return np.concatenate([kept, more[chosen]])
 
 
 def _roll(rotations: Rotations) -> Rotations:

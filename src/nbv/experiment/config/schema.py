@@ -354,6 +354,18 @@ class Transfer(Section):
     conditions: Annotated[dict[Name, Condition], AtLeastOne]
 
 
+class Rotations(Section):
+    """Answers of an estimator in three dimensions; see `studies.rotations`."""
+
+    pairs: DataPath | None = None
+    models_info: DataPath | None = None
+    objects: Annotated[list[Text], Distinct] = []
+    score_objects: Annotated[list[Text], Distinct] = []
+    concentration: Annotated[Number, Field(gt=0)] = 50.0
+    pseudo_observations: Annotated[Number, Field(gt=0)] = 10.0
+    flip_deg: Annotated[Number, Field(gt=0, lt=180)] = 20.0
+
+
 class Config(Section):
     """Everything a run depends on."""
 
@@ -388,6 +400,7 @@ class Config(Section):
     confirmation: Confirmation = Confirmation()
     randomisation: Randomisation = Randomisation()
     bundles: Bundles = Bundles()
+    rotations: Rotations = Rotations()
 
     @model_validator(mode="after")
     def _check_categories(self) -> Self:
