@@ -133,7 +133,14 @@ def some_moves(n=6, seed=3):
 def test_conditionals_against_enumeration(symmetry, flip_deg, given):
     """The definition in docs/method.md, pair by pair, with the roll found by trial."""
     offsets = Rotation.random(12, rng=np.random.default_rng(5)).as_matrix()
-    errors = made(symmetry, n=25, flip_deg=flip_deg, offsets=offsets, concentration=8.0)
+    errors = made(
+        symmetry,
+        n=25,
+        flip_deg=flip_deg,
+        offsets=offsets,
+        concentration=8.0,
+        pseudo_observations=10.0,
+    )
     support, move = offsets, some_moves(1)
     known, other = (errors.estimate, errors.truth)[:: 1 if given == "estimate" else -1]
     n, m = len(known), len(support)

@@ -35,15 +35,15 @@ def pairs(tmp_path_factory):
     rng = np.random.default_rng(0)
     tables = []
     for object_id, instance in np.ndindex(2, 2):
-        truth = Rotation.random(9, rng=rng).as_matrix()
+        truth = Rotation.random(6, rng=rng).as_matrix()
         flips = truth[:, 2, 0] < -0.3
         turned = np.where(flips[:, None, None], np.diag([1.0, -1, -1]), np.eye(3))
-        small = Rotation.from_rotvec(rng.normal(0, 2, (9, 3)), degrees=True).as_matrix()
+        small = Rotation.from_rotvec(rng.normal(0, 2, (6, 3)), degrees=True).as_matrix()
         columns = {
             "object_id": str(object_id),
             "scene_id": 1,
             "instance": instance,
-            "im_id": np.arange(9),
+            "im_id": np.arange(6),
             "R_true": text(truth),
             "t_true_mm": "0.00 0.00 700.00",
             "R_estimate": text(truth @ small @ turned),
@@ -83,7 +83,8 @@ def test_methods_choose_by_cost_turn_and_hindsight():
     turn = np.array([[0, 20, 170, 90], [20, 0, 150, 70], [170, 150, 0, 80], [90, 70, 80, 0.0]])
     error = np.array([[9, 1, 5, 3], [1, 9, 5, 3], [2, 2, 9, 1], [4, 1, 8, 9.0]])
     cost = np.array([[0, 2, 2, 1], [3, 0, 3, 3], [1, 2, 0, 3], [1, 1, 0.5, 0.0]])
-    found = TwoViews({"posterior": error}, {"expected_error": cost}, turn, True)
+    costs = {"posterior": {"expected_error": cost}}
+    found = TwoViews({"posterior": error}, costs, turn, True)
     chosen = chosen_views(found, "posterior")
     assert chosen["single"].ravel().tolist() == [0, 1, 2, 3]
     assert chosen["random"].tolist() == [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
@@ -94,7 +95,7 @@ def test_methods_choose_by_cost_turn_and_hindsight():
     assert chosen["hindsight"].ravel().tolist() == [1, 0, 3, 1]
     # The best of one half of the images, and the image of the other half nearest to it.
     assert chosen["oracle"].tolist() == [[3, 2], [3, 2], [0, 1], [0, 1]]
-    still = TwoViews({"posterior": error}, {"expected_error": cost}, turn, False)
+    still = TwoViews({"posterior": error}, costs, turn, False)
     assert chosen_views(still, "posterior")["recommended"].ravel().tolist() == [2, 2, 0, 0]
 
 

@@ -95,7 +95,7 @@ class RotationErrors:
         Poses of the same image, object to camera.
     symmetry : Symmetry
     concentration : float
-        Of both kernels, exp(concentration (cos(angle) - 1)): 50 has a standard deviation of 8°.
+        Of both kernels, exp(concentration (cos(angle) - 1)): 25 has a standard deviation of 11°.
     pseudo_observations : float
         Weight of what holds on average over all directions, against pairs that are seen from the
         same one and weigh 1 each.
@@ -111,8 +111,8 @@ class RotationErrors:
     estimate: Rotations
     truth: Rotations
     symmetry: Symmetry = ASYMMETRIC
-    concentration: float = 50.0
-    pseudo_observations: float = 10.0
+    concentration: float = 25.0
+    pseudo_observations: float = 3.0
     flip_deg: float = 20.0
     offsets: Rotations | None = None
     ratio: ScoreRatio | None = None

@@ -361,8 +361,8 @@ class Rotations(Section):
     models_info: DataPath | None = None
     objects: Annotated[list[Text], Distinct] = []
     score_objects: Annotated[list[Text], Distinct] = []
-    concentration: Annotated[Number, Field(gt=0)] = 50.0
-    pseudo_observations: Annotated[Number, Field(gt=0)] = 10.0
+    concentration: Annotated[Number, Field(gt=0)] = 25.0
+    pseudo_observations: Annotated[Number, Field(gt=0)] = 3.0
     flip_deg: Annotated[Number, Field(gt=0, lt=180)] = 20.0
 
 
