@@ -19,6 +19,7 @@ from nbv.core.rotation_views import (
     average,
     belief,
     best_move,
+    choose_kernel,
     costs_of,
     posterior,
     turn_deg,
@@ -315,6 +316,39 @@ def test_where_nothing_depends_on_the_view_the_farthest_is_taken():
     np.testing.assert_allclose(turn_deg(moves), [30, 170, 90], atol=1e-6)
     assert best_move(None, moves) == 1
     assert best_move(np.zeros(3), moves) == 0  # of equal costs the shortest way
+
+
+def test_a_kernel_is_chosen_by_the_errors_of_decisions():
+    """Flips are seen from one side only, so what sees all directions alike is worse."""
+    errors = made(n=60, offsets=np.stack([np.eye(3), np.diag([1.0, -1, -1])]))
+    groups = np.arange(60) % 3
+    chosen = choose_kernel(errors, groups, [25.0], [3.0, 1e6])
+    assert chosen.pseudo_observations == 3.0
+    # Nothing decides between candidates for an estimator that is right: the widest.
+    right = replace(errors, estimate=errors.truth)
+    chosen = choose_kernel(right, groups, [25.0, 12.0], [3.0, 10.0])
+    assert (chosen.concentration, chosen.pseudo_observations) == (12.0, 10.0)
+    with pytest.raises(UserError, match="two instances or more"):
+        choose_kernel(errors, np.zeros(60), [25.0], [3.0])
+
+
+def test_the_probability_to_be_within_an_error_counts_small_errors():
+    errors = made(n=300)
+    opposite = Rotation.align_vectors([[0, 0, -1]], [[-1.0, 0, 0]])[0].as_matrix()[None]
+    sure = belief(errors, opposite, IDENTITY)
+    small = errors.error_deg[~errors.is_flip]
+    assert sure.probability_within(2.0) == pytest.approx((small < 2).mean(), rel=0.1)
+    chances = [sure.probability_within(deg) for deg in (1, 5, 15, 30, 200)]
+    assert chances == sorted(chances)
+    assert chances[-1] == pytest.approx(1)
+
+
+def test_ambiguity_is_refused_after_two_views():
+    errors = made(n=10)
+    two = belief(errors, errors.estimate[:2], np.concatenate([IDENTITY, some_moves(1)]))
+    with pytest.raises(ValueError, match="two views, not 3"):
+        costs_of("pose_ambiguity", two, some_moves(2))
+    assert np.isfinite(costs_of("expected_error", two, some_moves(2))).all()
 
 
 def test_an_unknown_criterion_is_named():

@@ -220,7 +220,7 @@ class RotationErrors:
         total = result.sum(axis=2, keepdims=True)
         np.divide(result, total, out=result, where=total > 0)
         result[total[..., 0] <= 0] = 1 / m
-        return result
+        return np.asarray(result)
 
     def depends_on_view(self, groups: Sequence[Hashable] | NDArray[Any]) -> bool:
         """Return whether the viewing direction says more about flips than their share does.

@@ -6,8 +6,10 @@ pose here is in the first camera, so turning the world changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import itertools
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,10 @@ from nbv.errors import UserError, nearest
 
 AGREE_DEG = 25.0
 """Estimates nearer than this are of one pose: their mean has a smaller error than each."""
+
+MOST_FIRST_VIEWS = 12
+"""Of each instance, to choose a kernel in seconds."""
+
 _AGREE = np.cos(np.radians(AGREE_DEG))
 
 
@@ -53,11 +59,13 @@ class RotationBelief:
         voted = self.probability[self.votes]
         return np.asarray(self.support[self.votes[np.argmax(voted)]])
 
-    @property
-    def expected_error_deg(self) -> float:
-        """The expected error of the fused pose, errors below `flip_deg` not counted."""
+    def probability_within(self, error_deg: float) -> float:
+        """Return the probability that the fused pose errs by less."""
         distance = self.errors.symmetry.distance_deg(self.support, self.pose)
-        return float(self.probability @ distance)
+        near = float(self.probability[distance < max(error_deg, AGREE_DEG)].sum())
+        right = self.errors.error_deg[~self.errors.is_flip]
+        # Of small errors it is known how large they are, not where.
+        return near * float((right < error_deg).mean()) if len(right) else near
 
 
 def belief(
@@ -134,7 +142,15 @@ def _entropy(distributions: Array) -> Array:
 
 
 def pose_ambiguity(first: RotationBelief, moves: Rotations) -> Array:
-    """Return the entropy of the pose after two views, by Eqs. 1 to 6 with T = V, (k,) in nats."""
+    """Return the entropy of the pose after two views, by Eqs. 1 to 6 with T = V, (k,) in nats.
+
+    Raises
+    ------
+    ValueError
+        If the belief is after more than one view: Eq. 6 has one factor for each of two views.
+    """
+    if len(first.votes) > 1:
+        raise ValueError(f"pose_ambiguity is defined for two views, not {len(first.votes) + 1}")
     pose = first.errors.conditional("estimate", first.support)[0]
     product = pose * first.errors.conditional("estimate", first.support, moves)
     total = product.sum(axis=2, keepdims=True)
@@ -165,10 +181,15 @@ def expected_error(first: RotationBelief, moves: Rotations) -> Array:
         return np.asarray((weights * angles).reshape(len(moves), -1).sum(axis=1))
     distance = np.degrees(np.arccos(errors.symmetry.cosine(support, support)))
     np.fill_diagonal(distance, 0)
-    # What it costs to answer each estimate with the estimate itself or with the first one.
-    costs = np.stack([(distance * joint).sum(axis=1), distance[0] @ joint])
-    own, was = np.diagonal(joint, axis1=1, axis2=2), joint[:, 0]
-    return np.asarray(np.where(own > was, costs[0], costs[1]).sum(axis=1))
+    # Answers are what an estimate stands for: the next one's own pose, or one voted for before.
+    voted = np.unique(first.votes)
+    before = joint[:, voted].argmax(axis=1)[:, None]
+    chance, cost = (
+        np.take_along_axis(of_voted, before, axis=1)[:, 0]
+        for of_voted in (joint[:, voted], distance[voted] @ joint)
+    )
+    own = np.diagonal(joint, axis1=1, axis2=2)
+    return np.asarray(np.where(own > chance, (distance * joint).sum(axis=1), cost).sum(axis=1))
 
 
 Criterion = Callable[[RotationBelief, Rotations], Array]
@@ -178,6 +199,55 @@ CRITERIA: dict[str, Criterion] = {
     "expected_error": expected_error,
 }
 """Criteria: the cost (k,) of each move (k, 3, 3) under a belief, lower is better."""
+
+
+def choose_kernel(
+    errors: RotationErrors,
+    groups: Sequence[Hashable] | NDArray[Any],
+    concentrations: Sequence[float],
+    pseudo_observations: Sequence[float],
+) -> RotationErrors:
+    """Return the same pairs with the kernel of least error, by cross-validation of decisions.
+
+    Pairs of one group, an instance, are views of one object that differ by their true moves. For
+    each group the pairs of all others choose a second view by `expected_error` and fuse by
+    `posterior`. Among equals the widest kernel and most pseudo-observations win.
+
+    Raises
+    ------
+    UserError
+        If there are fewer than two groups of two views.
+    """
+    labels = np.unique(np.asarray(groups), return_inverse=True)[1]
+    views = [np.flatnonzero(labels == k) for k in np.unique(labels)]
+    if sum(len(own) > 1 for own in views) < 2:
+        raise UserError("a kernel is chosen by two instances or more with two views each")
+    best, least = errors, np.inf
+    for kappa, alpha in itertools.product(
+        sorted(concentrations), sorted(pseudo_observations, reverse=True)
+    ):
+        candidate = replace(errors, concentration=kappa, pseudo_observations=alpha)
+        means = [_decision_error_deg(candidate, own) for own in views if len(own) > 1]
+        if (error := float(np.mean(means))) < least:
+            best, least = candidate, error
+    return best
+
+
+def _decision_error_deg(errors: RotationErrors, own: NDArray[np.intp]) -> float:
+    """Return the mean error of two views among some pairs, by the errors of all others."""
+    estimate, truth = errors.estimate[own], errors.truth[own]
+    others = replace(
+        errors, estimate=np.delete(errors.estimate, own, 0), truth=np.delete(errors.truth, own, 0)
+    )
+    poses = []
+    firsts = np.arange(0, len(own), 1 + (len(own) - 1) // MOST_FIRST_VIEWS)
+    for i in firsts:
+        moves = truth @ truth[i].T
+        rest = np.delete(np.arange(len(own)), i)
+        first = belief(others, estimate[[i]], moves[[i]])
+        pair = [i, rest[best_move(expected_error(first, moves[rest]), moves[rest])]]
+        poses.append(posterior(others, estimate[pair], moves[pair]))
+    return float(errors.symmetry.distance_deg(np.stack(poses), truth[firsts]).mean())
 
 
 def turn_deg(moves: Rotations) -> Array:
