@@ -149,8 +149,14 @@ def test_conditionals_against_enumeration(symmetry, flip_deg, given):
     angles = np.radians(np.arange(0, 360, 0.5))[:, None] * [0, 0, 1]
     rolls = Rotation.from_rotvec(angles).as_matrix()
     expected = np.zeros((m, m))
-    for row, seen in zip(expected, move @ support, strict=True):
-        row += 10.0 * share / m
+    flips = list(zip(known[errors.is_flip], other[errors.is_flip], strict=True))
+    for row, pose, seen in zip(expected, support, move @ support, strict=True):
+        anywhere = np.full(m, 1 / m)  # one flip that leads anywhere
+        for a, b in flips if flip_deg else ():
+            there = symmetry.canonical(pose[None]) @ symmetry.canonical(a[None]).mT @ b
+            kernel = np.exp(8.0 * (symmetry.cosine(there, support)[0] - 1))
+            anywhere += kernel / kernel.sum()
+        row += 10.0 * share * anywhere / anywhere.sum()
         right = 10.0 * (1 - share)
         for a, b, flip in zip(known, other, errors.is_flip, strict=True):
             alike = rolls[:, None] @ (a @ symmetry.discrete)

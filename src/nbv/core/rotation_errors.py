@@ -141,11 +141,37 @@ class RotationErrors:
         """The `offsets` (m, 3, 3): by default the identity, each kind of flip and others, apart."""
         if self.offsets is not None:
             return self.offsets
-        flips = self.is_flip & (self.error_deg > SPACING_DEG / 2)
-        own = self.symmetry.canonical(self.estimate[flips])
-        seen = own.mT @ self.symmetry.nearest(self.truth[flips], own)
-        found = _apart(np.eye(3)[None], seen, SPACING_DEG / 2, self.symmetry)
+        found = _apart(np.eye(3)[None], self._turns("estimate"), SPACING_DEG / 2, self.symmetry)
         return _apart(found, spiral(2000), SPACING_DEG, self.symmetry)
+
+    def _pairs(self, given: Given) -> tuple[Rotations, Rotations]:
+        """Return what is given of the pairs, and the other."""
+        return (self.estimate, self.truth) if given == "estimate" else (self.truth, self.estimate)
+
+    def _turns(self, given: Given) -> Rotations:
+        """Return the flips (f, 3, 3) on the object's axes, from what is given to the other."""
+        known, other = (poses[self.is_flip] for poses in self._pairs(given))
+        known = self.symmetry.canonical(known)
+        return known.mT @ self.symmetry.nearest(other, known)
+
+    def _flips_anywhere(self, given: Given, support: Rotations) -> Array:
+        """Return where flips lead from each pose of a support, (m, m), whatever the direction.
+
+        They turn the object as any flip of calibration did; one more leads anywhere.
+        """
+        m, turns = len(support), self._turns(given)
+        if not self.flip_deg or not len(turns):
+            return np.full((m, m), 1 / m)
+        where = self.symmetry.canonical(support)[:, None] @ turns
+        kernel = self._near(where.reshape(-1, 3, 3), support).reshape(m, -1, m)
+        return (kernel.sum(axis=1) + 1 / m) / (len(turns) + 1)
+
+    def _near(self, rotations: Rotations, support: Rotations) -> Array:
+        """Return the kernel about rotations (n, 3, 3) among the poses of a support, (n, m)."""
+        # Single precision halves the time.
+        cosine = self.symmetry.cosine(rotations.astype(np.float32), support.astype(np.float32))
+        kernel = np.exp(self.concentration * (cosine - cosine.max(axis=1, keepdims=True)))
+        return np.asarray(kernel / kernel.sum(axis=1, keepdims=True))
 
     def possible_poses(self, estimate: Rotations) -> Rotations:
         """Return the poses (m, 3, 3) that are thought possible after an estimate (3, 3)."""
@@ -153,8 +179,7 @@ class RotationErrors:
 
     def flip_probability(self, rotations: Rotations, given: Given) -> Array:
         """Return the probability of a flip for each estimated or true pose (n, 3, 3)."""
-        pairs = self.estimate if given == "estimate" else self.truth
-        weights = self._weights(rotations, pairs)
+        weights = self._weights(rotations, self._pairs(given)[0])
         alpha = self.pseudo_observations
         flips = weights[:, self.is_flip].sum(axis=1) + alpha * self.share_of_flips
         return np.asarray(flips / (weights.sum(axis=1) + alpha))
@@ -195,24 +220,20 @@ class RotationErrors:
         moves = np.eye(3)[None] if moves is None else moves
         own = np.arange(m) if rows is None else np.asarray(rows)
         poses = (moves[:, None] @ support[own]).reshape(-1, 3, 3)
-        known, other = self.estimate, self.truth
-        if given == "truth":
-            known, other = other, known
+        known, other = self._pairs(given)
         weights = self._weights(poses, known)
         alpha, share = self.pseudo_observations, self.share_of_flips
         right = weights[:, ~self.is_flip].sum(axis=1) + alpha * (1 - share)
         flips = np.flatnonzero(self.is_flip)
-        result = np.full((len(poses), m), alpha * share / m)
+        anywhere = alpha * share * self._flips_anywhere(given, support)[own]
+        result = np.tile(anywhere, (len(moves), 1))
         i, k = np.nonzero(weights[:, flips] > NEGLIGIBLE)
         if len(i):
             pair = flips[k]
             turn = self.symmetry.towards(viewing_direction(poses[i]), known[pair])
             roll = _roll(poses[i] @ (known[pair] @ turn).mT)
             where = moves[i // len(own)].mT @ roll @ other[pair]
-            # Single precision halves the time.
-            kernel = self.symmetry.cosine(where.astype(np.float32), support.astype(np.float32))
-            kernel = np.exp(self.concentration * (kernel - kernel.max(axis=1, keepdims=True)))
-            kernel *= (weights[i, pair] / kernel.sum(axis=1))[:, None]
+            kernel = self._near(where, support) * weights[i, pair][:, None]
             starts = np.flatnonzero(np.diff(i, prepend=-1))
             result[i[starts]] += np.add.reduceat(kernel, starts)
         result = result.reshape(len(moves), len(own), m) * np.reshape(ratio, (-1, 1))
