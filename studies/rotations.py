@@ -121,7 +121,7 @@ def errors_of(
 
 
 FUSIONS = ("average", "posterior", "score")
-"""Eq. 7, the posterior, and the posterior with scores, which then count in the choice too."""
+"""Eq. 7, the posterior, and the posterior with the estimator's scores."""
 
 FIVE = 5
 """So many of the best-ranked images are reported too: a robot may not reach the first."""
@@ -135,8 +135,8 @@ class TwoViews:
     ----------
     error_deg : dict of str to ndarray (n, n)
         Of each fusion, [first, second view]; the diagonal is of one view.
-    cost : dict of str to dict of str to ndarray (n, n)
-        Of each fusion and criterion.
+    cost : dict of str to ndarray (n, n)
+        Of each criterion.
     turn_deg : ndarray (n, n)
         The angle between the views.
     depends_on_view : bool
@@ -144,7 +144,7 @@ class TwoViews:
     """
 
     error_deg: Mapping[str, Array]
-    cost: Mapping[str, Mapping[str, Array]]
+    cost: Mapping[str, Array]
     turn_deg: Array
     depends_on_view: bool
 
@@ -153,15 +153,14 @@ def two_views(one: Instance, errors: RotationErrors, depends_on_view: bool) -> T
     """Evaluate every pair of views of an instance."""
     n = len(one.truth)
     fused = {name: np.empty((n, n, 3, 3)) for name in FUSIONS}
-    plain, scored = ({name: np.empty((n, n)) for name in CRITERIA} for _ in range(2))
+    cost = {name: np.empty((n, n)) for name in CRITERIA}
     turns = np.empty((n, n))
     for i in range(n):
         moves = one.truth @ one.truth[i].T
         turns[i] = turn_deg(moves)
-        for cost, scores in ((plain, None), (scored, one.score[[i]])):
-            first = belief(errors, one.estimate[[i]], np.eye(3)[None], scores)
-            for name in CRITERIA:
-                cost[name][i] = costs_of(name, first, moves)
+        first = belief(errors, one.estimate[[i]], np.eye(3)[None])
+        for name in CRITERIA:
+            cost[name][i] = costs_of(name, first, moves)
         for j in range(n):
             views = [i] if i == j else [i, j]
             given = errors, one.estimate[views], moves[views]
@@ -170,8 +169,7 @@ def two_views(one: Instance, errors: RotationErrors, depends_on_view: bool) -> T
             fused["score"][i, j] = posterior(*given, one.score[views])
     distance = errors.symmetry.distance_deg
     error = {name: distance(poses, one.truth[:, None]) for name, poses in fused.items()}
-    costs = {"average": plain, "posterior": plain, "score": scored}
-    return TwoViews(error, costs, turns, depends_on_view)
+    return TwoViews(error, cost, turns, depends_on_view)
 
 
 def chosen_views(found: TwoViews, fusion: str) -> dict[str, NDArray[np.intp]]:
@@ -185,7 +183,7 @@ def chosen_views(found: TwoViews, fusion: str) -> dict[str, NDArray[np.intp]]:
     error, turns = found.error_deg[fusion][first, others], found.turn_deg[first, others]
     farthest = others[first, turns.argmax(axis=1)[:, None]]
     chosen = {"single": first, "random": others, "opposite": farthest}
-    for name, cost in found.cost[fusion].items():
+    for name, cost in found.cost.items():
         order = np.lexsort((turns, np.round(cost[first, others], 9)), axis=1)
         ranked = np.take_along_axis(others, order, axis=1)
         chosen[name] = ranked[:, :1]

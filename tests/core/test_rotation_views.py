@@ -326,8 +326,8 @@ def test_where_nothing_depends_on_the_view_the_farthest_is_taken():
 
 def test_a_kernel_is_chosen_by_the_errors_of_decisions():
     """Flips are seen from one side only, so what sees all directions alike is worse."""
-    errors = made(n=60)
-    groups = np.arange(60) % 3
+    errors = made(n=45)
+    groups = np.arange(45) % 3
     chosen = choose_kernel(errors, groups, [25.0], [3.0, 1e6])
     assert chosen.pseudo_observations == 3.0
     # Nothing decides between candidates for an estimator that is right: the widest.
@@ -335,7 +335,7 @@ def test_a_kernel_is_chosen_by_the_errors_of_decisions():
     chosen = choose_kernel(right, groups, [25.0, 12.0], [3.0, 10.0])
     assert (chosen.concentration, chosen.pseudo_observations) == (12.0, 10.0)
     with pytest.raises(UserError, match="two instances or more"):
-        choose_kernel(errors, np.zeros(60), [25.0], [3.0])
+        choose_kernel(errors, np.zeros(45), [25.0], [3.0])
 
 
 def test_the_probability_to_be_within_an_error_counts_small_errors():

@@ -83,7 +83,7 @@ def test_methods_choose_by_cost_turn_and_hindsight():
     turn = np.array([[0, 20, 170, 90], [20, 0, 150, 70], [170, 150, 0, 80], [90, 70, 80, 0.0]])
     error = np.array([[9, 1, 5, 3], [1, 9, 5, 3], [2, 2, 9, 1], [4, 1, 8, 9.0]])
     cost = np.array([[0, 2, 2, 1], [3, 0, 3, 3], [1, 2, 0, 3], [1, 1, 0.5, 0.0]])
-    costs = {"posterior": {"expected_error": cost}}
+    costs = {"expected_error": cost}
     found = TwoViews({"posterior": error}, costs, turn, True)
     chosen = chosen_views(found, "posterior")
     assert chosen["single"].ravel().tolist() == [0, 1, 2, 3]

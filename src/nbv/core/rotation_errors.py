@@ -152,19 +152,19 @@ class RotationErrors:
         """Return the flips (f, 3, 3) on the object's axes, from what is given to the other."""
         known, other = (poses[self.is_flip] for poses in self._pairs(given))
         known = self.symmetry.canonical(known)
-        return known.mT @ self.symmetry.nearest(other, known)
+        return np.asarray(known.mT @ self.symmetry.nearest(other, known))
 
-    def _flips_anywhere(self, given: Given, support: Rotations) -> Array:
-        """Return where flips lead from each pose of a support, (m, m), whatever the direction.
+    def _flips_anywhere(self, given: Given, poses: Rotations, support: Rotations) -> Array:
+        """Return where flips lead from poses (r, 3, 3), (r, m), whatever the direction.
 
         They turn the object as any flip of calibration did; one more leads anywhere.
         """
         m, turns = len(support), self._turns(given)
         if not self.flip_deg or not len(turns):
-            return np.full((m, m), 1 / m)
-        where = self.symmetry.canonical(support)[:, None] @ turns
-        kernel = self._near(where.reshape(-1, 3, 3), support).reshape(m, -1, m)
-        return (kernel.sum(axis=1) + 1 / m) / (len(turns) + 1)
+            return np.full((len(poses), m), 1 / m)
+        where = self.symmetry.canonical(poses)[:, None] @ turns
+        kernel = self._near(where.reshape(-1, 3, 3), support).reshape(len(poses), -1, m)
+        return np.asarray((kernel.sum(axis=1) + 1 / m) / (len(turns) + 1))
 
     def _near(self, rotations: Rotations, support: Rotations) -> Array:
         """Return the kernel about rotations (n, 3, 3) among the poses of a support, (n, m)."""
@@ -225,7 +225,7 @@ class RotationErrors:
         alpha, share = self.pseudo_observations, self.share_of_flips
         right = weights[:, ~self.is_flip].sum(axis=1) + alpha * (1 - share)
         flips = np.flatnonzero(self.is_flip)
-        anywhere = alpha * share * self._flips_anywhere(given, support)[own]
+        anywhere = alpha * share * self._flips_anywhere(given, support[own], support)
         result = np.tile(anywhere, (len(moves), 1))
         i, k = np.nonzero(weights[:, flips] > NEGLIGIBLE)
         if len(i):

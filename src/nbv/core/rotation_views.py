@@ -86,19 +86,30 @@ def belief(
     scores : (n,), optional
         The estimator's scores.
     """
-    seen = moves.mT @ estimates
-    support, votes = _support(errors, seen)
-    ratios = np.ones(len(seen))
+    support, votes = _support(errors, moves.mT @ estimates)
+    weights = _weights(errors, support, votes, np.arange(len(support)), moves, scores)
+    return RotationBelief(support, weights / weights.sum(), votes, errors)
+
+
+def _weights(
+    errors: RotationErrors,
+    support: Rotations,
+    votes: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    moves: Rotations,
+    scores: Sequence[float] | Array | None,
+) -> Array:
+    """Return V L … L, up to a factor, at some poses of the support, rows (r,)."""
+    ratios = np.ones(len(votes))
     if scores is not None and errors.ratio is not None:
         ratios = errors.ratio(scores)
-    probability = errors.conditional("estimate", support, None, votes[:1], ratios[0])[0, 0]
+    weights = errors.conditional("estimate", support, None, votes[:1], ratios[0])[0, 0, rows]
     for vote, move, ratio in zip(votes[1:], moves[1:], ratios[1:], strict=True):
-        likelihood = errors.conditional("truth", support, move[None])[0, :, vote]
+        likelihood = errors.conditional("truth", support, move[None], rows)[0, :, vote]
         # A score is of the estimate, and what is not a flip is at the truth.
-        likelihood = np.where(np.arange(len(support)) == vote, likelihood, likelihood * ratio)
-        probability = probability * likelihood
-        probability = probability / probability.sum()
-    return RotationBelief(support, probability, votes, errors)
+        weights = weights * likelihood * np.where(rows == vote, 1.0, ratio)
+        weights = weights / weights.sum()
+    return np.asarray(weights)
 
 
 def _support(errors: RotationErrors, seen: Rotations) -> tuple[Rotations, NDArray[np.intp]]:
@@ -128,11 +139,14 @@ def posterior(
     scores: Sequence[float] | Array | None = None,
 ) -> Rotations:
     """Return the pose (3, 3) of `belief` after all views, V of the first and L of the others."""
-    if errors.flip_deg:
-        agreed = errors.symmetry.cosine(seen := moves.mT @ estimates, seen[:1])
-        if agreed.min() > _AGREE:
-            return errors.symmetry.mean(seen)
-    return belief(errors, estimates, moves, scores).pose
+    if not errors.flip_deg:
+        return belief(errors, estimates, moves, scores).pose
+    support, votes = _support(errors, moves.mT @ estimates)
+    voted = np.unique(votes)  # of which the belief is not needed anywhere else
+    if len(voted) == 1:
+        return np.asarray(support[voted[0]])
+    weights = _weights(errors, support, votes, voted, moves, scores)
+    return np.asarray(support[voted[np.argmax(weights)]])
 
 
 def _entropy(distributions: Array) -> Array:
