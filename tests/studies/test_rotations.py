@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.spatial.transform import Rotation
 from studies.rotation_tables import rotation_table
 from studies.rotations import (
     FUSIONS,
@@ -20,38 +19,16 @@ from studies.rotations import (
 
 from nbv.core.rotations import ASYMMETRIC
 from nbv.errors import UserError
+from rotation_pairs import rotation_pairs
 
 PAIRS = Path(__file__).parents[3] / "shared/data/estimates/tless_megapose.csv"
 SETTINGS = {"concentration": 50.0, "pseudo_observations": 10.0, "flip_deg": 20.0}
 
 
-def text(matrices):
-    return [" ".join(f"{x:.6f}" for x in matrix.ravel()) for matrix in matrices]
-
-
 @pytest.fixture(scope="module")
 def pairs(tmp_path_factory):
-    """Two objects of two instances; what looks from +x is upside down, and of low score."""
-    rng = np.random.default_rng(0)
-    tables = []
-    for object_id, instance in np.ndindex(2, 2):
-        truth = Rotation.random(6, rng=rng).as_matrix()
-        flips = truth[:, 2, 0] < -0.3
-        turned = np.where(flips[:, None, None], np.diag([1.0, -1, -1]), np.eye(3))
-        small = Rotation.from_rotvec(rng.normal(0, 2, (6, 3)), degrees=True).as_matrix()
-        columns = {
-            "object_id": str(object_id),
-            "scene_id": 1,
-            "instance": instance,
-            "im_id": np.arange(6),
-            "R_true": text(truth),
-            "t_true_mm": "0.00 0.00 700.00",
-            "R_estimate": text(truth @ small @ turned),
-            "score": np.where(flips, 0.4, 0.9),
-        }
-        tables.append(pd.DataFrame(columns))
     path = tmp_path_factory.mktemp("pairs") / "pairs.csv"
-    pd.concat(tables).to_csv(path, index=False)
+    rotation_pairs().to_csv(path, index=False)
     return path
 
 

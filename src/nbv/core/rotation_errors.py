@@ -168,10 +168,13 @@ class RotationErrors:
 
     def _near(self, rotations: Rotations, support: Rotations) -> Array:
         """Return the kernel about rotations (n, 3, 3) among the poses of a support, (n, m)."""
-        # Single precision halves the time.
-        cosine = self.symmetry.cosine(rotations.astype(np.float32), support.astype(np.float32))
-        kernel = np.exp(self.concentration * (cosine - cosine.max(axis=1, keepdims=True)))
-        return np.asarray(kernel / kernel.sum(axis=1, keepdims=True))
+        # In place and in single precision, in half the time.
+        kernel = self.symmetry.cosine(rotations.astype(np.float32), support.astype(np.float32))
+        kernel -= kernel.max(axis=1, keepdims=True)
+        kernel *= self.concentration
+        np.exp(kernel, out=kernel)
+        kernel /= kernel.sum(axis=1, keepdims=True)
+        return kernel
 
     def possible_poses(self, estimate: Rotations) -> Rotations:
         """Return the poses (m, 3, 3) that are thought possible after an estimate (3, 3)."""
@@ -209,7 +212,7 @@ class RotationErrors:
         rows : (r,) int, optional
             Indices of what is given, in the support; all by default.
         ratio : float or ndarray (r,)
-            Likelihood ratio of a flip by the score, of what is given for V; for L see `beliefs`.
+            Likelihood ratio of a flip by the score, of what is given for V; for L see `belief`.
 
         Returns
         -------
@@ -233,9 +236,11 @@ class RotationErrors:
             turn = self.symmetry.towards(viewing_direction(poses[i]), known[pair])
             roll = _roll(poses[i] @ (known[pair] @ turn).mT)
             where = moves[i // len(own)].mT @ roll @ other[pair]
-            kernel = self._near(where, support) * weights[i, pair][:, None]
-            starts = np.flatnonzero(np.diff(i, prepend=-1))
-            result[i[starts]] += np.add.reduceat(kernel, starts)
+            from scipy.sparse import csr_array
+
+            entries = weights[i, pair].astype(np.float32), (i, np.arange(len(i)))
+            by_row = csr_array(entries, shape=(len(poses), len(i)))
+            result += np.asarray(by_row @ self._near(where, support))
         result = result.reshape(len(moves), len(own), m) * np.reshape(ratio, (-1, 1))
         result[:, np.arange(len(own)), own] += right.reshape(len(moves), -1)
         total = result.sum(axis=2, keepdims=True)

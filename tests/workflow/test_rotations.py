@@ -1,0 +1,27 @@
+"""The target `rotations` of the studies' Snakefile, run small."""
+
+from __future__ import annotations
+
+import json
+
+import pandas as pd
+import pytest
+
+from projects import STUDIES, TINY
+from rotation_pairs import rotation_pairs
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_table_of_pairs_is_judged(scratch):
+    rotation_pairs().to_csv(scratch.folder / "pairs.csv", index=False)
+    turns = {"symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]}
+    (scratch.folder / "models_info.json").write_text(json.dumps({"1": turns}))
+    more = ("rotations.pairs=pairs.csv", "rotations.models_info=models_info.json")
+    scratch.run("--cores", "2", *STUDIES, "rotations", overrides=(*TINY, *more))
+    cells = pd.read_csv(scratch.results / "tables/rotations.csv")
+    assert set(cells["group"]) == {"no symmetry or a discrete one", "turning freely"}
+    assert set(cells["fusion"]) == {"average", "posterior", "score"}
+    assert (
+        "# Two views in three dimensions" in (scratch.results / "tables/rotations.md").read_text()
+    )
