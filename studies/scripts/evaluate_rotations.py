@@ -10,4 +10,4 @@ with job(snakemake):
     given = snakemake.input
     symmetries = read_symmetries(given.models_info)
     figures = evaluate(given.pairs, symmetries, snakemake.params.settings)
-    write_csv(figures, snakemake.output[0])
+    write_csv(snakemake.output[0], figures)
