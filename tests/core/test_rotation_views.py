@@ -286,6 +286,20 @@ def test_a_view_that_shows_the_flip_is_chosen_and_the_flip_found():
     assert ASYMMETRIC.distance_deg(posterior(errors, views, three), truth) < 1
 
 
+@pytest.mark.parametrize("scored", [False, True])
+def test_the_fused_pose_is_the_beliefs(scored):
+    errors = made(HALF_TURN)
+    ratio = ScoreRatio(np.linspace(0, 1, 9), -1.0, 0.0)
+    errors = replace(errors, ratio=ratio)
+    rng, turned = np.random.default_rng(8), [np.eye(3), np.diag([1.0, -1, -1])]
+    for n_views in (2, 3, 3, 3):
+        moves = np.concatenate([IDENTITY, some_moves(n_views - 1, n_views)])
+        flips = np.stack([turned[k] for k in rng.integers(2, size=n_views)])
+        views = moves @ Rotation.random(rng=rng).as_matrix() @ flips
+        given = errors, views, moves, rng.random(n_views) if scored else None
+        np.testing.assert_allclose(posterior(*given), belief(*given).pose, atol=1e-9)
+
+
 def test_a_score_decides_between_estimates_that_directions_cannot_tell_apart():
     rng = np.random.default_rng(0)
     flips = rng.random(300) < 0.1
