@@ -22,6 +22,7 @@ from nbv.core.rotations import (
     Array,
     Rotations,
     Symmetry,
+    inverse,
     spiral,
     viewing_direction,
 )
@@ -152,7 +153,7 @@ class RotationErrors:
         """Return the flips (f, 3, 3) on the object's axes, from what is given to the other."""
         known, other = (poses[self.is_flip] for poses in self._pairs(given))
         known = self.symmetry.canonical(known)
-        return np.asarray(known.mT @ self.symmetry.nearest(other, known))
+        return np.asarray(inverse(known) @ self.symmetry.nearest(other, known))
 
     def _flips_anywhere(self, given: Given, poses: Rotations, support: Rotations) -> Array:
         """Return where flips lead from poses (r, 3, 3), (r, m), whatever the direction.
@@ -234,8 +235,8 @@ class RotationErrors:
         if len(i):
             pair = flips[k]
             turn = self.symmetry.towards(viewing_direction(poses[i]), known[pair])
-            roll = _roll(poses[i] @ (known[pair] @ turn).mT)
-            where = moves[i // len(own)].mT @ roll @ other[pair]
+            roll = _roll(poses[i] @ inverse(known[pair] @ turn))
+            where = inverse(moves[i // len(own)]) @ roll @ other[pair]
             from scipy.sparse import csr_array
 
             entries = weights[i, pair].astype(np.float32), (i, np.arange(len(i)))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.rotation_errors import RotationErrors
-from nbv.core.rotations import Array, Rotations, chordal_mean, viewing_direction
+from nbv.core.rotations import Array, Rotations, chordal_mean, inverse, viewing_direction
 from nbv.errors import UserError, nearest
 
 AGREE_DEG = 25.0
@@ -86,7 +86,7 @@ def belief(
     scores : (n,), optional
         The estimator's scores.
     """
-    support, votes = _support(errors, moves.mT @ estimates)
+    support, votes = _support(errors, inverse(moves) @ estimates)
     weights = _weights(errors, support, votes, np.arange(len(support)), moves, scores)
     return RotationBelief(support, weights / weights.sum(), votes, errors)
 
@@ -129,7 +129,7 @@ def _support(errors: RotationErrors, seen: Rotations) -> tuple[Rotations, NDArra
 
 def average(errors: RotationErrors, estimates: Rotations, moves: Rotations) -> Rotations:
     """Return the mean (3, 3) of estimates (n, 3, 3), each moved back to the first view (Eq. 7)."""
-    return errors.symmetry.mean(moves.mT @ estimates)
+    return errors.symmetry.mean(inverse(moves) @ estimates)
 
 
 def posterior(
@@ -141,7 +141,7 @@ def posterior(
     """Return the pose (3, 3) of `belief` after all views, V of the first and L of the others."""
     if not errors.flip_deg:
         return belief(errors, estimates, moves, scores).pose
-    support, votes = _support(errors, moves.mT @ estimates)
+    support, votes = _support(errors, inverse(moves) @ estimates)
     voted = np.unique(votes)  # of which the belief is not needed anywhere else
     if len(voted) == 1:
         return np.asarray(support[voted[0]])

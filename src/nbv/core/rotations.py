@@ -44,7 +44,7 @@ def check_rotations(name: str, rotations: ArrayLike) -> Rotations:
     if array.shape[-2:] != (3, 3):
         raise UserError(f"{name} is {array.shape} instead of (..., 3, 3)")
     flat = array.reshape(-1, 3, 3)
-    skewed = np.abs(flat @ flat.mT - np.eye(3)).max(axis=(1, 2))
+    skewed = np.abs(flat @ inverse(flat) - np.eye(3)).max(axis=(1, 2))
     skewed = np.asarray(~(skewed <= NOT_A_ROTATION))
     reflected = ~skewed & (np.linalg.det(np.where(skewed[:, None, None], 0, flat)) < 0)
     for bad, reason in (
@@ -55,6 +55,11 @@ def check_rotations(name: str, rotations: ArrayLike) -> Rotations:
             row = f"[{np.argmax(bad)}]" if array.ndim > 2 else ""
             raise UserError(f"{name}{row} is {reason}")
     return array
+
+
+def inverse(rotations: Rotations) -> Rotations:
+    """Return the inverse rotations (..., 3, 3)."""
+    return np.swapaxes(rotations, -1, -2)
 
 
 def viewing_direction(rotations: Rotations) -> Array:
@@ -161,13 +166,13 @@ class Symmetry:
         """Return the smallest angle between poses (..., 3, 3), in [0, 180], pair by pair."""
         first, second = np.broadcast_arrays(first, second)
         near = self.nearest(second.reshape(-1, 3, 3), first.reshape(-1, 3, 3))
-        return _angle_deg(first.reshape(-1, 3, 3).mT @ near).reshape(first.shape[:-2])
+        return _angle_deg(inverse(first.reshape(-1, 3, 3)) @ near).reshape(first.shape[:-2])
 
     def nearest(self, rotations: Rotations, target: Rotations) -> Rotations:
         """Return R g (n, 3, 3), of all g the one nearest to the target, pair by pair."""
         turned = rotations[:, None] @ self.discrete
         if self.axis is not None:
-            q = target.mT[:, None] @ turned
+            q = inverse(target)[:, None] @ turned
             p1, p2 = _across(self.axis)
             sine = np.einsum("i,ndij,j->nd", p1, q, p2) - np.einsum("i,ndij,j->nd", p2, q, p1)
             cosine = np.einsum("i,ndij,j->nd", p1, q, p1) + np.einsum("i,ndij,j->nd", p2, q, p2)
@@ -234,7 +239,7 @@ def chordal_mean(rotations: Rotations, weights: ArrayLike | None = None) -> Rota
 
 def _angle_deg(rotations: Rotations) -> Array:
     """Return the angle of rotations (n, 3, 3): from sine and cosine, so that 0 is exact."""
-    sine = np.linalg.norm((rotations - rotations.mT).reshape(-1, 9), axis=1) / np.sqrt(2)
+    sine = np.linalg.norm((rotations - inverse(rotations)).reshape(-1, 9), axis=1) / np.sqrt(2)
     cosine = np.trace(rotations, axis1=1, axis2=2) - 1
     return np.asarray(np.degrees(np.arctan2(sine, cosine)))
 
