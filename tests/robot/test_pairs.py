@@ -127,6 +127,23 @@ def test_further_columns_are_ignored(tmp_path):
     assert np.array_equal(PairTable.load(path).estimates.estimate_deg, wanted)
 
 
+def test_any_azimuths_calibrate_and_what_is_thin_is_said(tmp_path):
+    azimuth, estimate = np.array([10.5, 100.0, 100.0]), np.array([12.5, 100.0, 280.0])
+    views = np.arange(0, 360, 5)
+    path = written(tmp_path / "p.csv", {"thin": (azimuth, estimate), "whole": (views, views)})
+    estimates, (said,) = PairTable.load(path).thin_estimates
+    error = (estimates.estimate_deg[0] - np.arange(360)) % 360
+    assert set(error[90:120]) == {0.0, 180.0}  # both views at one azimuth count
+    assert error[90:120].mean() == 90
+    assert np.allclose(error[[11, 340]], 2)
+    assert "1 of 2 objects" in said
+    assert "'thin' one of 270°" in said
+    path = written(tmp_path / "q.csv", {"whole": (views, views)})
+    table = PairTable.load(path)
+    assert not table.thin_estimates[1]
+    assert np.array_equal(table.thin_estimates[0].estimate_deg, table.estimates.estimate_deg)
+
+
 # What is refused
 
 

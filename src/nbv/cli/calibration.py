@@ -226,7 +226,9 @@ def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: boo
     if criterion not in CRITERIA:
         raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
     pairs = PairTable.load(source)
-    estimates, sweeps = pairs.estimates.estimate_deg, pairs.distributions
+    sweeps = pairs.distributions
+    views, thin = (pairs.estimates, ()) if sweeps else pairs.thin_estimates
+    estimates = views.estimate_deg
     table = DistributionTable.from_pairs(sweeps) if sweeps else None
     lookup = chosen_lookup(estimates, criterion, DENSITY)
     if table is None:
@@ -235,9 +237,10 @@ def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: boo
         table.save(output, lookup)
     number = counted(len(estimates), "object")
     about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)}
-    about |= asdict(pairs.offset)
+    about |= asdict(pairs.offset) | {"thin": list(thin)}
     if not as_json:
         print_offset(str(source), number, pairs.offset)
+        print_warnings(thin)
         print_line(f"{output}: {criterion} from {number}")
     if table is not None:
         azimuth_deg, rows = (np.concatenate(parts) for parts in zip(*sweeps.values(), strict=True))

@@ -18,6 +18,7 @@ from nbv.core.logits import LEAST_PROBABILITY
 from nbv.core.offset import FOR_PAIRS, Offset
 from nbv.errors import UserError
 from nbv.files import read_numbers, read_rows
+from nbv.labels import counted
 
 FEWEST_CLASSES = 8
 
@@ -108,11 +109,37 @@ class PairTable:
             Where an object has two views at one azimuth, or views are farther apart than
             `WIDEST_GAP_DEG`.
         """
-        estimates = {
-            str(name): _object_estimates(self.path, str(name), rows)
-            for name, rows in self.rows.groupby("object_id", sort=False)
-        }
-        return Estimates(tuple(estimates), np.stack(list(estimates.values())))
+        for name, rows in self.rows.groupby("object_id", sort=False):
+            _check_full_turn(self.path, str(name), rows["azimuth_deg"].to_numpy(dtype=np.float64))
+        return self.thin_estimates[0]
+
+    @property
+    def thin_estimates(self) -> tuple[Estimates, tuple[str, ...]]:
+        """The same of views at any azimuths, several at one too, and what is thin.
+
+        Raises
+        ------
+        UserError
+            Where azimuths seem to be radians.
+        """
+        turns, gaps = {}, {}
+        for name, rows in self.rows.groupby("object_id", sort=False):
+            azimuth, estimate = (rows[key].to_numpy(dtype=np.float64) for key in COLUMNS[1:])
+            if hint := radians_hint(azimuth):
+                gap = widest_gap_deg(azimuth)
+                raise UserError(f"{self.path}: object {name!r} leaves a gap of {gap:.0f}°{hint}")
+            turns[str(name)] = full_turn(wrap_deg(azimuth), estimate)
+            gaps[str(name)] = widest_gap_deg(azimuth)
+        said = []
+        worst = max(gaps, key=gaps.__getitem__)
+        if gaps[worst] > WIDEST_GAP_DEG + 1e-6:
+            n_wide = sum(gap > WIDEST_GAP_DEG + 1e-6 for gap in gaps.values())
+            said.append(
+                f"{n_wide} of {counted(len(gaps), 'object')} leave gaps above "
+                f"{WIDEST_GAP_DEG:g}° between views, {worst!r} one of {gaps[worst]:.0f}°: "
+                "inside, the errors of the nearest views are assumed"
+            )
+        return Estimates(tuple(turns), np.stack(list(turns.values()))), tuple(said)
 
     @property
     def distributions(self) -> Sweeps:
@@ -203,8 +230,7 @@ class PairTable:
             )
 
 
-def _object_estimates(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.float64]:
-    azimuth_deg, estimate_deg = (rows[key].to_numpy(dtype=np.float64) for key in COLUMNS[1:])
+def _check_full_turn(path: Path, name: str, azimuth_deg: NDArray[np.float64]) -> None:
     values, counts = np.unique(wrap_deg(azimuth_deg), return_counts=True)
     if counts.max() > 1:
         raise UserError(
@@ -217,7 +243,6 @@ def _object_estimates(path: Path, name: str, rows: pd.DataFrame) -> NDArray[np.f
             f"{path}: the views of object {name!r} leave a gap of {gap:.0f}°; calibration needs a "
             f"view every {WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
         )
-    return full_turn(wrap_deg(azimuth_deg), estimate_deg)
 
 
 def full_turn(
@@ -225,11 +250,14 @@ def full_turn(
 ) -> NDArray[np.float64]:
     """Return the estimates (360,) of views one degree apart, from views (n,) at any azimuths.
 
-    Each view has the error of the nearest given view.
+    Each view has the error of the nearest given view; those at one azimuth take turns.
     """
     apart = signed_difference_deg(np.arange(N_VIEWS)[:, None], azimuth_deg)
     nearest = np.abs(apart).argmin(axis=1)
     moved = apart[np.arange(N_VIEWS), nearest]
+    twins = apart == moved[:, None]
+    turn = np.arange(N_VIEWS) % twins.sum(axis=1) + 1
+    nearest = (twins & (twins.cumsum(axis=1) == turn[:, None])).argmax(axis=1)
     return wrap_deg(np.where(moved == 0.0, estimate_deg[nearest], estimate_deg[nearest] + moved))
 
 
