@@ -91,6 +91,7 @@ _FLAGS = {
     "intrinsics": "--intrinsics",
     "max_travel_deg": "--max-travel",
     "near_m": "--near",
+    "ground_truth": "--ground-truth",
     "output": "--output",
 }
 

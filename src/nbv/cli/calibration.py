@@ -35,6 +35,9 @@ def calibrate(
     output: Path,
     bundle: str | None = None,
     criterion: str | None = None,
+    ground_truth: Path | None = None,
+    models_info: Path | None = None,
+    object: Annotated[list[str] | None, Parameter(negative=())] = None,  # noqa: A002
     intrinsics: str | None = None,
     depth_scale: float | None = None,
     near: float | None = None,
@@ -46,8 +49,10 @@ def calibrate(
     From pairs (object_id, azimuth_deg, estimate_deg) of any estimator it makes
     a lookup table for nbv recommend --estimate. With columns p0, p1, ..., the
     probabilities of the azimuths 360 k / B, the table also serves nbv recommend
-    --distribution. From a manifest of frames (object_id, sequence, file,
-    azimuth_deg) and a bundle it makes a bundle for your camera.
+    --distribution. From rotations, BOP's results or pairs (object_id, R_true,
+    R_estimate), it makes a table for camera poses. From a manifest of frames
+    (object_id, sequence, file, azimuth_deg) and a bundle it makes a bundle for
+    your camera.
 
     Example: nbv calibrate pairs.csv --output table.npz
 
@@ -64,6 +69,13 @@ def calibrate(
     criterion
         Criterion of the lookup table: pose_ambiguity (default), information_gain,
         expected_dispersion, bayes_error, expected_error or fixed.
+    ground_truth
+        The truth of BOP's results: the folder that has the scenes' scene_gt.json, or a CSV file in
+        the form of results. Default: the folder of the results.
+    models_info
+        BOP's models_info.json, for the symmetries of the objects of rotations.
+    object
+        Keep this object of rotations; give the option again for more. Default: all.
     intrinsics
         Camera of the frames: fx,fy,cx,cy in pixels, only the focal length, or a camera file.
     depth_scale
@@ -87,6 +99,20 @@ def calibrate(
                 "--bundle mug; pairs make a table, an .npz file"
             )
         check_writable("--output", output, [".npz"])
+        from nbv.robot.rotation_pairs import is_rotation_pairs
+
+        if is_rotation_pairs(source):
+            if criterion is not None:
+                raise UserError("--criterion is for azimuths; rotations rank by expected error")
+            _calibrate_rotations(
+                source, output, ground_truth, models_info, object or [], as_json=json
+            )
+            return
+        if any((ground_truth, models_info, object)):
+            raise UserError(
+                "--ground-truth, --models-info and --object are for rotations, which need columns "
+                "such as R_true and R_estimate"
+            )
         _calibrate_table(source, output, criterion or "pose_ambiguity", as_json=json)
         return
     if criterion is not None:
@@ -252,6 +278,37 @@ def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: boo
             print_offset("distributions", classes, offset)
     if as_json:
         print_json(about)
+
+
+def _calibrate_rotations(
+    source: Path,
+    output: Path,
+    truth: Path | None,
+    models_info: Path | None,
+    objects: list[str],
+    *,
+    as_json: bool,
+) -> None:
+    """Make the table of ``nbv calibrate`` from estimates in three dimensions."""
+    from nbv.robot.rotation_pairs import read_rotation_pairs
+
+    pairs, said = read_rotation_pairs(source, truth, models_info, objects)
+    about = pairs.about()
+    pairs.save(output)
+    if as_json:
+        print_json({"file": str(output), "objects": about, "left_out": list(said)})
+        return
+    print_warnings(said)
+    for one in about:
+        depends = "depend" if one["depends_on_view"] else "are not shown to depend"
+        print_line(
+            f"object {one['object_id']}: {counted(one['n_pairs'], 'pair')} "
+            f"of {counted(one['n_groups'], 'instance')} or scenes, {one['directions_covered']:.0%} of directions "
+            f"covered; error {one['mean_error_deg']:.1f}°, {counted(one['n_flips'], 'flip')}, "
+            f"which {depends} on the view"
+        )
+        print_warnings(one["warnings"])
+    print_line(f"{output}: {counted(len(pairs.object_id), 'pair')}")
 
 
 @dataclass(frozen=True)

@@ -187,23 +187,64 @@ def expected_error(first: RotationBelief, moves: Rotations) -> Array:
     Errors below `flip_deg` are not counted: they do not depend on the view.
     """
     errors, support = first.errors, first.support
-    joint = first.probability[:, None] * errors.conditional("truth", support, moves)
     if not errors.flip_deg:
+        joint = first.probability[:, None] * errors.conditional("truth", support, moves)
         weights = np.swapaxes(joint, 1, 2).reshape(-1, len(support))
         fused = chordal_mean(support, np.maximum(weights, np.finfo(float).tiny))
         angles = np.degrees(np.arccos(errors.symmetry.cosine(fused, support)))
         return np.asarray((weights * angles).reshape(len(moves), -1).sum(axis=1))
-    distance = np.degrees(np.arccos(errors.symmetry.cosine(support, support)))
+    return expected_losses(first, moves, _distances(first)[None])[0]
+
+
+def _distances(belief: RotationBelief) -> Array:
+    """Return the angles (m, m) between the poses of the support, degrees."""
+    support = belief.support
+    distance = np.degrees(np.arccos(belief.errors.symmetry.cosine(support, support)))
     np.fill_diagonal(distance, 0)
-    # Answers are what an estimate stands for: the next one's own pose, or one voted for before.
+    return distance
+
+
+def expected_losses(first: RotationBelief, moves: Rotations, losses: Array) -> Array:
+    """Return expected losses of the fusion after the next view, (n, k).
+
+    `losses` (n, m, m) are those of an answer of the support where another pose of it is true. The
+    answer is what an estimate stands for: the next one's own pose, or one voted for before.
+    """
+    likelihood = first.errors.conditional("truth", first.support, moves)
+    joint = first.probability[:, None] * likelihood
     voted = np.unique(first.votes)
     before = joint[:, voted].argmax(axis=1)[:, None]
-    chance, cost = (
-        np.take_along_axis(of_voted, before, axis=1)[:, 0]
-        for of_voted in (joint[:, voted], distance[voted] @ joint)
-    )
+    chance = np.take_along_axis(joint[:, voted], before, axis=1)[:, 0]
     own = np.diagonal(joint, axis1=1, axis2=2)
-    return np.asarray(np.where(own > chance, (distance * joint).sum(axis=1), cost).sum(axis=1))
+    result = []
+    for loss in losses:
+        cost = np.take_along_axis(loss[voted] @ joint, before, axis=1)[:, 0]
+        result.append(np.where(own > chance, (loss * joint).sum(axis=1), cost).sum(axis=1))
+    return np.stack(result)
+
+
+def chances_within(first: RotationBelief, moves: Rotations, errors_deg: Sequence[float]) -> Array:
+    """Return the probability that the pose after the next view errs by less, (n, k)."""
+    distance = _distances(first)
+    losses = np.stack([distance >= max(error_deg, AGREE_DEG) for error_deg in errors_deg])
+    small = first.errors.error_deg[~first.errors.is_flip]
+    shares = [(small < error_deg).mean() if len(small) else 1.0 for error_deg in errors_deg]
+    return (1 - expected_losses(first, moves, losses)) * np.array(shares)[:, None]
+
+
+def hypotheses_belief(
+    errors: RotationErrors, hypotheses: Rotations, scores: Sequence[float] | Array | None = None
+) -> RotationBelief:
+    """Return the belief after one view whose estimator gave several poses (n, 3, 3), best first.
+
+    It is the mean of V of each, weighted by the likelihood that its score is of no flip.
+    """
+    support, votes = _support(errors, hypotheses)
+    ratios = np.ones(len(hypotheses))
+    if scores is not None and errors.ratio is not None:
+        ratios = errors.ratio(scores)
+    rows = errors.conditional("estimate", support, None, votes, ratios[:, None])[0]
+    return RotationBelief(support, (1 / ratios / (1 / ratios).sum()) @ rows, votes, errors)
 
 
 Criterion = Callable[[RotationBelief, Rotations], Array]
