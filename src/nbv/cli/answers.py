@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from nbv.core.offset import Offset
+    from nbv.robot.next_camera import CameraMove, CameraRecommendation
     from nbv.robot.next_view import Recommendation
 
 Placement = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
@@ -154,6 +155,46 @@ def table_answer_as_json(
     ]
     about = {"criterion": criterion, "cost_unit": cost_unit}
     return _as_json({"azimuth_deg": estimate_deg % 360.0}, moves, warnings, targets) | about
+
+
+def camera_answer_as_json(answer: CameraRecommendation, enough: bool | None) -> dict[str, Any]:
+    """Return ranked camera poses for JSON: the keys of every answer, and those of rotations."""
+    moves = [
+        asdict(move)
+        | {"rotation_deg": None, "direction": move.direction.tolist()}
+        | {"target_camera_pose": None if (t := move.target_camera_pose) is None else t.tolist()}
+        for move in answer.moves
+    ]
+    known = {
+        "expected_error_deg": answer.expected_error_deg,
+        "rotation": answer.rotation.tolist(),
+        "probability_within": answer.probability_within,
+        "depends_on_view": answer.depends_on_view,
+        "enough": enough,
+        "target_camera_pose": moves[0]["target_camera_pose"],
+    }
+    return _as_json(known, moves, answer.warnings, None)
+
+
+def print_camera_answer(answer: CameraRecommendation, enough: bool | None) -> None:
+    """Print ranked camera poses in a few lines."""
+    print_line(f"pose       expected error {answer.expected_error_deg:.1f}°, {_chances(answer)}")
+    if enough is not None:
+        print_line(f"           {'enough: stop here' if enough else 'one more view'}")
+    for move, head in zip(answer.moves[:6], ["next view", *[""] * 5], strict=False):
+        metres = "" if move.travel_m is None else f", {move.travel_m:.2f} m"
+        print_line(
+            f"{head:<10} candidate {move.index}, travel {move.travel_deg:.0f}°{metres}: "
+            f"expected error {move.expected_error_deg:.1f}°, {_chances(move)}"
+        )
+    print_warnings(answer.warnings)
+    best = answer.moves[0].target_camera_pose
+    print_target(None if best is None else [best])
+
+
+def _chances(about: CameraRecommendation | CameraMove) -> str:
+    chances = about.probability_within.items()
+    return ", ".join(f"{p:.0%} within {error}°" for error, p in chances)
 
 
 def print_recommendation(

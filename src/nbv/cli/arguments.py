@@ -85,7 +85,9 @@ _FLAGS = {
     "azimuth_deg": "--azimuth",
     "elevation_deg": "--elevation",
     "gravity": "--gravity",
+    "camera_pose": "--camera-pose",
     "seed": "--seed",
+    "sphere": "--sphere",
     "sensor": "--sensor",
     "far_m": "--far",
     "intrinsics": "--intrinsics",
@@ -121,7 +123,15 @@ def as_paragraphs(command: Command) -> Command:
 # Minus, hyphens and dashes that typesetting puts for the minus sign.
 _MINUS = re.compile("[\u2010-\u2015\u2212\ufe63\uff0d]")
 
-NUMBER_OPTIONS = ("--rotations", "--allowed", "--axis", "--gravity", "--views", "--intrinsics")
+NUMBER_OPTIONS = (
+    "--estimate",
+    "--rotations",
+    "--allowed",
+    "--axis",
+    "--gravity",
+    "--views",
+    "--intrinsics",
+)
 
 
 def joined_numbers(arguments: Sequence[str]) -> list[str]:

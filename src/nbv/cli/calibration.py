@@ -37,7 +37,7 @@ def calibrate(
     criterion: str | None = None,
     ground_truth: Path | None = None,
     models_info: Path | None = None,
-    object: Annotated[list[str] | None, Parameter(negative=())] = None,  # noqa: A002
+    objects: Annotated[list[str] | None, Parameter(name="--object", negative=())] = None,
     intrinsics: str | None = None,
     depth_scale: float | None = None,
     near: float | None = None,
@@ -74,7 +74,7 @@ def calibrate(
         the form of results. Default: the folder of the results.
     models_info
         BOP's models_info.json, for the symmetries of the objects of rotations.
-    object
+    objects
         Keep this object of rotations; give the option again for more. Default: all.
     intrinsics
         Camera of the frames: fx,fy,cx,cy in pixels, only the focal length, or a camera file.
@@ -105,10 +105,10 @@ def calibrate(
             if criterion is not None:
                 raise UserError("--criterion is for azimuths; rotations rank by expected error")
             _calibrate_rotations(
-                source, output, ground_truth, models_info, object or [], as_json=json
+                source, output, ground_truth, models_info, objects or [], as_json=json
             )
             return
-        if any((ground_truth, models_info, object)):
+        if any((ground_truth, models_info, objects)):
             raise UserError(
                 "--ground-truth, --models-info and --object are for rotations, which need columns "
                 "such as R_true and R_estimate"
@@ -303,8 +303,9 @@ def _calibrate_rotations(
         depends = "depend" if one["depends_on_view"] else "are not shown to depend"
         print_line(
             f"object {one['object_id']}: {counted(one['n_pairs'], 'pair')} "
-            f"of {counted(one['n_groups'], 'instance')} or scenes, {one['directions_covered']:.0%} of directions "
-            f"covered; error {one['mean_error_deg']:.1f}°, {counted(one['n_flips'], 'flip')}, "
+            f"of {counted(one['n_groups'], 'instance')} or scenes, "
+            f"{one['directions_covered']:.0%} of directions covered; "
+            f"error {one['mean_error_deg']:.1f}°, {counted(one['n_flips'], 'flip')}, "
             f"which {depends} on the view"
         )
         print_warnings(one["warnings"])

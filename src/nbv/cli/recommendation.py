@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from nbv.cli.answers import (
+    camera_answer_as_json,
     print_assumed_camera,
+    print_camera_answer,
     print_json,
     print_line,
     print_recommendation,
@@ -56,9 +58,13 @@ def recommend(
     followed: Annotated[bool, Parameter(negative="--not-followed")] = True,
     camera_pose: Path | None = None,
     axis: Numbers = None,
-    estimate: float | None = None,
+    estimate: Rotations = None,
     distribution: Path | None = None,
     table: Path | None = None,
+    object_id: Annotated[str | None, Parameter(name="--object")] = None,
+    candidates: Path | None = None,
+    sphere: int | None = None,
+    until: float | None = None,
     plot: Path | None = None,
     json: Json = False,
 ) -> None:
@@ -114,12 +120,23 @@ def recommend(
         The object's upright axis in the base frame: a point, metres, or a point and a direction.
         Default direction: 0 0 1.
     estimate
-        Instead of frames: the azimuth from your own estimator, degrees.
+        Instead of frames: the azimuth from your own estimator, degrees. For a table of rotations:
+        the 9 numbers of a rotation, object to camera, or a .json or .npy file with several
+        hypotheses or views.
     distribution
         Instead of frames: a file with the distributions from your own estimator, one row for each
         view. CSV with columns p0, p1, ..., or .npy.
     table
         The file that nbv calibrate made for that estimator.
+    object_id
+        The object, where a table of rotations has several.
+    candidates
+        Camera poses that can be reached, for a table of rotations: 16 numbers each, like
+        --camera-pose.
+    sphere
+        Instead of --candidates: so many even camera poses about the object.
+    until
+        An expected error, degrees. If that of a rotation is not above it, the answer is: enough.
     plot
         Draw crops, belief, expected errors and the move into this file: .png, .pdf or .svg.
     json
@@ -139,9 +156,34 @@ def recommend(
         if ignored := [name for name, value in frame_options.items() if value is not None]:
             own = "--estimate" if distribution is None else "--distribution"
             raise UserError(f"{ignored[0]} does not go with {own} and --table; leave it out")
+        if (candidates, sphere) != (None, None):
+            if distribution is not None or axis is not None or allowed is not None:
+                raise UserError(
+                    "--candidates and --sphere go with --estimate and --table, not with "
+                    "--distribution, --axis or --allowed"
+                )
+            _recommend_camera(
+                estimate,
+                table,
+                object_id,
+                candidates,
+                sphere,
+                camera_pose,
+                max_travel,
+                until,
+                as_json=json,
+            )
+            return
+        if object_id is not None or until is not None:
+            raise UserError("--object and --until go with --candidates or --sphere")
         placement = _read_placement(camera_pose, axis)
         if distribution is None:
-            _recommend_by_table(estimate, table, allowed, max_travel, placement, as_json=json)
+            if isinstance(estimate, Path) or len(estimate or [0]) > 1:
+                raise UserError(
+                    "a rotation needs --candidates or --sphere; an azimuth is one number"
+                )
+            azimuth_deg = estimate[0] if estimate else None
+            _recommend_by_table(azimuth_deg, table, allowed, max_travel, placement, as_json=json)
             return
         if estimate is not None:
             raise UserError("--estimate and --distribution: give one of them")
@@ -156,6 +198,8 @@ def recommend(
             as_json=json,
         )
         return
+    if (object_id, candidates, sphere, until) != (None,) * 4:
+        raise UserError("--object, --candidates, --sphere and --until need --estimate and --table")
     if not frames:
         hint = "; give frames before --mask" if mask is not None else ""
         raise UserError(f"give a depth frame, or --estimate or --distribution with --table{hint}")
@@ -274,6 +318,45 @@ def _recommend_by_table(
         print_line(f"or {', '.join(listed)}")
     print_warnings(warnings)
     print_target(targets)
+
+
+def _recommend_camera(
+    estimate: list[float] | Path | None,
+    table: Path | None,
+    object_id: str | None,
+    candidates: Path | None,
+    sphere: int | None,
+    camera_pose: Path | None,
+    max_travel: float,
+    until: float | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Print the next camera poses of ``nbv recommend`` for rotations."""
+    if table is None or estimate is None:
+        raise UserError("--candidates and --sphere need --estimate and --table")
+    if candidates is not None and sphere is not None:
+        raise UserError("--candidates and --sphere: give one of them")
+    from nbv.robot.moves import read_pose
+    from nbv.robot.next_camera import as_view, read_poses, read_views, recommend_camera
+    from nbv.robot.rotation_pairs import RotationPairs
+
+    views = (
+        read_views(estimate) if isinstance(estimate, Path) else [as_view(estimate, "--estimate")]
+    )
+    answer = recommend_camera(
+        RotationPairs.load(table),
+        views,
+        read_poses(candidates) if candidates is not None else sphere or 0,
+        object_id=object_id,
+        camera_pose=None if camera_pose is None else read_pose(camera_pose),
+        max_travel_deg=max_travel,
+    )
+    enough = None if until is None else answer.expected_error_deg <= until
+    if as_json:
+        print_json(camera_answer_as_json(answer, enough))
+        return
+    print_camera_answer(answer, enough)
 
 
 def _recommend_by_distributions(

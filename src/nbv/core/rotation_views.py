@@ -193,7 +193,7 @@ def expected_error(first: RotationBelief, moves: Rotations) -> Array:
         fused = chordal_mean(support, np.maximum(weights, np.finfo(float).tiny))
         angles = np.degrees(np.arccos(errors.symmetry.cosine(fused, support)))
         return np.asarray((weights * angles).reshape(len(moves), -1).sum(axis=1))
-    return expected_losses(first, moves, _distances(first)[None])[0]
+    return np.asarray(expected_losses(first, moves, _distances(first)[None])[0])
 
 
 def _distances(belief: RotationBelief) -> Array:
@@ -201,7 +201,7 @@ def _distances(belief: RotationBelief) -> Array:
     support = belief.support
     distance = np.degrees(np.arccos(belief.errors.symmetry.cosine(support, support)))
     np.fill_diagonal(distance, 0)
-    return distance
+    return np.asarray(distance)
 
 
 def expected_losses(first: RotationBelief, moves: Rotations, losses: Array) -> Array:
@@ -226,10 +226,10 @@ def expected_losses(first: RotationBelief, moves: Rotations, losses: Array) -> A
 def chances_within(first: RotationBelief, moves: Rotations, errors_deg: Sequence[float]) -> Array:
     """Return the probability that the pose after the next view errs by less, (n, k)."""
     distance = _distances(first)
-    losses = np.stack([distance >= max(error_deg, AGREE_DEG) for error_deg in errors_deg])
+    losses = np.stack([1.0 * (distance >= max(e, AGREE_DEG)) for e in errors_deg])
     small = first.errors.error_deg[~first.errors.is_flip]
     shares = [(small < error_deg).mean() if len(small) else 1.0 for error_deg in errors_deg]
-    return (1 - expected_losses(first, moves, losses)) * np.array(shares)[:, None]
+    return np.asarray((1 - expected_losses(first, moves, losses)) * np.reshape(shares, (-1, 1)))
 
 
 def hypotheses_belief(
