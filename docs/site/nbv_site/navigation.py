@@ -17,6 +17,7 @@ SECTIONS = {
         "docs/drivers",
         "docs/turntable",
         "docs/your-estimator",
+        "docs/your-6d-estimator",
         "docs/own-category",
         "docs/bundles",
     ),
