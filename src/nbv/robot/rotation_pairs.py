@@ -192,6 +192,8 @@ class RotationPairs:
             shapes = [a.shape for a in (index, group, score, estimate, truth)]
             if not n or shapes != [(n,)] * 3 + [(n, 3, 3)] * 2:
                 raise damaged(path, "its arrays have different lengths", CALIBRATE_AGAIN)
+            if [a.dtype.kind for a in (names, index, group, score)] != ["U", "i", "U", "f"]:
+                raise damaged(path, "an array has another type", CALIBRATE_AGAIN)
             if index.min() < 0 or sorted(set(index.tolist())) != list(range(len(names))):
                 raise damaged(path, "its objects do not fit its pairs", CALIBRATE_AGAIN)
             estimate, truth = (
@@ -199,6 +201,8 @@ class RotationPairs:
                 for name, a in (("estimate", estimate), ("truth", truth))
             )
             models = json.loads(str(texts))
+            if not isinstance(models, dict):
+                raise damaged(path, "its symmetries are no entries by object", CALIBRATE_AGAIN)
             pairs = cls(names.astype(str)[index], group, estimate, truth, score, bool(ray), models)
             for name in pairs.object_ids:
                 pairs.symmetry(name)
