@@ -366,7 +366,48 @@ def of_mesh(name: str, make: Callable[[Path], object]) -> Reader:
     return Reader(f"mug/{name}", make, read_mesh, mesh_problem)
 
 
+def make_bop_results(path: Path) -> None:
+    from nbv.robot.bop_example import write_example
+
+    write_example(path.parent)
+
+
+def make_bop_truth(path: Path) -> None:
+    make_bop_results(path.parent)
+
+
+def read_bop_results(path: Path) -> Any:
+    from nbv.robot.rotation_pairs import read_rotation_pairs
+
+    return read_rotation_pairs(path.parent / "results.csv", None, path.parent / "models_info.json")
+
+
+def read_bop_truth(path: Path) -> Any:
+    return read_bop_results(path.parent)
+
+
+def bop_problem(result: Any) -> str:
+    pairs, _ = result
+    determinant = np.linalg.det(np.concatenate([pairs.estimate, pairs.truth]))
+    return "" if np.allclose(determinant, 1.0, atol=0.01) else "a matrix is no rotation"
+
+
+def make_rotation_table(path: Path) -> None:
+    make_bop_results(path.parent / "results.csv")
+    read_bop_results(path.parent / "results.csv")[0].save(path)
+
+
+def read_rotation_table(path: Path) -> Any:
+    from nbv.robot.rotation_pairs import RotationPairs
+
+    return RotationPairs.load(path), ()
+
+
 READERS: Mapping[str, Reader] = {
+    "bop results": Reader("results.csv", make_bop_results, read_bop_results, bop_problem),
+    "bop models": Reader("models_info.json", make_bop_results, read_bop_results, bop_problem),
+    "bop truth": Reader("000001/scene_gt.json", make_bop_truth, read_bop_truth, bop_problem),
+    "rotations": Reader("t.npz", make_rotation_table, read_rotation_table, bop_problem),
     "obj": of_mesh("one.obj", make_mesh),
     "obj by hand": of_mesh("one.obj", make_hand_written_obj),
     "ply ascii": of_mesh("one.ply", lambda path: make_mesh(path, encoding="ascii")),

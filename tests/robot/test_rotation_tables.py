@@ -152,6 +152,24 @@ def test_estimates_of_other_images_are_named(example, tmp_path):
         read_rotation_pairs(tmp_path / "r.csv", example)
 
 
+@pytest.mark.parametrize(
+    ("file", "text", "message"),
+    [
+        ("models_info.json", '{"1": [1]}', "object 1 of models_info is not an entry"),
+        ("models_info.json", '{"1": {"symmetries_discrete": [[1, 2]]}}', "16 numbers"),
+        ("000001/scene_gt.json", '{"0": 3}', "image 0: an instance lacks"),
+        ("000001/scene_gt.json", "[]", "scene_gt.json"),
+    ],
+)
+def test_files_that_are_not_bops_are_named(tmp_path, file, text, message):
+    write_example(tmp_path)
+    (tmp_path / file).write_text(text)
+    with pytest.raises(UserError, match=message):
+        read_rotation_pairs(tmp_path / "results.csv", None, tmp_path / "models_info.json")[
+            0
+        ].about()
+
+
 # The next camera pose
 
 

@@ -34,6 +34,8 @@ NO_DEPENDENCE = (
     "shown to help and the farthest view harmed; fusing a second view, with scores, did help"
 )
 
+NO_SCORES = "scores are not used: calibration pairs had none"
+
 
 @dataclass(frozen=True)
 class View:
@@ -188,6 +190,7 @@ def recommend_camera(
         for k, i in ((k, free[k]) for k in np.lexsort((travel[free], np.round(cost, 9))))
     ]
     distance = errors.symmetry.distance_deg(now.support, now.pose)
+    unused = bool(scores) and errors.ratio is None
     depends = pairs.depends_on_view(name)
     return CameraRecommendation(
         rays[-1].T @ cameras[-1] @ cameras[0].T @ now.pose,
@@ -195,7 +198,7 @@ def recommend_camera(
         _named(np.array([now.probability_within(error_deg) for error_deg in WITHIN_DEG])),
         tuple(ranked),
         depends,
-        () if depends else (NO_DEPENDENCE,),
+        (*(() if depends else (NO_DEPENDENCE,)), *([NO_SCORES] if unused else [])),
     )
 
 

@@ -93,6 +93,11 @@ class RotationPairs:
             return Symmetry.from_bop(self.models[name])
         except UserError as error:
             raise error.about(f"object {name} of models_info") from error
+        except (AttributeError, TypeError, ValueError):
+            raise UserError(
+                f"object {name} of models_info is not an entry of BOP: give symmetries_discrete "
+                "and symmetries_continuous"
+            ) from None
 
     def errors(self, name: str | None = None) -> RotationErrors:
         """Return the errors on an object, which may be unnamed if it is the only one.
@@ -350,14 +355,14 @@ def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
         if not file.is_file():
             continue
         for image, entries in _read_json(file).items():
-            for entry in entries:
-                try:
+            try:
+                for entry in entries:
                     r, t = (" ".join(map(str, entry[f"cam_{k}_m2c"])) for k in "Rt")
                     found.append((scene, str(int(image)), str(int(entry["obj_id"])), r, t))
-                except (KeyError, TypeError, ValueError):
-                    raise UserError(
-                        f"{file}, image {image}: an instance lacks obj_id, cam_R_m2c or cam_t_m2c"
-                    ) from None
+            except (KeyError, TypeError, ValueError):
+                raise UserError(
+                    f"{file}, image {image}: an instance lacks obj_id, cam_R_m2c or cam_t_m2c"
+                ) from None
     if not found:
         raise UserError(f"{truth} has no <scene>/scene_gt.json of a scene of the estimates")
     return pd.DataFrame(found, columns=[*keys, "R", "t"])
