@@ -237,6 +237,19 @@ def test_a_small_travel_keeps_near_candidates(pairs):
         recommend_camera(pairs, [VIEW], [np.eye(4)])
 
 
+@pytest.mark.parametrize(
+    ("pose", "message"),
+    [
+        (np.diag([1.0, -1, -1, 1]), "behind this camera"),
+        ([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -700], [0, 0, 0, 1]], "not millimetres"),
+        (np.diag([1.0, 1, -1, 1]), "not a rotation"),
+    ],
+)
+def test_a_wrong_candidate_is_named(pairs, pose, message):
+    with pytest.raises(UserError, match=f"^candidate 0.*{message}"):
+        recommend_camera(pairs, [VIEW], [np.asarray(pose)])
+
+
 def test_independence_of_the_view_is_said(tmp_path):
     rows = rotation_pairs().assign(scene_id=1).drop(columns="instance")
     rows.to_csv(tmp_path / "p.csv", index=False)

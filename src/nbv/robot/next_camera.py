@@ -26,6 +26,9 @@ from nbv.robot.moves import Pose, as_pose
 from nbv.robot.rotation_pairs import LEAST_MM, RotationPairs
 from nbv.robot.rotations import MIN_SEPARATION_DEG, as_travel
 
+FARTHEST_M = 50.0
+"""No arm looks at an object from farther: such camera poses are in millimetres."""
+
 WITHIN_DEG = (5.0, 15.0, 30.0)
 
 NO_DEPENDENCE = (
@@ -222,6 +225,11 @@ def _camera_at(pose: Pose, place: Array | None, pairs: RotationPairs, i: int) ->
         raise UserError(
             f"candidate {i}: the object is behind this camera: give poses of the optical frame "
             "(z forward) in the base frame, camera to base, in metres"
+        )
+    if (away := float(np.linalg.norm(position))) > FARTHEST_M:
+        raise UserError(
+            f"candidate {i}: the object is {away:.0f} m away: give camera poses in metres, not "
+            "millimetres"
         )
     return _ray(pairs, position) @ turned
 
