@@ -254,7 +254,16 @@ def test_a_linear_estimator_has_no_stage_of_training():
         linear.stage("training")
 
 
-def test_linear_estimators_learn_from_mirror_images_where_a_category_has_a_plane():
-    planes = [plan_of(*each).mirror_plane_deg("mug") for each in (("estimator=linear",), ())]
-    assert planes == [90.0, None]
-    assert plan_of("estimator=linear", "~mirror_plane_deg.mug").mirror_plane_deg("mug") is None
+@pytest.mark.parametrize("kind", ["regressor", "linear"])
+def test_estimators_learn_from_mirror_images_where_a_category_has_a_plane(kind):
+    estimator = f"estimator={kind}"
+    assert plan_of(estimator).mirror_plane_deg("mug") == 90.0
+    assert plan_of(estimator, "estimator.mirror_images=false").mirror_plane_deg("mug") is None
+    assert plan_of(estimator, "~mirror_plane_deg.mug").mirror_plane_deg("mug") is None
+
+
+def test_networks_without_mirror_images_that_are_meant_to_have_them_are_told():
+    assert plan_of().unmirrored == ()
+    assert plan_of("~mirror_plane_deg.mug", "estimator.mirror_images=false").unmirrored == ()
+    (sentence,) = plan_of("~mirror_plane_deg.mug").unmirrored
+    assert sentence.startswith("mug: ")

@@ -166,6 +166,7 @@ onstart:
         f"nbv: experiment {CONFIG['experiment']}, data set {CONFIG['dataset']['source']}, "
         f"{len(UNITS)} units of {CONFIG['n_folds']} folds",
         f"results: {PLAN.results}/    logs: {PLAN.results}/logs/",
+        *PLAN.unmirrored,
         *PLAN.caution,
     )
 

@@ -202,6 +202,21 @@ class Plan:
         plane: float | None = self.config["mirror_plane_deg"].get(category)
         return plane
 
+    @property
+    def unmirrored(self) -> tuple[str, ...]:
+        """Which categories lack the mirror images that networks are to learn from."""
+        if self.external or self.linear or not self.config["estimator"]["mirror_images"]:
+            return ()
+        without = [
+            name for name in self.config["categories"] if self.mirror_plane_deg(name) is None
+        ]
+        if not without:
+            return ()
+        return (
+            f"{' and '.join(without)}: no mirror_plane_deg, so no mirror images; give the azimuth "
+            "of the plane of symmetry, or about twice the epochs",
+        )
+
     def dataset_of(self, category: str) -> dict[str, Any]:
         """Return the data set's settings that concern one category.
 
