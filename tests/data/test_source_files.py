@@ -137,8 +137,8 @@ def test_names_that_would_break_a_table_or_a_line_are_refused(tmp_path, name):
 
 def test_names_with_spaces_commas_and_quotes_work(tmp_path):
     names = ["a, b", "c 'd' \"e\"", "{f} %g $h", "Täße", "#i;j", "k" * 200]
-    for name in names:
-        put(tmp_path / "mug" / f"{name}.ply")
+    for i, name in enumerate(names):
+        put(tmp_path / "mug" / f"{name}.ply", trimesh.creation.box((1, 1 + i, 1)))
     source = source_of("folder", root=str(tmp_path))
     assert source.object_ids("mug") == sorted(names)
     assert list(prepare_meshes(source, "mug", names)) == names

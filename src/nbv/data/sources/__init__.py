@@ -132,8 +132,8 @@ def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str])
     Raises
     ------
     UserError
-        After all meshes are tried, naming the first bad one and the number of others. The log has
-        an error for each.
+        After all meshes are tried, naming the first bad one and the number of others (the log has
+        an error for each), or all that are copies of others.
     """
     prepared: dict[str, Mesh] = {}
     bad: list[str] = []
@@ -153,6 +153,15 @@ def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str])
     if bad:
         more = f" (and {len(bad) - 1} more, logged above)" if len(bad) > 1 else ""
         raise UserError(f"{bad[0]}{more}: mend the file or list its id in dataset.exclude")
+    from nbv.data.copies import find_copies  # only here: it is slow
+
+    if not source.endless and (copies := find_copies(prepared)):
+        raise UserError(
+            f"dataset={source.name}: {category}: "
+            f"{', '.join(f'{one} is a copy of {other}' for one, other in copies.items())}; "
+            f"leave out copies, so that no test meets what a training saw: "
+            f"dataset.exclude=[{','.join(copies)}]"
+        )
     seconds = time.monotonic() - start
     logger.info("%s: %d meshes prepared in %.1f s", category, len(prepared), seconds)
     return prepared
