@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from nbv.errors import UserError
 from nbv.experiment.statistics.paired import MEAN_COLUMNS, object_means
-from studies.factorial import MORE_VIEWS, SINGLE, Factorial
+from studies.factorial import LIKELIEST, MORE_VIEWS, SINGLE, Factorial
 from studies.trainings import (
     Mean,
     crossed_mean,
@@ -20,7 +20,9 @@ from studies.trainings import (
 )
 
 ALL = "all"
-"""Stands for all categories together."""
+"""Stands for all categories together; all objects have equal weight."""
+EQUALLY = "all, equally weighted"
+"""The same with equal weight of categories, where they have different numbers of objects."""
 
 GROUP = ("dataset", "category")
 TRAINING = ("shuffle", "replicate")
@@ -121,8 +123,12 @@ def contrasts_of(methods: Sequence[Method]) -> list[Contrast]:
     paper = ("given_estimate", "average", 2)
     contrasts += [
         Contrast(paper, ("none", "none", 1)),
-        Contrast(("as_printed", "average", 2), paper, question=0 if has_product else 3),
+        Contrast((*LIKELIEST, 2), paper, question=0 if has_product else 3),
         Contrast(("expected_error", "product", 2), paper, question=4),
+        *(
+            Contrast(("through_estimate", "average", 2), other, question=0 if has_product else 6)
+            for other in (paper, *((name, "average", 2) for name in ("opposite", "given_truth")))
+        ),
     ]
     for n_views in sorted({n for *_, n in methods if n > 2}):
         for choice, fusion in (
@@ -217,37 +223,43 @@ def method_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
 
     Paired by object and training. Same parameters and errors as `method_means`. Primary contrasts
     over all categories keep their p-values. All others are adjusted by Holm's method within a data
-    set and category.
+    set and category. Categories of different sizes are also pooled with equal weight (`EQUALLY`).
     """
     rows = []
     for group, tables in _tables(objects):
-        means: dict[Contrast, Mean] = {}
-        for contrast in contrasts_of(list(tables)):
-            mine, other = (
-                tables[method]["error_deg"] for method in (contrast.method, contrast.other)
-            )
-            means[contrast] = crossed_mean(*(a - b for a, b in zip(mine, other, strict=True)))
-        over_all = group[1] == ALL
-        secondary = {
-            contrast.name + contrast.method[1]: contrast
-            for contrast in means
-            if not (contrast.question and over_all)
-        }
-        adjusted = holm({name: means[contrast].p_value for name, contrast in secondary.items()})
-        for contrast, mean in means.items():
-            interval = mean.interval()
-            p_value = adjusted.get(contrast.name + contrast.method[1], mean.p_value)
-            rows.append(
-                (
-                    *group,
-                    contrast.name,
-                    contrast.method[1],
-                    contrast.question,
-                    *(interval.value, interval.low, interval.high, p_value),
-                    *(mean.n_objects, mean.n_trainings),
-                )
-            )
+        sizes = {table.shape[1] for figures in tables.values() for table in figures["error_deg"]}
+        rows += _contrast_rows(group, tables)
+        if len(sizes) > 1:
+            rows += _contrast_rows((group[0], EQUALLY), tables)
     return pd.DataFrame(rows, columns=list(CONTRASTS_COLUMNS))
+
+
+def _contrast_rows(
+    group: tuple[str, str], tables: Mapping[Method, Figures]
+) -> list[tuple[str | int | float, ...]]:
+    means: dict[Contrast, Mean] = {}
+    for contrast in contrasts_of(list(tables)):
+        mine, other = (tables[method]["error_deg"] for method in (contrast.method, contrast.other))
+        differences = (a - b for a, b in zip(mine, other, strict=True))
+        means[contrast] = crossed_mean(*differences, equal_categories=group[1] == EQUALLY)
+    secondary = {
+        contrast.name + contrast.method[1]: contrast
+        for contrast in means
+        if not (contrast.question and group[1] in (ALL, EQUALLY))
+    }
+    adjusted = holm({name: means[contrast].p_value for name, contrast in secondary.items()})
+    rows: list[tuple[str | int | float, ...]] = []
+    for contrast, mean in means.items():
+        interval = mean.interval()
+        p_value = adjusted.get(contrast.name + contrast.method[1], mean.p_value)
+        rows.append(
+            (
+                *(*group, contrast.name, contrast.method[1], contrast.question),
+                *(interval.value, interval.low, interval.high, p_value),
+                *(mean.n_objects, mean.n_trainings),
+            )
+        )
+    return rows
 
 
 def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:

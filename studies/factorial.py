@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nbv.core.criteria import POSE_LIKELIHOODS
 from nbv.core.estimates import Posteriors
 from nbv.core.evidence import COARSE_BINS, Evidence, evidence_of_distributions
 from nbv.core.fusion import ESTIMATE_FUSIONS
@@ -36,8 +37,8 @@ Pair = tuple[str, str]
 """A choice of the next view and a fusion."""
 
 SINGLE: Final[Pair] = ("none", "none")
-AS_PRINTED: Final[Pair] = ("as_printed", "average")
-"""The paper's method as printed: T = L, the likeliest smoothing, no pseudo-observations."""
+LIKELIEST: Final[Pair] = ("given_truth_likeliest", "average")
+"""The weakest reading of the paper: T = L, the likeliest smoothing, no pseudo-observations."""
 RANDOM_POSTERIOR: Final[Pair] = ("random", "posterior")
 """Its density is shared by all choices with the fusion ``posterior``."""
 
@@ -47,17 +48,18 @@ POLICIES: Final[Mapping[str, str]] = {
     "opposite": "opposite",
     "given_truth": "pose_ambiguity",
     "given_estimate": "pose_ambiguity",
+    "through_estimate": "pose_ambiguity",
     "information_gain": "information_gain",
     "expected_dispersion": "expected_dispersion",
     "expected_error": "expected_error",
 }
-"""The policy of each choice; the pose ambiguity has two interpretations."""
+"""The policy of each choice; the pose ambiguity has three interpretations."""
 
 CHOICES_WITH_TABLES = tuple(choice for choice, policy in POLICIES.items() if needs_lookup(policy))
 
 METHODS: Final[Mapping[Pair, str]] = {
     (choice, fusion): policy for fusion in ESTIMATE_FUSIONS for choice, policy in POLICIES.items()
-} | {AS_PRINTED: "pose_ambiguity"}
+} | {LIKELIEST: "pose_ambiguity"}
 """The policies of all pairs that fuse estimates."""
 
 PRODUCT_CHOICES = ("random", "fixed", "opposite", "information_gain", "expected_error")
@@ -148,10 +150,10 @@ def evaluate_factorial(
 
 
 def _settings_of(choice: str, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a choice: the pose likelihood has two interpretations."""
-    if choice == "as_printed":
+    """Return the settings of a choice: the pose likelihood has three interpretations."""
+    if choice == LIKELIEST[0]:
         return dict(settings) | {"pose_likelihood": "given_truth", "pseudo_observations": [0.0]}
-    given = "given_truth" if choice == "given_truth" else "given_estimate"
+    given = choice if choice in POSE_LIKELIHOODS else "given_estimate"
     return dict(settings) | {"pose_likelihood": given}
 
 
@@ -168,12 +170,14 @@ def _densities(
         chosen = choose_densities(estimate_deg, methods, own, shared=shared)
         return {(choice, fusion): density for choice, density in chosen.items()}
 
-    others = [choice for choice in CHOICES_WITH_TABLES if choice != "given_truth"]
-    average = best("average", *others) | best("average", "given_truth")
+    apart = ("given_truth", "through_estimate")
+    average = best("average", *(one for one in CHOICES_WITH_TABLES if one not in apart))
+    for choice in apart:
+        average |= best("average", choice)
     posterior = best("posterior", "random")
     kernel = best("posterior", "expected_error", shared=posterior[RANDOM_POSTERIOR])
-    printed = most_likely_density(estimate_deg, _settings_of("as_printed", settings))
-    return average | posterior | kernel | {AS_PRINTED: printed}
+    likeliest = most_likely_density(estimate_deg, _settings_of(LIKELIEST[0], settings))
+    return average | posterior | kernel | {LIKELIEST: likeliest}
 
 
 def _lookups(

@@ -56,7 +56,7 @@ class Mean:
         return float(2.0 * stats.t.sf(t, self.degrees_of_freedom))
 
 
-def crossed_mean(*tables: ArrayLike) -> Mean:
+def crossed_mean(*tables: ArrayLike, equal_categories: bool = False) -> Mean:
     """Return the mean of one quantity over crossed objects and trainings.
 
     Parameters
@@ -65,11 +65,13 @@ def crossed_mean(*tables: ArrayLike) -> Mean:
         An object's mean error under a training, or the difference between two methods' errors. One
         table per category, all with the same trainings: objects vary within their category, and
         categories may share the variation between trainings.
+    equal_categories : bool
+        Give all categories equal weight, instead of all objects.
 
     Returns
     -------
     Mean
-        All objects have equal weight. With one training, the variance is over objects only.
+        With one training, the variance is over objects only.
 
     Raises
     ------
@@ -81,7 +83,7 @@ def crossed_mean(*tables: ArrayLike) -> Mean:
     for table in arrays:
         if table.ndim != 2 or not table.size or not np.isfinite(table).all():
             raise ValueError("crossed_mean needs a finite value for each training and object")
-    by_training = training_means(arrays)
+    by_training = training_means(arrays, equal_categories)
     n_trainings, n_objects = len(by_training), sum(table.shape[1] for table in arrays)
     mean = float(by_training.mean())
     if min(table.shape[1] for table in arrays) == 1:
@@ -92,7 +94,7 @@ def crossed_mean(*tables: ArrayLike) -> Mean:
     objects, remainders = [], []
     for table in arrays:
         n = table.shape[1]
-        share = (n / n_objects) ** 2
+        share = (1 / len(arrays) if equal_categories else n / n_objects) ** 2
         object_means = table.mean(axis=0)
         objects.append((share * _spread(object_means) / n, n - 1))
         left = table - object_means - table.mean(axis=1, keepdims=True) + table.mean()
@@ -110,10 +112,12 @@ def crossed_mean(*tables: ArrayLike) -> Mean:
     return Mean(mean, variance, max(freedom, least), n_objects, n_trainings)
 
 
-def training_means(tables: Sequence[Floats]) -> Floats:
-    """Return the mean of each training over all objects, (n_trainings,); see `crossed_mean`."""
+def training_means(tables: Sequence[Floats], equal_categories: bool = False) -> Floats:
+    """Return the mean of each training, (n_trainings,); see `crossed_mean`."""
     if len({len(table) for table in tables}) > 1:
         raise ValueError("all categories need the same trainings")
+    if equal_categories:
+        return np.asarray(np.mean([table.mean(axis=1) for table in tables], axis=0))
     return np.asarray(np.concatenate(tables, axis=1).mean(axis=1))
 
 

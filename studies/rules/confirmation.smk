@@ -98,6 +98,25 @@ use rule estimate from paper as replicate_estimate with:
         "<benchmarks>/replicate_estimate/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}/fold{fold}.tsv"
 
 
+if PLAN.linear:
+
+    ruleorder: replicate_fit > replicate_train > replicate_estimate
+
+    use rule fit from paper as replicate_fit with:
+        input:
+            sources("fit_linear"),
+            splits=shuffled_splits,
+            features="<results>/features/{category}/el{elevation}.npy",
+            objects="<results>/depth/{category}/el{elevation}_objects.json",
+        output:
+            **estimates_of_fold(TRAINING),
+            estimator=f"{TRAINING}/estimators/{FOLD}/estimator.safetensors",
+        log:
+            "<logs>/replicate_fit/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}/fold{fold}.log",
+        benchmark:
+            "<benchmarks>/replicate_fit/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}/fold{fold}.tsv"
+
+
 rule keep_estimates:
     input:
         sources("keep_estimates"),

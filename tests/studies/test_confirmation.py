@@ -100,7 +100,7 @@ def test_densities_are_counted_over_folds_and_trainings():
         for fold in (1, 2)
         for pair, width, alpha in (
             (("random", "posterior"), 4.0 * fold, 100.0),
-            (("as_printed", "average"), 6.0, 0.0),
+            (("through_estimate", "average"), 6.0, 0.0),
         )
     ]
     places = ["dataset", "category", "shuffle", "replicate", "fold"]
@@ -108,7 +108,7 @@ def test_densities_are_counted_over_folds_and_trainings():
     assert table.parts[0].heading == "real, Mug (4 folds)"
     assert [[cell.text for cell in row] for row in table.parts[0].rows] == [
         ["Random", "posterior", "4° (2), 8° (2)", "100 (4)", "17"],
-        ["As printed", "average", "6° (4)", "0 (4)", "100"],
+        ["Through estimate", "average", "6° (4)", "0 (4)", "100"],
     ]
 
 

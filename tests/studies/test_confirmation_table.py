@@ -12,6 +12,7 @@ from studies.confirmation import (
     BELIEF_COLUMNS,
     BELIEFS_COLUMNS,
     CONTRASTS_COLUMNS,
+    EQUALLY,
     METHODS_COLUMNS,
     OBJECTS_COLUMNS,
     TRAININGS_COLUMNS,
@@ -32,7 +33,8 @@ SHIFT = {
     ("fixed", "average", 2): 2.0,
     ("opposite", "average", 2): 2.5,
     ("given_estimate", "average", 2): 1.5,
-    ("as_printed", "average", 2): 3.5,
+    ("given_truth_likeliest", "average", 2): 3.5,
+    ("through_estimate", "average", 2): 1.2,
     ("expected_error", "average", 2): 1.0,
     ("fixed", "product", 2): 0.5,
     ("expected_error", "product", 2): 0.0,
@@ -140,6 +142,17 @@ def test_all_but_primary_contrasts_over_all_categories_are_adjusted_together(obj
             assert rows.loc[key, "p_holm"] == pytest.approx(expected)
 
 
+def test_categories_of_different_sizes_are_also_pooled_with_equal_weight(objects):
+    found = method_contrasts(objects).set_index(["category", "contrast", "fusion"])
+    name = "expected_error - fixed", "average"
+    parts = [found.loc[(one, *name), "difference_deg"] for one in SIZES]
+    assert found.loc[(EQUALLY, *name), "difference_deg"] == pytest.approx(np.mean(parts))
+    weighted = np.average(parts, weights=list(SIZES.values()))
+    assert found.loc[(ALL, *name), "difference_deg"] == pytest.approx(weighted)
+    same = objects[~objects["object_id"].isin(["mug5", "mug6", "mug7"])]
+    assert EQUALLY not in set(method_contrasts(same)["category"])
+
+
 def test_each_training_is_compared_with_the_others(objects):
     found = training_contrasts(objects)
     assert tuple(found.columns) == TRAININGS_COLUMNS
@@ -179,7 +192,9 @@ def test_names_say_what_differs():
         "given_estimate - opposite",
         "given_estimate - fixed",
         "given_estimate - none (none)",
-        "as_printed - given_estimate",
+        "given_truth_likeliest - given_estimate",
+        "through_estimate - given_estimate",
+        "through_estimate - opposite",
         "expected_error - given_estimate (average)",
         "expected_error - evenly_spaced, 3 views",
     }
@@ -202,7 +217,9 @@ def test_a_regressor_answers_for_the_paper_and_a_classifier_for_the_product():
     assert answers["regressor"] == {
         (1, "expected_error - fixed", "average"),
         (2, "given_estimate - opposite", "average"),
-        (3, "as_printed - given_estimate", "average"),
+        (3, "given_truth_likeliest - given_estimate", "average"),
+        (6, "through_estimate - given_estimate", "average"),
+        (6, "through_estimate - opposite", "average"),
     }
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from studies.confirmation import factorial_beliefs
 from studies.factorial import (
-    AS_PRINTED,
+    LIKELIEST,
     POLICIES,
     PRODUCT_CHOICES,
     SINGLE,
@@ -53,7 +53,7 @@ def more_views(sides, made):
 
 def test_every_choice_meets_every_fusion(made):
     expected = set(itertools.product(POLICIES, ESTIMATE_FUSIONS))
-    expected |= {(choice, "product") for choice in PRODUCT_CHOICES} | {SINGLE, AS_PRINTED}
+    expected |= {(choice, "product") for choice in PRODUCT_CHOICES} | {SINGLE, LIKELIEST}
     assert set(made.frames) == expected
     assert {len(frame) for frame in made.frames.values()} == {3 * N_CLASSES}
     for frame in made.frames.values():
@@ -87,15 +87,15 @@ def test_what_sees_the_hidden_handle_beats_a_random_view(made):
 def test_each_choice_has_a_density_of_its_own_where_the_fusion_has_none(made):
     densities = made.densities.set_index(["choice", "fusion"])
     tables = {choice for choice, policy in POLICIES.items() if needs_lookup(policy)}
-    expected = {(choice, "average") for choice in tables} | {AS_PRINTED}
+    expected = {(choice, "average") for choice in tables} | {LIKELIEST}
     expected |= {("random", "posterior"), ("expected_error", "posterior")}
     assert set(densities.index) == expected
     assert set(densities["bandwidth_deg"]) <= {6, 12}
-    assert densities.loc[AS_PRINTED, "pseudo_observations"] == 0
+    assert densities.loc[LIKELIEST, "pseudo_observations"] == 0
     assert densities.loc[("random", "posterior"), "pseudo_observations"] == 10
     # Five objects from every degree: five pairs a row.
     assert densities.loc[("random", "posterior"), "pairs_percent"] == pytest.approx(100 * 5 / 15)
-    assert densities.loc[AS_PRINTED, "pairs_percent"] == 100
+    assert densities.loc[LIKELIEST, "pairs_percent"] == 100
 
 
 def test_all_methods_start_from_the_same_views(made):

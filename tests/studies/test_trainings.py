@@ -146,14 +146,15 @@ def test_categories_are_pooled_by_their_objects():
         crossed_mean(tables[0], tables[1][:2])
 
 
+@pytest.mark.parametrize("equal_categories", [False, True])
 @pytest.mark.parametrize("shared", [0.0, 0.3])
-def test_categories_may_share_what_varies_between_trainings(shared):
+def test_categories_may_share_what_varies_between_trainings(shared, equal_categories):
     """One pretrained network for all of them: their means vary together."""
     rng, n, inside, values, variances = np.random.default_rng(5), 1500, 0, [], []
     for _ in range(n):
         of_training = shared * rng.standard_normal((5, 1))
         tables = [simulated(rng, 5, size, 0.1) + of_training for size in (20, 40)]
-        found = crossed_mean(*tables)
+        found = crossed_mean(*tables, equal_categories=equal_categories)
         inside += found.interval().low <= 0 <= found.interval().high
         values.append(found.value)
         variances.append(found.variance)

@@ -138,6 +138,11 @@ _BADGES = {
     NOT_RUN: {"sign": "–", "kind": "none"},
 }
 _UNKNOWN = "not recorded"
+_INTERPRETATIONS = {
+    "given_estimate": "that of the truth given the estimate (T = V)",
+    "given_truth": "that of the estimate given the truth (T = L)",
+    "through_estimate": "that of the belief which a true viewpoint leads to (T = L V)",
+}
 _STARTS = {
     "none": "each estimator starts from random weights",
     "elevations": "the lowest elevation starts from random weights, each other one from the "
@@ -205,7 +210,7 @@ def build_report(
             *_opening(judged, read_csv(table1)),
             *(figure for name, figure in shown.items() if name == _OPENING),
         ],
-        repairs=_repairs(settings["density"]),
+        left_open=_left_open(settings["density"]),
         sections=_SECTIONS,
         badges=_BADGES,
         run_facts=[*_run_facts(settings, splits), ("Commit", made_with.get("commit") or _UNKNOWN)],
@@ -315,22 +320,23 @@ def _run_facts(
         )
 
 
-def _repairs(density: Mapping[str, Any]) -> str:
-    """Return one sentence on how Proposed differs from the method as printed."""
-    repairs = []
-    if density["pose_likelihood"] == "given_estimate":
-        repairs.append("the pose likelihood of Eq. 6 is given the estimate and not the truth")
-    if len(density["bandwidths_deg"]) * len(density["pseudo_observations"]) > 1:
-        repairs.append(
-            "the smoothing is chosen by the errors of the decisions and not by the likelihood"
+def _left_open(density: Mapping[str, Any]) -> str:
+    """Return one sentence on how Proposed decides what the paper leaves open."""
+    given = _INTERPRETATIONS[density["pose_likelihood"]]
+    widths, alphas = density["bandwidths_deg"], density["pseudo_observations"]
+    if len(widths) * len(alphas) > 1:
+        smoothing = (
+            "the smoothing and the pseudo-observations are those whose decisions err least on "
+            "calibration objects"
         )
-    if min(density["pseudo_observations"]) > 0:
-        repairs.append("each row of the density has uniform pseudo-observations")
-    if not repairs:
-        return "Proposed is the paper's method as it is printed."
+    else:
+        smoothing = (
+            f"the smoothing is {widths[0]:g}°, and a row of the density has {alphas[0]:g} "
+            "pseudo-observations"
+        )
     return (
-        f"Proposed is the paper's method, repaired: {'; '.join(repairs)}. docs/method.md gives the "
-        "reasons."
+        "The paper leaves some choices open. In Proposed, the pose likelihood of Eq. 6 is "
+        f"{given}; {smoothing}. docs/method.md gives the reasons."
     )
 
 
