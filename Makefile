@@ -32,7 +32,7 @@ LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --genera
 	check lock audit licences docs tables clean
 
 reproduce: $(READY)
-	@echo "nbv: now the paper: usually half an hour on two cores with native bfloat16, an hour without"
+	@echo "nbv: now the paper: usually 20 to 45 minutes on two cores"
 	$(BIN)/snakemake --cores $(CORES)
 
 quick: $(READY)
