@@ -1,12 +1,23 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from experiment.claim_frames import everywhere, unit
 from nbv.experiment.paper import statements
 from nbv.experiment.paper.claims import CLAIMS
-from nbv.experiment.paper.statements import FAILS, HOLDS, NOT_RUN, AtLeast, FreeOfOutliers
+from nbv.experiment.paper.statements import (
+    FAILS,
+    HOLDS,
+    NOT_RUN,
+    UNDECIDED,
+    AtLeast,
+    Better,
+    FreeOfOutliers,
+    Term,
+)
 from nbv.experiment.paper.verdicts import evaluate_claims
 
 
@@ -79,6 +90,24 @@ def test_not_the_best_but_comparable_is_both(proposed, expected):
     assert list(each["verdict"]) == list(each["point_verdict"]) == [expected] * 2
     for summary in each["summary"]:
         assert all(f"{name} " in summary for name in ("Single", "Random", "Opposite", "Proposed"))
+
+
+def test_a_compound_shows_the_competitor_that_decides():
+    """Not the one that is closest, if it is decided and the part is not."""
+    proposed = Term("proposed", (("mug", 0),))
+    rivals = {name: replace(proposed, method=name) for name in ("random", "opposite")}
+    near, unsure = (Better("mae", proposed, rival) for rival in rivals.values())
+    shared = {"value": 5.0, "versus_value": 5.5}
+    measured = {
+        near: shared | {"part_verdict": HOLDS, "difference": -0.2, "ci_low": -0.3, "ci_high": -0.1},
+        unsure: shared
+        | {"part_verdict": UNDECIDED, "difference": -0.5, "ci_low": -1.2, "ci_high": 0.2},
+    }
+    whole = AtLeast(1, (statements.all_of([near, unsure], "Mug"),))
+    text = statements.summarise(whole, measured)
+    assert text.startswith("Mug: undecided (")
+    assert "Opposite" in text
+    assert "Random" not in text
 
 
 def test_the_papers_own_figures_bear_out_its_sentences():

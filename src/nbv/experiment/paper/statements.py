@@ -245,7 +245,7 @@ VERDICT_RULES = (
     "“By point estimates” judges ours as the paper judges its own figures: as they stand, without "
     "intervals. Intervals are not corrected for the number of comparisons.",
     "Our figures: each competitor with the paired difference to the claim's subject and its "
-    "interval; of compound claims, the closest competitor of each part.",
+    "interval; of compound claims, the competitor that decides each part.",
 )
 """The rules for verdicts, for readers of tables."""
 
@@ -263,7 +263,7 @@ def term_text(term: Term) -> str:
 
 
 def summarise(statement: Statement, measured: Measured) -> str:
-    """Return the key numbers: every competitor, or the closest competitor in each part."""
+    """Return the key numbers: every competitor, or the one that decides each part."""
     if isinstance(statement, AtLeast) and any(
         isinstance(part, AtLeast) and part.label for part in statement.parts
     ):
@@ -273,8 +273,9 @@ def summarise(statement: Statement, measured: Measured) -> str:
             label = part.label if isinstance(part, AtLeast) else ""
             verdict = combine_statement(part, verdicts)
             run = [leaf for leaf in leaves(part) if "value" in measured[leaf]]
-            closest = _competition([_closest(run, measured)], measured, False) if run else ""
-            texts.append(f"{label}: {verdict}" + (f" ({closest})" if closest else ""))
+            like_it = [leaf for leaf in run if verdicts[leaf] == verdict] or run
+            decides = _competition([_closest(like_it, measured)], measured, False) if run else ""
+            texts.append(f"{label}: {verdict}" + (f" ({decides})" if decides else ""))
         return "; ".join(texts)
     return _competition(leaves(statement), measured)
 
