@@ -28,10 +28,14 @@ NOTHING = Randomisation(
     size=0,
     nearest=None,
     farthest=None,
+    focal=0,
     measured=1,
     table=0,
+    cutout=0,
     thin=0,
+    split=0,
     inside=0,
+    hole=0,
     occluded=0,
     patches=0,
     edge_px=0,
@@ -93,13 +97,14 @@ def test_distance_leaves_the_size_of_a_pixel_on_the_object(mesh, renderer):
         assert np.abs(box[0] - box[1]).max() <= 3
 
 
-def test_the_table_is_level_and_lies_under_the_object(mesh, renderer):
+@pytest.mark.parametrize("kind", ["table", "cutout"])
+def test_the_table_is_level_and_lies_under_the_object(mesh, renderer, kind):
     rng = np.random.default_rng(0)
     depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
     views = object_views(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
     floor = float(mesh.vertices[:, 2].min())
     with_table = depth.copy()
-    add_table(with_table, views, floor, 1.0, rng)
+    add_table(with_table, views, floor, replace(NOTHING, **{kind: 1}), rng)
     assert np.array_equal(with_table[depth > 0], depth[depth > 0])
     view, row, column = np.nonzero(with_table != depth)
     assert len(view) > 20
@@ -111,7 +116,7 @@ def test_the_table_is_level_and_lies_under_the_object(mesh, renderer):
     assert points[:, 2] == pytest.approx(floor, abs=1e-4)
 
 
-@pytest.mark.parametrize("loss", ["thin", "inside", "occluded", "patches"])
+@pytest.mark.parametrize("loss", ["thin", "split", "inside", "occluded", "patches"])
 def test_a_loss_takes_pixels_away_and_changes_no_other(mesh, renderer, loss):
     depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
     before, lost, rng = depth.copy(), 0, np.random.default_rng(0)
@@ -121,6 +126,44 @@ def test_a_loss_takes_pixels_away_and_changes_no_other(mesh, renderer, loss):
         assert np.array_equal(image[kept], whole[kept])
         lost += np.count_nonzero(whole > 0) - np.count_nonzero(kept)
     assert lost > 0
+
+
+def test_a_hole_in_the_body_has_a_rim_at_another_depth(mesh, renderer):
+    depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+    rims, rng = 0, np.random.default_rng(0)
+    for image in depth:
+        whole = image.copy()
+        lose(image, replace(NOTHING, hole=1), rng)
+        lost, moved = (whole > 0) & (image == 0), (image > 0) & (image != whole)
+        assert 0.02 < lost.sum() / (whole > 0).sum() < 0.6
+        assert ndimage.label(lost)[1] == 1
+        assert not (moved & ~ndimage.binary_dilation(lost, iterations=5)).any()
+        assert np.abs(image - whole)[moved].max(initial=0.0) <= 0.1
+        rims += moved.any()
+    assert rims > len(depth) / 2
+
+
+def test_a_split_handle_keeps_its_ends(mesh, renderer):
+    (whole,) = renderer.render(mesh.vertices, mesh.faces, 5.0, np.zeros(1), CAMERA)
+    split = whole.copy()
+    lose(split, replace(NOTHING, split=1), np.random.default_rng(1))
+    rows = np.nonzero((whole > 0) & (split == 0))[0]
+    handle = np.nonzero((whole > 0) & ~ndimage.binary_opening(whole > 0, iterations=3))[0]
+    assert handle.min() < rows.min() <= rows.max() < handle.max()
+
+
+def test_a_wrong_focal_length_makes_the_object_wider_and_not_deeper(mesh, renderer):
+    sizes, reliefs = [], []
+    for seed in range(20):
+        codes = turn_of(mesh, renderer, replace(NOTHING, focal=0.2), seed)[0]
+        seen = codes > 0
+        sizes.append(np.ptp(np.nonzero(seen.any(axis=1))[0]) + 1)
+        reliefs.append(int(codes[seen].max()) - int(codes[seen].min()))
+    whole = turn_of(mesh, renderer, NOTHING)[0]
+    tall = np.ptp(np.nonzero((whole > 0).any(axis=1))[0]) + 1
+    assert 0.75 * tall < min(sizes) < 0.9 * tall
+    assert 1.1 * tall < max(sizes) < 1.25 * tall
+    assert np.ptp(reliefs) <= 0.1 * np.mean(reliefs)
 
 
 def test_an_edge_that_moves_leaves_the_middle_and_takes_depths_from_nearby(mesh, renderer):
@@ -167,7 +210,11 @@ def test_an_edge_moves_as_far_as_all_pairs_of_pixels_say(seed):
 
 
 def test_a_turn_depends_on_its_generator_alone(mesh, renderer):
-    draw = Randomisation(7.5, 5, 0.15, 3, 7, 0.6, 0.3, 0.1, 0.25, 0.15, 1, 2, 1.5)
+    draw = Randomisation(
+        *(7.5, 5, 0.15, 3, 7, 0.1),
+        *(0.6, 0.3, 0.1, 0.1, 0.1, 0.25, 0.1, 0.15),
+        *(1, 2, 1.5),
+    )
     one, again, other = (turn_of(mesh, renderer, draw, seed) for seed in (1, 1, 2))
     assert np.array_equal(one, again)
     assert not np.array_equal(one, other)

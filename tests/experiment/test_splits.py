@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -169,3 +171,17 @@ def test_a_calibration_fraction_of_one_leaves_none_to_train_on(n_objects, seed):
     trained = folds.make_splits(names, 2, 0.5, np.random.default_rng(seed))
     assert set(found["role"]) == {"calibration", "test"}
     assert found[found["role"] == "test"].equals(trained[trained["role"] == "test"])
+
+
+@given(n=st.integers(1, 50), n_places=st.integers(1, 6), most=st.integers(1, 200))
+def test_turns_are_shared_out_evenly_and_every_object_has_one(n, n_places, most):
+    names = [str(i) for i in range(n)]
+    seen = [folds.seen_at(names, place, n_places, most) for place in range(n_places)]
+    turns = Counter(name for of_place in seen for name in of_place)
+    assert set(turns) == set(names)
+    assert len(set(turns.values())) == 1
+    each = turns["0"]
+    assert each == 1 or each * n <= most
+    assert each == n_places or (each + 1) * n > most
+    counts = [len(of_place) for of_place in seen]
+    assert max(counts) - min(counts) <= each

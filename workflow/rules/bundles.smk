@@ -6,6 +6,7 @@ rule render_bundle:
     input:
         sources("render_bundle"),
         meshes="<results>/meshes/{category}.npz",
+        splits="<results>/splits/{category}.csv",
     output:
         depth="<results>/bundles/depth/{category}/el{elevation}.npy",
         objects="<results>/bundles/depth/{category}/el{elevation}_objects.json",
@@ -22,6 +23,9 @@ rule render_bundle:
         camera=CONFIG["camera"],
         randomisation=CONFIG["randomisation"],
         sensor=CONFIG["sensor"],
+        fold=1,
+        elevations=lambda wildcards: CONFIG["elevations_deg"][wildcards.category],
+        calibration_turns=CONFIG["bundles"]["calibration_turns"],
         seed=CONFIG["seed"],
     script:
         "../scripts/render_bundle.py"

@@ -3,6 +3,8 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
+    from dataclasses import replace
+
     import numpy as np
 
     from nbv.core.seeds import rng_for
@@ -12,6 +14,7 @@ with job(snakemake):
     from nbv.data.randomisation import Randomisation, randomised_sweep
     from nbv.data.render import N_AZIMUTHS, open_renderer
     from nbv.data.sensors import IDEAL, build_sensor
+    from nbv.experiment.splits import objects_with_role, read_splits, seen_at
 
     params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
     camera = Camera(**params.camera)
@@ -19,19 +22,29 @@ with job(snakemake):
     name = params.sensor["name"]
     sensor = None if name == IDEAL else build_sensor(name, params.sensor["parameters"])
     meshes = load_meshes(snakemake.input.meshes)
+    splits = read_splits(snakemake.input.splits)
+    trained, calibrated, tested = (
+        objects_with_role(splits, params.fold, role) for role in ("train", "calibration", "test")
+    )
+    place, turns = params.elevations.index(int(wildcards.elevation)), params.calibration_turns
+    calibrated = seen_at(calibrated, place, len(params.elevations), turns)
+    # The promises of a bundle are for what its camera measures.
+    learnt = Randomisation(**params.randomisation)
+    randomisation = dict.fromkeys(trained, learnt)
+    randomisation |= dict.fromkeys([*calibrated, *tested], replace(learnt, measured=1.0))
     images = (
         randomised_sweep(
-            mesh,
+            meshes[object_id],
             float(wildcards.elevation),
             np.arange(N_AZIMUTHS, dtype=np.float64) * (360.0 / N_AZIMUTHS),
             camera,
             renderer,
             sensor,
             params.sensor["diagonal_m"][wildcards.category],
-            Randomisation(**params.randomisation),
+            own,
             rng_for(params.seed, "bundle", wildcards.category, int(wildcards.elevation), object_id),
         )
-        for object_id, mesh in meshes.items()
+        for object_id, own in randomisation.items()
     )
     shape = N_AZIMUTHS, camera.image_side, camera.image_side
-    write_depth(output.depth, output.objects, meshes, images, shape)
+    write_depth(output.depth, output.objects, randomisation, images, shape)

@@ -10,7 +10,7 @@ with job(snakemake):
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
     from nbv.experiment.estimation.training import train_network
     from nbv.experiment.estimation.weights import Estimator, save_estimator
-    from nbv.experiment.splits import check_objects, objects_with_role, read_splits
+    from nbv.experiment.splits import objects_with_role, read_splits
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     use_one_thread()
@@ -20,7 +20,6 @@ with job(snakemake):
     # A gigabyte and more: one copy, filled elevation by elevation.
     codes = np.empty((len(opened), len(object_ids), *opened[0].codes.shape[1:]), dtype=np.uint8)
     for of_elevation, images in zip(codes, opened, strict=True):
-        check_objects(splits, images.object_ids)
         of_elevation[:] = images.of(object_ids)
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
     # Replicate 0 is the bundle itself.

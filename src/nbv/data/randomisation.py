@@ -1,8 +1,9 @@
 """Domain randomisation of depth images, for the unknown properties of real cameras.
 
-Drawn for each sweep: elevation, roll, the object's size and distance, and whether there is sensor
-noise. Drawn for each view: strips of the table within the mask, displaced edges, thin parts and
-dark insides without depth, other patches without depth, an occluder, and an off-centre crop.
+Drawn for each sweep: elevation, roll, the object's size and distance, the focal length, and
+whether there is sensor noise. Drawn for each view: strips of the table within the mask, or the
+table in all of its lower part; displaced edges; thin parts, their middles and dark insides without
+depth; a hole in the body, other patches without depth, an occluder, and an off-centre crop.
 """
 
 from __future__ import annotations
@@ -39,11 +40,15 @@ class Randomisation:
         Half the range of the object's relative size.
     nearest, farthest : float or None
         Range of the camera's distance, in diagonals; None is the training camera's distance.
+    focal : float
+        Half the range of the relative error of the assumed focal length: objects are wider or
+        narrower than their depth says.
     measured : float
         Fraction of sweeps with sensor noise.
-    table, thin, inside, occluded : float
-        Fractions of views with a strip of the table, without thin parts, without parts of the far
-        inside, and with an occluder.
+    table, cutout, thin, split, inside, hole, occluded : float
+        Fractions of views with a strip of the table, with the table in the lower part of the mask,
+        without thin parts, without the middle of a thin part, without parts of the far inside, with
+        a hole in the middle of the body, and with an occluder.
     patches : float
         Mean number of patches without depth in a view.
     edge_px : float
@@ -57,10 +62,14 @@ class Randomisation:
     size: float
     nearest: float | None
     farthest: float | None
+    focal: float
     measured: float
     table: float
+    cutout: float
     thin: float
+    split: float
     inside: float
+    hole: float
     occluded: float
     patches: float
     edge_px: float
@@ -110,9 +119,9 @@ def randomised_sweep(
     drawn = _drawn_camera(camera, draw, rng)
     vertices = np.asarray(mesh.vertices) * scale
     depth = renderer.render(vertices, mesh.faces, elevation, azimuths_deg, drawn)
-    if draw.table > 0:
+    if draw.table > 0 or draw.cutout > 0:
         views = object_views(vertices, mesh.faces, elevation, azimuths_deg, drawn)
-        add_table(depth, views, float(vertices[:, 2].min()), draw.table, rng)
+        add_table(depth, views, float(vertices[:, 2].min()), draw, rng)
     if sensor is not None and rng.random() < draw.measured:
         depth = sensor(depth, drawn, diagonal_m, rng)
     for image in depth:
@@ -128,6 +137,8 @@ def _drawn_camera(camera: Camera, draw: Randomisation, rng: np.random.Generator)
     distance = rng.uniform(near, far)
     side = math.ceil(camera.image_side * _MARGIN)
     focal_px = camera.focal_px * distance / camera.distance
+    if draw.focal > 0:
+        focal_px *= 1.0 + rng.uniform(-draw.focal, draw.focal)
     return replace(
         camera,
         distance=distance,
@@ -143,28 +154,40 @@ _TABLE_REACH = 0.7
 
 
 def add_table(
-    depth: Depths, views: Views, floor: float, share: float, rng: np.random.Generator
+    depth: Depths, views: Views, floor: float, draw: Randomisation, rng: np.random.Generator
 ) -> None:
-    """Add strips of the plane z = floor at the lower edge of the object to its images."""
-    camera, side = views.camera, depth.shape[-1]
-    centres = np.arange(side) + 0.5
-    for view in np.flatnonzero(rng.random(len(depth)) < share):
+    """Add the plane z = floor to images: a strip at the lower edge, or all of the lower part."""
+    side = depth.shape[-1]
+    chance = rng.random(len(depth))
+    for view in np.flatnonzero(chance < draw.table + draw.cutout):
         rows, columns = np.nonzero(depth[view])
         if not len(rows):
             continue
-        top = max(int(rows.max() - rng.integers(0, 5)), 0)
-        end = min(int(rows.max() + rng.integers(1, 7)), side)
-        ends = rng.integers(columns.min() - 2, columns.max() + 4, 2).clip(0, side)
-        left, right = int(ends.min()), int(ends.max())
-        principal_column, principal_row = views.principal_px[view]
-        x = (centres[left:right] - principal_column) / camera.focal_px
-        y = (principal_row - centres[top:end]) / camera.focal_px
-        down = views.forward[view, 2] + x * views.right[view, 2] + y[:, None] * views.up[view, 2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            table = (floor - views.position[view, 2]) / down
+        if chance[view] < draw.table:
+            top = max(int(rows.max() - rng.integers(0, 5)), 0)
+            end = min(int(rows.max() + rng.integers(1, 7)), side)
+            ends = rng.integers(columns.min() - 2, columns.max() + 4, 2).clip(0, side)
+            left, right = int(ends.min()), int(ends.max())
+        else:
+            top = int(rng.integers(rows.min(), rows.max() + 1))
+            end = min(int(rows.max() + rng.integers(1, 9)), side)
+            left = max(int(columns.min() - rng.integers(0, 9)), 0)
+            right = min(int(columns.max() + rng.integers(1, 10)), side)
+        table = _table_depth(views, view, floor, slice(top, end), slice(left, right))
         patch = depth[view, top:end, left:right]
-        is_table = (patch == 0) & (np.abs(table - camera.distance) < _TABLE_REACH)
+        is_table = (patch == 0) & (np.abs(table - views.camera.distance) < _TABLE_REACH)
         patch[is_table] = table[is_table]
+
+
+def _table_depth(views: Views, view: np.intp, floor: float, rows: slice, columns: slice) -> Floats:
+    """Return the depth of the plane z = floor in a part of an image."""
+    camera = views.camera
+    principal_column, principal_row = views.principal_px[view]
+    x = (np.arange(columns.start, columns.stop) + 0.5 - principal_column) / camera.focal_px
+    y = (principal_row - np.arange(rows.start, rows.stop) - 0.5) / camera.focal_px
+    down = views.forward[view, 2] + x * views.right[view, 2] + y[:, None] * views.up[view, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray((floor - views.position[view, 2]) / down)
 
 
 # Range of the smoothing of edge displacements, in pixels.
@@ -222,8 +245,12 @@ def lose(image: Depths, draw: Randomisation, rng: np.random.Generator) -> None:
     """Set pixels of an image to 0 that a camera would not measure."""
     if rng.random() < draw.thin:
         _lose_thin_parts(image, rng)
+    if draw.split > 0 and rng.random() < draw.split:
+        _split_thin_part(image, rng)
     if rng.random() < draw.inside:
         _lose_inside(image, rng)
+    if draw.hole > 0 and rng.random() < draw.hole:
+        _lose_middle(image, rng)
     seen = np.flatnonzero(image)
     if not len(seen):
         return
@@ -246,18 +273,58 @@ def lose(image: Depths, draw: Randomisation, rng: np.random.Generator) -> None:
         image[distance < edge] = 0
 
 
-def _lose_thin_parts(image: Depths, rng: np.random.Generator) -> None:
-    """Remove all thin parts, or one of them, such as a handle."""
+def _thin_parts(image: Depths, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Return the pixels of thin parts, such as a handle; none where there is little else."""
     seen = image > 0
     bulk = ndimage.binary_opening(seen, iterations=int(rng.integers(1, 4)))
-    thin = seen & ~bulk
-    if np.count_nonzero(bulk) < 0.4 * np.count_nonzero(seen):
+    return seen & ~bulk & (np.count_nonzero(bulk) >= 0.4 * np.count_nonzero(seen))
+
+
+def _lose_thin_parts(image: Depths, rng: np.random.Generator) -> None:
+    """Remove all thin parts, or one of them, such as a handle."""
+    thin = _thin_parts(image, rng)
+    if not thin.any():
         return
     if rng.random() < 0.5:
         parts, n_parts = ndimage.label(thin)
         if n_parts:
             thin = parts == rng.integers(1, n_parts + 1)
     image[thin] = 0
+
+
+def _split_thin_part(image: Depths, rng: np.random.Generator) -> None:
+    """Remove the middle of the largest thin part, and leave its ends."""
+    parts, n_parts = ndimage.label(_thin_parts(image, rng))
+    if not n_parts:
+        return
+    largest = 1 + int(np.bincount(parts.ravel())[1:].argmax())
+    rows, columns = np.nonzero(parts == largest)
+    # Along the image's vertical, as a handle's ends are one above the other.
+    middle, half = (rows.min() + rows.max()) / 2, (np.ptp(rows) + 1) / 2
+    is_lost = np.abs(rows - middle) < rng.uniform(0.3, 0.8) * half
+    image[rows[is_lost], columns[is_lost]] = 0
+
+
+# Ranges of a hole's radii, relative to those of the object in the image, and of the depth of its
+# rim against the surface, in diagonals.
+_HOLE_RADII, _RIM_DEPTH = (0.15, 0.5), 0.1
+
+
+def _lose_middle(image: Depths, rng: np.random.Generator) -> None:
+    """Remove the middle of the body, as from white glaze; the rim is nearer or farther."""
+    seen = image > 0
+    if not seen.any():
+        return
+    rows, columns = _bounds(seen)
+    height, width = rows.stop - rows.start, columns.stop - columns.start
+    row = rows.start + height * rng.uniform(0.3, 0.7)
+    column = columns.start + width * rng.uniform(0.3, 0.7)
+    radii = rng.uniform(*_HOLE_RADII, 2) * (height, width) / 2
+    down, across = np.ogrid[: image.shape[0], : image.shape[1]]
+    is_hole = np.hypot((down - row) / radii[0], (across - column) / radii[1]) < 1.0
+    is_rim = ndimage.binary_dilation(is_hole, iterations=int(rng.integers(1, 4))) & ~is_hole
+    image[seen & is_rim] += rng.uniform(-_RIM_DEPTH, _RIM_DEPTH)
+    image[is_hole] = 0
 
 
 def _lose_inside(image: Depths, rng: np.random.Generator) -> None:

@@ -136,6 +136,16 @@ def objects_with_role(splits: pd.DataFrame, fold: int, *roles: str) -> list[str]
     return [str(name) for name in in_fold.loc[in_fold["role"].isin(roles), "object_id"]]
 
 
+def seen_at(object_ids: Sequence[str], place: int, n_places: int, most: int) -> list[str]:
+    """Return which objects are seen at one of several elevations.
+
+    All of them, if that makes no more than `most` turns at all elevations together; else each at
+    fewer elevations, but at least at one, in turn.
+    """
+    each = min(max(most // max(len(object_ids), 1), 1), n_places)
+    return [one for i, one in enumerate(object_ids) if (place - i) % n_places < each]
+
+
 def check_objects(splits: pd.DataFrame, object_ids: Iterable[str]) -> None:
     """Raise UserError with an object that only the images or only the splits have."""
     if different := sorted(set(object_ids) ^ set(splits["object_id"])):

@@ -306,10 +306,14 @@ class Randomisation(Section):
     size: Annotated[Number, Field(ge=0, le=0.9)] = 0.0
     nearest: Diagonals | None = None
     farthest: Diagonals | None = None
+    focal: Annotated[Number, Field(ge=0, le=0.9)] = 0.0
     measured: Share = 1.0
     table: Share = 0.0
+    cutout: Share = 0.0
     thin: Share = 0.0
+    split: Share = 0.0
     inside: Share = 0.0
+    hole: Share = 0.0
     occluded: Share = 0.0
     patches: Annotated[Number, Field(ge=0, le=100)] = 0.0
     edge_px: Annotated[Number, Field(ge=0, le=100)] = 0.0
@@ -327,8 +331,9 @@ class Randomisation(Section):
 
 
 class Bundles(Section):
-    """Ingredients that bundles are compared without, and the frames for it."""
+    """Calibration turns of bundles, the ingredients they are compared without, and the frames."""
 
+    calibration_turns: Annotated[int, Field(ge=1)] = 360
     ingredients: dict[Name, dict[Name, Number | None]] = {}
     replicates: Annotated[list[Replicate], Field(min_length=1), Distinct] = [0]
     frames: str | None = None

@@ -55,9 +55,10 @@ def sweeps_of(
     object_ids: Sequence[str],
     step: int = 1,
 ) -> tuple[list[Sweep], float, float]:
-    """Return the sweeps of objects at every elevation, and the objects' extent in the images.
+    """Return the sweeps of objects at elevations, and the objects' extent in the images.
 
-    A sweep has every `step`-th view, from the first on.
+    Objects that are not among an elevation's images have no sweep there. A sweep has every
+    `step`-th view, from the first on.
 
     Returns
     -------
@@ -67,7 +68,8 @@ def sweeps_of(
     """
     sweeps, extents = [], []
     for elevation, elevation_images in zip(elevations_deg, images, strict=True):
-        for object_id, whole in zip(object_ids, elevation_images.of(object_ids), strict=True):
+        seen = [name for name in object_ids if name in elevation_images.object_ids]
+        for object_id, whole in zip(seen, elevation_images.of(seen), strict=True):
             codes = whole[::step]
             logits = network(codes)
             azimuth_deg = np.arange(0, len(whole), step, dtype=np.float64) * (360.0 / len(whole))
