@@ -102,6 +102,7 @@ def fails(capsys, *arguments: str) -> str:
 
 
 def same_answer(printed: dict, answer) -> None:
+    assert printed["probability_within"] == pytest.approx(answer.probability_within, rel=1e-4)
     assert printed["azimuth_deg"] == pytest.approx(answer.azimuth_deg)
     assert printed["spread_deg"] == pytest.approx(answer.spread_deg)
     assert printed["expected_error_deg"] == pytest.approx(answer.expected_error_deg, rel=1e-4)
@@ -116,6 +117,7 @@ def same_move(printed: dict, answer) -> None:
         assert one["rotation_deg"] == move.rotation_deg
         assert one["travel_deg"] == move.travel_deg
         assert one["expected_error_deg"] == pytest.approx(move.expected_error_deg, rel=1e-4)
+        assert one["probability_within"] == pytest.approx(move.probability_within, rel=1e-4)
     known = [np.inf if error is None else error for error in printed["error_after_deg"]]
     assert known == pytest.approx(answer.error_after_deg.tolist(), rel=1e-4)
 
@@ -244,21 +246,22 @@ def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
     )
     lines = out.splitlines()
     assert lines[0] == f"camera     not given: a focal length of {FOCAL_PX:g} px is assumed"
-    assert f"azimuth {answer.azimuth_deg:.1f}° (camera around mug)" in lines[1]
-    assert "(1 view)" in lines[1]
-    assert f"turn by {answer.move.rotation_deg:+.0f}°" in lines[2]
-    assert f"expected error {answer.move.expected_error_deg:.1f}°" in lines[2]
+    assert f"azimuth {answer.azimuth_deg:.1f}° (camera around mug; 1 view)" in lines[1]
+    for line, about in zip(lines[2:4], (answer, answer.move), strict=True):
+        within = f"({about.probability_within['5']:.0%} within 5°)"
+        assert f"expected error {about.expected_error_deg:.1f}° {within}" in line
+    assert f"turn by {answer.move.rotation_deg:+.0f}°" in lines[3]
     for move in answer.alternatives:
-        assert f"{move.rotation_deg:+.0f}° ({move.expected_error_deg:.1f}°)" in lines[3]
-    assert lines[4] == "target camera pose in the base frame"
+        assert f"{move.rotation_deg:+.0f}° ({move.expected_error_deg:.1f}°)" in lines[4]
+    assert lines[5] == "target camera pose in the base frame"
     target = moved_camera(POSE, [0, 0, 0], [0, 0, 1], answer.move.rotation_deg)
-    found = np.array([[float(number) for number in line.split()] for line in lines[5:]])
+    found = np.array([[float(number) for number in line.split()] for line in lines[6:]])
     assert found == pytest.approx(target, abs=1e-5)
     two = run(
         *(capsys, "recommend", "f0.npy", "f1.npy", "--rotations", "0", "60"),
         *("--bundle", "b.safetensors", "--intrinsics", "150"),
     )
-    assert "(2 views)" in two
+    assert "; 2 views)" in two
     assert two.startswith("pose ")
 
 
@@ -283,8 +286,8 @@ def test_frames_all_round_have_a_pose_and_no_next_view(manifest, capsys):
     rotations = ("--rotations", *(f"{place * WIDTH:g}" for place in range(BINS)))
     where = ("--camera-pose", "pose.json", "--axis", "0", "0", "0")
     command = ("recommend", *frames, *rotations, "--bundle", "b.safetensors", *where)
-    _, pose, next_view, *others = run(capsys, *command).splitlines()
-    assert "(24 views)" in pose
+    _, pose, _, next_view, *others = run(capsys, *command).splitlines()
+    assert "; 24 views)" in pose
     assert next_view.startswith("next view  none: ")
     assert not any(line.startswith(("or ", "target")) for line in others)
     printed = json.loads(run(capsys, *command, "--json"))
@@ -294,6 +297,15 @@ def test_frames_all_round_have_a_pose_and_no_next_view(manifest, capsys):
         [frame(place) for place in range(BINS)], rotations_deg=np.arange(BINS) * WIDTH
     )
     assert printed["azimuth_deg"] == pytest.approx(answer.azimuth_deg)
+
+
+def test_until_an_expected_error_is_enough(here, capsys):
+    answer = Recommender.load("b.safetensors").recommend(frame(0))
+    for less, words in ((-0.01, "one more view"), (0.01, "enough: stop here")):
+        until = str(answer.expected_error_deg + less)
+        command = ("recommend", "f0.npy", "--bundle", "b.safetensors", "--until", until)
+        assert words in run(capsys, *command)
+        assert json.loads(run(capsys, *command, "--json"))["enough"] == (less > 0)
 
 
 @pytest.mark.parametrize(("limit", "is_told"), [(1e-6, True), (1e6, False)])

@@ -11,10 +11,11 @@ from tests.core.made import product_by_loops
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
 from nbv.core.criteria import expected_error
-from nbv.core.distributions import mean_direction_deg
+from nbv.core.distributions import log_bayes_factor, mean_direction_deg
 from nbv.core.evidence import evidence_of_distributions
 from nbv.core.fusion import product
 from nbv.core.look_alikes import (
+    WITHIN_DEG,
     Expected,
     LookAlikes,
     compared_step,
@@ -37,6 +38,12 @@ def expected_of(
     """Return the expected errors now, and after a view at every rotation, of beliefs (n, B)."""
     found = [alike.expected(belief, *options) for belief in beliefs]
     return np.array([one.now_deg for one in found]), np.stack([one.after_deg for one in found])
+
+
+def share_of(alike: LookAlikes, agreement: float = 0.0) -> np.ndarray:
+    """How much each sequence of views counts for one with a log Bayes factor."""
+    apart = np.minimum(alike.agreement, 0.0) - min(agreement, 0.0)
+    return np.exp(-0.5 * apart.astype(np.float64) ** 2)
 
 
 @pytest.mark.parametrize("n_turns", [3, 30])
@@ -177,7 +184,7 @@ def test_expected_errors_of_fewer_first_views_are_means_by_affinity(
     errors = every_error[rows] if rotations else near_first_views(every_error, fewer.first)
     now, after = expected_of(fewer, belief, 5.0, 30.0)
     for own, own_now, own_after in zip(belief, now, after, strict=True):
-        weight = 30.0 * (np.sqrt(everything.seen[rows]) @ np.sqrt(own)) ** 5.0
+        weight = 30.0 * (np.sqrt(everything.seen[rows]) @ np.sqrt(own)) ** 5.0 * share_of(fewer)
         weight += 30.0 / weight.size
         wanted = np.tensordot(weight / weight.sum(), errors)
         assert own_after == pytest.approx(wanted[:-1], rel=1e-4)
@@ -193,7 +200,7 @@ def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.G
     errors = np.concatenate(alike.errors_deg[..., :-1])
     for belief, own_now, own in zip(beliefs, now, after, strict=True):
         pairs = [np.sqrt(rows[..., ::2] + rows[..., 1::2]) for rows in (belief, views)]
-        weight = 3.0 * (pairs[1] @ pairs[0]) ** 5.0
+        weight = 3.0 * (pairs[1] @ pairs[0]) ** 5.0 * share_of(alike).ravel()
         total = weight.sum() + 30.0
         wanted = (weight @ errors + 30.0 * errors.mean(axis=0)) / total
         assert own[::2] == pytest.approx(wanted, rel=1e-4)
@@ -217,7 +224,8 @@ def test_what_is_left_out_hardly_counts(rng: np.random.Generator, sharpness: flo
     share = rng.uniform(0.1, 1, 20)
     belief = product_by_loops(distributions[3, [7, 12]], [0, 5])
     belief /= belief.sum()
-    weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 16.0 * share[:, None]
+    weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 16.0
+    weight *= share[:, None] * share_of(alike)
     errors = alike.errors_deg
     averaged = errors[np.arange(20)[:, None], first_views(20, 24, 400)].mean(axis=1)
     averaged[:, -1] = errors[..., -1].mean(axis=1)
@@ -229,8 +237,19 @@ def test_what_is_left_out_hardly_counts(rng: np.random.Generator, sharpness: flo
     assert averaged.mean(axis=0) == pytest.approx(errors.mean(axis=(0, 1)), rel=0.1)
 
 
-def of_parts(parts: np.ndarray, prior: np.ndarray, weight: float) -> Expected:
-    return Expected(0.0, np.zeros(parts.shape[1]), parts, parts.sum(axis=0) + prior, weight)
+def of_objects(errors: np.ndarray, prior: np.ndarray, weight: float) -> Expected:
+    """What weighted errors (O, M) of objects of equal weight lead one to expect."""
+    n_objects, n_steps = errors.shape
+    share = np.full((n_objects, 1), weight / n_objects)
+    return Expected(
+        now_deg=0.0,
+        after_deg=np.zeros(n_steps),
+        within_now=np.zeros(3),
+        within_after=np.zeros((3, n_steps)),
+        by_object=np.hstack([errors, share]),
+        total=errors.sum(axis=0) + prior,
+        weight=weight,
+    )
 
 
 @given(
@@ -240,7 +259,7 @@ def of_parts(parts: np.ndarray, prior: np.ndarray, weight: float) -> Expected:
 )
 def test_a_choice_is_never_pessimistic(seed: int, n_parts: int, steps: list[int]) -> None:
     rng = np.random.default_rng(seed)
-    expected = of_parts(rng.gamma(1.0, 1.0, (n_parts, 12)), rng.gamma(1.0, 0.2, 12), 20.0)
+    expected = of_objects(rng.gamma(1.0, 1.0, (n_parts, 12)), rng.gamma(1.0, 0.2, 12), 20.0)
     more = expected.optimism_deg(np.isin(np.arange(12), steps))
     assert more >= -1e-12
     if n_parts == 1 or len(set(steps)) == 1:
@@ -254,14 +273,14 @@ def test_the_least_of_uncertain_errors_and_its_optimism_are_right_on_average() -
     for _ in range(2000):
         sums = rng.normal(10.0, 2.0, (5, 60))
         least.append(sums.mean(axis=0).min())
-        raised.append(least[-1] + of_parts(sums, np.zeros(60), 5.0).optimism_deg(every))
+        raised.append(least[-1] + of_objects(sums, np.zeros(60), 5.0).optimism_deg(every))
     assert np.mean(least) < 8.5
     assert np.mean(raised) == pytest.approx(10.0, abs=0.1)
 
 
 def test_where_one_rotation_is_best_for_all_objects_nothing_is_added() -> None:
     sums = 10.0 - 8.0 * (np.arange(12) == 7) + np.zeros((5, 12))
-    assert of_parts(sums, np.zeros(12), 5.0).optimism_deg(np.ones(12, dtype=bool)) == 0.0
+    assert of_objects(sums, np.zeros(12), 5.0).optimism_deg(np.ones(12, dtype=bool)) == 0.0
 
 
 def test_where_no_view_is_alike_the_mean_of_all_is_expected() -> None:
@@ -287,7 +306,7 @@ def test_the_least_weights_count_as_they_are(
     for turn in rotations:
         alike = alike.after(turn)
     affinity = (np.sqrt(alike.seen) @ np.sqrt(belief)).astype(np.float64)
-    weight, errors = 15.0 * affinity**power, alike.errors_deg
+    weight, errors = 15.0 * affinity**power * share_of(alike), alike.errors_deg
     mean = errors.mean(axis=(0, 1))
     wanted = (np.tensordot(weight, errors) + 30.0 * mean) / (weight.sum() + 30.0)
     found = alike.expected(belief, power, 30.0)
@@ -321,7 +340,7 @@ def test_the_errors_of_a_belief_do_not_depend_on_those_before_it(rng: np.random.
 
 @pytest.mark.parametrize("rotations", [[], [5]])
 @pytest.mark.parametrize("most", [None, 20])
-def test_parts_are_of_whole_objects(
+def test_sums_are_of_whole_objects(
     rng: np.random.Generator, most: int | None, rotations: list[int]
 ) -> None:
     distributions, belief = turns(rng, 6), turns(rng)[0, 0]
@@ -332,10 +351,62 @@ def test_parts_are_of_whole_objects(
     share = rng.uniform(0.1, 1, 6)
     found = alike.expected(belief, 5.0, 30.0, share)
     assert found.total / found.weight == pytest.approx(found.after_deg, rel=1e-5)
-    # One object's turns are in one part: with another id for each turn there are more.
-    assert len(found.parts) == 3
-    assert len(of_turns.expected(belief, 5.0, 30.0).parts) == 5
-    for part, name in enumerate("abc"):
+    assert len(found.by_object) == 3
+    assert len(of_turns.expected(belief, 5.0, 30.0).by_object) == 6
+    for place, name in enumerate("abc"):
         own = np.where(np.array(ids) == name, share, 0.0)
         alone = alike.expected(belief, 5.0, 30.0, own)
-        assert found.parts[part] == pytest.approx(alone.parts.sum(axis=0), rel=1e-3)
+        assert found.by_object[place] == pytest.approx(alone.by_object.sum(axis=0), rel=1e-3)
+
+
+def test_agreement_is_the_log_bayes_factor_of_the_views(rng: np.random.Generator) -> None:
+    distributions = turns(rng)
+    for rotations in ([], [5], [5, 17]):
+        alike = LookAlikes.of_views(distributions, 40)
+        for turn in rotations:
+            alike = alike.after(turn)
+        for turn, views in enumerate(alike.first):
+            for place, first in enumerate(views):
+                taken = [0, *rotations]
+                own = distributions[turn, [(first + k) % 24 for k in taken]]
+                wanted = log_bayes_factor(own, [15.0 * k for k in taken])
+                assert alike.agreement[turn, place] == pytest.approx(wanted, abs=1e-3)
+
+
+def test_where_views_contradict_each_other_those_that_did_count(rng: np.random.Generator) -> None:
+    distributions, belief = turns(rng, 6), turns(rng)[0, 0]
+    alike = LookAlikes.of_views(distributions).after(5)
+    for agreement in (2.0, 0.0, -1.5):
+        weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 5.0 * share_of(alike, agreement)
+        errors = alike.errors_deg
+        sums = np.tensordot(weight, errors) + 30.0 * errors.mean(axis=(0, 1))
+        found = alike.expected(belief, 5.0, 30.0, agreement=agreement)
+        assert found.now_deg == pytest.approx(sums[-1] / (weight.sum() + 30.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("rotations", [[], [5]])
+def test_probabilities_are_the_shares_of_errors_that_are_not_larger(
+    rng: np.random.Generator, rotations: list[int]
+) -> None:
+    alike, belief = LookAlikes.of_views(sharp_turns(rng, 6, 3.0)), sharp_turns(rng, 1, 3.0)[0, 0]
+    for turn in rotations:
+        alike = alike.after(turn)
+    found = alike.expected(belief, 5.0, 30.0)
+    weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 5.0 * share_of(alike)
+    for limit, now, after in zip(WITHIN_DEG, found.within_now, found.within_after, strict=True):
+        within = (alike.errors_deg <= limit).astype(float)
+        sums = np.tensordot(weight, within) + 30.0 * within.mean(axis=(0, 1))
+        assert [*after, now] == pytest.approx(sums / (weight.sum() + 30.0), abs=1e-3)
+    assert (np.diff(found.within_after, axis=0) >= 0).all()
+
+
+def test_a_rotation_is_surely_better_by_two_standard_errors_over_objects() -> None:
+    rng = np.random.default_rng(3)
+    errors = rng.normal(5.0, 1.0, (40, 2))
+    difference = errors[:, 0] - errors[:, 1]
+    error = difference.std() / np.sqrt(40)
+    for shift in (1.8, 2.2):
+        moved = errors + np.array([-difference.mean() - shift * error, 0.0])
+        expected = of_objects(moved, np.zeros(2), 40.0)
+        assert expected.is_surely_better(0, 1) == (shift > 2)
+        assert not expected.is_surely_better(1, 0)

@@ -296,8 +296,10 @@ def test_a_narrow_frame_was_cropped_already():
     depth = bowl(row=19, column=40)
     assert math.degrees(2 * math.atan(40 / 200.0)) < 25 < math.degrees(2 * math.atan(40 / 150.0))
     assert cropped(depth, intrinsics=NARROW).codes.any()
-    full = np.full((60, 80), 0.6, dtype=np.float32)
-    assert cropped(full, intrinsics=NARROW).codes.any()
+    assert not any("border" in doubt for doubt in cropped(depth, intrinsics=NARROW).doubts)
+    full = cropped(np.full((60, 80), 0.6, dtype=np.float32), intrinsics=NARROW)
+    assert full.codes.any()
+    assert any("up to its border" in doubt for doubt in full.doubts)
     # What is high and narrow is no narrow frame.
     tall = Intrinsics(200.0, 100.0)
     refused("mask-at-border", depth, intrinsics=tall)

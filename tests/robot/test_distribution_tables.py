@@ -325,8 +325,8 @@ def test_the_command_answers_as_python_does(here, capsys, file):
     assert printed["target_camera_pose"] == pytest.approx(target)
     told = run(capsys, "recommend", *options, "--allowed", "45,120")
     only = table.recommend(read_distributions(file), [0.0, 90.0], allowed_deg=[45, 120])
-    assert f"azimuth {only.azimuth_deg:.1f}° (camera around object)" in told
-    assert "(2 views)" in told
+    assert f"azimuth {only.azimuth_deg:.1f}° (camera around object;" in told
+    assert "; 2 views)" in told
     assert f"turn by {only.move.rotation_deg:+g}°" in told
 
 

@@ -74,7 +74,7 @@ def test_both_circles_say_what_they_show(drawn):
     assert "Azimuth (camera around mug): 86°" in found
     assert "expected error 12.3°" in found
     assert "radius: √p(azimuth)" in found
-    assert "best: −90°, 6.0°" in found
+    assert "recommended: −90°, 6.0°" in found
     assert " ".join(found).count("0°: the camera now") == 1
     assert {"+90°", "180°", "−90°"} <= set(found)
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from nbv.core.offset import Offset
     from nbv.robot.next_camera import CameraMove, CameraRecommendation
-    from nbv.robot.next_view import Recommendation
+    from nbv.robot.next_view import Move, Recommendation
 
 Placement = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
 """Camera pose in the base frame, point on the object's axis, and direction of the axis."""
@@ -82,6 +82,8 @@ _KEYS = (
     "azimuth_deg",
     "spread_deg",
     "expected_error_deg",
+    "probability_within",
+    "enough",
     "move",
     "alternatives",
     "ood_score",
@@ -116,15 +118,18 @@ def recommendation_as_json(
     warnings: Iterable[str],
     targets: Sequence[NDArray[np.float64]] | None,
     assumed_focal_px: float | None = None,
+    enough: bool | None = None,
 ) -> dict[str, Any]:
     """Return a recommendation for JSON, with all warnings and the camera's poses after its moves.
 
-    `assumed_focal_px` is None if intrinsics were given.
+    `assumed_focal_px` is None if intrinsics were given, `enough` without ``--until``.
     """
     known = {
         "azimuth_deg": answer.azimuth_deg,
         "spread_deg": answer.spread_deg,
         "expected_error_deg": answer.expected_error_deg,
+        "probability_within": answer.probability_within,
+        "enough": enough,
         "ood_score": None if math.isnan(answer.ood_score) else answer.ood_score,
         "bayes_factor": answer.bayes_factor,
         "assumed_focal_px": assumed_focal_px,
@@ -149,8 +154,8 @@ def table_answer_as_json(
     cost of each move.
     """
     moves = [
-        {"rotation_deg": rotation, "travel_deg": abs(rotation), "expected_error_deg": None}
-        | {"cost": cost}
+        {"rotation_deg": rotation, "travel_deg": abs(rotation), "cost": cost}
+        | dict.fromkeys(("expected_error_deg", "probability_within"))
         for rotation, cost in ranked
     ]
     about = {"criterion": criterion, "cost_unit": cost_unit}
@@ -179,8 +184,7 @@ def camera_answer_as_json(answer: CameraRecommendation, enough: bool | None) -> 
 def print_camera_answer(answer: CameraRecommendation, enough: bool | None) -> None:
     """Print ranked camera poses in a few lines."""
     print_line(f"pose       expected error {answer.expected_error_deg:.1f}°, {_chances(answer)}")
-    if enough is not None:
-        print_line(f"           {'enough: stop here' if enough else 'one more view'}")
+    _print_enough(enough)
     for move, head in zip(answer.moves[:6], ["next view", *[""] * 5], strict=False):
         metres = "" if move.travel_m is None else f", {move.travel_m:.2f} m"
         print_line(
@@ -197,24 +201,40 @@ def _chances(about: CameraRecommendation | CameraMove) -> str:
     return ", ".join(f"{p:.0%} within {error}°" for error, p in chances)
 
 
+def _chance(about: Recommendation | Move) -> str:
+    """Return the probability of the smallest error."""
+    error, p = next(iter(about.probability_within.items()))
+    return f" ({p:.0%} within {error}°)"
+
+
+def _print_enough(enough: bool | None) -> None:
+    if enough is not None:
+        print_line(f"           {'enough: stop here' if enough else 'one more view'}")
+
+
 def print_recommendation(
     answer: Recommendation,
     category: str,
     warnings: Iterable[str],
     targets: Sequence[NDArray[np.float64]] | None,
+    enough: bool | None = None,
 ) -> None:
     """Print a recommendation for an object of a category in a few lines."""
     print_line(
-        f"pose       azimuth {answer.azimuth_deg:.1f}° (camera around {category}); "
-        f"expected error {answer.expected_error_deg:.1f}°, spread {answer.spread_deg:.1f}° "
-        f"({counted(answer.n_views, 'view')})"
+        f"pose       azimuth {answer.azimuth_deg:.1f}° (camera around {category}; "
+        f"{counted(answer.n_views, 'view')})"
     )
+    print_line(
+        f"           expected error {answer.expected_error_deg:.1f}°{_chance(answer)}, "
+        f"spread {answer.spread_deg:.1f}°"
+    )
+    _print_enough(enough)
     if (move := answer.move) is None:
         print_line("next view  none: all candidates are within 15° of an existing view")
     else:
         print_line(
             f"next view  turn by {move.rotation_deg:+g}° (travel {move.travel_deg:g}°): "
-            f"expected error {move.expected_error_deg:.1f}°"
+            f"expected error {move.expected_error_deg:.1f}°{_chance(move)}"
         )
     if answer.alternatives:
         others = (

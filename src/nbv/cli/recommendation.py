@@ -136,7 +136,7 @@ def recommend(
     sphere
         Instead of --candidates: so many even camera poses about the object.
     until
-        An expected error, degrees. If that of a rotation is not above it, the answer is: enough.
+        An expected error, degrees. If that of the pose is not above it, the answer is: enough.
     plot
         Draw crops, belief, expected errors and the move into this file: .png, .pdf or .svg.
     json
@@ -174,8 +174,10 @@ def recommend(
                 as_json=json,
             )
             return
-        if object_id is not None or until is not None:
-            raise UserError("--object and --until go with --candidates or --sphere")
+        if object_id is not None:
+            raise UserError("--object goes with --candidates or --sphere")
+        if until is not None and distribution is None:
+            raise UserError("--until needs an expected error: frames, --distribution, or rotations")
         placement = _read_placement(camera_pose, axis)
         if distribution is None:
             if isinstance(estimate, Path) or len(estimate or [0]) > 1:
@@ -194,12 +196,13 @@ def recommend(
             allowed,
             max_travel,
             placement,
+            until,
             followed=followed,
             as_json=json,
         )
         return
-    if (object_id, candidates, sphere, until) != (None,) * 4:
-        raise UserError("--object, --candidates, --sphere and --until need --estimate and --table")
+    if (object_id, candidates, sphere) != (None,) * 3:
+        raise UserError("--object, --candidates and --sphere need --estimate and --table")
     if not frames:
         hint = "; give frames before --mask" if mask is not None else ""
         raise UserError(f"give a depth frame, or --estimate or --distribution with --table{hint}")
@@ -250,12 +253,13 @@ def recommend(
 
         draw_recommendation(answer, plot, recommender.bundle.category)
     focal_px = recommender.bundle.focal_px if intrinsics is None else None
+    enough = None if until is None else answer.expected_error_deg <= until
     if json:
-        print_json(recommendation_as_json(answer, warnings, targets, focal_px))
+        print_json(recommendation_as_json(answer, warnings, targets, focal_px, enough))
         return
     if focal_px is not None:
         print_assumed_camera(focal_px)
-    print_recommendation(answer, recommender.bundle.category, warnings, targets)
+    print_recommendation(answer, recommender.bundle.category, warnings, targets, enough)
 
 
 def _read_placement(camera_pose: Path | None, axis: list[float] | None) -> Placement | None:
@@ -366,6 +370,7 @@ def _recommend_by_distributions(
     allowed: list[float] | Path | None,
     max_travel: float,
     placement: Placement | None,
+    until: float | None,
     *,
     followed: bool,
     as_json: bool,
@@ -387,7 +392,8 @@ def _recommend_by_distributions(
     axis_warnings = () if placement is None else check_axis(*placement)
     warnings = (*answer.warnings, *axis_warnings)
     targets = target_poses((move.rotation_deg for move in answer.moves), placement)
+    enough = None if until is None else answer.expected_error_deg <= until
     if as_json:
-        print_json(recommendation_as_json(answer, warnings, targets))
+        print_json(recommendation_as_json(answer, warnings, targets, enough=enough))
         return
-    print_recommendation(answer, "object", warnings, targets)
+    print_recommendation(answer, "object", warnings, targets, enough)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from nbv.core.distributions import FLAT
 from nbv.core.evidence import Float32Array as Table
@@ -32,6 +32,15 @@ The tables of all 15,000 views of 125 turns are much larger than the cache of a 
 
 N_PARTS = 5
 """Of the calibration objects, for `Expected.optimism_deg`."""
+
+WITHIN_DEG = (5.0, 15.0, 30.0)
+"""Errors of which it is expected how likely the pose's is not larger."""
+
+AGREEMENT_NATS = 1.0
+"""Bandwidth of the kernel on log Bayes factors, below 0, by which sequences of views are alike."""
+
+SURE = 2.0
+"""Standard errors by which a rotation has to be better than another one to be chosen for it."""
 
 MOST_AVERAGED = 400
 """First views at most whose errors after more views are averaged for the pseudo-observations.
@@ -117,25 +126,25 @@ def error_after_deg(
     return _started_at(error, ahead)
 
 
-def near_first_views(errors_deg: Table, first: NDArray[np.intp]) -> Table:
-    """Return the mean errors (S, K, m) of all first views near each of some.
+def near_first_views(values: Table, first: NDArray[np.intp]) -> Table:
+    """Return the mean values (S, K, m) of all first views near each of some.
 
     Near are those up to half way to the next of `first`. One that is half way counts half for each
     of the two.
 
     Parameters
     ----------
-    errors_deg : ndarray (S, B, m)
+    values : ndarray (S, B, m)
         By the first view.
     first : ndarray (S, K)
         In bins, B / K apart.
     """
-    n_turns, n_bins, _ = errors_deg.shape
+    n_turns, n_bins, _ = values.shape
     apart = n_bins // first.shape[1]
     near = np.arange(-(apart // 2), apart // 2 + 1)
     share = np.minimum(1.0, (apart + 1) / 2 - np.abs(near)).astype(np.float32) / np.float32(apart)
     places = (first[:, :, None] + near) % n_bins
-    rows = errors_deg[np.arange(n_turns)[:, None, None], places]
+    rows = values[np.arange(n_turns)[:, None, None], places]
     return np.asarray(np.einsum("skum,u->skm", rows, share))
 
 
@@ -178,18 +187,24 @@ class Expected:
         The expected error.
     after_deg : ndarray (B,)
         The same after a view at every rotation.
-    parts : ndarray (N, M)
-        Weighted errors after a view at each of M rotations, 360 / M degrees apart, summed over each
-        part of the calibration objects.
+    within_now : ndarray (3,)
+        How likely the error is at most each of `WITHIN_DEG`.
+    within_after : ndarray (3, B)
+        The same after a view at every rotation.
+    by_object : ndarray (O, M + 1)
+        Of each calibration object, weighted errors after a view at each of M rotations, 360 / M
+        degrees apart, and the weight.
     total : ndarray (M,)
-        The same of all objects and of the pseudo-observations.
+        The same errors of all objects and of the pseudo-observations.
     weight : float
         Of all that is in `total`.
     """
 
     now_deg: float
     after_deg: NDArray[np.float64]
-    parts: NDArray[np.float64]
+    within_now: NDArray[np.float64]
+    within_after: NDArray[np.float64]
+    by_object: NDArray[np.float64]
     total: NDArray[np.float64]
     weight: float
 
@@ -206,16 +221,29 @@ class Expected:
         is_choice : ndarray (M,)
             Which of the M rotations from the first view there are to choose from; one or more.
         """
-        if len(self.parts) == 1:
+        n_parts = min(N_PARTS, len(self.by_object))
+        if n_parts == 1:
             return 0.0
+        errors = self.by_object[:, :-1]
+        parts = np.stack([errors[part::n_parts].sum(axis=0) for part in range(n_parts)])
         total = np.where(is_choice, self.total, np.inf)
         of_all = total.argmin()
-        of_others = (total - self.parts).argmin(axis=1).tolist()
+        of_others = (total - parts).argmin(axis=1).tolist()
         # A few numbers: quicker than more arrays.
-        more = sum(
-            own[other] - own[of_all] for own, other in zip(self.parts, of_others, strict=True)
-        )
+        more = sum(own[other] - own[of_all] for own, other in zip(parts, of_others, strict=True))
         return float(more / self.weight)
+
+    def is_surely_better(self, rotation: int, other: int) -> bool:
+        """Return whether a rotation is better than another by `SURE` standard errors.
+
+        Both are numbers of the M rotations. The standard error is that of a ratio of sums over the
+        calibration objects.
+        """
+        own = self.by_object[:, rotation] - self.by_object[:, other]
+        share = self.by_object[:, -1]
+        mean = own.sum() / max(share.sum(), np.finfo(float).tiny)
+        error = np.sqrt(np.square(own - mean * share).sum())
+        return bool(self.total[rotation] - self.total[other] + SURE * error < 0.0)
 
 
 @dataclass(frozen=True)
@@ -233,19 +261,23 @@ class LookAlikes:
         The same `in_object_frame`: ``[s, p, m]`` is view ``m * step + p`` of turn s.
     first : ndarray (S, K)
         The first views that a belief is compared with, in bins; see `first_views`.
-    is_in_part : ndarray (N + 1, S)
-        Whether each turn is in each part of the objects, and in all of them.
-    near_deg : ndarray (S, K, M + 1), or None
-        Errors after a view at each of M rotations, and now. Where they are given, they take the
-        place of the errors of the first views themselves.
+    is_of_object : ndarray (O, S)
+        Whether each turn is of each object.
+    agreement : ndarray (S, K)
+        The log Bayes factors of the fused views; see
+        `nbv.core.distributions.log_bayes_factor`.
+    near : ndarray (S, K, 4 M + 5), or None
+        `_outcomes` of the errors after a view at each of M rotations, and now. Where they are
+        given, they take the place of those of the first views themselves.
     """
 
     seen: Table
     doubled: Table
     further: Table
     first: NDArray[np.intp]
-    is_in_part: NDArray[np.float64]
-    near_deg: Table | None = None
+    is_of_object: NDArray[np.float64]
+    agreement: Table
+    near: Table | None = None
 
     @staticmethod
     def of_views(
@@ -256,24 +288,26 @@ class LookAlikes:
         ``most`` of all first views together are compared, as in `first_views`. With each one, the
         errors of all first views near it count (`near_first_views`); after further views, whose
         errors have to be found while a robot waits, its own alone. Turns are of the objects
-        ``object_ids`` (S,); without them, each is of another one. One object's turns are in one
-        part of `Expected.parts`.
+        ``object_ids`` (S,); without them, each is of another one.
         """
         doubled = _doubled(np.asarray(distributions, dtype=np.float32))
         n_turns, n_bins, _ = doubled.shape
         own = doubled[:, :, :n_bins]
         by_step = _in_object_frame(doubled).reshape(n_turns, -1, compared_step(n_bins), n_bins)
         further = np.ascontiguousarray(by_step.swapaxes(1, 2))
-        is_in_part = _is_in_part(np.arange(n_turns) if object_ids is None else object_ids)
+        names = np.arange(n_turns) if object_ids is None else np.asarray(object_ids)
+        is_of_object = (names == np.unique(names)[:, None]).astype(np.float64)
         every = first_views(n_turns, n_bins)
-        everything = LookAlikes(own, doubled, further, every, is_in_part)
+        agreement = np.zeros(every.shape, dtype=np.float32)
+        everything = LookAlikes(own, doubled, further, every, is_of_object, agreement)
         first = first_views(n_turns, n_bins, most)
-        errors_deg = everything.errors_deg
+        outcomes = _outcomes(everything.errors_deg)
         if first.shape == every.shape:
-            return replace(everything, near_deg=errors_deg)
-        near_deg = near_first_views(errors_deg, first)
+            return replace(everything, near=outcomes)
+        near = near_first_views(outcomes, first)
         seen = own[np.arange(n_turns)[:, None], first]
-        return LookAlikes(seen, doubled, further, first, is_in_part, near_deg)
+        agreement = agreement[:, : first.shape[1]]
+        return LookAlikes(seen, doubled, further, first, is_of_object, agreement, near)
 
     def after(self, rotation_bins: int) -> LookAlikes:
         """Return the turns after one more view, at a rotation from the first one."""
@@ -283,8 +317,10 @@ class LookAlikes:
         both: Table = _windows(self.doubled)[places]
         both *= self.seen
         # A product with 1 takes less time than a sum over short rows.
-        both /= (both @ np.ones(n_bins, dtype=np.float32))[:, :, None]
-        return replace(self, seen=both, near_deg=None)
+        total = both @ np.ones(n_bins, dtype=np.float32)
+        both /= total[:, :, None]
+        agreement = self.agreement + np.log(n_bins * total)
+        return replace(self, seen=both, agreement=agreement, near=None)
 
     @property
     def _step(self) -> int:
@@ -303,8 +339,8 @@ class LookAlikes:
 
         Those that count for the first views; the rotations are whole steps apart.
         """
-        if self.near_deg is not None:
-            return self.near_deg
+        if self.near is not None:
+            return self.near[..., : self.further.shape[2] + 1]
         n_turns, n_first = self.first.shape
         every = np.arange(n_first)
         for turn in range(n_turns):
@@ -338,6 +374,7 @@ class LookAlikes:
         power: float,
         pseudo_observations: float,
         share: NDArray[np.floating] | None = None,
+        agreement: float = 0.0,
     ) -> Expected:
         """Return what a belief leads one to expect.
 
@@ -351,6 +388,9 @@ class LookAlikes:
             See `nbv.core.criteria`.
         share : ndarray (S,), optional
             How much each turn counts; 1 without it.
+        agreement : float
+            The log Bayes factor of the views at hand. Where it is below 0, views contradict each
+            other, and sequences that did so as much count.
         """
         n_turns, n_first = self.first.shape
         of_turn = np.ones(n_turns) if share is None else np.asarray(share)
@@ -363,53 +403,62 @@ class LookAlikes:
         affinity[affinity < float(np.finfo(np.float32).tiny) ** (1.0 / max(power, 1.0))] = 0.0
         weight = affinity ** np.float32(power)
         weight *= of_view.astype(np.float32)[:, None]
-        by_part = self.is_in_part @ self._weighted_errors(weight, pseudo_observations)
-        sums = by_part[-1] + pseudo_observations / of_view.sum() * (of_view @ self._mean_errors)
-        errors = sums / sums[-1]
-        after_deg = errors[:-2] @ _interpolation(len(errors) - 2, self._step)
-        now_deg, all_weight = float(errors[-2]), float(sums[-1])
-        return Expected(now_deg, after_deg, by_part[:-1, :-2], sums[:-2], all_weight)
+        if self.near is None:
+            apart = np.minimum(self.agreement, 0.0) - np.float32(min(agreement, 0.0))
+            weight *= np.exp(-0.5 * (apart / np.float32(AGREEMENT_NATS)) ** 2)
+        by_object = self.is_of_object @ self._weighted(weight, pseudo_observations)
+        of_all = pseudo_observations / of_view.sum() * (of_view @ self._mean_outcomes)
+        sums = by_object.sum(axis=0) + of_all
+        n_steps = self.further.shape[2]
+        means = (sums[:-1] / sums[-1]).reshape(-1, n_steps + 1)
+        after = means[:, :-1] @ _interpolation(n_steps, self._step)
+        return Expected(
+            now_deg=float(means[0, -1]),
+            after_deg=after[0],
+            within_now=means[1:, -1],
+            within_after=after[1:],
+            by_object=by_object[:, [*range(n_steps), -1]],
+            total=sums[:n_steps],
+            weight=float(sums[-1]),
+        )
 
     def _affinities(self, belief: NDArray[np.floating]) -> Table:
         """Return the affinity of a belief (B,) with each first view, (S, K)."""
         compared = _joined(np.asarray(belief, dtype=np.float32), self._step)
         return np.asarray(self._roots @ np.sqrt(compared))
 
-    def _weighted_errors(self, weight: Table, pseudo_observations: float) -> NDArray[np.floating]:
-        """Return the sums of `errors_deg` by weights (S, K) and of these, by turn, (S, M + 2)."""
+    def _weighted(self, weight: Table, pseudo_observations: float) -> NDArray[np.floating]:
+        """Return the sums of `_outcomes` by weights (S, K), by turn, (S, 4 M + 5)."""
         # Turn by turn: the threads of a matrix library wait for each other where other programs
         # hold the cores, and take no part in small products.
-        if self._near_errors is not None:
-            return np.asarray(np.matmul(weight[:, None], self._near_errors)[:, 0])
+        if self.near is not None:
+            return np.asarray(np.matmul(weight[:, None], self.near)[:, 0])
         least = NEGLIGIBLE * (weight.sum() + pseudo_observations)
         is_counted = weight >= least
         # With those that are averaged, because it takes less time to find them together.
         found = self._find(*np.nonzero(is_counted | self._is_averaged))
         turn, place = np.nonzero(is_counted)
-        errors = weight[turn, place, None] * _and_one(found[turn, place])
-        sums = np.zeros((len(weight), errors.shape[1]))
+        outcomes = weight[turn, place, None] * _outcomes(found[turn, place])
+        sums = np.zeros((len(weight), outcomes.shape[1]))
         starts = np.flatnonzero(np.diff(turn, prepend=-1))
-        sums[turn[starts]] = np.add.reduceat(errors, starts)
+        sums[turn[starts]] = np.add.reduceat(outcomes, starts)
         return sums
 
     @cached_property
-    def _near_errors(self) -> Table | None:
-        return None if self.near_deg is None else _and_one(self.near_deg)
-
-    @cached_property
-    def _mean_errors(self) -> NDArray[np.float64]:
-        """Of each turn, `errors_deg` on average over its first views, and 1: (S, M + 2).
+    def _mean_outcomes(self) -> NDArray[np.float64]:
+        """Of each turn, `_outcomes` on average over its first views, (S, 4 M + 5).
 
         After more views of some of them: those of the next turn lie between.
         """
-        if self._near_errors is not None:
-            return np.asarray(self._near_errors.mean(axis=1, dtype=np.float64))
+        if self.near is not None:
+            return np.asarray(self.near.mean(axis=1, dtype=np.float64))
         averaged = np.nonzero(self._is_averaged)
         found = self._find(*averaged)
         of_turns = found[averaged].reshape(len(found), -1, found.shape[2])
-        mean = np.asarray(_and_one(of_turns).mean(axis=1, dtype=np.float64))
+        mean = np.asarray(_outcomes(of_turns).mean(axis=1, dtype=np.float64))
         # The errors now are found for all: it takes little.
-        mean[:, -2] = self.error_now_deg.mean(axis=1)
+        now = _outcomes(self.error_now_deg[..., None]).mean(axis=1)
+        mean[:, found.shape[2] - 1 :: found.shape[2]] = now[:, :-1]
         return mean
 
     @cached_property
@@ -427,17 +476,14 @@ class LookAlikes:
         return np.sqrt(_joined(self.seen, self._step))
 
 
-def _is_in_part(object_ids: ArrayLike) -> NDArray[np.float64]:
-    """Return whether each turn (S,) is in each part of the objects, and in all, (N + 1, S)."""
-    names, number = np.unique(np.asarray(object_ids), return_inverse=True)
-    n_parts = min(N_PARTS, len(names))
-    is_in_part = number % n_parts == np.arange(n_parts)[:, None]
-    return np.vstack([is_in_part, np.ones(len(number))])
+def _outcomes(errors_deg: Table) -> Table:
+    """Return errors (..., m), whether each is within each of `WITHIN_DEG`, and 1: (..., 4 m + 1).
 
-
-def _and_one(errors_deg: Table) -> Table:
-    """Return errors (..., m), and 1: the weighted sum of the last column is the total weight."""
-    return np.concatenate([errors_deg, np.ones_like(errors_deg[..., :1])], axis=-1)
+    The weighted sum of the last column is the total weight.
+    """
+    within = (errors_deg <= np.float32(limit) for limit in WITHIN_DEG)
+    one = np.ones_like(errors_deg[..., :1])
+    return np.concatenate([errors_deg, *within, one], axis=-1, dtype=np.float32)
 
 
 def _started_at(rows: Table, places: NDArray[np.intp]) -> Table:

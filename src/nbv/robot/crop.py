@@ -72,6 +72,10 @@ class Crop:
     doubts: tuple[str, ...] = ()
 
 
+_FULL_BORDER = 0.95
+"""Share of a crop's border; an object alone leaves its corners free."""
+
+
 def pixel_step(camera: Camera) -> float:
     """Return the size of a crop's pixel on the object, diagonals."""
     return camera.distance / camera.focal_px
@@ -143,7 +147,11 @@ def crop_frame(
     codes = encode_depth(images, camera)[0]
     right_m, down_m, ahead_m = (away_m * part for part in towards)
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
-    doubts = (*intrinsics.doubts(rows, columns), *_size_doubts(extent, extent_m))
+    doubts = (
+        *intrinsics.doubts(rows, columns),
+        *_size_doubts(extent, extent_m),
+        *_border_doubts(codes),
+    )
     return Crop(codes, distance_m, extent, centre_m, doubts)
 
 
@@ -155,6 +163,17 @@ def _size_doubts(extent: float, extent_m: tuple[float, float]) -> tuple[str, ...
     return (
         f"the object would be {extent:.2g} m across in the image; {least:.2g} to {most:.2g} m are "
         "usual: check the unit of depth, the intrinsics and the mask",
+    )
+
+
+def _border_doubts(codes: NDArray[np.uint8]) -> tuple[str, ...]:
+    """Return a sentence if nearly the whole border of a crop is object."""
+    border = np.concatenate([codes[[0, -1]].ravel(), codes[1:-1, [0, -1]].ravel()])
+    if np.count_nonzero(border) < _FULL_BORDER * border.size:
+        return ()
+    return (
+        "the object fills the image up to its border: check that the mask, or the depth between "
+        "`near_m` and `far_m`, holds the object alone and not what it stands on",
     )
 
 

@@ -8,8 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.special import logsumexp, softmax
 
-from nbv.core.angles import circular_distance_deg, signed_difference_deg, travel_deg, wrap_deg
+from nbv.core.angles import (
+    circular_distance_deg,
+    nearest_bin,
+    signed_difference_deg,
+    travel_deg,
+    wrap_deg,
+)
 from nbv.core.distributions import mean_direction_deg, rotated
 from nbv.core.logits import from_logits
 from nbv.core.look_alikes import LookAlikes, error_after_deg, in_object_frame
@@ -20,7 +27,7 @@ from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.network import Sweep
 from nbv.robot.next_view import AfterRotations, after_rotations
 from nbv.robot.ood import ood_score
-from nbv.robot.rotations import MIN_SEPARATION_DEG
+from nbv.robot.rotations import MIN_SEPARATION_DEG, farthest_of
 
 SINGLE, RANDOM, FIXED = "single", "random", "best fixed"
 OPPOSITE, SPACED, RECOMMENDED = "opposite", "evenly spaced", "recommended"
@@ -89,7 +96,9 @@ def best_fixed_deg(errors_deg: NDArray[np.float64], sweep_weights: NDArray[np.fl
 
 
 Chooser = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
-"""Maps beliefs (n, B) and rotations so far (n, t) to the next ones (n,), from first views."""
+"""Maps sums of t views' logarithms (n, B), and rotations (n, t), to the next rotations (n,).
+
+All rotations are from first views."""
 
 
 def replay(predictions: Predictions, choose: Chooser, n_views: int) -> NDArray[np.float64]:
@@ -105,12 +114,10 @@ def replay(predictions: Predictions, choose: Chooser, n_views: int) -> NDArray[n
     logs = np.log(distributions)
     errors = []
     for view in range(n_views):
-        beliefs = np.exp(logs - logs.max(axis=1, keepdims=True))
-        beliefs /= beliefs.sum(axis=1, keepdims=True)
-        errors.append(signed_difference_deg(mean_direction_deg(beliefs), azimuth_deg))
+        errors.append(signed_difference_deg(mean_direction_deg(softmax(logs, axis=1)), azimuth_deg))
         if view + 1 == n_views:
             break
-        chosen = choose(beliefs, np.take_along_axis(rotations_deg, taken, axis=1))
+        chosen = choose(logs, np.take_along_axis(rotations_deg, taken, axis=1))
         apart = circular_distance_deg(rotations_deg, chosen[:, None])
         np.put_along_axis(apart, taken, np.inf, axis=1)
         following = apart.argmin(axis=1)
@@ -123,23 +130,33 @@ def replay(predictions: Predictions, choose: Chooser, n_views: int) -> NDArray[n
 def recommended(
     calibrated: AfterRotations, predictions: Predictions, affinity: Mapping[str, float]
 ) -> Chooser:
-    """Return the choice of least expected error, given look-alikes after the same rotations."""
+    """Return the choice of `nbv.robot.next_view`, given look-alikes after the same rotations."""
     n_bins = predictions.distributions.shape[-1]
     candidates_deg = np.arange(n_bins) * (360.0 / n_bins)
 
-    def choose(beliefs: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    def choose(logs: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
         bins = np.rint(rotations * (n_bins / 360.0)).astype(int) % n_bins
         sequences, sequence_of_row = np.unique(bins, axis=0, return_inverse=True)
-        error = np.empty(beliefs.shape)
+        beliefs, chosen = softmax(logs, axis=1), np.empty(len(logs))
+        agreement = logsumexp(logs, axis=1) + (rotations.shape[1] - 1) * np.log(n_bins)
         # Sorted, so that neighbouring sequences share the look-alikes of their first rotations.
         for i, sequence in enumerate(sequences.tolist()):
             alike = calibrated(tuple(sequence[1:]))
             for row in np.flatnonzero(sequence_of_row.ravel() == i):
-                expected = alike.expected(beliefs[row], **affinity, share=predictions.sweep_weights)
-                error[row] = expected.after_deg
-        near = circular_distance_deg(candidates_deg[:, None], rotations[:, None, :]).min(axis=2)
-        best = np.where(near < MIN_SEPARATION_DEG, np.inf, error).argmin(axis=1)
-        return np.asarray(candidates_deg[best])
+                apart = circular_distance_deg(candidates_deg[:, None], rotations[row]).min(axis=1)
+                expected = alike.expected(
+                    beliefs[row],
+                    **affinity,
+                    share=predictions.sweep_weights,
+                    agreement=float(agreement[row]),
+                )
+                error = np.where(apart < MIN_SEPARATION_DEG, np.inf, expected.after_deg)
+                # From the last view, as a robot ranks them.
+                order = np.roll(candidates_deg, -sequence[-1])
+                both_deg = candidates_deg[error.argmin()], order[farthest_of(order, rotations[row])]
+                best, farthest = nearest_bin(both_deg, len(expected.total)).tolist()
+                chosen[row] = both_deg[not expected.is_surely_better(best, farthest)]
+        return chosen
 
     return choose
 
@@ -150,11 +167,11 @@ def at_random(rng: np.random.Generator) -> Chooser:
     If `_MOST_DRAWS` draws find no such rotation among many views, the last draw counts.
     """
 
-    def choose(beliefs: NDArray[np.float64], taken: NDArray[np.float64]) -> NDArray[np.float64]:
+    def choose(logs: NDArray[np.float64], taken: NDArray[np.float64]) -> NDArray[np.float64]:
         def draw(n: int) -> NDArray[np.float64]:
             return rng.uniform(MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG, n)
 
-        chosen = draw(len(beliefs))
+        chosen = draw(len(logs))
         for _ in range(_MOST_DRAWS):
             apart = circular_distance_deg(chosen[:, None], taken).min(axis=1)
             is_near = apart < MIN_SEPARATION_DEG
@@ -173,7 +190,7 @@ def baselines(n_views: int, fixed_deg: float, rng: np.random.Generator) -> dict[
     """
 
     def at_steps(step_deg: float) -> Chooser:
-        return lambda beliefs, taken: np.full(len(beliefs), taken.shape[1] * step_deg)
+        return lambda logs, taken: np.full(len(logs), taken.shape[1] * step_deg)
 
     return {
         RANDOM: at_random(rng),

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nbv.core.look_alikes import WITHIN_DEG
 from nbv.core.rotation_views import (
     belief,
     chances_within,
@@ -23,13 +24,12 @@ from nbv.errors import UserError, reason_of
 from nbv.files import missing, read_numbers, read_text
 from nbv.labels import counted
 from nbv.robot.moves import Pose, as_pose
+from nbv.robot.next_view import as_chances
 from nbv.robot.rotation_pairs import LEAST_MM, RotationPairs
 from nbv.robot.rotations import MIN_SEPARATION_DEG, as_travel
 
 FARTHEST_M = 50.0
 """No arm looks at an object from farther: such camera poses are in millimetres."""
-
-WITHIN_DEG = (5.0, 15.0, 30.0)
 
 NO_DEPENDENCE = (
     "calibration shows no dependence of this object's flips on the view, so no candidate is known "
@@ -186,7 +186,7 @@ def recommend_camera(
             float(travel[i]),
             float(np.linalg.norm(targets[i][:3, 3] - poses[-1][:3, 3])) if known else None,
             float(cost[k]),
-            _named(within[:, k]),
+            as_chances(within[:, k]),
             targets[i] if known else None,
             -turned[i][2],
         )
@@ -198,15 +198,11 @@ def recommend_camera(
     return CameraRecommendation(
         rays[-1].T @ cameras[-1] @ cameras[0].T @ now.pose,
         float(now.probability @ distance) + small,
-        _named(np.array([now.probability_within(error_deg) for error_deg in WITHIN_DEG])),
+        as_chances(np.array([now.probability_within(error_deg) for error_deg in WITHIN_DEG])),
         tuple(ranked),
         depends,
         (*(() if depends else (NO_DEPENDENCE,)), *([NO_SCORES] if unused else [])),
     )
-
-
-def _named(chances: Array) -> dict[str, float]:
-    return {f"{error:g}": float(p) for error, p in zip(WITHIN_DEG, chances, strict=True)}
 
 
 def _ray(pairs: RotationPairs, position: Array | None) -> Rotations:

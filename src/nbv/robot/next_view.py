@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +17,7 @@ from nbv.core.distributions import (
     product_of_views,
     rotated,
 )
-from nbv.core.look_alikes import MOST_COMPARED, Expected, LookAlikes
+from nbv.core.look_alikes import MOST_COMPARED, WITHIN_DEG, Expected, LookAlikes
 from nbv.errors import FrameError, UserError
 from nbv.labels import counted
 from nbv.robot.rotations import (
@@ -27,11 +27,13 @@ from nbv.robot.rotations import (
     at_rotations,
     best_rotations,
     bins_deg,
+    farthest_of,
     flat_warnings,
+    with_first,
 )
 
 LEAST_BAYES_FACTOR = 0.05
-"""Below it views contradict each other; at most 1 in 20 correct sets of views is below."""
+"""Below it views contradict each other: with exact distributions at most 1 in 20 right sets."""
 
 N_KEPT = 6
 """Number of cached sequences of rotations; the look-alikes of `mug` take 4 MB each."""
@@ -55,6 +57,8 @@ class Move:
         Its absolute value, in [0, 180].
     expected_error_deg : float
         Expected error of the pose once the new view is added.
+    probability_within : dict of str to float
+        How likely that error is at most 5, 15 and 30 degrees.
 
     Examples
     --------
@@ -66,6 +70,7 @@ class Move:
     rotation_deg: float
     travel_deg: float
     expected_error_deg: float
+    probability_within: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -82,7 +87,9 @@ class Recommendation:
         Expected error of `azimuth_deg`: the mean calibration error of objects that looked alike.
         It is raised if the last view was recommended, because the same errors chose that view.
     move : Move, or None
-        The best next view; None if every candidate is within 15° of an existing view.
+        The next view: that of least expected error if it is better than the view farthest from
+        all so far by more than its uncertainty, else the farthest. None if every candidate is
+        within 15° of an existing view.
     alternatives : tuple of Move
         Other local optima, best first.
     belief : ndarray (B,)
@@ -101,6 +108,8 @@ class Recommendation:
         Likely mistakes in the frames, and whether no view is better than another; a sentence each.
     n_views : int
         Number of views whose product is the belief.
+    probability_within : dict of str to float
+        How likely the error of `azimuth_deg` is at most 5, 15 and 30 degrees.
     crops : tuple of ndarray (side, side) uint8
         The network's input for each frame; empty without frames.
     object_position_m : tuple of float, or None
@@ -127,6 +136,7 @@ class Recommendation:
     bayes_factor: float
     warnings: tuple[str, ...]
     n_views: int
+    probability_within: dict[str, float] = field(default_factory=dict)
     crops: tuple[NDArray[np.uint8], ...] = ()
     object_position_m: tuple[float, float, float] | None = None
 
@@ -177,9 +187,10 @@ def next_view(
     """Return the estimated pose and the next view.
 
     Views are fused by product. The next one has the least expected error, which is the mean error
-    of calibration objects after the same rotations (`nbv.core.look_alikes`). Choosing the least
-    value makes it too low by the optimism of the choice, which is added. If a recommendation chose
-    the last view, the same holds for the current expected error.
+    of calibration objects after the same rotations (`nbv.core.look_alikes`), unless it is not
+    surely better than the view farthest from all so far. Choosing the least value makes it too low
+    by the optimism of the choice, which is added. If a recommendation chose the last view, the same
+    holds for the current expected error.
 
     Parameters
     ----------
@@ -208,7 +219,10 @@ def next_view(
     n_bins = len(belief)
     width = 360.0 / n_bins
     bins = [round(rotation / width) % n_bins for rotation in rotations_deg[1:]]
-    expected = calibrated(tuple(bins)).expected(belief, **affinity, share=share)
+    log_factor = log_bayes_factor(distributions, rotations_deg)
+    expected = calibrated(tuple(bins)).expected(
+        belief, **affinity, share=share, agreement=log_factor
+    )
     last = rotations_deg[-1]
     taken = tuple(rotation - last for rotation in rotations_deg)
     n_steps = len(expected.total)
@@ -223,7 +237,10 @@ def next_view(
     now_deg = expected.now_deg
     if followed and len(distributions) > 1:
         before = calibrated(tuple(bins[:-1])).expected(
-            product_of_views(distributions[:-1], rotations_deg[:-1]), **affinity, share=share
+            product_of_views(distributions[:-1], rotations_deg[:-1]),
+            **affinity,
+            share=share,
+            agreement=log_bayes_factor(distributions[:-1], rotations_deg[:-1]),
         )
         # The errors that chose the last view are also those of its expected error.
         now_deg += _optimism_deg(before, rotations_deg[:-1], n_bins)
@@ -231,21 +248,35 @@ def next_view(
     if rotation_deg.size:
         error = error + expected.optimism_deg(is_choice)
     # Rotations from the first view become rotations from the last one.
-    error = np.roll(error, -round(last / width)) if last else error
+    back = -round(last / width)
+    error, within = np.roll(error, back), np.roll(expected.within_after, back, axis=-1)
     if allowed_deg is None:
         cost, error_after_deg = error[is_allowed], np.where(is_allowed, error, np.inf)
     else:
         cost, nearest = at_rotations(error, rotation_deg), nearest_bin(rotation_deg, n_bins)
         error_after_deg = np.full(n_bins, np.inf)
         error_after_deg[nearest] = error[nearest]
+    ranked = best_rotations(rotation_deg, cost, width)
+    if ranked:
+        farthest = farthest_of(rotation_deg, taken)
+        step_of_best, step_of_farthest = nearest_bin(
+            np.array([ranked[0][0], rotation_deg[farthest]]) + last, n_steps
+        ).tolist()
+        if not expected.is_surely_better(step_of_best, step_of_farthest):
+            ranked = with_first(ranked, (float(rotation_deg[farthest]), float(cost[farthest])))
     moves = [
-        Move(rotation, abs(rotation), error_deg)
-        for rotation, error_deg in best_rotations(rotation_deg, cost, width)
+        Move(
+            rotation,
+            abs(rotation),
+            error_deg,
+            as_chances(at_rotations(each, np.array([rotation]))[0] for each in within),
+        )
+        for rotation, error_deg in ranked
     ]
     if moves:
         warnings += flat_warnings(moves[0].expected_error_deg, cost)
     direction_deg, spread_deg = direction_and_spread_deg(belief)
-    bayes_factor = math.exp(min(log_bayes_factor(distributions, rotations_deg), _LARGEST_LOG))
+    bayes_factor = math.exp(min(log_factor, _LARGEST_LOG))
     return Recommendation(
         azimuth_deg=float(wrap_deg(direction_deg + last)),
         spread_deg=spread_deg,
@@ -256,11 +287,17 @@ def next_view(
         error_after_deg=error_after_deg,
         ood_score=ood_score,
         bayes_factor=bayes_factor,
-        warnings=(*warnings, *_contradictions(bayes_factor)),
+        warnings=(*warnings, *_contradictions(bayes_factor, distributions, rotations_deg)),
         n_views=len(distributions),
+        probability_within=as_chances(expected.within_now),
         crops=crops,
         object_position_m=object_position_m,
     )
+
+
+def as_chances(probabilities: Iterable[float]) -> dict[str, float]:
+    """Return probabilities by the errors of `WITHIN_DEG` that they are for."""
+    return {f"{limit:g}": float(p) for limit, p in zip(WITHIN_DEG, probabilities, strict=True)}
 
 
 def _optimism_deg(before: Expected, rotations_deg: Sequence[float], n_bins: int) -> float:
@@ -270,13 +307,22 @@ def _optimism_deg(before: Expected, rotations_deg: Sequence[float], n_bins: int)
     return before.optimism_deg(is_choice) if is_choice.any() else 0.0
 
 
-def _contradictions(bayes_factor: float) -> tuple[str, ...]:
+def _contradictions(
+    bayes_factor: float, distributions: NDArray[np.float64], rotations_deg: Sequence[float]
+) -> tuple[str, ...]:
+    """Return a sentence where views contradict each other, with the likeliest reason."""
     if bayes_factor >= LEAST_BAYES_FACTOR:
         return ()
+    said = f"the views contradict each other (Bayes factor {bayes_factor:.1g})"
+    turned_back = [-rotation for rotation in rotations_deg]
+    if log_bayes_factor(distributions, turned_back) > 0.0:
+        return (
+            f"{said}, and agree if turned the other way: check that frames are not mirrored, and "
+            "the sign of the rotations (counter-clockwise seen from above)",
+        )
     return (
-        f"the views contradict each other (Bayes factor {bayes_factor:.1g}): check that "
-        "frames are not mirrored (mirrored ones and a wrong sign look alike), the rotations and "
-        "their sign (counter-clockwise seen from above), and that all show one object",
+        f"{said}: one is likely wrong, and one more view helps; check too that the rotations are "
+        "right and that all frames show one object",
     )
 
 

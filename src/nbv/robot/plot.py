@@ -145,7 +145,7 @@ def _draw_errors(axes: PolarAxes, answer: Recommendation, best: Move) -> None:
     rotation = f"{best.rotation_deg:+g}".replace("-", "−")
     axes.set_title(
         "Expected error (degrees) after a rotation\n"
-        f"best: {rotation}°, {best.expected_error_deg:.1f}°"
+        f"recommended: {rotation}°, {best.expected_error_deg:.1f}°"
     )
 
 

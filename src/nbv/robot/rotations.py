@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.angles import is_angle, nearest_bin, wrap_deg
+from nbv.core.angles import circular_distance_deg, is_angle, nearest_bin, wrap_deg
 from nbv.core.criteria import IN_DEGREES
 from nbv.core.lookup import LookupTable
 from nbv.errors import UserError, check_number
@@ -103,6 +103,24 @@ def best_rotations(
         if len(ranked) > N_ALTERNATIVES:
             break
     return ranked
+
+
+def farthest_of(rotation_deg: NDArray[np.float64], taken: ArrayLike) -> int:
+    """Return which rotation (m,) is farthest from all `taken` so far; of equal ones the first.
+
+    After one view it is the opposite one. Rotations are from the last view, degrees.
+    """
+    apart = circular_distance_deg(rotation_deg[:, None], np.asarray(taken)).min(axis=1)
+    return int(np.rint(apart * 1e6).argmax())
+
+
+def with_first(
+    ranked: list[tuple[float, float]], first: tuple[float, float]
+) -> list[tuple[float, float]]:
+    """Return ranked rotations and costs after another one, without those near it."""
+    least, most = MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG
+    others = [each for each in ranked if least <= abs(each[0] - first[0]) <= most]
+    return [first, *others][: N_ALTERNATIVES + 1]
 
 
 def ranked_rotations(
