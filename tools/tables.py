@@ -114,6 +114,20 @@ def bundle() -> pd.DataFrame:
     return pd.DataFrame(columns, index=[*BUNDLE_ROWS])
 
 
+def focal_lengths() -> pd.DataFrame:
+    """MAE of two views of real mugs without the recordings' offsets, degrees."""
+    errors = pd.read_csv(REFERENCE / "bundles/focal_lengths.csv").query("n_views == 2")
+    places = errors["sequence"].map({1: "nearly level", 2: "from above"})
+    errors["recording"] = errors["object_id"].str.replace("mug", "mug ") + ", " + places
+    by_choice = errors.pivot_table(
+        index=["recording", "focal_px"], columns="choice", values="mae_without_offset_deg"
+    )
+    both = by_choice["recommended"].map("{:.1f}".format) + " / "
+    cells = both + by_choice["opposite"].map("{:.1f}".format)
+    table = cells.unstack("focal_px")  # noqa: PD010 - nothing to aggregate
+    return table.rename(columns="{} px".format).rename_axis(None).sort_index(ascending=True)
+
+
 def bundles() -> pd.DataFrame:
     """Size, time and MAE of each shipped bundle; a row for each kind of test objects."""
     timed = json.loads((REFERENCE / "bench.json").read_text("utf-8"))
@@ -132,6 +146,7 @@ TABLES = {
     "confirmation": confirmation,
     "bundle": bundle,
     "bundles": bundles,
+    "focal_lengths": focal_lengths,
 }
 
 
