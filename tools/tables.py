@@ -39,8 +39,8 @@ BUNDLE_COLUMNS = {
 }
 CONFIRMATION_ROWS = {
     "one view": ("none", "none"),
-    "as printed, average": ("as_printed", "average"),
-    "repaired, average": ("given_estimate", "average"),
+    "T = L, likeliest smoothing, average": ("as_printed", "average"),
+    "T = V (Proposed), average": ("given_estimate", "average"),
     "fixed, posterior": ("fixed", "posterior"),
     "expected error, posterior": ("expected_error", "posterior"),
     "opposite, product": ("opposite", "product"),
