@@ -264,14 +264,11 @@ def next_view(
         ).tolist()
         if not expected.is_surely_better(step_of_best, step_of_farthest):
             ranked = with_first(ranked, (float(rotation_deg[farthest]), float(cost[farthest])))
+    taken_deg = np.array([rotation for rotation, _ in ranked])
+    chances = np.transpose([at_rotations(each, taken_deg) for each in within])
     moves = [
-        Move(
-            rotation,
-            abs(rotation),
-            error_deg,
-            as_chances(at_rotations(each, np.array([rotation]))[0] for each in within),
-        )
-        for rotation, error_deg in ranked
+        Move(rotation, abs(rotation), error_deg, as_chances(own))
+        for (rotation, error_deg), own in zip(ranked, chances, strict=True)
     ]
     if moves:
         warnings += flat_warnings(moves[0].expected_error_deg, cost)

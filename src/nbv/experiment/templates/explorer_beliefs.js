@@ -64,7 +64,8 @@ function meanDirection(belief) {
     x += belief[i] * Math.cos(angle);
     y += belief[i] * Math.sin(angle);
   }
-  if (Math.hypot(x, y) < 1e-9) return null;
+  // FLAT of nbv.core.distributions.
+  if (Math.hypot(x, y) <= 1e-5) return null;
   return modulo((Math.atan2(y, x) * 180) / Math.PI, 360);
 }
 
