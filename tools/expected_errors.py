@@ -139,13 +139,16 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=20)
     parser.add_argument("--meshes", help="ShapeNetCore, instead of generated objects")
     parser.add_argument("--exclude", help="file of objects to leave out")
+    parser.add_argument(
+        "--overrides", nargs="*", default=[], help="settings: randomisation.hole=0 …"
+    )
     parser.add_argument("--rows", type=Path, help="CSV of every promise and error")
     parser.add_argument("--cores", type=int, default=2)
     given = parser.parse_args()
-    overrides: tuple[str, ...] = ()
+    overrides: tuple[str, ...] = tuple(given.overrides)
     category = Recommender.load(given.bundle).bundle.category
     if given.meshes:
-        overrides = ("dataset=shapenet", f"dataset.root={given.meshes}", "n_objects=null")
+        overrides += ("dataset=shapenet", f"dataset.root={given.meshes}", "n_objects=null")
         overrides += (f"dataset.exclude_file={given.exclude}",) if given.exclude else ()
         names = tools_of(given.bundle, overrides, given.seed)[-1].object_ids(category)
     else:
