@@ -21,6 +21,7 @@ use rule train_bundle from paper as train_variant with:
         splits="<results>/splits/{category}.csv",
         depth=variant_images(".npy"),
         objects=variant_images("_objects.json"),
+        start=BUNDLE_START,
     output:
         "<results>/bundles{variant}/estimators/{category}.safetensors",
     log:

@@ -41,6 +41,7 @@ rule train_bundle:
         objects=lambda wildcards: bundle_elevations(
             wildcards, "<results>/bundles/depth/{category}/el{elevation}_objects.json"
         ),
+        start=BUNDLE_START,
     output:
         "<results>/bundles/estimators/{category}.safetensors",
     log:
@@ -54,7 +55,7 @@ rule train_bundle:
         runtime=per_attempt(120),
     params:
         fold=1,
-        estimator=lambda wildcards: settings_of("training"),
+        estimator=lambda wildcards: settings_of(PLAN.bundle_stage),
         mirror_plane_deg=lambda wildcards: PLAN.mirror_plane_deg(wildcards.category),
         seed=CONFIG["seed"],
         replicate=0,

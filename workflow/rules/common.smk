@@ -128,6 +128,9 @@ def training_start(wildcards, below="<results>"):
     return [f"{below}/estimators/{unit}/fold{wildcards.fold}/{name}.safetensors"]
 
 
+BUNDLE_START = [os.path.relpath(SHIPPED)] if PLAN.bundle_stage == "fine_tuning" else []
+
+
 @one_line()
 def settings_of(stage):
     """The settings of a stage of training."""

@@ -9,7 +9,7 @@ with job(snakemake):
     from nbv.data.depth_images import open_depth
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
     from nbv.experiment.estimation.training import train_network
-    from nbv.experiment.estimation.weights import Estimator, save_estimator
+    from nbv.experiment.estimation.weights import Estimator, read_start, save_estimator
     from nbv.experiment.splits import objects_with_role, read_splits
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
@@ -26,13 +26,19 @@ with job(snakemake):
     own = [params.replicate] if params.replicate else []
     images = codes.reshape(-1, *codes.shape[2:])
     plane_deg = params.mirror_plane_deg
+    starts = [
+        read_start(path, wildcards.category, object_ids, snakemake.output[0], hardware)
+        for path in given.start
+    ]
     network = train_network(
         images,
         params.estimator,
         hardware,
         seed_for(params.seed, "bundle", wildcards.category, *own),
+        start=starts[0].weights if starts else None,
         mirror_planes_deg=None if plane_deg is None else [plane_deg] * len(images),
     )
     names = [f"{name}/{place}" for place in range(len(opened)) for name in object_ids]
-    estimator = Estimator(network, params.estimator, codes.shape[-1], names)
+    origin = starts[0].origin if starts else None
+    estimator = Estimator(network, params.estimator, codes.shape[-1], names, origin)
     save_estimator(snakemake.output[0], estimator, hardware)

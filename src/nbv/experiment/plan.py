@@ -21,7 +21,7 @@ from nbv.experiment.config import load_config
 from nbv.experiment.config.schema import LINEAR
 from nbv.experiment.report import settings as report
 from nbv.experiment.results import Unit
-from nbv.experiment.stages import Stage, Start, stage_settings, start_of
+from nbv.experiment.stages import FEATURES, Stage, Start, stage_settings, start_of
 from nbv.robot.pairs import PairTable
 
 Fold = tuple[str, int, int]
@@ -194,6 +194,13 @@ class Plan:
             )
         epochs = self.config["crossfit_epochs"] if self.crossfit else None
         return stage_settings(self.config["estimator"], stage, epochs)
+
+    @property
+    def bundle_stage(self) -> Stage:
+        """The stage of a bundle's training: from random weights, or from the depth features."""
+        return (
+            "fine_tuning" if self.config["estimator"].get("warm_start") == FEATURES else "training"
+        )
 
     def mirror_plane_deg(self, category: str) -> float | None:
         """Return the plane of symmetry whose mirror images a category's estimators learn from."""
