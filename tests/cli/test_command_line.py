@@ -620,7 +620,7 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
         *("--views", "2", "3", "--json", "--output", "table.csv"),
     )
     printed = json.loads(out)
-    assert pd.DataFrame(printed["errors"]).equals(wanted)
+    pd.testing.assert_frame_equal(pd.DataFrame(printed["errors"]), wanted)
     ood = count_ood(Bundle.load("b.safetensors"), sweeps_of("manifest.csv"))
     assert printed["ood"] == ood.to_dict("records")
     written = pd.read_csv("table.csv", dtype={"object_id": str, "sequence": str})
@@ -637,6 +637,9 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
     assert warning == f"warning: {ood['warning'][0]}"
     assert "estimates do not follow azimuths" in warning
     assert numbers.split()[-3:] == ["1", "2", "3"]
+    *lines, expected = lines
+    errors = [f"{error:.1f}" for error in wanted["expected_deg"].dropna()]
+    assert re.split("  +", expected.strip()) == ["expected error", *errors]
     assert len(lines) == wanted["choice"].nunique()
     for line in lines:
         choice, *cells = re.split("  +", line.strip())
@@ -644,6 +647,9 @@ def test_an_evaluation_is_that_of_the_recordings(manifest, capsys):
         assert cells == [
             f"{row.mae_deg:.1f} ({row.mae_without_offset_deg:.1f})" for row in rows.itertuples()
         ]
+    options = ("evaluate", "manifest.csv", "--bundle", "b.safetensors", "--until", "90")
+    ended = f"expected {wanted['expected_deg'][0]:.1f}, after 1.0 of at most 5 views"
+    assert ended in run(capsys, *options)
 
 
 def test_an_object_that_calibrated_the_bundle_is_named(manifest, capsys):

@@ -408,5 +408,5 @@ def test_a_rotation_is_surely_better_by_two_standard_errors_over_objects() -> No
     for shift in (1.8, 2.2):
         moved = errors + np.array([-difference.mean() - shift * error, 0.0])
         expected = of_objects(moved, np.zeros(2), 40.0)
-        assert expected.is_surely_better(0, 1) == (shift > 2)
-        assert not expected.is_surely_better(1, 0)
+        assert expected.is_surely_better(0.0, 180.0) == (shift > 2)
+        assert not expected.is_surely_better(180.0, 0.0)

@@ -258,6 +258,8 @@ def print_evaluation(errors: pd.DataFrame, ood: pd.DataFrame) -> None:
 
     The frames are those of `evaluate` and `count_ood` in `nbv.robot.evaluation`.
     """
+    from nbv.robot.evaluation import RECOMMENDED, SINGLE, UNTIL
+
     for about in ood.to_dict("records"):
         is_recording = (errors["object_id"] == about["object_id"]) & (
             errors["sequence"] == about["sequence"]
@@ -279,15 +281,25 @@ def print_evaluation(errors: pd.DataFrame, ood: pd.DataFrame) -> None:
         print_line(
             f"  {'MAE (without offset), degrees':<30}" + "".join(f"{n:>15}" for n in numbers)
         )
-        for choice in dict.fromkeys(rows["choice"]):
-            by_views = rows[rows["choice"] == choice].set_index("n_views")
-            cells = (
-                f"{by_views['mae_deg'][n]:.1f} ({by_views['mae_without_offset_deg'][n]:.1f})"
-                if n in by_views.index
-                else ""
-                for n in numbers
+        is_until = rows["choice"] == UNTIL
+        table = {
+            choice: {
+                row["n_views"]: f"{row['mae_deg']:.1f} ({row['mae_without_offset_deg']:.1f})"
+                for row in of_choice.to_dict("records")
+            }
+            for choice, of_choice in rows[~is_until].groupby("choice", sort=False)
+        }
+        expected = rows[rows["choice"].isin([SINGLE, RECOMMENDED])].set_index("n_views")
+        table["expected error"] = {n: f"{e:.1f}" for n, e in expected["expected_deg"].items()}
+        for choice, cells in table.items():
+            line = "".join(f"{cells.get(n, ''):>15}" for n in numbers)
+            print_line(f"  {choice:<30}{line}")
+        for row in rows[is_until].to_dict("records"):
+            print_line(
+                f"  {UNTIL}: {row['mae_deg']:.1f} ({row['mae_without_offset_deg']:.1f}), expected "
+                f"{row['expected_deg']:.1f}, after {row['mean_views']:.1f} of at most "
+                f"{row['n_views']} views"
             )
-            print_line(f"  {choice:<30}" + "".join(f"{cell:>15}" for cell in cells))
 
 
 def print_names(about: Mapping[str, Any]) -> None:

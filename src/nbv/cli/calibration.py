@@ -162,6 +162,7 @@ def evaluate(
     *,
     bundle: str = SHIPPED,
     views: WholeNumbers = None,
+    until: float | None = None,
     intrinsics: str | None = None,
     depth_scale: float | None = None,
     near: float | None = None,
@@ -182,6 +183,9 @@ def evaluate(
         The name of a shipped bundle, or a file.
     views
         Numbers of views. Default: 2 3 4 5.
+    until
+        Also stop as soon as the expected error is at most this, degrees, or after the largest
+        number of views.
     intrinsics
         fx,fy,cx,cy in pixels, only the focal length, or a camera file.
     depth_scale
@@ -208,7 +212,8 @@ def evaluate(
         if len(sweeps) > 1:
             print(f"evaluated {n_done} of {len(sweeps)} recordings", file=sys.stderr)  # noqa: T201
 
-    errors = evaluation.evaluate(used, sweeps, views or [2, 3, 4, 5], report=report)
+    numbers = views or [2, 3, 4, 5]
+    errors = evaluation.evaluate(used, sweeps, numbers, until_deg=until, report=report)
     if output is not None:
         write_csv(output, errors)
     ood = evaluation.count_ood(used, sweeps)
@@ -216,7 +221,7 @@ def evaluate(
     if json:
         print_json(
             {
-                "errors": errors.to_dict("records"),
+                "errors": errors.astype(object).where(errors.notna(), None).to_dict("records"),
                 "calibrated_by": calibrated_by,
                 "ood": [
                     about | {"warning": about["warning"] or None}

@@ -15,6 +15,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.core.angles import nearest_bin
 from nbv.core.distributions import FLAT
 from nbv.core.evidence import Float32Array as Table
 
@@ -233,12 +234,14 @@ class Expected:
         more = sum(own[other] - own[of_all] for own, other in zip(parts, of_others, strict=True))
         return float(more / self.weight)
 
-    def is_surely_better(self, rotation: int, other: int) -> bool:
+    def is_surely_better(self, rotation_deg: float, other_deg: float) -> bool:
         """Return whether a rotation is better than another by `SURE` standard errors.
 
-        Both are numbers of the M rotations. The standard error is that of a ratio of sums over the
-        calibration objects.
+        Both are from the first view, and the nearest of the M rotations count. The standard error
+        is that of a ratio of sums over the calibration objects.
         """
+        both_deg = np.array([rotation_deg, other_deg])
+        rotation, other = nearest_bin(both_deg, len(self.total)).tolist()
         own = self.by_object[:, rotation] - self.by_object[:, other]
         share = self.by_object[:, -1]
         mean = own.sum() / max(share.sum(), np.finfo(float).tiny)

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.special import logsumexp, softmax
+from scipy.special import softmax
 
 from nbv.core.angles import (
     circular_distance_deg,
-    nearest_bin,
     signed_difference_deg,
     travel_deg,
     wrap_deg,
@@ -25,12 +24,14 @@ from nbv.errors import UserError
 from nbv.labels import counted
 from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.network import Sweep
-from nbv.robot.next_view import AfterRotations, after_rotations
+from nbv.robot.next_view import AfterRotations, after_rotations, next_view
 from nbv.robot.ood import ood_score
-from nbv.robot.rotations import MIN_SEPARATION_DEG, farthest_of
+from nbv.robot.rotations import MIN_SEPARATION_DEG
 
 SINGLE, RANDOM, FIXED = "single", "random", "best fixed"
 OPPOSITE, SPACED, RECOMMENDED = "opposite", "evenly spaced", "recommended"
+UNTIL = "recommended, until enough"
+"""No more views than are needed for an expected error."""
 PAPER = "paper's table, averaged"
 """Views by the lookup table, with averaged estimates. All others fuse distributions."""
 
@@ -95,8 +96,8 @@ def best_fixed_deg(errors_deg: NDArray[np.float64], sweep_weights: NDArray[np.fl
     return float((sweep_weights @ errors_deg).argmin() * (360.0 / errors_deg.shape[1]))
 
 
-Chooser = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
-"""Maps sums of t views' logarithms (n, B), and rotations (n, t), to the next rotations (n,).
+Chooser = Callable[[NDArray[np.intp], NDArray[np.float64]], NDArray[np.float64]]
+"""Maps frames taken so far (n, t) and their rotations (n, t) to the next rotations (n,).
 
 All rotations are from first views."""
 
@@ -117,48 +118,47 @@ def replay(predictions: Predictions, choose: Chooser, n_views: int) -> NDArray[n
         errors.append(signed_difference_deg(mean_direction_deg(softmax(logs, axis=1)), azimuth_deg))
         if view + 1 == n_views:
             break
-        chosen = choose(logs, np.take_along_axis(rotations_deg, taken, axis=1))
-        apart = circular_distance_deg(rotations_deg, chosen[:, None])
-        np.put_along_axis(apart, taken, np.inf, axis=1)
-        following = apart.argmin(axis=1)
+        chosen = choose(taken, np.take_along_axis(rotations_deg, taken, axis=1))
+        following = _nearest_unused(rotations_deg, taken, chosen)
         rotation = rotations_deg[np.arange(n), following]
         logs = logs + np.log(rotated(distributions[following], rotation))
         taken = np.column_stack([taken, following])
     return np.stack(errors, axis=1)
 
 
-def recommended(
-    calibrated: AfterRotations, predictions: Predictions, affinity: Mapping[str, float]
-) -> Chooser:
-    """Return the choice of `nbv.robot.next_view`, given look-alikes after the same rotations."""
-    n_bins = predictions.distributions.shape[-1]
-    candidates_deg = np.arange(n_bins) * (360.0 / n_bins)
+def follow(
+    calibrated: AfterRotations,
+    predictions: Predictions,
+    affinity: Mapping[str, float],
+    n_views: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the errors where `next_view` chooses the views, and what it expected of them.
 
-    def choose(logs: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
-        bins = np.rint(rotations * (n_bins / 360.0)).astype(int) % n_bins
-        sequences, sequence_of_row = np.unique(bins, axis=0, return_inverse=True)
-        beliefs, chosen = softmax(logs, axis=1), np.empty(len(logs))
-        agreement = logsumexp(logs, axis=1) + (rotations.shape[1] - 1) * np.log(n_bins)
+    Signed errors (n, n_views) as of `replay`, and expected errors (n, n_views - 1), of all numbers
+    of views but the last.
+    """
+    azimuth_deg, distributions = predictions.azimuth_deg, predictions.distributions
+    n, n_bins = len(azimuth_deg), distributions.shape[-1]
+    expected = np.empty((n, n_views - 1))
+
+    def choose(taken: NDArray[np.intp], turned_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+        chosen = np.empty(n)
+        bins = np.rint(turned_deg * (n_bins / 360.0)) % n_bins
         # Sorted, so that neighbouring sequences share the look-alikes of their first rotations.
-        for i, sequence in enumerate(sequences.tolist()):
-            alike = calibrated(tuple(sequence[1:]))
-            for row in np.flatnonzero(sequence_of_row.ravel() == i):
-                apart = circular_distance_deg(candidates_deg[:, None], rotations[row]).min(axis=1)
-                expected = alike.expected(
-                    beliefs[row],
-                    **affinity,
-                    share=predictions.sweep_weights,
-                    agreement=float(agreement[row]),
-                )
-                error = np.where(apart < MIN_SEPARATION_DEG, np.inf, expected.after_deg)
-                # From the last view, as a robot ranks them.
-                order = np.roll(candidates_deg, -sequence[-1])
-                both_deg = candidates_deg[error.argmin()], order[farthest_of(order, rotations[row])]
-                best, farthest = nearest_bin(both_deg, len(expected.total)).tolist()
-                chosen[row] = both_deg[not expected.is_surely_better(best, farthest)]
+        for row in np.lexsort(bins.T[::-1]):
+            answer = next_view(
+                distributions[taken[row]],
+                turned_deg[row].tolist(),
+                calibrated,
+                affinity,
+                predictions.sweep_weights,
+            )
+            expected[row, taken.shape[1] - 1] = answer.expected_error_deg
+            # Where no view is admissible, any will do.
+            chosen[row] = turned_deg[row, -1] + (answer.move.rotation_deg if answer.move else 180.0)
         return chosen
 
-    return choose
+    return replay(predictions, choose, n_views), expected
 
 
 def at_random(rng: np.random.Generator) -> Chooser:
@@ -167,13 +167,13 @@ def at_random(rng: np.random.Generator) -> Chooser:
     If `_MOST_DRAWS` draws find no such rotation among many views, the last draw counts.
     """
 
-    def choose(logs: NDArray[np.float64], taken: NDArray[np.float64]) -> NDArray[np.float64]:
+    def choose(taken: NDArray[np.intp], turned_deg: NDArray[np.float64]) -> NDArray[np.float64]:
         def draw(n: int) -> NDArray[np.float64]:
             return rng.uniform(MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG, n)
 
-        chosen = draw(len(logs))
+        chosen = draw(len(taken))
         for _ in range(_MOST_DRAWS):
-            apart = circular_distance_deg(chosen[:, None], taken).min(axis=1)
+            apart = circular_distance_deg(chosen[:, None], turned_deg).min(axis=1)
             is_near = apart < MIN_SEPARATION_DEG
             if not is_near.any():
                 break
@@ -190,7 +190,7 @@ def baselines(n_views: int, fixed_deg: float, rng: np.random.Generator) -> dict[
     """
 
     def at_steps(step_deg: float) -> Chooser:
-        return lambda logs, taken: np.full(len(logs), taken.shape[1] * step_deg)
+        return lambda taken, turned_deg: np.full(len(taken), taken.shape[1] * step_deg)
 
     return {
         RANDOM: at_random(rng),
@@ -217,9 +217,7 @@ def paper_errors(
     while taken.shape[1] < n_views:
         newest = taken[:, -1]
         chosen = rotations_deg[first, newest] + advised[newest]
-        apart = circular_distance_deg(rotations_deg, chosen[:, None])
-        np.put_along_axis(apart, taken, np.inf, axis=1)
-        taken = np.column_stack([taken, apart.argmin(axis=1)])
+        taken = np.column_stack([taken, _nearest_unused(rotations_deg, taken, chosen)])
     poses = np.radians(estimates[taken] - np.take_along_axis(rotations_deg, taken, axis=1))
     pose = np.degrees(np.arctan2(np.sin(poses).sum(axis=1), np.cos(poses).sum(axis=1)))
     return np.asarray(signed_difference_deg(pose, azimuth_deg))
@@ -242,18 +240,23 @@ def evaluate(
     n_views: Sequence[int] = (2, 3, 4, 5),
     n_random: int = 10,
     seed: int = 0,
+    until_deg: float | None = None,
     report: Callable[[int], None] = lambda n_done: None,
 ) -> pd.DataFrame:
     """Return the errors of every way to choose views, for each recording.
 
-    `report` is called after each recording with the number of finished ones.
+    With `until_deg`, also those where one stops as soon as the expected error is not above it, or
+    after the largest number of views. `report` is called after each recording with the number of
+    finished ones.
 
     Returns
     -------
     DataFrame
         ``object_id, sequence, choice, n_views, mae_deg, median_deg, above_45_percent, offset_deg,
-        mae_without_offset_deg``. The offset is the circular median of all single-view errors of
-        the recording, because a constant error may be the turntable's zero.
+        mae_without_offset_deg, expected_deg, mean_views``. The offset is the circular median of
+        all single-view errors of the recording, because a constant error may be the turntable's
+        zero. The mean expected error is NaN where the views are not recommended ones; the mean
+        number of views is `n_views` unless one stops before.
 
     Raises
     ------
@@ -275,11 +278,16 @@ def evaluate(
     for n_done, sweep in enumerate(sweeps, start=1):
         predictions = predict(bundle, sweep)
         # The first views are the same for every number of views.
-        choose_best = recommended(calibrated, predictions, bundle.affinity)
-        errors = replay(predictions, choose_best, max(numbers))
+        errors, expected = follow(calibrated, predictions, bundle.affinity, max(numbers) + 1)
         single = errors[:, 0]
         offset = constant_offset_deg(single)
-        rows.append(_row(predictions, SINGLE, 1, single, offset))
+        rows.append(_row(predictions, SINGLE, 1, single, offset, expected[:, 0]))
+        if until_deg is not None:
+            is_last = expected <= until_deg
+            is_last[:, -1] = True
+            stop = np.arange(len(single)), is_last.argmax(axis=1)
+            row = _row(predictions, UNTIL, max(numbers), errors[stop], offset, expected[stop])
+            rows.append(row | {"mean_views": float(stop[1].mean() + 1)})
         for number in numbers:
             by_table = paper_errors(predictions, bundle.paper, sweep.elevation_deg, number)
             rows.append(_row(predictions, PAPER, number, by_table, offset))
@@ -289,7 +297,9 @@ def evaluate(
                 repeats = n_random if name == RANDOM else 1
                 last = [replay(predictions, choose, number)[:, -1] for _ in range(repeats)]
                 rows.append(_row(predictions, name, number, np.concatenate(last), offset))
-            rows.append(_row(predictions, RECOMMENDED, number, errors[:, number - 1], offset))
+            place = np.s_[:, number - 1]
+            own = _row(predictions, RECOMMENDED, number, errors[place], offset, expected[place])
+            rows.append(own)
         report(n_done)
     return pd.DataFrame(rows)
 
@@ -310,7 +320,7 @@ def calibration_errors_deg(bundle: Bundle, most: int = 30) -> dict[str, float]:
         weights = bundle.weights_at(None) * (others if others.any() else 1.0)
         rows = bundle.distributions[i, ::step].astype(np.float64)
         views = Predictions(bundle.object_ids[i], "", azimuth_deg, rows, weights)
-        best = replay(views, recommended(calibrated, views, bundle.affinity), 2)
+        best, _ = follow(calibrated, views, bundle.affinity, 2)
         errors.append(np.abs([*best.T, replay(views, opposite, 2)[:, 1]]).mean(axis=1))
     return dict(zip(("one_view", "two_views", "opposite"), np.mean(errors, axis=0), strict=True))
 
@@ -352,12 +362,22 @@ def count_ood(bundle: Bundle, sweeps: Sequence[Sweep]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def _nearest_unused(
+    rotations_deg: NDArray[np.float64], taken: NDArray[np.intp], chosen_deg: NDArray[np.float64]
+) -> NDArray[np.intp]:
+    """Return the frames (n,) nearest to the chosen rotations that are not among those taken."""
+    apart = circular_distance_deg(rotations_deg, chosen_deg[:, None])
+    np.put_along_axis(apart, taken, np.inf, axis=1)
+    return np.asarray(apart.argmin(axis=1))
+
+
 def _row(
     predictions: Predictions,
     choice: str,
     n_views: int,
     error_deg: NDArray[np.float64],
     offset: float,
+    expected_deg: NDArray[np.float64] | float = np.nan,
 ) -> dict[str, object]:
     size = np.abs(error_deg)
     return {
@@ -370,4 +390,6 @@ def _row(
         "above_45_percent": float(100 * (size > LARGE_ERROR_DEG).mean()),
         "offset_deg": offset,
         "mae_without_offset_deg": float(circular_distance_deg(error_deg, offset).mean()),
+        "expected_deg": float(np.mean(expected_deg)),
+        "mean_views": float(n_views),
     }

@@ -259,10 +259,7 @@ def next_view(
     ranked = best_rotations(rotation_deg, cost, width)
     if ranked:
         farthest = farthest_of(rotation_deg, taken)
-        step_of_best, step_of_farthest = nearest_bin(
-            np.array([ranked[0][0], rotation_deg[farthest]]) + last, n_steps
-        ).tolist()
-        if not expected.is_surely_better(step_of_best, step_of_farthest):
+        if not expected.is_surely_better(ranked[0][0] + last, rotation_deg[farthest] + last):
             ranked = with_first(ranked, (float(rotation_deg[farthest]), float(cost[farthest])))
     taken_deg = np.array([rotation for rotation, _ in ranked])
     chances = np.transpose([at_rotations(each, taken_deg) for each in within])
