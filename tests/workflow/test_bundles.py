@@ -13,6 +13,8 @@ from safetensors import safe_open
 from nbv.cli import main
 from nbv.data.meshes import load_meshes
 from nbv.data.procedural import generate
+from nbv.experiment.estimation.features import SHIPPED
+from nbv.files import sha256_of
 from nbv.robot.bundle import Bundle
 from nbv.robot.depth_files import write_depth
 from nbv.robot.evaluation import evaluate
@@ -51,6 +53,21 @@ def test_an_edit_of_the_renderer_renders_a_bundles_images_again(made: Project) -
     jobs = made.would_run(*CAMERA[len(TINY) :], targets=("bundles",))
     path.write_text(text)
     assert jobs["render_bundle"] == 2
+
+
+def test_its_network_may_start_from_the_depth_features(tmp_path: Path) -> None:
+    project = copy_of_project(tmp_path)
+    start = ("estimator.warm_start=features", "camera.image_side=64", "elevations_deg.mug=[0]")
+    still = ("fine_tuning.epochs=1", "fine_tuning.learning_rate=1.0e-9", "weight_decay=0")
+    settings = (*CAMERA, *start, *(f"estimator.{each}" for each in still))
+    path = "results/tiny/bundles/estimators/mug.safetensors"
+    project.run("--cores", "1", path, overrides=settings)
+    with safe_open(tmp_path / path, framework="numpy") as made, safe_open(SHIPPED, "numpy") as own:
+        history = json.loads(made.metadata()["nbv"])
+        assert history["started_from"]["sha256"] == sha256_of(SHIPPED)
+        for name in ("0.0.weight", "2.weight"):
+            features = own.get_tensor(name).astype(np.float32)
+            assert made.get_tensor(name) == pytest.approx(features, abs=1e-3, rel=1e-2)
 
 
 def test_its_mugs_have_handles_that_stand_out(made: Project) -> None:
