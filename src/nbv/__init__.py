@@ -39,9 +39,12 @@ if TYPE_CHECKING:
     from nbv.robot.intrinsics import Intrinsics as Intrinsics
     from nbv.robot.moves import check_axis as check_axis
     from nbv.robot.moves import moved_camera as moved_camera
+    from nbv.robot.next_camera import View as View
+    from nbv.robot.next_camera import recommend_camera as recommend_camera
     from nbv.robot.next_view import Move as Move
     from nbv.robot.next_view import Recommendation as Recommendation
     from nbv.robot.recommender import Recommender as Recommender
+    from nbv.robot.rotation_pairs import RotationPairs as RotationPairs
     from nbv.robot.synthetic import example_frame as example_frame
 
 __version__ = "0.2.0"
@@ -52,6 +55,9 @@ _MODULES = {
     "Recommendation": "nbv.robot.next_view",
     "Move": "nbv.robot.next_view",
     "DistributionTable": "nbv.robot.distribution_table",
+    "RotationPairs": "nbv.robot.rotation_pairs",
+    "View": "nbv.robot.next_camera",
+    "recommend_camera": "nbv.robot.next_camera",
     "moved_camera": "nbv.robot.moves",
     "check_axis": "nbv.robot.moves",
     "BundleError": "nbv.errors",
