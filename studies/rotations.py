@@ -104,19 +104,26 @@ def score_ratio(
     return ScoreRatio.fit(scores, np.concatenate(error) > flip_deg)
 
 
-def errors_of(
-    instances: Sequence[Instance],
-    symmetry: Symmetry,
-    ratio: ScoreRatio,
+def others_of(one: Instance, instances: Sequence[Instance]) -> list[Instance]:
+    """Return the other instances of an object."""
+    return [o for o in instances if o.object_id == one.object_id and o is not one]
+
+
+def calibration(
+    others: Sequence[Instance],
+    scored: Sequence[Instance],
+    symmetries: Mapping[str, Symmetry],
     settings: Mapping[str, Any],
 ) -> RotationErrors:
-    """Return the estimator's errors on some instances of an object."""
+    """Return the errors on some instances of an object, with what a score says on `scored`."""
+    object_id = others[0].object_id
+    model = {k: settings[k] for k in ("concentration", "pseudo_observations", "flip_deg")}
     return RotationErrors(
-        np.concatenate([one.estimate for one in instances]),
-        np.concatenate([one.truth for one in instances]),
-        symmetry,
-        ratio=ratio,
-        **settings,
+        np.concatenate([one.estimate for one in others]),
+        np.concatenate([one.truth for one in others]),
+        symmetries.get(object_id, ASYMMETRIC),
+        ratio=score_ratio(scored, symmetries, object_id, model["flip_deg"]),
+        **model,
     )
 
 
@@ -217,15 +224,12 @@ def evaluate(
     """
     instances = read_instances(path, settings["objects"])
     scored = read_instances(path, settings["score_objects"])
-    model = {k: settings[k] for k in ("concentration", "pseudo_observations", "flip_deg")}
     rows = []
     for one in instances:
-        others = [o for o in instances if o.object_id == one.object_id and o is not one]
+        others = others_of(one, instances)
         if not others:
             continue
-        symmetry = symmetries.get(one.object_id, ASYMMETRIC)
-        ratio = score_ratio(scored, symmetries, one.object_id, model["flip_deg"])
-        errors = errors_of(others, symmetry, ratio, model)
+        errors = calibration(others, scored, symmetries, settings)
         groups = np.repeat([o.name for o in others], [len(o.truth) for o in others])
         found = two_views(one, errors, errors.depends_on_view(groups))
         for fusion, error_deg in found.error_deg.items():

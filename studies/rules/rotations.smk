@@ -27,10 +27,14 @@ rule rotations:
     input:
         sources("tabulate_rotations"),
         figures=rules.evaluate_rotations.output[0],
+        pairs=lambda wildcards: rotation_file("pairs"),
         models_info=lambda wildcards: rotation_file("models_info"),
     output:
         csv="<results>/tables/rotations.csv",
         md="<results>/tables/rotations.md",
+        png="<results>/figures/rotations.png",
+        pdf="<results>/figures/rotations.pdf",
+        svg="<results>/figures/rotations.svg",
     log:
         "<logs>/rotations.log",
     benchmark:
@@ -42,5 +46,6 @@ rule rotations:
     params:
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
+        settings=CONFIG["rotations"],
     script:
         "../scripts/tabulate_rotations.py"
