@@ -54,6 +54,12 @@ CONFIRMATION_COLUMNS = {
     "other people's, classifier": "real-classifier",
 }
 
+ROTATIONS = {
+    "one view": ("score", "single"),
+    "two, averaged as in the paper": ("average", "random"),
+    "two, posterior with scores": ("score", "random"),
+}
+
 
 def bold_least(values: Iterable[float | None], decimals: int) -> list[str]:
     """Return numbers as text, the least one in bold and a missing one as a dash."""
@@ -140,6 +146,17 @@ def bundles() -> pd.DataFrame:
     return pd.DataFrame(rows, index=[*BUNDLE_TESTS.values()], columns=columns)
 
 
+def rotations() -> pd.DataFrame:
+    """Mean errors of MegaPose on T-LESS with one view and with a random second one, degrees."""
+    found = pd.read_csv(REFERENCE / "rotations/rotations.csv")
+    error = found.set_index(["group", "fusion", "method"])["mean_deg"].map("{:.1f}".format)
+    rows = {
+        group: [error[group, fusion, method] for fusion, method in ROTATIONS.values()]
+        for group in found["group"].unique()
+    }
+    return pd.DataFrame(rows, index=[*ROTATIONS]).T
+
+
 TABLES = {
     "table1": table1,
     "linear": linear,
@@ -147,6 +164,7 @@ TABLES = {
     "bundle": bundle,
     "bundles": bundles,
     "focal_lengths": focal_lengths,
+    "rotations": rotations,
 }
 
 
