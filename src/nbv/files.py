@@ -323,6 +323,14 @@ def read_json(path: str | Path) -> Any:
         return json.loads(Path(path).read_text(encoding="utf-8"))
 
 
+def read_given_json(path: Path, remedy: str) -> Any:
+    """Read a user's JSON file; raise UserError with the remedy where it is none."""
+    if not path.is_file():
+        raise UserError(f"{path} {missing(path)}")
+    with readable(path, remedy):
+        return json.loads(read_text(path))
+
+
 def existing(path: str | Path) -> Path:
     """Return `path`; raise UserError if it is not a file."""
     if not Path(path).is_file():

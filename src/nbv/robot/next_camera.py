@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,12 +19,12 @@ from nbv.core.rotation_views import (
     turn_deg,
 )
 from nbv.core.rotations import Array, Rotations, along_ray, check_rotations
-from nbv.errors import UserError, reason_of
-from nbv.files import missing, read_numbers, read_text
+from nbv.errors import UserError
+from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted
 from nbv.robot.moves import Pose, as_pose
 from nbv.robot.next_view import as_chances
-from nbv.robot.rotation_pairs import LEAST_MM, RotationPairs
+from nbv.robot.rotation_pairs import RotationPairs, check_position
 from nbv.robot.rotations import MIN_SEPARATION_DEG, as_travel
 
 FARTHEST_M = 50.0
@@ -270,13 +269,7 @@ def as_view(given: Any, name: str) -> View:
     view = View(check_rotations(f"{name}: R", rotation))
     if (t := entry.get("t")) is not None:
         position = _array(t, f"{name}: t", 3)
-        if position[2] <= 0:
-            raise UserError(
-                f"{name}: t is behind the camera: give the pose object to camera, not camera to "
-                "object"
-            )
-        if np.linalg.norm(position) < LEAST_MM:
-            raise UserError(f"{name}: t is {position[2]:g} mm away; give mm, not metres")
+        check_position(f"{name}: t", position)
         view = replace(view, position_mm=position)
     if (score := entry.get("score")) is not None:
         view = replace(view, score=float(_array(score, f"{name}: score", 1)[0]))
@@ -304,7 +297,7 @@ def read_views(path: str | Path) -> list[View]:
             raise UserError(f"{path}: shape {array.shape} instead of (..., 3, 3)")
         given: Any = list(array.reshape(-1, 9))
     else:
-        given = _json(path)
+        given = read_given_json(path, "give JSON, or an .npy array")
         is_one = isinstance(given, dict) or np.size(given) == 9
         given = [given] if is_one else given
     if not isinstance(given, list):
@@ -321,12 +314,3 @@ def read_poses(path: str | Path) -> list[Pose]:
     return [
         as_pose(pose, f"{path}, candidate {i}") for i, pose in enumerate(numbers.reshape(-1, 16))
     ]
-
-
-def _json(path: Path) -> Any:
-    if not path.is_file():
-        raise UserError(f"{path} {missing(path)}")
-    try:
-        return json.loads(read_text(path))
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"{path} cannot be read ({reason_of(error)})") from error

@@ -29,10 +29,9 @@ from nbv.files import (
     CALIBRATE_AGAIN,
     calibrated_file,
     damaged,
-    missing,
     read_arrays,
+    read_given_json,
     read_rows,
-    read_text,
     readable,
     write_arrays,
 )
@@ -256,7 +255,7 @@ def read_rotation_pairs(
         rows, said = _matched(path, Path(truth) if truth else path.parent)
     elif truth is not None:
         raise UserError(f"{path} has its own truths (R_true); leave `ground_truth` out")
-    models = {} if models_info is None else _read_json(Path(models_info))
+    models = {} if models_info is None else _read_entries(Path(models_info))
     for name in TABLE_COLUMNS:
         if name not in rows:
             raise UserError(f"{path}: no column {name!r}; it needs {', '.join(TABLE_COLUMNS)}")
@@ -354,7 +353,7 @@ def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
         file = truth / f"{int(scene):06d}" / "scene_gt.json"
         if not file.is_file():
             continue
-        for image, entries in _read_json(file).items():
+        for image, entries in _read_entries(file).items():
             try:
                 for entry in entries:
                     r, t = (" ".join(map(str, entry[f"cam_{k}_m2c"])) for k in "Rt")
@@ -368,14 +367,11 @@ def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
     return pd.DataFrame(found, columns=[*keys, "R", "t"])
 
 
-def _read_json(path: Path) -> Any:
-    if not path.is_file():
-        raise UserError(f"{path} {missing(path)}")
-    with readable(path, "give a JSON file of BOP"):
-        given = json.loads(read_text(path))
-        if not isinstance(given, dict):
-            raise ValueError("it is not a JSON object")
-        return given
+def _read_entries(path: Path) -> dict[str, Any]:
+    given = read_given_json(path, remedy := "give a JSON file of BOP")
+    if not isinstance(given, dict):
+        raise damaged(path, "it is not a JSON object", remedy)
+    return given
 
 
 def _numbers(path: Path, rows: pd.DataFrame, name: str, n: int) -> Array:
@@ -404,15 +400,20 @@ def _rotations(path: Path, rows: pd.DataFrame, name: str) -> Rotations:
 
 def _positions(path: Path, rows: pd.DataFrame, name: str) -> Array:
     positions = _numbers(path, rows, name, 3)
-    for row, (x, y, z) in zip(rows.index, positions, strict=True):
-        if z <= 0:
-            raise UserError(
-                f"{path}, row {row + 2}: {name} is behind the camera (z = {z:g}): give the pose "
-                "object to camera, not camera to object"
-            )
-        if np.hypot(np.hypot(x, y), z) < LEAST_MM:
-            raise UserError(f"{path}, row {row + 2}: {name} is {z:g} mm away; give mm, not metres")
+    for row, position in zip(rows.index, positions, strict=True):
+        check_position(f"{path}, row {row + 2}: {name}", position)
     return positions
+
+
+def check_position(name: str, position_mm: Array) -> None:
+    """Raise UserError where an object at a position (3,) in the camera cannot be seen."""
+    if position_mm[2] <= 0:
+        raise UserError(
+            f"{name} is behind the camera (z = {position_mm[2]:g}): give the pose object to "
+            "camera, not camera to object"
+        )
+    if (away := float(np.linalg.norm(position_mm))) < LEAST_MM:
+        raise UserError(f"{name} is {away:g} mm away; give mm, not metres")
 
 
 def _check_way_round(path: Path, rows: pd.DataFrame, truth: Rotations, estimate: Rotations) -> None:
