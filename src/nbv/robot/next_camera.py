@@ -51,6 +51,12 @@ class View:
     score : float or None
     camera_pose : ndarray (4, 4) or None
         Of further views of the same object; without it several are hypotheses of one view.
+
+    Examples
+    --------
+    >>> import nbv, numpy as np
+    >>> nbv.View(np.eye(3), score=0.4).position_mm is None
+    True
     """
 
     rotation: Rotations
@@ -130,6 +136,16 @@ def recommend_camera(
     ------
     UserError
         Where views, poses and table do not fit each other, or no candidate can be reached.
+
+    Examples
+    --------
+    >>> import nbv, numpy as np
+    >>> n, pose = 12, np.stack([np.eye(3)] * 12)
+    >>> text = np.array(["cup"] * n)
+    >>> pairs = nbv.RotationPairs(text, text, pose, pose, np.full(n, np.nan), False, {})
+    >>> answer = nbv.recommend_camera(pairs, [nbv.View(np.eye(3))], 50)
+    >>> answer.depends_on_view, answer.probability_within["30"] > 0.9
+    (False, True)
     """
     errors = pairs.errors(object_id)
     name = pairs.object_ids[0] if object_id is None else object_id

@@ -69,6 +69,14 @@ class RotationPairs:
         Whether positions were known.
     models : mapping
         Entries of BOP's models_info by object.
+
+    Examples
+    --------
+    >>> import nbv, numpy as np
+    >>> n, pose = 12, np.stack([np.eye(3)] * 12)
+    >>> text = np.array(["cup"] * n)
+    >>> nbv.RotationPairs(text, text, pose, pose, np.full(n, np.nan), False, {}).object_ids
+    ['cup']
     """
 
     object_id: NDArray[np.str_]
