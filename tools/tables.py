@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from nbv.labels import interval_text
+
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "docs/reference"
 MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -97,6 +99,23 @@ def linear() -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
+def features() -> pd.DataFrame:
+    """MAE of networks that start from the features, and less that of networks that do not."""
+    found = pd.read_csv(REFERENCE / "warm-start/features.csv").query("method != 'random'")
+    elevation = ", " + found["elevation_deg"].astype(str) + "°"
+    found["unit"] = found["category"].str.capitalize() + elevation.where(
+        found["elevation_deg"] > 0, ""
+    )
+    less = found[["difference_deg", "ci_low", "ci_high"]].itertuples(index=False)
+    found["cell"] = [
+        f"{error:.1f}; {interval_text(*row, decimals=1)}"
+        for error, row in zip(found["features_deg"], less, strict=True)
+    ]
+    found["method"] = found["method"].str.capitalize()
+    units, methods = found["unit"].unique(), found["method"].unique()
+    return found.pivot_table("cell", "unit", "method", aggfunc="first").loc[units, methods]
+
+
 def confirmation() -> pd.DataFrame:
     """MAE over all categories and trainings, degrees."""
     found = pd.read_csv(REFERENCE / "confirmation/methods.csv")
@@ -160,6 +179,7 @@ def rotations() -> pd.DataFrame:
 TABLES = {
     "table1": table1,
     "linear": linear,
+    "features": features,
     "confirmation": confirmation,
     "bundle": bundle,
     "bundles": bundles,
