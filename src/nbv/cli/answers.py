@@ -198,13 +198,17 @@ def print_camera_answer(answer: CameraRecommendation, enough: bool | None) -> No
 
 def _chances(about: CameraRecommendation | CameraMove) -> str:
     chances = about.probability_within.items()
-    return ", ".join(f"{p:.0%} within {error}°" for error, p in chances)
+    return ", ".join(f"{_percent(p)} within {error}°" for error, p in chances)
 
 
 def _chance(about: Recommendation | Move) -> str:
     """Return the probability of the smallest error."""
     error, p = next(iter(about.probability_within.items()))
-    return f" ({p:.0%} within {error}°)"
+    return f" ({_percent(p)} within {error}°)"
+
+
+def _percent(p: float) -> str:
+    return ">99%" if p > 0.994 else f"{p:.0%}"
 
 
 def _print_enough(enough: bool | None) -> None:
