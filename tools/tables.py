@@ -24,7 +24,6 @@ BUNDLE_ROWS = {
 }
 BUNDLE_COLUMNS = {
     "one": ("single", 1),
-    "random": ("random", 2),
     "best fixed": ("best fixed", 2),
     "opposite": ("opposite", 2),
     "recommended": ("recommended", 2),
