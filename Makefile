@@ -2,7 +2,7 @@
 # make test        the test suite               make check   lint, types, imports, workflow lint
 # make bench       the speed benchmarks         make compare a finished run with docs/reference
 # make confirm     several trainings of all data sets, for hours (tools/confirm.sh)
-# make bundles     the bundles that the package ships, for half an hour
+# make bundles     the bundles that the package ships, for an hour or more
 # make features    the depth features that the package ships, for half an hour
 # make test-slurm  the workflow on a real SLURM of one node, where root may install it
 # make test-browser the pages in a real browser, where there is one or root may install it
