@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from nbv.core.rotation_errors import RotationErrors, ScoreRatio
 from nbv.core.rotation_views import (
     CRITERIA,
+    NextViews,
     average,
     belief,
     costs_of,
@@ -166,8 +167,9 @@ def two_views(one: Instance, errors: RotationErrors, depends_on_view: bool) -> T
         moves = one.truth @ one.truth[i].T
         turns[i] = turn_deg(moves)
         first = belief(errors, one.estimate[[i]], np.eye(3)[None])
+        ahead = NextViews(first, moves)
         for name in CRITERIA:
-            cost[name][i] = costs_of(name, first, moves)
+            cost[name][i] = costs_of(name, ahead)
         for j in range(n):
             views = [i] if i == j else [i, j]
             given = errors, one.estimate[views], moves[views]

@@ -16,6 +16,7 @@ from nbv.core.evidence import gather_evidence
 from nbv.core.rotation_errors import RotationErrors, ScoreRatio
 from nbv.core.rotation_views import (
     CRITERIA,
+    NextViews,
     average,
     belief,
     best_move,
@@ -83,7 +84,7 @@ def test_about_one_axis_costs_and_choices_are_the_circles(circle):
         first = belief(errors, at(BINS_DEG[e]), IDENTITY)
         on_circle = circle_belief.first_belief(BINS_DEG[[e]], evidence)
         for name in ("pose_ambiguity", "information_gain"):
-            cost = costs_of(name, first, moves)
+            cost = costs_of(name, NextViews(first, moves))
             expected = criteria.CRITERIA[name](on_circle, evidence, "posterior")[0]
             np.testing.assert_allclose(cost, expected, atol=2e-5)
             assert expected[best_move(cost, moves)] <= expected.min() + 2e-5
@@ -97,7 +98,7 @@ def test_about_one_axis_costs_and_choices_are_the_circles(circle):
             error = circular_distance_deg(
                 direction_deg(moment.real, moment.imag), BINS_DEG[:, None]
             )
-            cost = costs_of("expected_error", first, moves[[delta]])
+            cost = costs_of("expected_error", NextViews(first, moves[[delta]]))
             assert cost[0] == pytest.approx((joint * error).sum(), abs=2e-2)
 
 
@@ -198,7 +199,7 @@ def test_costs_against_enumeration(flip_deg):
             error += after @ ASYMMETRIC.distance_deg(first.support, pose)
         poses = [v[0][p] * v[1][p] for p in range(m)]
         ambiguity = entropy(sum(b[p] * pose / pose.sum() for p, pose in enumerate(poses)))
-        costs = [CRITERIA[name](first, moves)[k] for name in CRITERIA]
+        costs = [CRITERIA[name](NextViews(first, moves))[k] for name in CRITERIA]
         assert costs[:2] == pytest.approx([ambiguity, gain], abs=1e-5)
         if not flip_deg:  # with flips the pose is one of two, which `posterior` finds on its own
             assert costs[2] == pytest.approx(error, abs=1e-2)
@@ -207,7 +208,7 @@ def test_costs_against_enumeration(flip_deg):
 def answers(errors, estimates, moves):
     """Costs of further moves after the first view, and the pose after all views."""
     first = belief(errors, estimates[:1], IDENTITY)
-    costs = [costs_of(name, first, moves[1:]) for name in CRITERIA]
+    costs = [costs_of(name, NextViews(first, moves[1:])) for name in CRITERIA]
     return np.concatenate(costs), posterior(errors, estimates, moves)
 
 
@@ -275,7 +276,7 @@ def test_a_view_that_shows_the_flip_is_chosen_and_the_flip_found():
     )
     moves = np.stack([near, sideways, behind])
     for name in ("information_gain", "expected_error"):
-        assert best_move(costs_of(name, first, moves), moves) > 0
+        assert best_move(costs_of(name, NextViews(first, moves)), moves) > 0
     views = np.concatenate([flipped, (sideways @ truth)[None]])
     both = np.stack([np.eye(3), sideways])
     assert ASYMMETRIC.distance_deg(posterior(errors, views, both), truth) < 1
@@ -367,11 +368,12 @@ def test_ambiguity_is_refused_after_two_views():
     errors = made(n=10)
     two = belief(errors, errors.estimate[:2], np.concatenate([IDENTITY, some_moves(1)]))
     with pytest.raises(ValueError, match="two views, not 3"):
-        costs_of("pose_ambiguity", two, some_moves(2))
-    assert np.isfinite(costs_of("expected_error", two, some_moves(2))).all()
+        costs_of("pose_ambiguity", NextViews(two, some_moves(2)))
+    assert np.isfinite(costs_of("expected_error", NextViews(two, some_moves(2)))).all()
 
 
 def test_an_unknown_criterion_is_named():
     errors = made(n=10)
+    ahead = NextViews(belief(errors, errors.estimate[:1], IDENTITY), IDENTITY)
     with pytest.raises(UserError, match="criterion 'entropi' is unknown"):
-        costs_of("entropi", belief(errors, errors.estimate[:1], IDENTITY), IDENTITY)
+        costs_of("entropi", ahead)

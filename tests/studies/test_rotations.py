@@ -18,7 +18,7 @@ from studies.rotations import (
     read_symmetries,
 )
 
-from nbv.core.rotation_views import belief, expected_error
+from nbv.core.rotation_views import NextViews, belief, expected_error
 from nbv.core.rotations import ASYMMETRIC, Symmetry
 from nbv.errors import UserError
 from rotation_pairs import rotation_pairs
@@ -100,7 +100,7 @@ def test_the_figure_shows_the_first_flip_of_the_instance_of_most_flips(tmp_path)
     truth, first = shown.one.truth, shown.one.estimate[[shown.first]]
     rest = [i for i in range(len(truth)) if i != shown.first]
     moves = truth[rest] @ truth[shown.first].T
-    costs = expected_error(belief(shown.errors, first, np.eye(3)[None]), moves)
+    costs = expected_error(NextViews(belief(shown.errors, first, np.eye(3)[None]), moves))
     assert costs[rest.index(shown.second)] == pytest.approx(costs.min())
 
     (title,) = [axes.get_title() for axes in rotation_figure(shown).axes if axes.get_title()]

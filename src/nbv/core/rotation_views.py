@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -155,7 +156,28 @@ def _entropy(distributions: Array) -> Array:
     return -np.asarray((distributions * logs).sum(axis=-1))
 
 
-def pose_ambiguity(first: RotationBelief, moves: Rotations) -> Array:
+@dataclass(frozen=True)
+class NextViews:
+    """The views that a belief foresees.
+
+    Attributes
+    ----------
+    belief : RotationBelief
+        Of a support of m poses.
+    moves : ndarray (k, 3, 3)
+        From the first camera to each of the views.
+    """
+
+    belief: RotationBelief
+    moves: Rotations
+
+    @cached_property
+    def likelihood(self) -> Array:
+        """L of each pose of the support in each view, (k, m, m)."""
+        return self.belief.errors.conditional("truth", self.belief.support, self.moves)
+
+
+def pose_ambiguity(ahead: NextViews) -> Array:
     """Return the entropy of the pose after two views, by Eqs. 1 to 6 with T = V, (k,) in nats.
 
     Raises
@@ -163,37 +185,39 @@ def pose_ambiguity(first: RotationBelief, moves: Rotations) -> Array:
     ValueError
         If the belief is after more than one view: Eq. 6 has one factor for each of two views.
     """
+    first = ahead.belief
     if len(first.votes) > 1:
         raise ValueError(f"pose_ambiguity is defined for two views, not {len(first.votes) + 1}")
     pose = first.errors.conditional("estimate", first.support)[0]
-    product = pose * first.errors.conditional("estimate", first.support, moves)
+    product = pose * first.errors.conditional("estimate", first.support, ahead.moves)
     total = product.sum(axis=2, keepdims=True)
     uniform = np.full_like(product, 1 / product.shape[2])
     np.divide(product, total, out=uniform, where=total > 0)
     return _entropy(first.probability @ uniform)
 
 
-def information_gain(first: RotationBelief, moves: Rotations) -> Array:
+def information_gain(ahead: NextViews) -> Array:
     """Return the expected entropy of the pose after the next view, (k,) in nats."""
-    likelihood = first.errors.conditional("truth", first.support, moves)
+    first, likelihood = ahead.belief, ahead.likelihood
     noise = _entropy(likelihood) @ first.probability
     gained = _entropy(first.probability @ likelihood) - noise
     return np.asarray(_entropy(first.probability) - gained)
 
 
-def expected_error(first: RotationBelief, moves: Rotations) -> Array:
+def expected_error(ahead: NextViews) -> Array:
     """Return the expected error of the posterior fusion after the next view, (k,) in degrees.
 
     Errors below `flip_deg` are not counted: they do not depend on the view.
     """
+    first = ahead.belief
     errors, support = first.errors, first.support
     if not errors.flip_deg:
-        joint = first.probability[:, None] * errors.conditional("truth", support, moves)
+        joint = first.probability[:, None] * ahead.likelihood
         weights = np.swapaxes(joint, 1, 2).reshape(-1, len(support))
         fused = chordal_mean(support, np.maximum(weights, np.finfo(float).tiny))
         angles = np.degrees(np.arccos(errors.symmetry.cosine(fused, support)))
-        return np.asarray((weights * angles).reshape(len(moves), -1).sum(axis=1))
-    return np.asarray(expected_losses(first, moves, _distances(first)[None])[0])
+        return np.asarray((weights * angles).reshape(len(ahead.moves), -1).sum(axis=1))
+    return np.asarray(expected_losses(ahead, _distances(first)[None])[0])
 
 
 def _distances(belief: RotationBelief) -> Array:
@@ -204,14 +228,14 @@ def _distances(belief: RotationBelief) -> Array:
     return np.asarray(distance)
 
 
-def expected_losses(first: RotationBelief, moves: Rotations, losses: Array) -> Array:
+def expected_losses(ahead: NextViews, losses: Array) -> Array:
     """Return expected losses of the fusion after the next view, (n, k).
 
     `losses` (n, m, m) are those of an answer of the support where another pose of it is true. The
     answer is what an estimate stands for: the next one's own pose, or one voted for before.
     """
-    likelihood = first.errors.conditional("truth", first.support, moves)
-    joint = first.probability[:, None] * likelihood
+    first = ahead.belief
+    joint = first.probability[:, None] * ahead.likelihood
     voted = np.unique(first.votes)
     before = joint[:, voted].argmax(axis=1)[:, None]
     chance = np.take_along_axis(joint[:, voted], before, axis=1)[:, 0]
@@ -223,13 +247,14 @@ def expected_losses(first: RotationBelief, moves: Rotations, losses: Array) -> A
     return np.stack(result)
 
 
-def chances_within(first: RotationBelief, moves: Rotations, errors_deg: Sequence[float]) -> Array:
+def chances_within(ahead: NextViews, errors_deg: Sequence[float]) -> Array:
     """Return the probability that the pose after the next view errs by less, (n, k)."""
+    first = ahead.belief
     distance = _distances(first)
     losses = np.stack([1.0 * (distance >= max(e, AGREE_DEG)) for e in errors_deg])
     small = first.errors.error_deg[~first.errors.is_flip]
     shares = [(small < error_deg).mean() if len(small) else 1.0 for error_deg in errors_deg]
-    return np.asarray((1 - expected_losses(first, moves, losses)) * np.reshape(shares, (-1, 1)))
+    return np.asarray((1 - expected_losses(ahead, losses)) * np.reshape(shares, (-1, 1)))
 
 
 def hypotheses_belief(
@@ -247,13 +272,13 @@ def hypotheses_belief(
     return RotationBelief(support, (1 / ratios / (1 / ratios).sum()) @ rows, votes, errors)
 
 
-Criterion = Callable[[RotationBelief, Rotations], Array]
+Criterion = Callable[[NextViews], Array]
 CRITERIA: dict[str, Criterion] = {
     "pose_ambiguity": pose_ambiguity,
     "information_gain": information_gain,
     "expected_error": expected_error,
 }
-"""Criteria: the cost (k,) of each move (k, 3, 3) under a belief, lower is better."""
+"""Criteria: the cost (k,) of each of the next views, lower is better."""
 
 
 def choose_kernel(
@@ -300,7 +325,7 @@ def _decision_error_deg(errors: RotationErrors, own: NDArray[np.intp]) -> float:
         moves = truth @ truth[i].T
         rest = np.delete(np.arange(len(own)), i)
         first = belief(others, estimate[[i]], moves[[i]])
-        pair = [i, rest[best_move(expected_error(first, moves[rest]), moves[rest])]]
+        pair = [i, rest[best_move(expected_error(NextViews(first, moves[rest])), moves[rest])]]
         poses.append(posterior(others, estimate[pair], moves[pair]))
     return float(errors.symmetry.distance_deg(np.stack(poses), truth[firsts]).mean())
 
@@ -311,8 +336,8 @@ def turn_deg(moves: Rotations) -> Array:
     return np.degrees(np.arccos(np.clip(-forward, -1, 1)))
 
 
-def costs_of(criterion: str, first: RotationBelief, moves: Rotations) -> Array:
-    """Return the costs (k,) of moves by a criterion's name.
+def costs_of(criterion: str, ahead: NextViews) -> Array:
+    """Return the costs (k,) of the next views by a criterion's name.
 
     Raises
     ------
@@ -321,7 +346,7 @@ def costs_of(criterion: str, first: RotationBelief, moves: Rotations) -> Array:
     """
     if criterion not in CRITERIA:
         raise UserError(f"criterion {criterion!r} is unknown: {nearest(criterion, CRITERIA)}")
-    return CRITERIA[criterion](first, moves)
+    return CRITERIA[criterion](ahead)
 
 
 def best_move(costs: Array | None, moves: Rotations) -> int:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.look_alikes import WITHIN_DEG
 from nbv.core.rotation_views import (
+    NextViews,
     belief,
     chances_within,
     expected_error,
@@ -192,9 +193,9 @@ def recommend_camera(
             f"none of {counted(len(targets), 'candidate')} is {MIN_SEPARATION_DEG:g}° or more from "
             "every view so far and within `max_travel_deg`: the same view repeats its error"
         )
-    moves = turned[free] @ cameras[0].T
+    ahead = NextViews(now, turned[free] @ cameras[0].T)
     small = float(errors.error_deg[~errors.is_flip].mean()) if not errors.is_flip.all() else 0.0
-    cost, within = expected_error(now, moves) + small, chances_within(now, moves, WITHIN_DEG)
+    cost, within = expected_error(ahead) + small, chances_within(ahead, WITHIN_DEG)
     ranked = [
         CameraMove(
             int(i),
