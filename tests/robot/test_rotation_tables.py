@@ -13,9 +13,10 @@ from tests.rotation_pairs import rotation_pairs
 
 from nbv.cli import main
 from nbv.errors import UserError
+from nbv.robot.bop import read_rotation_pairs
 from nbv.robot.bop_example import HALF_TURN, write_example
 from nbv.robot.next_camera import View, as_view, read_poses, read_views, recommend_camera
-from nbv.robot.rotation_pairs import RotationPairs, read_rotation_pairs
+from nbv.robot.rotation_pairs import RotationPairs
 
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "estimates"
 HIDDEN = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])

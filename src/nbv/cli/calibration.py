@@ -99,7 +99,7 @@ def calibrate(
                 "--bundle mug; pairs make a table, an .npz file"
             )
         check_writable("--output", output, [".npz"])
-        from nbv.robot.rotation_pairs import is_rotation_pairs
+        from nbv.robot.bop import is_rotation_pairs
 
         if is_rotation_pairs(source):
             if criterion is not None:
@@ -295,7 +295,7 @@ def _calibrate_rotations(
     as_json: bool,
 ) -> None:
     """Make the table of ``nbv calibrate`` from estimates in three dimensions."""
-    from nbv.robot.rotation_pairs import read_rotation_pairs
+    from nbv.robot.bop import read_rotation_pairs
 
     pairs, said = read_rotation_pairs(source, truth, models_info, objects)
     about = pairs.about()

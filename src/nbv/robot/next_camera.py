@@ -23,9 +23,10 @@ from nbv.core.rotations import Array, Rotations, along_ray, check_rotations
 from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted
+from nbv.robot.bop import check_position
 from nbv.robot.moves import Pose, as_pose
 from nbv.robot.next_view import as_chances
-from nbv.robot.rotation_pairs import RotationPairs, check_position
+from nbv.robot.rotation_pairs import RotationPairs
 from nbv.robot.rotations import MIN_SEPARATION_DEG, as_travel
 
 FARTHEST_M = 50.0

@@ -1,0 +1,243 @@
+"""Calibration pairs in three dimensions: BOP's results with their truths, and tables of pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nbv.core.rotations import ASYMMETRIC, Array, Rotations, along_ray, check_rotations, inverse
+from nbv.errors import UserError, nearest
+from nbv.files import damaged, read_given_json, read_rows
+from nbv.labels import counted
+from nbv.robot.rotation_pairs import FLIP_DEG, RotationPairs
+
+BOP_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
+TABLE_COLUMNS = ("object_id", "R_true", "R_estimate")
+
+NEAREST_MM = 50.0
+"""An estimate farther from every instance of its object is of none of them."""
+
+FEWEST_PAIRS = 12
+"""An object with fewer says too little about where it flips."""
+
+LEAST_MM = 10.0
+"""No camera sees an object from nearer: such distances are metres."""
+
+
+def is_rotation_pairs(path: Path) -> bool:
+    """Return whether the head of a file names rotations: BOP's results, or a table of pairs."""
+    try:
+        columns = set(read_rows(path, ()))
+    except UserError:
+        return False  # whose reader says what is wrong
+    return {"obj_id", "R"} <= columns or "R_true" in columns
+
+
+def read_rotation_pairs(
+    path: str | Path,
+    truth: str | Path | None = None,
+    models_info: str | Path | None = None,
+    objects: Sequence[str] = (),
+) -> tuple[RotationPairs, tuple[str, ...]]:
+    """Read pairs, and what was left out of them.
+
+    Parameters
+    ----------
+    path : path
+        BOP's results, or a table with `TABLE_COLUMNS` and perhaps score, t_true_mm, scene_id and
+        instance. Rotations are object to camera, row by row; positions are in millimetres.
+    truth : path, optional
+        Of BOP's results: a folder with ``<scene>/scene_gt.json``, or a CSV file in the form of
+        results. By default the folder of the results.
+    models_info : path, optional
+        BOP's symmetries; without an entry an object is asymmetric.
+    objects : sequence of str
+        Objects to keep; all by default.
+
+    Raises
+    ------
+    UserError
+        Names the file and the row.
+    """
+    path = Path(path)
+    rows = read_rows(path, ())
+    said: list[str] = []
+    if "obj_id" in rows:
+        rows, said = _matched(path, Path(truth) if truth else path.parent)
+    elif truth is not None:
+        raise UserError(f"{path} has its own truths (R_true); leave `ground_truth` out")
+    models = {} if models_info is None else _read_entries(Path(models_info))
+    for name in TABLE_COLUMNS:
+        if name not in rows:
+            raise UserError(f"{path}: no column {name!r}; it needs {', '.join(TABLE_COLUMNS)}")
+    known = list(dict.fromkeys(rows["object_id"]))
+    for name in objects:
+        if name not in known:
+            raise UserError(f"{path}: no object {name}: {nearest(name, known)}")
+    if objects:
+        rows = rows[rows["object_id"].isin(objects)]
+    counts = rows["object_id"].value_counts()
+    for name in dict.fromkeys(rows["object_id"]):
+        if counts[name] < FEWEST_PAIRS:
+            few = (
+                f"object {name}, row {rows.index[rows['object_id'] == name][0] + 2}: "
+                f"{counted(int(counts[name]), 'pair')} of an estimate and the truth; "
+                f"{FEWEST_PAIRS} are needed"
+            )
+            if name in objects or counts.max() < FEWEST_PAIRS:
+                raise UserError(f"{path}: {few}")
+            said.append(f"{few}: left out")
+    rows = rows[rows["object_id"].map(counts) >= FEWEST_PAIRS]
+    both = [_rotations(path, rows, name) for name in TABLE_COLUMNS[1:]]
+    _check_way_round(path, rows, *both)
+    ray = "t_true_mm" in rows
+    if ray:
+        turn = along_ray(_positions(path, rows, "t_true_mm"))
+        both = [turn @ poses for poses in both]
+    score = np.full(len(rows), np.nan)
+    if "score" in rows:
+        score = _numbers(path, rows, "score", 1)[:, 0]
+    keys = [name for name in ("scene_id", "instance") if name in rows]
+    group = rows[keys].agg("/".join, axis=1).to_numpy(dtype=str) if keys else [""] * len(rows)
+    names = rows["object_id"].to_numpy(dtype=str)
+    pairs = RotationPairs(names, np.array(group), both[1], both[0], score, ray, models)
+    return pairs, tuple(said)
+
+
+def _matched(path: Path, truth: Path) -> tuple[pd.DataFrame, list[str]]:
+    """Return BOP's results with the truths of their instances."""
+    rows = read_rows(path, BOP_COLUMNS)
+    keys = ["scene_id", "im_id", "obj_id"]
+    for name in keys:
+        rows[name] = _numbers(path, rows, name, 1)[:, 0].astype(int).astype(str)
+    position, score = _positions(path, rows, "t"), _numbers(path, rows, "score", 1)[:, 0]
+    known = _read_truths(truth, set(rows["scene_id"]))
+    positions = _positions(truth, known, "t")
+    by_key = {k: list(v) for k, v in known.groupby(keys).indices.items()}
+    images = set(zip(known["scene_id"], known["im_id"], strict=True))
+    scenes = set(known["scene_id"])
+    best: dict[int, int] = {}
+    n_elsewhere = 0
+    for i, key in enumerate(zip(*(rows[k] for k in keys), strict=True)):
+        if key[0] not in scenes:
+            n_elsewhere += 1
+            continue
+        if key[:2] not in images:
+            raise UserError(
+                f"{path}, row {i + 2}: scene {key[0]} has no image {key[1]} in {truth}: are "
+                "estimates and truths of different images?"
+            )
+        if (own := by_key.get(key)) is None:
+            continue
+        apart = np.linalg.norm(positions[own] - position[i], axis=1)
+        j = own[int(apart.argmin())]
+        if apart.min() <= NEAREST_MM and (j not in best or score[i] > score[best[j]]):
+            best[j] = i
+    if not best:
+        raise UserError(
+            f"{path}: none of {len(rows)} estimates is within {NEAREST_MM:g} mm of an instance of "
+            f"its object in {truth}: are both of the same images, and object to camera in mm?"
+        )
+    truths, own = list(best), list(best.values())
+    matched = rows.iloc[own].assign(
+        object_id=rows["obj_id"].iloc[own],
+        R_estimate=rows["R"].iloc[own],
+        R_true=known["R"].to_numpy()[truths],
+        t_true_mm=known["t"].to_numpy()[truths],
+    )
+    n_free = len(rows) - len(own) - n_elsewhere
+    said = [f"{n_free} of {len(rows)} estimates found no partner"] if n_free else []
+    if n_elsewhere:
+        said.append(f"{n_elsewhere} of {len(rows)} estimates are of scenes without truth")
+    return matched.sort_index(), said
+
+
+def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
+    keys = ["scene_id", "im_id", "obj_id"]
+    if truth.suffix.lower() == ".csv":
+        known = read_rows(truth, (*keys, "R", "t"))
+        for name in keys:
+            known[name] = _numbers(truth, known, name, 1)[:, 0].astype(int).astype(str)
+        return known
+    found = []
+    for scene in sorted(scenes):
+        file = truth / f"{int(scene):06d}" / "scene_gt.json"
+        if not file.is_file():
+            continue
+        for image, entries in _read_entries(file).items():
+            try:
+                for entry in entries:
+                    r, t = (" ".join(map(str, entry[f"cam_{k}_m2c"])) for k in "Rt")
+                    found.append((scene, str(int(image)), str(int(entry["obj_id"])), r, t))
+            except (KeyError, TypeError, ValueError):
+                raise UserError(
+                    f"{file}, image {image}: an instance lacks obj_id, cam_R_m2c or cam_t_m2c"
+                ) from None
+    if not found:
+        raise UserError(f"{truth} has no <scene>/scene_gt.json of a scene of the estimates")
+    return pd.DataFrame(found, columns=[*keys, "R", "t"])
+
+
+def _read_entries(path: Path) -> dict[str, Any]:
+    given = read_given_json(path, remedy := "give a JSON file of BOP")
+    if not isinstance(given, dict):
+        raise damaged(path, "it is not a JSON object", remedy)
+    return given
+
+
+def _numbers(path: Path, rows: pd.DataFrame, name: str, n: int) -> Array:
+    numbers = np.empty((len(rows), n))
+    for i, (row, text) in enumerate(zip(rows.index, rows[name], strict=True)):
+        try:
+            numbers[i] = np.array(text.split(), dtype=np.float64).reshape(n)
+            if not np.isfinite(numbers[i]).all():
+                raise ValueError
+        except ValueError:
+            raise UserError(
+                f"{path}, row {row + 2}: {name} {text!r} is not {counted(n, 'finite number')}"
+            ) from None
+    return numbers
+
+
+def _rotations(path: Path, rows: pd.DataFrame, name: str) -> Rotations:
+    matrices = _numbers(path, rows, name, 9).reshape(-1, 3, 3)
+    try:
+        return check_rotations(name, matrices)
+    except UserError:
+        for row, matrix in zip(rows.index, matrices, strict=True):
+            check_rotations(f"{path}, row {row + 2}: {name}", matrix)
+        raise
+
+
+def _positions(path: Path, rows: pd.DataFrame, name: str) -> Array:
+    positions = _numbers(path, rows, name, 3)
+    for row, position in zip(rows.index, positions, strict=True):
+        check_position(f"{path}, row {row + 2}: {name}", position)
+    return positions
+
+
+def check_position(name: str, position_mm: Array) -> None:
+    """Raise UserError where an object at a position (3,) in the camera cannot be seen."""
+    if position_mm[2] <= 0:
+        raise UserError(
+            f"{name} is behind the camera (z = {position_mm[2]:g}): give the pose object to "
+            "camera, not camera to object"
+        )
+    if (away := float(np.linalg.norm(position_mm))) < LEAST_MM:
+        raise UserError(f"{name} is {away:g} mm away; give mm, not metres")
+
+
+def _check_way_round(path: Path, rows: pd.DataFrame, truth: Rotations, estimate: Rotations) -> None:
+    """Refuse estimates that would be right the other way round."""
+    error, turned = (
+        np.median(ASYMMETRIC.distance_deg(poses, truth)) for poses in (estimate, inverse(estimate))
+    )
+    if error > FLIP_DEG and turned < FLIP_DEG / 2:
+        raise UserError(
+            f"{path}, row {rows.index[0] + 2}: R_estimate or R_true is transposed, camera to "
+            "object: give both object to camera, row by row"
+        )
