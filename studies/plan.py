@@ -15,6 +15,7 @@ from nbv.experiment.config import load_condition, read_configuration
 from nbv.experiment.plan import Fold, Plan
 from nbv.experiment.results import ESTIMATED_ROLES, Unit
 from studies.kept_estimates import kept_settings
+from studies.solids import SOLIDS
 
 Training = tuple[int, int]
 """A shuffle of the objects into folds, and a replicate of its trainings."""
@@ -132,12 +133,34 @@ class Studies:
 
     @property
     def rotation_files(self) -> dict[str, str]:
-        """The pairs and BOP's ``models_info`` of the study `rotations`."""
+        """The pairs and BOP's ``models_info`` of the study `rotations`, where they are given."""
         files = {key: self.run.config["rotations"][key] for key in ("pairs", "models_info")}
         for key, path in files.items():
             if path is None or not Path(path).exists():
                 raise UserError(f"rotations.{key}={path or 'null'}: this target needs a file there")
         return files
+
+    @property
+    def category_folds(self) -> list[tuple[str, int]]:
+        """Category and fold of each estimator of rotations.
+
+        Raises
+        ------
+        UserError
+            Where the run trains no network that has calibration objects.
+        """
+        if self.run.external or self.run.linear or self.run.crossfit:
+            raise UserError(
+                "rotations.pairs=null: the study trains its own networks; give estimator=regressor "
+                "and calibration=holdout, or a table of pairs"
+            )
+        categories = self.run.config["categories"]
+        return [(category, fold) for category in categories for fold in self.run.folds]
+
+    @property
+    def shape_folds(self) -> list[tuple[str, int]]:
+        """The same, and one fold of each solid, whose objects are all the same."""
+        return self.category_folds + [(name, 1) for name in SOLIDS]
 
     # Trained on × tested on
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from nbv.core.rotations import ASYMMETRIC, VOLUME, Symmetry
 from nbv.experiment.report.table import DECIDED, Cell, Part, Row, Table, difference_cell
 from nbv.experiment.statistics.metrics import percentile_interval
-from nbv.labels import interval_text, method_label, number
+from nbv.labels import category_label, counted, interval_text, method_label, number
+from studies.solids import SOLIDS, solid
 
 FIGURES = ("mean_deg", "median_deg", "above_30", "within_15")
 """Of every instance and method; an object's are the means over its instances."""
-
 FUSION_LABELS = {
     "average": "averaged (Eq. 7)",
     "posterior": "posterior",
@@ -51,24 +53,36 @@ def _sample(values: pd.DataFrame, rng: np.random.Generator, n_resamples: int) ->
     return _Sample(values, weights)
 
 
+def by_symmetry(objects: Iterable[str], symmetries: Mapping[str, Symmetry]) -> dict[str, list[str]]:
+    """Return objects in two groups: those that turn freely about an axis, and others."""
+    turning = {name for name, symmetry in symmetries.items() if symmetry.axis is not None}
+    names = list(objects)
+    return {
+        "no symmetry or a discrete one": [name for name in names if name not in turning],
+        "turning freely": [name for name in names if name in turning],
+    }
+
+
 def rotation_table(
-    figures: pd.DataFrame, turning: Sequence[str], n_resamples: int, rng: np.random.Generator
+    figures: pd.DataFrame,
+    groups: Mapping[str, Sequence[str]],
+    n_resamples: int,
+    rng: np.random.Generator,
 ) -> Table:
-    """Return the table of all methods, for objects that turn freely about an axis and others.
+    """Return the table of all methods, for each group of objects.
 
     Parameters
     ----------
     figures : DataFrame
         Of `studies.rotations.evaluate`.
-    turning : sequence of str
-        Objects that turn freely.
+    groups : mapping
+        Objects by the name of their group.
     n_resamples : int
         For the intervals.
     """
-    is_turning = figures["object_id"].isin(turning)
-    groups = {"no symmetry or a discrete one": ~is_turning, "turning freely": is_turning}
     parts, cells = [], []
-    for group, of_group in groups.items():
+    for group, objects in groups.items():
+        of_group = figures["object_id"].isin(objects)
         for fusion, label in FUSION_LABELS.items():
             part = figures[of_group & (figures["fusion"] == fusion)]
             if part.empty:
@@ -104,10 +118,8 @@ def rotation_table(
                         Cell(", ".join(worse) or "none"),
                     )
                 )
-            n_objects = part["object_id"].nunique()
-            heading = (
-                f"{n_objects} objects, {group}, {part['instance'].nunique()} instances, {label}"
-            )
+            n_objects = counted(part["object_id"].nunique(), "object")
+            heading = f"{n_objects}, {group}, {part['instance'].nunique()} instances, {label}"
             parts.append(Part(tuple(rows), heading))
     header = ("Method", "Error (°)", "less random", "less opposite", "median", "> 30° (%)")
     title = "Two views in three dimensions"
@@ -129,13 +141,61 @@ def rotation_table(
 
 def _objects(values: pd.DataFrame, method: str) -> list[tuple[str, tuple[float, float, float]]]:
     """Return each object's error less that of one view, with Student's interval."""
+    return [
+        (str(object_id), student(rows[method] - rows["single"]))
+        for object_id, rows in values.groupby(level="object_id")
+    ]
+
+
+def estimator_table(pairs: pd.DataFrame, n_poses: int) -> Table:
+    """Return the table of the study's own estimators, of one view.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        Columns ``object_id, instance, role, log_likelihood, error_deg``.
+    n_poses : int
+        In the estimators' grid.
+    """
+    cells, rows = [], []
+    for name, part in pairs[pairs["role"] == "test"].groupby("object_id", sort=False):
+        objects = part.groupby("instance")
+        found: dict[str, Any] = {"object_id": name, "n_instances": len(objects)}
+        texts = [category_label(str(name))]
+        for figure, decimals in (("log_likelihood", 2), ("error_deg", 1)):
+            mean, low, high = student(objects[figure].mean())
+            found |= {figure: mean, f"{figure}_low": low, f"{figure}_high": high}
+            texts.append(interval_text(mean, low, high, decimals))
+        found["median_deg"] = part["error_deg"].median()
+        found["above_30"] = (part["error_deg"] > 30).mean()
+        symmetry = solid(str(name))[1] if name in SOLIDS else ASYMMETRIC
+        # What turns freely has a bound of its own, which depends on the grid.
+        if symmetry.axis is None:
+            found["most"] = np.log(n_poses / VOLUME / len(symmetry.discrete))
+        cells.append(found)
+        texts.insert(2, number(found["most"]) if "most" in found else "–")
+        texts += [number(found["median_deg"], 1), number(100 * found["above_30"], 1)]
+        rows.append(tuple(map(Cell, texts)))
+    title = "One view in three dimensions"
+    header = ("", "log-likelihood", "at most", "Error (°)", "median", "> 30° (%)")
+    uniform = number(-np.log(VOLUME))
+    notes = (
+        f"Log density at the true pose, per π² of volume: the uniform one has {uniform}.",
+        f"At most: of {n_poses:,} poses those that look the same have all probability.",
+        "Errors are modulo symmetry. In brackets Student's 95 % interval over objects; a solid is "
+        "one object, and the interval over parts of its images.",
+    )
+    frame = pd.DataFrame(cells)
+    return Table("rotation_estimator", title, title, frame, header, (Part(tuple(rows)),), notes)
+
+
+def student(values: ArrayLike) -> tuple[float, float, float]:
+    """Return a mean with Student's interval, unbounded for one value."""
     from scipy import stats
 
-    found = []
-    for object_id, rows in values.groupby(level="object_id"):
-        less = (rows[method] - rows["single"]).to_numpy(dtype=np.float64)
-        half = np.inf
-        if len(less) > 1:
-            half = stats.t.ppf(0.975, len(less) - 1) * less.std(ddof=1) / np.sqrt(len(less))
-        found.append((str(object_id), (less.mean(), less.mean() - half, less.mean() + half)))
-    return found
+    numbers = np.asarray(values, dtype=np.float64)
+    half = np.inf
+    if len(numbers) > 1:
+        half = stats.t.ppf(0.975, len(numbers) - 1) * stats.sem(numbers)
+    mean = float(numbers.mean())
+    return mean, mean - half, mean + half

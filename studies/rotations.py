@@ -42,6 +42,8 @@ class Instance:
     truth, estimate : ndarray (n, 3, 3)
         Poses as a camera sees them that looks straight at the object.
     score : ndarray (n,)
+    role : str
+        ``calibration`` or ``test``; empty where an instance is both.
     """
 
     object_id: str
@@ -49,6 +51,7 @@ class Instance:
     truth: Array
     estimate: Array
     score: Array
+    role: str = ""
 
 
 COLUMNS = ("scene_id", "instance", "R_true", "t_true_mm", "R_estimate", "score")
@@ -62,7 +65,8 @@ def read_symmetries(path: str | Path) -> dict[str, Symmetry]:
 def read_instances(path: str | Path, objects: Sequence[str]) -> list[Instance]:
     """Read the instances of some objects, all by default, from a table of pairs.
 
-    The columns are ``object_id`` and `COLUMNS`: rotations row by row in BOP's convention.
+    The columns are ``object_id`` and `COLUMNS`: rotations row by row in BOP's convention. With a
+    column ``role`` an instance is for calibration or tested, else both.
 
     Raises
     ------
@@ -85,7 +89,8 @@ def read_instances(path: str | Path, objects: Sequence[str]) -> list[Instance]:
         )
         score = rows["score"].to_numpy(dtype=np.float64)
         name = "_".join(map(str, key))
-        instances.append(Instance(rows["object_id"].iloc[0], name, truth, estimate, score))
+        role = str(rows["role"].iloc[0]) if "role" in rows else ""
+        instances.append(Instance(rows["object_id"].iloc[0], name, truth, estimate, score, role))
     return instances
 
 
@@ -93,21 +98,38 @@ def _numbers(cells: pd.Series[str]) -> Array:
     return np.array([cell.split() for cell in cells], dtype=np.float64)
 
 
+def pairs_table(
+    object_id: str, truth: Array, estimate: Array, columns: Mapping[str, Any]
+) -> pd.DataFrame:
+    """Return a table for `read_instances` of poses (n, 3, 3) that cameras see straight ahead.
+
+    `columns` are ``instance``, ``score`` and any others.
+    """
+    rotations = {"R_true": truth, "R_estimate": estimate}
+    texts = {
+        name: [" ".join(f"{x:.6f}" for x in pose.ravel()) for pose in poses]
+        for name, poses in rotations.items()
+    }
+    about = {"object_id": object_id, "scene_id": 0, "t_true_mm": "0 0 1000"}
+    return pd.DataFrame({**about, **texts, **columns})
+
+
 def score_ratio(
-    instances: Sequence[Instance], symmetries: Mapping[str, Symmetry], without: str, flip_deg: float
+    instances: Sequence[Instance], symmetries: Mapping[str, Symmetry], flip_deg: float
 ) -> ScoreRatio:
-    """Fit what a score says about a flip on all objects but one."""
-    others = [one for one in instances if one.object_id != without]
+    """Fit what a score says about a flip on some instances."""
     error = [
-        symmetries.get(o.object_id, ASYMMETRIC).distance_deg(o.estimate, o.truth) for o in others
+        symmetries.get(o.object_id, ASYMMETRIC).distance_deg(o.estimate, o.truth) for o in instances
     ]
-    scores = np.concatenate([one.score for one in others])
+    scores = np.concatenate([one.score for one in instances])
     return ScoreRatio.fit(scores, np.concatenate(error) > flip_deg)
 
 
 def others_of(one: Instance, instances: Sequence[Instance]) -> list[Instance]:
-    """Return the other instances of an object."""
-    return [o for o in instances if o.object_id == one.object_id and o is not one]
+    """Return the other instances of an object that are for calibration."""
+    return [
+        o for o in instances if o.object_id == one.object_id and o is not one and o.role != "test"
+    ]
 
 
 def calibration(
@@ -116,14 +138,18 @@ def calibration(
     symmetries: Mapping[str, Symmetry],
     settings: Mapping[str, Any],
 ) -> RotationErrors:
-    """Return the errors on some instances of an object, with what a score says on `scored`."""
+    """Return the errors on some instances of an object, with what a score says on `scored`.
+
+    Of these other objects count, or the instances themselves where there is no other object.
+    """
     object_id = others[0].object_id
+    elsewhere = [one for one in scored if one.object_id != object_id] or others
     model = {k: settings[k] for k in ("concentration", "pseudo_observations", "flip_deg")}
     return RotationErrors(
         np.concatenate([one.estimate for one in others]),
         np.concatenate([one.truth for one in others]),
         symmetries.get(object_id, ASYMMETRIC),
-        ratio=score_ratio(scored, symmetries, object_id, model["flip_deg"]),
+        ratio=score_ratio(elsewhere, symmetries, model["flip_deg"]),
         **model,
     )
 
@@ -229,7 +255,7 @@ def evaluate(
     rows = []
     for one in instances:
         others = others_of(one, instances)
-        if not others:
+        if not others or one.role == "calibration":
             continue
         errors = calibration(others, scored, symmetries, settings)
         groups = np.repeat([o.name for o in others], [len(o.truth) for o in others])

@@ -7,9 +7,13 @@ from studies.plan import (
     training_folder,
     variant_folder,
 )
+from studies.solids import SOLIDS
 
 STUDIES = Studies(PLAN)
 FOLD = "{category}/el{elevation}/fold{fold}"
+# Of the study's own estimators of rotations.
+OWN = "<results>/rotations/{category}"
+OWN_FOLD = f"{OWN}/fold{{fold}}"
 
 
 wildcard_constraints:
@@ -152,5 +156,22 @@ def real_frames(wildcards):
 
 @one_line()
 def rotation_file(key):
-    """A file that the study `rotations` reads."""
-    return STUDIES.rotation_files[key]
+    """A file that the study `rotations` reads: one that is given, or of its own estimators."""
+    if CONFIG["rotations"]["pairs"]:
+        return STUDIES.rotation_files[key]
+    # The figure shows one object of one fold.
+    return f"<results>/rotations/{PLAN.focus}/fold1/pairs.csv" if key == "pairs" else []
+
+
+@one_line()
+def rotation_figures(wildcards):
+    """The figures of every instance: of the table that is given, or of every fold."""
+    if CONFIG["rotations"]["pairs"]:
+        return ["<results>/rotations/instances.csv"]
+    return paths(f"{OWN_FOLD}/instances.csv", STUDIES.category_folds)
+
+
+@one_line()
+def rotation_pairs(wildcards):
+    """The pairs of every fold of each category, and of each solid."""
+    return paths(f"{OWN_FOLD}/pairs.csv", STUDIES.shape_folds)

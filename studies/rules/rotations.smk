@@ -1,4 +1,5 @@
-# Two views of an estimator in three dimensions, on images that exist: nothing is trained.
+# Two views of an estimator in three dimensions: of a table of pairs, which needs no training, or of
+# the study's own estimators.
 
 
 rule evaluate_rotations:
@@ -26,7 +27,7 @@ rule evaluate_rotations:
 rule rotations:
     input:
         sources("tabulate_rotations"),
-        figures=rules.evaluate_rotations.output[0],
+        figures=rotation_figures,
         pairs=lambda wildcards: rotation_file("pairs"),
         models_info=lambda wildcards: rotation_file("models_info"),
     output:

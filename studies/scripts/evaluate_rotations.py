@@ -8,6 +8,6 @@ with job(snakemake):
     from nbv.files import write_csv
 
     given = snakemake.input
-    symmetries = read_symmetries(given.models_info)
+    symmetries = read_symmetries(given.models_info) if given.models_info else {}
     figures = evaluate(given.pairs, symmetries, snakemake.params.settings)
     write_csv(snakemake.output[0], figures)

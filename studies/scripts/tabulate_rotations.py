@@ -4,8 +4,9 @@ from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
+    import pandas as pd
     from studies.rotation_figure import example, rotation_figure
-    from studies.rotation_tables import rotation_table
+    from studies.rotation_tables import by_symmetry, rotation_table
     from studies.rotations import read_symmetries
 
     from nbv.experiment.report.table import write_table
@@ -13,10 +14,12 @@ with job(snakemake):
     from nbv.robot.style import save_figure
 
     given, params, output = snakemake.input, snakemake.params, snakemake.output
-    symmetries = read_symmetries(given.models_info)
-    turning = [name for name, symmetry in symmetries.items() if symmetry.axis is not None]
+    symmetries = read_symmetries(given.models_info) if given.models_info else {}
+    figures = pd.concat([read_csv(path) for path in given.figures], ignore_index=True)
+    names = figures["object_id"].unique()
+    groups = by_symmetry(names, symmetries) if symmetries else {name: [name] for name in names}
     rng = np.random.default_rng(params.seed)
-    table = rotation_table(read_csv(given.figures), turning, params.n_resamples, rng)
+    table = rotation_table(figures, groups, params.n_resamples, rng)
     write_table(table, {kind: output[kind] for kind in ("csv", "md")})
     figure = rotation_figure(example(given.pairs, symmetries, params.settings))
     save_figure(figure, {kind: output[kind] for kind in ("png", "pdf", "svg")})

@@ -133,3 +133,13 @@ def test_a_bundle_is_trained_without_each_ingredient_and_by_each_replicate():
     assert studies.randomisation("/without_size") == own | {"size": 0}
     assert "replicate" not in studies.bundle_settings("/without_size")
     assert studies.bundle_settings("/replicate2")["replicate"] == 2
+
+
+def test_rotations_are_estimated_by_networks_with_calibration_objects_alone():
+    studies = studies_of("categories=[mug]")
+    assert studies.category_folds == [("mug", 1), ("mug", 2)]
+    assert studies.shape_folds[:3] == [("mug", 1), ("mug", 2), ("tetrahedron", 1)]
+    crossfit = ("calibration=crossfit", "crossfit_epochs=1")
+    for refused in (("estimator=linear",), crossfit):
+        with pytest.raises(UserError, match=r"rotations.pairs=null"):
+            assert studies_of(*refused).category_folds

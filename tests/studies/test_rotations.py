@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from studies.rotation_figure import example, rotation_figure
-from studies.rotation_tables import rotation_table
+from studies.rotation_tables import by_symmetry, rotation_table
 from studies.rotations import (
     FUSIONS,
     TwoViews,
@@ -44,7 +44,9 @@ def test_every_method_is_evaluated_on_every_instance(pairs):
     assert np.ptp(wide.loc["single"]) == 0
     assert (wide.loc["hindsight"] <= wide.drop(index="single") + 1e-9).all(axis=None)
 
-    table = rotation_table(figures, ["1"], 100, np.random.default_rng(0))
+    turning = {"1": Symmetry(np.eye(3)[None], np.array([0.0, 0, 1]))}
+    groups = by_symmetry(["0", "1"], turning)
+    table = rotation_table(figures, groups, 100, np.random.default_rng(0))
     cells = table.cells.set_index(["group", "fusion", "method"])
     for object_id, group in (("0", "no symmetry or a discrete one"), ("1", "turning freely")):
         own = figures[figures["object_id"] == object_id].groupby(["fusion", "method"])

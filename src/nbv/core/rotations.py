@@ -26,6 +26,9 @@ MOST_ELEMENTS = 60
 NOT_A_ROTATION = 1e-3
 """Most that an entry of R Rᵀ may differ from the identity: files have six digits."""
 
+VOLUME = np.pi**2
+"""Of all rotations; a density is per unit of it."""
+
 _SAME = 1e-5  # Two elements of a group are one; of the trace: 0.2 degrees.
 
 

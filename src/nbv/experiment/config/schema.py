@@ -369,6 +369,9 @@ class Rotations(Section):
     concentration: Annotated[Number, Field(gt=0)] = 25.0
     pseudo_observations: Annotated[Number, Field(gt=0)] = 3.0
     flip_deg: Annotated[Number, Field(gt=0, lt=180)] = 20.0
+    turns: Annotated[Whole, Field(ge=2, le=10_000)] = 16
+    views: Annotated[Whole, Field(ge=1, le=360)] = 24
+    poses: Annotated[Whole, Field(ge=24, le=100_000)] = 4608
 
 
 class Config(Section):
