@@ -3,7 +3,8 @@
 
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -31,21 +32,27 @@ BUNDLE_COLUMNS = {
     "three, even": ("evenly spaced", 3),
     "three": ("recommended", 3),
 }
-CONFIRMATION_ROWS = {
+AVERAGED = {
     "one view": ("none", "none"),
-    "T = L, likeliest smoothing, average": ("as_printed", "average"),
+    "opposite, average": ("opposite", "average"),
+    "T = L, likeliest smoothing, average": ("given_truth_likeliest", "average"),
+    "T = L, average": ("given_truth", "average"),
     "T = V (Proposed), average": ("given_estimate", "average"),
+    "T = L V, average": ("through_estimate", "average"),
     "fixed, posterior": ("fixed", "posterior"),
     "expected error, posterior": ("expected_error", "posterior"),
+}
+MULTIPLIED = {
+    "one view": ("none", "none"),
+    "T = V (Proposed), average": ("given_estimate", "average"),
     "opposite, product": ("opposite", "product"),
     "fixed, product": ("fixed", "product"),
     "expected error, product": ("expected_error", "product"),
 }
-CONFIRMATION_COLUMNS = {
-    "procedural, regressor": "embedded",
-    "other people's, regressor": "real",
-    "procedural, classifier": "embedded-classifier",
-    "other people's, classifier": "real-classifier",
+CONFIRMATION_DATA = {"procedural": "embedded", "other people's": "real"}
+CONFIRMATION_ESTIMATORS = {
+    "regressors": {"networks": "", "linear": "-linear"},
+    "classifiers": {"networks": "-classifier"},
 }
 
 ROTATIONS = {
@@ -108,16 +115,19 @@ def features() -> pd.DataFrame:
     return found.pivot_table("cell", "unit", "method", aggfunc="first").loc[units, methods]
 
 
-def confirmation() -> pd.DataFrame:
+def confirmation(kind: str, rows: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
     """MAE over all categories and trainings, degrees."""
     found = pd.read_csv(REFERENCE / "confirmation/methods.csv")
     found = found.query("category == 'all' and n_views <= 2")
     mae = found.set_index(["dataset", "choice", "fusion"])["mae_deg"]
     columns = {
-        label: bold_least([mae.get((data, *method)) for method in CONFIRMATION_ROWS.values()], 1)
-        for label, data in CONFIRMATION_COLUMNS.items()
+        f"{label}, {estimator}": bold_least(
+            [mae.get((data + suffix, *method)) for method in rows.values()], 1
+        )
+        for label, data in CONFIRMATION_DATA.items()
+        for estimator, suffix in CONFIRMATION_ESTIMATORS[kind].items()
     }
-    return pd.DataFrame(columns, index=[*CONFIRMATION_ROWS])
+    return pd.DataFrame(columns, index=[*rows])
 
 
 def bundle() -> pd.DataFrame:
@@ -166,7 +176,8 @@ TABLES = {
     "table1": table1,
     "linear": linear,
     "features": features,
-    "confirmation": confirmation,
+    "confirmation_regressors": partial(confirmation, "regressors", AVERAGED),
+    "confirmation_classifiers": partial(confirmation, "classifiers", MULTIPLIED),
     "bundle": bundle,
     "bundles": bundles,
     "focal_lengths": focal_lengths,
