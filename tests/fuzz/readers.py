@@ -377,7 +377,7 @@ def make_bop_truth(path: Path) -> None:
 
 
 def read_bop_results(path: Path) -> Any:
-    from nbv.robot.rotation_pairs import read_rotation_pairs
+    from nbv.robot.bop import read_rotation_pairs
 
     return read_rotation_pairs(path.parent / "results.csv", None, path.parent / "models_info.json")
 
