@@ -154,6 +154,18 @@ def real_frames(wildcards):
     return files_of_manifest(manifest) if manifest else []
 
 
+def shape_file(kind):
+    """A category's file is the run's own; a solid's lies with its images."""
+
+    def found(wildcards):
+        if wildcards.category in SOLIDS:
+            return f"<results>/rotations/{wildcards.category}/{kind}"
+        folder, suffix = kind.split(".")
+        return f"<results>/{folder}/{wildcards.category}.{suffix}"
+
+    return found
+
+
 @one_line()
 def rotation_file(key):
     """A file that the study `rotations` reads: one that is given, or of its own estimators."""

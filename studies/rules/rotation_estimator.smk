@@ -5,18 +5,6 @@ SHAPES = "|".join([*map(re.escape, CONFIG["categories"]), *SOLIDS])
 ROTATION_VIEWS = {key: CONFIG["rotations"][key] for key in ("turns", "views")}
 
 
-def shape_file(kind):
-    """A category's file is the run's own; a solid's lies with its images."""
-
-    def found(wildcards):
-        if wildcards.category in SOLIDS:
-            return f"<results>/rotations/{wildcards.category}/{kind}"
-        folder, suffix = kind.split(".")
-        return f"<results>/{folder}/{wildcards.category}.{suffix}"
-
-    return found
-
-
 rule make_solid:
     input:
         sources("make_solid"),
