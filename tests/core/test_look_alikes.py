@@ -15,6 +15,7 @@ from nbv.core.distributions import log_bayes_factor, mean_direction_deg
 from nbv.core.evidence import evidence_of_distributions
 from nbv.core.fusion import product
 from nbv.core.look_alikes import (
+    N_GROUPS,
     WITHIN_DEG,
     Expected,
     LookAlikes,
@@ -410,3 +411,54 @@ def test_a_rotation_is_surely_better_by_two_standard_errors_over_objects() -> No
         expected = of_objects(moved, np.zeros(2), 40.0)
         assert expected.is_surely_better(0.0, 180.0) == (shift > 2)
         assert not expected.is_surely_better(180.0, 0.0)
+
+
+def unclear_turns(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Turns that are clear from half of the views; from the others, an answer may be opposite."""
+    distributions = sharp_turns(rng, n, 12.0)
+    is_wrong = rng.random((n, 24)) < 0.4 * (np.arange(24) < 12)
+    flat = np.where(np.arange(24) < 12, 0.4, 1.0)[:, None]
+    rows = np.where(is_wrong[..., None], np.roll(distributions, 12, axis=-1), distributions) ** flat
+    return rows / rows.sum(axis=-1, keepdims=True)
+
+
+def test_what_is_observed_was_expected_by_the_other_objects(rng: np.random.Generator) -> None:
+    """Where the first views of all groups are expected to err, their mean errors are observed."""
+    distributions = unclear_turns(rng, 16)
+    ids = [f"{k // 2}" for k in range(16)]
+    alike = LookAlikes.of_views(distributions, None, ids)
+    expected, happened = [], []
+    for turn, own in enumerate(ids):
+        others = np.array(ids) != own
+        rest = LookAlikes.of_views(distributions[others])
+        expected += [rest.expected(view, 6.0, 3.0).now_deg for view in distributions[turn]]
+        happened += alike.error_now_deg[turn].tolist()
+    expected, happened = np.array(expected), np.array(happened)
+    groups = np.array_split(expected.argsort(), N_GROUPS)
+    places = [expected[group].mean() for group in groups]
+    observed = np.array([alike.observed(place, 6.0, 3.0) for place in places])
+    # Isotonic regression keeps the mean, and is the nearest monotone curve.
+    outcomes = np.column_stack([happened, *(happened <= limit for limit in WITHIN_DEG)])
+    means = np.array([outcomes[group].mean(axis=0) for group in groups])
+    assert observed.mean(axis=0) == pytest.approx(means.mean(axis=0), rel=1e-4)
+    assert (np.diff(observed, axis=0) * [1, -1, -1, -1] >= 0).all()
+    assert (np.diff(observed[:, 1:], axis=1) >= 0).all()
+    for curve, wanted, sign in zip(observed.T, means.T, [1, -1, -1, -1], strict=True):
+        monotone = np.sort(rng.uniform(wanted.min(), wanted.max(), (1000, N_GROUPS)))
+        if sign < 0:
+            monotone = monotone[:, ::-1]
+        assert np.square(curve - wanted).sum() <= np.square(monotone - wanted).sum(axis=1).min()
+
+
+def test_small_and_large_errors_are_observed_as_they_are_on_fresh_objects() -> None:
+    """In thirds of what is expected; a mean over look-alikes alone is drawn towards the middle."""
+    rng = np.random.default_rng(4)
+    alike, fresh = LookAlikes.of_views(unclear_turns(rng, 150)), unclear_turns(rng, 150)
+    errors = LookAlikes.of_views(fresh).error_now_deg.reshape(-1)
+    expected = np.array([alike.expected(v, 6.0, 3.0).now_deg for v in fresh.reshape(-1, 24)])
+    observed = np.array([alike.observed(value, 6.0, 3.0)[0] for value in expected])
+    for third in np.array_split(expected.argsort(), 3):
+        assert observed[third].mean() == pytest.approx(errors[third].mean(), rel=0.15, abs=1.0)
+    least, _, most = np.array_split(expected.argsort(), 3)
+    assert expected[least].mean() > 5 * errors[least].mean()
+    assert expected[most].mean() < 0.8 * errors[most].mean()

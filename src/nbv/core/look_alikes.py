@@ -49,6 +49,12 @@ MOST_AVERAGED = 400
 One of each turn, where there are more turns.
 """
 
+FEWEST_OBJECTS = 10
+"""From so many on, `LookAlikes.observed` says more than what is expected."""
+
+N_GROUPS = 24
+"""Groups of first views by what is expected of them, in `LookAlikes.observed`."""
+
 NEGLIGIBLE = 1e-5
 """Of all that counts, pseudo-observations too: after more views, what counts less is left out."""
 
@@ -424,6 +430,61 @@ class LookAlikes:
             total=sums[:n_steps],
             weight=float(sums[-1]),
         )
+
+    def observed(
+        self, expected_deg: float, power: float, pseudo_observations: float
+    ) -> NDArray[np.float64]:
+        """Return the error and the chances of `WITHIN_DEG` where an error is expected, (4,).
+
+        For turns after one view. A mean over look-alikes is drawn towards the mean of all: where
+        the error is small, too much is expected, and too little where it is large. So what each
+        object's first views lead one to expect, by the other objects, is compared with what
+        happened: by isotonic regression over `N_GROUPS` groups of first views, linear between their
+        means.
+
+        Parameters
+        ----------
+        expected_deg : float
+            ``now_deg`` of an `Expected`.
+        power, pseudo_observations : float
+            With which it was found.
+        """
+        key = power, pseudo_observations
+        if key not in self._reliability:
+            self._reliability[key] = self._curves(*key)
+        expected, *observed = self._reliability[key]
+        return np.array([np.interp(expected_deg, expected, curve) for curve in observed])
+
+    @cached_property
+    def _reliability(self) -> dict[tuple[float, float], NDArray[np.float64]]:
+        """`_curves` that were found."""
+        return {}
+
+    def _curves(self, power: float, pseudo_observations: float) -> NDArray[np.float64]:
+        """Return the mean expected errors of groups, and of what happened, (5, N_GROUPS)."""
+        from scipy.optimize import isotonic_regression
+
+        n_first = self.first.shape[1]
+        of_object = np.repeat(self.is_of_object.argmax(axis=0), n_first)
+        errors = self.errors_deg[..., -1].reshape(-1)
+        roots = self._roots.reshape(len(errors), -1)
+        expected = np.empty(len(errors))
+        for part in np.array_split(np.arange(len(errors)), N_GROUPS):
+            is_other = of_object[part, None] != of_object
+            weight = np.float32(360.0 / n_first) * (roots[part] @ roots.T) ** np.float32(power)
+            weight += np.float32(pseudo_observations) / is_other.sum(axis=1, keepdims=True)
+            weight *= is_other
+            expected[part] = weight @ errors / weight.sum(axis=1)
+        happened = _outcomes(self.error_now_deg.reshape(-1, 1))[:, :-1]
+        rows = np.column_stack([expected, happened])
+        groups = np.array_split(rows[expected.argsort(kind="stable")], N_GROUPS)
+        means = np.stack([group.mean(axis=0) for group in groups], axis=1)
+        # With a larger error, small ones are rarer.
+        observed = (
+            isotonic_regression(curve, increasing=place == 0).x
+            for place, curve in enumerate(means[1:])
+        )
+        return np.stack([means[0], *observed])
 
     def _affinities(self, belief: NDArray[np.floating]) -> Table:
         """Return the affinity of a belief (B,) with each first view, (S, K)."""

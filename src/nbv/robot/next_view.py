@@ -17,7 +17,13 @@ from nbv.core.distributions import (
     product_of_views,
     rotated,
 )
-from nbv.core.look_alikes import MOST_COMPARED, WITHIN_DEG, Expected, LookAlikes
+from nbv.core.look_alikes import (
+    FEWEST_OBJECTS,
+    MOST_COMPARED,
+    WITHIN_DEG,
+    Expected,
+    LookAlikes,
+)
 from nbv.errors import FrameError, UserError
 from nbv.labels import counted
 from nbv.robot.rotations import (
@@ -84,7 +90,8 @@ class Recommendation:
     spread_deg : float
         Circular standard deviation of the belief.
     expected_error_deg : float
-        Expected error of `azimuth_deg`: the mean calibration error of objects that looked alike.
+        Expected error of `azimuth_deg`: the mean calibration error of objects that looked alike,
+        and after one view the error that really came of as large a mean (`LookAlikes.observed`).
         It is raised if the last view was recommended, because the same errors chose that view.
     move : Move, or None
         The next view: that of least expected error if it is better than the view farthest from
@@ -220,9 +227,8 @@ def next_view(
     width = 360.0 / n_bins
     bins = [round(rotation / width) % n_bins for rotation in rotations_deg[1:]]
     log_factor = log_bayes_factor(distributions, rotations_deg)
-    expected = calibrated(tuple(bins)).expected(
-        belief, **affinity, share=share, agreement=log_factor
-    )
+    alike = calibrated(tuple(bins))
+    expected = alike.expected(belief, **affinity, share=share, agreement=log_factor)
     last = rotations_deg[-1]
     taken = tuple(rotation - last for rotation in rotations_deg)
     n_steps = len(expected.total)
@@ -234,7 +240,9 @@ def next_view(
             "no admissible rotation; relax `allowed_deg` or `max_travel_deg`: a view is "
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
         )
-    now_deg = expected.now_deg
+    now_deg, within_now = expected.now_deg, expected.within_now
+    if not bins and len(alike.is_of_object) >= FEWEST_OBJECTS:
+        now_deg, *within_now = alike.observed(now_deg, **affinity).tolist()
     if followed and len(distributions) > 1:
         before = calibrated(tuple(bins[:-1])).expected(
             product_of_views(distributions[:-1], rotations_deg[:-1]),
@@ -283,7 +291,7 @@ def next_view(
         bayes_factor=bayes_factor,
         warnings=(*warnings, *_contradictions(bayes_factor, distributions, rotations_deg)),
         n_views=len(distributions),
-        probability_within=as_chances(expected.within_now),
+        probability_within=as_chances(within_now),
         crops=crops,
         object_position_m=object_position_m,
     )
