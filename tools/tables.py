@@ -52,7 +52,7 @@ MULTIPLIED = {
 CONFIRMATION_DATA = {"procedural": "embedded", "other people's": "real"}
 CONFIRMATION_ESTIMATORS = {
     "regressors": {"networks": "", "linear": "-linear"},
-    "classifiers": {"networks": "-classifier"},
+    "classifiers": {"networks": "-classifier", "linear": "-linear_classifier"},
 }
 
 ROTATIONS = {
