@@ -42,14 +42,25 @@ class _Sample:
 
 
 def _sample(values: pd.DataFrame, rng: np.random.Generator, n_resamples: int) -> _Sample:
-    """Draw objects, then instances of each drawn object, both with replacement."""
-    objects = pd.factorize(values.index.get_level_values("object_id"))[0]
-    members = [np.flatnonzero(objects == k) for k in range(objects.max() + 1)]
+    """Draw units, then instances of each drawn unit, both with replacement.
+
+    Units are the objects; of categories that have several trainings, the trainings of each.
+    """
+    index = values.index.to_frame(index=False)
+    object_id = pd.factorize(index["object_id"])[0]
+    is_trained = "training" in index
+    unit = pd.factorize(index["training"])[0] if is_trained else object_id
+    parts = object_id if is_trained else np.zeros(len(index), dtype=np.intp)
+    members = [
+        [np.flatnonzero((parts == part) & (unit == k)) for k in np.unique(unit[parts == part])]
+        for part in np.unique(parts)
+    ]
     weights = np.zeros((n_resamples, len(values)))
     for row in weights:
-        for k in rng.integers(len(members), size=len(members)):
-            drawn = rng.choice(members[k], size=len(members[k]))
-            np.add.at(row, drawn, 1 / (len(drawn) * len(members)))
+        for units in members:
+            for k in rng.integers(len(units), size=len(units)):
+                drawn = rng.choice(units[k], size=len(units[k]))
+                np.add.at(row, drawn, 1 / (len(drawn) * len(units) * len(members)))
     return _Sample(values, weights)
 
 
@@ -74,13 +85,17 @@ def rotation_table(
     Parameters
     ----------
     figures : DataFrame
-        Of `studies.rotations.evaluate`.
+        Of `studies.rotations.evaluate`; with a column ``training`` where each object is a category
+        and its instances are judged by several trainings.
     groups : mapping
         Objects by the name of their group.
     n_resamples : int
         For the intervals.
     """
     parts, cells = [], []
+    is_trained = "training" in figures
+    by = ["object_id", "training", "instance"] if is_trained else ["object_id", "instance"]
+    drawn = "each category's trainings" if is_trained else "objects"
     for group, objects in groups.items():
         of_group = figures["object_id"].isin(objects)
         for fusion, label in FUSION_LABELS.items():
@@ -88,10 +103,7 @@ def rotation_table(
             if part.empty:
                 continue
             wide = {
-                name: part.pivot_table(
-                    values=name, index=["object_id", "instance"], columns="method"
-                )
-                for name in FIGURES
+                name: part.pivot_table(values=name, index=by, columns="method") for name in FIGURES
             }
             draw = _sample(wide["mean_deg"], rng, n_resamples)
             rows: list[Row] = []
@@ -118,9 +130,10 @@ def rotation_table(
                         Cell(", ".join(worse) or "none"),
                     )
                 )
+            n_instances = part["instance"].nunique()
             n_objects = counted(part["object_id"].nunique(), "object")
-            heading = f"{n_objects}, {group}, {part['instance'].nunique()} instances, {label}"
-            parts.append(Part(tuple(rows), heading))
+            of = group if is_trained else f"{n_objects}, {group}"
+            parts.append(Part(tuple(rows), f"{of}, {n_instances} instances, {label}"))
     header = ("Method", "Error (°)", "less random", "less opposite", "median", "> 30° (%)")
     title = "Two views in three dimensions"
     return Table(
@@ -132,7 +145,7 @@ def rotation_table(
         tuple(parts),
         (
             "Errors are modulo symmetry. Figures are means over objects of means over instances.",
-            f"In brackets 95 % intervals: {n_resamples} resamples of objects, then instances.",
+            f"In brackets 95 % intervals: {n_resamples} resamples of {drawn}, then instances.",
             "An object is worse than with one view where Student's interval over its instances is.",
             DECIDED,
         ),

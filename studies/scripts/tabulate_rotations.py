@@ -15,9 +15,14 @@ with job(snakemake):
 
     given, params, output = snakemake.input, snakemake.params, snakemake.output
     symmetries = read_symmetries(given.models_info) if given.models_info else {}
-    figures = pd.concat([read_csv(path) for path in given.figures], ignore_index=True)
-    names = figures["object_id"].unique()
+    found = [read_csv(path) for path in given.figures]
+    if len(found) > 1:
+        found = [figures.assign(training=k) for k, figures in enumerate(found)]
+    figures = pd.concat(found, ignore_index=True)
+    names = list(figures["object_id"].unique())
     groups = by_symmetry(names, symmetries) if symmetries else {name: [name] for name in names}
+    if len(names) > 1 and "training" in figures:
+        groups["all categories"] = names
     rng = np.random.default_rng(params.seed)
     table = rotation_table(figures, groups, params.n_resamples, rng)
     write_table(table, {kind: output[kind] for kind in ("csv", "md")})

@@ -60,6 +60,30 @@ def test_every_method_is_evaluated_on_every_instance(pairs):
             assert cell["less_random"] == pytest.approx(less)
 
 
+def test_intervals_contain_the_chance_of_training():
+    """Instances that agree within a training: the interval is that of the trainings' means."""
+    rng = np.random.default_rng(1)
+    rows = []
+    for training in range(8):
+        category, error = "ab"[training // 4], rng.normal(10.0, 2.0)
+        for k in range(30):
+            own = {"object_id": category, "training": training, "instance": f"{training}-{k}"}
+            for method in ("single", "random", "opposite"):
+                own_error = error * (1 + (method == "single"))
+                rows.append(own | {"fusion": "average", "method": method, "mean_deg": own_error})
+    figures = pd.DataFrame(rows).assign(median_deg=0.0, above_30=0.0, within_15=1.0)
+    groups = {"a": ["a"], "both": ["a", "b"]}
+    cells = rotation_table(figures, groups, 4000, rng).cells.set_index(["group", "method"])
+    means = figures.query("method == 'random'").groupby("training")["mean_deg"].mean().to_numpy()
+    for group, n_categories in (("a", 1), ("both", 2)):
+        drawn = rng.integers(4, size=(4000, n_categories, 4)) + 4 * np.arange(n_categories)[:, None]
+        low, high = np.quantile(means[drawn].mean(axis=(1, 2)), [0.025, 0.975])
+        found = cells.loc[group, "random"]
+        assert found["mean_deg"] == pytest.approx(means[: 4 * n_categories].mean())
+        assert [found["ci_low"], found["ci_high"]] == pytest.approx([low, high], abs=0.15)
+        assert cells.loc[group, "single"]["less_random"] == pytest.approx(found["mean_deg"])
+
+
 def test_methods_choose_by_cost_turn_and_hindsight():
     turn = np.array([[0, 20, 170, 90], [20, 0, 150, 70], [170, 150, 0, 80], [90, 70, 80, 0.0]])
     error = np.array([[9, 1, 5, 3], [1, 9, 5, 3], [2, 2, 9, 1], [4, 1, 8, 9.0]])
