@@ -57,8 +57,19 @@ CONFIRMATION_ESTIMATORS = {
 
 ROTATIONS = {
     "one view": ("score", "single"),
-    "two, averaged as in the paper": ("average", "random"),
-    "two, posterior with scores": ("score", "random"),
+    "Random, averaged": ("average", "random"),
+    "Random": ("score", "random"),
+    "Opposite": ("score", "opposite"),
+    "expected error": ("score", "expected_error"),
+}
+OWN_ROTATIONS = {
+    "one view": ("score", "single"),
+    "Random, average": ("average", "random"),
+    "Proposed, average": ("average", "pose_ambiguity"),
+    "Random": ("score", "random"),
+    "Opposite": ("score", "opposite"),
+    "Proposed": ("score", "pose_ambiguity"),
+    "expected error": ("score", "expected_error"),
 }
 
 
@@ -161,15 +172,48 @@ def bundles() -> pd.DataFrame:
     return bundle()[[*shown]].rename(columns=shown)
 
 
-def rotations() -> pd.DataFrame:
-    """Mean errors of MegaPose on T-LESS with one view and with a random second one, degrees."""
-    found = pd.read_csv(REFERENCE / "rotations/rotations.csv")
+def rotations(folder: str, columns: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
+    """Mean errors of an estimator in three dimensions by fusion and method, degrees."""
+    found = pd.read_csv(REFERENCE / folder / "rotations.csv")
     error = found.set_index(["group", "fusion", "method"])["mean_deg"].map("{:.1f}".format)
     rows = {
-        group: [error[group, fusion, method] for fusion, method in ROTATIONS.values()]
+        group: [error[group, fusion, method] for fusion, method in columns.values()]
         for group in found["group"].unique()
     }
-    return pd.DataFrame(rows, index=[*ROTATIONS]).T
+    return pd.DataFrame(rows, index=[*columns]).T
+
+
+def both_rotations() -> pd.DataFrame:
+    """Return `rotations` of a published estimator, and of the study's own over all categories."""
+    found = rotations("rotations", ROTATIONS).rename(index="MegaPose, {}".format)
+    own = rotations("rotation-estimator", ROTATIONS).loc[["all categories"]]
+    return pd.concat([found, own.set_axis(["the study's own, five categories"])])
+
+
+def own_rotations() -> pd.DataFrame:
+    """Return `rotations` of the study's own estimators, and what the choice of a view brings."""
+    folder = "rotation-estimator"
+    found = pd.read_csv(REFERENCE / folder / "rotations.csv")
+    chosen = found.query("method == 'expected_error' and fusion == 'score'").set_index("group")
+    table = rotations(folder, OWN_ROTATIONS)
+    for other in ("random", "opposite"):
+        names = [f"less_{other}{end}" for end in ("", "_ci_low", "_ci_high")]
+        less = chosen[names].itertuples(index=False)
+        table[f"less {other.capitalize()}"] = [interval_text(*row, decimals=1) for row in less]
+    return table.rename(index=str.capitalize)
+
+
+def rotation_estimator() -> pd.DataFrame:
+    """One view of the study's own estimators: log-likelihoods, and errors in degrees."""
+    found = pd.read_csv(REFERENCE / "rotation-estimator/rotation_estimator.csv")
+    columns = {
+        "log-likelihood": found["log_likelihood"].map("{:.2f}".format),
+        "at most": found["most"].map("{:.2f}".format).replace("nan", "–"),
+        "mean error": found["error_deg"].map("{:.1f}".format),
+        "median": found["median_deg"].map("{:.1f}".format),
+        "> 30°": (100 * found["above_30"]).map("{:.1f} %".format),
+    }
+    return pd.DataFrame(columns).set_axis(found["object_id"].str.capitalize())
 
 
 TABLES = {
@@ -181,7 +225,9 @@ TABLES = {
     "bundle": bundle,
     "bundles": bundles,
     "focal_lengths": focal_lengths,
-    "rotations": rotations,
+    "rotations": both_rotations,
+    "own_rotations": own_rotations,
+    "rotation_estimator": rotation_estimator,
 }
 
 
