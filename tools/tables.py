@@ -64,8 +64,6 @@ ROTATIONS = {
 }
 OWN_ROTATIONS = {
     "one view": ("score", "single"),
-    "Random, average": ("average", "random"),
-    "Proposed, average": ("average", "pose_ambiguity"),
     "Random": ("score", "random"),
     "Opposite": ("score", "opposite"),
     "Proposed": ("score", "pose_ambiguity"),
@@ -211,7 +209,7 @@ def rotation_estimator() -> pd.DataFrame:
         "at most": found["most"].map("{:.2f}".format).replace("nan", "–"),
         "mean error": found["error_deg"].map("{:.1f}".format),
         "median": found["median_deg"].map("{:.1f}".format),
-        "> 30°": (100 * found["above_30"]).map("{:.1f} %".format),
+        "> 30° (%)": (100 * found["above_30"]).map("{:.1f}".format),
     }
     return pd.DataFrame(columns).set_axis(found["object_id"].str.capitalize())
 
