@@ -76,3 +76,18 @@ def hidden_range_estimates(n_objects: int, seed: int = 0) -> np.ndarray:
     estimate = truth + rng.normal(0, 4, (n_objects, 360))
     estimate[:, hidden] = 90 + rng.normal(0, 10, (n_objects, hidden.sum()))
     return estimate % 360
+
+
+def sharp_turns(rng: np.random.Generator, n: int, sharpness: float) -> np.ndarray:
+    apart = np.arange(24) - np.arange(24)[:, None]
+    logits = sharpness * np.cos(np.radians(15 * apart)) + rng.normal(0, 0.3, (n, 24, 24))
+    return np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
+
+
+def unclear_turns(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Turns that are clear from half of the views; from the others, an answer may be opposite."""
+    distributions = sharp_turns(rng, n, 12.0)
+    is_wrong = rng.random((n, 24)) < 0.4 * (np.arange(24) < 12)
+    flat = np.where(np.arange(24) < 12, 0.4, 1.0)[:, None]
+    rows = np.where(is_wrong[..., None], np.roll(distributions, 12, axis=-1), distributions) ** flat
+    return rows / rows.sum(axis=-1, keepdims=True)

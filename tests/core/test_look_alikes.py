@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.core.made import product_by_loops
+from scipy.optimize import isotonic_regression
+from tests.core.made import product_by_loops, sharp_turns, unclear_turns
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
@@ -211,12 +212,6 @@ def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.G
         assert own_now == pytest.approx(wanted_now, rel=1e-4)
 
 
-def sharp_turns(rng: np.random.Generator, n: int, sharpness: float) -> np.ndarray:
-    apart = np.arange(24) - np.arange(24)[:, None]
-    logits = sharpness * np.cos(np.radians(15 * apart)) + rng.normal(0, 0.3, (n, 24, 24))
-    return np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
-
-
 @pytest.mark.parametrize("sharpness", [1.0, 6.0, 20.0])
 def test_what_is_left_out_hardly_counts(rng: np.random.Generator, sharpness: float) -> None:
     """After two views: sums over all first views, but 400 at most for the pseudo-observations."""
@@ -413,41 +408,43 @@ def test_a_rotation_is_surely_better_by_two_standard_errors_over_objects() -> No
         assert not expected.is_surely_better(180.0, 0.0)
 
 
-def unclear_turns(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Turns that are clear from half of the views; from the others, an answer may be opposite."""
-    distributions = sharp_turns(rng, n, 12.0)
-    is_wrong = rng.random((n, 24)) < 0.4 * (np.arange(24) < 12)
-    flat = np.where(np.arange(24) < 12, 0.4, 1.0)[:, None]
-    rows = np.where(is_wrong[..., None], np.roll(distributions, 12, axis=-1), distributions) ** flat
-    return rows / rows.sum(axis=-1, keepdims=True)
-
-
-def test_what_is_observed_was_expected_by_the_other_objects(rng: np.random.Generator) -> None:
-    """Where the first views of all groups are expected to err, their mean errors are observed."""
+@pytest.mark.parametrize("by_share", [False, True])
+def test_what_is_observed_was_expected_by_the_other_objects(
+    rng: np.random.Generator, by_share: bool
+) -> None:
+    """Groups by what the others lead one to expect, and isotonic regression of their errors."""
     distributions = unclear_turns(rng, 16)
-    ids = [f"{k // 2}" for k in range(16)]
-    alike = LookAlikes.of_views(distributions, None, ids)
-    expected, happened = [], []
+    ids = np.array([f"{k // 2}" for k in range(16)])
+    # Groups of equal weight are then groups of equal size.
+    share = np.full(16, 0.3) if by_share else None
+    alike = LookAlikes.of_views(distributions, None, ids.tolist())
+    expected = []
     for turn, own in enumerate(ids):
-        others = np.array(ids) != own
-        rest = LookAlikes.of_views(distributions[others])
-        expected += [rest.expected(view, 6.0, 3.0).now_deg for view in distributions[turn]]
-        happened += alike.error_now_deg[turn].tolist()
-    expected, happened = np.array(expected), np.array(happened)
-    groups = np.array_split(expected.argsort(), N_GROUPS)
-    places = [expected[group].mean() for group in groups]
-    observed = np.array([alike.observed(place, 6.0, 3.0) for place in places])
-    # Isotonic regression keeps the mean, and is the nearest monotone curve.
+        others = np.where(ids != own, 1.0 if share is None else share, 0.0)
+        expected += [alike.expected(view, 6.0, 3.0, others).now_deg for view in distributions[turn]]
+    happened = alike.error_now_deg.reshape(-1)
     outcomes = np.column_stack([happened, *(happened <= limit for limit in WITHIN_DEG)])
+    groups = np.array_split(np.argsort(expected), N_GROUPS)
+    places = [np.array(expected)[group].mean() for group in groups]
     means = np.array([outcomes[group].mean(axis=0) for group in groups])
-    assert observed.mean(axis=0) == pytest.approx(means.mean(axis=0), rel=1e-4)
-    assert (np.diff(observed, axis=0) * [1, -1, -1, -1] >= 0).all()
+    observed = np.array([alike.observed(place, 6.0, 3.0, share) for place in places])
+    for column, increasing in enumerate([True, False, False, False]):
+        wanted = isotonic_regression(means[:, column], increasing=increasing).x
+        assert observed[:, column] == pytest.approx(wanted, rel=1e-3, abs=1e-3)
     assert (np.diff(observed[:, 1:], axis=1) >= 0).all()
-    for curve, wanted, sign in zip(observed.T, means.T, [1, -1, -1, -1], strict=True):
-        monotone = np.sort(rng.uniform(wanted.min(), wanted.max(), (1000, N_GROUPS)))
-        if sign < 0:
-            monotone = monotone[:, ::-1]
-        assert np.square(curve - wanted).sum() <= np.square(monotone - wanted).sum(axis=1).min()
+
+
+def test_views_that_do_not_count_are_not_observed() -> None:
+    """As of frames at another elevation, where a share is next to nothing."""
+    rng = np.random.default_rng(5)
+    own, other = unclear_turns(rng, 12), np.full((12, 24, 24), 1 / 24)
+    both = LookAlikes.of_views(np.concatenate([own, other]))
+    alone = LookAlikes.of_views(own)
+    share = np.repeat([1.0, 1e-12], 12)
+    for place in (10.0, 30.0, 60.0):
+        wanted = alone.observed(place, 6.0, 3.0)
+        assert both.observed(place, 6.0, 3.0, share) == pytest.approx(wanted, rel=1e-3, abs=1e-3)
+    assert both.observed(60.0, 6.0, 3.0)[0] != pytest.approx(alone.observed(60.0, 6.0, 3.0)[0])
 
 
 def test_small_and_large_errors_are_observed_as_they_are_on_fresh_objects() -> None:

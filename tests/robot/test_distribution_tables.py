@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.cli.test_command_line import POSE, fails, run, same_move
+from tests.core.made import unclear_turns
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.core.angles import circular_distance_deg
@@ -384,3 +385,21 @@ def test_damaged_distributions_of_pairs_are_one_line(here, capsys, edit, message
     edit(pd.read_csv("pairs.csv")).to_csv("pairs.csv", index=False)
     assert message in fails(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     assert not Path("t.npz").exists()
+
+
+def test_the_expected_error_of_one_view_is_right_where_it_is_small_and_where_it_is_large():
+    rng = np.random.default_rng(6)
+    azimuths = np.arange(24) * 15.0
+    table = DistributionTable.from_pairs(
+        {f"{k}": (azimuths, rows) for k, rows in enumerate(unclear_turns(rng, 60))}
+    )
+    promised, errors = [], []
+    for rows in unclear_turns(rng, 60):
+        for azimuth, view in zip(azimuths, rows, strict=True):
+            answer = table.recommend(view)
+            promised.append([answer.expected_error_deg, answer.probability_within["15"]])
+            errors.append(float(circular_distance_deg(answer.azimuth_deg, azimuth)))
+    promised, errors = np.array(promised), np.array(errors)
+    for half in np.array_split(promised[:, 0].argsort(), 2):
+        assert promised[half, 0].mean() == pytest.approx(errors[half].mean(), rel=0.2, abs=1.0)
+        assert promised[half, 1].mean() == pytest.approx((errors[half] <= 15).mean(), abs=0.05)

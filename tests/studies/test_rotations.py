@@ -60,27 +60,39 @@ def test_every_method_is_evaluated_on_every_instance(pairs):
             assert cell["less_random"] == pytest.approx(less)
 
 
-def test_intervals_contain_the_chance_of_training():
-    """Instances that agree within a training: the interval is that of the trainings' means."""
+@pytest.mark.parametrize(("of_training", "of_instance"), [(2.0, 0.0), (0.0, 6.0)])
+def test_intervals_contain_the_chance_of_training(of_training, of_instance):
+    """Trainings are drawn within each category, and then instances."""
     rng = np.random.default_rng(1)
     rows = []
     for training in range(8):
-        category, error = "ab"[training // 4], rng.normal(10.0, 2.0)
+        category, error = "ab"[training // 4], 10.0 * (1 + training // 4)
+        error += of_training * rng.normal()
         for k in range(30):
             own = {"object_id": category, "training": training, "instance": f"{training}-{k}"}
+            own_error = error + of_instance * rng.normal()
             for method in ("single", "random", "opposite"):
-                own_error = error * (1 + (method == "single"))
-                rows.append(own | {"fusion": "average", "method": method, "mean_deg": own_error})
+                found = own_error * (1 + (method == "single"))
+                rows.append(own | {"fusion": "average", "method": method, "mean_deg": found})
     figures = pd.DataFrame(rows).assign(median_deg=0.0, above_30=0.0, within_15=1.0)
     groups = {"a": ["a"], "both": ["a", "b"]}
     cells = rotation_table(figures, groups, 4000, rng).cells.set_index(["group", "method"])
-    means = figures.query("method == 'random'").groupby("training")["mean_deg"].mean().to_numpy()
+    errors = figures.query("method == 'random'").groupby("training")["mean_deg"].apply(np.array)
     for group, n_categories in (("a", 1), ("both", 2)):
-        drawn = rng.integers(4, size=(4000, n_categories, 4)) + 4 * np.arange(n_categories)[:, None]
-        low, high = np.quantile(means[drawn].mean(axis=(1, 2)), [0.025, 0.975])
+        drawn = [
+            np.mean(
+                [
+                    rng.choice(errors[4 * category + k], 30)
+                    for category in range(n_categories)
+                    for k in rng.integers(4, size=4)
+                ]
+            )
+            for _ in range(4000)
+        ]
         found = cells.loc[group, "random"]
-        assert found["mean_deg"] == pytest.approx(means[: 4 * n_categories].mean())
-        assert [found["ci_low"], found["ci_high"]] == pytest.approx([low, high], abs=0.15)
+        assert found["mean_deg"] == pytest.approx(np.mean([*errors[: 4 * n_categories]]))
+        wanted = np.quantile(drawn, [0.025, 0.975])
+        assert [found["ci_low"], found["ci_high"]] == pytest.approx(wanted, abs=0.2)
         assert cells.loc[group, "single"]["less_random"] == pytest.approx(found["mean_deg"])
 
 

@@ -432,11 +432,15 @@ class LookAlikes:
         )
 
     def observed(
-        self, expected_deg: float, power: float, pseudo_observations: float
+        self,
+        expected_deg: float,
+        power: float,
+        pseudo_observations: float,
+        share: NDArray[np.floating] | None = None,
     ) -> NDArray[np.float64]:
         """Return the error and the chances of `WITHIN_DEG` where an error is expected, (4,).
 
-        For turns after one view. A mean over look-alikes is drawn towards the mean of all: where
+        For turns after one view. A mean over look-alikes is shrunk towards the mean of all: where
         the error is small, too much is expected, and too little where it is large. So what each
         object's first views lead one to expect, by the other objects, is compared with what
         happened: by isotonic regression over `N_GROUPS` groups of first views, linear between their
@@ -446,45 +450,73 @@ class LookAlikes:
         ----------
         expected_deg : float
             ``now_deg`` of an `Expected`.
-        power, pseudo_observations : float
+        power, pseudo_observations, share
             With which it was found.
         """
-        key = power, pseudo_observations
+        of_turn = np.ones(len(self.first)) if share is None else np.asarray(share, np.float64)
+        key = power, pseudo_observations, of_turn.tobytes()
         if key not in self._reliability:
-            self._reliability[key] = self._curves(*key)
+            # One alone: a moving camera has another elevation, and share, in each frame.
+            self._reliability.clear()
+            self._reliability[key] = self._curves(power, pseudo_observations, of_turn)
         expected, *observed = self._reliability[key]
         return np.array([np.interp(expected_deg, expected, curve) for curve in observed])
 
     @cached_property
-    def _reliability(self) -> dict[tuple[float, float], NDArray[np.float64]]:
-        """`_curves` that were found."""
+    def _reliability(self) -> dict[tuple[float, float, bytes], NDArray[np.float64]]:
+        """The `_curves` that were found last."""
         return {}
 
-    def _curves(self, power: float, pseudo_observations: float) -> NDArray[np.float64]:
-        """Return the mean expected errors of groups, and of what happened, (5, N_GROUPS)."""
+    def _curves(
+        self, power: float, pseudo_observations: float, of_turn: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return what is expected of groups of first views, and what happened, (5, n)."""
         from scipy.optimize import isotonic_regression
 
         n_first = self.first.shape[1]
-        of_object = np.repeat(self.is_of_object.argmax(axis=0), n_first)
-        errors = self.errors_deg[..., -1].reshape(-1)
-        roots = self._roots.reshape(len(errors), -1)
-        expected = np.empty(len(errors))
-        for part in np.array_split(np.arange(len(errors)), N_GROUPS):
-            is_other = of_object[part, None] != of_object
-            weight = np.float32(360.0 / n_first) * (roots[part] @ roots.T) ** np.float32(power)
-            weight += np.float32(pseudo_observations) / is_other.sum(axis=1, keepdims=True)
-            weight *= is_other
-            expected[part] = weight @ errors / weight.sum(axis=1)
-        happened = _outcomes(self.error_now_deg.reshape(-1, 1))[:, :-1]
-        rows = np.column_stack([expected, happened])
-        groups = np.array_split(rows[expected.argsort(kind="stable")], N_GROUPS)
-        means = np.stack([group.mean(axis=0) for group in groups], axis=1)
+        errors, happened = self.errors_deg[..., -1], _outcomes(self.error_now_deg.reshape(-1, 1))
+        of_view = np.repeat(of_turn * (360.0 / n_first), n_first)
+        both = np.stack([of_view * errors.reshape(-1), of_view], axis=1)
+        near = self._weights_between(power) @ both.astype(np.float32)
+        of_object = self.is_of_object @ both.reshape(len(of_turn), n_first, 2).sum(axis=1)
+        others = (of_object.sum(axis=0) - of_object)[self._of_object]
+        alpha = pseudo_observations
+        expected = near[:, 0] + alpha * others[:, 0] / others[:, 1]
+        expected /= near[:, 1] + alpha
+        order = expected.argsort(kind="stable")
+        # Groups of equal weight, by the middle of each view's own.
+        middle = of_view[order].cumsum() - of_view[order] / 2
+        group = (N_GROUPS * middle / of_view.sum()).astype(np.intp)
+        starts = np.flatnonzero(np.diff(group, prepend=-1))
+        rows = np.column_stack([expected, happened[:, :-1], np.ones(len(expected))])
+        sums = np.add.reduceat(of_view[order, None] * rows[order], starts, axis=0)
+        means = (sums[:, :-1] / sums[:, -1:]).T
         # With a larger error, small ones are rarer.
         observed = (
-            isotonic_regression(curve, increasing=place == 0).x
+            isotonic_regression(curve, weights=sums[:, -1], increasing=place == 0).x
             for place, curve in enumerate(means[1:])
         )
         return np.stack([means[0], *observed])
+
+    @cached_property
+    def _of_object(self) -> NDArray[np.intp]:
+        """The object of each first view, (S K,)."""
+        return np.repeat(self.is_of_object.argmax(axis=0), self.first.shape[1])
+
+    @cached_property
+    def _between(self) -> dict[float, Table]:
+        """Of all first views the weights for each other, 0 within an object, by power."""
+        return {}
+
+    def _weights_between(self, power: float) -> Table:
+        if power not in self._between:
+            roots = self._roots.reshape(len(self._of_object), -1)
+            weights = np.empty((len(roots), len(roots)), dtype=np.float32)
+            for part in np.array_split(np.arange(len(roots)), N_GROUPS):
+                weights[part] = (roots[part] @ roots.T) ** np.float32(power)
+                weights[part] *= self._of_object[part, None] != self._of_object
+            self._between[power] = weights
+        return self._between[power]
 
     def _affinities(self, belief: NDArray[np.floating]) -> Table:
         """Return the affinity of a belief (B,) with each first view, (S, K)."""

@@ -91,7 +91,7 @@ class Recommendation:
         Circular standard deviation of the belief.
     expected_error_deg : float
         Expected error of `azimuth_deg`: the mean calibration error of objects that looked alike,
-        and after one view the error that really came of as large a mean (`LookAlikes.observed`).
+        after one view recalibrated: the mean error of calibration views that promised as much.
         It is raised if the last view was recommended, because the same errors chose that view.
     move : Move, or None
         The next view: that of least expected error if it is better than the view farthest from
@@ -242,7 +242,7 @@ def next_view(
         )
     now_deg, within_now = expected.now_deg, expected.within_now
     if not bins and len(alike.is_of_object) >= FEWEST_OBJECTS:
-        now_deg, *within_now = alike.observed(now_deg, **affinity).tolist()
+        now_deg, *within_now = alike.observed(now_deg, **affinity, share=share).tolist()
     if followed and len(distributions) > 1:
         before = calibrated(tuple(bins[:-1])).expected(
             product_of_views(distributions[:-1], rotations_deg[:-1]),
