@@ -76,7 +76,7 @@ def test_intervals_contain_the_chance_of_training(of_training, of_instance):
                 rows.append(own | {"fusion": "average", "method": method, "mean_deg": found})
     figures = pd.DataFrame(rows).assign(median_deg=0.0, above_30=0.0, within_15=1.0)
     groups = {"a": ["a"], "both": ["a", "b"]}
-    cells = rotation_table(figures, groups, 4000, rng).cells.set_index(["group", "method"])
+    cells = rotation_table(figures, groups, 1000, rng).cells.set_index(["group", "method"])
     errors = figures.query("method == 'random'").groupby("training")["mean_deg"].apply(np.array)
     for group, n_categories in (("a", 1), ("both", 2)):
         drawn = [
@@ -87,12 +87,12 @@ def test_intervals_contain_the_chance_of_training(of_training, of_instance):
                     for k in rng.integers(4, size=4)
                 ]
             )
-            for _ in range(4000)
+            for _ in range(1000)
         ]
         found = cells.loc[group, "random"]
         assert found["mean_deg"] == pytest.approx(np.mean([*errors[: 4 * n_categories]]))
         wanted = np.quantile(drawn, [0.025, 0.975])
-        assert [found["ci_low"], found["ci_high"]] == pytest.approx(wanted, abs=0.2)
+        assert [found["ci_low"], found["ci_high"]] == pytest.approx(wanted, abs=0.3)
         assert cells.loc[group, "single"]["less_random"] == pytest.approx(found["mean_deg"])
 
 
