@@ -480,13 +480,13 @@ class LookAlikes:
         near = self._weights_between(power) @ both.astype(np.float32)
         of_object = self.is_of_object @ both.reshape(len(of_turn), n_first, 2).sum(axis=1)
         others = (of_object.sum(axis=0) - of_object)[self._of_object]
-        alpha = pseudo_observations
+        alpha = max(pseudo_observations, float(np.finfo(np.float32).tiny))
         expected = near[:, 0] + alpha * others[:, 0] / others[:, 1]
         expected /= near[:, 1] + alpha
         order = expected.argsort(kind="stable")
         # Groups of equal weight, by the middle of each view's own.
         middle = of_view[order].cumsum() - of_view[order] / 2
-        group = (N_GROUPS * middle / of_view.sum()).astype(np.intp)
+        group = np.minimum(N_GROUPS * middle / of_view.sum(), N_GROUPS - 1).astype(np.intp)
         starts = np.flatnonzero(np.diff(group, prepend=-1))
         rows = np.column_stack([expected, happened[:, :-1], np.ones(len(expected))])
         sums = np.add.reduceat(of_view[order, None] * rows[order], starts, axis=0)
