@@ -16,30 +16,30 @@ N_SAMPLES = 40_000
 SAME_SIZE = 2e-3
 """Largest difference of extents between copies, in object diagonals."""
 SAME_SURFACE = 1.3
-"""Samples of two surfaces are at most so many times as far apart as two samples of one.
+"""Largest ratio of the distance between samples of two surfaces to that of two samples of one.
 
-Six pairs of copies among other people's meshes have at most 1.04, the next pair 1.8."""
+Six pairs of copies among collected meshes have at most 1.04, the next pair 1.8."""
 
 
 def find_copies(meshes: Mapping[str, Mesh]) -> dict[str, str]:
-    """Return the objects whose surface is that of an earlier one, and which one that is."""
+    """Return the earlier object with the same surface, by the object that copies it."""
     names = list(meshes)
     corners = [mesh.vertices[mesh.faces].reshape(-1, 3) for mesh in meshes.values()]
     extents = np.array([np.ptp(each, axis=0) for each in corners])
-    found: dict[str, str] = {}
+    copies: dict[str, str] = {}
     for later, name in enumerate(names):
-        alike = np.abs(extents[:later] - extents[later]).max(axis=1, initial=0.0) < SAME_SIZE
-        for earlier in np.flatnonzero(alike):
+        same_size = np.abs(extents[:later] - extents[later]).max(axis=1, initial=0.0) < SAME_SIZE
+        for earlier in np.flatnonzero(same_size):
             other = names[earlier]
-            if other not in found and _same_surface(meshes[other], meshes[name]):
-                found[name] = other
+            if other not in copies and _same_surface(meshes[other], meshes[name]):
+                copies[name] = other
                 break
-    return found
+    return copies
 
 
-def _same_surface(one: Mesh, other: Mesh) -> bool:
-    sample, again, of_other = (_sampled(*each) for each in ((one, 0), (one, 1), (other, 2)))
-    return _apart(sample, of_other) < SAME_SURFACE * _apart(sample, again)
+def _same_surface(first: Mesh, second: Mesh) -> bool:
+    sample, again, other = (_sampled(*each) for each in ((first, 0), (first, 1), (second, 2)))
+    return _apart(sample, other) < SAME_SURFACE * _apart(sample, again)
 
 
 def _sampled(mesh: Mesh, seed: int) -> NDArray[np.float64]:
@@ -48,7 +48,7 @@ def _sampled(mesh: Mesh, seed: int) -> NDArray[np.float64]:
     return np.asarray(points, dtype=np.float64)
 
 
-def _apart(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def _apart(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
     """Return the mean distance to the nearest point of the other sample, both ways."""
-    both = cKDTree(one).query(other)[0], cKDTree(other).query(one)[0]
+    both = cKDTree(first).query(second)[0], cKDTree(second).query(first)[0]
     return float(sum(np.asarray(distances).mean() for distances in both))

@@ -65,7 +65,7 @@ def parse_mesh(path: Path) -> trimesh.Trimesh:
     Raises
     ------
     Exception
-        Of any type, with the reason, if the file is damaged or has another format.
+        Any type, with the reason, if the file is damaged or has another format.
     """
     extension, data = path.suffix.lower(), path.read_bytes()
     if not data:
@@ -103,7 +103,7 @@ def parse_mesh(path: Path) -> trimesh.Trimesh:
     return mesh
 
 
-# Vertices, and the corners of each polygon.
+# Vertices, and the vertex indices of each polygon.
 _Polygons = tuple[Sequence[Sequence[float]], Sequence[Sequence[int]]]
 
 
@@ -142,7 +142,7 @@ def _read_obj(data: bytes) -> _Polygons:
                 if wrong < 1:
                     what = f"a face refers to vertex {wrong}, of {len(vertices)} so far"
                     raise ValueError(f"line {number}: {what}")
-                # From 1, or back from the last vertex so far.
+                # Indices count from 1, negative ones back from the last vertex so far.
                 polygons.append([i + len(vertices) if i < 0 else i - 1 for i in face])
     if not vertices:
         raise ValueError("no line is a vertex, 'v x y z'; is it an OBJ file?")

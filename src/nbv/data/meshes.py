@@ -62,15 +62,15 @@ def direction(axis: str, key: str) -> NDArray[np.float64]:
     return vector / length
 
 
-def frame_rotation(up: str, front: str, turn_deg: float) -> NDArray[np.float64]:
+def frame_rotation(up: str, front: str, azimuth_deg: float) -> NDArray[np.float64]:
     """Return the rotation from a file's frame into the object frame.
 
     Parameters
     ----------
     up, front : str
-        Axes of the file that become +z and, before the turn, +x; see `direction`.
-    turn_deg : float
-        Counter-clockwise turn about +z: the final azimuth of `front`.
+        Axes of the file that become +z and, at azimuth 0, +x; see `direction`.
+    azimuth_deg : float
+        Azimuth of `front` in the object frame, counter-clockwise about +z.
 
     Returns
     -------
@@ -88,8 +88,8 @@ def frame_rotation(up: str, front: str, turn_deg: float) -> NDArray[np.float64]:
         raise UserError(f"up={up}, front={front}: the two must be perpendicular")
     x = x - (x @ z) * z
     x /= np.linalg.norm(x)
-    turn = np.radians(turn_deg)
-    cos, sin = np.cos(turn), np.sin(turn)
+    azimuth = np.radians(azimuth_deg)
+    cos, sin = np.cos(azimuth), np.sin(azimuth)
     about_z = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     rotation: NDArray[np.float64] = about_z @ np.stack([x, np.cross(z, x), z])
     return rotation
@@ -131,7 +131,7 @@ def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
 
 
 def normalise(
-    mesh: trimesh.Trimesh, up: str, front: str, turn_deg: float, centre: Centre
+    mesh: trimesh.Trimesh, up: str, front: str, azimuth_deg: float, centre: Centre
 ) -> trimesh.Trimesh:
     """Return a mesh in the object frame, with a unit diagonal.
 
@@ -139,7 +139,7 @@ def normalise(
     ----------
     mesh : trimesh.Trimesh
         A mesh that passes `check_mesh`.
-    up, front, turn_deg
+    up, front, azimuth_deg
         See `frame_rotation`.
     centre : {"box", "origin"}
         The vertical axis x = y = 0 passes through the middle of the bounding box, or through the
@@ -160,8 +160,8 @@ def normalise(
     if centre not in CENTRES:
         raise UserError(f"centre={centre}: no such centre; {nearest(centre, CENTRES)}")
     used, faces = np.unique(np.asarray(mesh.faces), return_inverse=True)
-    rotation = frame_rotation(up, front, turn_deg)
-    # Not with BLAS, whose rounding depends on the machine.
+    rotation = frame_rotation(up, front, azimuth_deg)
+    # The rounding of BLAS depends on the machine.
     vertices = np.einsum("nj,ij->ni", np.asarray(mesh.vertices, dtype=np.float64)[used], rotation)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle = (low + high) / 2.0

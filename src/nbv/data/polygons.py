@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Of a polygon's area: a smaller dent is rounding.
+# As a share of a polygon's area: a smaller dent is rounding.
 _NO_DENT = 1e-6
-# Of a polygon's size, squared: a smaller triangle is a line.
+# As a share of a polygon's squared size: a smaller triangle is a line.
 _NO_AREA = 1e-12
 
 
@@ -63,10 +63,10 @@ def _holds_fan(points: Floats) -> NDArray[np.bool_]:
         length = np.linalg.norm(sums, axis=1)
         areas = np.einsum("mij,mj->mi", normals, sums) / length[:, None]
         angles = np.arctan2(areas, (spokes[:, :-1] * spokes[:, 1:]).sum(axis=2))
-        turns_one_way = (areas >= -_NO_DENT * sizes[:, None]).all(axis=1)
+        has_no_dent = (areas >= -_NO_DENT * sizes[:, None]).all(axis=1)
         is_simple = (angles.sum(axis=1) < 2 * np.pi) & (length > _NO_DENT * sizes)
         is_line = sizes <= _NO_AREA * (spokes**2).sum(axis=(1, 2))
-        return np.asarray((turns_one_way & is_simple) | is_line | ~np.isfinite(sizes))
+        return np.asarray((has_no_dent & is_simple) | is_line | ~np.isfinite(sizes))
 
 
 def _ears(points: Floats) -> list[tuple[int, int, int]]:

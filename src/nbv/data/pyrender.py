@@ -90,10 +90,10 @@ class PyrenderRenderer:
         views = object_views(vertices, faces, elevation_deg, azimuths_deg, camera)
         side = camera.image_side
         self._offscreen.viewport_width = self._offscreen.viewport_height = side
-        one_way = np.asarray(faces, dtype=np.uint32)
+        front_faces = np.asarray(faces, dtype=np.uint32)
         triangles = pyrender.Primitive(
             positions=np.asarray(vertices, dtype=np.float32),
-            indices=np.concatenate([one_way, one_way[:, ::-1]]),
+            indices=np.concatenate([front_faces, front_faces[:, ::-1]]),
             mode=pyrender.constants.GLTF.TRIANGLES,
         )
         scene = pyrender.Scene()

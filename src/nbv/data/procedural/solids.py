@@ -140,7 +140,7 @@ def box(
     exponent : float
         Roundness in plan, see :func:`superellipse`.
     bevel : float
-        Of the top and bottom edges.
+        Depth of the bevel at the top and bottom edges.
     """
     x, y, z = np.asarray(centre, dtype=np.float64)
     width, depth, height = np.asarray(extents, dtype=np.float64)
@@ -266,8 +266,8 @@ def mirrored(solid: trimesh.Trimesh) -> trimesh.Trimesh:
 
 def both_sides(solids: Iterable[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
     """Return the solids followed by their reflections in the plane y = 0."""
-    one_side = list(solids)
-    return one_side + [mirrored(solid) for solid in one_side]
+    originals = list(solids)
+    return originals + [mirrored(solid) for solid in originals]
 
 
 def moved(solid: trimesh.Trimesh, offset: ArrayLike) -> trimesh.Trimesh:

@@ -74,21 +74,21 @@ def window_weights(width_px: float) -> NDArray[np.float64]:
 
 
 def window_share(z: Metres, width_px: float, focal_px: float) -> Metres:
-    """Return the fraction of each pixel's window on the pixel's own surface, in [0, 1]."""
+    """Return the fraction of each pixel's window that shows the pixel's surface, in [0, 1]."""
     weights = window_weights(width_px)
     reach = len(weights) // 2
     padded = np.pad(z, [(0, 0), (reach, reach), (reach, reach)])
     seen, index = z > 0, np.flatnonzero(padded > 0)
-    own, own_share = z[seen], np.zeros(len(index), dtype=np.float32)
+    depth, on_surface = z[seen], np.zeros(len(index), dtype=np.float32)
     for down, row_weight in enumerate(weights):
         for across, column_weight in enumerate(weights):
             step = (down - reach) * padded.shape[-1] + across - reach
             there = padded.ravel()[index + step]
             apart = math.hypot(down - reach, across - reach)
             weight = np.float32(row_weight * column_weight / weights.sum() ** 2)
-            own_share += weight * same_surface(own, there, apart, focal_px)
+            on_surface += weight * same_surface(depth, there, apart, focal_px)
     share = np.zeros_like(z)
-    share[seen] = own_share
+    share[seen] = on_surface
     return share
 
 

@@ -158,7 +158,7 @@ def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str])
     if not source.endless and (copies := find_copies(prepared)):
         raise UserError(
             f"dataset={source.name}: {category}: "
-            f"{', '.join(f'{one} is a copy of {other}' for one, other in copies.items())}; "
+            f"{', '.join(f'{copy} is a copy of {name}' for copy, name in copies.items())}; "
             f"leave out copies, so that no test meets what a training saw: "
             f"dataset.exclude=[{','.join(copies)}]"
         )

@@ -92,9 +92,9 @@ class FileSource(ABC):
         mesh = _reader().read(files[object_id])
         check_mesh(mesh, str(files[object_id]))
         up, front = self.orientation(category, object_id)
-        turn_deg = self.settings["turn_deg"].get(category, 0.0)
+        azimuth_deg = self.settings["turn_deg"].get(category, 0.0)
         try:
-            return normalise(mesh, up, front, turn_deg, self.settings["centre"])
+            return normalise(mesh, up, front, azimuth_deg, self.settings["centre"])
         except UserError as error:
             raise UserError(f"dataset={self.name}, {files[object_id]}: {error}") from error
 
@@ -169,7 +169,7 @@ def exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
 
 @contextmanager
 def readable_paths(source: str) -> Iterator[None]:
-    """Turn an OSError, such as for a path that is too long, into a UserError."""
+    """Raise a UserError for an OSError, such as for a path that is too long."""
     try:
         yield
     except OSError as error:

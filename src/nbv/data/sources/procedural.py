@@ -59,5 +59,5 @@ class ProceduralSource:
             square_share=settings["square_share"],
         )
         check_mesh(mesh, f"dataset=procedural: {object_id}")
-        turn_deg = settings["turn_deg"].get(category, 0.0)
-        return normalise(mesh, settings["up"], settings["front"], turn_deg, settings["centre"])
+        azimuth_deg = settings["turn_deg"].get(category, 0.0)
+        return normalise(mesh, settings["up"], settings["front"], azimuth_deg, settings["centre"])
