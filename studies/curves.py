@@ -35,7 +35,7 @@ from nbv.core.simulation import (
     random_next,
     recommended_next,
 )
-from nbv.experiment.statistics.metrics import accuracy_area, half_turned
+from nbv.experiment.statistics.metrics import above_90, accuracy_area
 
 Floats = NDArray[np.float64]
 Run = Callable[..., Floats]
@@ -101,7 +101,7 @@ def more_views_rows(
 def _row(object_ids: tuple[str, ...], method: str, n_views: int, reached: Floats) -> pd.DataFrame:
     """Return the rows of one policy and number of views; `reached` comes from `follow`."""
     errors, *others = reached
-    figures = (errors, accuracy_area(errors), half_turned(errors), *others)
+    figures = (errors, accuracy_area(errors), above_90(errors), *others)
     means = (figure.mean(axis=1) for figure in figures)
     values = (method, n_views, object_ids, *means)
     return pd.DataFrame(dict(zip(VIEWS_COLUMNS, values, strict=True)))

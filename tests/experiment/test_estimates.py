@@ -38,7 +38,7 @@ def test_a_missing_view_is_refused(tmp_path):
     write_estimates(path, Estimates(("a",), np.zeros((1, 360))))
     lines = path.read_text().splitlines()
     path.write_text("\n".join(lines[:50] + lines[51:]) + "\n")
-    with pytest.raises(UserError, match="full turn"):
+    with pytest.raises(UserError, match="full sweep"):
         read_estimates(path)
 
 

@@ -23,7 +23,6 @@ from nbv.experiment.explorer.data import (
     COLUMNS,
     byte_planes,
     expected_pose,
-    half_turn,
     hundredths,
     outcomes_of,
     page_table,
@@ -31,6 +30,7 @@ from nbv.experiment.explorer.data import (
     quantised_logs,
     ring_of,
     rows_differenced,
+    wrapped,
 )
 from nbv.experiment.report.figures.views import depth_limits, shade
 
@@ -106,12 +106,12 @@ def test_outcomes_are_the_rows_of_the_files(evaluations):
         rows = rows.loc[order]
         pose = outcomes.pose[method].ravel()
         np.testing.assert_array_equal(pose, np.round(rows["pose_estimate_deg"] * 100) % 36000)
-        assert (method in outcomes.turn) == (method != "single")
-        if method in outcomes.turn:
-            np.testing.assert_array_equal(outcomes.turn[method].ravel(), rows["delta_deg"])
+        assert (method in outcomes.rotation) == (method != "single")
+        if method in outcomes.rotation:
+            np.testing.assert_array_equal(outcomes.rotation[method].ravel(), rows["delta_deg"])
         # What the page works out by itself is next to what the files say: little is left to keep.
-        expected = expected_pose(outcomes.estimate, outcomes.turn.get(method))
-        off = np.abs(half_turn(outcomes.pose[method] - expected))
+        expected = expected_pose(outcomes.estimate, outcomes.rotation.get(method))
+        off = np.abs(wrapped(outcomes.pose[method] - expected))
         assert np.mean(off <= 2) > 0.999
         means = rows["error_deg"].groupby(level=0).mean().loc[list(outcomes.object_ids)]
         np.testing.assert_allclose(outcomes.means[method], means, atol=0.005)
@@ -169,7 +169,7 @@ def test_what_never_occurs_makes_nothing_else_coarser():
 
 def test_angles_wrap_at_a_full_turn():
     assert hundredths(np.array([359.996, 0.004, 12.345])).tolist() == [0, 0, 1234]
-    assert half_turn(np.array([18000, -18001, 35999])).tolist() == [-18000, 17999, -1]
+    assert wrapped(np.array([18000, -18001, 35999])).tolist() == [-18000, 17999, -1]
 
 
 @pytest.mark.parametrize(

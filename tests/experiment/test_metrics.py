@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from nbv.experiment.statistics import metrics
-from nbv.experiment.statistics.metrics import accuracy_area, half_turned
+from nbv.experiment.statistics.metrics import above_90, accuracy_area
 
 errors_strategy = arrays(np.float64, st.integers(1, 40), elements=st.floats(0, 180))
 
@@ -173,6 +173,6 @@ def test_resampled_medians_equal_a_naive_loop_to_within_the_grid(rng):
     assert np.abs(rank).max() <= objects.size / 1000 + 2
 
 
-def test_half_turned_images_are_those_above_90_degrees():
-    assert half_turned([0.0, 90.0, 90.1, 180.0]).tolist() == [0.0, 0.0, 100.0, 100.0]
+def test_an_error_of_exactly_90_degrees_is_not_above_90():
+    assert above_90([0.0, 90.0, 90.1, 180.0]).tolist() == [0.0, 0.0, 100.0, 100.0]
     assert metrics.above_90_percent([0.0, 90.0, 90.1, 180.0]) == 50.0

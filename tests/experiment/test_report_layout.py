@@ -56,7 +56,7 @@ def test_the_least_spread_over_folds_is_the_best(tables):
         assert set(bold) == {min(values)}
 
 
-def test_the_share_of_half_turns_stands_below_the_figures(tables):
+def test_the_share_of_errors_above_90_degrees_stands_below_the_figures(tables):
     for name in ("table1", "table2", "table3", "table4", "table5"):
         labels = [row[0].text for row in tables[name].rows]
         half = len(labels) // 2
@@ -75,8 +75,8 @@ def test_the_last_column_is_the_difference_that_the_cells_have(tables):
     assert table.header[-1] == "Proposed − Opposite"
     cells = table.cells[table.cells["method"] == "proposed"]
     for row in table.rows:
-        label, *half_turns = row[0].text.split(": ")
-        shown = cells[(cells["metric"] == "mae") != bool(half_turns)]
+        label, *above_90 = row[0].text.split(": ")
+        shown = cells[(cells["metric"] == "mae") != bool(above_90)]
         found = shown[shown["row_label"] == label].iloc[0]
         value, low, high = (
             float(text.replace("−", "-")) for text in re.findall(r"[−\d.]+", row[-1].text)

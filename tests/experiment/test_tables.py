@@ -59,7 +59,7 @@ def cell(table, row, method, metric):
     return found.iloc[0]
 
 
-def half_turns(errors):
+def above_90(errors):
     return 100 * statistics.mean(error > 90 for error in errors)
 
 
@@ -68,7 +68,7 @@ def half_turns(errors):
     [
         ("table1", "mae", statistics.mean),
         ("table3", "pauc", pauc),
-        ("table1", "above_90_percent", half_turns),
+        ("table1", "above_90_percent", above_90),
     ],
 )
 def test_by_category(evaluations, rows, name, metric, function):

@@ -45,7 +45,7 @@ from nbv.experiment.reference import (
     table_files,
 )
 from nbv.experiment.report.settings import CELL_COLUMNS, TRANSFER
-from nbv.experiment.report.tables import HALF_TURNS
+from nbv.experiment.report.tables import ABOVE_90
 from nbv.labels import method_label, number
 
 IDENTICAL, WITHIN, OUTSIDE, UNJUDGED = "identical", "within", "outside", "not judged"
@@ -220,7 +220,7 @@ def judge_cell(theirs: CellRecord, mine: CellRecord, factor: float) -> list[Cell
     # Both σ are judged, so their difference adds nothing.
     for quantity in ("value",) if is_sigma else ("value", "difference", "sigma"):
         reference, here = float(theirs[quantity]), float(mine[quantity])
-        rare = theirs["metric"] == HALF_TURNS
+        rare = theirs["metric"] == ABOVE_90
         if (math.isnan(reference) and math.isnan(here)) or (rare and quantity == "sigma"):
             continue
         low, high = _tolerance("sigma" if is_sigma else quantity, theirs, mine, factor)

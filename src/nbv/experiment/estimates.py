@@ -1,4 +1,4 @@
-"""Files of estimates and distributions for full turns of objects."""
+"""Files of estimates and distributions for sweeps of objects."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def write_estimates(path: str | Path, estimates: Estimates) -> None:
     columns = (
         np.repeat(np.asarray(estimates.object_ids, dtype=object), n_views),
         np.tile(estimates.azimuth_deg.astype(int), n_objects),
-        # Rounding to 4 decimals may turn 359.99999 into 360.0, which is 0.
+        # 359.99999 is rounded to 360.0, which is 0.
         (np.round(estimates.estimate_deg, 4) % 360.0).ravel(),
     )
     write_csv(path, pd.DataFrame(dict(zip(COLUMNS, columns, strict=True))))
@@ -47,16 +47,14 @@ def read_estimates(path: str | Path) -> Estimates:
     """
     frame = read_csv(path)
     check_columns(path, frame, COLUMNS)
-    object_ids = objects_of_full_turns(path, frame, "azimuth_deg")
+    object_ids = sweep_objects(path, frame, "azimuth_deg")
     check_azimuths(path, frame, ("estimate_deg",))
     estimate_deg = frame["estimate_deg"].to_numpy(dtype=np.float64)
     return Estimates(object_ids, estimate_deg.reshape(len(object_ids), -1))
 
 
-def objects_of_full_turns(
-    path: str | Path, frame: pd.DataFrame, azimuth_column: str
-) -> tuple[str, ...]:
-    """Return the objects of a table with one row for every view of a full turn.
+def sweep_objects(path: str | Path, frame: pd.DataFrame, azimuth_column: str) -> tuple[str, ...]:
+    """Return the objects of a table with one row for every view of a full sweep.
 
     Raises
     ------
@@ -72,7 +70,7 @@ def objects_of_full_turns(
         or not np.array_equal(frame[azimuth_column].to_numpy(), azimuth_deg)
         or not np.array_equal(frame["object_id"], np.repeat(object_ids, n_views))
     ):
-        raise damaged(path, "an object has no full turn of equally spaced views")
+        raise damaged(path, "an object has no full sweep of equally spaced views")
     return object_ids
 
 

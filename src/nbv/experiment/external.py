@@ -52,8 +52,8 @@ def take_fold(
             for name in object_ids:
                 azimuth_deg, rows = sweeps[name]
                 # The temperature was fitted to the distributions before they are rotated.
-                own = posteriors_of((name,), np.log(rows)[None], temperature).distributions[0]
-                whole.append(evenly_apart(azimuth_deg, own, n_views))
+                scaled = posteriors_of((name,), np.log(rows)[None], temperature).distributions[0]
+                whole.append(evenly_apart(azimuth_deg, scaled, n_views))
             posteriors = Posteriors(tuple(object_ids), np.log(np.stack(whole)), temperature)
         taken[role] = Estimates(tuple(object_ids), estimate_deg), posteriors
     return taken

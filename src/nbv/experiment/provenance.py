@@ -49,14 +49,14 @@ def source_files(script: str | Path, chosen: tuple[str, ...] = ()) -> list[str]:
     not count.
     """
     imports = _imports()
-    found: set[str] = set()
+    dependencies: set[str] = set()
     waiting = [*_imported_names(script), *(entry.partition(":")[0] for entry in chosen)]
     while waiting:
         module = waiting.pop()
-        if module in imports and module not in found | UNRELATED:
-            found.add(module)
+        if module in imports and module not in dependencies | UNRELATED:
+            dependencies.add(module)
             waiting += imports[module]
-    return sorted({file for module in found for file in _files_of(module)})
+    return sorted({file for module in dependencies for file in _files_of(module)})
 
 
 @functools.cache
@@ -93,7 +93,7 @@ def _files_of(module: str) -> Iterator[str]:
 
 
 def git_commit(directory: str | Path = Path(__file__).parent) -> str:
-    """Return the commit checked out in a folder, this package's own unless another is given.
+    """Return the commit checked out in a folder, by default this package's.
 
     It is marked ``-dirty`` where files differ from it, and ``unknown`` outside a checkout and, with
     a warning, where git refuses to answer, such as for the checkout of another user.
@@ -107,7 +107,7 @@ def git_commit(directory: str | Path = Path(__file__).parent) -> str:
             env=os.environ | {"LC_ALL": "C"},
         )
     except (OSError, subprocess.CalledProcessError) as error:
-        # Of another user's checkout, git names the command that allows it.
+        # For another user's checkout, git's reason names the command that allows it.
         reason = " ".join((getattr(error, "stderr", "") or str(error)).split())
         if "not a git repository" not in reason:
             logger.warning("the commit is unknown: %s", reason)

@@ -15,7 +15,7 @@ from nbv.core.evidence import Evidence
 from nbv.core.lookup import LookupTable
 from nbv.core.policies import HeldOutViews, two_views
 from nbv.errors import UserError
-from nbv.experiment.estimates import check_azimuths, objects_of_full_turns, read_estimates
+from nbv.experiment.estimates import check_azimuths, read_estimates, sweep_objects
 from nbv.experiment.splits import read_splits
 from nbv.files import check_columns, damaged, existing, read_csv, readable
 
@@ -183,7 +183,7 @@ def read_evaluation(path: Path) -> pd.DataFrame:
     """Read the errors of one method in one fold; same errors as `load_evaluations`."""
     frame = read_csv(path)
     check_columns(path, frame, COLUMNS)
-    objects_of_full_turns(path, frame, "initial_deg")
+    sweep_objects(path, frame, "initial_deg")
     check_azimuths(path, frame, ("initial_estimate_deg", "pose_estimate_deg"))
     followed = frame.dropna(subset="delta_deg")
     if len(followed) not in (0, len(frame)):

@@ -30,9 +30,9 @@ def make_splits(
 ) -> pd.DataFrame:
     """Divide objects into folds; each object is tested in exactly one.
 
-    Of a fold's remaining objects, `calibration_fraction` (at least one, and at least one is left
-    to train on) calibrate and the others train; or they are divided into parts. A fraction of 1
-    leaves none to train on. The test objects of a fold do not depend on this. `crossfit_parts` is
+    A fold divides its other objects: `calibration_fraction` of them calibrate (at least one, and
+    at least one trains) and the others train; or they form parts for cross-fitting. A fraction of
+    1 leaves none to train on. The test objects of a fold do not depend on this. `crossfit_parts` is
     the number of parts for cross-fitting, of equal size (to within one object).
 
     Returns
@@ -137,13 +137,13 @@ def objects_with_role(splits: pd.DataFrame, fold: int, *roles: str) -> list[str]
 
 
 def seen_at(object_ids: Sequence[str], place: int, n_places: int, most: int) -> list[str]:
-    """Return which objects are seen at one of several elevations.
+    """Return the objects that are seen at one of several elevations.
 
-    All of them, if that makes no more than `most` turns at all elevations together; else each at
-    fewer elevations, but at least at one, in turn.
+    All objects, if that makes no more than `most` sweeps over all elevations; else each object at
+    fewer elevations, at least one, distributed evenly.
     """
     each = min(max(most // max(len(object_ids), 1), 1), n_places)
-    return [one for i, one in enumerate(object_ids) if (place - i) % n_places < each]
+    return [name for i, name in enumerate(object_ids) if (place - i) % n_places < each]
 
 
 def check_objects(splits: pd.DataFrame, object_ids: Iterable[str]) -> None:

@@ -8,8 +8,8 @@ from typing import Any, Final, Literal
 PRETRAINED: Final = "pretrained"
 FEATURES: Final = "features"
 Start = int | Literal["pretrained", "features"] | None
-"""What a training starts from: the estimator of an elevation, the network of all categories, that
-of the depth features, or None."""
+"""What a training starts from: the estimator of an elevation, the network of all categories, the
+network of the depth features, or None for random weights."""
 
 Stage = Literal["training", "pretraining", "fine_tuning", "next_elevation"]
 STAGES: tuple[Stage, ...] = ("training", "pretraining", "fine_tuning", "next_elevation")
@@ -30,7 +30,7 @@ def start_of(warm_start: str, elevations_deg: Collection[int], elevation: int) -
     elevations_deg : collection of int
         All elevations of the category, degrees.
     elevation : int
-        One of them.
+        The elevation to train, degrees.
 
     Returns
     -------
@@ -66,13 +66,13 @@ def stage_settings(
         ``training`` from random weights, ``pretraining`` of all categories together,
         ``fine_tuning`` of the pretrained network or that of the features, or ``next_elevation``.
     epochs : int, optional
-        Those of a training from random weights, where they are not ``estimator.epochs``. Each
-        other stage takes its own in the same proportion, and one at the least.
+        Epochs of a training from random weights, by default ``estimator.epochs``. Other stages
+        scale their epochs in the same proportion, to at least one.
     """
-    own: Mapping[str, Any] = estimator if stage == "training" else estimator[stage]
+    schedule: Mapping[str, Any] = estimator if stage == "training" else estimator[stage]
     share = 1.0 if epochs is None else epochs / estimator["epochs"]
     others = ("warm_start", "mirror_images", *STAGES)
     return {key: value for key, value in estimator.items() if key not in others} | {
-        "epochs": max(round(own["epochs"] * share), 1),
-        "learning_rate": own["learning_rate"],
+        "epochs": max(round(schedule["epochs"] * share), 1),
+        "learning_rate": schedule["learning_rate"],
     }

@@ -166,7 +166,7 @@ class Schedule(Section):
 LINEAR = ("linear", "linear_classifier")
 """Estimators on depth features, which are not trained; see `nbv.experiment.estimation.linear`."""
 
-_OF_OUTPUTS = ("kind", "mirror_images", "n_classes", "target_bandwidth_deg", "pairs")
+_OUTPUT_KEYS = ("kind", "mirror_images", "n_classes", "target_bandwidth_deg", "pairs")
 
 
 class Estimator(Section):
@@ -192,7 +192,7 @@ class Estimator(Section):
 
     @model_validator(mode="after")
     def _check_training(self) -> Self:
-        trained = [name for name in type(self).model_fields if name not in _OF_OUTPUTS]
+        trained = [name for name in type(self).model_fields if name not in _OUTPUT_KEYS]
         if self.kind in LINEAR:
             # An experiment sets them for any estimator, but a run must record what applies to it.
             for name in trained:
@@ -247,7 +247,7 @@ class Density(Section):
 
 
 class Affinity(Section):
-    """How alike two distributions must be to count; see `nbv.core.criteria`."""
+    """How similar two distributions must be to count; see `nbv.core.criteria`."""
 
     power: Annotated[Number, Field(gt=0, le=10**4)]
     pseudo_observations: PseudoObservations
@@ -331,7 +331,7 @@ class Randomisation(Section):
 
 
 class Bundles(Section):
-    """Calibration turns of bundles, the ingredients they are compared without, and the frames."""
+    """Calibration sweeps of bundles, the ingredients they are compared without, and the frames."""
 
     calibration_turns: Annotated[int, Field(ge=1)] = 360
     ingredients: dict[Name, dict[Name, Number | None]] = {}

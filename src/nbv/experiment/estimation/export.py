@@ -22,9 +22,9 @@ def onnx_model(estimator: Estimator, mirrored_classes: NDArray[np.intp] | None =
     """Return a network as an ONNX model; the same weights give the same bytes in any folder.
 
     Its input is ``codes`` (n, 1, side, side) float32: crops as depth codes, 0 to 255. Its outputs
-    are ``logits`` (n, B), the network's own, and ``hidden`` (n, H), its hidden layer for the crops
-    as they are. Kernels and matrices are rounded to half precision, which halves the model's size;
-    the model computes in single precision.
+    are ``logits`` (n, B) and ``hidden`` (n, H), its hidden layer for the crops as they are.
+    Kernels and matrices are rounded to half precision, which halves the model's size; the model
+    computes in single precision.
 
     Parameters
     ----------
@@ -83,6 +83,6 @@ class _OnCodes(nn.Module):
         logits = self.to_logits(hidden)
         if self.mirrored is None:
             return logits, hidden
-        own, other = logits.reshape(-1, 2, self.to_logits.out_features).unbind(1)
-        mean = (own + other.index_select(1, self.mirrored)) / 2
+        plain, mirrored = logits.reshape(-1, 2, self.to_logits.out_features).unbind(1)
+        mean = (plain + mirrored.index_select(1, self.mirrored)) / 2
         return mean, hidden.reshape(-1, 2, self.to_logits.in_features)[:, 0]

@@ -99,5 +99,7 @@ class Features:
         These are half the sum and half the difference of the features of an image and of its mirror
         image. The mirror image has the same even part, and the odd part with the other sign.
         """
-        own, mirrored = self.of(codes), self.of(codes[..., ::-1])
-        return np.asarray(np.concatenate([own + mirrored, own - mirrored], axis=1) / 2, np.float32)
+        plain, mirrored = self.of(codes), self.of(codes[..., ::-1])
+        return np.asarray(
+            np.concatenate([plain + mirrored, plain - mirrored], axis=1) / 2, np.float32
+        )

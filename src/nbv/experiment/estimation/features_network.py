@@ -40,23 +40,23 @@ def train_features(
     images : sequence of DepthImages
         One for each category and elevation, all with the same number of views.
     categories : sequence of str
-        The category of each.
+        The category of each element of `images`.
     mirror_planes_deg : mapping
         The azimuth of each category's plane of symmetry.
     settings, hardware, seed
-        As of `nbv.experiment.estimation.training.train_network`.
+        See `nbv.experiment.estimation.training.train_network`.
     """
     names = sorted(set(categories))
     n_views, side = images[0].codes.shape[1:3]
     of_views = direction_targets(settings, n_views)
     targets, mirrored = [], []
     for category, each in zip(categories, images, strict=True):
-        own = np.full((n_views, 2 * len(names)), np.nan, dtype=np.float32)
+        of_category = np.full((n_views, 2 * len(names)), np.nan, dtype=np.float32)
         first = 2 * names.index(category)
-        own[:, first : first + 2] = of_views
+        of_category[:, first : first + 2] = of_views
         plane = mirrored_bins(n_views, mirror_planes_deg[category])
-        targets.append(np.tile(own, (len(each.codes), 1)))
-        mirrored.append(np.tile(own[plane], (len(each.codes), 1)))
+        targets.append(np.tile(of_category, (len(each.codes), 1)))
+        mirrored.append(np.tile(of_category[plane], (len(each.codes), 1)))
     torch.manual_seed(seed)
     network = cast(nn.Sequential, build_network(settings, side))
     network[-1] = nn.Linear(settings["hidden"], 2 * len(names))
@@ -64,7 +64,7 @@ def train_features(
         network.to(hardware.device),
         np.concatenate([each.codes for each in images]),
         np.concatenate(targets),
-        _loss_of_own_outputs,
+        _masked_loss,
         settings,
         hardware,
         seed,
@@ -73,7 +73,7 @@ def train_features(
     return Estimator(network, settings, side, ())
 
 
-def _loss_of_own_outputs(outputs: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
+def _masked_loss(outputs: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
     """Return the mean squared error of the outputs that have a target; the others' is NaN."""
     return (outputs - targets)[~targets.isnan()].square().mean()
 

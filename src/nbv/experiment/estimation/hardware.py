@@ -71,8 +71,8 @@ def choose_hardware(device: str = "auto", precision: str = "auto") -> Hardware:
 def use_one_thread() -> None:
     """Make torch compute on one thread and deterministically.
 
-    Two jobs of two threads each on two cores ran 5 to 13 times slower than two of one, and the
-    result of a sum depends on the number of threads.
+    Two jobs of two threads each on two cores ran 5 to 13 times slower than two of one thread
+    each, and the result of a sum depends on the number of threads.
     """
     torch.set_num_threads(1)
     if torch.get_num_threads() != 1:

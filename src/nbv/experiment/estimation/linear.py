@@ -39,12 +39,12 @@ N_PARTS = 5
 """Parts of the training objects. The penalty is the one with the least error on left-out parts."""
 
 CLASS_PENALTY = 1e-8
-"""Of `fit_classes`, nats per image; calibration objects of mugs are then likeliest."""
+"""Penalty of `fit_classes`, nats per image: the likeliest for calibration objects of mugs."""
 CLASS_STEP = 4
-"""`fit_classes` takes every fourth view, because neighbouring views are alike."""
+"""`fit_classes` takes every fourth view, because neighbouring views are similar."""
 N_ITERATIONS = 60
 START_SHARPNESS = 10.0
-"""Logits start as so many times the cosine between a class and the regression's direction."""
+"""Initial logits, as a multiple of the cosine between a class and the regression's direction."""
 
 
 @dataclass(frozen=True)
@@ -92,14 +92,14 @@ def fit_fold(
     Parameters
     ----------
     features : ndarray (n, n_views, D)
-        Of full turns of all objects of the category.
+        Features of the sweeps of all objects of the category.
     object_ids : sequence of str
         The n objects.
     splits : DataFrame
         From `nbv.experiment.splits.read_splits`.
     fold : int
     settings, mirror_plane_deg
-        As of `fit_linear`.
+        See `fit_linear`.
 
     Returns
     -------
@@ -126,9 +126,9 @@ def fit_fold(
     names: list[str] = []
     outputs = []
     for part, role in enumerate(held_out, start=1):
-        own = fitted if held_out == ("calibration",) else fit(without=part)
+        estimator = fitted if held_out == ("calibration",) else fit(without=part)
         names += (in_part := objects_with_role(splits, fold, role))
-        outputs.append(own.outputs(of(in_part)))
+        outputs.append(estimator.outputs(of(in_part)))
     test = objects_with_role(splits, fold, "test")
     return fitted, {
         "calibration": (names, np.concatenate(outputs)),
@@ -144,7 +144,7 @@ def fit_linear(
     Parameters
     ----------
     features : ndarray (n, n_views, D)
-        Of full turns of the training objects; even and odd parts where there is a plane.
+        Features of the sweeps of the training objects; even and odd parts where there is a plane.
     settings : mapping
         The configuration's ``estimator``.
     mirror_plane_deg : float or None
@@ -159,13 +159,13 @@ def fit_directions(features: Rows, mirror_plane_deg: float | None) -> LinearEsti
     """Fit (cos, sin) of the azimuth by ridge regression; see `fit_linear`."""
     n_views, n_features = features.shape[1:]
     if mirror_plane_deg is None:
-        turn = 2 * np.pi * np.arange(n_views) / n_views
-        return _ridge(features, np.stack([np.cos(turn), np.sin(turn)], axis=1))
+        azimuth = 2 * np.pi * np.arange(n_views) / n_views
+        return _ridge(features, np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1))
     plane = np.radians(mirror_plane_deg)
-    turn = 2 * np.pi * np.arange(n_views) / n_views - plane
+    azimuth = 2 * np.pi * np.arange(n_views) / n_views - plane
     half = n_features // 2
-    even = _ridge(features[..., :half], np.cos(turn)[:, None])
-    odd = _ridge(features[..., half:], np.sin(turn)[:, None], has_bias=False)
+    even = _ridge(features[..., :half], np.cos(azimuth)[:, None])
+    odd = _ridge(features[..., half:], np.sin(azimuth)[:, None], has_bias=False)
     along, across = (np.array([[np.cos(a), np.sin(a)]]) for a in (plane, plane + np.pi / 2))
     return LinearEstimator(
         np.concatenate([even.weights @ along, odd.weights @ across]),
@@ -215,7 +215,7 @@ def fit_classes(
 ) -> LinearEstimator:
     """Fit a logit for each class by penalised maximum likelihood; see `fit_linear`.
 
-    `settings` has ``n_classes`` and ``target_bandwidth_deg``, as of
+    `settings` has ``n_classes`` and ``target_bandwidth_deg``; see
     `nbv.experiment.estimation.outputs.class_targets`.
     """
     n_features, n_classes = features.shape[-1], settings["n_classes"]
@@ -252,6 +252,6 @@ def _softmax_regression(x: Rows, y: Targets, start: LinearEstimator) -> LinearEs
         return value, np.concatenate([apart.sum(axis=0), slope.ravel()]).astype(np.float64)
 
     first = np.concatenate([start.bias @ unit, (start.weights @ unit).ravel()]) * START_SHARPNESS
-    found = minimize(loss, first, jac=True, method="L-BFGS-B", options={"maxiter": N_ITERATIONS})
-    weights, bias = unpacked(found.x)
+    solution = minimize(loss, first, jac=True, method="L-BFGS-B", options={"maxiter": N_ITERATIONS})
+    weights, bias = unpacked(solution.x)
     return LinearEstimator(weights, bias, CLASS_PENALTY)

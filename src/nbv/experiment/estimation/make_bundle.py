@@ -113,8 +113,8 @@ def make_bundle(
     estimator : Estimator
         A classifier, trained on ``<object id>/<elevation>``.
     sweeps : sequence of Sweep
-        Of calibration objects, which the estimator has not seen, by its `bundled_network`
-        with the mirror plane.
+        Sweeps of calibration objects, which the estimator has not seen, with the logits of its
+        `bundled_network` with the mirror plane.
     extent_px : (float, float)
         From `sweeps_of`.
     mirror_plane_deg : float or None

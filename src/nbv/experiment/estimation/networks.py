@@ -78,7 +78,7 @@ class Kind:
     network : callable
         ``network(settings, image_side)``, untrained.
     targets : callable
-        ``targets(settings, n_views)``: the targets of the views of a full turn, (n_views, k).
+        ``targets(settings, n_views)``: the targets of the views of a sweep, (n_views, k).
     loss : callable
         ``loss(outputs, targets)``, a scalar tensor.
     """

@@ -85,7 +85,7 @@ def estimates_of(
     ----------
     outputs : mapping
         For each role, ``calibration`` and ``test``, the ids of n objects and the outputs
-        (n, n_views, k) for their full turns.
+        (n, n_views, k) for their sweeps.
     distributions : bool
         Whether outputs are logits of distributions. Calibration objects then choose one
         temperature (`nbv.core.logits.fit_temperature`).

@@ -149,7 +149,7 @@ def fit_network(
     settings : mapping
         ``epochs, batch_size, learning_rate, weight_decay``.
     hardware, seed
-        As of `train_network`.
+        See `train_network`.
     mirrored_targets : ndarray (n, k) float32, optional
         The targets of the mirror images. With them, half of each batch is mirrored.
 

@@ -56,7 +56,7 @@ class Start:
     Attributes
     ----------
     weights : mapping of str to Tensor
-        Of all layers, or of all but the last.
+        Weights of all layers, or of all but the last.
     origin : mapping
         See `Estimator.started_from`.
     """
@@ -148,9 +148,9 @@ def read_start(
         kept = {k: tensor for k, tensor in tensors.items() if not k.startswith(f"{last}.")}
         return Start(kept, origin)
     stored = load_estimator(path, hardware)
-    seen, own = set(stored.trained_on), set(object_ids)
+    seen, wanted = set(stored.trained_on), set(object_ids)
     qualified = set(with_category(category, object_ids))
-    if seen != own and {name for name in seen if name.startswith(f"{category}/")} != qualified:
+    if seen != wanted and {name for name in seen if name.startswith(f"{category}/")} != qualified:
         raise damaged(path, f"it was trained on other objects of {category}")
     return Start(stored.network.state_dict(), origin)
 

@@ -19,10 +19,10 @@ from nbv.experiment.estimates import read_posteriors
 from nbv.experiment.explorer.data import (
     COLUMNS,
     Outcomes,
+    distributions_text,
     methods_of,
     outcomes_of,
     outcomes_text,
-    own_distributions_text,
     page_table,
     ring_of,
     unit_facts,
@@ -97,7 +97,7 @@ def build_explorer(inputs: ExplorerInputs) -> str:
         chunks[f"unit-{index}"] = outcomes_text(outcomes)
         tables = _add_tables(chunks, inputs, criteria, index, unit, outcomes)
         images = _add_images(chunks, inputs, index, unit, outcomes)
-        own = _add_own(chunks, inputs, index, unit, outcomes)
+        distributions = _add_distributions(chunks, inputs, index, unit, outcomes)
         units.append(
             {
                 "category": unit[0],
@@ -105,7 +105,7 @@ def build_explorer(inputs: ExplorerInputs) -> str:
                 "elevation": unit[1],
                 "tables": tables,
                 "images": images,
-                "own": own,
+                "own": distributions,
                 **unit_facts(outcomes),
             }
         )
@@ -189,7 +189,7 @@ def _add_images(
     return {"count": ring.n_images, "side": ring.side, "columns": COLUMNS}
 
 
-def _add_own(
+def _add_distributions(
     chunks: dict[str, str], inputs: ExplorerInputs, index: int, unit: Unit, outcomes: Outcomes
 ) -> dict[str, int] | None:
     if not inputs.posteriors:
@@ -198,5 +198,5 @@ def _add_own(
         tested = zip(outcomes.object_ids, outcomes.folds, strict=True)
         ids = [name for name, tested_in in tested if tested_in == fold]
         posteriors = read_posteriors(existing(inputs.posteriors[*unit, fold]), ids)
-        chunks[f"own-{index}-{fold}"] = own_distributions_text(posteriors)
+        chunks[f"own-{index}-{fold}"] = distributions_text(posteriors)
     return {"classes": posteriors.log_posterior.shape[2]}

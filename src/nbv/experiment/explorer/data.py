@@ -24,13 +24,13 @@ from nbv.core.lookup import LookupTable
 from nbv.errors import UserError
 from nbv.experiment.report.figures.views import depth_limits, shade
 from nbv.experiment.results import Unit
-from nbv.experiment.statistics.metrics import HALF_TURN_DEG
+from nbv.experiment.statistics.metrics import FRONT_BACK_DEG
 
 Codes = NDArray[np.uint8]
 Hundredths = NDArray[np.int64]
 
-TURN = 36000
-"""A full turn, in hundredths of a degree."""
+FULL_CIRCLE = 36000
+"""360 degrees in hundredths of a degree."""
 
 # Relative to a table's largest value; codes for smaller values would make all others coarser.
 _LEAST_PART = 1e-9
@@ -38,12 +38,12 @@ _LEAST_PART = 1e-9
 
 def hundredths(angle_deg: NDArray[np.floating[Any]]) -> Hundredths:
     """Return angles in hundredths of a degree, in [0, 36000)."""
-    return np.rint(np.asarray(angle_deg, dtype=np.float64) * 100.0).astype(np.int64) % TURN
+    return np.rint(np.asarray(angle_deg, dtype=np.float64) * 100.0).astype(np.int64) % FULL_CIRCLE
 
 
-def half_turn(difference: Hundredths) -> Hundredths:
+def wrapped(difference: Hundredths) -> Hundredths:
     """Wrap differences of angles to [-18000, 18000)."""
-    return np.asarray((difference + TURN // 2) % TURN - TURN // 2)
+    return np.asarray((difference + FULL_CIRCLE // 2) % FULL_CIRCLE - FULL_CIRCLE // 2)
 
 
 def byte_planes(values: Hundredths) -> bytes:
@@ -194,7 +194,7 @@ def page_table(table: LookupTable) -> PageTable:
     )
 
 
-def own_distributions_text(posteriors: Posteriors) -> str:
+def distributions_text(posteriors: Posteriors) -> str:
     """Return the distributions of the images at the azimuths of the classes, as text.
 
     Square roots in 256 steps, relative to the largest of the distribution; (n_objects, k, k) bytes.
@@ -219,13 +219,13 @@ class Outcomes:
         First views of each object, evenly spaced.
     estimate : ndarray (n_objects, n_views) int64
         The estimate from the first view alone, hundredths of a degree.
-    turn : dict of str to ndarray (n_objects, n_views) int64
-        By method: the rotation to the second view, in steps of 360° / n_views; absent for methods
+    rotation : dict of str to ndarray (n_objects, n_views) int64
+        Rotation to the second view by method, in steps of 360° / n_views; absent for methods
         without a second view.
     pose : dict of str to ndarray (n_objects, n_views) int64
-        By method: the fused pose, hundredths of a degree.
+        Fused pose by method, hundredths of a degree.
     means : dict of str to list
-        By method: mean errors by object, degrees to two decimals.
+        Mean errors by method and object, degrees to two decimals.
     overall : dict of str to dict
         By method, over all first views: the mean error, the part of errors above 90° in it (both in
         degrees), and their share in percent.
@@ -235,7 +235,7 @@ class Outcomes:
     folds: tuple[int, ...]
     n_views: int
     estimate: Hundredths
-    turn: dict[str, Hundredths]
+    rotation: dict[str, Hundredths]
     pose: dict[str, Hundredths]
     means: dict[str, list[float]]
     overall: dict[str, dict[str, float]]
@@ -255,44 +255,44 @@ def outcomes_of(unit: Unit, frame: pd.DataFrame) -> Outcomes:
     shape = (len(object_ids), -1)
     estimate_deg = _table(next(iter(by_method.values())), "initial_estimate_deg", shape)
     n_views = estimate_deg.shape[1]
-    turn, pose = {}, {}
+    rotation, pose = {}, {}
     means: dict[str, list[float]] = {}
     for method, part in by_method.items():
-        own = part.set_index("object_id").loc[list(object_ids)]
-        _check_same(unit, method, _table(own, "initial_estimate_deg", shape), estimate_deg)
-        pose[method] = hundredths(_table(own, "pose_estimate_deg", shape))
-        if own["delta_deg"].notna().all():
-            delta_deg = _table(own, "delta_deg", shape)
-            turn[method] = np.rint(delta_deg * n_views / 360.0).astype(np.int64)
+        rows = part.set_index("object_id").loc[list(object_ids)]
+        _check_same(unit, method, _table(rows, "initial_estimate_deg", shape), estimate_deg)
+        pose[method] = hundredths(_table(rows, "pose_estimate_deg", shape))
+        if rows["delta_deg"].notna().all():
+            delta_deg = _table(rows, "delta_deg", shape)
+            rotation[method] = np.rint(delta_deg * n_views / 360.0).astype(np.int64)
             seen = np.take_along_axis(
-                estimate_deg, (np.arange(n_views) + turn[method]) % n_views, axis=1
+                estimate_deg, (np.arange(n_views) + rotation[method]) % n_views, axis=1
             )
-            _check_same(unit, method, _table(own, "next_estimate_deg", shape), seen)
-        means[method] = _rounded(_table(own, "error_deg", shape).mean(axis=1))
+            _check_same(unit, method, _table(rows, "next_estimate_deg", shape), seen)
+        means[method] = _rounded(_table(rows, "error_deg", shape).mean(axis=1))
     return Outcomes(
         object_ids,
         folds,
         n_views,
         hundredths(estimate_deg),
-        turn,
+        rotation,
         pose,
         means,
         {method: _overall(part["error_deg"]) for method, part in by_method.items()},
     )
 
 
-def expected_pose(estimate: Hundredths, turn: Hundredths | None) -> Hundredths:
-    """Return the pose halfway between the first estimate and the second one, turned back (Eq. 7).
+def expected_pose(estimate: Hundredths, rotation: Hundredths | None) -> Hundredths:
+    """Return the pose halfway between the first estimate and the second, rotated back (Eq. 7).
 
     In whole hundredths of a degree, (n_objects, n_views), exactly as on the page; the first
     estimate without a second view.
     """
-    if turn is None:
+    if rotation is None:
         return estimate
     n_views = estimate.shape[1]
-    second = np.take_along_axis(estimate, (np.arange(n_views) + turn) % n_views, axis=1)
-    back = half_turn(second - turn * (36000 // n_views) - estimate)
-    return np.asarray((estimate + back // 2) % 36000)
+    second = np.take_along_axis(estimate, (np.arange(n_views) + rotation) % n_views, axis=1)
+    back = wrapped(second - rotation * (FULL_CIRCLE // n_views) - estimate)
+    return np.asarray((estimate + back // 2) % FULL_CIRCLE)
 
 
 def outcomes_text(outcomes: Outcomes) -> str:
@@ -302,13 +302,13 @@ def outcomes_text(outcomes: Outcomes) -> str:
     `expected_pose`.
     """
     n_views = outcomes.n_views
-    off = half_turn(outcomes.estimate - np.arange(n_views) * (36000 // n_views))
-    parts = [byte_planes(half_turn(np.diff(off, axis=1, prepend=0)))]
+    off = wrapped(outcomes.estimate - np.arange(n_views) * (FULL_CIRCLE // n_views))
+    parts = [byte_planes(wrapped(np.diff(off, axis=1, prepend=0)))]
     for method, pose in outcomes.pose.items():
-        turn = outcomes.turn.get(method)
-        if turn is not None:
-            parts.append(byte_planes(turn))
-        parts.append(byte_planes(half_turn(pose - expected_pose(outcomes.estimate, turn))))
+        rotation = outcomes.rotation.get(method)
+        if rotation is not None:
+            parts.append(byte_planes(rotation))
+        parts.append(byte_planes(wrapped(pose - expected_pose(outcomes.estimate, rotation))))
     return as_text(*parts)
 
 
@@ -318,7 +318,7 @@ def unit_facts(outcomes: Outcomes) -> dict[str, Any]:
         "objects": outcomes.object_ids,
         "folds": outcomes.folds,
         "views": outcomes.n_views,
-        "turns": list(outcomes.turn),
+        "turns": list(outcomes.rotation),
         "means": outcomes.means,
         "overall": outcomes.overall,
     }
@@ -337,7 +337,7 @@ def _check_same(unit: Unit, method: str, values: np.ndarray, expected: np.ndarra
 
 
 def _overall(error_deg: pd.Series) -> dict[str, float]:
-    above = error_deg > HALF_TURN_DEG
+    above = error_deg > FRONT_BACK_DEG
     mean, part_above, share = _rounded(
         [error_deg.mean(), error_deg.where(above, 0.0).mean(), 100.0 * above.mean()]
     )

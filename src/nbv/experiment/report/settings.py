@@ -90,7 +90,7 @@ def reference_units(units: Iterable[Unit], settings: ReportSettings) -> list[Uni
     by_category: dict[str, list[Unit]] = {}
     for unit in units:
         by_category.setdefault(unit[0], []).append(unit)
-    return [(name, common_elevation_deg(own, settings)) for name, own in by_category.items()]
+    return [(name, common_elevation_deg(every, settings)) for name, every in by_category.items()]
 
 
 def common_elevation_deg(units: Iterable[Unit], settings: ReportSettings) -> int:
@@ -111,8 +111,8 @@ def focus_unit(units: Iterable[Unit], settings: ReportSettings) -> Unit:
     """Return the focus category at the reference elevation, or at its lowest one."""
     present = list(units)
     category = focus_category(present, settings)
-    own = [unit for unit in present if unit[0] == category]
-    return category, common_elevation_deg(own, settings)
+    of_category = [unit for unit in present if unit[0] == category]
+    return category, common_elevation_deg(of_category, settings)
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ Body = tuple[list[str], list[Row]]
 """The titles of the columns after the first, and the rows."""
 
 METRIC_TITLES = {"mae": "MAE", "pauc": "pAUC"}
-HALF_TURNS = "above_90_percent"
+ABOVE_90 = "above_90_percent"
 
 
 def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
@@ -51,9 +51,9 @@ def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
     methods = _methods(cells)
     differs = _shows_difference(cells, settings)
     rows = []
-    in_blocks = cells.sort_values("metric", key=lambda names: names == HALF_TURNS, kind="stable")
+    in_blocks = cells.sort_values("metric", key=lambda names: names == ABOVE_90, kind="stable")
     for (metric, label), part in in_blocks.groupby(["metric", "row_label"], sort=False):
-        title = f"{label}: errors above 90°" if metric == HALF_TURNS else str(label)
+        title = f"{label}: errors above 90°" if metric == ABOVE_90 else str(label)
         row = [Cell(title), *_values(part, methods)]
         if differs:
             subject = part[part["method"] == settings.subject].iloc[0]
@@ -146,8 +146,8 @@ def _example_cells(estimates: pd.Series, errors: pd.Series) -> Iterator[Cell]:
     least = errors.round(1).min()
     for estimate, error in zip(estimates, errors, strict=True):
         if np.isfinite(error):
-            turned = number(round(estimate, 1) % 360, 1)  # 359.96 is shown as 0.0, not as 360.0
-            yield Cell(f"{turned}° ({number(error, 1)}°)", bool(round(error, 1) == least))
+            shown = number(round(estimate, 1) % 360, 1)  # 359.96 is shown as 0.0, not as 360.0
+            yield Cell(f"{shown}° ({number(error, 1)}°)", bool(round(error, 1) == least))
         else:
             yield Cell("–")
 
@@ -280,7 +280,7 @@ def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) 
     for unit in units:
         sample = pair_methods(evaluations[unit], unit[0])
         label = unit_label(unit, elevation)
-        for shown in (metric, HALF_TURNS):
+        for shown in (metric, ABOVE_90):
             made = method_cells(name, unit[0], label, shown, sample, resampler, settings)
             cells += _with_published(made) if unit[1] == 0 else made
     title = f"{METRIC_TITLES[metric]} by category at elevation {elevation}°"
@@ -295,7 +295,7 @@ def _by_elevation(name: str, evaluations: Evaluations, settings: ReportSettings)
     for elevation in sorted(degrees for other, degrees in evaluations if other == category):
         sample = pair_methods(evaluations[category, elevation], category)
         row = str(elevation), f"{elevation}°"
-        for shown in (metric, HALF_TURNS):
+        for shown in (metric, ABOVE_90):
             cells += method_cells(name, *row, shown, sample, resampler, settings)
     if category == published.FOCUS_CATEGORY:
         cells = _with_published(cells)
@@ -313,7 +313,7 @@ def _by_group(name: str, evaluations: Evaluations, settings: ReportSettings) -> 
             span = f"{start}–359°, 0–{stop - 1}°" if start > stop else f"{start}–{stop - 1}°"
             sample = everything.select(groups == group)
             row = str(group), f"{group} ({span})"
-            for shown in ("mae", HALF_TURNS):
+            for shown in ("mae", ABOVE_90):
                 cells += method_cells(name, *row, shown, sample, resampler, settings)
     title = f"MAE of {_focus_title(unit, 'by viewpoint group')}"
     return _Measured(title, "Viewpoint group", _with_published_focus(unit, cells))

@@ -18,7 +18,7 @@ Ints = NDArray[np.int64]
 PAUC_LIMIT_DEG = 100.0
 """Upper end of the thresholds that the pAUC integrates over (Tables 3 and 4 of the paper)."""
 
-HALF_TURN_DEG = 90.0
+FRONT_BACK_DEG = 90.0
 """Errors above this angle confuse front and back rather than being inaccurate."""
 
 
@@ -27,9 +27,9 @@ def accuracy_area(errors_deg: ArrayLike) -> Floats:
     return PAUC_LIMIT_DEG - np.minimum(np.asarray(errors_deg, dtype=np.float64), PAUC_LIMIT_DEG)
 
 
-def half_turned(errors_deg: ArrayLike) -> Floats:
+def above_90(errors_deg: ArrayLike) -> Floats:
     """Return the contribution of each image to the share of errors above 90°: 0 or 100 percent."""
-    return np.where(np.asarray(errors_deg, dtype=np.float64) > HALF_TURN_DEG, 100.0, 0.0)
+    return np.where(np.asarray(errors_deg, dtype=np.float64) > FRONT_BACK_DEG, 100.0, 0.0)
 
 
 _MEDIAN_GRID = 1001
@@ -101,9 +101,9 @@ def pauc(errors_deg: ArrayLike) -> float:
 
     Exactly ``100 - mean(min(error, 100))``: integrating the step of one image from 0 to 100
     leaves the part of the range above its error. It is thus an MAE with errors clipped at 100
-    degrees, and adds little to the MAE unless half-turns are common. Higher is
-    better. Many published values are lower than this can be; see
-    `nbv.experiment.paper.published`. Same parameters and errors as `mae_deg`.
+    degrees, and adds little to the MAE unless larger errors are common. Higher is better. Many
+    published values are lower than this can be; see `nbv.experiment.paper.published`. Same
+    parameters and errors as `mae_deg`.
     """
     return float(np.mean(accuracy_area(_non_empty(errors_deg))))
 
@@ -112,9 +112,9 @@ def above_90_percent(errors_deg: ArrayLike) -> float:
     """Return the share of errors above 90 degrees, in percent: front and back are confused.
 
     Lower is better. The mean of two opposite estimates is 90 degrees from both, so averaging can
-    turn one error of 180 degrees into two of 90. Same parameters and errors as `mae_deg`.
+    split one error of 180 degrees into two of 90. Same parameters and errors as `mae_deg`.
     """
-    return float(np.mean(half_turned(_non_empty(errors_deg))))
+    return float(np.mean(above_90(_non_empty(errors_deg))))
 
 
 def fold_std(values: ArrayLike) -> float:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from nbv.core.angles import travel_deg
 from nbv.errors import UserError
 from nbv.experiment.statistics import metrics
-from nbv.experiment.statistics.metrics import Floats, Interval, Ints, accuracy_area, half_turned
+from nbv.experiment.statistics.metrics import Floats, Interval, Ints, above_90, accuracy_area
 from nbv.files import existing, read_csv
 
 VIEWPOINT_GROUPS: Mapping[int, tuple[int, int]] = {
@@ -251,7 +251,7 @@ def _estimate_sigma(
 def _per_image(statistic: str, errors_deg: Floats) -> Floats:
     """Return the contribution of each image to a statistic that is a mean over images."""
     if statistic == "above_90_percent":
-        return half_turned(errors_deg)
+        return above_90(errors_deg)
     return accuracy_area(errors_deg) if statistic == "pauc" else errors_deg
 
 
@@ -288,7 +288,7 @@ def object_means(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
         travel = travel_deg(frame["delta_deg"].fillna(0).to_numpy(dtype=np.float64))
         rows = frame.assign(
             pauc_percent=accuracy_area(frame["error_deg"]),
-            above_90_percent=half_turned(frame["error_deg"]),
+            above_90_percent=above_90(frame["error_deg"]),
             travel_deg=travel,
         ).groupby("object_id")
         means = rows[list(MEAN_COLUMNS)].mean()

@@ -107,7 +107,7 @@ def idea(inputs: FigureInputs) -> Figure:
         ],
     ]
     titles = ["After one view", "Before a second view: p(θ | e, δ)"]
-    turns = [0, worst, best]
+    rotations = [0, worst, best]
     captions = ["first view", "worst second", "recommended"]
     seen = shown.outcomes.get(inputs.settings.subject)
     if seen is not None and np.isfinite(_delta(shown, inputs.settings.subject)):
@@ -123,7 +123,7 @@ def idea(inputs: FigureInputs) -> Figure:
     top = 1.3 * max(float(spread.max()) for row in curves for spread, *_ in row)
     azimuths = np.arange(n_bins) * step
     for row, lines in enumerate(curves):
-        azimuth = float(wrap_deg(shown.azimuth_deg + turns[row] * step))
+        azimuth = float(wrap_deg(shown.azimuth_deg + rotations[row] * step))
         image = figure.add_subplot(grid[row, 0])
         draw_depth(image, shown.view(azimuth), limits)
         image.set_xlabel(f"{captions[row]}, {azimuth:.0f}°")

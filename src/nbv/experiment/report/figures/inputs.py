@@ -130,7 +130,7 @@ class ExampleView:
         """The object, its category, fold and elevation."""
         category, elevation = self.unit
         fold = self.example.fold
-        # Hashes of 32 digits fill the line; eight digits are distinct, and Table 6 has all.
+        # An id may be a hash of 32 digits: eight are distinct, and Table 6 shows all.
         name = self.example.object_id
         short = name if len(name) <= _LONGEST_NAME else f"{name[:8]}…"
         return f"{short} ({category}, fold {fold}, elevation {elevation}°)"

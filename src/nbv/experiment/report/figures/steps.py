@@ -32,7 +32,7 @@ Curve = NDArray[np.float32]
 
 _DPI = 90
 _COLOURS = 48
-_TURNING_FRAMES = 32
+_MOVING_FRAMES = 32
 _LOOKING_FRAMES = 20
 _STEP_MS, _READ_MS = 90, 2600
 
@@ -97,20 +97,20 @@ def steps(inputs: FigureInputs) -> Figure:
         "2  The table: cost of each turn",
         f"3  Two views, δ = {delta}°",
     )
-    for row, (title, turned) in enumerate(zip(titles, (0, None, scene.best), strict=True)):
+    for row, (title, rotation) in enumerate(zip(titles, (0, None, scene.best), strict=True)):
         axes = figure.add_subplot(grid[row, 1])
         axes.set_title(title, loc="left", fontweight="bold", fontsize=9)
         image = figure.add_subplot(grid[row, 0])
-        if turned is None:
+        if rotation is None:
             _draw_ring(image, scene, [0, scene.best])
             _draw_cost(axes, scene, scene.best)
             azimuth_axis(axes, "Rotation δ (degrees)")
             continue
-        azimuth = scene.azimuth_deg(turned)
+        azimuth = scene.azimuth_deg(rotation)
         draw_depth(image, scene.shown.view(azimuth), limits)
         image.set_xlabel(f"from {azimuth:.0f}°")
-        curve = after if turned else scene.one_view
-        _draw_pose(axes, scene, curve, method_style("single", ()).color if not turned else "", top)
+        curve = after if rotation else scene.one_view
+        _draw_pose(axes, scene, curve, "" if rotation else method_style("single", ()).color, top)
         azimuth_axis(axes, "Pose (degrees)")
     return figure
 
@@ -118,15 +118,15 @@ def steps(inputs: FigureInputs) -> Figure:
 def animation_frames(inputs: FigureInputs) -> Iterator[tuple[Figure, int]]:
     """Yield each frame with its duration in milliseconds.
 
-    First one view; then the table's row from start to end; then the camera turns, each frame with
+    First one view; then the table's row from start to end; then the camera moves, each frame with
     the distribution from both views if it stopped there; last two views.
     """
     scene = _scene(inputs)
     best = scene.best if scene.best <= scene.n_bins / 2 else scene.best - scene.n_bins
-    turned = np.unique(np.linspace(0, best, _TURNING_FRAMES).round().astype(int))
-    turned = turned if best >= 0 else turned[::-1]
+    rotations = np.unique(np.linspace(0, best, _MOVING_FRAMES).round().astype(int))
+    rotations = rotations if best >= 0 else rotations[::-1]
     looked = np.linspace(0, scene.n_bins, _LOOKING_FRAMES, endpoint=False).astype(int)
-    top = _top([scene.one_view, *(scene.two_views(int(delta)) for delta in turned)])
+    top = _top([scene.one_view, *(scene.two_views(int(delta)) for delta in rotations)])
     estimate = round(scene.shown.estimate_deg) % 360
     delta = round(scene.best * scene.step_deg)
     start = f"1  One view, estimate {estimate}°: many poses fit it"
@@ -136,9 +136,9 @@ def animation_frames(inputs: FigureInputs) -> Iterator[tuple[Figure, int]]:
         yield _frame(scene, look, 0, int(delta_bin), top), _STEP_MS
     chosen = f"2  A turn by δ = {delta}° costs least"
     yield _frame(scene, chosen, 0, scene.best, top), _READ_MS
-    turning = "3  The camera turns, the shorter way"
-    for delta_bin in turned[1:-1]:
-        yield _frame(scene, turning, int(delta_bin), scene.best, top), _STEP_MS
+    moving = "3  The camera turns, the shorter way"
+    for delta_bin in rotations[1:-1]:
+        yield _frame(scene, moving, int(delta_bin), scene.best, top), _STEP_MS
     end = f"3  Two views, δ = {delta}°: few poses fit both"
     yield _frame(scene, end, best, scene.best, top), 2 * _READ_MS
 
@@ -191,11 +191,11 @@ def _frame(scene: _Scene, text: str, delta: int, looked: int | None, top: float)
     draw_depth(image, scene.shown.view(azimuth), depth_limits(scene.shown.views))
     image.set_xlabel(f"depth image from {azimuth:.0f}°")
     pose = figure.add_subplot(grid[0, 1])
-    turned = delta != 0
-    curve = scene.two_views(delta) if turned else scene.one_view
-    _draw_pose(pose, scene, curve, "" if turned else method_style("single", ()).color, top)
+    has_moved = delta != 0
+    curve = scene.two_views(delta) if has_moved else scene.one_view
+    _draw_pose(pose, scene, curve, "" if has_moved else method_style("single", ()).color, top)
     azimuth_axis(pose, "Pose: azimuth of the first view (degrees)")
-    _draw_ring(figure.add_subplot(grid[1, 0]), scene, [0, delta] if turned else [0])
+    _draw_ring(figure.add_subplot(grid[1, 0]), scene, [0, delta] if has_moved else [0])
     cost = figure.add_subplot(grid[1, 1])
     _draw_cost(cost, scene, looked)
     azimuth_axis(cost, "Rotation δ to the next view (degrees)")
@@ -246,8 +246,8 @@ def _draw_ring(axes: Axes, scene: _Scene, deltas: Sequence[int]) -> None:
     axes.set(xlim=(-1.45, 1.45), ylim=(-1.45, 1.45))
     start = scene.shown.azimuth_deg
     for number, delta in enumerate(deltas, 1):
-        turn = (delta * scene.step_deg + 180) % 360 - 180
-        angle = np.radians(start + turn)
+        rotation_deg = (delta * scene.step_deg + 180) % 360 - 180
+        angle = np.radians(start + rotation_deg)
         color = method_style("single", ()).color if number == 1 else scene.color
         position = np.cos(angle), np.sin(angle)
         axes.plot(
@@ -258,11 +258,11 @@ def _draw_ring(axes: Axes, scene: _Scene, deltas: Sequence[int]) -> None:
         )
         axes.plot(*position, marker="o", color=color, markersize=8)
         # The least angle between two numbers.
-        aside = np.copysign(max(0.0, 25.0 - abs(turn)), turn) if number > 1 else 0.0
+        aside = np.copysign(max(0.0, 25.0 - abs(rotation_deg)), rotation_deg) if number > 1 else 0.0
         named = angle + np.radians(aside)
         axes.text(1.28 * np.cos(named), 1.28 * np.sin(named), str(number), ha="center", va="center")
         if number > 1:
-            arc = np.radians(start + np.linspace(0, turn, 60))
+            arc = np.radians(start + np.linspace(0, rotation_deg, 60))
             axes.plot(1.06 * np.cos(arc), 1.06 * np.sin(arc), color=color, linewidth=1.8)
 
 
