@@ -17,7 +17,7 @@ from nbv.experiment.statistics.paired import Resampler, mae_difference, mae_inte
 from nbv.labels import number
 
 ALL = 0
-"""Stands for all calibration objects."""
+"""The value of ``n_calibration`` for all calibration objects."""
 
 PAPER: Mapping[str, Any] = {
     "criterion": "pose_ambiguity",
@@ -85,15 +85,15 @@ def ablate(
     """
     wanted = instance["n_calibration"]
     estimate_deg = calibration.estimate_deg[: wanted if wanted != ALL else None]
-    own = dict(settings) | {key: instance[key] for key in ("pose_likelihood", "spread")}
+    settings = dict(settings) | {key: instance[key] for key in ("pose_likelihood", "spread")}
     method = {"policy": instance["criterion"], "fusion": instance["fusion"]}
     if instance["chosen_by"] == "given":
         density = DensityParams(instance["bandwidth_deg"], instance["pseudo_observations"])
     elif instance["chosen_by"] == "likelihood":
-        density = most_likely_density(estimate_deg, own)
+        density = most_likely_density(estimate_deg, settings)
     else:
-        density = choose_densities(estimate_deg, {"ablated": method}, own)["ablated"]
-    evidence = chosen_evidence(estimate_deg, density, own, instance["n_bins"])
+        density = choose_densities(estimate_deg, {"ablated": method}, settings)["ablated"]
+    evidence = chosen_evidence(estimate_deg, density, settings, instance["n_bins"])
     error = two_views(**method, views=HeldOutViews(test.estimate_deg, evidence)).error_deg
     return pd.DataFrame({"object_id": test.object_ids, "error_deg": error.mean(axis=1)})
 

@@ -14,7 +14,7 @@ from nbv.robot.evaluation import RECOMMENDED, SINGLE
 from studies.trainings import crossed_mean
 
 ALL = ""
-"""Stands for "nothing is left out"."""
+"""Key of the trainings that leave nothing out."""
 
 _SHOWN = ((SINGLE, 1, "one view"), (RECOMMENDED, 2, "two views"))
 
@@ -25,12 +25,12 @@ Replicates = Sequence[pd.DataFrame]
 
 
 def ingredient_table(rendered: Mapping[Key, Replicates], real: Mapping[Key, Replicates]) -> Table:
-    """Return the errors of bundles without an ingredient, less those of bundles with all.
+    """Return the differences of errors between bundles without an ingredient and with all.
 
     Parameters
     ----------
     rendered : mapping of (str, str) to sequence of DataFrame
-        By category and left-out ingredient, `ALL` first: results on randomised test objects.
+        Results on randomised test objects by category and left-out ingredient, `ALL` first.
     real : mapping
         Results on recordings of a real camera, or empty.
     """

@@ -24,7 +24,7 @@ from nbv.experiment.estimates import read_estimates, read_posteriors
 from nbv.files import damaged, readable, write_arrays
 
 FORMAT = 2
-# The file may be anything that a user names.
+# The remedy in messages: a user may name any file.
 _AGAIN = "name a file of kept estimates, or keep them again"
 _SETTINGS = "settings"
 
@@ -81,13 +81,13 @@ def held_out(estimates: Estimates, posteriors: Posteriors | None = None) -> Held
     The number of views must be a multiple of the number of classes.
     """
     away = signed_difference_deg(estimates.estimate_deg, estimates.azimuth_deg)
-    # Half a turn is stored as -18000 in either direction.
+    # 180° in either direction is stored as -18000.
     residual = (np.rint(away * 100.0) + 18000) % 36000 - 18000
     surprisal = None
     if posteriors is not None:
         p = posteriors.distributions
         p = p[:, :: p.shape[1] // p.shape[2]]
-        # At most −10 log of the least probability, 138.
+        # At most 138, which is −10 log of the least probability.
         surprisal = np.rint(-10.0 * np.log(in_object_frame(p))).astype(np.uint8)
     return HeldOut(estimates.object_ids, residual.astype(np.int16), surprisal)
 

@@ -132,7 +132,7 @@ def _rank_notes(methods: Methods, mae: Mapping[str, Floats], ranks: Floats) -> I
 def _shared_methods(blocks: Blocks, methods: Methods) -> list[str]:
     """Return the methods of the configuration that every block has.
 
-    Of several methods with the same policy and fusion, only the first is ranked.
+    Duplicates of a policy and fusion are ranked once, by the first name.
     """
     first = next(iter(blocks.values()))
     everywhere = [m for m in first.errors_deg if all(m in s.errors_deg for s in blocks.values())]

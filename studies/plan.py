@@ -1,4 +1,4 @@
-"""What the studies make, from the plan of the run and what other runs have left."""
+"""The files of the studies, from the plan of the run and the files of other runs."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Training = tuple[int, int]
 
 @dataclass(frozen=True)
 class KeptRun:
-    """A run whose estimates the statistics are made of.
+    """A run whose estimates enter the statistics.
 
     Attributes
     ----------
     path : str or None
-        The file that they are kept in; None for this run's own.
+        The file of kept estimates; None for this run's estimates.
     keys : sequence of (shuffle, replicate, category, elevation in degrees)
     dataset : str
         The name of its data set.
@@ -41,9 +41,9 @@ class KeptRun:
 
 @dataclass(frozen=True, eq=False)
 class Studies:
-    """What the studies of one run make.
+    """The files that the studies of one run make.
 
-    Folders are relative to the run's folder: empty, or with a slash in front.
+    Folders are relative to the run's folder: empty, or with a leading slash.
     """
 
     run: Plan
@@ -52,7 +52,7 @@ class Studies:
 
     @property
     def decision(self) -> dict[str, Any]:
-        """What decides on a rotation where distributions are fused."""
+        """Settings that decide on a rotation where distributions are fused."""
         return self.run.decision | {"affinity": self.run.config["affinity"]}
 
     @property
@@ -106,16 +106,16 @@ class Studies:
     def two_view_methods(self, run: str) -> list[str]:
         """Return a run's methods of two views, and those that multiply its distributions."""
         settings = self.settings_of(run)
-        products = settings["extensions"].items()
+        methods, extensions = settings["methods"], settings["extensions"].items()
         return [
-            *(name for name, one in settings["methods"].items() if one["policy"] != "none"),
-            *(name for name, one in products if one.get("fusion") == "product"),
+            *(name for name, method in methods.items() if method["policy"] != "none"),
+            *(name for name, method in extensions if method.get("fusion") == "product"),
         ]
 
     def compared_roles(self, run: str) -> Sequence[str]:
         """Return the roles to compare: the calibration objects where all runs have the same."""
         runs = self.compared_runs
-        ways = {self.settings_of(one).get("calibration", "holdout") for one in runs}
+        ways = {self.settings_of(name).get("calibration", "holdout") for name in runs}
         return ESTIMATED_ROLES if len(ways) == 1 else ("test",)
 
     def compared(
@@ -159,7 +159,7 @@ class Studies:
 
     @property
     def shape_folds(self) -> list[tuple[str, int]]:
-        """The same, and one fold of each solid, whose objects are all the same."""
+        """`category_folds`, and one fold of each solid, whose objects are all the same."""
         return self.category_folds + [(name, 1) for name in SOLIDS]
 
     # Trained on × tested on
@@ -182,7 +182,7 @@ class Studies:
         return settings
 
     def condition_folder(self, name: str) -> str:
-        """Return the folder of a condition: the run's own where it was made under that very one."""
+        """Return the folder of a condition: the run's where its settings are the same."""
         settings, config = self.condition(name), self.run.config
         is_run = self.transfer_unit in self.run.units and all(
             settings[key] == config[key] for key in ("camera", "sensor")
@@ -192,12 +192,12 @@ class Studies:
     def estimator_folder(self, name: str) -> str:
         """Return the folder of a condition's estimators.
 
-        The run's own are taken only where they too were trained from random weights.
+        The run's estimators serve only where they too were trained from random weights.
         """
         if self.run.crossfit:
             raise UserError("transfer calibrates with objects held out: needs calibration=holdout")
-        own = self.run.start(*self.transfer_unit) is None
-        return self.condition_folder(name) if own else f"/transfer/{name}"
+        is_from_scratch = self.run.start(*self.transfer_unit) is None
+        return self.condition_folder(name) if is_from_scratch else f"/transfer/{name}"
 
     # Trainings beyond the run's own
 
@@ -205,17 +205,17 @@ class Studies:
     def trainings(self) -> list[Training]:
         """Shuffle and replicate of every training."""
         replicates = self.run.config["confirmation"]["replicates"]
-        return [(shuffle, one) for shuffle, of_it in enumerate(replicates) for one in of_it]
+        return [(shuffle, n) for shuffle, of_it in enumerate(replicates) for n in of_it]
 
     @property
     def held_out(self) -> list[tuple[str, int, int, str]]:
-        """Category, elevation, fold and role of what is kept of a training."""
+        """Category, elevation, fold and role of the estimates that are kept of a training."""
         folds: list[Fold] = self.run.folds_of(self.run.lowest_units)
         return [(*fold, role) for fold in folds for role in ESTIMATED_ROLES]
 
     @functools.cached_property
     def kept_runs(self) -> dict[str, KeptRun]:
-        """What the statistics are made of, by run.
+        """Estimates that enter the statistics, by run.
 
         Raises
         ------
@@ -225,24 +225,24 @@ class Studies:
         config = self.run.config
         if not config["confirmation"]["kept"]:
             units = self.run.lowest_units
-            own = [(*training, *unit) for training in self.trainings for unit in units]
-            return {config["name"]: KeptRun(None, own, _dataset(config))}
-        found: dict[str, KeptRun] = {}
+            keys = [(*training, *unit) for training in self.trainings for unit in units]
+            return {config["name"]: KeptRun(None, keys, _dataset(config))}
+        runs: dict[str, KeptRun] = {}
         for path in config["confirmation"]["kept"]:
             settings, keys = _kept_settings(path)
             run, dataset = settings["name"], _dataset(settings)
-            if run in found:
-                other = found[run].path
+            if run in runs:
+                other = runs[run].path
                 raise UserError(f"confirmation.kept: {path} is of the run {run}, as {other} is")
             categories = {key[2] for key in keys}
-            for one in found.values():
-                if one.dataset == dataset and categories & {key[2] for key in one.keys}:
+            for kept in runs.values():
+                if kept.dataset == dataset and categories & {key[2] for key in kept.keys}:
                     raise UserError(
-                        f"confirmation.kept: {path} and {one.path} have the same categories of "
+                        f"confirmation.kept: {path} and {kept.path} have the same categories of "
                         f"the data set {dataset}"
                     )
-            found[run] = KeptRun(path, keys, dataset)
-        return found
+            runs[run] = KeptRun(path, keys, dataset)
+        return runs
 
     @property
     def kept_trainings(self) -> list[dict[str, Any]]:
@@ -257,23 +257,23 @@ class Studies:
 
     @property
     def variants(self) -> dict[str, tuple[str, int]]:
-        """By their folder: what each training is without, and its replicate; not the bundle's."""
+        """Left-out ingredient and replicate by folder, without the bundle's training."""
         bundles = self.run.config["bundles"]
-        found = {
+        all_variants = {
             variant_folder(without, replicate): (without, replicate)
             for without in ("", *bundles["ingredients"])
             for replicate in {0, *bundles["replicates"]}
         }
-        return {folder: variant for folder, variant in found.items() if folder}
+        return {folder: variant for folder, variant in all_variants.items() if folder}
 
     @property
     def rendered_variants(self) -> list[str]:
-        """The folders of those that have images of their own: replicates share theirs."""
+        """Folders of the variants that render images, which their replicates share."""
         return [folder for folder, (_, replicate) in self.variants.items() if not replicate]
 
     @property
     def compared_variants(self) -> list[tuple[str, str, int]]:
-        """Category, what is left out, and replicate of each bundle in the table."""
+        """Category, left-out ingredient and replicate of each bundle in the table."""
         bundles = self.run.config["bundles"]
         return [
             (category, without, replicate)
@@ -289,20 +289,20 @@ class Studies:
         return {**config["randomisation"], **left_out}
 
     def bundle_settings(self, variant: str) -> dict[str, Any]:
-        """Return what a variant's bundle says of its training."""
+        """Return the training settings that a variant's bundle records."""
         _, replicate = self.variants[variant]
-        said = self.run.bundle_settings | {"randomisation": self.randomisation(variant)}
-        return said | ({"replicate": replicate} if replicate else {})
+        settings = self.run.bundle_settings | {"randomisation": self.randomisation(variant)}
+        return settings | ({"replicate": replicate} if replicate else {})
 
 
 def training_folder(shuffle: int | str, replicate: int | str) -> str:
-    """Return the folder of a training, relative to the run's; 0 and 0 are the run's own."""
-    own = (str(shuffle), str(replicate)) == ("0", "0")
-    return "" if own else f"/confirmation/shuffle{shuffle}/replicate{replicate}"
+    """Return the folder of a training, relative to the run's; empty for (0, 0), the run's."""
+    is_run = (str(shuffle), str(replicate)) == ("0", "0")
+    return "" if is_run else f"/confirmation/shuffle{shuffle}/replicate{replicate}"
 
 
 def shuffle_folder(shuffle: int | str) -> str:
-    """Return the folder of a shuffle, relative to the run's; 0 is the run's own."""
+    """Return the folder of a shuffle, relative to the run's; empty for 0, the run's."""
     return "" if str(shuffle) == "0" else f"/confirmation/shuffle{shuffle}"
 
 
@@ -323,9 +323,7 @@ def files_of_manifest(path: str) -> list[str]:
         recordings = read_manifest(path)
     except UserError as error:
         raise UserError(f"bundles.frames: {error}") from error
-    columns = [
-        one.frames[name] for one in recordings for name in ("path", "mask") if name in one.frames
-    ]
+    columns = [each.frames.get(name, ()) for each in recordings for name in ("path", "mask")]
     return [path, *(file for column in columns for file in column if file)]
 
 

@@ -98,17 +98,17 @@ def _lines(
 
 
 def _scopes(
-    units: list[Unit], common_deg: int
+    all_units: list[Unit], common_deg: int
 ) -> Iterator[tuple[str, str, Mapping[str, list[Unit]]]]:
     """Yield the name, label and units by category of all scopes."""
     by_category: dict[str, list[Unit]] = {}
-    for unit in units:
+    for unit in all_units:
         by_category.setdefault(unit[0], []).append(unit)
-    for category, own in by_category.items():
-        for unit in own:
+    for category, units in by_category.items():
+        for unit in units:
             yield f"{category}/el{unit[1]:02d}", unit_label(unit, common_deg), {category: [unit]}
-        if len(own) > 1:
-            yield category, f"{category_label(category)}, all elevations", {category: own}
+        if len(units) > 1:
+            yield category, f"{category_label(category)}, all elevations", {category: units}
     if len(by_category) > 1:
         yield "all", "All categories", by_category
 

@@ -140,17 +140,17 @@ def predicted_by_others(tables: Sequence[Floats]) -> list[Interval]:
     """
     means = training_means(tables)
     predictions = []
-    for own in range(len(means) if len(means) > 2 else 0):
-        others = np.delete(means, own)
+    for k in range(len(means) if len(means) > 2 else 0):
+        others = np.delete(means, k)
         half = stats.t.ppf(0.975, len(others) - 1) * others.std(ddof=1)
         half *= np.sqrt(1 + 1 / len(others))
         centre = others.mean()
-        predictions.append(Interval(float(means[own]), float(centre - half), float(centre + half)))
+        predictions.append(Interval(float(means[k]), float(centre - half), float(centre + half)))
     return predictions
 
 
 def holm(p_values: Mapping[str, float]) -> dict[str, float]:
-    """Return p-values adjusted for their number (Holm, 1979): each that is below 0.05 still counts.
+    """Return p-values adjusted for their number (Holm, 1979), to compare with 0.05.
 
     The k-th least of n is multiplied by n - k + 1, and none is less than the one before it. NaN
     stays NaN and does not count.
