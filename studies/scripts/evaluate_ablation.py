@@ -9,9 +9,9 @@ with job(snakemake):
     from nbv.experiment.estimates import read_estimates
     from nbv.files import write_csv
 
-    params, found = snakemake.params, []
+    params, errors = snakemake.params, []
     pairs = zip(snakemake.input.calibration, snakemake.input.test, params.folds, strict=True)
     for calibration, test, fold in pairs:
         estimates = read_estimates(calibration), read_estimates(test)
-        found.append(ablate(*estimates, params.instance, params.density).assign(fold=fold))
-    write_csv(snakemake.output[0], pd.concat(found))
+        errors.append(ablate(*estimates, params.instance, params.density).assign(fold=fold))
+    write_csv(snakemake.output[0], pd.concat(errors))

@@ -15,10 +15,10 @@ with job(snakemake):
     params, wildcards = snakemake.params, snakemake.wildcards
     splits, posteriors = read_splits(given.splits), {}
     estimates = {role: read_estimates(given[role]) for role in ("calibration", "test")}
-    for role, found in estimates.items():
-        check_role(splits, int(wildcards.fold), role, found.object_ids)
+    for role, of_role in estimates.items():
+        check_role(splits, int(wildcards.fold), role, of_role.object_ids)
         if path := given.get(f"{role}_posteriors"):
-            posteriors[f"{role}_posteriors"] = read_posteriors(path, found.object_ids)
+            posteriors[f"{role}_posteriors"] = read_posteriors(path, of_role.object_ids)
     made = evaluate_extensions(
         estimates["calibration"],
         estimates["test"],

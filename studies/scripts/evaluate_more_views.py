@@ -19,7 +19,7 @@ with job(snakemake):
     check_role(splits, int(wildcards.fold), "test", test.object_ids)
     choices = read_csv(given.choices)
     evidences = stored_evidence(calibration, choices, params.density)
-    # The label decides the draws of random views: it stays as it was.
+    # The label seeds the draws of random views, so it keeps its old name.
     rng = rng_for(params.seed, "sequence", *wildcards)
     if path := given.get("calibration_posteriors"):
         held_out = read_posteriors(path, calibration.object_ids)

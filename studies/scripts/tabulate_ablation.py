@@ -1,4 +1,4 @@
-"""Tabulate what each choice in the paper's method brings."""
+"""Tabulate the effect of each choice in the paper's method."""
 
 from nbv.experiment.jobs import job
 

@@ -30,7 +30,7 @@ with job(snakemake):
         recordings = read_manifest(given.frames[0])
         for key, path in zip(keys, given.bundles, strict=True):
             recommender = Recommender.load(path)
-            sweeps = [run_network(recommender, one, None, None, left_out) for one in recordings]
+            sweeps = [run_network(recommender, each, None, None, left_out) for each in recordings]
             real.setdefault(key, []).append(evaluate(recommender.bundle, sweeps, n_views=(2,)))
     table = ingredient_table(rendered, real)
     write_table(table, dict(snakemake.output.items()), params.caution)

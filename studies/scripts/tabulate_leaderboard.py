@@ -12,7 +12,7 @@ with job(snakemake):
 
     params = snakemake.params
     files = files_by_run(params.folds, snakemake.input.objects)
-    blocks = blocks_of({run: load_folds(found) for run, found in files.items()})
+    blocks = blocks_of({run: load_folds(paths) for run, paths in files.items()})
     resampler = Resampler.seeded(np.random.default_rng(params.seed), params.n_resamples)
     table = leaderboard_table(blocks, params.methods, resampler)
     write_table(table, dict(snakemake.output.items()), snakemake.params.caution)

@@ -1,4 +1,4 @@
-"""Make the page to play with."""
+"""Make the explorer, an interactive page."""
 
 from pathlib import Path
 
@@ -18,9 +18,9 @@ with job(snakemake):
     }
     # The rule declares what the run has: no depth images, or no distributions, in some.
     files = {
-        name: dict(zip(keys[name], map(Path, found), strict=True))
-        for name, found in given.items()
-        if name in keys and found
+        name: dict(zip(keys[name], map(Path, paths), strict=True))
+        for name, paths in given.items()
+        if name in keys and paths
     }
     inputs = ExplorerInputs(
         name=params.name,

@@ -13,7 +13,7 @@ with job(snakemake):
     params, given, output = snakemake.params, snakemake.input, snakemake.output
     use_one_thread()
     hardware = choose_hardware(params.device, params.precision)
-    found = estimate_fold(
+    estimates = estimate_fold(
         open_depth(given.depth, given.objects),
         read_splits(given.splits),
         int(snakemake.wildcards.fold),
@@ -22,4 +22,4 @@ with job(snakemake):
         hardware,
         distributions=bool(output.get("test_posteriors")),
     )
-    write_fold(output, found)
+    write_fold(output, estimates)

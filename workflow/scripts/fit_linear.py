@@ -1,4 +1,4 @@
-"""Fit the linear estimator of one fold to depth features, and estimate what it has not seen."""
+"""Fit the linear estimator of one fold to depth features, and estimate held-out objects."""
 
 from nbv.experiment.jobs import job
 

@@ -1,4 +1,4 @@
-"""Put a network and what held-out objects teach about it into one file; test it on others."""
+"""Make a bundle of a network and its calibration with held-out objects; test it on others."""
 
 from nbv.experiment.jobs import job
 
@@ -33,9 +33,9 @@ with job(snakemake):
         objects_with_role(splits, params.fold, role) for role in ("calibration", "test")
     )
     network = bundled_network(estimator)
-    # Of 360 views one every 15 degrees, as on a turntable.
-    of_turntable = 15
-    plain, *_ = sweeps_of(network, images, params.elevations, calibration, of_turntable)
+    # A view every 15 degrees, as on a turntable.
+    step = 15
+    plain, *_ = sweeps_of(network, images, params.elevations, calibration, step)
     plane_deg = find_mirror_plane(network, plain)
     where = "none" if plane_deg is None else f"at an azimuth of {plane_deg:g}°"
     logging.getLogger("nbv").info("mirror plane of the objects: %s", where)
@@ -54,5 +54,5 @@ with job(snakemake):
         | {"settings": params.settings},
     )
     bundle.save(snakemake.output.bundle)
-    tested, *_ = sweeps_of(network, test_images, params.elevations, test, of_turntable)
+    tested, *_ = sweeps_of(network, test_images, params.elevations, test, step)
     write_csv(snakemake.output.evaluation, evaluate(bundle, tested, n_views=(2, 3)))

@@ -21,8 +21,8 @@ with job(snakemake):
     }
     # A figure's rule declares what the figure needs, and nothing else.
     files = {
-        name: dict(zip(keys[name], map(Path, found), strict=True))
-        for name, found in given.items()
+        name: dict(zip(keys[name], map(Path, of_kind), strict=True))
+        for name, of_kind in given.items()
         if name in keys
     }
     evaluations = load_evaluations(files.pop("evaluations"))

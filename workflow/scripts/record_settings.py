@@ -1,4 +1,4 @@
-"""Write down what the results were made with: configuration, commit and versions."""
+"""Record the configuration, commit and versions that made the results."""
 
 from nbv.experiment.jobs import job
 

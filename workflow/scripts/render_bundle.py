@@ -1,4 +1,4 @@
-"""Render a turn of each object of one category near one elevation, as a real camera sees it."""
+"""Render a sweep of each object of one category near one elevation, as a real camera sees it."""
 
 from nbv.experiment.jobs import job
 
@@ -26,9 +26,9 @@ with job(snakemake):
     trained, calibrated, tested = (
         objects_with_role(splits, params.fold, role) for role in ("train", "calibration", "test")
     )
-    place, turns = params.elevations.index(int(wildcards.elevation)), params.calibration_turns
-    calibrated = seen_at(calibrated, place, len(params.elevations), turns)
-    # The promises of a bundle are for what its camera measures.
+    place, n_places = params.elevations.index(int(wildcards.elevation)), len(params.elevations)
+    calibrated = seen_at(calibrated, place, n_places, params.calibration_turns)
+    # A bundle is calibrated and tested on what its camera measures.
     learnt = Randomisation(**params.randomisation)
     randomisation = dict.fromkeys(trained, learnt)
     randomisation |= dict.fromkeys([*calibrated, *tested], replace(learnt, measured=1.0))
@@ -41,10 +41,10 @@ with job(snakemake):
             renderer,
             sensor,
             params.sensor["diagonal_m"][wildcards.category],
-            own,
+            drawn,
             rng_for(params.seed, "bundle", wildcards.category, int(wildcards.elevation), object_id),
         )
-        for object_id, own in randomisation.items()
+        for object_id, drawn in randomisation.items()
     )
     shape = N_AZIMUTHS, camera.image_side, camera.image_side
     write_depth(output.depth, output.objects, randomisation, images, shape)

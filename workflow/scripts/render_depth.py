@@ -1,4 +1,4 @@
-"""Render a full turn of each object of one category at one elevation."""
+"""Render a full sweep of each object of one category at one elevation."""
 
 from nbv.experiment.jobs import job
 

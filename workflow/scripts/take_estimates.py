@@ -11,10 +11,10 @@ with job(snakemake):
     given, output, wildcards = snakemake.input, snakemake.output, snakemake.wildcards
     pairs = PairTable.load(given.pairs)
     pairs = pairs.for_unit(wildcards.category, float(wildcards.elevation))
-    found = take_fold(
+    estimates = take_fold(
         pairs.estimates,
         pairs.distributions if output.get("test_posteriors") else {},
         read_splits(given.splits),
         int(wildcards.fold),
     )
-    write_fold(output, found)
+    write_fold(output, estimates)

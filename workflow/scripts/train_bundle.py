@@ -17,13 +17,13 @@ with job(snakemake):
     splits = read_splits(given.splits)
     object_ids = objects_with_role(splits, params.fold, "train")
     opened = [open_depth(*paths) for paths in zip(given.depth, given.objects, strict=True)]
-    # A gigabyte and more: one copy, filled elevation by elevation.
+    # A single copy, filled elevation by elevation: it may exceed a gigabyte.
     codes = np.empty((len(opened), len(object_ids), *opened[0].codes.shape[1:]), dtype=np.uint8)
     for of_elevation, images in zip(codes, opened, strict=True):
         of_elevation[:] = images.of(object_ids)
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
     # Replicate 0 is the bundle itself.
-    own = [params.replicate] if params.replicate else []
+    replicate = [params.replicate] if params.replicate else []
     images = codes.reshape(-1, *codes.shape[2:])
     plane_deg = params.mirror_plane_deg
     starts = [
@@ -34,7 +34,7 @@ with job(snakemake):
         images,
         params.estimator,
         hardware,
-        seed_for(params.seed, "bundle", wildcards.category, *own),
+        seed_for(params.seed, "bundle", wildcards.category, *replicate),
         start=starts[0].weights if starts else None,
         mirror_planes_deg=None if plane_deg is None else [plane_deg] * len(images),
     )

@@ -1,7 +1,7 @@
-"""Train the estimator of one category, elevation and fold, or of the parts but one of a fold.
+"""Train the estimator of one category, elevation and fold, or of all parts but one of a fold.
 
-A fold's own estimator then estimates the calibration and the test objects, where files for that
-are asked for.
+A fold's estimator then estimates the calibration and the test objects, where the rule has these
+outputs.
 """
 
 from nbv.experiment.jobs import job
@@ -40,10 +40,10 @@ with job(snakemake):
     )
     save_estimator(output.estimator, estimator, hardware)
     if output.get("test"):
-        # What is estimated with is what the file holds.
+        # Estimates come from the saved weights.
         saved = load_estimator(output.estimator, hardware)
         distributions = bool(output.get("test_posteriors"))
-        found = estimate_fold(
+        estimates = estimate_fold(
             images, splits, fold, saved, [], hardware, distributions=distributions
         )
-        write_fold(output, found)
+        write_fold(output, estimates)

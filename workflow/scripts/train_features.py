@@ -15,7 +15,7 @@ with job(snakemake):
 
     params, given = snakemake.params, snakemake.input
     use_one_thread()
-    # This job alone may take all cores: it has no others beside it.
+    # This job may take all cores: it runs alone.
     torch.set_num_threads(snakemake.threads)
     trained = train_features(
         [open_depth(*paths) for paths in zip(given.depth, given.objects, strict=True)],

@@ -1,4 +1,4 @@
-"""Hold every file of a run to the checksum that it had when it was written."""
+"""Compare every file of a run with the checksum that was recorded when it was written."""
 
 from nbv.experiment.jobs import SOUND, job, states_of_files
 
