@@ -129,7 +129,7 @@ def make_metadata(path: Path) -> None:
 
 def read_metadata(path: Path) -> Any:
     source = dataset("shapenet", path.parent)
-    return [(name, source.orientation("mug", name)) for name in source.object_ids("mug")]
+    return [(name, source.mesh_axes("mug", name)) for name in source.object_ids("mug")]
 
 
 def metadata_problem(objects: Any) -> str:
