@@ -55,7 +55,7 @@ CONTRASTS_COLUMNS = (
 )
 
 BELIEF_COLUMNS = ("log_likelihood", "inside_50_percent", "inside_90_percent")
-"""The quality of beliefs; see `nbv.core.simulation.follow`."""
+"""The quality of beliefs; see `studies.simulation.follow`."""
 
 BELIEFS_COLUMNS = (
     *GROUP,
