@@ -23,8 +23,8 @@ from nbv.core.plans import (
     step_by_step,
 )
 from nbv.core.policies import HeldOutViews, take_second_views
-from nbv.core.selection import SelectedMethod
 from nbv.experiment.statistics.metrics import accuracy_area, half_turned
+from studies.selection import SelectedMethod
 from studies.simulation import (
     DistributionViews,
     EstimatedViews,
