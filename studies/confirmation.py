@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.experiment.statistics.paired import MEAN_COLUMNS, object_means
 from studies.factorial import LIKELIEST, MORE_VIEWS, SINGLE, Factorial
+from studies.object_errors import MEAN_COLUMNS, object_means
 from studies.trainings import (
     Mean,
     crossed_mean,
