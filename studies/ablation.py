@@ -13,8 +13,9 @@ from nbv.core.fusion import ESTIMATE_FUSIONS
 from nbv.core.policies import HeldOutViews, two_views
 from nbv.core.selection import DensityParams, choose_densities, chosen_evidence, most_likely_density
 from nbv.experiment.report.table import DECIDED, Cell, Table, difference_cell
-from nbv.experiment.statistics.paired import Resampler, mae_difference, mae_interval, paired_objects
+from nbv.experiment.statistics.paired import Resampler
 from nbv.labels import number
+from studies.object_errors import mae_difference, mae_interval, paired_objects
 
 ALL = 0
 """The value of ``n_calibration`` for all calibration objects."""

@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.errors import UserError
-from nbv.experiment.statistics.paired import MEAN_COLUMNS, object_means
 from studies.factorial import LIKELIEST, MORE_VIEWS, SINGLE, Factorial
+from studies.object_errors import MEAN_COLUMNS, object_means
 from studies.trainings import (
     Mean,
     crossed_mean,
@@ -55,7 +55,7 @@ CONTRASTS_COLUMNS = (
 )
 
 BELIEF_COLUMNS = ("log_likelihood", "inside_50_percent", "inside_90_percent")
-"""The quality of beliefs; see `nbv.core.simulation.follow`."""
+"""The quality of beliefs; see `studies.simulation.follow`."""
 
 BELIEFS_COLUMNS = (
     *GROUP,

@@ -23,8 +23,9 @@ from nbv.core.plans import (
     step_by_step,
 )
 from nbv.core.policies import HeldOutViews, take_second_views
-from nbv.core.selection import SelectedMethod
-from nbv.core.simulation import (
+from nbv.experiment.statistics.metrics import above_90, accuracy_area
+from studies.selection import SelectedMethod
+from studies.simulation import (
     DistributionViews,
     EstimatedViews,
     Views,
@@ -35,7 +36,6 @@ from nbv.core.simulation import (
     random_next,
     recommended_next,
 )
-from nbv.experiment.statistics.metrics import above_90, accuracy_area
 
 Floats = NDArray[np.float64]
 Run = Callable[..., Floats]
@@ -84,7 +84,7 @@ def more_views_rows(
     DataFrame
         Columns `VIEWS_COLUMNS`: means over first views. Travel goes from view to view, the shorter
         way. The last three describe the belief after all views; see
-        `nbv.core.simulation.follow`.
+        `studies.simulation.follow`.
     """
     run = partial(follow, start_every_deg=settings["start_every_deg"], rng=rng)
     reached = list(_by_posterior(test, evidences, settings, run))

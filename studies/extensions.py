@@ -14,15 +14,11 @@ from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
 from nbv.core.fusion import OF_DISTRIBUTIONS
 from nbv.core.lookup import LookupTable
-from nbv.core.selection import (
-    DensityParams,
-    Methods,
-    SelectedMethod,
-    chosen_evidence,
-    select_methods,
-)
+from nbv.core.selection import DensityParams, chosen_evidence
+from nbv.experiment.methods import Methods
 from nbv.experiment.results import evaluate_method
 from studies.curves import travel_rows
+from studies.selection import SelectedMethod, select_methods
 
 CHOICE_COLUMNS = (
     "method",
@@ -68,7 +64,7 @@ def evaluate_extensions(
     calibration, test : Estimates
         The estimates of one fold.
     extensions, settings : mapping
-        See `nbv.core.selection.select_methods`.
+        See `studies.selection.select_methods`.
     rng_of : callable
         Returns the generator of an extension, by name.
     calibration_posteriors, test_posteriors : Posteriors, optional

@@ -16,15 +16,9 @@ from scipy import stats
 
 from nbv.experiment.report.table import Cell, Table
 from nbv.experiment.statistics.metrics import Floats
-from nbv.experiment.statistics.paired import (
-    PairedErrors,
-    Resampler,
-    indistinct_from_best,
-    mae_difference,
-    mae_interval,
-    paired_objects,
-)
+from nbv.experiment.statistics.paired import PairedErrors, Resampler
 from nbv.labels import category_label, number
+from studies.object_errors import indistinct_from_best, mae_difference, mae_interval, paired_objects
 
 Block = tuple[str, str]
 """A run and a category."""
@@ -58,7 +52,7 @@ def blocks_of(
     """Return the objects' errors by run and category at the reference elevation.
 
     A category that was not run there is taken at its lowest elevation. ``runs`` maps the name of a
-    run to its ``objects.csv`` files, read by `nbv.experiment.statistics.paired.load_folds`.
+    run to its ``objects.csv`` files, read by `studies.object_errors.load_folds`.
     """
     blocks = {}
     for run, means in runs.items():

@@ -16,8 +16,9 @@ import pandas as pd
 from nbv.experiment.report.settings import ReportSettings, cell, shared_resampler
 from nbv.experiment.report.table import Cell, Row, Table
 from nbv.experiment.results import Unit, load_evaluations
-from nbv.experiment.statistics.paired import fold_sigma, mae_difference, mae_interval, pair_methods
+from nbv.experiment.statistics.paired import fold_sigma, pair_methods
 from nbv.labels import category_label, method_label, number
+from studies.object_errors import mae_difference, mae_interval
 
 Pair = tuple[str, str]
 """The condition trained on and the one tested on."""

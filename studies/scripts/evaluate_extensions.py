@@ -4,11 +4,11 @@ from nbv.experiment.jobs import job
 
 with job(snakemake):
     from studies.extensions import evaluate_extensions
+    from studies.object_errors import object_means
 
     from nbv.core.seeds import rng_for
     from nbv.experiment.estimates import read_estimates, read_posteriors
     from nbv.experiment.splits import check_role, read_splits
-    from nbv.experiment.statistics.paired import object_means
     from nbv.files import read_csv, write_csv
 
     given, output = snakemake.input, snakemake.output

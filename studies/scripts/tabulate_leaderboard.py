@@ -5,10 +5,11 @@ from nbv.experiment.jobs import job
 with job(snakemake):
     import numpy as np
     from studies.leaderboard import blocks_of, leaderboard_table
+    from studies.object_errors import load_folds
     from studies.runs import files_by_run
 
     from nbv.experiment.report.table import write_table
-    from nbv.experiment.statistics.paired import Resampler, load_folds
+    from nbv.experiment.statistics.paired import Resampler
 
     params = snakemake.params
     files = files_by_run(params.folds, snakemake.input.objects)

@@ -10,6 +10,7 @@ from urllib.parse import parse_qs, urlencode, urlsplit
 import numpy as np
 import pandas as pd
 import pytest
+from studies.simulation import bisecting_next, recommended_next
 
 import synthetic
 from conftest import UNITS
@@ -21,7 +22,6 @@ from nbv.core.distributions import FLAT, mean_direction_deg
 from nbv.core.estimates import posteriors_of
 from nbv.core.evidence import Evidence
 from nbv.core.lookup import LookupTable
-from nbv.core.simulation import bisecting_next, recommended_next
 from nbv.experiment.estimates import write_posteriors
 from nbv.experiment.explorer import ExplorerInputs, build_explorer
 from nbv.experiment.explorer.data import page_table

@@ -8,6 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from studies.simulation import (
+    DistributionViews,
+    evenly_spaced_travel_deg,
+    follow,
+    recommended_next,
+)
 from tests.core.made import direction_by_loops, product_by_loops
 from tests.core.test_errors_given_distributions import (
     N_BINS,
@@ -29,12 +35,6 @@ from nbv.core.plans import (
     spacing_bins,
     step_by_step,
     step_by_step_errors_deg,
-)
-from nbv.core.simulation import (
-    DistributionViews,
-    evenly_spaced_travel_deg,
-    follow,
-    recommended_next,
 )
 
 CAUTIOUS = {"caution": 2.0}

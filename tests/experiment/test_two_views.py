@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from studies.extensions import evaluate_extensions
+from studies.selection import select_methods
 from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 from nbv.core.angles import circular_distance_deg
@@ -10,7 +11,6 @@ from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import gather_evidence
 from nbv.core.fusion import FUSIONS
 from nbv.core.lookup import build_lookup
-from nbv.core.selection import select_methods
 from nbv.experiment.results import COLUMNS, evaluate_method
 
 RNG = np.random.default_rng(0)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from studies.leaderboard import blocks_of
-
-from nbv.experiment.statistics.paired import OBJECT_COLUMNS
+from studies.object_errors import OBJECT_COLUMNS
 
 METHODS = {
     "single": {"policy": "none"},

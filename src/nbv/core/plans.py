@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from studies.simulation import DistributionViews, NextView, follow, recommended_next
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
@@ -24,7 +25,6 @@ from nbv.core.distributions import (
 )
 from nbv.core.evidence import Evidence, Float32Array, evidence_of_distributions
 from nbv.core.fusion import Rotations
-from nbv.core.simulation import DistributionViews, NextView, follow, recommended_next
 
 
 def spacing_bins(n_views: int, n_bins: int, min_separation_deg: float) -> NDArray[np.int64]:

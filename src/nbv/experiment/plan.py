@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from nbv.core.policies import needs_lookup
-from nbv.core.selection import check_methods
 from nbv.data.meshes import load_meshes
 from nbv.data.render import RENDERERS
 from nbv.data.sensors import SENSORS, check_sensor
@@ -19,6 +18,7 @@ from nbv.errors import UserError
 from nbv.experiment import provenance
 from nbv.experiment.config import load_config
 from nbv.experiment.config.schema import LINEAR
+from nbv.experiment.methods import check_methods
 from nbv.experiment.report import settings as report
 from nbv.experiment.results import Unit
 from nbv.experiment.stages import FEATURES, Stage, Start, stage_settings, start_of

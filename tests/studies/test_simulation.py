@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.core.made import evidence_of, objects
-
-from nbv.core.angles import circular_distance_deg, travel_deg
-from nbv.core.belief import Belief
-from nbv.core.criteria import CRITERIA
-from nbv.core.simulation import (
+from studies.simulation import (
     evenly_spaced_travel_deg,
     random_next,
     recommended_next,
     shortest_walk_deg,
 )
+
+from nbv.core.angles import circular_distance_deg, travel_deg
+from nbv.core.belief import Belief
+from nbv.core.criteria import CRITERIA
+from tests.core.made import evidence_of, objects
 
 
 def test_recommended_views_keep_their_distance():
