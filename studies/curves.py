@@ -16,12 +16,6 @@ from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import COARSE_BINS, Evidence
 from nbv.core.fusion import ESTIMATE_FUSIONS, Rotations, rotation_errors_deg
 from nbv.core.lookup import least_cost_delta
-from nbv.core.plans import (
-    at_spacing,
-    choose_plan,
-    plans_of,
-    step_by_step,
-)
 from nbv.core.policies import HeldOutViews, take_second_views
 from nbv.experiment.statistics.metrics import above_90, accuracy_area
 from studies.selection import SelectedMethod
@@ -31,7 +25,6 @@ from studies.simulation import (
     Views,
     bisecting_next,
     evenly_spaced_next,
-    first_views,
     follow,
     random_next,
     recommended_next,
@@ -75,7 +68,7 @@ def more_views_rows(
     settings : mapping
         The configuration's ``more_views``: ``n_views, start_every_deg, min_separation_deg``.
     rng : numpy.random.Generator
-    posteriors, of_distributions : optional
+    posteriors, distribution_evidence : optional
         The test objects' distributions, and evidence from those of calibration objects; they add
         policies with the fusion ``product``.
 
@@ -133,7 +126,7 @@ def _by_posterior(
 def _by_product(
     posteriors: Posteriors, evidence: Evidence, settings: Mapping[str, Any], run: Run
 ) -> Iterator[Reached]:
-    """Yield the same, fused by product; with two views and more the first one chooses a plan."""
+    """Yield the same, fused by product."""
     every, apart_deg = range(1, settings["n_views"] + 1), settings["min_separation_deg"]
     seen = DistributionViews(posteriors.distributions, evidence)
     yield "random_product", every, run(random_next, seen, n_views=every[-1])
@@ -141,17 +134,6 @@ def _by_product(
         yield "evenly_spaced_product", [n], run(evenly_spaced_next(n), seen, n_views=n)
     by_gain = recommended_next("information_gain", evidence, apart_deg)
     yield "information_gain_product", every, run(by_gain, seen, n_views=every[-1])
-    belief = first_views(seen, settings["start_every_deg"])[2]
-    yield "expected_error_product", [1], run(random_next, seen, n_views=1)
-    for n in every[1:]:
-        plans = plans_of(evidence, n, apart_deg)
-        chosen = choose_plan(belief, evidence, plans)
-        steps_deg = np.append(plans.spacing_deg, 0)[chosen]
-        spaced = run(at_spacing(steps_deg), seen, n_views=n)
-        stepped = run(step_by_step(evidence, apart_deg, n), seen, n_views=n)
-        goes_on = (chosen == len(plans.spacing_deg)).reshape(spaced.shape[1:3])
-        planned = np.where(goes_on[None, :, :, None], stepped, spaced)
-        yield "expected_error_product", [n], planned
 
 
 # Multiples of the travel cost at which staying costs as much as moving for the mean estimate.

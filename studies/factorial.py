@@ -72,7 +72,6 @@ MORE_VIEWS: Final[Mapping[str, Pair]] = {
     "random_product": ("random", "product"),
     "evenly_spaced_product": ("evenly_spaced", "product"),
     "information_gain_product": ("information_gain", "product"),
-    "expected_error_product": ("expected_error", "product"),
 }
 """Choice and fusion of the policies of `studies.curves` in the comparison."""
 

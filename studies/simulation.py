@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
@@ -21,9 +20,6 @@ from nbv.core.lookup import least_cost_delta
 Floats = NDArray[np.floating]
 Indices = NDArray[np.intp]
 
-# Tolerance for rounding in sums of angles.
-_ROUNDING_DEG = 1e-6
-
 BISECTING_DEG = (180, 90, 270, 45, 225, 135, 315)
 
 NextView = Callable[[Belief, Rotations, np.random.Generator], Rotations]
@@ -34,9 +30,7 @@ the views so far. All rotations count from the first view, whose rotation is 0.
 """
 
 
-def recommended_next(
-    criterion: str, coarse: Evidence, min_separation_deg: float, n_views: int | None = None
-) -> NextView:
+def recommended_next(criterion: str, coarse: Evidence, min_separation_deg: float) -> NextView:
     """Return the policy that takes the view of least cost.
 
     Parameters
@@ -48,8 +42,6 @@ def recommended_next(
     min_separation_deg : float
         Smallest distance from all previous views: errors of neighbouring views are similar, but
         criteria assume that views are independent.
-    n_views : int, optional
-        Total number of views. If given, they travel no farther than as many evenly spaced views.
     """
 
     def next_view(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:
@@ -57,47 +49,9 @@ def recommended_next(
         bin_deg = 360.0 / coarse.n_bins
         rotations = np.arange(coarse.n_bins) * bin_deg
         apart = circular_distance_deg(taken_deg[:, :, None], rotations).min(axis=1)
-        cost = np.where(apart < min_separation_deg, np.inf, cost)
-        if n_views is None:
-            return least_cost_delta(cost)
-        travel = travel_deg(rotations - taken_deg[:, -1:])
-        travel += travel_deg(np.diff(taken_deg, axis=1)).sum(axis=1, keepdims=True)
-        n_more = n_views - 1 - taken_deg.shape[1]
-        travel += shortest_walk_deg(taken_deg, coarse.n_bins, n_more, min_separation_deg)
-        return least_cost_delta(
-            np.where(travel <= evenly_spaced_travel_deg(n_views) + _ROUNDING_DEG, cost, np.inf)
-        )
+        return least_cost_delta(np.where(apart < min_separation_deg, np.inf, cost))
 
     return next_view
-
-
-def shortest_walk_deg(
-    taken_deg: Rotations, n_bins: int, n_more: int, min_separation_deg: float
-) -> NDArray[np.float64]:
-    """Return an upper bound of the travel after each next rotation, (n, B) degrees.
-
-    The `n_more` views after the next one are taken in one direction around the circle, each as soon
-    as it is far enough from all others, the views so far (n, t) included. The bound is infinite if
-    there is no room for them.
-    """
-    different, row_of = np.unique(taken_deg, axis=0, return_inverse=True)
-    rotations = np.arange(n_bins) * (360.0 / n_bins)
-    apart = circular_distance_deg(different[:, :, None], rotations).min(axis=1)
-    free, step = apart >= min_separation_deg, math.ceil(min_separation_deg * n_bins / 360.0)
-    walks = []
-    for sign in (1, -1):
-        n_taken, last = np.zeros(free.shape, dtype=int), np.zeros(free.shape, dtype=int)
-        for walked in range(1, n_bins + 1 - step):
-            ahead = np.roll(free, -sign * walked, axis=1)
-            is_taken = ahead & (walked - last >= step) & (n_taken < n_more)
-            n_taken, last = n_taken + is_taken, np.where(is_taken, walked, last)
-        walks.append(np.where(n_taken == n_more, last * (360.0 / n_bins), np.inf))
-    return np.asarray(np.minimum(*walks)[row_of.ravel()])
-
-
-def evenly_spaced_travel_deg(n_views: int) -> float:
-    """Return the travel of n views that are 360 / n degrees apart."""
-    return (n_views - 1) * 360.0 / n_views
 
 
 def random_next(belief: Belief, taken_deg: Rotations, rng: np.random.Generator) -> Rotations:

@@ -191,16 +191,14 @@ rule statistics:
         densities=factorial_files("densities"),
     output:
         **{
-            f"{name}_{kind}": f"<results>/confirmation/{name}.{kind}"
-            for name in ("methods", "contrasts", "beliefs", "densities")
-            for kind in ("csv", "md")
+            f"{name}_csv": f"<results>/confirmation/{name}.csv"
+            for name in ("methods", "contrasts", "trainings", "beliefs", "densities")
         },
         **{
             f"{name}_{kind}": f"<results>/confirmation/{name}.{kind}"
             for name in ("answers", "contrasts")
             for kind in ("png", "pdf", "svg")
         },
-        trainings_csv="<results>/confirmation/trainings.csv",
     log:
         "<logs>/statistics.log",
     benchmark:
@@ -213,7 +211,6 @@ rule statistics:
         places=lambda wildcards: dict.fromkeys(
             ("objects", "beliefs", "densities"), STUDIES.kept_trainings
         ),
-        caution=PLAN.caution,
     script:
         "../scripts/tabulate_confirmation.py"
 

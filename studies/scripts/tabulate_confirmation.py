@@ -1,4 +1,4 @@
-"""Tabulate means and contrasts over all trainings."""
+"""Tabulate means and contrasts over all trainings, and draw the contrasts."""
 
 from nbv.experiment.jobs import job
 
@@ -10,16 +10,11 @@ with job(snakemake):
         method_means,
         training_contrasts,
     )
-    from studies.confirmation_tables import (
+    from studies.confirmation_figures import (
         answers_figure,
-        beliefs_table,
         contrasts_figure,
-        contrasts_table,
-        densities_table,
-        methods_table,
     )
 
-    from nbv.experiment.report.table import write_table
     from nbv.files import read_csv, write_csv
     from nbv.robot.style import save_figure
 
@@ -35,17 +30,16 @@ with job(snakemake):
         for name, places in snakemake.params.places.items()
     }
     objects = read["objects"]
-    contrasts, of_trainings = method_contrasts(objects), training_contrasts(objects)
+    contrasts = method_contrasts(objects)
     tables = {
-        "methods": methods_table(method_means(objects)),
-        "contrasts": contrasts_table(contrasts, of_trainings),
-        "beliefs": beliefs_table(belief_means(read["beliefs"])),
-        "densities": densities_table(read["densities"]),
+        "methods": method_means(objects),
+        "contrasts": contrasts,
+        "trainings": training_contrasts(objects),
+        "beliefs": belief_means(read["beliefs"]),
+        "densities": read["densities"],
     }
-    write_csv(output.trainings_csv, of_trainings)
     for name, table in tables.items():
-        paths = {kind: output[f"{name}_{kind}"] for kind in ("csv", "md")}
-        write_table(table, paths, snakemake.params.caution)
+        write_csv(output[f"{name}_csv"], table)
     figures = {"answers": answers_figure(contrasts), "contrasts": contrasts_figure(contrasts)}
     for name, figure in figures.items():
         paths = {kind: output[f"{name}_{kind}"] for kind in ("png", "pdf", "svg")}

@@ -23,7 +23,6 @@ from nbv.core.distributions import (
     mean_direction_deg,
     product_of,
     product_of_views,
-    products_at_spacing,
     rotated,
 )
 from nbv.core.estimates import posteriors_of
@@ -115,16 +114,6 @@ def test_the_object_frame_rotates_each_view_by_its_azimuth():
 
 
 # Fused
-
-
-@pytest.mark.parametrize(("n_views", "spacing"), [(2, 5), (3, -2), (4, 1)])
-def test_products_at_a_spacing_are_those_of_each_first_view(n_views, spacing):
-    sweep = np.random.default_rng(1).dirichlet(np.ones(BINS), BINS)
-    (found,) = products_at_spacing(np.log(sweep)[None].astype(np.float32), n_views, spacing)
-    rotations = spacing * np.arange(n_views)
-    for start in range(BINS):
-        wanted = product_by_loops(sweep[(start + rotations) % BINS], rotations)
-        assert found[start] == pytest.approx(wanted / wanted.max(), rel=1e-4)
 
 
 @given(seed=st.integers(0, 10**6), bins=st.lists(whole, min_size=2, max_size=2))

@@ -25,7 +25,7 @@ from tests.core.made import FEW_DENSITIES
 from tests.experiment.test_two_views import N_CLASSES, hidden_handle, mean_directions
 
 SETTINGS = FEW_DENSITIES | {
-    "affinity": {"power": 16, "pseudo_observations": 90, "caution": 2.0},
+    "affinity": {"power": 16, "pseudo_observations": 90},
     "travel_cost": 0.0,
     "max_travel_deg": 180.0,
 }

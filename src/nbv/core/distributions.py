@@ -116,21 +116,6 @@ def _log_product(distributions: NDArray[np.floating], rotations_deg: Sequence[fl
     return np.asarray(np.log(rotated(distributions, rotations_deg)).sum(axis=0))
 
 
-def products_at_spacing(
-    logs: NDArray[np.float32], n_views: int, spacing_bins: int
-) -> NDArray[np.float32]:
-    """Return the products (n, B, B) of n_views views at one spacing, from every view of n sweeps.
-
-    `logs` (n, B, B) are the logarithms of the sweeps' distributions. Products are in the frames of
-    the first views, and their largest probability is 1.
-    """
-    total = logs.copy()
-    for view in range(1, n_views):
-        shift = -view * spacing_bins
-        total += np.roll(logs, (shift, shift), axis=(1, 2))
-    return np.asarray(np.exp(total - total.max(axis=-1, keepdims=True)))
-
-
 def mean_direction_deg(
     probabilities: NDArray[np.floating[Any]], otherwise_deg: Floats | None = None
 ) -> Floats:

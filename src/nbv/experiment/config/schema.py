@@ -251,7 +251,6 @@ class Affinity(Section):
 
     power: Annotated[Number, Field(gt=0, le=10**4)]
     pseudo_observations: PseudoObservations
-    caution: Annotated[Number, Field(ge=0, le=100)] = 2.0  # standard errors
 
 
 class Recommendation(Section):
