@@ -3,7 +3,6 @@ from __future__ import annotations
 import errno
 import logging
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -16,12 +15,21 @@ from nbv.errors import UserError
 from nbv.experiment.jobs import (
     LAST_ERROR,
     NO_SPACE,
-    forget_last_error,
+    begin_run,
     import_from,
     job,
     why_stopped,
     write_checksum,
 )
+
+
+@pytest.fixture(autouse=True)
+def environment():
+    """A run that a test begins leaves nothing in the environment of later tests."""
+    before = dict(os.environ)
+    yield
+    os.environ.clear()
+    os.environ.update(before)
 
 
 @pytest.fixture
@@ -165,59 +173,49 @@ KILLED = "error: killed from outside: "
 
 
 def test_jobs_that_end_without_a_word_were_killed(ended, tmp_path):
-    logs, since = tmp_path / "results" / "logs", time.time() - 5
+    results = str(tmp_path / "results")
+    logs = tmp_path / "results/logs"
+    begin_run(results)
     ended("whole")
     ended("interrupted", KeyboardInterrupt())
-    assert why_stopped(logs, since) == []
+    assert why_stopped(results) == []
     ended("crashed", ZeroDivisionError())
     ended("failed", UserError("x"))
-    assert why_stopped(logs, since) == ["error: x"]
+    assert why_stopped(results) == ["error: x"]
     (logs / "train").mkdir()
     (logs / "train/mug.log").write_text("[10:00:00 train mug] epoch 3\n")
     (logs / "train/old.log").write_text("[10:00:00 train old] epoch 3\n")
-    os.utime(logs / "train/old.log", (since - 100, since - 100))
-    failed, killed, advice = why_stopped(logs, since)
+    before = time.time() - 100
+    os.utime(logs / "train/old.log", (before, before))
+    failed, killed, advice = why_stopped(results)
     assert (failed, killed) == ("error: x", f"{KILLED}train/mug")
     assert "fewer --cores" in advice
 
 
-# What Snakemake logs of a script that ended by itself, that a signal ended, and of a full disk.
-FAILED = "Command 'python train.py' returned non-zero exit status 1."
-SIGNALLED = "Command 'python render.py' died with <Signals.SIGKILL: 9>."
-FULL = f"OSError: [Errno {errno.ENOSPC}] {os.strerror(errno.ENOSPC)}"
+def test_a_full_disk_is_named_where_it_cut_logs_off(ended, tmp_path):
+    results = str(tmp_path / "results")
+    begin_run(results)
+    ended("failed", OSError(errno.ENOSPC, "No space left on device"))
+    (tmp_path / "results/logs/cut.log").write_text("[10:00:00 cut] epo")
+    assert why_stopped(results) == [f"error: out.csv: {NO_SPACE}"]
 
 
-@pytest.mark.parametrize(
-    ("told", "cut_off", "first"),
-    [
-        (SIGNALLED, False, f"{KILLED}render"),  # it had no time to begin its log
-        (SIGNALLED, True, f"{KILLED}cut"),
-        (f"{FAILED}\n{SIGNALLED}", True, f"{KILLED}cut"),
-        (FAILED, True, None),  # a full disk cut its log off
-        (FULL, False, f"error: {{results}}: {NO_SPACE}"),
-        ("", False, None),
-    ],
-)
-def test_the_log_of_snakemake_says_what_no_job_could(told, cut_off, first, tmp_path):
-    results = tmp_path / "results"
-    logs, of_snakemake = results / "logs", tmp_path / "snakemake.log"
-    logs.mkdir(parents=True)
-    of_snakemake.write_text(told)
-    if cut_off:
-        (logs / "cut.log").write_text("[10:00:00 cut] epo")
-    lines = why_stopped(logs, time.time() - 5, [of_snakemake])
-    assert lines[:1] == ([] if first is None else [first.format(results=results)])
+def test_a_disk_that_is_nearly_full_is_named_where_no_job_said_more(tmp_path, monkeypatch):
+    results = str(tmp_path / "results")
+    begin_run(results)
+    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=10**6))
+    assert why_stopped(results) == [f"error: {results}: {NO_SPACE}"]
 
 
 def test_a_run_begins_with_no_error(tmp_path):
     logs = tmp_path / "results/one/logs"
     logs.mkdir(parents=True)
     (logs / LAST_ERROR).write_text("error: of yesterday\n")
-    forget_last_error(str(logs.parent))
-    assert why_stopped(logs, time.time()) == []
+    begin_run(str(logs.parent))
+    assert why_stopped(str(logs.parent)) == []
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match=r"file/two cannot be written"):
-        forget_last_error(str(tmp_path / "file/two"))
+        begin_run(str(tmp_path / "file/two"))
 
 
 def test_jobs_import_packages_of_a_folder_before_those_of_others(tmp_path, monkeypatch):
@@ -229,40 +227,3 @@ def test_jobs_import_packages_of_a_folder_before_those_of_others(tmp_path, monke
     assert os.environ["PYTHONPATH"] == f"{tmp_path}{os.pathsep}/elsewhere"
     done = subprocess.run([sys.executable, "-c", "import beside"], capture_output=True, text=True)
     assert done.stdout == "found\n"
-
-
-# A process called snakemake starts a shell, which starts a job that says how long it lives.
-STARTER = """
-import subprocess, sys
-subprocess.run(["bash", "-c", f"{sys.executable} {sys.argv[1]}; true"])
-"""
-JOB = """
-import time
-from pathlib import Path
-from nbv.experiment.jobs import end_with_snakemake
-end_with_snakemake()
-for beat in range(600):
-    Path("next.txt").write_text(str(beat))
-    Path("next.txt").replace("beat.txt")
-    time.sleep(0.1)
-"""
-
-
-@pytest.mark.slow
-def test_a_job_ends_soon_after_its_snakemake_was_killed(tmp_path):
-    (tmp_path / "snakemake").write_text(STARTER)
-    (tmp_path / "job.py").write_text(JOB)
-    starter = subprocess.Popen([sys.executable, "snakemake", "job.py"], cwd=tmp_path)
-    beat = tmp_path / "beat.txt"
-    for _ in range(200):
-        if beat.exists():
-            break
-        time.sleep(0.1)
-    starter.send_signal(signal.SIGKILL)
-    starter.wait()
-    deadline = time.monotonic() + 30
-    last = None
-    while beat.read_text() != last and time.monotonic() < deadline:
-        last = beat.read_text()
-        time.sleep(2)
-    assert 0 < int(last) < 400

@@ -55,13 +55,17 @@ def kill_group(running, rng) -> None:
 
 
 def kill_job(running, rng) -> None:
-    """Kill one job, as the kernel does where memory runs out; wait for one, or for the end."""
+    """Kill a job that began its log, as the kernel does where memory runs out; wait for one."""
     while running.poll() is None:
         with contextlib.suppress(psutil.NoSuchProcess):
             below = psutil.Process(running.pid).children(recursive=True)
-            jobs = [one for one in below if any(".snakemake/scripts" in a for a in one.cmdline())]
-            if python := [one for one in jobs if one.name().startswith("python")]:
-                rng.choice(python).kill()
+            logging = [
+                process
+                for process in below
+                if any("/logs/" in file.path for file in process.open_files())
+            ]
+            if logging:
+                rng.choice(logging).kill()
                 return
         time.sleep(0.02)
 

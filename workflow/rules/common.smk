@@ -5,7 +5,6 @@
 import os
 import re
 import sys
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,7 +18,7 @@ except ModuleNotFoundError:
 from nbv.data.sensors import sensor_settings
 from nbv.errors import UserError
 from nbv.experiment.config import snakemake_overrides
-from nbv.experiment.jobs import check_results, forget_last_error, hold_lock, why_stopped
+from nbv.experiment.jobs import begin_run, check_folders, why_stopped
 from nbv.experiment.estimation.features import SHIPPED
 from nbv.experiment.plan import Plan, paths
 from nbv.experiment.reference import find_reference
@@ -29,7 +28,6 @@ from nbv.experiment.stages import FEATURES, PRETRAINED, stage_from
 # Figures need no backend, and one that is unknown here, such as Jupyter's, ends the import of
 # matplotlib, in this process and in its jobs.
 os.environ.pop("MPLBACKEND", None)
-STARTED = time.time()
 # The Snakefile that was started lies in the project's folder, or below it.
 ROOT = next(
     folder
@@ -48,11 +46,8 @@ def one_line():
 
 
 with one_line():
-    # Held until this process ends, so it has a name.
-    RUN_LOCK = hold_lock(Path(".snakemake"))
     PLAN = Plan.load(ROOT / "config", tuple(snakemake_overrides(config)))
-    if workflow.is_main_process:
-        check_results(PLAN.results)
+    check_folders(PLAN.results)
 
 CONFIG, UNITS = PLAN.config, PLAN.units
 METHODS = CONFIG["methods"]
@@ -164,7 +159,7 @@ def banner(*lines):
 
 onstart:
     with one_line():
-        forget_last_error(PLAN.results)
+        begin_run(PLAN.results)
     banner(
         f"nbv: experiment {CONFIG['experiment']}, data set {CONFIG['dataset']['source']}, "
         f"{len(UNITS)} units of {CONFIG['n_folds']} folds",
@@ -184,7 +179,7 @@ onsuccess:
 onerror:
     banner(
         "nbv: stopped",
-        *why_stopped(f"{PLAN.results}/logs", STARTED, log),
+        *why_stopped(PLAN.results),
         "what was finished is kept; the same command goes on from there",
         f"logs: {PLAN.results}/logs/",
     )

@@ -1,29 +1,27 @@
 """Every job of the workflow logs its progress, and an error ends it with one clear line.
 
-A job reads nothing that changed after it was written, and does not outlive its workflow.
+A job reads nothing that changed after it was written, and does not outlive its run.
 """
 
 from __future__ import annotations
 
-import base64
 import contextlib
 import errno
 import fcntl
-import functools
 import gc
 import logging
 import os
+import platform
 import re
+import shutil
 import signal
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePath
-from typing import IO, Any, Literal
-
-import psutil
+from typing import Any, Literal
 
 from nbv.errors import UserError
 from nbv.files import sha256_of, write_text
@@ -39,12 +37,14 @@ State = Literal[
 ]
 
 _SECONDS_BETWEEN_MESSAGES = 60
-# An orphan works on for no longer than this while the next run works.
-_SECONDS_BETWEEN_CHECKS = 0.5
+_NEARLY_FULL_BYTES = 10**8
 _FINISHED, _FAILED, _STOPPED = "processor time", "error: ", "stopped"
 _NOT_RESULTS = ("logs", "benchmarks", "checksums")
 LAST_ERROR = "last_error.txt"
 """In the folder of a run's logs: the line of the job that failed last."""
+_LOCK = "run.lock"
+# The name of the machine that a run was started on, in the environment of its jobs.
+_MACHINE = "NBV_MACHINE_OF_RUN"
 NO_SPACE = "no space left on the disk; free some and run the same command again"
 _FOR_THE_USER: dict[int | None, str] = {
     errno.ENOSPC: NO_SPACE,
@@ -65,7 +65,7 @@ def job(snakemake: Any) -> Iterator[None]:
     progress one message a minute.
 
     The inputs are held to their checksums before, and the outputs get theirs after. A job whose
-    Snakemake was killed ends as well.
+    run was killed ends as well.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def job(snakemake: Any) -> Iterator[None]:
     path = Path(snakemake.log[0])
     label = " ".join([snakemake.rule, "/".join(snakemake.wildcards)]).strip()
     _log_to(path, label)
-    end_with_snakemake()
+    end_with_run(_logs_above(path))
     # Imports make 200,000 objects and no garbage: the search for it took an eighth of their time.
     gc.set_threshold(100_000)
     try:
@@ -113,33 +113,23 @@ def job(snakemake: Any) -> Iterator[None]:
         log.info(f"{_FINISHED} %.2f s", sum(os.times()[:4]), extra={"log_only": True})
 
 
-def why_stopped(
-    logs: str | Path, since: float, snakemake_logs: Iterable[str | Path] = ()
-) -> list[str]:
-    """Return the lines that say why a run stopped; none where it was interrupted.
+def why_stopped(results: str) -> list[str]:
+    """Return the lines that say why a run stopped, of its jobs' logs; none where none says it.
 
     Parameters
     ----------
-    logs : path
-        The folder of a run's logs, where a job that failed has left its error.
-    since : float
-        Seconds since 1970: older logs are of earlier runs.
-    snakemake_logs : iterable of path
-        Snakemake's own logs of this run. A job that had no time to begin its log is known to
-        Snakemake alone.
+    results : str
+        The folder of a run that `begin_run` began. Older logs are of earlier runs.
     """
-    last_error = Path(logs) / LAST_ERROR
+    logs = Path(results, "logs")
+    last_error = logs / LAST_ERROR
     lines = last_error.read_text(encoding="utf-8").splitlines() if last_error.exists() else []
-    told = "".join(Path(log).read_text(encoding="utf-8") for log in snakemake_logs)
-    if not lines and os.strerror(errno.ENOSPC) in told:
+    if not lines and shutil.disk_usage(logs).free < _NEARLY_FULL_BYTES:
         # Snakemake's own files are on the disk, too.
-        lines = [f"{_FAILED}{Path(logs).parent}: {NO_SPACE}"]
-    killed = _killed_jobs(Path(logs), since) or re.findall(
-        r"(\w+)\.py' died with <Signals.SIGKILL", told
-    )
+        lines = [f"{_FAILED}{results}: {NO_SPACE}"]
+    killed = _killed_jobs(logs, (logs / _LOCK).stat().st_mtime)
     # A full disk ends logs in the middle, too.
-    ended_by_itself = "returned non-zero exit status" in told and "died with <Signals" not in told
-    if not killed or ended_by_itself:
+    if not killed or any(NO_SPACE in line for line in lines):
         return lines
     return [
         *lines,
@@ -155,42 +145,59 @@ def import_from(folder: Path) -> None:
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(folder), before]))
 
 
-@functools.cache
-def check_results(results: str) -> None:
-    """Check the folder of a run's results, and warn where Snakemake has no record of them.
+def check_folders(results: str) -> None:
+    """Raise UserError for a folder that Snakemake needs and would miss in a traceback."""
+    needed = Path(".snakemake")
+    for folder in (Path(results), *Path(results).parents, needed):
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise UserError(f"{folder} is not a folder, which a run needs there; move it away")
+    if not os.access(needed if needed.exists() else ".", os.W_OK):
+        raise UserError(f"{needed.absolute()} cannot be written: permission denied")
+
+
+def begin_run(results: str) -> None:
+    """Lock the folder of a run's results until this process ends, and forget the last error.
+
+    Jobs on this machine end when the lock does; see `end_with_run`. The lock's file holds where
+    the folder lies, which tells a copied run.
 
     Raises
     ------
     UserError
-        If a part of its path is a file.
+        If the folder cannot be written, or another run works on it.
     """
-    for part in (Path(results), *Path(results).parents):
-        if os.path.lexists(part) and not part.is_dir():
-            raise UserError(f"{part} is not a folder, which a run needs there; move it away")
-    made = f"{results}/provenance.json"
-    record = base64.urlsafe_b64encode(made.encode()).decode()
-    if Path(made).is_file() and not Path(".snakemake/metadata", record).is_file():
+    logs = Path(results, "logs")
+    lock, here = logs / _LOCK, str(logs.resolve())
+    try:
+        logs.mkdir(parents=True, exist_ok=True)
+        _lock(lock)
+        (logs / LAST_ERROR).unlink(missing_ok=True)
+        made_in = lock.read_text(encoding="utf-8")
+        lock.write_text(here, encoding="utf-8")
+    except BlockingIOError as error:
+        raise UserError(f"another run works on {results}: wait until it has ended") from error
+    except OSError as error:
+        raise UserError(f"{results} cannot be written: {error.strerror}") from error
+    if made_in not in ("", here):
         sys.stderr.write(
-            f"nbv: warning: {results} was not made in this folder, so the times of its files "
-            "decide what runs again; for a copy of what this version made, run the same command "
-            "with --touch --forceall first\n"
+            f"nbv: warning: {results} is a copy of {Path(made_in).parent}; without that one's "
+            ".snakemake, the times of its files decide what runs again: run the same command with "
+            "--touch --forceall first\n"
         )
 
 
-def forget_last_error(results: str) -> None:
-    """Begin a run with no error: the first thing that it writes.
-
-    Raises
-    ------
-    UserError
-        If the folder of its results cannot be written.
-    """
-    logs = Path(results, "logs")
+def _lock(path: Path) -> None:
+    # Never closed, because the lock would end.
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
-        logs.mkdir(parents=True, exist_ok=True)
-        (logs / LAST_ERROR).unlink(missing_ok=True)
-    except OSError as error:
-        raise UserError(f"{results} cannot be written: {error.strerror}") from error
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        raise
+    except OSError:
+        # A file system without such locks.
+        return
+    os.environ[_MACHINE] = platform.node()
 
 
 def _killed_jobs(logs: Path, since: float) -> list[str]:
@@ -267,11 +274,16 @@ def _is_lack_of_memory(error: Exception) -> bool:
 def _fail(message: str, log_file: Path) -> None:
     message = " ".join(message.splitlines())
     log.error("%s%s", _FAILED, message)
-    logs = next((folder for folder in log_file.parents if folder.name == "logs"), log_file.parent)
     # A full disk may not even take this line; the terminal has it already.
     with contextlib.suppress(OSError):
-        (logs / LAST_ERROR).write_text(f"{_FAILED}{message}\n", encoding="utf-8")
+        last_error = _logs_above(log_file) / LAST_ERROR
+        last_error.write_text(f"{_FAILED}{message}\n", encoding="utf-8")
     raise SystemExit(1)
+
+
+def _logs_above(log_file: Path) -> Path:
+    """Return the folder of a run's logs."""
+    return next((folder for folder in log_file.parents if folder.name == "logs"), log_file.parent)
 
 
 def _fail_unexpectedly(error: Exception, path: Path) -> None:
@@ -371,81 +383,24 @@ def _checksum_of(path: str) -> str | None:
     return f"results/{run}/checksums/{'/'.join(rest)}.sha256"
 
 
-def end_with_snakemake() -> None:
-    """Let this process end soon after the Snakemake that started it; where there is none, not.
+def end_with_run(logs: Path) -> None:
+    """Let this process end with the run that started it on this machine; where none did, not.
 
     A termination signal becomes an exception, so that a job removes its temporary file.
-    """
-    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
-    starter, parent = _snakemake_above(), os.getppid()
-    if starter is not None:
-        threading.Thread(target=_watch, args=(starter, parent), daemon=True).start()
-
-
-def _snakemake_above() -> psutil.Process | None:
-    for process in psutil.Process().parents():
-        with contextlib.suppress(psutil.Error):
-            if _runs_snakemake(process.cmdline()):
-                return process
-    return None
-
-
-def _runs_snakemake(arguments: Iterable[str]) -> bool:
-    return any(Path(argument).name == "snakemake" for argument in arguments)
-
-
-def _watch(starter: psutil.Process, parent: int) -> None:
-    while os.getppid() == parent and _is_alive(starter):
-        time.sleep(_SECONDS_BETWEEN_CHECKS)
-    # Nobody waits for this job any more, and the next run starts another one.
-    os._exit(1)
-
-
-def _is_alive(process: psutil.Process) -> bool:
-    try:
-        return bool(process.is_running() and process.status() != psutil.STATUS_ZOMBIE)
-    except psutil.Error:
-        return False
-
-
-def hold_lock(folder: Path) -> IO[bytes] | None:
-    """Remove Snakemake's locks where the runs that took them are dead, and mark this one as alive.
-
-    Snakemake's lock is a file, which a killed run leaves behind. Every run of this project also
-    holds a lock of the operating system, which ends with its process: exclusive for a moment where
-    no other run is alive, to remove those files; shared as long as it runs.
 
     Parameters
     ----------
-    folder : Path
-        ``.snakemake``.
-
-    Returns
-    -------
-    file or None
-        The lock, held until the file is closed. None where the file system has no such locks; then
-        nothing is removed.
-
-    Raises
-    ------
-    UserError
-        If the folder cannot be written, which Snakemake tells in a traceback.
+    logs : Path
+        The folder of the run's logs.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        held = (folder / "nbv.lock").open("ab")
-        # Those of Snakemake, which another user may have made.
-        for each in (folder, *folder.iterdir()):
-            if not os.access(each, os.W_OK):
-                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(each))
-    except OSError as error:
-        raise UserError(f"{error.filename} cannot be written: {error.strerror}") from error
-    try:
-        with contextlib.suppress(BlockingIOError):
-            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            for lock in (folder / "locks").glob("*.lock"):
-                lock.unlink()
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
+    # On another machine, the lock may be free though the run lives.
+    if os.environ.get(_MACHINE) == platform.node():
+        threading.Thread(target=_wait_for_end, args=(logs / _LOCK,), daemon=True).start()
+
+
+def _wait_for_end(lock: Path) -> None:
+    with contextlib.suppress(OSError), lock.open("rb") as held:
         fcntl.flock(held, fcntl.LOCK_SH)
-    except OSError:
-        return None
-    return held
+        # Nobody waits for this job any more. No other run begins before the lock is free again.
+        os._exit(1)
