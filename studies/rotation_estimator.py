@@ -1,7 +1,7 @@
-"""An estimator of rotations in three dimensions: a classifier on a grid of poses.
+"""An estimator of orientations: a classifier on a grid of poses.
 
-It is trained and asked on depth images of objects in random orientations, the camera's roll
-included. Log-likelihoods are of densities over the volume pi² of all rotations, as those of
+It is trained and tested on depth images of objects in random orientations, the camera's roll
+included. Log-likelihoods are of densities over the volume pi² of SO(3), as those of
 Implicit-PDF (Murphy et al., 2021) are; the uniform density has -2.29.
 """
 
@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from torch import nn
 
 from nbv.core.logits import TEMPERATURES, log_softmax, softmax
-from nbv.core.rotations import VOLUME, Rotations, chordal_mean, spiral
+from nbv.core.rotations import VOLUME, Orientations, chordal_mean, spiral
 from nbv.core.seeds import rng_for
 from nbv.data.camera import Camera, viewpoint_frames
 from nbv.data.depth_codes import encode_depth
@@ -34,35 +34,36 @@ from nbv.experiment.estimation.weights import Estimator
 Array = NDArray[np.float64]
 
 CONCENTRATION: Final = 50.0
-"""Of a training target about the true pose, exp(concentration (cos(angle) - 1)): 8 degrees."""
+"""Training targets are exp(concentration (cos(angle) - 1)) about the true pose: 8 degrees wide."""
 
 NEAR_DEG: Final = 30.0
-"""Poses so near to the likeliest one are averaged; the grid's are 15 degrees apart."""
+"""Poses nearer to the likeliest pose are averaged; the grid's are 15 degrees apart."""
 
 
-def turns_of(object_id: str, category: str, n: int, seed: int) -> Rotations:
-    """Return the random turns (n, 3, 3) in which an object is shown."""
+def orientations_of(object_id: str, category: str, n: int, seed: int) -> Orientations:
+    """Return the random orientations (n, 3, 3) in which an object is shown."""
     rng = rng_for(seed, "rotations", category, object_id)
     return np.asarray(Rotation.random(n, rng=rng).as_matrix())
 
 
-def poses_of(turns: Rotations, n_views: int) -> Rotations:
-    """Return the poses (n, n_views, 3, 3), object to camera, that `turned_views` shows."""
+def poses_of(orientations: Orientations, n_views: int) -> Orientations:
+    """Return the poses (n, n_views, 3, 3), object to camera, that `oriented_views` shows."""
     right, up, forward = viewpoint_frames(0.0, _azimuths_deg(n_views))
-    return np.asarray(np.stack([right, -up, forward], axis=1) @ turns[:, None])
+    return np.asarray(np.stack([right, -up, forward], axis=1) @ orientations[:, None])
 
 
-def turned_views(
-    mesh: Surface, turns: Rotations, n_views: int, camera: Camera, renderer: Renderer
+def oriented_views(
+    mesh: Surface, orientations: Orientations, n_views: int, camera: Camera, renderer: Renderer
 ) -> Codes:
-    """Return the depth codes (n * n_views, side, side) of an object after each of n turns.
+    """Return the depth codes (n * n_views, side, side) of an object in n orientations.
 
-    The views after one turn are evenly spaced on a level circle, so that one mesh is prepared for
-    many images. Seen from the object, circle and roll are random where turns are.
+    The views of each orientation are evenly spaced on a level circle, so that one prepared mesh
+    serves many images. Seen from the object, circle and roll are random where orientations are.
     """
     azimuths_deg, vertices = _azimuths_deg(n_views), np.asarray(mesh.vertices)
     depths = (
-        renderer.render(vertices @ turn.T, mesh.faces, 0.0, azimuths_deg, camera) for turn in turns
+        renderer.render(vertices @ orientation.T, mesh.faces, 0.0, azimuths_deg, camera)
+        for orientation in orientations
     )
     return np.concatenate([encode_depth(depth, camera) for depth in depths])
 
@@ -71,7 +72,7 @@ def _azimuths_deg(n_views: int) -> Array:
     return np.linspace(0.0, 360.0, n_views, endpoint=False)
 
 
-def mirrored(poses: Rotations, plane_deg: float) -> Rotations:
+def mirrored(poses: Orientations, plane_deg: float) -> Orientations:
     """Return the poses (..., 3, 3) that the mirror images of an object show.
 
     The object is its own mirror image in the vertical plane through the azimuth `plane_deg`.
@@ -82,9 +83,9 @@ def mirrored(poses: Rotations, plane_deg: float) -> Rotations:
     return np.asarray(np.diag([-1.0, 1.0, 1.0]) @ poses @ other_side)
 
 
-def train_rotations(
+def train_orientations(
     codes: Codes,
-    poses: Rotations,
+    poses: Orientations,
     settings: Mapping[str, Any],
     hardware: Hardware,
     seed: int,
@@ -95,7 +96,7 @@ def train_rotations(
     Parameters
     ----------
     settings : mapping
-        Those of `nbv.experiment.estimation.training.train_network`; ``n_classes`` is the number of
+        As in `nbv.experiment.estimation.training.train_network`; ``n_classes`` is the number of
         poses in the grid.
     plane_deg : float, optional
         With it, half of each batch are mirror images; see `mirrored`.
@@ -116,13 +117,13 @@ def train_rotations(
     return Estimator(network, settings, codes.shape[-1], ())
 
 
-def _flat(poses: Rotations) -> torch.Tensor:
+def _flat(poses: Orientations) -> torch.Tensor:
     return torch.from_numpy(poses.reshape(-1, 9).astype(np.float32))
 
 
 @dataclass(frozen=True)
-class Answers:
-    """What the estimator says of n images.
+class Predictions:
+    """Estimates of n images.
 
     Attributes
     ----------
@@ -134,12 +135,12 @@ class Answers:
         Log density at the true pose.
     """
 
-    estimate: Rotations
+    estimate: Orientations
     score: Array
     log_likelihood: Array
 
 
-def log_likelihood(logits: Array, truth: Rotations, temperature: float = 1.0) -> Array:
+def log_likelihood(logits: Array, truth: Orientations, temperature: float = 1.0) -> Array:
     """Return the log densities (n,) of logits (n, k) at true poses (n, 3, 3), per pi² of volume."""
     n, k = logits.shape
     cell = (truth.reshape(n, 9) @ spiral(k).reshape(k, 9).T).argmax(axis=1)
@@ -147,7 +148,7 @@ def log_likelihood(logits: Array, truth: Rotations, temperature: float = 1.0) ->
     return np.asarray(of_cell + np.log(k / VOLUME))
 
 
-def fit_rotation_temperature(logits: Array, truth: Rotations) -> float:
+def fit_orientation_temperature(logits: Array, truth: Orientations) -> float:
     """Fit the temperature of logits (n, k) to true poses (n, 3, 3) by maximum likelihood."""
 
     def loss(log_temperature: float) -> float:
@@ -157,8 +158,8 @@ def fit_rotation_temperature(logits: Array, truth: Rotations) -> float:
     return float(np.exp(minimize_scalar(loss, bounds=bounds, method="bounded").x))
 
 
-def answers(logits: Array, truth: Rotations, temperature: float) -> Answers:
-    """Return the answers of logits (n, k) for images of true poses (n, 3, 3)."""
+def predictions(logits: Array, truth: Orientations, temperature: float) -> Predictions:
+    """Return the predictions of logits (n, k) for images of true poses (n, 3, 3)."""
     k = logits.shape[1]
     grid = spiral(k)
     cosine = (np.tensordot(grid, grid, ((1, 2), (1, 2))) - 1) / 2
@@ -166,4 +167,4 @@ def answers(logits: Array, truth: Rotations, temperature: float) -> Answers:
     likeliest = (p @ np.exp(CONCENTRATION * (cosine - 1))).argmax(axis=1)
     p *= cosine[likeliest] > np.cos(np.radians(NEAR_DEG))
     at_truth = log_likelihood(logits, truth, temperature)
-    return Answers(chordal_mean(grid, p), p.sum(axis=1), at_truth)
+    return Predictions(chordal_mean(grid, p), p.sum(axis=1), at_truth)

@@ -12,9 +12,9 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from nbv.core.rotation_errors import RotationErrors
-from nbv.core.rotation_views import turn_deg
-from nbv.core.rotations import ASYMMETRIC, Rotations, Symmetry, viewing_direction
+from nbv.core.rotation_criteria import view_angle_deg
+from nbv.core.rotation_errors import OrientationErrors
+from nbv.core.rotations import ASYMMETRIC, Orientations, Symmetry, viewing_direction
 from nbv.robot.style import AGAINST, INK, MUTED, RC, method_style, new_figure
 from studies.rotations import (
     Instance,
@@ -33,7 +33,7 @@ class Example:
     Attributes
     ----------
     one : Instance
-    errors : RotationErrors
+    errors : OrientationErrors
         Of the object's other instances.
     first, second : int
         Images of the instance.
@@ -42,7 +42,7 @@ class Example:
     """
 
     one: Instance
-    errors: RotationErrors
+    errors: OrientationErrors
     first: int
     second: int
     error_deg: Mapping[str, float]
@@ -72,7 +72,7 @@ def example(
     found = two_views(one, errors, depends_on_view=True)
     i, chosen = int(np.argmax(is_flip[one.name])), chosen_views(found, "score")
     after = {name: float(found.error_deg["score"][i, k[i]].mean()) for name, k in chosen.items()}
-    return Example(one, errors, i, int(chosen["expected_error"][i, 0]), after)
+    return Example(one, errors, i, int(chosen["bayes_error"][i, 0]), after)
 
 
 # Light, so that marks of every colour stand out.
@@ -95,7 +95,7 @@ def rotation_figure(shown: Example) -> Figure:
     label = "Probability of a flip, from calibration (%)"
     figure.colorbar(shades, orientation="horizontal", label=label, shrink=0.6, aspect=30)
 
-    def mark(poses: Rotations, label: str, marker: str, size: float, **style: Any) -> None:
+    def mark(poses: Orientations, label: str, marker: str, size: float, **style: Any) -> None:
         x, y, z = viewing_direction(poses.reshape(-1, 3, 3)).T
         axes.plot(np.arctan2(y, x), np.arcsin(z), marker, label=label, markersize=size, **style)
 
@@ -124,10 +124,10 @@ def rotation_figure(shown: Example) -> Figure:
     axes.tick_params(labelsize=8, labelcolor=MUTED)
     figure.legend(loc="outside lower center", ncols=4, handlelength=1, columnspacing=1.2)
     single, after, other = (
-        f"{shown.error_deg[name]:.1f}°" for name in ("single", "expected_error", "random")
+        f"{shown.error_deg[name]:.1f}°" for name in ("single", "bayes_error", "random")
     )
     axes.set_title(
         f"Object {one.object_id} ({one.name}): one view errs by {single},\nwith the chosen second "
-        f"one, {turn_deg(move[None])[0]:.0f}° away, {after}; with a random one {other}"
+        f"one, {view_angle_deg(move[None])[0]:.0f}° away, {after}; with a random one {other}"
     )
     return figure

@@ -74,7 +74,7 @@ def by_symmetry(objects: Iterable[str], symmetries: Mapping[str, Symmetry]) -> d
     }
 
 
-def rotation_table(
+def orientation_table(
     figures: pd.DataFrame,
     groups: Mapping[str, Sequence[str]],
     n_resamples: int,

@@ -15,17 +15,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.core.rotation_errors import RotationErrors, ScoreRatio
-from nbv.core.rotation_views import (
-    CRITERIA,
-    NextViews,
-    average,
-    belief,
-    costs_of,
-    posterior,
-    turn_deg,
-)
-from nbv.core.rotations import ASYMMETRIC, Symmetry, along_ray, check_rotations
+from nbv.core.rotation_belief import average, belief, posterior
+from nbv.core.rotation_criteria import CRITERIA, NextViews, costs_of, ranking, view_angle_deg
+from nbv.core.rotation_errors import OrientationErrors, ScoreRatio
+from nbv.core.rotations import ASYMMETRIC, Symmetry, along_ray, check_orientations
 from nbv.errors import UserError
 from nbv.files import check_columns, read_csv, read_json
 
@@ -84,7 +77,7 @@ def read_instances(path: str | Path, objects: Sequence[str]) -> list[Instance]:
     for key, rows in chosen.groupby(keys, sort=False):
         ray = along_ray(_numbers(rows["t_true_mm"]))
         truth, estimate = (
-            ray @ check_rotations(name, _numbers(rows[name]).reshape(-1, 3, 3))
+            ray @ check_orientations(name, _numbers(rows[name]).reshape(-1, 3, 3))
             for name in ("R_true", "R_estimate")
         )
         score = rows["score"].to_numpy(dtype=np.float64)
@@ -137,7 +130,7 @@ def calibration(
     scored: Sequence[Instance],
     symmetries: Mapping[str, Symmetry],
     settings: Mapping[str, Any],
-) -> RotationErrors:
+) -> OrientationErrors:
     """Return the errors on some instances of an object, with what a score says on `scored`.
 
     Of these other objects count, or the instances themselves where there is no other object.
@@ -145,7 +138,7 @@ def calibration(
     object_id = others[0].object_id
     elsewhere = [one for one in scored if one.object_id != object_id] or others
     model = {k: settings[k] for k in ("concentration", "pseudo_observations", "flip_deg")}
-    return RotationErrors(
+    return OrientationErrors(
         np.concatenate([one.estimate for one in others]),
         np.concatenate([one.truth for one in others]),
         symmetries.get(object_id, ASYMMETRIC),
@@ -171,7 +164,7 @@ class TwoViews:
         Of each fusion, [first, second view]; the diagonal is of one view.
     cost : dict of str to ndarray (n, n)
         Of each criterion.
-    turn_deg : ndarray (n, n)
+    angle_deg : ndarray (n, n)
         The angle between the views.
     depends_on_view : bool
         Whether calibration shows that flips depend on the view.
@@ -179,19 +172,19 @@ class TwoViews:
 
     error_deg: Mapping[str, Array]
     cost: Mapping[str, Array]
-    turn_deg: Array
+    angle_deg: Array
     depends_on_view: bool
 
 
-def two_views(one: Instance, errors: RotationErrors, depends_on_view: bool) -> TwoViews:
+def two_views(one: Instance, errors: OrientationErrors, depends_on_view: bool) -> TwoViews:
     """Evaluate every pair of views of an instance."""
     n = len(one.truth)
     fused = {name: np.empty((n, n, 3, 3)) for name in FUSIONS}
     cost = {name: np.empty((n, n)) for name in CRITERIA}
-    turns = np.empty((n, n))
+    angle = np.empty((n, n))
     for i in range(n):
         moves = one.truth @ one.truth[i].T
-        turns[i] = turn_deg(moves)
+        angle[i] = view_angle_deg(moves)
         first = belief(errors, one.estimate[[i]], np.eye(3)[None])
         ahead = NextViews(first, moves)
         for name in CRITERIA:
@@ -204,7 +197,7 @@ def two_views(one: Instance, errors: RotationErrors, depends_on_view: bool) -> T
             fused["score"][i, j] = posterior(*given, one.score[views])
     distance = errors.symmetry.distance_deg
     error = {name: distance(poses, one.truth[:, None]) for name, poses in fused.items()}
-    return TwoViews(error, cost, turns, depends_on_view)
+    return TwoViews(error, cost, angle, depends_on_view)
 
 
 def chosen_views(found: TwoViews, fusion: str) -> dict[str, NDArray[np.intp]]:
@@ -212,27 +205,27 @@ def chosen_views(found: TwoViews, fusion: str) -> dict[str, NDArray[np.intp]]:
 
     Where a method takes several, their mean counts.
     """
-    n = len(found.turn_deg)
+    n = len(found.angle_deg)
     first = np.arange(n)[:, None]
     others = np.array([np.delete(np.arange(n), i) for i in range(n)])
-    error, turns = found.error_deg[fusion][first, others], found.turn_deg[first, others]
-    farthest = others[first, turns.argmax(axis=1)[:, None]]
+    error, angle = found.error_deg[fusion][first, others], found.angle_deg[first, others]
+    farthest = others[first, angle.argmax(axis=1)[:, None]]
     chosen = {"single": first, "random": others, "opposite": farthest}
     for name, cost in found.cost.items():
-        order = np.lexsort((turns, np.round(cost[first, others], 9)), axis=1)
+        order = ranking(cost[first, others], angle)
         ranked = np.take_along_axis(others, order, axis=1)
         chosen[name] = ranked[:, :1]
         chosen[f"{name}_five"] = ranked[:, :FIVE]
-    chosen["recommended"] = chosen["expected_error"] if found.depends_on_view else farthest
+    chosen["farthest_if_independent"] = chosen["bayes_error"] if found.depends_on_view else farthest
     chosen["hindsight"] = others[first, error.argmin(axis=1)[:, None]]
     chosen["oracle"] = np.concatenate(
-        [_oracle(error, turns, others, found.turn_deg, half) for half in (0, 1)], axis=1
+        [_oracle(error, angle, others, found.angle_deg, half) for half in (0, 1)], axis=1
     )
     return chosen
 
 
 def _oracle(
-    error: Array, turns: Array, others: NDArray[np.intp], between: Array, half: int
+    error: Array, angle: Array, others: NDArray[np.intp], between: Array, half: int
 ) -> NDArray[np.intp]:
     """Return views (n, 1) of one half that are nearest to the best ones of the other half."""
     first = np.arange(len(others))[:, None]
@@ -248,7 +241,7 @@ def evaluate(
     """Return the figures of every instance, fusion and method.
 
     ``settings`` has ``objects``, which are evaluated, and ``score_objects``, which say what a score
-    is worth; and those of `RotationErrors`.
+    is worth; and those of `OrientationErrors`.
     """
     instances = read_instances(path, settings["objects"])
     scored = read_instances(path, settings["score_objects"])

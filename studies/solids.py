@@ -17,7 +17,7 @@ _POLYHEDRA: Final[Mapping[str, tuple[Literal["T", "O", "I"], tuple[float, ...]]]
     "cube": ("O", (1.0, 1.0, 1.0)),
     "icosahedron": ("I", (0.0, 1.0, (1 + 5**0.5) / 2)),
 }
-# They turn freely about z; the other turns.
+# They are symmetric about z; these are the other elements of their groups.
 _ROUND: Final = {"cone": np.eye(3)[None], "cylinder": np.stack([np.eye(3), np.diag([1.0, -1, -1])])}
 
 SOLIDS: Final = (*_POLYHEDRA, *_ROUND)
@@ -26,7 +26,7 @@ SOLIDS: Final = (*_POLYHEDRA, *_ROUND)
 def solid(name: str) -> tuple[trimesh.Trimesh, Symmetry]:
     """Return one of `SOLIDS` and the group of its rotations.
 
-    A polyhedron is the hull of one vertex that every element of its group turns.
+    A polyhedron is the hull of the images of one vertex under its group.
     """
     import trimesh
     from scipy.spatial.transform import Rotation
@@ -35,7 +35,7 @@ def solid(name: str) -> tuple[trimesh.Trimesh, Symmetry]:
         mesh = getattr(trimesh.creation, name)(radius=0.5, height=1.0, sections=128)
         return mesh, Symmetry(_ROUND[name], np.array([0.0, 0.0, 1.0]))
     group, vertex = _POLYHEDRA[name]
-    turns = Rotation.create_group(group)
+    elements = Rotation.create_group(group)
     # The identity is the first element of a symmetry.
-    turns = turns[turns.magnitude().argsort()]
-    return trimesh.convex.convex_hull(turns.apply(vertex)), Symmetry(turns.as_matrix())
+    elements = elements[elements.magnitude().argsort()]
+    return trimesh.convex.convex_hull(elements.apply(vertex)), Symmetry(elements.as_matrix())

@@ -7,7 +7,7 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 
-def rotation_pairs():
+def orientation_pairs():
     """Two objects of two instances; what looks from +x is upside down, and of low score."""
     rng = np.random.default_rng(0)
     tables = []

@@ -43,6 +43,14 @@ def test_type_checkers_see_the_same_names():
         assert getattr(import_module(module), of_module) is getattr(nbv, name)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [("RotationPairs", "OrientationTable"), ("View", "PoseEstimate")]
+)
+def test_a_former_name_warns_of_the_new_name(old, new):
+    with pytest.warns(DeprecationWarning, match=f"nbv.{old} is now nbv.{new}"):
+        assert getattr(nbv, old) is getattr(nbv, new)
+
+
 def test_all_public_names_are_listed():
     assert set(nbv.__all__) <= set(dir(nbv))
 

@@ -60,14 +60,14 @@ ROTATIONS = {
     "Random, averaged": ("average", "random"),
     "Random": ("score", "random"),
     "Opposite": ("score", "opposite"),
-    "expected error": ("score", "expected_error"),
+    "Bayes error": ("score", "bayes_error"),
 }
 OWN_ROTATIONS = {
     "one view": ("score", "single"),
     "Random": ("score", "random"),
     "Opposite": ("score", "opposite"),
     "Proposed": ("score", "pose_ambiguity"),
-    "expected error": ("score", "expected_error"),
+    "Bayes error": ("score", "bayes_error"),
 }
 
 
@@ -192,7 +192,7 @@ def own_rotations() -> pd.DataFrame:
     """Return `rotations` of the study's own estimators, and what the choice of a view brings."""
     folder = "rotation-estimator"
     found = pd.read_csv(REFERENCE / folder / "rotations.csv")
-    chosen = found.query("method == 'expected_error' and fusion == 'score'").set_index("group")
+    chosen = found.query("method == 'bayes_error' and fusion == 'score'").set_index("group")
     table = rotations(folder, OWN_ROTATIONS)
     for other in ("random", "opposite"):
         names = [f"less_{other}{end}" for end in ("", "_ci_low", "_ci_high")]

@@ -18,6 +18,7 @@ With an estimator of one's own, by the lookup table of its errors::
 `build_lookup` makes a table of the evidence that `gather_evidence` makes of calibration estimates.
 """
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -39,12 +40,12 @@ if TYPE_CHECKING:
     from nbv.robot.intrinsics import Intrinsics as Intrinsics
     from nbv.robot.moves import check_axis as check_axis
     from nbv.robot.moves import moved_camera as moved_camera
-    from nbv.robot.next_camera import View as View
+    from nbv.robot.next_camera import PoseEstimate as PoseEstimate
     from nbv.robot.next_camera import recommend_camera as recommend_camera
     from nbv.robot.next_view import Move as Move
     from nbv.robot.next_view import Recommendation as Recommendation
     from nbv.robot.recommender import Recommender as Recommender
-    from nbv.robot.rotation_pairs import RotationPairs as RotationPairs
+    from nbv.robot.rotation_pairs import OrientationTable as OrientationTable
     from nbv.robot.synthetic import example_frame as example_frame
 
 __version__ = "0.2.0"
@@ -55,8 +56,8 @@ _MODULES = {
     "Recommendation": "nbv.robot.next_view",
     "Move": "nbv.robot.next_view",
     "DistributionTable": "nbv.robot.distribution_table",
-    "RotationPairs": "nbv.robot.rotation_pairs",
-    "View": "nbv.robot.next_camera",
+    "OrientationTable": "nbv.robot.rotation_pairs",
+    "PoseEstimate": "nbv.robot.next_camera",
     "recommend_camera": "nbv.robot.next_camera",
     "moved_camera": "nbv.robot.moves",
     "check_axis": "nbv.robot.moves",
@@ -76,11 +77,19 @@ _MODULES = {
     "build_lookup": "nbv.core.lookup",
 }
 
+# Former names, for one release.
+_RENAMED = {"RotationPairs": "OrientationTable", "View": "PoseEstimate"}
+
 __all__ = list(_MODULES)
 
 
 def __getattr__(name: str) -> Any:
     """Import what the public API names when it is first asked for."""
+    if name in _RENAMED:
+        new = _RENAMED[name]
+        message = f"nbv.{name} is now nbv.{new}; the old name goes with the next release"
+        warnings.warn(message, DeprecationWarning, stacklevel=2)
+        name = new
     if name not in _MODULES:
         raise AttributeError(f"module 'nbv' has no attribute {name!r}")
     return getattr(import_module(_MODULES[name]), name)

@@ -1,4 +1,4 @@
-"""Train one fold's estimator of rotations, and estimate one view of each turn held out."""
+"""Train one fold's estimator of orientations, and estimate held-out views, one per orientation."""
 
 from nbv.experiment.jobs import job
 
@@ -6,11 +6,11 @@ with job(snakemake):
     import numpy as np
     import pandas as pd
     from studies.rotation_estimator import (
-        answers,
-        fit_rotation_temperature,
+        fit_orientation_temperature,
+        orientations_of,
         poses_of,
-        train_rotations,
-        turns_of,
+        predictions,
+        train_orientations,
     )
     from studies.rotations import pairs_table
     from studies.solids import SOLIDS, solid
@@ -25,17 +25,20 @@ with job(snakemake):
 
     params, given = snakemake.params, snakemake.input
     category, fold = snakemake.wildcards.category, int(snakemake.wildcards.fold)
-    n_turns, n_views = params.settings["turns"], params.settings["views"]
+    n_orientations, n_views = params.settings["turns"], params.settings["views"]
     use_one_thread()
     splits, images = read_splits(given.splits), open_depth(given.depth, given.objects)
     check_objects(splits, images.object_ids)
-    turns = {name: turns_of(name, category, n_turns, params.seed) for name in images.object_ids}
+    orientations = {
+        name: orientations_of(name, category, n_orientations, params.seed)
+        for name in images.object_ids
+    }
     hardware = choose_hardware(params.estimator["device"], params.estimator["precision"])
     seen = objects_with_role(splits, fold, "train")
     codes = images.of(seen)
-    estimator = train_rotations(
+    estimator = train_orientations(
         codes.reshape(-1, *codes.shape[2:]),
-        np.concatenate([poses_of(turns[name], n_views).reshape(-1, 3, 3) for name in seen]),
+        np.concatenate([poses_of(orientations[name], n_views).reshape(-1, 3, 3) for name in seen]),
         {**params.estimator, "n_classes": params.settings["poses"]},
         hardware,
         seed_for(params.seed, "rotations", category, fold),
@@ -44,17 +47,19 @@ with job(snakemake):
     held_out = {role: objects_with_role(splits, fold, role) for role in ("calibration", "test")}
     logits, truth = {}, {}
     for role, names in held_out.items():
-        found = network_outputs(estimator, images.of(names)[:, ::n_views], hardware)
-        logits[role] = found.reshape(-1, found.shape[-1])
-        truth[role] = np.concatenate([poses_of(turns[name], n_views)[:, 0] for name in names])
-    temperature = fit_rotation_temperature(logits["calibration"], truth["calibration"])
+        outputs = network_outputs(estimator, images.of(names)[:, ::n_views], hardware)
+        logits[role] = outputs.reshape(-1, outputs.shape[-1])
+        truth[role] = np.concatenate(
+            [poses_of(orientations[name], n_views)[:, 0] for name in names]
+        )
+    temperature = fit_orientation_temperature(logits["calibration"], truth["calibration"])
     symmetry = solid(category)[1] if category in SOLIDS else ASYMMETRIC
     tables = []
     for role, names in held_out.items():
-        found = answers(logits[role], truth[role], temperature)
+        found = predictions(logits[role], truth[role], temperature)
         columns = {
             "role": role,
-            "instance": np.repeat(names, n_turns),
+            "instance": np.repeat(names, n_orientations),
             "log_likelihood": found.log_likelihood,
             "error_deg": symmetry.distance_deg(found.estimate, truth[role]),
             "score": found.score,

@@ -3,7 +3,7 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from studies.rotation_estimator import turned_views, turns_of
+    from studies.rotation_estimator import orientations_of, oriented_views
 
     from nbv.data.camera import Camera
     from nbv.data.depth_images import write_depth
@@ -14,12 +14,16 @@ with job(snakemake):
     category, settings = snakemake.wildcards.category, params.settings
     camera, renderer = Camera(**params.camera), open_renderer(params.renderer["name"])
     meshes = load_meshes(snakemake.input.meshes)
-    n_turns, n_views = settings["turns"], settings["views"]
+    n_orientations, n_views = settings["turns"], settings["views"]
     images = (
-        turned_views(
-            mesh, turns_of(name, category, n_turns, params.seed), n_views, camera, renderer
+        oriented_views(
+            mesh,
+            orientations_of(name, category, n_orientations, params.seed),
+            n_views,
+            camera,
+            renderer,
         )
         for name, mesh in meshes.items()
     )
-    shape = n_turns * n_views, camera.image_side, camera.image_side
+    shape = n_orientations * n_views, camera.image_side, camera.image_side
     write_depth(output.depth, output.objects, meshes, images, shape)

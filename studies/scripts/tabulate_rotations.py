@@ -6,7 +6,7 @@ with job(snakemake):
     import numpy as np
     import pandas as pd
     from studies.rotation_figure import example, rotation_figure
-    from studies.rotation_tables import by_symmetry, rotation_table
+    from studies.rotation_tables import by_symmetry, orientation_table
     from studies.rotations import read_symmetries
 
     from nbv.experiment.report.table import write_table
@@ -24,7 +24,7 @@ with job(snakemake):
     if len(names) > 1 and "training" in figures:
         groups["all categories"] = names
     rng = np.random.default_rng(params.seed)
-    table = rotation_table(figures, groups, params.n_resamples, rng)
+    table = orientation_table(figures, groups, params.n_resamples, rng)
     write_table(table, {kind: output[kind] for kind in ("csv", "md")})
     figure = rotation_figure(example(given.pairs, symmetries, params.settings))
     save_figure(figure, {kind: output[kind] for kind in ("png", "pdf", "svg")})

@@ -13,18 +13,9 @@ from nbv.core import criteria, fusion
 from nbv.core.angles import circular_distance_deg, direction_deg
 from nbv.core.density import von_mises_kernel
 from nbv.core.evidence import gather_evidence
-from nbv.core.rotation_errors import RotationErrors, ScoreRatio
-from nbv.core.rotation_views import (
-    CRITERIA,
-    NextViews,
-    average,
-    belief,
-    best_move,
-    choose_kernel,
-    costs_of,
-    posterior,
-    turn_deg,
-)
+from nbv.core.rotation_belief import average, belief, posterior
+from nbv.core.rotation_criteria import CRITERIA, NextViews, costs_of, ranking, view_angle_deg
+from nbv.core.rotation_errors import OrientationErrors, ScoreRatio
 from nbv.core.rotations import ASYMMETRIC, Symmetry, viewing_direction
 from nbv.errors import UserError
 
@@ -57,7 +48,7 @@ def circle():
     evidence = gather_evidence(estimate_deg, settings, **density)
     # Pairs weigh 1 at the kernel's centre, and there a part of 1 on the circle.
     alpha = ALPHA * 360 / N_BINS / von_mises_kernel(N_BINS, BANDWIDTH_DEG)[0]
-    errors = RotationErrors(
+    errors = OrientationErrors(
         at(estimate_deg),
         at(np.tile(BINS_DEG, 3)),
         concentration=1 / np.radians(BANDWIDTH_DEG) ** 2,
@@ -87,9 +78,10 @@ def test_about_one_axis_costs_and_choices_are_the_circles(circle):
             cost = costs_of(name, NextViews(first, moves))
             expected = criteria.CRITERIA[name](on_circle, evidence, "posterior")[0]
             np.testing.assert_allclose(cost, expected, atol=2e-5)
-            assert expected[best_move(cost, moves)] <= expected.min() + 2e-5
+            best = ranking(cost, view_angle_deg(moves))[0]
+            assert expected[best] <= expected.min() + 2e-5
             if np.sort(expected)[1] > expected.min() + 1e-4:
-                assert best_move(cost, moves) == expected.argmin()
+                assert best == expected.argmin()
         # The expected error of the posterior mean direction.
         unit = np.exp(1j * np.radians(BINS_DEG))
         for delta in (0, 7, 18):
@@ -98,7 +90,7 @@ def test_about_one_axis_costs_and_choices_are_the_circles(circle):
             error = circular_distance_deg(
                 direction_deg(moment.real, moment.imag), BINS_DEG[:, None]
             )
-            cost = costs_of("expected_error", NextViews(first, moves[[delta]]))
+            cost = costs_of("bayes_error", NextViews(first, moves[[delta]]))
             assert cost[0] == pytest.approx((joint * error).sum(), abs=2e-2)
 
 
@@ -122,7 +114,7 @@ def made(symmetry=ASYMMETRIC, n=80, seed=0, **settings):
         rng.random(n) < 0.7
     )
     upside_down = np.where(flips[:, None, None], np.diag([1.0, -1, -1]), np.eye(3))
-    return RotationErrors(truth @ small @ upside_down, truth, symmetry, **settings)
+    return OrientationErrors(truth @ small @ upside_down, truth, symmetry, **settings)
 
 
 def some_moves(n=6, seed=3):
@@ -275,8 +267,8 @@ def test_a_view_that_shows_the_flip_is_chosen_and_the_flip_found():
         Rotation.from_rotvec([0, angle, 0], degrees=True).as_matrix() for angle in (100, 180, 10)
     )
     moves = np.stack([near, sideways, behind])
-    for name in ("information_gain", "expected_error"):
-        assert best_move(costs_of(name, NextViews(first, moves)), moves) > 0
+    for name in ("information_gain", "bayes_error"):
+        assert np.argmin(costs_of(name, NextViews(first, moves))) > 0
     views = np.concatenate([flipped, (sideways @ truth)[None]])
     both = np.stack([np.eye(3), sideways])
     assert ASYMMETRIC.distance_deg(posterior(errors, views, both), truth) < 1
@@ -323,7 +315,7 @@ def test_scores_say_nothing_without_flips_or_without_anything_else():
         np.testing.assert_allclose(ScoreRatio.fit(scores, flips)(scores), 1)
 
 
-def test_where_nothing_depends_on_the_view_the_farthest_is_taken():
+def test_calibration_shows_whether_flips_depend_on_the_view():
     rng = np.random.default_rng(4)
     dependent = made(n=600)
     groups = np.arange(600) % 4
@@ -332,25 +324,13 @@ def test_where_nothing_depends_on_the_view_the_farthest_is_taken():
     chance = replace(dependent, estimate=dependent.truth @ flips, offsets=None)
     assert not chance.depends_on_view(groups)
     assert not dependent.depends_on_view(np.zeros(600))
-    turns = [Rotation.from_rotvec([0, a, 0], degrees=True).as_matrix() for a in (30, 170, 90)]
-    moves = np.stack(turns)
-    np.testing.assert_allclose(turn_deg(moves), [30, 170, 90], atol=1e-6)
-    assert best_move(None, moves) == 1
-    assert best_move(np.zeros(3), moves) == 0  # of equal costs the shortest way
 
 
-def test_a_kernel_is_chosen_by_the_errors_of_decisions():
-    """Flips are seen from one side only, so what sees all directions alike is worse."""
-    errors = made(n=45)
-    groups = np.arange(45) % 3
-    chosen = choose_kernel(errors, groups, [25.0], [3.0, 1e6])
-    assert chosen.pseudo_observations == 3.0
-    # Nothing decides between candidates for an estimator that is right: the widest.
-    right = replace(errors, estimate=errors.truth)
-    chosen = choose_kernel(right, groups, [25.0, 12.0], [3.0, 10.0])
-    assert (chosen.concentration, chosen.pseudo_observations) == (12.0, 10.0)
-    with pytest.raises(UserError, match="two instances or more"):
-        choose_kernel(errors, np.zeros(45), [25.0], [3.0])
+def test_of_equal_costs_the_shortest_way_is_first():
+    angles_deg = np.array([30, 170, 90])
+    moves = Rotation.from_rotvec(angles_deg[:, None] * [0, 1, 0], degrees=True).as_matrix()
+    np.testing.assert_allclose(view_angle_deg(moves), angles_deg, atol=1e-6)
+    assert ranking(np.array([1.0, 1e-12, 0.0]), view_angle_deg(moves)).tolist() == [2, 1, 0]
 
 
 def test_the_probability_to_be_within_an_error_counts_small_errors():
@@ -369,7 +349,7 @@ def test_ambiguity_is_refused_after_two_views():
     two = belief(errors, errors.estimate[:2], np.concatenate([IDENTITY, some_moves(1)]))
     with pytest.raises(ValueError, match="two views, not 3"):
         costs_of("pose_ambiguity", NextViews(two, some_moves(2)))
-    assert np.isfinite(costs_of("expected_error", NextViews(two, some_moves(2)))).all()
+    assert np.isfinite(costs_of("bayes_error", NextViews(two, some_moves(2)))).all()
 
 
 def test_an_unknown_criterion_is_named():

@@ -10,7 +10,7 @@ from nbv.core.rotations import (
     ASYMMETRIC,
     Symmetry,
     along_ray,
-    check_rotations,
+    check_orientations,
     spiral,
     viewing_direction,
 )
@@ -128,7 +128,7 @@ def test_a_camera_that_looks_straight_sees_the_object_on_its_axis():
     np.testing.assert_allclose(
         seen, np.linalg.norm(position, axis=1)[:, None] * [0, 0, 1], atol=1e-9
     )
-    np.testing.assert_allclose(check_rotations("turns", turns)[1], np.eye(3))
+    np.testing.assert_allclose(check_orientations("turns", turns)[1], np.eye(3))
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_a_camera_that_looks_straight_sees_the_object_on_its_axis():
         ({"symmetries_continuous": freely([0, 0, 1]) + freely([1, 0, 0])}, "more than one axis"),
         (
             {"symmetries_continuous": freely([0, 0, 1]), "symmetries_discrete": bop([90, 0, 0])},
-            "turns the axis",
+            "moves the axis",
         ),
     ],
 )
@@ -163,4 +163,4 @@ def test_an_impossible_symmetry_is_refused(entry, said):
 )
 def test_what_is_no_rotation_is_named(rotations, said):
     with pytest.raises(UserError, match=said):
-        check_rotations("R", rotations)
+        check_orientations("R", rotations)

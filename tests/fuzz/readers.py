@@ -129,7 +129,7 @@ def make_metadata(path: Path) -> None:
 
 def read_metadata(path: Path) -> Any:
     source = dataset("shapenet", path.parent)
-    return [(name, source.orientation("mug", name)) for name in source.object_ids("mug")]
+    return [(name, source.mesh_axes("mug", name)) for name in source.object_ids("mug")]
 
 
 def metadata_problem(objects: Any) -> str:
@@ -377,9 +377,11 @@ def make_bop_truth(path: Path) -> None:
 
 
 def read_bop_results(path: Path) -> Any:
-    from nbv.robot.bop import read_rotation_pairs
+    from nbv.robot.bop import read_orientation_table
 
-    return read_rotation_pairs(path.parent / "results.csv", None, path.parent / "models_info.json")
+    return read_orientation_table(
+        path.parent / "results.csv", None, path.parent / "models_info.json"
+    )
 
 
 def read_bop_truth(path: Path) -> Any:
@@ -398,9 +400,9 @@ def make_rotation_table(path: Path) -> None:
 
 
 def read_rotation_table(path: Path) -> Any:
-    from nbv.robot.rotation_pairs import RotationPairs
+    from nbv.robot.rotation_pairs import OrientationTable
 
-    return RotationPairs.load(path), ()
+    return OrientationTable.load(path), ()
 
 
 READERS: Mapping[str, Reader] = {

@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.rotation_pairs import rotation_pairs
+from tests.rotation_pairs import orientation_pairs
 
 from nbv.cli import main
 from nbv.errors import UserError
 from nbv.numbers import read_poses
-from nbv.robot.bop import read_rotation_pairs
+from nbv.robot.bop import read_orientation_table
 from nbv.robot.bop_example import HALF_TURN, write_example
-from nbv.robot.next_camera import View, as_view, read_views, recommend_camera
-from nbv.robot.rotation_pairs import RotationPairs
+from nbv.robot.next_camera import PoseEstimate, as_view, read_views, recommend_camera
+from nbv.robot.rotation_pairs import OrientationTable
 
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "estimates"
 HIDDEN = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
@@ -31,13 +31,13 @@ def example(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def pairs(example) -> RotationPairs:
-    return read_rotation_pairs(example / "results.csv")[0]
+def pairs(example) -> OrientationTable:
+    return read_orientation_table(example / "results.csv")[0]
 
 
 def table(path: Path, edit=lambda rows: rows) -> Path:
     """Pairs of two objects in a table, edited."""
-    edit(rotation_pairs()).to_csv(path, index=False)
+    edit(orientation_pairs()).to_csv(path, index=False)
     return path
 
 
@@ -53,7 +53,7 @@ def test_results_find_the_nearest_instance_once(example, tmp_path):
     far["score"] = "3"
     path = tmp_path / "results.csv"
     pd.concat([worse, rows, better, far]).to_csv(path, index=False)
-    found, said = read_rotation_pairs(path, example)
+    found, said = read_orientation_table(path, example)
     assert len(found.estimate) == len(rows)
     assert said == ("3 of 163 estimates found no partner",)
     assert (found.score == 2).sum() == 1
@@ -68,7 +68,7 @@ def test_truth_may_be_a_csv_file_in_the_form_of_results(example, tmp_path, pairs
             rows.append((int(file.parent.name), image, entry["obj_id"], 1, r, t, -1))
     columns = ["scene_id", "im_id", "obj_id", "score", "R", "t", "time"]
     pd.DataFrame(rows, columns=columns).to_csv(tmp_path / "truth.csv", index=False)
-    found, said = read_rotation_pairs(example / "results.csv", tmp_path / "truth.csv")
+    found, said = read_orientation_table(example / "results.csv", tmp_path / "truth.csv")
     assert not said
     assert np.allclose(found.truth, pairs.truth)
     assert np.allclose(found.estimate, pairs.estimate)
@@ -76,7 +76,7 @@ def test_truth_may_be_a_csv_file_in_the_form_of_results(example, tmp_path, pairs
 
 def test_a_table_is_read_as_it_was_written(pairs, tmp_path):
     pairs.save(tmp_path / "t.npz")
-    again = RotationPairs.load(tmp_path / "t.npz")
+    again = OrientationTable.load(tmp_path / "t.npz")
     assert again.about() == pairs.about()
     again.save(tmp_path / "again.npz")
     assert (tmp_path / "t.npz").read_bytes() == (tmp_path / "again.npz").read_bytes()
@@ -92,7 +92,7 @@ def test_what_is_thin_or_suspicious_is_said(example, pairs, tmp_path):
     half_turn[:3, :3] = HALF_TURN
     entry = {"1": {"symmetries_discrete": [half_turn.ravel().tolist()]}}
     (tmp_path / "m.json").write_text(json.dumps(entry))
-    known, _ = read_rotation_pairs(example / "results.csv", None, tmp_path / "m.json")
+    known, _ = read_orientation_table(example / "results.csv", None, tmp_path / "m.json")
     (about,) = known.about()
     assert about["n_flips"] == 0
     assert not about["depends_on_view"]
@@ -151,7 +151,7 @@ def test_estimates_of_other_images_are_named(example, tmp_path):
     rows.loc[3, "im_id"] = "77"
     rows.to_csv(tmp_path / "r.csv", index=False)
     with pytest.raises(UserError, match=r"row 5: scene 1 has no image 77.*different images"):
-        read_rotation_pairs(tmp_path / "r.csv", example)
+        read_orientation_table(tmp_path / "r.csv", example)
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_files_that_are_not_bops_are_named(tmp_path, file, text, message):
     write_example(tmp_path)
     (tmp_path / file).write_text(text)
     with pytest.raises(UserError, match=message):
-        read_rotation_pairs(tmp_path / "results.csv", None, tmp_path / "models_info.json")[
+        read_orientation_table(tmp_path / "results.csv", None, tmp_path / "models_info.json")[
             0
         ].about()
 
@@ -176,7 +176,7 @@ def test_files_that_are_not_bops_are_named(tmp_path, file, text, message):
 
 
 def test_a_hidden_mark_is_looked_for(pairs):
-    view = View(HIDDEN @ HALF_TURN, np.array([10.0, -20.0, 700.0]), 0.4)
+    view = PoseEstimate(HIDDEN @ HALF_TURN, np.array([10.0, -20.0, 700.0]), 0.4)
     answer = recommend_camera(pairs, [view], 50)
     costs = [move.expected_error_deg for move in answer.moves]
     assert costs == sorted(costs)
@@ -205,7 +205,7 @@ def test_turning_the_base_frame_changes_no_rank(pairs):
     assert np.allclose(turned.rotation, VIEW.rotation)
 
 
-VIEW = View(HIDDEN @ HALF_TURN, np.array([10.0, -20.0, 700.0]), 0.4)
+VIEW = PoseEstimate(HIDDEN @ HALF_TURN, np.array([10.0, -20.0, 700.0]), 0.4)
 
 
 def _answer(pairs, **options):
@@ -215,18 +215,18 @@ def _answer(pairs, **options):
 def test_a_second_view_that_sees_the_mark_decides(pairs):
     target = _answer(pairs).moves[0].target_camera_pose
     relative = target[:3, :3].T
-    seen = View(relative @ HIDDEN, np.array([0.0, 0.0, 700.0]), 0.9, target)
-    both = [View(VIEW.rotation, VIEW.position_mm, 0.4, np.eye(4)), seen]
+    seen = PoseEstimate(relative @ HIDDEN, np.array([0.0, 0.0, 700.0]), 0.9, target)
+    both = [PoseEstimate(VIEW.rotation, VIEW.position_mm, 0.4, np.eye(4)), seen]
     fused = recommend_camera(pairs, both, 20)
     assert pairs.symmetry("1").distance_deg(fused.rotation, seen.rotation) < 5
     assert fused.expected_error_deg < 0.5 * _answer(pairs).expected_error_deg
 
 
 def test_two_hypotheses_share_the_belief(pairs):
-    other = View(HIDDEN, VIEW.position_mm, 0.4)
+    other = PoseEstimate(HIDDEN, VIEW.position_mm, 0.4)
     both = recommend_camera(pairs, [VIEW, other], 20)
     assert both.probability_within["30"] == pytest.approx(0.5, abs=0.1)
-    surer = recommend_camera(pairs, [VIEW, View(HIDDEN, VIEW.position_mm, 0.95)], 20)
+    surer = recommend_camera(pairs, [VIEW, PoseEstimate(HIDDEN, VIEW.position_mm, 0.95)], 20)
     assert np.allclose(surer.rotation, HIDDEN, atol=1e-6)
     assert surer.probability_within["30"] > both.probability_within["30"]
 
@@ -253,15 +253,15 @@ def test_a_wrong_candidate_is_named(pairs, pose, message):
 
 
 def test_independence_of_the_view_is_said(tmp_path):
-    rows = rotation_pairs().assign(scene_id=1).drop(columns="instance")
+    rows = orientation_pairs().assign(scene_id=1).drop(columns="instance")
     rows.to_csv(tmp_path / "p.csv", index=False)
-    pairs, _ = read_rotation_pairs(tmp_path / "p.csv")
-    answer = recommend_camera(pairs, [View(np.eye(3))], 20, object_id="1")
+    pairs, _ = read_orientation_table(tmp_path / "p.csv")
+    answer = recommend_camera(pairs, [PoseEstimate(np.eye(3))], 20, object_id="1")
     assert not answer.depends_on_view
     assert "no dependence" in answer.warnings[0]
     assert answer.moves[0].target_camera_pose is None
     with pytest.raises(UserError, match="2 objects"):
-        recommend_camera(pairs, [View(np.eye(3))], 20)
+        recommend_camera(pairs, [PoseEstimate(np.eye(3))], 20)
 
 
 @pytest.mark.parametrize(
@@ -318,7 +318,7 @@ def test_the_keys_of_an_azimuth_are_a_subset(tmp_path, monkeypatch, capsys, pair
     assert set(one_axis) - {"criterion", "cost_unit"} <= set(answer)
     assert set(one_axis["move"]) - {"cost"} <= set(answer["move"])
     assert main([*options, "r.npy", "--table", "circle.npz", "--sphere", "9"]) == 2
-    assert "holds no rotations" in capsys.readouterr().err
+    assert "holds no orientations" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -338,14 +338,14 @@ def test_a_damaged_table_is_refused(pairs, tmp_path, name, value):
         arrays = dict(stored)
     np.savez(tmp_path / "t.npz", **(arrays | {name: value}))
     with pytest.raises(UserError, match=r"t\.npz"):
-        RotationPairs.load(tmp_path / "t.npz")
+        OrientationTable.load(tmp_path / "t.npz")
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="../shared/data/estimates is absent")
 def test_a_published_estimators_files_give_its_table():
     models = SHARED / "bop" / "models_info.json"
-    whole, _ = read_rotation_pairs(SHARED / "tless_megapose.csv", None, models)
-    scenes, _ = read_rotation_pairs(SHARED / "bop" / "megapose_tless-test.csv", None, models)
+    whole, _ = read_orientation_table(SHARED / "tless_megapose.csv", None, models)
+    scenes, _ = read_orientation_table(SHARED / "bop" / "megapose_tless-test.csv", None, models)
     about = {one["object_id"]: one for one in whole.about()}
     assert round(about["23"]["mean_error_deg"], 1) == 44.7
     assert about["23"]["n_flips"] == 49

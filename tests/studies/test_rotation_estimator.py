@@ -1,4 +1,4 @@
-"""The study's own estimator of rotations: its images, its training and its answers."""
+"""The study's own estimator of orientations: its images, its training and its predictions."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 from studies.rotation_estimator import (
-    answers,
-    fit_rotation_temperature,
+    fit_orientation_temperature,
     log_likelihood,
     mirrored,
+    orientations_of,
+    oriented_views,
     poses_of,
-    train_rotations,
-    turned_views,
-    turns_of,
+    predictions,
+    train_orientations,
 )
 from studies.rotation_tables import estimator_table
 from studies.solids import SOLIDS, solid
@@ -62,9 +62,9 @@ def share_alike(depth, other):
 
 def test_an_image_shows_its_pose():
     chair = object_of("chair")
-    turns = turns_of("chair-0000", "chair", 2, seed=0)
-    codes = turned_views(chair, turns, 3, CAMERA, open_renderer("embree"))
-    poses = poses_of(turns, 3).reshape(-1, 3, 3)
+    orientations = orientations_of("chair-0000", "chair", 2, seed=0)
+    codes = oriented_views(chair, orientations, 3, CAMERA, open_renderer("embree"))
+    poses = poses_of(orientations, 3).reshape(-1, 3, 3)
     found = [
         [share_alike(depth_of(code), projected(chair, pose)) for pose in poses] for code in codes
     ]
@@ -75,9 +75,9 @@ def test_an_image_shows_its_pose():
 
 def test_a_mirror_image_shows_the_mirrored_pose():
     car = object_of("car")
-    turns = turns_of("car-0000", "car", 2, seed=0)
-    codes = turned_views(car, turns, 2, CAMERA, open_renderer("embree"))
-    poses = mirrored(poses_of(turns, 2).reshape(-1, 3, 3), 0.0)
+    orientations = orientations_of("car-0000", "car", 2, seed=0)
+    codes = oriented_views(car, orientations, 2, CAMERA, open_renderer("embree"))
+    poses = mirrored(poses_of(orientations, 2).reshape(-1, 3, 3), 0.0)
     images = [projected(car, pose) for pose in poses]
     found = [[share_alike(depth_of(code[:, ::-1]), image) for image in images] for code in codes]
     assert np.diag(found).min() > 0.6
@@ -127,7 +127,7 @@ def test_densities_are_per_volume_of_all_rotations():
     logits = rng.normal(size=(4000, 30))
     p = np.exp(logits) / np.exp(logits).sum(axis=1, keepdims=True)
     drawn = np.array([rng.choice(30, p=own) for own in p])
-    assert fit_rotation_temperature(3 * logits, spiral(30)[drawn]) == pytest.approx(3, rel=0.1)
+    assert fit_orientation_temperature(3 * logits, spiral(30)[drawn]) == pytest.approx(3, rel=0.1)
 
 
 def test_an_answer_is_the_mean_about_the_likeliest_pose():
@@ -137,7 +137,7 @@ def test_an_answer_is_the_mean_about_the_likeliest_pose():
     other = truth @ Rotation.from_euler("y", 150, degrees=True).as_matrix()
     cosines = [(np.tensordot(pose, grid, ((1, 2), (1, 2))) - 1) / 2 for pose in (truth, other)]
     density = 0.7 * np.exp(50 * (cosines[0] - 1)) + 0.3 * np.exp(50 * (cosines[1] - 1))
-    found = answers(np.log(density + 1e-30), truth, 1.0)
+    found = predictions(np.log(density + 1e-30), truth, 1.0)
     assert ASYMMETRIC.distance_deg(found.estimate, truth).max() < 3
     assert found.score == pytest.approx(0.7, abs=0.06)
 
@@ -145,9 +145,9 @@ def test_an_answer_is_the_mean_about_the_likeliest_pose():
 def test_a_classifier_learns_poses_and_their_mirror_images():
     camera = Camera(image_side=32)
     mug, renderer = object_of("mug"), open_renderer("embree")
-    turns = turns_of("mug-0000", "mug", 3, seed=0)
-    codes = turned_views(mug, turns, 8, camera, renderer)
-    poses = poses_of(turns, 8).reshape(-1, 3, 3)
+    orientations = orientations_of("mug-0000", "mug", 3, seed=0)
+    codes = oriented_views(mug, orientations, 8, camera, renderer)
+    poses = poses_of(orientations, 8).reshape(-1, 3, 3)
     settings = {
         "channels": [16, 32],
         "hidden": 64,
@@ -159,11 +159,11 @@ def test_a_classifier_learns_poses_and_their_mirror_images():
     }
     use_one_thread()
     hardware = choose_hardware("cpu", "float32")
-    trained = train_rotations(codes, poses, settings, hardware, seed=0, plane_deg=90.0)
+    trained = train_orientations(codes, poses, settings, hardware, seed=0, plane_deg=90.0)
     for shown, pose in ((codes, poses), (codes[..., ::-1], mirrored(poses, 90.0))):
         outputs = network_outputs(trained, np.ascontiguousarray(shown), hardware)
         assert log_likelihood(outputs, pose).mean() > 1.0
-        estimate = answers(outputs, pose, 1.0).estimate
+        estimate = predictions(outputs, pose, 1.0).estimate
         assert np.median(ASYMMETRIC.distance_deg(estimate, pose)) < 25
 
 

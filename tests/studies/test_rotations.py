@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from studies.rotation_figure import example, rotation_figure
-from studies.rotation_tables import by_symmetry, rotation_table
+from studies.rotation_tables import by_symmetry, orientation_table
 from studies.rotations import (
     FUSIONS,
     TwoViews,
@@ -18,10 +18,11 @@ from studies.rotations import (
     read_symmetries,
 )
 
-from nbv.core.rotation_views import NextViews, belief, expected_error
+from nbv.core.rotation_belief import belief
+from nbv.core.rotation_criteria import NextViews, bayes_error
 from nbv.core.rotations import ASYMMETRIC, Symmetry
 from nbv.errors import UserError
-from rotation_pairs import rotation_pairs
+from rotation_pairs import orientation_pairs
 
 PAIRS = Path(__file__).parents[3] / "shared/data/estimates/tless_megapose.csv"
 SETTINGS = {"concentration": 50.0, "pseudo_observations": 10.0, "flip_deg": 20.0}
@@ -30,7 +31,7 @@ SETTINGS = {"concentration": 50.0, "pseudo_observations": 10.0, "flip_deg": 20.0
 @pytest.fixture(scope="module")
 def pairs(tmp_path_factory):
     path = tmp_path_factory.mktemp("pairs") / "pairs.csv"
-    rotation_pairs().to_csv(path, index=False)
+    orientation_pairs().to_csv(path, index=False)
     return path
 
 
@@ -46,7 +47,7 @@ def test_every_method_is_evaluated_on_every_instance(pairs):
 
     turning = {"1": Symmetry(np.eye(3)[None], np.array([0.0, 0, 1]))}
     groups = by_symmetry(["0", "1"], turning)
-    table = rotation_table(figures, groups, 100, np.random.default_rng(0))
+    table = orientation_table(figures, groups, 100, np.random.default_rng(0))
     cells = table.cells.set_index(["group", "fusion", "method"])
     for object_id, group in (("0", "no symmetry or a discrete one"), ("1", "turning freely")):
         own = figures[figures["object_id"] == object_id].groupby(["fusion", "method"])
@@ -76,7 +77,7 @@ def test_intervals_contain_the_chance_of_training(of_training, of_instance):
                 rows.append(own | {"fusion": "average", "method": method, "mean_deg": found})
     figures = pd.DataFrame(rows).assign(median_deg=0.0, above_30=0.0, within_15=1.0)
     groups = {"a": ["a"], "both": ["a", "b"]}
-    cells = rotation_table(figures, groups, 1000, rng).cells.set_index(["group", "method"])
+    cells = orientation_table(figures, groups, 1000, rng).cells.set_index(["group", "method"])
     errors = figures.query("method == 'random'").groupby("training")["mean_deg"].apply(np.array)
     for group, n_categories in (("a", 1), ("both", 2)):
         drawn = [
@@ -97,29 +98,29 @@ def test_intervals_contain_the_chance_of_training(of_training, of_instance):
 
 
 def test_methods_choose_by_cost_turn_and_hindsight():
-    turn = np.array([[0, 20, 170, 90], [20, 0, 150, 70], [170, 150, 0, 80], [90, 70, 80, 0.0]])
+    angle = np.array([[0, 20, 170, 90], [20, 0, 150, 70], [170, 150, 0, 80], [90, 70, 80, 0.0]])
     error = np.array([[9, 1, 5, 3], [1, 9, 5, 3], [2, 2, 9, 1], [4, 1, 8, 9.0]])
     cost = np.array([[0, 2, 2, 1], [3, 0, 3, 3], [1, 2, 0, 3], [1, 1, 0.5, 0.0]])
-    costs = {"expected_error": cost}
-    found = TwoViews({"posterior": error}, costs, turn, True)
+    costs = {"bayes_error": cost}
+    found = TwoViews({"posterior": error}, costs, angle, True)
     chosen = chosen_views(found, "posterior")
     assert chosen["single"].ravel().tolist() == [0, 1, 2, 3]
     assert chosen["random"].tolist() == [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
     assert chosen["opposite"].ravel().tolist() == [2, 2, 0, 0]
     # Never the first view again; of equal costs the nearest.
-    assert chosen["expected_error"].ravel().tolist() == [3, 0, 0, 2]
-    assert chosen["recommended"].tolist() == chosen["expected_error"].tolist()
+    assert chosen["bayes_error"].ravel().tolist() == [3, 0, 0, 2]
+    assert chosen["farthest_if_independent"].tolist() == chosen["bayes_error"].tolist()
     assert chosen["hindsight"].ravel().tolist() == [1, 0, 3, 1]
     # The best of one half of the images, and the image of the other half nearest to it.
     assert chosen["oracle"].tolist() == [[3, 2], [3, 2], [0, 1], [0, 1]]
-    still = TwoViews({"posterior": error}, costs, turn, False)
-    assert chosen_views(still, "posterior")["recommended"].ravel().tolist() == [2, 2, 0, 0]
+    independent = chosen_views(TwoViews({"posterior": error}, costs, angle, False), "posterior")
+    assert independent["farthest_if_independent"].ravel().tolist() == [2, 2, 0, 0]
 
 
 def test_the_figure_shows_the_first_flip_of_the_instance_of_most_flips(tmp_path):
     pairs = tmp_path / "pairs.csv"
     # The instance of most flips is not the first one.
-    later_first = rotation_pairs().sort_values("instance", ascending=False, kind="stable")
+    later_first = orientation_pairs().sort_values("instance", ascending=False, kind="stable")
     later_first.to_csv(pairs, index=False)
     symmetries = {"1": Symmetry(np.eye(3)[None], np.array([0.0, 0, 1]))}
     settings = {**SETTINGS, "objects": [], "score_objects": []}
@@ -138,11 +139,11 @@ def test_the_figure_shows_the_first_flip_of_the_instance_of_most_flips(tmp_path)
     truth, first = shown.one.truth, shown.one.estimate[[shown.first]]
     rest = [i for i in range(len(truth)) if i != shown.first]
     moves = truth[rest] @ truth[shown.first].T
-    costs = expected_error(NextViews(belief(shown.errors, first, np.eye(3)[None]), moves))
+    costs = bayes_error(NextViews(belief(shown.errors, first, np.eye(3)[None]), moves))
     assert costs[rest.index(shown.second)] == pytest.approx(costs.min())
 
     (title,) = [axes.get_title() for axes in rotation_figure(shown).axes if axes.get_title()]
-    for method in ("single", "expected_error", "random"):
+    for method in ("single", "bayes_error", "random"):
         assert f"{shown.error_deg[method]:.1f}°" in title
 
 

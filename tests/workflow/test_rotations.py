@@ -8,13 +8,13 @@ import pandas as pd
 import pytest
 
 from projects import STUDIES, TINY
-from rotation_pairs import rotation_pairs
+from rotation_pairs import orientation_pairs
 
 pytestmark = pytest.mark.slow
 
 
 def test_a_table_of_pairs_is_judged(scratch):
-    rotation_pairs().to_csv(scratch.folder / "pairs.csv", index=False)
+    orientation_pairs().to_csv(scratch.folder / "pairs.csv", index=False)
     turns = {"symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]}
     (scratch.folder / "models_info.json").write_text(json.dumps({"1": turns}))
     more = ("rotations.pairs=pairs.csv", "rotations.models_info=models_info.json")

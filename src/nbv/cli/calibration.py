@@ -99,9 +99,9 @@ def calibrate(
                 "--bundle mug; pairs make a table, an .npz file"
             )
         check_writable("--output", output, [".npz"])
-        from nbv.robot.bop import is_rotation_pairs
+        from nbv.robot.bop import is_orientation_table
 
-        if is_rotation_pairs(source):
+        if is_orientation_table(source):
             if criterion is not None:
                 raise UserError("--criterion is for azimuths; rotations rank by expected error")
             _calibrate_rotations(
@@ -295,9 +295,9 @@ def _calibrate_rotations(
     as_json: bool,
 ) -> None:
     """Make the table of ``nbv calibrate`` from estimates in three dimensions."""
-    from nbv.robot.bop import read_rotation_pairs
+    from nbv.robot.bop import read_orientation_table
 
-    pairs, said = read_rotation_pairs(source, truth, models_info, objects)
+    pairs, said = read_orientation_table(source, truth, models_info, objects)
     about = pairs.about()
     pairs.save(output)
     if as_json:

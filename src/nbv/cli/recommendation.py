@@ -343,13 +343,13 @@ def _recommend_camera(
         raise UserError("--candidates and --sphere: give one of them")
     from nbv.numbers import read_pose, read_poses
     from nbv.robot.next_camera import as_view, read_views, recommend_camera
-    from nbv.robot.rotation_pairs import RotationPairs
+    from nbv.robot.rotation_pairs import OrientationTable
 
     views = (
         read_views(estimate) if isinstance(estimate, Path) else [as_view(estimate, "--estimate")]
     )
     answer = recommend_camera(
-        RotationPairs.load(table),
+        OrientationTable.load(table),
         views,
         read_poses(candidates) if candidates is not None else sphere or 0,
         object_id=object_id,

@@ -1,10 +1,10 @@
-"""V and L of poses in three dimensions, from pairs of an estimate and the truth (docs/method.md).
+"""V and L of orientations, from pairs of an estimate and the truth (docs/method.md).
 
-An estimator errs alike where it sees the object from alike directions, whatever the camera's roll.
-Pairs count by a kernel in this direction, in that of the estimate for V and of the truth for L. A
-pair whose error is small says that the estimate is right there. Any other, a flip, says where the
-pose is instead. Without small errors (`flip_deg` = 0) this is a kernel density, on the circle that
-of `nbv.core.density`.
+An estimator has similar errors where it sees the object from similar directions, whatever the
+camera's roll. Pairs are weighted by a kernel in this direction: the estimate's for V, the truth's
+for L. A pair with a small error says that the estimate is right there. A pair with a larger error,
+a flip, says where the pose is instead. Without small errors (`flip_deg` = 0) this is a kernel
+density; on the circle it is that of `nbv.core.density`, which a test shows.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.core.rotations import (
     ASYMMETRIC,
     Array,
-    Rotations,
+    Orientations,
     Symmetry,
     inverse,
     spiral,
@@ -33,7 +33,7 @@ NEGLIGIBLE = 1e-3
 """A flip of less weight than this is left out."""
 
 SPACING_DEG = 40.0
-"""Between other poses that are thought possible."""
+"""Angle between the other possible poses."""
 
 MOST_RATIO = 50.0
 """A score never changes the odds of a flip by more than this factor."""
@@ -87,7 +87,7 @@ def _logit_rank(ordered: Array, scores: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True)
-class RotationErrors:
+class OrientationErrors:
     """An estimator's errors on calibration images of one object or category.
 
     Attributes
@@ -96,26 +96,25 @@ class RotationErrors:
         Poses of the same image, object to camera.
     symmetry : Symmetry
     concentration : float
-        Of both kernels, exp(concentration (cos(angle) - 1)): 25 has a standard deviation of 11°.
+        Both kernels are exp(concentration (cos(angle) - 1)): 25 has a standard deviation of 11°.
     pseudo_observations : float
-        Weight of what holds on average over all directions, against pairs that are seen from the
-        same one and weigh 1 each.
+        Weight of the mean over all directions, where a pair seen from the same direction weighs 1.
     flip_deg : float
-        A larger error is a flip. Of 0: every pair is.
+        A larger error is a flip; with 0 every pair is a flip.
     offsets : ndarray (m, 3, 3), optional
-        Poses that are thought possible, the estimate being the identity, which is the first. By
-        default the flips and about even poses `SPACING_DEG` apart.
+        Possible poses relative to the estimate; the first is the identity. By default the flips
+        and about even poses `SPACING_DEG` apart.
     ratio : ScoreRatio, optional
         Needed where estimates have scores.
     """
 
-    estimate: Rotations
-    truth: Rotations
+    estimate: Orientations
+    truth: Orientations
     symmetry: Symmetry = ASYMMETRIC
     concentration: float = 25.0
     pseudo_observations: float = 3.0
     flip_deg: float = 20.0
-    offsets: Rotations | None = None
+    offsets: Orientations | None = None
     ratio: ScoreRatio | None = None
 
     @cached_property
@@ -138,65 +137,65 @@ class RotationErrors:
         return float((self.is_flip.sum() + 0.5) / (len(self.estimate) + 1))
 
     @cached_property
-    def possible(self) -> Rotations:
-        """The `offsets` (m, 3, 3): by default the identity, each kind of flip and others, apart."""
+    def possible(self) -> Orientations:
+        """The `offsets` (m, 3, 3), or their default."""
         if self.offsets is not None:
             return self.offsets
-        found = _apart(np.eye(3)[None], self._turns("estimate"), SPACING_DEG / 2, self.symmetry)
-        return _apart(found, spiral(2000), SPACING_DEG, self.symmetry)
+        flips = _apart(np.eye(3)[None], self._flips("estimate"), SPACING_DEG / 2, self.symmetry)
+        return _apart(flips, spiral(2000), SPACING_DEG, self.symmetry)
 
-    def _pairs(self, given: Given) -> tuple[Rotations, Rotations]:
+    def _pairs(self, given: Given) -> tuple[Orientations, Orientations]:
         """Return what is given of the pairs, and the other."""
         return (self.estimate, self.truth) if given == "estimate" else (self.truth, self.estimate)
 
-    def _turns(self, given: Given) -> Rotations:
+    def _flips(self, given: Given) -> Orientations:
         """Return the flips (f, 3, 3) on the object's axes, from what is given to the other."""
         known, other = (poses[self.is_flip] for poses in self._pairs(given))
         known = self.symmetry.canonical(known)
         return np.asarray(inverse(known) @ self.symmetry.nearest(other, known))
 
-    def _flips_anywhere(self, given: Given, poses: Rotations, support: Rotations) -> Array:
+    def _flips_anywhere(self, given: Given, poses: Orientations, support: Orientations) -> Array:
         """Return where flips lead from poses (r, 3, 3), (r, m), whatever the direction.
 
-        They turn the object as any flip of calibration did; one more leads anywhere.
+        Each flip of calibration is applied to the poses; one more leads anywhere.
         """
-        m, turns = len(support), self._turns(given)
-        if not self.flip_deg or not len(turns):
+        m, flips = len(support), self._flips(given)
+        if not self.flip_deg or not len(flips):
             return np.full((len(poses), m), 1 / m)
-        where = self.symmetry.canonical(poses)[:, None] @ turns
+        where = self.symmetry.canonical(poses)[:, None] @ flips
         kernel = self._near(where.reshape(-1, 3, 3), support).reshape(len(poses), -1, m)
-        return np.asarray((kernel.sum(axis=1) + 1 / m) / (len(turns) + 1))
+        return np.asarray((kernel.sum(axis=1) + 1 / m) / (len(flips) + 1))
 
-    def _near(self, rotations: Rotations, support: Rotations) -> Array:
-        """Return the kernel about rotations (n, 3, 3) among the poses of a support, (n, m)."""
+    def _near(self, poses: Orientations, support: Orientations) -> Array:
+        """Return the kernel about poses (n, 3, 3) among the poses of a support, (n, m)."""
         # In place and in single precision, in half the time.
-        kernel = self.symmetry.cosine(rotations.astype(np.float32), support.astype(np.float32))
+        kernel = self.symmetry.cosine(poses.astype(np.float32), support.astype(np.float32))
         kernel -= kernel.max(axis=1, keepdims=True)
         kernel *= self.concentration
         np.exp(kernel, out=kernel)
         kernel /= kernel.sum(axis=1, keepdims=True)
         return kernel
 
-    def possible_poses(self, estimate: Rotations) -> Rotations:
-        """Return the poses (m, 3, 3) that are thought possible after an estimate (3, 3)."""
+    def possible_poses(self, estimate: Orientations) -> Orientations:
+        """Return the possible poses (m, 3, 3) after an estimate (3, 3)."""
         return self.symmetry.canonical(estimate[None]) @ self.possible
 
-    def flip_probability(self, rotations: Rotations, given: Given) -> Array:
+    def flip_probability(self, poses: Orientations, given: Given) -> Array:
         """Return the probability of a flip for each estimated or true pose (n, 3, 3)."""
-        weights = self._weights(rotations, self._pairs(given)[0])
+        weights = self._weights(poses, self._pairs(given)[0])
         alpha = self.pseudo_observations
         flips = weights[:, self.is_flip].sum(axis=1) + alpha * self.share_of_flips
         return np.asarray(flips / (weights.sum(axis=1) + alpha))
 
-    def _weights(self, rotations: Rotations, pairs: Rotations) -> Array:
-        cosine = self.symmetry.direction_cosine(*map(viewing_direction, (rotations, pairs)))
+    def _weights(self, poses: Orientations, pairs: Orientations) -> Array:
+        cosine = self.symmetry.direction_cosine(*map(viewing_direction, (poses, pairs)))
         return np.asarray(np.exp(self.concentration * (cosine - 1)))
 
     def conditional(
         self,
         given: Given,
-        support: Rotations,
-        moves: Rotations | None = None,
+        support: Orientations,
+        moves: Orientations | None = None,
         rows: Sequence[int] | NDArray[np.intp] | None = None,
         ratio: ArrayLike = 1.0,
     ) -> Array:
@@ -213,7 +212,7 @@ class RotationErrors:
         rows : (r,) int, optional
             Indices of what is given, in the support; all by default.
         ratio : float or ndarray (r,)
-            Likelihood ratio of a flip by the score, of what is given for V; for L see `belief`.
+            Likelihood ratio of a flip, given each estimate's score, for V; for L see `belief`.
 
         Returns
         -------
@@ -222,28 +221,28 @@ class RotationErrors:
         """
         m = len(support)
         moves = np.eye(3)[None] if moves is None else moves
-        own = np.arange(m) if rows is None else np.asarray(rows)
-        poses = (moves[:, None] @ support[own]).reshape(-1, 3, 3)
+        rows = np.arange(m) if rows is None else np.asarray(rows)
+        poses = (moves[:, None] @ support[rows]).reshape(-1, 3, 3)
         known, other = self._pairs(given)
         weights = self._weights(poses, known)
         alpha, share = self.pseudo_observations, self.share_of_flips
         right = weights[:, ~self.is_flip].sum(axis=1) + alpha * (1 - share)
         flips = np.flatnonzero(self.is_flip)
-        anywhere = alpha * share * self._flips_anywhere(given, support[own], support)
+        anywhere = alpha * share * self._flips_anywhere(given, support[rows], support)
         result = np.tile(anywhere, (len(moves), 1))
         i, k = np.nonzero(weights[:, flips] > NEGLIGIBLE)
         if len(i):
             pair = flips[k]
-            turn = self.symmetry.towards(viewing_direction(poses[i]), known[pair])
-            roll = _roll(poses[i] @ inverse(known[pair] @ turn))
-            where = inverse(moves[i // len(own)]) @ roll @ other[pair]
+            element = self.symmetry.towards(viewing_direction(poses[i]), known[pair])
+            roll = _roll(poses[i] @ inverse(known[pair] @ element))
+            where = inverse(moves[i // len(rows)]) @ roll @ other[pair]
             from scipy.sparse import csr_array
 
             entries = weights[i, pair].astype(np.float32), (i, np.arange(len(i)))
             by_row = csr_array(entries, shape=(len(poses), len(i)))
             result += np.asarray(by_row @ self._near(where, support))
-        result = result.reshape(len(moves), len(own), m) * np.reshape(ratio, (-1, 1))
-        result[:, np.arange(len(own)), own] += right.reshape(len(moves), -1)
+        result = result.reshape(len(moves), len(rows), m) * np.reshape(ratio, (-1, 1))
+        result[:, np.arange(len(rows)), rows] += right.reshape(len(moves), -1)
         total = result.sum(axis=2, keepdims=True)
         np.divide(result, total, out=result, where=total > 0)
         result[total[..., 0] <= 0] = 1 / m
@@ -253,8 +252,7 @@ class RotationErrors:
         """Return whether the viewing direction says more about flips than their share does.
 
         It compares the log likelihoods of the flips of each group, an instance or an object, given
-        the pairs of all others. A gain of more than a standard error over groups counts. Where
-        nothing depends on the view, the farthest is as good as any.
+        the pairs of all others. A gain of more than a standard error over groups counts.
         """
         labels = np.unique(np.asarray(groups), return_inverse=True)[1]
         n_groups = int(labels.max()) + 1
@@ -262,18 +260,20 @@ class RotationErrors:
             return False
         gains = np.empty(n_groups)
         for label in range(n_groups):
-            own = labels == label
-            others = replace(self, estimate=self.estimate[~own], truth=self.truth[~own])
-            by_view = others.flip_probability(self.estimate[own], "estimate")
+            held_out = labels == label
+            others = replace(self, estimate=self.estimate[~held_out], truth=self.truth[~held_out])
+            by_view = others.flip_probability(self.estimate[held_out], "estimate")
             shares = np.full_like(by_view, others.share_of_flips)
-            flips = self.is_flip[own]
+            flips = self.is_flip[held_out]
             by_view, shares = (np.where(flips, p, 1 - p) for p in (by_view, shares))
             gains[label] = np.log(by_view / shares).sum()
         return bool(gains.mean() > gains.std(ddof=1) / np.sqrt(n_groups))
 
 
-def _apart(kept: Rotations, more: Rotations, spacing_deg: float, symmetry: Symmetry) -> Rotations:
-    """Return rotations and those of some more that are apart from all before."""
+def _apart(
+    kept: Orientations, more: Orientations, spacing_deg: float, symmetry: Symmetry
+) -> Orientations:
+    """Return orientations, and those of `more` that are apart from all before."""
     nearest = np.cos(np.radians(spacing_deg))
     free = symmetry.cosine(more, kept).max(axis=1) < nearest
     chosen: list[int] = []
@@ -283,9 +283,8 @@ def _apart(kept: Rotations, more: Rotations, spacing_deg: float, symmetry: Symme
     return np.concatenate([kept, more[chosen]])
 
 
-def _roll(rotations: Rotations) -> Rotations:
-    """Return the turn about the optical axis nearest to each rotation (n, 3, 3)."""
-    a = rotations
+def _roll(a: Orientations) -> Orientations:
+    """Return the rotation about the optical axis nearest to each orientation (n, 3, 3)."""
     angle = np.arctan2(a[:, 1, 0] - a[:, 0, 1], a[:, 0, 0] + a[:, 1, 1])
     roll = np.zeros_like(a)
     roll[:, 0, 0] = roll[:, 1, 1] = np.cos(angle)

@@ -1,9 +1,9 @@
-"""Rotations, and what a symmetric object makes of them.
+"""Orientations, elements of SO(3), modulo the symmetry of an object.
 
-A pose is a rotation R (3, 3) from the object's axes to the camera's, x right, y down, z forward
+A pose is an orientation R (3, 3) from the object's axes to the camera's, x right, y down, z forward
 (BOP's convention). A camera that moves by M sees the pose M R. An object looks the same in R and in
 R g for each element g of its symmetry group; every function here gives the same answer for both.
-Arrays of rotations are (..., 3, 3) float64.
+Arrays of orientations are (..., 3, 3) float64.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.errors import UserError
 
 Array = NDArray[np.float64]
-Rotations = NDArray[np.float64]
+Orientations = NDArray[np.float64]
 
 MOST_ELEMENTS = 60
-"""Rotations of an icosahedron, the largest finite group that is not that of a prism."""
+"""Orientations of an icosahedron, the largest finite group that is not that of a prism."""
 
 NOT_A_ROTATION = 1e-3
 """Most that an entry of R Rᵀ may differ from the identity: files have six digits."""
 
 VOLUME = np.pi**2
-"""Of all rotations; a density is per unit of it."""
+"""Volume of SO(3); densities are per unit of it."""
 
-_SAME = 1e-5  # Two elements of a group are one; of the trace: 0.2 degrees.
+_SAME = 1e-5  # Difference of traces below which two elements are the same: 0.2 degrees.
 
 
-def check_rotations(name: str, rotations: ArrayLike) -> Rotations:
-    """Return rotations (..., 3, 3) as float64.
+def check_orientations(name: str, orientations: ArrayLike) -> Orientations:
+    """Return orientations (..., 3, 3) as float64.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def check_rotations(name: str, rotations: ArrayLike) -> Rotations:
         Names the first matrix that is not a rotation, and why.
     """
     try:
-        array = np.asarray(rotations, dtype=np.float64)
+        array = np.asarray(orientations, dtype=np.float64)
     except (TypeError, ValueError):
         raise UserError(f"{name} has an entry that is not a number") from None
     if array.shape[-2:] != (3, 3):
@@ -60,18 +60,18 @@ def check_rotations(name: str, rotations: ArrayLike) -> Rotations:
     return array
 
 
-def inverse(rotations: Rotations) -> Rotations:
-    """Return the inverse rotations (..., 3, 3)."""
-    return np.swapaxes(rotations, -1, -2)
+def inverse(orientations: Orientations) -> Orientations:
+    """Return the inverse orientations (..., 3, 3)."""
+    return np.swapaxes(orientations, -1, -2)
 
 
-def viewing_direction(rotations: Rotations) -> Array:
+def viewing_direction(orientations: Orientations) -> Array:
     """Return the direction (..., 3) from which the object is seen, a unit vector on its axes."""
-    return np.asarray(-rotations[..., 2, :])
+    return np.asarray(-orientations[..., 2, :])
 
 
-def along_ray(translation: ArrayLike) -> Rotations:
-    """Return the turn (..., 3, 3) of a camera that looks straight at an object, from where it is.
+def along_ray(translation: ArrayLike) -> Orientations:
+    """Return the rotation (..., 3, 3) that puts an object at `translation` on the optical axis.
 
     `translation` (..., 3) is the object's position in the camera, z > 0. The pose of an object off
     the image's centre, multiplied by this from the left, depends on the direction from which the
@@ -86,8 +86,8 @@ def along_ray(translation: ArrayLike) -> Rotations:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def spiral(n: int) -> Rotations:
-    """Return n nearly uniform rotations (n, 3, 3): super-Fibonacci spirals (Alexa, 2022)."""
+def spiral(n: int) -> Orientations:
+    """Return n nearly uniform orientations (n, 3, 3): super-Fibonacci spirals (Alexa, 2022)."""
     s = np.arange(n) + 0.5
     inner, outer = np.sqrt(s / n), np.sqrt(1 - s / n)
     alpha, beta = 2 * np.pi * s / np.sqrt(2), 2 * np.pi * s / 1.533751168755204288118041
@@ -109,11 +109,11 @@ class Symmetry:
     discrete : ndarray (n, 3, 3)
         A finite group; the first is the identity.
     axis : ndarray (3,) or None
-        A unit vector. Every turn about it belongs to the group too; `discrete` then maps it to
-        itself or its opposite.
+        A unit vector. Every rotation about it belongs to the group too; `discrete` then maps it
+        to itself or its opposite.
     """
 
-    discrete: Rotations
+    discrete: Orientations
     axis: Array | None = None
 
     @classmethod
@@ -125,21 +125,21 @@ class Symmetry:
         Raises
         ------
         UserError
-            If a symmetry is no rotation, the rotations form no group of a solid, or the object
-            turns freely about more than one axis.
+            If a symmetry is no rotation, the rotations form no group of a solid, or the object has
+            more than one axis of continuous symmetry.
         """
-        turns = [np.eye(3)]
+        generators = [np.eye(3)]
         for matrix in entry.get("symmetries_discrete", ()):
             if np.size(matrix) != 16:
                 raise UserError("symmetries_discrete has a matrix without 16 numbers")
             corner = np.reshape(matrix, (4, 4))[:3, :3]
-            turns.append(check_rotations("a matrix of symmetries_discrete", corner))
+            generators.append(check_orientations("a matrix of symmetries_discrete", corner))
         axes = entry.get("symmetries_continuous", ())
         if len(axes) > 1:
             raise UserError(
-                "symmetries_continuous has more than one axis: such a pose has no error"
+                "symmetries_continuous has more than one axis: a sphere has no orientation"
             )
-        group = _closed(turns)
+        group = _closed(generators)
         if not axes:
             return cls(group)
         axis = np.asarray(axes[0].get("axis", ()), dtype=np.float64)
@@ -148,12 +148,12 @@ class Symmetry:
         axis = axis / np.linalg.norm(axis)
         images = group @ axis
         if (np.abs(images @ axis) < 1 - NOT_A_ROTATION).any():
-            raise UserError("symmetries_discrete turns the axis of symmetries_continuous away")
-        # Of the rest only whether it turns the object upside down matters.
+            raise UserError("symmetries_discrete moves the axis of symmetries_continuous")
+        # Up to rotations about the axis, an element keeps the axis or flips it.
         flips = images @ axis < 0
         return cls(group[[0, int(np.argmax(flips))]] if flips.any() else group[:1], axis)
 
-    def cosine(self, first: Rotations, second: Rotations) -> Array:
+    def cosine(self, first: Orientations, second: Orientations) -> Array:
         """Return the cosine of the smallest angle between all poses (n, 3, 3) and (m, 3, 3)."""
         if self.axis is not None:
             images = [second @ (g @ self.axis) for g in self.discrete]
@@ -165,31 +165,31 @@ class Symmetry:
             cosine /= 2
         return np.clip(cosine, -1, 1, out=cosine)
 
-    def distance_deg(self, first: Rotations, second: Rotations) -> Array:
+    def distance_deg(self, first: Orientations, second: Orientations) -> Array:
         """Return the smallest angle between poses (..., 3, 3), in [0, 180], pair by pair."""
         first, second = np.broadcast_arrays(first, second)
         near = self.nearest(second.reshape(-1, 3, 3), first.reshape(-1, 3, 3))
         return _angle_deg(inverse(first.reshape(-1, 3, 3)) @ near).reshape(first.shape[:-2])
 
-    def nearest(self, rotations: Rotations, target: Rotations) -> Rotations:
-        """Return R g (n, 3, 3), of all g the one nearest to the target, pair by pair."""
-        turned = rotations[:, None] @ self.discrete
+    def nearest(self, orientations: Orientations, target: Orientations) -> Orientations:
+        """Return the R g (n, 3, 3) nearest to the target over all g, pair by pair."""
+        images = orientations[:, None] @ self.discrete
         if self.axis is not None:
-            q = inverse(target)[:, None] @ turned
+            q = inverse(target)[:, None] @ images
             p1, p2 = _across(self.axis)
             sine = np.einsum("i,ndij,j->nd", p1, q, p2) - np.einsum("i,ndij,j->nd", p2, q, p1)
             cosine = np.einsum("i,ndij,j->nd", p1, q, p1) + np.einsum("i,ndij,j->nd", p2, q, p2)
-            turned = turned @ _turns(self.axis, np.arctan2(sine, cosine))
-        best = np.einsum("nij,ndij->nd", target, turned).argmax(axis=1)
-        return np.asarray(turned[np.arange(len(turned)), best])
+            images = images @ _about(self.axis, np.arctan2(sine, cosine))
+        best = np.einsum("nij,ndij->nd", target, images).argmax(axis=1)
+        return np.asarray(images[np.arange(len(images)), best])
 
-    def canonical(self, rotations: Rotations) -> Rotations:
+    def canonical(self, orientations: Orientations) -> Orientations:
         """Return the same R g (n, 3, 3) for every R g of a pose, whatever the camera's roll.
 
         It is the one that is seen from nearest to a direction in which no group has a symmetry.
         """
-        oblique = np.broadcast_to(_OBLIQUE, (len(rotations), 3))
-        return rotations @ self.towards(oblique, rotations)
+        oblique = np.broadcast_to(_OBLIQUE, (len(orientations), 3))
+        return orientations @ self.towards(oblique, orientations)
 
     def direction_cosine(self, first: Array, second: Array) -> Array:
         """Return the cosine of the smallest angle between all directions (n, 3) and (m, 3)."""
@@ -201,46 +201,46 @@ class Symmetry:
         products = along[:, None, None] * images + across[:, None, None] * images_across
         return np.asarray(products.max(axis=-1))
 
-    def towards(self, directions: Array, rotations: Rotations) -> Rotations:
+    def towards(self, directions: Array, orientations: Orientations) -> Orientations:
         """Return the g (n, 3, 3) with which R g is seen from nearest to a direction (n, 3)."""
-        elements = np.broadcast_to(self.discrete, (len(rotations), *self.discrete.shape))
+        elements = np.broadcast_to(self.discrete, (len(orientations), *self.discrete.shape))
         if self.axis is not None:
             p1, p2 = _across(self.axis)
-            seen = viewing_direction(rotations[:, None] @ elements)
+            seen = viewing_direction(orientations[:, None] @ elements)
             angle = np.arctan2(seen @ p2, seen @ p1)
             angle = angle - np.arctan2(directions @ p2, directions @ p1)[:, None]
-            elements = elements @ _turns(self.axis, angle)
-        seen = viewing_direction(rotations[:, None] @ elements)
+            elements = elements @ _about(self.axis, angle)
+        seen = viewing_direction(orientations[:, None] @ elements)
         best = np.einsum("nj,ndj->nd", directions, seen).argmax(axis=1)
         return np.asarray(elements[np.arange(len(elements)), best])
 
-    def mean(self, rotations: Rotations, weights: ArrayLike | None = None) -> Rotations:
+    def mean(self, orientations: Orientations, weights: ArrayLike | None = None) -> Orientations:
         """Return the mean pose (3, 3) of (n, 3, 3), each taken nearest to the first.
 
-        Of two it is the middle of the shortest way, the first where they are half a turn apart.
+        The mean of two poses is halfway between them, or the first where they are 180° apart.
         """
-        near = self.nearest(rotations, np.broadcast_to(rotations[0], rotations.shape))
+        near = self.nearest(orientations, np.broadcast_to(orientations[0], orientations.shape))
         return chordal_mean(near, weights)
 
 
 ASYMMETRIC = Symmetry(np.eye(3)[None])
 
 
-def chordal_mean(rotations: Rotations, weights: ArrayLike | None = None) -> Rotations:
-    """Return the rotations (..., 3, 3) of least mean squared chord to rotations (n, 3, 3).
+def chordal_mean(orientations: Orientations, weights: ArrayLike | None = None) -> Orientations:
+    """Return the orientations (..., 3, 3) of least mean squared chord to orientations (n, 3, 3).
 
-    `weights` are (..., n), 1 by default. Where there is no such one, it is the first.
+    `weights` are (..., n), 1 by default. Where the mean is undefined, it is the first.
     """
-    share = np.ones(len(rotations)) if weights is None else np.asarray(weights, dtype=np.float64)
-    mean = (share / share.sum(axis=-1, keepdims=True)) @ rotations.reshape(-1, 9)
+    share = np.ones(len(orientations)) if weights is None else np.asarray(weights, dtype=np.float64)
+    mean = (share / share.sum(axis=-1, keepdims=True)) @ orientations.reshape(-1, 9)
     u, size, vt = np.linalg.svd(mean.reshape(*share.shape[:-1], 3, 3))
     sign = np.linalg.det(u @ vt)
     u[..., 2] *= sign[..., None]
     undefined = size[..., 1] + sign * size[..., 2] < 1e-9
-    return np.asarray(np.where(undefined[..., None, None], rotations[0], u @ vt))
+    return np.asarray(np.where(undefined[..., None, None], orientations[0], u @ vt))
 
 
-def _angle_deg(rotations: Rotations) -> Array:
+def _angle_deg(rotations: Orientations) -> Array:
     """Return the angle of rotations (n, 3, 3): from sine and cosine, so that 0 is exact."""
     sine = np.linalg.norm((rotations - inverse(rotations)).reshape(-1, 9), axis=1) / np.sqrt(2)
     cosine = np.trace(rotations, axis1=1, axis2=2) - 1
@@ -262,8 +262,8 @@ def _across(axis: Array) -> tuple[Array, Array]:
     return first, np.cross(axis, first)
 
 
-def _turns(axis: Array, angle_rad: Array) -> Rotations:
-    """Return the turns (..., 3, 3) about an axis."""
+def _about(axis: Array, angle_rad: Array) -> Orientations:
+    """Return the rotations (..., 3, 3) about an axis."""
     p1, p2 = _across(axis)
     cosine, sine = (part(angle_rad)[..., None, None] for part in (np.cos, np.sin))
     flat = np.outer(p1, p1) + np.outer(p2, p2)
@@ -272,10 +272,10 @@ def _turns(axis: Array, angle_rad: Array) -> Rotations:
     )
 
 
-def _closed(turns: Sequence[Rotations]) -> Rotations:
-    """Return the group that rotations generate, the identity first."""
-    group = [turns[0]]
-    for generator in turns[1:]:
+def _closed(generators: Sequence[Orientations]) -> Orientations:
+    """Return the group that rotations generate; the identity is first."""
+    group = [generators[0]]
+    for generator in generators[1:]:
         queue = [generator]
         while queue:
             new = queue.pop()
@@ -284,8 +284,8 @@ def _closed(turns: Sequence[Rotations]) -> Rotations:
             group.append(new)
             if len(group) > MOST_ELEMENTS:
                 raise UserError(
-                    f"symmetries_discrete makes more than {MOST_ELEMENTS} rotations: a prism of "
-                    "so many sides turns freely, in symmetries_continuous"
+                    f"symmetries_discrete makes more than {MOST_ELEMENTS} rotations: give the axis "
+                    "of a prism with so many sides in symmetries_continuous"
                 )
             queue += [product for g in list(group) for product in (new @ g, g @ new)]
     return np.stack(group)

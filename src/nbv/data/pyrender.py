@@ -5,7 +5,7 @@ It draws the same views as Embree, with three precautions:
 - pyrender draws into a multisampled buffer and keeps one sample of each pixel, off its centre. It
   is given a buffer with one sample, at the centre; switching multisampling off is not enough for
   NVIDIA's driver.
-- It draws the depth of front faces only. Collected meshes have faces of either orientation, so each
+- It draws the depth of front faces only. Collected meshes have faces of either winding, so each
   face is drawn both ways.
 - Depth passes through a 24-bit buffer, so the near and far planes are close to the object.
 """

@@ -9,17 +9,24 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.core.rotations import ASYMMETRIC, Array, Rotations, along_ray, check_rotations, inverse
+from nbv.core.rotations import (
+    ASYMMETRIC,
+    Array,
+    Orientations,
+    along_ray,
+    check_orientations,
+    inverse,
+)
 from nbv.errors import UserError, nearest
 from nbv.files import damaged, read_given_json, read_rows
 from nbv.labels import counted
-from nbv.robot.rotation_pairs import FLIP_DEG, RotationPairs
+from nbv.robot.rotation_pairs import FLIP_DEG, OrientationTable
 
 BOP_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
 TABLE_COLUMNS = ("object_id", "R_true", "R_estimate")
 
 NEAREST_MM = 50.0
-"""An estimate farther from every instance of its object is of none of them."""
+"""An estimate farther from every instance of its object matches none of them."""
 
 FEWEST_PAIRS = 12
 """An object with fewer says too little about where it flips."""
@@ -28,7 +35,7 @@ LEAST_MM = 10.0
 """No camera sees an object from nearer: such distances are metres."""
 
 
-def is_rotation_pairs(path: Path) -> bool:
+def is_orientation_table(path: Path) -> bool:
     """Return whether the head of a file names rotations: BOP's results, or a table of pairs."""
     try:
         columns = set(read_rows(path, ()))
@@ -37,19 +44,19 @@ def is_rotation_pairs(path: Path) -> bool:
     return {"obj_id", "R"} <= columns or "R_true" in columns
 
 
-def read_rotation_pairs(
+def read_orientation_table(
     path: str | Path,
     truth: str | Path | None = None,
     models_info: str | Path | None = None,
     objects: Sequence[str] = (),
-) -> tuple[RotationPairs, tuple[str, ...]]:
+) -> tuple[OrientationTable, tuple[str, ...]]:
     """Read pairs, and what was left out of them.
 
     Parameters
     ----------
     path : path
         BOP's results, or a table with `TABLE_COLUMNS` and perhaps score, t_true_mm, scene_id and
-        instance. Rotations are object to camera, row by row; positions are in millimetres.
+        instance. Orientations are object to camera, row by row; positions are in millimetres.
     truth : path, optional
         Of BOP's results: a folder with ``<scene>/scene_gt.json``, or a CSV file in the form of
         results. By default the folder of the results.
@@ -70,7 +77,7 @@ def read_rotation_pairs(
         rows, said = _matched(path, Path(truth) if truth else path.parent)
     elif truth is not None:
         raise UserError(f"{path} has its own truths (R_true); leave `ground_truth` out")
-    models = {} if models_info is None else _read_entries(Path(models_info))
+    symmetries = {} if models_info is None else _read_entries(Path(models_info))
     for name in TABLE_COLUMNS:
         if name not in rows:
             raise UserError(f"{path}: no column {name!r}; it needs {', '.join(TABLE_COLUMNS)}")
@@ -94,18 +101,18 @@ def read_rotation_pairs(
     rows = rows[rows["object_id"].map(counts) >= FEWEST_PAIRS]
     both = [_rotations(path, rows, name) for name in TABLE_COLUMNS[1:]]
     _check_way_round(path, rows, *both)
-    ray = "t_true_mm" in rows
-    if ray:
-        turn = along_ray(_positions(path, rows, "t_true_mm"))
-        both = [turn @ poses for poses in both]
-    score = np.full(len(rows), np.nan)
-    if "score" in rows:
-        score = _numbers(path, rows, "score", 1)[:, 0]
+    straightened = "t_true_mm" in rows
+    if straightened:
+        straightening = along_ray(_positions(path, rows, "t_true_mm"))
+        both = [straightening @ poses for poses in both]
+    score = _numbers(path, rows, "score", 1)[:, 0] if "score" in rows else None
     keys = [name for name in ("scene_id", "instance") if name in rows]
     group = rows[keys].agg("/".join, axis=1).to_numpy(dtype=str) if keys else [""] * len(rows)
     names = rows["object_id"].to_numpy(dtype=str)
-    pairs = RotationPairs(names, np.array(group), both[1], both[0], score, ray, models)
-    return pairs, tuple(said)
+    table = OrientationTable(
+        names, np.array(group), both[1], both[0], score, straightened, symmetries
+    )
+    return table, tuple(said)
 
 
 def _matched(path: Path, truth: Path) -> tuple[pd.DataFrame, list[str]]:
@@ -203,13 +210,13 @@ def _numbers(path: Path, rows: pd.DataFrame, name: str, n: int) -> Array:
     return numbers
 
 
-def _rotations(path: Path, rows: pd.DataFrame, name: str) -> Rotations:
+def _rotations(path: Path, rows: pd.DataFrame, name: str) -> Orientations:
     matrices = _numbers(path, rows, name, 9).reshape(-1, 3, 3)
     try:
-        return check_rotations(name, matrices)
+        return check_orientations(name, matrices)
     except UserError:
         for row, matrix in zip(rows.index, matrices, strict=True):
-            check_rotations(f"{path}, row {row + 2}: {name}", matrix)
+            check_orientations(f"{path}, row {row + 2}: {name}", matrix)
         raise
 
 
@@ -231,12 +238,14 @@ def check_position(name: str, position_mm: Array) -> None:
         raise UserError(f"{name} is {away:g} mm away; give mm, not metres")
 
 
-def _check_way_round(path: Path, rows: pd.DataFrame, truth: Rotations, estimate: Rotations) -> None:
+def _check_way_round(
+    path: Path, rows: pd.DataFrame, truth: Orientations, estimate: Orientations
+) -> None:
     """Refuse estimates that would be right the other way round."""
-    error, turned = (
+    error, transposed = (
         np.median(ASYMMETRIC.distance_deg(poses, truth)) for poses in (estimate, inverse(estimate))
     )
-    if error > FLIP_DEG and turned < FLIP_DEG / 2:
+    if error > FLIP_DEG and transposed < FLIP_DEG / 2:
         raise UserError(
             f"{path}, row {rows.index[0] + 2}: R_estimate or R_true is transposed, camera to "
             "object: give both object to camera, row by row"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nbv.core.rotations import Rotations, viewing_direction
+from nbv.core.rotations import Orientations, viewing_direction
 from nbv.files import write_text
 
 N_SCENES, N_IMAGES = 4, 40
@@ -45,7 +45,7 @@ def write_example(folder: str | Path) -> None:
     write_text(folder / "estimate.json", json.dumps(view))
 
 
-def _estimates(truth: Rotations, rng: np.random.Generator) -> tuple[Rotations, Rotations]:
+def _estimates(truth: Orientations, rng: np.random.Generator) -> tuple[Orientations, Orientations]:
     from scipy.spatial.transform import Rotation
 
     small = Rotation.from_rotvec(rng.normal(0, 1.5, (len(truth), 3)), degrees=True).as_matrix()

@@ -11,57 +11,57 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nbv.core.look_alikes import WITHIN_DEG
-from nbv.core.rotation_views import (
+from nbv.core.rotation_belief import belief, hypotheses_belief
+from nbv.core.rotation_criteria import (
     NextViews,
-    belief,
+    bayes_error,
     chances_within,
-    expected_error,
-    hypotheses_belief,
-    turn_deg,
+    ranking,
+    view_angle_deg,
 )
-from nbv.core.rotations import Array, Rotations, along_ray, check_rotations
+from nbv.core.rotations import Array, Orientations, along_ray, check_orientations
 from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted
 from nbv.numbers import Pose, as_pose
 from nbv.robot.bop import check_position
 from nbv.robot.next_view import as_chances
-from nbv.robot.rotation_pairs import RotationPairs
+from nbv.robot.rotation_pairs import OrientationTable
 from nbv.robot.rotations import MIN_SEPARATION_DEG, as_travel
 
 FARTHEST_M = 50.0
 """No arm looks at an object from farther: such camera poses are in millimetres."""
 
 NO_DEPENDENCE = (
-    "calibration shows no dependence of this object's flips on the view, so no candidate is known "
-    "to be better than a random one. With a published estimator on real images the choice was not "
-    "shown to help and the farthest view harmed; fusing a second view, with scores, did help"
+    "calibration shows no dependence of this object's flips on the view; the ranking may be no "
+    "better than random"
 )
 
 NO_SCORES = "scores are not used: calibration pairs had none"
 
 
 @dataclass(frozen=True)
-class View:
-    """An estimate of one image: a rotation, object to camera, and what is known besides.
+class PoseEstimate:
+    """The estimate of an object's pose in one image.
 
     Attributes
     ----------
     rotation : ndarray (3, 3)
+        Object to camera.
     position_mm : ndarray (3,) or None
         The object in the camera.
     score : float or None
     camera_pose : ndarray (4, 4) or None
-        Of further views of the same object; without it several are hypotheses of one view.
+        Camera to base. Estimates without it are hypotheses of the same image.
 
     Examples
     --------
     >>> import nbv, numpy as np
-    >>> nbv.View(np.eye(3), score=0.4).position_mm is None
+    >>> nbv.PoseEstimate(np.eye(3), score=0.4).position_mm is None
     True
     """
 
-    rotation: Rotations
+    rotation: Orientations
     position_mm: Array | None = None
     score: float | None = None
     camera_pose: Pose | None = None
@@ -76,17 +76,17 @@ class CameraMove:
     index : int
         The candidate's number, from 0.
     travel_deg : float
-        Its angle to the last view, about the object.
+        Angle to the last view, about the object.
     travel_m : float or None
-        Its distance.
+        Distance to the last view.
     expected_error_deg : float
-        Of the pose after a view there.
+        Expected error of the pose after a view there.
     probability_within : dict of str to float
-        Of that error being below 5, 15 and 30 degrees.
+        Probability that the error after this view is below 5, 15 and 30 degrees.
     target_camera_pose : ndarray (4, 4) or None
         None where the object's position is unknown.
     direction : ndarray (3,)
-        From which the object is seen, in the frame of the camera poses.
+        Direction from which the object is seen, in the frame of the camera poses.
     """
 
     index: int
@@ -102,7 +102,7 @@ class CameraMove:
 class CameraRecommendation:
     """The pose (3, 3) in the last camera, its error, and candidates, best first."""
 
-    rotation: Rotations
+    rotation: Orientations
     expected_error_deg: float
     probability_within: dict[str, float]
     moves: tuple[CameraMove, ...]
@@ -111,8 +111,8 @@ class CameraRecommendation:
 
 
 def recommend_camera(
-    pairs: RotationPairs,
-    views: Sequence[View],
+    pairs: OrientationTable,
+    views: Sequence[PoseEstimate],
     candidates: Sequence[Pose] | int,
     *,
     object_id: str | None = None,
@@ -123,8 +123,8 @@ def recommend_camera(
 
     Parameters
     ----------
-    pairs : RotationPairs
-    views : sequence of View
+    pairs : OrientationTable
+    views : sequence of PoseEstimate
         Views in succession if each has its camera pose, else hypotheses of one view.
     candidates : sequence of (4, 4), or int
         Camera poses that can be reached; or how many even ones on a sphere about the object.
@@ -142,10 +142,10 @@ def recommend_camera(
     Examples
     --------
     >>> import nbv, numpy as np
-    >>> n, pose = 12, np.stack([np.eye(3)] * 12)
-    >>> text = np.array(["cup"] * n)
-    >>> pairs = nbv.RotationPairs(text, text, pose, pose, np.full(n, np.nan), False, {})
-    >>> answer = nbv.recommend_camera(pairs, [nbv.View(np.eye(3))], 50)
+    >>> poses = np.stack([np.eye(3)] * 12)
+    >>> cups = np.array(["cup"] * 12)
+    >>> pairs = nbv.OrientationTable(cups, group=cups, estimate=poses, truth=poses)
+    >>> answer = nbv.recommend_camera(pairs, [nbv.PoseEstimate(np.eye(3))], 50)
     >>> answer.depends_on_view, answer.probability_within["30"] > 0.9
     (False, True)
     """
@@ -186,8 +186,8 @@ def recommend_camera(
             True,
         )
     turned = np.stack([_camera_at(pose, place, pairs, i) for i, pose in enumerate(targets)])
-    travel = turn_deg(turned @ cameras[-1].T)
-    apart = np.min([turn_deg(turned @ camera.T) for camera in cameras], axis=0)
+    travel = view_angle_deg(turned @ cameras[-1].T)
+    apart = np.min([view_angle_deg(turned @ camera.T) for camera in cameras], axis=0)
     free = np.flatnonzero((apart >= MIN_SEPARATION_DEG) & (travel <= as_travel(max_travel_deg)))
     if not len(free):
         raise UserError(
@@ -196,7 +196,7 @@ def recommend_camera(
         )
     ahead = NextViews(now, turned[free] @ cameras[0].T)
     small = float(errors.error_deg[~errors.is_flip].mean()) if not errors.is_flip.all() else 0.0
-    cost, within = expected_error(ahead) + small, chances_within(ahead, WITHIN_DEG)
+    cost, within = bayes_error(ahead) + small, chances_within(ahead, WITHIN_DEG)
     ranked = [
         CameraMove(
             int(i),
@@ -207,7 +207,7 @@ def recommend_camera(
             targets[i] if known else None,
             -turned[i][2],
         )
-        for k, i in ((k, free[k]) for k in np.lexsort((travel[free], np.round(cost, 9))))
+        for k, i in ((k, free[k]) for k in ranking(cost, travel[free]))
     ]
     distance = errors.symmetry.distance_deg(now.support, now.pose)
     unused = bool(scores) and errors.ratio is None
@@ -222,13 +222,13 @@ def recommend_camera(
     )
 
 
-def _ray(pairs: RotationPairs, position: Array | None) -> Rotations:
+def _ray(pairs: OrientationTable, position: Array | None) -> Orientations:
     if position is None:
         return np.eye(3)
-    return along_ray(position) if pairs.ray else np.eye(3)
+    return along_ray(position) if pairs.straightened else np.eye(3)
 
 
-def _camera_at(pose: Pose, place: Array | None, pairs: RotationPairs, i: int) -> Rotations:
+def _camera_at(pose: Pose, place: Array | None, pairs: OrientationTable, i: int) -> Orientations:
     """Return base to camera (3, 3), turned straight at the object if its place is known."""
     turned = pose[:3, :3].T
     if place is None:
@@ -271,7 +271,7 @@ def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> list[Po
     return poses
 
 
-def as_view(given: Any, name: str) -> View:
+def as_view(given: Any, name: str) -> PoseEstimate:
     """Return a view from R (9 numbers), or a mapping of R, t (mm), score and camera_pose.
 
     Raises
@@ -284,7 +284,7 @@ def as_view(given: Any, name: str) -> View:
         what = "has no R" if "R" not in entry else f"has {min(odd)!r}"
         raise UserError(f"{name} {what}; give R, t (mm), score, camera_pose")
     rotation = _array(entry["R"], f"{name}: R", 9).reshape(3, 3)
-    view = View(check_rotations(f"{name}: R", rotation))
+    view = PoseEstimate(check_orientations(f"{name}: R", rotation))
     if (t := entry.get("t")) is not None:
         position = _array(t, f"{name}: t", 3)
         check_position(f"{name}: t", position)
@@ -306,7 +306,7 @@ def _array(values: Any, name: str, n: int) -> Array:
     return numbers
 
 
-def read_views(path: str | Path) -> list[View]:
+def read_views(path: str | Path) -> list[PoseEstimate]:
     """Read estimates: JSON as of `as_view`, one or a list, or ``.npy`` of (..., 3, 3)."""
     path = Path(path)
     if path.suffix.lower() != ".json":

@@ -59,7 +59,7 @@ class FileSource(ABC):
     def whereabouts(self, category: str) -> str:
         """Return the location of a category's files, for messages."""
 
-    def orientation(self, category: str, object_id: str) -> tuple[str, str]:
+    def mesh_axes(self, category: str, object_id: str) -> tuple[str, str]:
         """Return the up and front axes of a file."""
         return self.settings["up"], self.settings["front"]
 
@@ -91,7 +91,7 @@ class FileSource(ABC):
             raise UserError(f"dataset={self.name}: {self.whereabouts(category)}: no {object_id}")
         mesh = _reader().read(files[object_id])
         check_mesh(mesh, str(files[object_id]))
-        up, front = self.orientation(category, object_id)
+        up, front = self.mesh_axes(category, object_id)
         turn_deg = self.settings["turn_deg"].get(category, 0.0)
         try:
             return normalise(mesh, up, front, turn_deg, self.settings["centre"])
@@ -291,7 +291,7 @@ class ShapeNetCoreSource(_ShapeNetSource):
         """Return the synset's folder."""
         return str(self._synset(category))
 
-    def orientation(self, category: str, object_id: str) -> tuple[str, str]:
+    def mesh_axes(self, category: str, object_id: str) -> tuple[str, str]:
         """Return the up and front axes: the configuration's, or the layout's for `auto`."""
         is_v1 = self.files(category)[object_id].name == _MODEL["v1"].name
         return self.axes("v1" if is_v1 else "v2")
@@ -335,7 +335,7 @@ class ShapeNetSemSource(_ShapeNetSource):
         """Return the metadata's path."""
         return f"category {category} of {self.root / _METADATA}"
 
-    def orientation(self, category: str, object_id: str) -> tuple[str, str]:
+    def mesh_axes(self, category: str, object_id: str) -> tuple[str, str]:
         """Return the up and front axes of the metadata, or of the configuration."""
         row = self._metadata()[object_id]
         up, front = self.axes("sem")
