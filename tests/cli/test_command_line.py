@@ -504,7 +504,7 @@ def test_what_does_not_go_with_frames_is_refused(manifest, capsys):
     # Pairs may have the columns of a manifest too.
     pd.read_csv(manifest).assign(estimate_deg="north").to_csv("both.csv")
     message = fails(capsys, "calibrate", "both.csv", "--output", "own.npz")
-    assert "row 2: estimate_deg 'north' is not a number" in message
+    assert "row 2: estimate_deg 'north' is not a finite number" in message
 
 
 @pytest.mark.slow

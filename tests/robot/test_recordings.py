@@ -163,11 +163,17 @@ def test_a_manifest_without_rows_or_that_does_not_exist_is_one_line(tmp_path):
     ("columns", "message"),
     [
         ({"mask": ["", "m9.png", "", ""]}, "row 3: mask 'm9.png' does not exist"),
-        ({"azimuth_deg": [0, 10, "north", 30]}, "row 4: azimuth_deg=north is not a number"),
+        (
+            {"azimuth_deg": [0, 10, "north", 30]},
+            "azimuth_deg 'north' is not a finite number",
+        ),
         ({"fx": [500, -500, "", 500]}, "row 3: intrinsics: fx=-500 must be above 0"),
         ({"fx": [500, "", "", ""], "cx": ["", "", "", 320]}, "row 5: cx without fx"),
         ({"fx": [500] * 4, "cx": [320, 320, 320, ""], "cy": [240, "", 240, ""]}, "cx without cy"),
-        ({"elevation_deg": [10, "", 100, ""]}, "row 4: elevation_deg=100 is not between"),
+        (
+            {"elevation_deg": [10, "", 100, ""]},
+            "row 4: elevation_deg '100' is not between -90",
+        ),
     ],
 )
 def test_a_cell_that_cannot_be_is_named_with_its_row(folder, columns, message):
@@ -180,8 +186,8 @@ def test_a_cell_that_cannot_be_is_named_with_its_row(folder, columns, message):
         ("cup,1,f0.npy,0\ncup,1,f1.npy,10,5", "row 3: 5 values and the head has 4"),
         ("cup,1,f0.npy,0,\ncup,1,f1.npy,10,", "row 2: 5 values and the head has 4"),
         ("cup,1,f0.npy,0\ncup,1,f1.npy", "row 3: 3 values and the head has 4"),
-        ('cup,1,f0.npy,"0,5"', "row 2: azimuth_deg=0,5 is not a number; write 0.5"),
-        ("cup,1,f0.npy,1e300", "row 2: azimuth_deg=1e300 is beyond 1e6"),
+        ('cup,1,f0.npy,"0,5"', "row 2: azimuth_deg '0,5' is not a finite number; write 0.5"),
+        ("cup,1,f0.npy,1e300", "row 2: azimuth_deg '1e300' is not between -1000000"),
     ],
 )
 def test_a_row_has_a_value_for_each_column(folder, rows, message):

@@ -269,7 +269,7 @@ def _read_placement(camera_pose: Path | None, axis: list[float] | None) -> Place
         raise UserError("--camera-pose and --axis belong together; give both, or neither")
     if len(axis) not in (3, 6):
         raise UserError(f"--axis has {len(axis)} numbers; give a point, or a point and a direction")
-    from nbv.robot.moves import read_pose
+    from nbv.numbers import read_pose
 
     return read_pose(camera_pose), axis[:3], axis[3:] or [0.0, 0.0, 1.0]
 
@@ -341,8 +341,8 @@ def _recommend_camera(
         raise UserError("--candidates and --sphere need --estimate and --table")
     if candidates is not None and sphere is not None:
         raise UserError("--candidates and --sphere: give one of them")
-    from nbv.robot.moves import read_pose
-    from nbv.robot.next_camera import as_view, read_poses, read_views, recommend_camera
+    from nbv.numbers import read_pose, read_poses
+    from nbv.robot.next_camera import as_view, read_views, recommend_camera
     from nbv.robot.rotation_pairs import OrientationTable
 
     views = (

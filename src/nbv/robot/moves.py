@@ -16,11 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.core.angles import is_angle
 from nbv.errors import FrameError, UserError
 from nbv.files import read_numbers
-
-Pose = NDArray[np.float64]
-
-_ROTATION_TOLERANCE = 1e-3
-_FARTHEST_M = 1e6
+from nbv.numbers import Pose, as_finite, as_point, as_pose
 
 ROLL_LIMIT_DEG = 10.0
 """Roll of a camera at which two opposite views have a 50 % larger error."""
@@ -35,64 +31,6 @@ UPSIDE_DOWN = 0.1
 If a camera points straight down, the vertical component in the image is small and has a random
 sign.
 """
-
-
-def _as_numbers(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.float64]:
-    try:
-        given = np.asarray(values)
-        if not np.iscomplexobj(given):
-            return given.astype(np.float64)
-    except (TypeError, ValueError):
-        pass
-    raise UserError(f"{name}: not numbers; give {what_to_give}")
-
-
-def _as_vector(values: ArrayLike, name: str, what_to_give: str) -> NDArray[np.float64]:
-    vector = _as_numbers(values, name, what_to_give)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise UserError(f"{name}: give {what_to_give}")
-    return vector
-
-
-def _check_metres(position: NDArray[np.float64], name: str) -> None:
-    if (np.abs(position) > _FARTHEST_M).any():
-        raise UserError(f"{name}: {np.abs(position).max():g} m away; give metres")
-
-
-def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
-    """Return a 4 × 4 pose, from (4, 4) or its 16 numbers row by row.
-
-    Raises
-    ------
-    UserError
-        Where the matrix is not a rotation with a translation.
-    """
-    numbers = _as_numbers(values, name, "the 16 of a 4 × 4 matrix").ravel()
-    if numbers.size != 16:
-        raise UserError(f"{name}: {numbers.size} numbers; give the 16 of a 4 × 4 matrix")
-    pose = numbers.reshape(4, 4)
-    if not (finite := np.isfinite(pose).all(axis=1)).all():
-        row = int((~finite).argmax())
-        raise UserError(f"{name}: row {row + 1} is {_joined(pose[row])}; give finite numbers")
-    if not np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9):
-        raise UserError(
-            f"{name}: the last row is {_joined(pose[3])}, but a pose has 0 0 0 1; is it transposed "
-            "or scaled?"
-        )
-    rotation = pose[:3, :3]
-    is_rotation = (
-        (np.abs(rotation) < 2).all()  # else the product may overflow
-        and np.allclose(rotation @ rotation.T, np.eye(3), atol=_ROTATION_TOLERANCE)
-        and np.linalg.det(rotation) > 0
-    )
-    if not is_rotation:
-        raise UserError(f"{name}: not a rotation with a translation; is it transposed or scaled?")
-    _check_metres(pose[:3, 3], name)
-    return pose
-
-
-def _joined(row: NDArray[np.float64]) -> str:
-    return " ".join(f"{number:g}" for number in row)
 
 
 def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> Pose:
@@ -112,10 +50,7 @@ def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> 
     """
     origin, (x, y, z) = _as_axis(point, direction)
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    degrees = _as_numbers(angle_deg, "rotation", "one finite number of degrees")
-    if degrees.size != 1 or not np.isfinite(degrees).all():
-        raise UserError(f"rotation: {angle_deg}; give one finite number of degrees")
-    angle = math.radians(degrees.item())
+    angle = math.radians(as_finite(angle_deg, "rotation", 1, "; give degrees").item())
     rotation = np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
     motion = np.eye(4)
     motion[:3, :3] = rotation
@@ -127,10 +62,8 @@ def _as_axis(
     point: ArrayLike, direction: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return a point (3,) on an axis and its unit direction (3,)."""
-    three = "three finite numbers: x,y,z"
-    origin = _as_vector(point, "axis: the point", three)
-    _check_metres(origin, "axis: the point")
-    axis = _as_vector(direction, "axis: the direction", three)
+    origin = as_point(point, "axis: the point")
+    axis = as_finite(direction, "axis: the direction", 3, "; give x,y,z")
     largest = float(np.abs(axis).max())
     if largest <= 1e-9:
         raise UserError("axis: give a point and a direction that is not 0")
@@ -289,7 +222,7 @@ def roll_warnings(down: ArrayLike) -> tuple[str, ...]:
 
 
 def _as_down(gravity: ArrayLike) -> NDArray[np.float64]:
-    down = _as_vector(gravity, "gravity", "three finite numbers, the direction down: x,y,z")
+    down = as_finite(gravity, "gravity", 3, "; give the direction down: x,y,z")
     if not down.any():
         raise UserError("gravity: 0,0,0 is not a direction; give x,y,z")
     return down
@@ -362,9 +295,3 @@ def read_rotations(path: str | Path) -> NDArray[np.float64]:
     if path.suffix.lower() != ".npy":
         raise UserError(f"{path}: give rotations in degrees, or a .npy file")
     return as_rotations(read_numbers(path), str(path))
-
-
-def read_pose(path: str | Path) -> Pose:
-    """Read a pose from ``.npy``, ``.json``, or text with 16 numbers; errors as in `as_pose`."""
-    path = Path(path)
-    return as_pose(read_numbers(path), str(path))

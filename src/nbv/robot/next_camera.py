@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from nbv.core.look_alikes import WITHIN_DEG
 from nbv.core.rotation_belief import belief, hypotheses_belief
@@ -23,8 +23,8 @@ from nbv.core.rotations import Array, Orientations, along_ray, check_orientation
 from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted
+from nbv.numbers import Pose, as_pose
 from nbv.robot.bop import check_position
-from nbv.robot.moves import Pose, as_pose
 from nbv.robot.next_view import as_chances
 from nbv.robot.rotation_pairs import OrientationTable
 from nbv.robot.rotations import MIN_SEPARATION_DEG, as_travel
@@ -321,14 +321,3 @@ def read_views(path: str | Path) -> list[PoseEstimate]:
     if not isinstance(given, list):
         raise UserError(f"{path} is not an estimate or a list of them")
     return [as_view(entry, f"{path}, estimate {i}") for i, entry in enumerate(given)]
-
-
-def read_poses(path: str | Path) -> list[Pose]:
-    """Read camera poses (n, 4, 4) from ``.npy``, ``.json`` or text with 16 numbers each."""
-    path = Path(path)
-    numbers: NDArray[Any] = read_numbers(path)
-    if not numbers.size or numbers.size % 16:
-        raise UserError(f"{path}: {numbers.size} numbers; give 16 for each camera pose")
-    return [
-        as_pose(pose, f"{path}, candidate {i}") for i, pose in enumerate(numbers.reshape(-1, 16))
-    ]

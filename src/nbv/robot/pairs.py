@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.angles import is_angle, signed_difference_deg, wrap_deg
+from nbv.core.angles import MOST_DEG, signed_difference_deg, wrap_deg
 from nbv.core.distributions import rotated
 from nbv.core.estimates import COLUMNS, Estimates
 from nbv.core.logits import LEAST_PROBABILITY
@@ -19,6 +19,7 @@ from nbv.core.offset import FOR_PAIRS, Offset
 from nbv.errors import UserError
 from nbv.files import read_numbers, read_rows
 from nbv.labels import counted
+from nbv.numbers import column
 
 FEWEST_CLASSES = 8
 
@@ -69,14 +70,7 @@ class PairTable:
                 f"{path}, row {int(is_empty.argmax()) + 2}: object_id is empty; give it"
             )
         for name in COLUMNS[1:]:
-            numbers = pd.to_numeric(rows[name], errors="coerce").astype(np.float64)
-            if not (known := is_angle(numbers)).all():
-                row = int((~known).argmax())
-                raise UserError(
-                    f"{path}, row {row + 2}: {name} {rows[name].iloc[row]!r} is not a number of "
-                    "degrees, such as 2.5"
-                )
-            rows[name] = numbers
+            rows[name] = column(path, rows, name, limit=MOST_DEG)[:, 0]
         if "elevation_deg" in rows:
             rows["elevation_deg"] = pd.to_numeric(rows["elevation_deg"], errors="coerce")
         return cls(path, rows)

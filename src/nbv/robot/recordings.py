@@ -11,10 +11,11 @@ from typing import NoReturn
 import numpy as np
 import pandas as pd
 
-from nbv.core.angles import is_angle
+from nbv.core.angles import MOST_DEG
 from nbv.errors import FrameError, UserError
 from nbv.files import missing, read_rows
 from nbv.labels import counted
+from nbv.numbers import column
 from nbv.robot.depth_files import read_depth, read_mask
 from nbv.robot.intrinsics import Intrinsics, camera_of
 from nbv.robot.network import Sweep
@@ -22,6 +23,8 @@ from nbv.robot.recommender import Recommender
 
 REQUIRED = ("object_id", "sequence", "file", "azimuth_deg")
 OPTIONAL = ("mask", "elevation_deg", "fx", "fy", "cx", "cy")
+
+_LIMITS = {"azimuth_deg": MOST_DEG, "elevation_deg": 90.0}
 
 # Similarity of a misspelt optional column: one letter of elevation_deg, but not its unit.
 _SIMILARITY = 0.9
@@ -83,9 +86,11 @@ def read_manifest(path: str | Path) -> list[Recording]:
             raise UserError(
                 f"{path}: a column {name!r}; call it {alike[0]!r} if it is that, or remove it"
             )
-    for name in {"azimuth_deg", *OPTIONAL} - {"mask"}:
+    for name in ("azimuth_deg", *OPTIONAL[1:]):
         if name in table:
-            table[name] = _numbers(path, table[name])
+            limit = _LIMITS.get(name, np.inf)
+            numbers = column(path, table, name, limit=limit, is_optional=name in OPTIONAL)
+            table[name] = numbers[:, 0]
     table["path"] = _files(path, table["file"])
     if (again := table.duplicated(["object_id", "sequence", "file"])).any():
         row = int(again.to_numpy().argmax())
@@ -107,22 +112,6 @@ def read_manifest(path: str | Path) -> list[Recording]:
 def _reject(path: Path, row: int, what: str) -> NoReturn:
     # Row 1 of the file holds the names of the columns.
     raise UserError(f"{path}, row {row + 2}: {what}")
-
-
-def _numbers(path: Path, texts: pd.Series[str]) -> pd.Series[float]:
-    """Return a column of numbers; NaN where an optional one is empty."""
-    numbers = pd.to_numeric(texts, errors="coerce").astype(float)
-    name = str(texts.name)
-    for row, (text, number) in enumerate(zip(texts, numbers, strict=True)):
-        is_absent = name in OPTIONAL and text.strip().lower() in ("", "nan")
-        if not (np.isfinite(number) or is_absent):
-            hint = "; write 0.5 and not 0,5" if "," in text else ""
-            _reject(path, row, f"{name}={text} is not a number{hint}")
-        if name == "azimuth_deg" and not is_angle(number):
-            _reject(path, row, f"azimuth_deg={text} is beyond 1e6; give degrees")
-        if name == "elevation_deg" and abs(number) > 90:
-            _reject(path, row, f"elevation_deg={text} is not between -90 and 90")
-    return numbers
 
 
 def _files(path: Path, names: pd.Series[str]) -> list[str | None]:

@@ -1,0 +1,166 @@
+"""Numbers, poses and orientations from users: as arguments, in files, and in columns of CSV files.
+
+A pose is a 4 × 4 matrix that maps points from the camera's frame to the base frame, in metres. An
+orientation is a rotation matrix, object to camera.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.errors import UserError
+from nbv.files import read_numbers
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+Pose = NDArray[np.float64]
+
+ORIENTATION_TOLERANCE = 1e-3
+"""Most that an entry of R Rᵀ may differ from the identity: files have six digits."""
+
+LARGEST_M = 1e6
+"""Largest coordinate of a pose or an axis in the base frame; a larger one is in another unit."""
+
+
+def as_finite(values: ArrayLike, name: str, n: int, hint: str = "") -> Array:
+    """Return n finite numbers (n,), from an array of any shape or from texts.
+
+    Raises
+    ------
+    UserError
+        If there are not n numbers, or one is not finite; `hint` ends the message.
+    """
+    try:
+        given = np.asarray(values)
+        numbers = np.empty(0) if np.iscomplexobj(given) else given.astype(np.float64).ravel()
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if len(numbers) != n or not np.isfinite(numbers).all():
+        what = "a finite number" if n == 1 else f"{n} finite numbers"
+        raise UserError(f"{name} is not {what}{hint}")
+    return numbers
+
+
+def as_point(values: ArrayLike, name: str) -> Array:
+    """Return a point (3,) of the base frame, metres; raise UserError unless it is one."""
+    point = as_finite(values, name, 3, "; give x,y,z")
+    if (largest := float(np.abs(point).max())) > LARGEST_M:
+        raise UserError(f"{name}: {largest:g} m away; give metres")
+    return point
+
+
+def as_orientations(values: ArrayLike, name: str) -> Array:
+    """Return rotation matrices (..., 3, 3).
+
+    Raises
+    ------
+    UserError
+        Names the first matrix that is not a rotation, and why.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise UserError(f"{name} has an entry that is not a number") from None
+    if array.shape[-2:] != (3, 3):
+        raise UserError(f"{name} is {array.shape} instead of (..., 3, 3)")
+    # Products of larger entries may overflow.
+    flat = np.clip(array.reshape(-1, 3, 3), -2.0, 2.0)
+    skewed = np.abs(flat @ flat.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2))
+    skewed = np.asarray(~(skewed <= ORIENTATION_TOLERANCE))
+    reflected = ~skewed & (np.linalg.det(np.where(skewed[:, None, None], 0, flat)) < 0)
+    for bad, reason in (
+        (skewed, "not a rotation: its rows are not perpendicular unit vectors"),
+        (reflected, "a reflection: its determinant is -1; give right-handed axes"),
+    ):
+        if bad.any():
+            row = f"[{np.argmax(bad)}]" if array.ndim > 2 else ""
+            raise UserError(f"{name}{row} is {reason}")
+    return array
+
+
+def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
+    """Return a 4 × 4 pose, from (4, 4) or its 16 numbers row by row.
+
+    Raises
+    ------
+    UserError
+        If the matrix is not a rotation with a translation in metres.
+    """
+    pose = as_finite(values, name, 16, "; give a 4 × 4 matrix row by row").reshape(4, 4)
+    if not np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9):
+        row = " ".join(f"{number:g}" for number in pose[3])
+        raise UserError(
+            f"{name}: the last row is {row}, but a pose has 0 0 0 1; is it transposed or scaled?"
+        )
+    as_orientations(pose[:3, :3], f"{name}: the upper left 3 × 3 matrix")
+    as_point(pose[:3, 3], f"{name}: the translation")
+    return pose
+
+
+def read_poses(path: str | Path) -> list[Pose]:
+    """Read poses (n, 4, 4) from ``.npy``, ``.json`` or text with 16 numbers each.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or as in `as_pose`.
+    """
+    path = Path(path)
+    numbers: NDArray[Any] = read_numbers(path)
+    if not numbers.size or numbers.size % 16:
+        raise UserError(f"{path}: {numbers.size} numbers; give the 16 of each 4 × 4 matrix")
+    return [as_pose(pose, f"{path}, pose {i}") for i, pose in enumerate(numbers.reshape(-1, 16))]
+
+
+def read_pose(path: str | Path) -> Pose:
+    """Read a pose from ``.npy``, ``.json``, or text with 16 numbers; errors as in `as_pose`."""
+    path = Path(path)
+    return as_pose(read_numbers(path), str(path))
+
+
+def column(
+    path: Path,
+    rows: pd.DataFrame,
+    name: str,
+    n: int = 1,
+    *,
+    limit: float = np.inf,
+    is_optional: bool = False,
+) -> Array:
+    """Return the numbers (rows, n) in the cells of a column of a file.
+
+    Parameters
+    ----------
+    path : path
+        The file, for messages.
+    rows : DataFrame
+        Texts; the index counts the rows of the file from 0.
+    name : str
+    n : int
+        How many numbers, separated by spaces, a cell has.
+    limit : float
+        Largest magnitude of a number.
+    is_optional : bool
+        Whether cells may be empty, which gives NaN.
+
+    Raises
+    ------
+    UserError
+        Names the row of a cell with something else.
+    """
+    numbers = np.full((len(rows), n), np.nan)
+    for i, (row, text) in enumerate(zip(rows.index, rows[name], strict=True)):
+        if is_optional and text.strip().lower() in ("", "nan"):
+            continue
+        cell = f"{path}, row {row + 2}: {name} {text!r}"
+        hint = "; write 0.5 and not 0,5" if "," in text else ""
+        numbers[i] = as_finite(text.split(), cell, n, hint)
+        if np.abs(numbers[i]).max() > limit:
+            raise UserError(f"{cell} is not between {-limit:.9g} and {limit:.9g}")
+    return numbers
