@@ -73,7 +73,7 @@ def fresh(tmp_path: Path) -> Project:
 
 @pytest.fixture(scope="session")
 def bundle() -> Bundle:
-    """Of random weights: 24 bins, three calibration objects at two elevations."""
+    """A bundle of random weights: 24 bins, three calibration objects at two elevations."""
     return made_bundle()
 
 

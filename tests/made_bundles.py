@@ -48,7 +48,7 @@ def random_codes(rng: np.random.Generator, n: int, side: int = SIDE) -> NDArray[
 def random_estimator(
     chosen: dict, side: int = SIDE, seed: int = 0, sharpness: float = 3.0
 ) -> Estimator:
-    """Of a network that has seen random crops: its batch norms are not the identity."""
+    """Return a network that has seen random crops, so that its batch norms are not the identity."""
     torch.manual_seed(seed)
     network = build_network(chosen, side)
     rng = np.random.default_rng(seed)

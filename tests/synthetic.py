@@ -107,16 +107,16 @@ def _estimates(category, elevation, n_objects, rng):
     estimates = truth + bias + noise
     if category in HIDDEN:
         centre, half = HIDDEN[category]
-        turn = (truth - centre + 180.0) % 360.0 - 180.0
-        blind = np.abs(turn) < half * ease
-        estimates = np.where(blind, centre + 0.25 * turn + bias + noise, estimates)
+        difference = (truth - centre + 180.0) % 360.0 - 180.0
+        blind = np.abs(difference) < half * ease
+        estimates = np.where(blind, centre + 0.25 * difference + bias + noise, estimates)
     flipped = rng.random((n_objects, N_VIEWS)) < FLIPS[category] * ease
     return (estimates + 180.0 * flipped) % 360.0
 
 
 def _smooth(counts, bandwidth_deg):
-    turn = np.minimum(np.arange(N_VIEWS), N_VIEWS - np.arange(N_VIEWS))
-    kernel = np.exp(-0.5 * (turn / bandwidth_deg) ** 2)
+    difference = np.minimum(np.arange(N_VIEWS), N_VIEWS - np.arange(N_VIEWS))
+    kernel = np.exp(-0.5 * (difference / bandwidth_deg) ** 2)
     transform = np.fft.fft(kernel / kernel.sum())
     spread = np.fft.ifft2(np.fft.fft2(counts) * np.outer(transform, transform)).real
     return np.maximum(spread, 0.0)
@@ -188,8 +188,8 @@ def evaluate(names, estimates, method, recommended, rng):
             "proposed": lambda: recommended[np.round(estimates).astype(int) % N_VIEWS],
         }[method]()
         following = np.take_along_axis(estimates, (truth + delta) % N_VIEWS, axis=1)
-        turn = (following - delta - estimates + 180.0) % 360.0 - 180.0
-        pose = (estimates + turn / 2) % 360.0
+        difference = (following - delta - estimates + 180.0) % 360.0 - 180.0
+        pose = (estimates + difference / 2) % 360.0
     return pd.DataFrame(
         {
             "object_id": np.repeat(names, N_VIEWS),

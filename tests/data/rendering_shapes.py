@@ -35,9 +35,9 @@ def triangle_soup(seed: int, n_faces: int) -> Shape:
     return shape_of(soup)
 
 
-def turned(shape: Shape, turn_deg: float) -> Shape:
-    turn = np.radians(turn_deg)
+def rotated(shape: Shape, rotation_deg: float) -> Shape:
+    angle = np.radians(rotation_deg)
     about_z = np.array(
-        [[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
     )
     return Shape(shape.vertices @ about_z.T, shape.faces)

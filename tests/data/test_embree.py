@@ -7,7 +7,7 @@ import builtins
 import numpy as np
 import pytest
 import trimesh
-from rendering_shapes import procedural, shape_of, triangle_soup, turned
+from rendering_shapes import procedural, rotated, shape_of, triangle_soup
 
 from nbv.data.camera import Camera, object_views
 from nbv.data.render import open_renderer
@@ -81,14 +81,14 @@ def test_a_sphere_has_the_same_image_from_everywhere_and_the_right_size(embree):
 
 
 @pytest.mark.parametrize("category", ["mug", "chair"])
-def test_turning_the_object_rolls_the_azimuths(embree, category):
+def test_rotating_the_object_rolls_the_azimuths(embree, category):
     shape = procedural(category)
     azimuths = np.arange(0, 360, 15)
     camera = Camera()
     depth = embree.render(*shape, 15.0, azimuths, camera)
-    for turns in (1, 6, 17):
-        rolled = embree.render(*turned(shape, 15.0 * turns), 15.0, azimuths, camera)
-        expected = np.roll(depth, turns, axis=0)
+    for steps in (1, 6, 17):
+        rolled = embree.render(*rotated(shape, 15.0 * steps), 15.0, azimuths, camera)
+        expected = np.roll(depth, steps, axis=0)
         # Single precision moves a ray by 1e-7; some edge lies within that of a few rays.
         assert (np.abs(rolled - expected) > 1e-5).mean() < 1e-3
 

@@ -28,7 +28,7 @@ def test_other_files_and_letter_case_do_not_matter(tmp_path):
     source.load("mug", "one")
 
 
-def test_a_category_may_have_another_folder_and_a_turn(tmp_path):
+def test_a_category_may_have_another_folder_and_front(tmp_path):
     put(tmp_path / "cups" / "one.ply", pointer((0, 0, 1)))
     source = source_of(
         "folder", root=str(tmp_path), categories={"mug": "cups"}, turn_deg={"mug": 270}

@@ -31,13 +31,13 @@ def test_there_are_24_pairs_of_axes():
 
 @pytest.mark.parametrize(("up", "front"), PAIRS)
 @settings(max_examples=20)
-@given(turn=st.floats(-720, 720))
-def test_rotations_are_proper_and_take_the_axes_where_they_belong(up, front, turn):
-    rotation = frame_rotation(up, front, turn)
+@given(azimuth_deg=st.floats(-720, 720))
+def test_rotations_are_proper_and_take_the_axes_where_they_belong(up, front, azimuth_deg):
+    rotation = frame_rotation(up, front, azimuth_deg)
     assert np.allclose(rotation @ rotation.T, np.eye(3))
     assert np.isclose(np.linalg.det(rotation), 1.0)
     assert np.allclose(rotation @ direction(up, "up"), [0, 0, 1])
-    azimuth = np.radians(turn)
+    azimuth = np.radians(azimuth_deg)
     expected = [np.cos(azimuth), np.sin(azimuth), 0]
     assert np.allclose(rotation @ direction(front, "front"), expected)
 
@@ -59,9 +59,11 @@ def test_rounded_vectors_still_rotate_properly():
 
 @pytest.mark.parametrize(("up", "front"), PAIRS)
 @settings(max_examples=20)
-@given(vertices=TETRAHEDRA, turn=st.floats(0, 360), centre=st.sampled_from(["box", "origin"]))
-def test_shape_is_kept_and_size_and_place_are_set(up, front, vertices, turn, centre):
-    mesh = normalise(tetrahedron(vertices), up, front, turn, centre)
+@given(
+    vertices=TETRAHEDRA, azimuth_deg=st.floats(0, 360), centre=st.sampled_from(["box", "origin"])
+)
+def test_shape_is_kept_and_size_and_place_are_set(up, front, vertices, azimuth_deg, centre):
+    mesh = normalise(tetrahedron(vertices), up, front, azimuth_deg, centre)
     result = np.asarray(mesh.vertices)
     low, high = result.min(axis=0), result.max(axis=0)
     assert np.isclose(np.linalg.norm(high - low), 1.0)
@@ -77,10 +79,10 @@ def test_shape_is_kept_and_size_and_place_are_set(up, front, vertices, turn, cen
 
 
 @given(vertices=TETRAHEDRA)
-def test_the_origin_may_stay_the_turning_axis(vertices):
+def test_the_origin_may_stay_the_vertical_axis(vertices):
     whole = normalise(tetrahedron(vertices), "+z", "+x", 0.0, "origin")
-    turned = normalise(tetrahedron(vertices), "+z", "+x", 180.0, "origin")
-    assert np.allclose(np.asarray(turned.vertices) * [-1, -1, 1], whole.vertices)
+    rotated = normalise(tetrahedron(vertices), "+z", "+x", 180.0, "origin")
+    assert np.allclose(np.asarray(rotated.vertices) * [-1, -1, 1], whole.vertices)
     scale = np.linalg.norm(np.ptp(vertices, axis=0))
     assert np.allclose(np.asarray(whole.vertices)[:, :2] * scale, vertices[:, :2])
 

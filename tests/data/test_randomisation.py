@@ -53,7 +53,7 @@ def renderer():
     return open_renderer("embree")
 
 
-def turn_of(mesh, renderer, draw, seed=0, elevation=20.0):
+def sweep_of(mesh, renderer, draw, seed=0, elevation=20.0):
     rng = np.random.default_rng(seed)
     return randomised_sweep(mesh, elevation, AZIMUTHS, CAMERA, renderer, None, 0.17, draw, rng)
 
@@ -61,21 +61,21 @@ def turn_of(mesh, renderer, draw, seed=0, elevation=20.0):
 def test_where_nothing_varies_it_is_the_rendered_image(mesh, renderer):
     depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, sensor_camera(CAMERA))
     wanted = encode_depth(crop_measured(depth, CAMERA), CAMERA)
-    assert np.array_equal(turn_of(mesh, renderer, NOTHING), wanted)
+    assert np.array_equal(sweep_of(mesh, renderer, NOTHING), wanted)
 
 
 def test_an_elevation_that_does_not_vary_may_be_any(mesh, renderer):
     depth = renderer.render(mesh.vertices, mesh.faces, 88.0, AZIMUTHS, sensor_camera(CAMERA))
     wanted = encode_depth(crop_measured(depth, CAMERA), CAMERA)
-    assert np.array_equal(turn_of(mesh, renderer, NOTHING, elevation=88.0), wanted)
+    assert np.array_equal(sweep_of(mesh, renderer, NOTHING, elevation=88.0), wanted)
 
 
 def test_a_camera_on_its_head_sees_the_image_on_its_head(mesh, renderer):
     upright = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
-    turned = renderer.render(
+    upside_down = renderer.render(
         mesh.vertices, mesh.faces, 20.0, AZIMUTHS, replace(CAMERA, roll_deg=180.0)
     )
-    assert np.allclose(turned[:, ::-1, ::-1], upright, atol=1e-4)
+    assert np.allclose(upside_down[:, ::-1, ::-1], upright, atol=1e-4)
 
 
 def test_a_camera_that_leans_to_the_right_sees_the_right_above(renderer):
@@ -89,8 +89,8 @@ def test_a_camera_that_leans_to_the_right_sees_the_right_above(renderer):
 
 
 def test_distance_leaves_the_size_of_a_pixel_on_the_object(mesh, renderer):
-    near = turn_of(mesh, renderer, NOTHING)
-    far = turn_of(mesh, renderer, replace(NOTHING, nearest=8.0, farthest=8.0))
+    near = sweep_of(mesh, renderer, NOTHING)
+    far = sweep_of(mesh, renderer, replace(NOTHING, nearest=8.0, farthest=8.0))
     for one, other in zip(near, far, strict=True):
         box = [np.ptp(np.nonzero(image), axis=1) for image in (one, other)]
         # Perspective makes the near half larger than the far one.
@@ -155,11 +155,11 @@ def test_a_split_handle_keeps_its_ends(mesh, renderer):
 def test_a_wrong_focal_length_makes_the_object_wider_and_not_deeper(mesh, renderer):
     sizes, reliefs = [], []
     for seed in range(20):
-        codes = turn_of(mesh, renderer, replace(NOTHING, focal=0.2), seed)[0]
+        codes = sweep_of(mesh, renderer, replace(NOTHING, focal=0.2), seed)[0]
         seen = codes > 0
         sizes.append(np.ptp(np.nonzero(seen.any(axis=1))[0]) + 1)
         reliefs.append(int(codes[seen].max()) - int(codes[seen].min()))
-    whole = turn_of(mesh, renderer, NOTHING)[0]
+    whole = sweep_of(mesh, renderer, NOTHING)[0]
     tall = np.ptp(np.nonzero((whole > 0).any(axis=1))[0]) + 1
     assert 0.75 * tall < min(sizes) < 0.9 * tall
     assert 1.1 * tall < max(sizes) < 1.25 * tall
@@ -209,12 +209,12 @@ def test_an_edge_moves_as_far_as_all_pairs_of_pixels_say(seed):
         assert moved[tuple(pixel)] in wanted
 
 
-def test_a_turn_depends_on_its_generator_alone(mesh, renderer):
+def test_a_sweep_depends_on_its_generator_alone(mesh, renderer):
     draw = Randomisation(
         *(7.5, 5, 0.15, 3, 7, 0.1),
         *(0.6, 0.3, 0.1, 0.1, 0.1, 0.25, 0.1, 0.15),
         *(1, 2, 1.5),
     )
-    one, again, other = (turn_of(mesh, renderer, draw, seed) for seed in (1, 1, 2))
+    one, again, other = (sweep_of(mesh, renderer, draw, seed) for seed in (1, 1, 2))
     assert np.array_equal(one, again)
     assert not np.array_equal(one, other)

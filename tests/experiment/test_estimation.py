@@ -122,12 +122,12 @@ def test_outputs_do_not_depend_on_the_batch():
 
 
 @given(st.integers(0, 99), st.integers(0, 23), st.floats(0.1, 10))
-def test_decoding_turns_with_the_classes_and_is_the_mean_direction(seed, k, scale):
+def test_decoding_rotates_with_the_classes_and_is_the_mean_direction(seed, k, scale):
     logits = scale * np.random.default_rng(seed).normal(size=24)
-    estimate, turned = decode_classes(logits), decode_classes(np.roll(logits, k))
+    estimate, rotated = decode_classes(logits), decode_classes(np.roll(logits, k))
     weights = np.exp(logits) / np.exp(logits).sum()
     mean = sum(w * np.exp(2j * np.pi * c / 24) for c, w in enumerate(weights))
-    assert circular_distance_deg(turned, estimate + 15 * k) < 1e-6
+    assert circular_distance_deg(rotated, estimate + 15 * k) < 1e-6
     assert circular_distance_deg(estimate, np.degrees(np.angle(mean))) < 1e-6
 
 
@@ -204,8 +204,8 @@ def test_targets_of_a_classifier_are_circular_and_centred_on_the_azimuth(n_class
     settings = {"n_classes": n_classes, "target_bandwidth_deg": bandwidth}
     targets = class_targets(settings, 360).astype(np.float64)
     np.testing.assert_allclose(targets.sum(axis=1), 1, atol=1e-6)
-    turned = np.roll(targets, (360 // n_classes, 1), axis=(0, 1))
-    np.testing.assert_allclose(turned, targets, atol=1e-6)
+    rotated = np.roll(targets, (360 // n_classes, 1), axis=(0, 1))
+    np.testing.assert_allclose(rotated, targets, atol=1e-6)
     centres = np.arange(n_classes) * 360 / n_classes
     for view in (0, 1, 100, 359):
         apart = circular_distance_deg(centres, view)

@@ -167,7 +167,7 @@ def test_what_never_occurs_makes_nothing_else_coarser():
     assert np.exp(restored(kept)[0, 0]) < 1e-8
 
 
-def test_angles_wrap_at_a_full_turn():
+def test_angles_wrap_at_360_degrees():
     assert hundredths(np.array([359.996, 0.004, 12.345])).tolist() == [0, 0, 1234]
     assert wrapped(np.array([18000, -18001, 35999])).tolist() == [-18000, 17999, -1]
 

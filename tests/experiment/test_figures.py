@@ -366,16 +366,16 @@ def test_steps_show_the_row_of_the_table_and_both_distributions(inputs):
 
 
 @pytest.mark.slow
-def test_the_animation_turns_from_the_first_view_to_the_recommended_one(inputs):
+def test_the_animation_moves_from_the_first_view_to_the_recommended_one(inputs):
     shown, table = example_view(inputs), stored(inputs)
     delta = int(table.recommended_delta_deg[round(shown.estimate_deg) % 360])
     frames = list(steps.animation_frames(inputs))
     views = [int(figure.axes[0].get_xlabel().split()[-1][:-1]) for figure, _ in frames]
     assert views[0] == shown.azimuth_deg
     assert views[-1] == (shown.azimuth_deg + delta) % 360
-    turned = np.abs((np.diff(views) + 180) % 360 - 180)
-    assert turned.max() <= 180 / 20
-    assert turned.sum() == circular_distance_deg(delta, 0)
+    moved = np.abs((np.diff(views) + 180) % 360 - 180)
+    assert moved.max() <= 180 / 20
+    assert moved.sum() == circular_distance_deg(delta, 0)
     likely = [figure.axes[1].lines[0].get_ydata().max() for figure, _ in frames]
     assert likely[-1] > likely[0]
     assert all(duration > 0 for _, duration in frames)

@@ -51,7 +51,7 @@ def test_claims_have_short_titles_of_their_own():
 
 
 def test_a_claims_picture_shows_every_difference_and_the_papers(judged, rows):
-    """Of Proposed against each method at one place."""
+    """The claim compares Proposed with each method at one place."""
     claim = CLAIM["examples"]
     (axes,) = claim_figure(claim, rows[claim.id]).axes
     found = judged[judged["id"] == claim.id]

@@ -19,17 +19,17 @@ from nbv.experiment.estimation.outputs import decode_classes, decode_directions
 
 N_OBJECTS, N_VIEWS, HALF = 7, 24, 6
 AZIMUTHS_DEG = np.arange(N_VIEWS) * (360.0 / N_VIEWS)
-TURN = np.radians(AZIMUTHS_DEG)
+PHI = np.radians(AZIMUTHS_DEG)
 CLASSES = {"kind": "linear_classifier", "n_classes": 12, "target_bandwidth_deg": 20}
 
 
 @pytest.fixture
 def features(rng) -> np.ndarray:
     """Parts of features that know something about the azimuth, (n, n_views, 2 HALF)."""
-    known = np.stack([np.cos(TURN), np.sin(TURN), np.cos(2 * TURN)], axis=1)
+    known = np.stack([np.cos(PHI), np.sin(PHI), np.cos(2 * PHI)], axis=1)
     noise = rng.normal(size=(N_OBJECTS, N_VIEWS, 2 * HALF))
-    own = known @ rng.normal(size=(3, 2 * HALF)) + 0.5 * rng.normal(size=(N_OBJECTS, 1, 2 * HALF))
-    return (own + noise + 1.0).astype(np.float32)
+    known = known @ rng.normal(size=(3, 2 * HALF)) + 0.5 * rng.normal(size=(N_OBJECTS, 1, 2 * HALF))
+    return (known + noise + 1.0).astype(np.float32)
 
 
 def ridge(x, y, penalty) -> tuple[np.ndarray, np.ndarray]:
@@ -43,7 +43,7 @@ def ridge(x, y, penalty) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_directions_are_the_ridge_regression_whose_penalty_errs_least_on_left_out_objects(features):
-    wanted = np.stack([np.cos(TURN), np.sin(TURN)], axis=1)
+    wanted = np.stack([np.cos(PHI), np.sin(PHI)], axis=1)
     x = features.astype(np.float64)
 
     def rows(objects):
@@ -75,12 +75,12 @@ def test_a_mirror_image_has_the_mirrored_estimate(features, plane_deg):
     assert circular_distance_deg(other, 2 * plane_deg - estimate).max() < 1e-3
 
 
-def test_a_plane_elsewhere_turns_the_estimates_of_a_turned_turntable(features):
+def test_a_plane_elsewhere_rotates_the_estimates_by_its_azimuth(features):
     """Who calls the handle's azimuth 90 instead of 0 gets each estimate 90 degrees on."""
     step = N_VIEWS // 4
-    turned = np.roll(features, step, axis=1)
+    rotated = np.roll(features, step, axis=1)
     before = decode_directions(fit_directions(features, 0.0).outputs(features))
-    after = decode_directions(fit_directions(turned, 90.0).outputs(features))
+    after = decode_directions(fit_directions(rotated, 90.0).outputs(features))
     assert circular_distance_deg(after, before + 90.0).max() < 1e-3
 
 
@@ -92,10 +92,10 @@ def test_even_and_odd_parts_are_fitted_as_images_and_mirror_images_would_be(feat
     )
     even = even - even.mean(axis=(0, 1))
     x = np.concatenate([np.concatenate([even, sign * odd], axis=2) for sign in (1, -1)])
-    y = np.concatenate([np.stack([np.cos(TURN), s * np.sin(TURN)], axis=1) for s in (1, -1)])
-    half_turns = np.concatenate([np.tile(part, (N_OBJECTS, 1)) for part in np.split(y, 2)])
+    y = np.concatenate([np.stack([np.cos(PHI), s * np.sin(PHI)], axis=1) for s in (1, -1)])
+    wanted = np.concatenate([np.tile(part, (N_OBJECTS, 1)) for part in np.split(y, 2)])
     rows = x.reshape(-1, 2 * HALF)
-    residual = half_turns - rows @ fitted.weights
+    residual = wanted - rows @ fitted.weights
     slope = rows.T @ residual
     # At a ridge's optimum the slope of the squares is the penalty times the weights.
     for part, column in ((slice(HALF), 0), (slice(HALF, None), 1)):
@@ -112,8 +112,8 @@ def test_classes_know_more_than_a_uniform_distribution_and_decode_near_the_truth
 ):
     if plane_deg is not None:
         # Parts that a camera could see: even in the azimuth from the plane, and odd.
-        turn = TURN - np.radians(plane_deg)
-        shown = np.stack([np.cos(turn), np.cos(2 * turn), np.sin(turn), np.sin(2 * turn)], axis=1)
+        phi = PHI - np.radians(plane_deg)
+        shown = np.stack([np.cos(phi), np.cos(2 * phi), np.sin(phi), np.sin(2 * phi)], axis=1)
         features = 0.1 * features[..., :4] + shown.astype(np.float32)
     fitted = fit_classes(features, CLASSES, plane_deg)
     logits = fitted.outputs(features)

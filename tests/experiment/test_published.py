@@ -70,9 +70,9 @@ def test_table_6_errors_follow_from_its_estimates_but_for_one_slip():
     wrong = []
     for azimuth, estimates in PUBLISHED["table6"].values["estimate"].items():
         for method, estimate in zip(METHODS, estimates, strict=True):
-            turn = abs(estimate - float(azimuth)) % 360
+            difference = abs(estimate - float(azimuth)) % 360
             printed = published_value("table6", "error", azimuth, method)
-            if min(turn, 360 - turn) != pytest.approx(printed):
+            if min(difference, 360 - difference) != pytest.approx(printed):
                 wrong.append((azimuth, method))
     assert wrong == [("0", "random")]
 

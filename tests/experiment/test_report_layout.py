@@ -92,7 +92,7 @@ def test_table_6_pairs_ours_with_the_published_example(tables):
     assert "342.0° (18.0°)" in [cell.text for cell in tables["table6"].rows[1]]
 
 
-def test_an_estimate_that_rounds_to_a_full_turn_is_zero(evaluations):
+def test_an_estimate_that_rounds_to_360_degrees_is_zero(evaluations):
     frame = evaluations["mug", 0].copy()
     first = (frame["initial_deg"] == 0) & (frame["method"] == "single")
     frame.loc[first, ["pose_estimate_deg", "error_deg"]] = (359.96, 0.04)

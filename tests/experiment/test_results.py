@@ -78,8 +78,8 @@ def test_a_broken_file_is_named(tmp_path, text, message):
 def test_object_ids_are_names_whatever_they_look_like(tree, tmp_path):
     names = ["0007", "NA", "null", "None", "nan", "1e3", "inf", "-", "true"]
     path = synthetic.evaluation_files(tree, [MUG], 1)[*MUG, 1, "single"]
-    turn = pd.read_csv(path).head(synthetic.N_VIEWS)
-    write_csv(tmp_path / "single.csv", pd.concat([turn.assign(object_id=name) for name in names]))
+    sweep = pd.read_csv(path).head(synthetic.N_VIEWS)
+    write_csv(tmp_path / "single.csv", pd.concat([sweep.assign(object_id=name) for name in names]))
     unit = load(tmp_path / "single.csv")
     assert unit["object_id"].drop_duplicates().tolist() == names
     assert unit["delta_deg"].isna().all()

@@ -174,13 +174,13 @@ def test_a_calibration_fraction_of_one_leaves_none_to_train_on(n_objects, seed):
 
 
 @given(n=st.integers(1, 50), n_places=st.integers(1, 6), most=st.integers(1, 200))
-def test_turns_are_shared_out_evenly_and_every_object_has_one(n, n_places, most):
+def test_sweeps_are_shared_out_evenly_and_every_object_has_one(n, n_places, most):
     names = [str(i) for i in range(n)]
     seen = [folds.seen_at(names, place, n_places, most) for place in range(n_places)]
-    turns = Counter(name for of_place in seen for name in of_place)
-    assert set(turns) == set(names)
-    assert len(set(turns.values())) == 1
-    each = turns["0"]
+    sweeps = Counter(name for of_place in seen for name in of_place)
+    assert set(sweeps) == set(names)
+    assert len(set(sweeps.values())) == 1
+    each = sweeps["0"]
     assert each == 1 or each * n <= most
     assert each == n_places or (each + 1) * n > most
     counts = [len(of_place) for of_place in seen]

@@ -55,7 +55,7 @@ def test_combining_agrees_with_trying_out_every_open_part():
 
 @given(st.data())
 def test_the_deciding_comparison_has_the_verdict_of_the_claim(data):
-    """Of every claim of the paper, whatever its comparisons came to."""
+    """Every claim of the paper, with any verdicts of its comparisons."""
     claim = data.draw(st.sampled_from(CLAIMS))
     parts = list(dict.fromkeys(leaves(claim.statement)))
     drawn = st.lists(

@@ -192,7 +192,7 @@ def test_a_bundle_is_calibrated_again(bundle):
 
 
 def test_the_same_frames_keep_their_flag_after_a_calibration(bundle):
-    """Of one object, clean frames say little of other objects before the same camera."""
+    """Clean frames of one object say little of other objects before the same camera."""
     model = replace(bundle.ood, threshold=1e3 * bundle.ood.threshold)
     familiar = replace(bundle, ood=model)
     found = recalibrated(familiar, [sweep("x")], "recording.csv", ONE_DENSITY)

@@ -169,7 +169,7 @@ def test_the_best_fixed_rotation_is_that_of_the_calibration(bundle, elevation):
 
 @pytest.mark.parametrize("n_views", [2, 3, 4, 6])
 def test_the_best_fixed_step_keeps_views_apart_and_errs_least(bundle, n_views):
-    """Of views at equal steps on the calibration sweeps, multiplied one after the other."""
+    """The views lie at equal steps on the calibration sweeps and are multiplied one by one."""
     angles = np.exp(2j * np.pi * np.arange(BINS) / BINS)
     errors = {}
     for step in range(BINS):

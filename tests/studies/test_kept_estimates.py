@@ -43,7 +43,7 @@ def test_estimates_are_kept_to_half_a_hundredth_of_a_degree(seed):
     np.testing.assert_array_equal(twice.residual, held_out(estimates).residual)
 
 
-def test_half_a_turn_and_a_full_circle_are_angles_like_others():
+def test_180_and_360_degrees_are_angles_like_others():
     truth = np.arange(4) * 90.0
     estimates = Estimates(("a",), (np.add(truth, [180.0, -180.0, 359.999, 0.004]) % 360)[None])
     kept = held_out(estimates)

@@ -96,7 +96,7 @@ def test_a_bundle_is_calibrated_by_objects_that_it_was_not_trained_on(made: Proj
     assert set(pd.read_csv(made.results / "bundles/mug.csv")["object_id"]) == of_role["test"]
 
 
-def test_a_bundle_has_turns_at_every_elevation(made: Project) -> None:
+def test_a_bundle_has_sweeps_at_every_elevation(made: Project) -> None:
     bundle = Bundle.load(made.results / "bundles/mug.safetensors")
     assert sorted(set(bundle.elevation_deg.tolist())) == [0.0, 30.0]
     assert bundle.distributions.sum(axis=-1) == pytest.approx(1.0, abs=1e-5)
@@ -188,7 +188,7 @@ def network_of(folder: Path) -> bytes:
 
 
 def test_a_folder_of_meshes_becomes_a_bundle_that_answers(tmp_path, capsys, monkeypatch) -> None:
-    """Of a category of one's own, with its size."""
+    """The category is the user's, with its size."""
     folder = tmp_path / "meshes/jug"
     folder.mkdir(parents=True)
     for number in range(8):

@@ -50,8 +50,8 @@ def test_a_classifier_says_how_likely_each_azimuth_is(other):
         assert p.shape == (4, 360, 24)
         np.testing.assert_allclose(p.sum(axis=-1), 1, atol=1e-5)
         mean = (p @ np.exp(2j * np.pi * np.arange(24) / 24)).ravel()
-        turned = np.exp(1j * np.radians(test["estimate_deg"])) * abs(mean)
-        np.testing.assert_allclose(turned, mean, atol=1e-4)
+        scaled = np.exp(1j * np.radians(test["estimate_deg"])) * abs(mean)
+        np.testing.assert_allclose(scaled, mean, atol=1e-4)
 
 
 def test_image_distributions_recommend_for_the_images_of_the_default_run(other):

@@ -118,7 +118,7 @@ N_CLASSES = 24
 
 
 def foreign_distributions() -> pd.DataFrame:
-    """Of eight objects, views of 10°: blunt, sharper where the handle is seen, and too sure."""
+    """Eight objects seen every 10°: blunt, sharper where the handle is seen, and too sure."""
     rng = np.random.default_rng(0)
     azimuth_deg, classes_deg = np.arange(0.0, 360.0, 10.0), np.arange(N_CLASSES) * 15.0
     tables = []

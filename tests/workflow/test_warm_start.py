@@ -59,7 +59,7 @@ def ancestors(path: Path) -> list[Path]:
 
 @pytest.mark.parametrize("part", [None, "part1", "part2"])
 def test_ancestors_have_seen_the_training_objects_and_no_others(warm, part):
-    """Of an estimator that calibrates one part of the training objects: none of that part."""
+    """Ancestors of an estimator that calibrates a part have seen none of that part."""
     name = "estimator" if part is None else f"without_{part}"
     estimators = warm.results / "estimators"
     own = {name: training_objects(warm.results, name, 1, part) for name in ("mug", "chair")}

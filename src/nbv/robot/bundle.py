@@ -310,7 +310,7 @@ def _bundle_of(about: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> 
 
 
 def _check_sound(bundle: Bundle) -> None:
-    """Raise ValueError for what `make_bundle` and `recalibrated` do not make."""
+    """Raise ValueError for values that `make_bundle` and `recalibrated` never write."""
     n_sweeps, n_bins = len(bundle.object_ids), bundle.n_bins
     model, paper, camera = bundle.ood, bundle.paper, bundle.camera
     n_features = 2 * min(CELLS, operator.index(camera.image_side)) ** 2

@@ -33,14 +33,14 @@ NEAREST, FARTHEST = 1.5, 20.0
 
 _Axis = tuple[float, float, float]
 
-# A limit of depth beyond this has no effect; diagonals.
+# A depth limit, diagonals, beyond which it excludes nothing.
 _NO_LIMIT = 100.0
 
 # Units of depth, millimetres: metres, centimetres, 1 mm, 1/4 mm (L515), 1/5000 m (TUM), 1/6553.5 m
 # (Replica), 1/8 mm (SR300, R200), 1/10 mm (D405).
 _UNITS_MM = (1000.0, 10.0, 1.0, 0.25, 0.2, 1 / 6.5535, 0.125, 0.1)
 
-# Factors from each of them taken for millimetres or for metres, and back.
+# Factors of depth when a unit is mistaken for millimetres or metres, and their inverses.
 _FACTORS = sorted(
     {factor for u in _UNITS_MM for factor in (u, u / 1000, 1 / u, 1000 / u)} - {1.0}, reverse=True
 )

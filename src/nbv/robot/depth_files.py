@@ -112,10 +112,10 @@ def read_mask(path: str | Path) -> NDArray[np.bool_]:
         has_opacity = mask.shape[2] in (2, 4)
         colours = mask[:, :, :-1] if has_opacity else mask
         mask = np.asarray(colours.any(axis=2) & (mask[:, :, -1] if has_opacity else True))
-    return one_mask(mask, str(path))
+    return single_mask(mask, str(path))
 
 
-def one_mask(mask: NDArray[np.bool_], name: str) -> NDArray[np.bool_]:
+def single_mask(mask: NDArray[np.bool_], name: str) -> NDArray[np.bool_]:
     """Return a mask (rows, columns), also from (rows, columns, n) or (n, rows, columns).
 
     Raises
@@ -191,13 +191,13 @@ def to_metres(
 
 
 def _check_byte_order(values: NDArray[Any], name: str) -> None:
-    """Raise UserError if neighbouring integers of 16 bits are far more alike with bytes swapped."""
+    """Raise UserError if neighbouring integers of 16 bits are far closer with swapped bytes."""
     is_measured = (values[:, 1:] > 0) & (values[:, :-1] > 0)
     given, swapped = (
         np.abs(np.diff(values.astype("<u2").view(order).astype(int), axis=1)[is_measured])
         for order in ("<u2", ">u2")
     )
-    # Depth is up to 256 times as smooth in its own order. Multiples of 256 are smooth in both.
+    # Depth is up to 256 times as smooth in the right order. Multiples of 256 are smooth in both.
     is_enough = given.size > 100 and values.max() <= _LARGEST_16_BIT and (values & 255).any()
     if is_enough and given.sum() > 8 * swapped.sum():
         raise UserError(

@@ -7,12 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from nbv.errors import FrameError, UserError
-from nbv.robot.depth_files import DepthImage, is_in_mask, one_mask
+from nbv.robot.depth_files import DepthImage, is_in_mask, single_mask
 
 Mask = NDArray[np.bool_]
 
 LEAST_MEASURED = 0.5
-"""Least share of a mask's pixels that need a depth.
+"""Least share of a mask's pixels with a depth.
 
 When half of the depth of 60 drawn mugs was removed in patches, 19 were rejected as two objects, and
 a third of the other estimates were off by more than 45°.
@@ -80,7 +80,7 @@ def object_mask(
             "the frame has no depth at all, no number above 0: is the sensor covered or too close?",
         )
     if mask is not None:
-        given = one_mask(is_in_mask(mask), "mask")
+        given = single_mask(is_in_mask(mask), "mask")
         if given.shape != depth_m.shape:
             raise UserError(
                 f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}: "

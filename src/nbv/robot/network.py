@@ -106,13 +106,13 @@ def open_network(
     def network(codes: NDArray[np.uint8]) -> NDArray[np.float32]:
         if codes.ndim != 3 or codes.shape[1:] != (image_side, image_side):
             raise UserError(f"crops of shape {codes.shape}: give (n, {image_side}, {image_side})")
-        (found,) = session.run([output], {"codes": codes[:, None].astype(np.float32)})
-        if not np.isfinite(found).all():
+        (values,) = session.run([output], {"codes": codes[:, None].astype(np.float32)})
+        if not np.isfinite(values).all():
             raise BundleError(
                 "damaged-bundle",
                 "the bundle's network gives numbers that are not finite; get it again",
             )
-        return np.asarray(found)
+        return np.asarray(values)
 
     return network
 
@@ -125,7 +125,7 @@ def find_mirror_plane(network: Network, sweeps: Sequence[Sweep]) -> float | None
     network : callable
     sweeps : sequence of Sweep
         Sweeps of calibration objects, which were not trained on, with the logits of `network`. A
-        view every 15 degrees is enough, because neighbouring views are alike.
+        view every 15 degrees is enough, because neighbouring views are similar.
 
     Returns
     -------

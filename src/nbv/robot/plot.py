@@ -135,7 +135,7 @@ def _draw_errors(axes: PolarAxes, answer: Recommendation, best: Move) -> None:
     _draw_move(axes, best.rotation_deg, _MOVE_RADIUS * largest)
     _label_radii(axes, largest)
     axes.set_xticklabels(["", "+90°", "180°", "−90°"])
-    # A tick's own label is centred; this one is so wide that it would reach into the circle.
+    # A tick's label is centred, and one this wide would reach into the circle.
     axes.annotate(
         *("0°: the\ncamera\nnow", (0.0, _RIM * largest), (5, 0)),
         textcoords="offset points",

@@ -152,13 +152,13 @@ def test_left_mirrors_right(category):
 
 
 @each_category
-def test_no_object_is_the_same_after_half_a_turn(category):
+def test_no_object_is_the_same_after_rotation_by_180_degrees(category):
     for mesh in objects(category):
         assert farthest_from_image(mesh, (-1, -1, 1)) > 0.02
 
 
 @pytest.mark.parametrize("category", [name for name in CATEGORIES if name != "mug"])
-def test_stands_on_the_ground_with_its_box_about_the_turning_axis(category):
+def test_stands_on_the_ground_with_its_box_about_the_vertical_axis(category):
     for mesh in objects(category):
         np.testing.assert_allclose(mesh.bounds.mean(axis=0)[:2], 0, atol=1e-9 * diagonal(mesh))
         assert mesh.bounds[0, 2] == pytest.approx(0, abs=1e-9)
@@ -216,11 +216,11 @@ def test_a_mug_is_a_body_and_a_handle():
     assert all(len(parts(mesh)) == 2 for mesh in objects("mug"))
 
 
-def test_the_body_is_unchanged_by_turning_it():
+def test_the_body_is_unchanged_by_rotation():
     for mesh in objects("mug"):
         vertices = np.asarray(body_and_handle(mesh)[0].vertices)
-        turn = trimesh.transformations.rotation_matrix(2 * np.pi / 96, (0, 0, 1))[:3, :3]
-        assert cKDTree(vertices).query(vertices @ turn.T)[0].max() < 1e-9
+        rotation = trimesh.transformations.rotation_matrix(2 * np.pi / 96, (0, 0, 1))[:3, :3]
+        assert cKDTree(vertices).query(vertices @ rotation.T)[0].max() < 1e-9
 
 
 def test_the_body_is_hollow_and_open_upwards():
