@@ -32,7 +32,7 @@ def example(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def pairs(example) -> OrientationTable:
-    return read_orientation_table(example / "results.csv")[0]
+    return read_orientation_table(example / "results.csv")
 
 
 def table(path: Path, edit=lambda rows: rows) -> Path:
@@ -53,9 +53,9 @@ def test_results_find_the_nearest_instance_once(example, tmp_path):
     far["score"] = "3"
     path = tmp_path / "results.csv"
     pd.concat([worse, rows, better, far]).to_csv(path, index=False)
-    found, said = read_orientation_table(path, example)
+    found = read_orientation_table(path, example)
     assert len(found.estimate) == len(rows)
-    assert said == ("3 of 163 estimates found no partner",)
+    assert found.left_out == ("3 of 163 estimates found no partner",)
     assert (found.score == 2).sum() == 1
     assert np.allclose(found.score.max(), 2)
 
@@ -68,8 +68,8 @@ def test_truth_may_be_a_csv_file_in_the_form_of_results(example, tmp_path, pairs
             rows.append((int(file.parent.name), image, entry["obj_id"], 1, r, t, -1))
     columns = ["scene_id", "im_id", "obj_id", "score", "R", "t", "time"]
     pd.DataFrame(rows, columns=columns).to_csv(tmp_path / "truth.csv", index=False)
-    found, said = read_orientation_table(example / "results.csv", tmp_path / "truth.csv")
-    assert not said
+    found = read_orientation_table(example / "results.csv", tmp_path / "truth.csv")
+    assert not found.left_out
     assert np.allclose(found.truth, pairs.truth)
     assert np.allclose(found.estimate, pairs.estimate)
 
@@ -84,19 +84,19 @@ def test_a_table_is_read_as_it_was_written(pairs, tmp_path):
 
 def test_what_is_thin_or_suspicious_is_said(example, pairs, tmp_path):
     (about,) = pairs.about()
-    assert about["n_pairs"] == 160
-    assert about["directions_covered"] > 0.95
-    assert about["depends_on_view"]
-    assert "by 180°" in " ".join(about["warnings"])  # a half turn without an entry
+    assert about.n_pairs == 160
+    assert about.directions_covered > 0.95
+    assert about.depends_on_view
+    assert "by 180°" in " ".join(about.warnings)  # a half turn without an entry
     half_turn = np.eye(4)
     half_turn[:3, :3] = HALF_TURN
     entry = {"1": {"symmetries_discrete": [half_turn.ravel().tolist()]}}
     (tmp_path / "m.json").write_text(json.dumps(entry))
-    known, _ = read_orientation_table(example / "results.csv", None, tmp_path / "m.json")
+    known = read_orientation_table(example / "results.csv", None, tmp_path / "m.json")
     (about,) = known.about()
-    assert about["n_flips"] == 0
-    assert not about["depends_on_view"]
-    assert "180°" not in " ".join(about["warnings"])
+    assert about.n_flips == 0
+    assert not about.depends_on_view
+    assert "180°" not in " ".join(about.warnings)
 
 
 def first(column, change):
@@ -167,9 +167,9 @@ def test_files_that_are_not_bops_are_named(tmp_path, file, text, message):
     write_example(tmp_path)
     (tmp_path / file).write_text(text)
     with pytest.raises(UserError, match=message):
-        read_orientation_table(tmp_path / "results.csv", None, tmp_path / "models_info.json")[
-            0
-        ].about()
+        read_orientation_table(
+            tmp_path / "results.csv", None, tmp_path / "models_info.json"
+        ).about()
 
 
 # The next camera pose
@@ -255,7 +255,7 @@ def test_a_wrong_candidate_is_named(pairs, pose, message):
 def test_independence_of_the_view_is_said(tmp_path):
     rows = orientation_pairs().assign(scene_id=1).drop(columns="instance")
     rows.to_csv(tmp_path / "p.csv", index=False)
-    pairs, _ = read_orientation_table(tmp_path / "p.csv")
+    pairs = read_orientation_table(tmp_path / "p.csv")
     answer = recommend_camera(pairs, [PoseEstimate(np.eye(3))], 20, object_id="1")
     assert not answer.depends_on_view
     assert "no dependence" in answer.warnings[0]
@@ -344,11 +344,11 @@ def test_a_damaged_table_is_refused(pairs, tmp_path, name, value):
 @pytest.mark.skipif(not SHARED.is_dir(), reason="../shared/data/estimates is absent")
 def test_a_published_estimators_files_give_its_table():
     models = SHARED / "bop" / "models_info.json"
-    whole, _ = read_orientation_table(SHARED / "tless_megapose.csv", None, models)
-    scenes, _ = read_orientation_table(SHARED / "bop" / "megapose_tless-test.csv", None, models)
-    about = {one["object_id"]: one for one in whole.about()}
-    assert round(about["23"]["mean_error_deg"], 1) == 44.7
-    assert about["23"]["n_flips"] == 49
+    whole = read_orientation_table(SHARED / "tless_megapose.csv", None, models)
+    scenes = read_orientation_table(SHARED / "bop" / "megapose_tless-test.csv", None, models)
+    about = {summary.object_id: summary for summary in whole.about()}
+    assert round(about["23"].mean_error_deg, 1) == 44.7
+    assert about["23"].n_flips == 49
     # The same pairs, as far as these scenes go.
     texts = {r.tobytes() for r in np.round(whole.truth, 3) + 0.0}
     found = [r.tobytes() in texts for r in np.round(scenes.truth, 3) + 0.0]

@@ -149,8 +149,8 @@ def recommend_camera(
     >>> answer.depends_on_view, answer.probability_within["30"] > 0.9
     (False, True)
     """
-    errors = pairs.errors(object_id)
-    name = pairs.object_ids[0] if object_id is None else object_id
+    name = pairs.name_of(object_id)
+    errors = pairs.errors(name)
     if not views:
         raise UserError("no estimate; give one")
     scores = [view.score for view in views if view.score is not None]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,33 @@ _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "
 
 
 @dataclass(frozen=True)
+class ObjectSummary:
+    """The calibration pairs of one object.
+
+    Attributes
+    ----------
+    object_id : str
+    n_pairs, n_groups, n_flips : int
+        Groups are instances or scenes; a flip errs by more than `FLIP_DEG`.
+    mean_error_deg : float
+    directions_covered : float
+        Share of the viewing directions that have pairs nearby.
+    depends_on_view : bool
+        Whether calibration shows that flips depend on the view.
+    warnings : tuple of str
+    """
+
+    object_id: str
+    n_pairs: int
+    n_groups: int
+    n_flips: int
+    mean_error_deg: float
+    directions_covered: float
+    depends_on_view: bool
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class OrientationTable:
     """Pairs of an estimate and the truth of the same image, and the objects' symmetries.
 
@@ -52,6 +80,8 @@ class OrientationTable:
         Whether poses were rotated onto the optical axis (positions known).
     symmetries : mapping
         Entries of BOP's models_info by object; an object without one is asymmetric.
+    left_out : tuple of str
+        Which pairs of the file are not in the table, and why.
 
     Examples
     --------
@@ -69,6 +99,7 @@ class OrientationTable:
     score: Array | None = None
     straightened: bool = False
     symmetries: Mapping[str, Any] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
 
     @property
     def object_ids(self) -> list[str]:
@@ -89,69 +120,93 @@ class OrientationTable:
                 "and symmetries_continuous"
             ) from None
 
-    def errors(self, name: str | None = None) -> OrientationErrors:
-        """Return the errors on an object, which may be unnamed if it is the only one.
+    def name_of(self, object_id: str | None) -> str:
+        """Return the name of an object, which may be None if the table has only one.
 
         Raises
         ------
         UserError
-            For an unknown object, or none where there are several.
+            For an unknown object, or None where there are several.
         """
         known = self.object_ids
-        if name is None and len(known) > 1:
+        if object_id is None and len(known) > 1:
             raise UserError(f"the table has {len(known)} objects; name one of {', '.join(known)}")
-        name = known[0] if name is None else name
+        name = known[0] if object_id is None else object_id
         if name not in known:
             raise UserError(f"object {name} is not in the table: {nearest(name, known)}")
-        ratio = None
-        if self.score is not None and np.isfinite(self.score).all():
-            flips = [self._plain(other).is_flip for other in known]
-            scores = [self.score[self.object_id == other] for other in known]
-            ratio = ScoreRatio.fit(np.concatenate(scores), np.concatenate(flips))
-        is_named = self.object_id == name
-        return OrientationErrors(
-            self.estimate[is_named], self.truth[is_named], self.symmetry(name), ratio=ratio
-        )
+        return name
 
-    def _plain(self, name: str) -> OrientationErrors:
-        is_named = self.object_id == name
-        return OrientationErrors(self.estimate[is_named], self.truth[is_named], self.symmetry(name))
+    def errors(self, object_id: str | None = None) -> OrientationErrors:
+        """Return the errors on an object; its name and errors are those of `name_of`."""
+        return self._errors[self.name_of(object_id)]
+
+    @cached_property
+    def _errors(self) -> dict[str, OrientationErrors]:
+        ratio = self.score_ratio()
+        rows = {name: self.object_id == name for name in self.object_ids}
+        return {
+            name: OrientationErrors(
+                self.estimate[k], self.truth[k], self.symmetry(name), ratio=ratio
+            )
+            for name, k in rows.items()
+        }
+
+    def score_ratio(self, flip_deg: float = FLIP_DEG) -> ScoreRatio | None:
+        """Return what a score says about a flip of any object, if the pairs have scores."""
+        if self.score is None or not np.isfinite(self.score).all():
+            return None
+        rows = [(name, self.object_id == name) for name in self.object_ids]
+        error_deg = [
+            self.symmetry(name).distance_deg(self.estimate[k], self.truth[k]) for name, k in rows
+        ]
+        scores = np.concatenate([self.score[k] for _, k in rows])
+        return ScoreRatio.fit(scores, np.concatenate(error_deg) > flip_deg)
+
+    def where(self, rows: NDArray[np.bool_]) -> OrientationTable:
+        """Return the table of some of the pairs (n,)."""
+        return replace(
+            self,
+            object_id=self.object_id[rows],
+            group=self.group[rows],
+            estimate=self.estimate[rows],
+            truth=self.truth[rows],
+            score=None if self.score is None else self.score[rows],
+        )
 
     def depends_on_view(self, name: str) -> bool:
         """Return whether calibration shows that an object's flips depend on the view."""
-        errors, groups = self._plain(name), self.group[self.object_id == name]
+        errors, groups = self.errors(name), self.group[self.object_id == name]
         is_known = bool((groups != "").all() and errors.is_flip.any())
         return is_known and errors.depends_on_view(groups)
 
-    def about(self) -> list[dict[str, Any]]:
-        """Return what is known of each object, and what is thin or suspicious."""
+    def about(self) -> list[ObjectSummary]:
+        """Return a summary of each object."""
         return [self._about(name) for name in self.object_ids]
 
-    def _about(self, name: str) -> dict[str, Any]:
-        errors, is_named = self._plain(name), self.object_id == name
-        n, flips = int(is_named.sum()), errors.is_flip
-        seen = viewing_direction(spiral(500))
-        cosine = errors.symmetry.direction_cosine(seen, viewing_direction(errors.truth))
+    def _about(self, name: str) -> ObjectSummary:
+        errors = self.errors(name)
+        directions = viewing_direction(spiral(500))
+        cosine = errors.symmetry.direction_cosine(directions, viewing_direction(errors.truth))
         weight = np.exp(errors.concentration * (cosine - 1)).sum(axis=1)
-        said = []
-        if (known := float((weight > 1).mean())) < 0.5:
-            said.append(f"{1 - known:.0%} of the directions are seen by no pair nearby")
-        if (n_groups := len(set(self.group[is_named]) - {""})) < 2:
-            said.append("pairs are of one instance or scene: dependence on the view is unknown")
-        if not flips.any():
-            said.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
+        warnings = []
+        if (covered := float((weight > 1).mean())) < 0.5:
+            warnings.append(f"{1 - covered:.0%} of the directions are seen by no pair nearby")
+        if (n_groups := len(set(self.group[self.object_id == name]) - {""})) < 2:
+            warnings.append("pairs are of one instance or scene: dependence on the view is unknown")
+        if not errors.is_flip.any():
+            warnings.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
         elif hint := _common_axis(errors):
-            said.append(hint)
-        return {
-            "object_id": name,
-            "n_pairs": n,
-            "n_groups": n_groups,
-            "n_flips": int(flips.sum()),
-            "mean_error_deg": float(errors.error_deg.mean()),
-            "directions_covered": known,
-            "depends_on_view": self.depends_on_view(name),
-            "warnings": said,
-        }
+            warnings.append(hint)
+        return ObjectSummary(
+            object_id=name,
+            n_pairs=len(errors.estimate),
+            n_groups=n_groups,
+            n_flips=int(errors.is_flip.sum()),
+            mean_error_deg=float(errors.error_deg.mean()),
+            directions_covered=covered,
+            depends_on_view=self.depends_on_view(name),
+            warnings=tuple(warnings),
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the pairs as ``.npz``."""
