@@ -1,19 +1,17 @@
-"""Tabulate two views in three dimensions, pooled over objects, and draw one object."""
+"""Tabulate two views in three dimensions, pooled over objects."""
 
 from nbv.experiment.jobs import job
 
 with job(snakemake):
     import numpy as np
     import pandas as pd
-    from studies.rotation_figure import example, rotation_figure
     from studies.rotation_tables import by_symmetry, rotation_table
     from studies.rotations import read_symmetries
 
     from nbv.experiment.report.table import write_table
     from nbv.files import read_csv
-    from nbv.robot.style import save_figure
 
-    given, params, output = snakemake.input, snakemake.params, snakemake.output
+    given, params = snakemake.input, snakemake.params
     symmetries = read_symmetries(given.models_info) if given.models_info else {}
     found = [read_csv(path) for path in given.figures]
     if len(found) > 1:
@@ -25,6 +23,4 @@ with job(snakemake):
         groups["all categories"] = names
     rng = np.random.default_rng(params.seed)
     table = rotation_table(figures, groups, params.n_resamples, rng)
-    write_table(table, {kind: output[kind] for kind in ("csv", "md")})
-    figure = rotation_figure(example(given.pairs, symmetries, params.settings))
-    save_figure(figure, {kind: output[kind] for kind in ("png", "pdf", "svg")})
+    write_table(table, dict(snakemake.output.items()))

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from studies.rotation_figure import example, rotation_figure
 from studies.rotation_tables import by_symmetry, rotation_table
 from studies.rotations import (
     FUSIONS,
@@ -18,7 +17,6 @@ from studies.rotations import (
     read_symmetries,
 )
 
-from nbv.core.rotation_views import NextViews, belief, expected_error
 from nbv.core.rotations import ASYMMETRIC, Symmetry
 from nbv.errors import UserError
 from rotation_pairs import rotation_pairs
@@ -114,36 +112,6 @@ def test_methods_choose_by_cost_turn_and_hindsight():
     assert chosen["oracle"].tolist() == [[3, 2], [3, 2], [0, 1], [0, 1]]
     still = TwoViews({"posterior": error}, costs, turn, False)
     assert chosen_views(still, "posterior")["recommended"].ravel().tolist() == [2, 2, 0, 0]
-
-
-def test_the_figure_shows_the_first_flip_of_the_instance_of_most_flips(tmp_path):
-    pairs = tmp_path / "pairs.csv"
-    # The instance of most flips is not the first one.
-    later_first = rotation_pairs().sort_values("instance", ascending=False, kind="stable")
-    later_first.to_csv(pairs, index=False)
-    symmetries = {"1": Symmetry(np.eye(3)[None], np.array([0.0, 0, 1]))}
-    settings = {**SETTINGS, "objects": [], "score_objects": []}
-    shown = example(pairs, symmetries, settings)
-    # Object 1 has more flips, but turns freely.
-    error = {
-        one.name: ASYMMETRIC.distance_deg(one.estimate, one.truth)
-        for one in read_instances(pairs, ["0"])
-    }
-    n_flips = {name: sum(angle > 20 for angle in angles) for name, angles in error.items()}
-    own = error[shown.one.name]
-    assert n_flips[shown.one.name] == max(n_flips.values())
-    assert shown.first == [angle > 20 for angle in own].index(True)
-    assert shown.error_deg["single"] == pytest.approx(own[shown.first])
-
-    truth, first = shown.one.truth, shown.one.estimate[[shown.first]]
-    rest = [i for i in range(len(truth)) if i != shown.first]
-    moves = truth[rest] @ truth[shown.first].T
-    costs = expected_error(NextViews(belief(shown.errors, first, np.eye(3)[None]), moves))
-    assert costs[rest.index(shown.second)] == pytest.approx(costs.min())
-
-    (title,) = [axes.get_title() for axes in rotation_figure(shown).axes if axes.get_title()]
-    for method in ("single", "expected_error", "random"):
-        assert f"{shown.error_deg[method]:.1f}°" in title
 
 
 @pytest.mark.parametrize(
