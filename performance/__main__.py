@@ -14,14 +14,7 @@ from nbv.files import write_json
 from performance.figures import HEADER, Figure, summary_line, table_line
 
 # In the order of the table; each is a module with `run(quick) -> list[Figure]`.
-BENCHMARKS = (
-    "rendering",
-    "training",
-    "lookup",
-    "evaluation",
-    "frames",
-    "workflow",
-)
+BENCHMARKS = ("rendering", "training", "lookup", "frames")
 
 
 def main(arguments: Sequence[str] | None = None) -> list[Figure]:

@@ -31,30 +31,27 @@ class Figure:
     name : str
     ratio : float or None
         None where it could not be measured; `detail` then says why.
-    target : Target or None
-        None where there is nothing to reach.
+    target : Target
     detail : str
         What was measured, in absolute terms.
     """
 
     name: str
     ratio: float | None
-    target: Target | None
+    target: Target
     detail: str
 
     @property
     def reached(self) -> bool | None:
-        """Whether the target is reached; None where there is none or no ratio."""
-        if self.ratio is None or self.target is None:
-            return None
-        return self.target.holds(self.ratio)
+        """Whether the target is reached; None without a ratio."""
+        return None if self.ratio is None else self.target.holds(self.ratio)
 
     def as_json(self) -> dict[str, Any]:
         """Return what is kept: numbers for the ratio, text for the target."""
         return {
             "name": self.name,
             "ratio": None if self.ratio is None else round(self.ratio, 4),
-            "target": None if self.target is None else str(self.target),
+            "target": str(self.target),
             "reached": self.reached,
             "detail": self.detail,
         }
@@ -68,9 +65,8 @@ def table_line(figure: Figure) -> str:
     ratio = "–" if figure.ratio is None else f"{figure.ratio:.3g}"
     if figure.ratio is not None and abs(figure.ratio) >= 1000:
         ratio = f"{figure.ratio:,.0f}"
-    target = "" if figure.target is None else str(figure.target)
     verdict = _VERDICT[figure.reached]
-    return f"{figure.name:44} {ratio:>8}  {target:8} {verdict:8} {figure.detail}".rstrip()
+    return f"{figure.name:44} {ratio:>8}  {figure.target!s:8} {verdict:8} {figure.detail}".rstrip()
 
 
 def summary_line(figures: Iterable[Figure]) -> str:

@@ -8,9 +8,7 @@ from typing import Any
 
 from nbv.experiment.config import load_config
 
-ROOT = Path(__file__).parents[1]
-
 
 @cache
 def configuration() -> dict[str, Any]:
-    return load_config(ROOT / "config", [])
+    return load_config(Path(__file__).parents[1] / "config", [])

@@ -58,8 +58,8 @@ CONTRASTS_COLUMNS = (
 PLANS_P_VALUES: Final[Mapping[tuple[str, str, int], float]] = {
     ("embedded-classifier", "airplane", 5): 0.01737,
     ("embedded-linear_classifier", "chair", 3): 0.00297,
-    ("embedded-linear_classifier", "chair", 4): 1.25e-5,
-    ("embedded-linear_classifier", "chair", 5): 0.3,
+    ("embedded-linear_classifier", "chair", 4): 9.7e-6,
+    ("embedded-linear_classifier", "chair", 5): 0.1842,
     ("embedded-linear_classifier", "mug", 3): 8.0e-7,
     ("embedded-linear_classifier", "mug", 4): 4.9e-6,
     ("embedded-linear_classifier", "mug", 5): 0.00379,

@@ -168,11 +168,8 @@ def shape_file(kind):
 
 @one_line()
 def rotation_file(key):
-    """A file that the study `rotations` reads: one that is given, or of its own estimators."""
-    if CONFIG["rotations"]["pairs"]:
-        return STUDIES.rotation_files[key]
-    # The figure shows one object of one fold.
-    return f"<results>/rotations/{PLAN.focus}/fold1/pairs.csv" if key == "pairs" else []
+    """A given file of the study `rotations`; without a table of pairs it needs none."""
+    return STUDIES.rotation_files[key] if CONFIG["rotations"]["pairs"] else []
 
 
 @one_line()

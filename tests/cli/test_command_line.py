@@ -341,16 +341,6 @@ def test_what_cannot_be_recommended_is_one_line(here, capsys, arguments, message
     assert message in fails(capsys, "recommend", *arguments, "--bundle", "b.safetensors")
 
 
-def test_a_frame_that_is_refused_is_named(here, capsys):
-    np.save("dark.npy", np.zeros((ROWS, COLUMNS), np.float32))
-    for options, message in (
-        (("dark.npy",), "empty-mask: dark.npy: the frame has no depth at all"),
-        (("f0.npy", "dark.npy", "--rotations", "0", "90"), "empty-mask: dark.npy: the frame has"),
-    ):
-        line = fails(capsys, "recommend", *options, "--bundle", "b.safetensors")
-        assert line.startswith(f"nbv: error: {message}")
-
-
 def test_a_missing_or_damaged_bundle_is_one_line(here, capsys):
     assert "no-such" in fails(capsys, "recommend", "f0.npy", "--bundle", "no-such")
     (here / "cut.safetensors").write_bytes((here / "b.safetensors").read_bytes()[:1000])

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from tests.fuzz.mutations import mutate
 
 from made_bundles import COLUMNS as WIDTH_PX
 from made_bundles import FOCAL_PX, ROWS, frame
@@ -42,26 +43,6 @@ def here(tmp_path, monkeypatch, bundle_file) -> Path:
     Path("camera.yaml").write_text(ROS)
     np.save("pose.npy", np.eye(4))
     return tmp_path
-
-
-def damaged(content: bytes, rng: np.random.Generator) -> bytes:
-    """Bytes that are changed, lost, put in or exchanged; more often near the start, the header."""
-    changed = bytearray(content)
-    for _ in range(rng.integers(1, 4)):
-        place = int(len(changed) * rng.random() ** 3)
-        length = int(rng.integers(1, 1 + max(1, len(changed) // int(rng.choice([2, 10, 100])))))
-        match rng.integers(0, 5):
-            case 0:
-                changed[place : place + 1] = rng.bytes(1)
-            case 1:
-                changed[place : place + length] = rng.bytes(min(length, len(changed) - place))
-            case 2:
-                del changed[place : place + length]
-            case 3:
-                changed[place:place] = rng.bytes(length)
-            case _:
-                del changed[place:]
-    return bytes(changed)
 
 
 def odd_frame(rng: np.random.Generator) -> np.ndarray:
@@ -118,7 +99,7 @@ def test_damaged_files_are_one_line_or_an_answer(here, capsys, name, option):
     Path(damaged_name).write_bytes(content)
     assert one_line_or_an_answer(capsys, *used)
     for _ in range(40):
-        Path(damaged_name).write_bytes(damaged(content, rng))
+        Path(damaged_name).write_bytes(mutate(content, [b"{}"], rng))
         one_line_or_an_answer(capsys, *used)
 
 
@@ -136,6 +117,6 @@ def test_a_damaged_bundle_is_one_line(here, capsys, bundle_file, rng):
     """A single other byte is found: no answer comes of a bundle that was changed."""
     content = bundle_file.read_bytes()
     for _ in range(60):
-        changed = damaged(content, rng)
+        changed = mutate(content, [b"{}"], rng)
         Path("b.safetensors").write_bytes(changed)
         assert one_line_or_an_answer(capsys, "frame.npy") == (changed == content)

@@ -91,6 +91,13 @@ def test_a_page_depends_on_its_templates_and_on_no_other_page():
     assert report & explorer <= table
 
 
+def test_a_table_depends_on_the_published_numbers():
+    assert {"experiment/paper/published.csv", "experiment/paper/published.py"} <= set(
+        names("tabulate_paper")
+    )
+    assert "experiment/paper/published.csv" not in names("render_depth")
+
+
 def test_imports_are_followed_to_their_end(tmp_path):
     """The files are those that a fresh Python loads, where nothing is imported from a package."""
     script = tmp_path / "script.py"
