@@ -15,7 +15,7 @@ use rule splits from paper as shuffle_splits with:
 
 use rule pretrain from paper as replicate_pretrain with:
     input:
-        sources("pretrain_network"),
+        code=sources("pretrain_network"),
         splits=all_shuffled_splits,
         depth=paths("<results>/depth/{category}/el{elevation}.npy", PLAN.lowest_units),
         objects=paths(
@@ -31,7 +31,7 @@ use rule pretrain from paper as replicate_pretrain with:
 
 use rule pretrain from paper as replicate_pretrain_part with:
     input:
-        sources("pretrain_network"),
+        code=sources("pretrain_network"),
         splits=all_shuffled_splits,
         depth=paths("<results>/depth/{category}/el{elevation}.npy", PLAN.lowest_units),
         objects=paths(
@@ -47,7 +47,7 @@ use rule pretrain from paper as replicate_pretrain_part with:
 
 use rule train from paper as replicate_train with:
     input:
-        sources("train_estimator"),
+        code=sources("train_estimator"),
         splits=shuffled_splits,
         depth="<results>/depth/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -63,7 +63,7 @@ use rule train from paper as replicate_train with:
 
 use rule train from paper as replicate_train_part with:
     input:
-        sources("train_estimator"),
+        code=sources("train_estimator"),
         splits=shuffled_splits,
         depth="<results>/depth/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -81,7 +81,7 @@ ruleorder: replicate_train > replicate_estimate
 
 use rule estimate from paper as replicate_estimate with:
     input:
-        sources("estimate_views"),
+        code=sources("estimate_views"),
         splits=shuffled_splits,
         depth="<results>/depth/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -104,7 +104,7 @@ if PLAN.linear:
 
     use rule fit from paper as replicate_fit with:
         input:
-            sources("fit_linear"),
+            code=sources("fit_linear"),
             splits=shuffled_splits,
             features="<results>/features/{category}/el{elevation}.npy",
             objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -119,7 +119,7 @@ if PLAN.linear:
 
 rule keep_estimates:
     input:
-        sources("keep_estimates"),
+        code=sources("keep_estimates"),
         estimates=held_out_files(".csv"),
         posteriors=(
             held_out_files("_posteriors.npz") if CONFIG["gives_distributions"] else []
@@ -143,7 +143,7 @@ rule keep_estimates:
 
 rule join_kept_estimates:
     input:
-        sources("join_kept_estimates"),
+        code=sources("join_kept_estimates"),
         kept=paths(rules.keep_estimates.output[0], STUDIES.trainings),
     output:
         "<results>/confirmation/estimates.npz",
@@ -161,7 +161,7 @@ rule join_kept_estimates:
 
 rule evaluate_factorial:
     input:
-        sources("evaluate_factorial"),
+        code=sources("evaluate_factorial"),
         kept=kept_file,
     output:
         objects="<results>/confirmation/objects/{run}/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}.csv",
@@ -185,7 +185,7 @@ rule evaluate_factorial:
 
 rule statistics:
     input:
-        sources("tabulate_confirmation"),
+        code=sources("tabulate_confirmation"),
         objects=factorial_files("objects"),
         beliefs=factorial_files("beliefs"),
         densities=factorial_files("densities"),

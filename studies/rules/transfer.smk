@@ -12,7 +12,9 @@ TRANSFER_KEYS = [
 
 use rule render from paper as transfer_render with:
     input:
-        lambda wildcards: sources("render_depth", condition_of(wildcards.condition)),
+        code=lambda wildcards: sources(
+            "render_depth", condition_of(wildcards.condition)
+        ),
         meshes="<results>/meshes/{category}.npz",
     output:
         depth="<results>/transfer/{condition}/depth/{category}/el{elevation}.npy",
@@ -32,7 +34,7 @@ use rule render from paper as transfer_render with:
 
 use rule train from paper as transfer_train with:
     input:
-        sources("train_estimator"),
+        code=sources("train_estimator"),
         splits="<results>/splits/{category}.csv",
         depth=lambda wildcards: condition_images(wildcards.trained, ".npy"),
         objects=lambda wildcards: condition_images(wildcards.trained, "_objects.json"),
@@ -50,7 +52,7 @@ use rule train from paper as transfer_train with:
 
 use rule estimate from paper as transfer_estimate with:
     input:
-        sources("estimate_views"),
+        code=sources("estimate_views"),
         splits="<results>/splits/{category}.csv",
         depth=lambda wildcards: condition_images(wildcards.tested, ".npy"),
         objects=lambda wildcards: condition_images(wildcards.tested, "_objects.json"),
@@ -67,7 +69,7 @@ use rule estimate from paper as transfer_estimate with:
 
 use rule lookup from paper as transfer_lookup with:
     input:
-        sources("build_lookup"),
+        code=sources("build_lookup"),
         splits="<results>/splits/{category}.csv",
         calibration="<results>/transfer/{trained}/{tested}/estimates/{category}/el{elevation}/fold{fold}/calibration.csv",
     output:
@@ -80,7 +82,7 @@ use rule lookup from paper as transfer_lookup with:
 
 use rule evaluate_baselines from paper as transfer_baselines with:
     input:
-        sources("evaluate_baselines"),
+        code=sources("evaluate_baselines"),
         splits="<results>/splits/{category}.csv",
         test="<results>/transfer/{trained}/{tested}/estimates/{category}/el{elevation}/fold{fold}/test.csv",
     output:
@@ -97,7 +99,7 @@ use rule evaluate_baselines from paper as transfer_baselines with:
 
 use rule evaluate_recommended from paper as transfer_recommended with:
     input:
-        sources("evaluate_recommended"),
+        code=sources("evaluate_recommended"),
         splits="<results>/splits/{category}.csv",
         test="<results>/transfer/{trained}/{tested}/estimates/{category}/el{elevation}/fold{fold}/test.csv",
         lookup=lambda wildcards: (
@@ -114,7 +116,7 @@ use rule evaluate_recommended from paper as transfer_recommended with:
 
 rule transfer_table:
     input:
-        sources("tabulate_transfer"),
+        code=sources("tabulate_transfer"),
         evaluations=paths(
             "<results>/transfer/{trained}/{tested}/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
             [

@@ -4,7 +4,7 @@
 # The network of all categories that a fold's estimators can start from, at lowest elevations.
 rule pretrain:
     input:
-        sources("pretrain_network"),
+        code=sources("pretrain_network"),
         splits=paths("<results>/splits/{category}.csv", zip(CONFIG["categories"])),
         depth=paths("<results>/depth/{category}/el{elevation}.npy", PLAN.lowest_units),
         objects=paths(
@@ -44,7 +44,7 @@ use rule pretrain as pretrain_part with:
 # It estimates, too, what its estimator has not seen: a job of its own would load torch once more.
 rule train:
     input:
-        sources("train_estimator"),
+        code=sources("train_estimator"),
         splits="<results>/splits/{category}.csv",
         depth="<results>/depth/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -85,7 +85,7 @@ if PLAN.external:
 
     rule estimate:
         input:
-            sources("take_estimates"),
+            code=sources("take_estimates"),
             splits="<results>/splits/{category}.csv",
             pairs=CONFIG["estimator"]["pairs"],
         output:
@@ -112,7 +112,7 @@ else:
     # Where calibration is cross-fitted, several estimators answer for a fold.
     rule estimate:
         input:
-            sources("estimate_views"),
+            code=sources("estimate_views"),
             splits="<results>/splits/{category}.csv",
             depth="<results>/depth/{category}/el{elevation}.npy",
             objects="<results>/depth/{category}/el{elevation}_objects.json",

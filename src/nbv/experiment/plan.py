@@ -348,7 +348,7 @@ class Plan:
         return sorted(found, key=lambda job: Path(job[1]).parts)
 
     def sources(self, script: Path, settings: Mapping[str, Any] | None = None) -> list[str]:
-        """Return the source files that a script depends on, relative to the working directory.
+        """Return a script and what it depends on in nbv, relative to the working directory.
 
         Parameters
         ----------
@@ -368,7 +368,7 @@ class Plan:
         here = Path.cwd()
         return [
             str(Path(file).relative_to(here)) if Path(file).is_relative_to(here) else file
-            for file in provenance.source_files(script, chosen.get(script.stem, ()))
+            for file in (str(script), *provenance.source_files(script, chosen.get(script.stem, ())))
         ]
 
 
