@@ -76,9 +76,6 @@ use rule train from paper as replicate_train_part with:
         "<benchmarks>/replicate_train_part/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}/fold{fold}/{part}.tsv"
 
 
-ruleorder: replicate_train > replicate_estimate
-
-
 use rule estimate from paper as replicate_estimate with:
     input:
         code=sources("estimate_views"),
@@ -99,8 +96,6 @@ use rule estimate from paper as replicate_estimate with:
 
 
 if PLAN.linear:
-
-    ruleorder: replicate_fit > replicate_train > replicate_estimate
 
     use rule fit from paper as replicate_fit with:
         input:

@@ -46,6 +46,8 @@ use rule train from paper as transfer_train with:
         "<logs>/transfer/train/{trained}/{category}/el{elevation}/fold{fold}.log",
     benchmark:
         "<benchmarks>/transfer/train/{trained}/{category}/el{elevation}/fold{fold}.tsv"
+    wildcard_constraints:
+        fold=FOLDS,
     params:
         estimator=lambda wildcards: settings_of("training"),
 
@@ -65,6 +67,8 @@ use rule estimate from paper as transfer_estimate with:
         "<logs>/transfer/estimate/{trained}/{tested}/{category}/el{elevation}/fold{fold}.log",
     benchmark:
         "<benchmarks>/transfer/estimate/{trained}/{tested}/{category}/el{elevation}/fold{fold}.tsv"
+    wildcard_constraints:
+        fold=FOLDS,
 
 
 use rule lookup from paper as transfer_lookup with:

@@ -50,6 +50,7 @@ with one_line():
     check_folders(PLAN.results)
 
 CONFIG, UNITS = PLAN.config, PLAN.units
+FOLDS = "|".join(map(str, PLAN.folds))
 METHODS = CONFIG["methods"]
 REFERENCES = Path(os.path.relpath(ROOT / "docs/reference"))
 # Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
@@ -65,7 +66,7 @@ pathvars:
 wildcard_constraints:
     category="|".join(map(re.escape, CONFIG["categories"])),
     elevation=r"\d\d",
-    fold="|".join(map(str, PLAN.folds)),
+    fold=FOLDS,
     part="|".join(map(str, PLAN.parts)) or "none",
     method="|".join(map(re.escape, PLAN.lookup_methods)) or "none",
     criterion="|".join(PLAN.lookup_criteria) or "none",
@@ -105,7 +106,30 @@ def estimates_of_fold(below="<results>"):
 
 def estimates_of_training(below="<results>"):
     """The estimates that a training makes: a fold's, or none where `estimate` makes them."""
-    return {} if PLAN.crossfit or PLAN.external else estimates_of_fold(below)
+    return {} if PLAN.estimates_apart else estimates_of_fold(below)
+
+
+def folds_if(made):
+    """All folds, or none where another rule makes the files."""
+    return FOLDS if made else "none"
+
+
+def estimated_from(wildcards):
+    """What a fold's estimates are made of: another program's file, or images and estimators."""
+    splits = "<results>/splits/{category}.csv"
+    if PLAN.external:
+        return {"splits": splits, "pairs": CONFIG["estimator"]["pairs"]}
+    images = "<results>/depth/{category}/el{elevation}"
+    estimators = "<results>/estimators/{category}/el{elevation}/fold{fold}"
+    return {
+        "splits": splits,
+        "depth": f"{images}.npy",
+        "objects": f"{images}_objects.json",
+        "estimator": f"{estimators}/estimator.safetensors",
+        "of_parts": [
+            f"{estimators}/without_part{part}.safetensors" for part in PLAN.parts
+        ],
+    }
 
 
 def training_start(wildcards, below="<results>"):

@@ -1,9 +1,6 @@
 # Linear estimators: the depth features of a unit's images, and a fit for each fold.
 
 
-ruleorder: fit > train > estimate
-
-
 rule extract:
     input:
         code=sources("extract_features"),
