@@ -166,9 +166,10 @@ rule evaluate_factorial:
         "<logs>/evaluate_factorial/{run}/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}.log",
     benchmark:
         "<benchmarks>/evaluate_factorial/{run}/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}.tsv"
-    # A file of kept estimates may have categories that this run has not.
+    # A file of kept estimates may have categories and elevations that this run does not have.
     wildcard_constraints:
         category="[^/]+",
+        elevation=r"\d\d",
     conda:
         ENVIRONMENT
     resources:

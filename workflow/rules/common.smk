@@ -51,6 +51,7 @@ with one_line():
 
 CONFIG, UNITS = PLAN.config, PLAN.units
 FOLDS = "|".join(map(str, PLAN.folds))
+ELEVATIONS = "|".join(sorted({f"{elevation:02d}" for _, elevation in UNITS}))
 METHODS = CONFIG["methods"]
 REFERENCES = Path(os.path.relpath(ROOT / "docs/reference"))
 # Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
@@ -65,7 +66,7 @@ pathvars:
 
 wildcard_constraints:
     category="|".join(map(re.escape, CONFIG["categories"])),
-    elevation=r"\d\d",
+    elevation=ELEVATIONS,
     fold=FOLDS,
     part="|".join(map(str, PLAN.parts)) or "none",
     method="|".join(map(re.escape, PLAN.lookup_methods)) or "none",
@@ -168,6 +169,16 @@ def bundle_elevations(wildcards, pattern):
     PLAN.check_bundle(wildcards.category)
     elevations = CONFIG["elevations_deg"][wildcards.category]
     return paths(pattern, [(wildcards.category, each) for each in elevations])
+
+
+@one_line()
+def what_exists(wildcards):
+    """No input: a path is of a fold or an elevation that the run does not have."""
+    units = ", ".join(paths("{category}/el{elevation}", UNITS))
+    raise UserError(
+        f"{PLAN.results}/{wildcards.missing} is not of this run, which has {units}, each with "
+        f"fold1 to fold{CONFIG['n_folds']}"
+    )
 
 
 @one_line()
