@@ -11,7 +11,7 @@ ABLATIONS = Paramspace(
 
 rule evaluate_ablation:
     input:
-        sources("evaluate_ablation"),
+        code=sources("evaluate_ablation"),
         calibration=paths(
             estimates_of_fold()["calibration"], PLAN.folds_of([PLAN.focus_unit])
         ),
@@ -38,7 +38,7 @@ rule evaluate_ablation:
 
 rule ablation:
     input:
-        sources("tabulate_ablation"),
+        code=sources("tabulate_ablation"),
         rows=[f"<results>/ablation/{one}.csv" for one in ABLATIONS.instance_patterns],
     output:
         csv="<results>/tables/ablation.csv",

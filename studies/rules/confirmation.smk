@@ -15,7 +15,7 @@ use rule splits from paper as shuffle_splits with:
 
 use rule pretrain from paper as replicate_pretrain with:
     input:
-        sources("pretrain_network"),
+        code=sources("pretrain_network"),
         splits=all_shuffled_splits,
         depth=paths("<results>/depth/{category}/el{elevation}.npy", PLAN.lowest_units),
         objects=paths(
@@ -31,7 +31,7 @@ use rule pretrain from paper as replicate_pretrain with:
 
 use rule pretrain from paper as replicate_pretrain_part with:
     input:
-        sources("pretrain_network"),
+        code=sources("pretrain_network"),
         splits=all_shuffled_splits,
         depth=paths("<results>/depth/{category}/el{elevation}.npy", PLAN.lowest_units),
         objects=paths(
@@ -47,7 +47,7 @@ use rule pretrain from paper as replicate_pretrain_part with:
 
 use rule train from paper as replicate_train with:
     input:
-        sources("train_estimator"),
+        code=sources("train_estimator"),
         splits=shuffled_splits,
         depth="<results>/depth/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -63,7 +63,7 @@ use rule train from paper as replicate_train with:
 
 use rule train from paper as replicate_train_part with:
     input:
-        sources("train_estimator"),
+        code=sources("train_estimator"),
         splits=shuffled_splits,
         depth="<results>/depth/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -76,12 +76,9 @@ use rule train from paper as replicate_train_part with:
         "<benchmarks>/replicate_train_part/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}/fold{fold}/{part}.tsv"
 
 
-ruleorder: replicate_train > replicate_estimate
-
-
 use rule estimate from paper as replicate_estimate with:
     input:
-        sources("estimate_views"),
+        code=sources("estimate_views"),
         splits=shuffled_splits,
         depth="<results>/depth/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -100,11 +97,9 @@ use rule estimate from paper as replicate_estimate with:
 
 if PLAN.linear:
 
-    ruleorder: replicate_fit > replicate_train > replicate_estimate
-
     use rule fit from paper as replicate_fit with:
         input:
-            sources("fit_linear"),
+            code=sources("fit_linear"),
             splits=shuffled_splits,
             features="<results>/features/{category}/el{elevation}.npy",
             objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -119,7 +114,7 @@ if PLAN.linear:
 
 rule keep_estimates:
     input:
-        sources("keep_estimates"),
+        code=sources("keep_estimates"),
         estimates=held_out_files(".csv"),
         posteriors=(
             held_out_files("_posteriors.npz") if CONFIG["gives_distributions"] else []
@@ -143,7 +138,7 @@ rule keep_estimates:
 
 rule join_kept_estimates:
     input:
-        sources("join_kept_estimates"),
+        code=sources("join_kept_estimates"),
         kept=paths(rules.keep_estimates.output[0], STUDIES.trainings),
     output:
         "<results>/confirmation/estimates.npz",
@@ -161,7 +156,7 @@ rule join_kept_estimates:
 
 rule evaluate_factorial:
     input:
-        sources("evaluate_factorial"),
+        code=sources("evaluate_factorial"),
         kept=kept_file,
     output:
         objects="<results>/confirmation/objects/{run}/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}.csv",
@@ -171,9 +166,10 @@ rule evaluate_factorial:
         "<logs>/evaluate_factorial/{run}/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}.log",
     benchmark:
         "<benchmarks>/evaluate_factorial/{run}/shuffle{shuffle}_replicate{replicate}/{category}/el{elevation}.tsv"
-    # A file of kept estimates may have categories that this run has not.
+    # A file of kept estimates may have categories and elevations that this run does not have.
     wildcard_constraints:
         category="[^/]+",
+        elevation=r"\d\d",
     conda:
         ENVIRONMENT
     resources:
@@ -185,7 +181,7 @@ rule evaluate_factorial:
 
 rule statistics:
     input:
-        sources("tabulate_confirmation"),
+        code=sources("tabulate_confirmation"),
         objects=factorial_files("objects"),
         beliefs=factorial_files("beliefs"),
         densities=factorial_files("densities"),

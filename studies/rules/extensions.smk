@@ -3,8 +3,8 @@
 
 rule evaluate_extensions:
     input:
-        sources("evaluate_extensions"),
         **estimates_of_fold(),
+        code=sources("evaluate_extensions"),
         splits="<results>/splits/{category}.csv",
         methods=expand(
             "<results>/evaluation/{category}/el{elevation}/fold{fold}/{name}.csv",

@@ -17,7 +17,7 @@ use rule render_bundle from paper as render_variant with:
 
 use rule train_bundle from paper as train_variant with:
     input:
-        sources("train_bundle"),
+        code=sources("train_bundle"),
         splits="<results>/splits/{category}.csv",
         depth=variant_images(".npy"),
         objects=variant_images("_objects.json"),
@@ -36,7 +36,7 @@ use rule train_bundle from paper as train_variant with:
 
 use rule bundle from paper as bundle_variant with:
     input:
-        sources("make_bundle"),
+        code=sources("make_bundle"),
         splits="<results>/splits/{category}.csv",
         depth=variant_images(".npy"),
         objects=variant_images("_objects.json"),
@@ -64,7 +64,7 @@ use rule bundle from paper as bundle_variant with:
 
 rule ingredients:
     input:
-        sources("tabulate_ingredients"),
+        code=sources("tabulate_ingredients"),
         frames=real_frames,
         bundles=variant_files(".safetensors"),
         evaluations=variant_files(".csv"),

@@ -3,7 +3,7 @@
 
 rule leaderboard:
     input:
-        sources("tabulate_leaderboard"),
+        code=sources("tabulate_leaderboard"),
         objects=leaderboard_files,
     output:
         csv="<results>/tables/leaderboard.csv",

@@ -3,8 +3,8 @@
 
 rule evaluate_more_views:
     input:
-        sources("evaluate_more_views"),
         **estimates_of_fold(),
+        code=sources("evaluate_more_views"),
         splits="<results>/splits/{category}.csv",
         choices="<results>/extensions/{category}/el{elevation}/fold{fold}/choices.csv",
     output:
@@ -27,7 +27,7 @@ rule evaluate_more_views:
 
 rule more_views:
     input:
-        sources("tabulate_more_views"),
+        code=sources("tabulate_more_views"),
         rows=rows_of_more_views,
     output:
         csv="<results>/tables/more_views.csv",

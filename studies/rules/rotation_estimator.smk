@@ -7,7 +7,7 @@ ROTATION_VIEWS = {key: CONFIG["rotations"][key] for key in ("turns", "views")}
 
 rule make_solid:
     input:
-        sources("make_solid"),
+        code=sources("make_solid"),
     output:
         f"{OWN}/meshes.npz",
     log:
@@ -26,7 +26,7 @@ rule make_solid:
 
 use rule splits from paper as solid_splits with:
     input:
-        sources("split_objects"),
+        code=sources("split_objects"),
         meshes=f"{OWN}/meshes.npz",
     output:
         f"{OWN}/splits.csv",
@@ -40,7 +40,7 @@ use rule splits from paper as solid_splits with:
 
 rule render_rotations:
     input:
-        sources("render_rotations"),
+        code=sources("render_rotations"),
         meshes=shape_file("meshes.npz"),
     output:
         depth=f"{OWN}/depth.npy",
@@ -66,7 +66,7 @@ rule render_rotations:
 
 rule estimate_rotations:
     input:
-        sources("estimate_rotations"),
+        code=sources("estimate_rotations"),
         splits=shape_file("splits.csv"),
         depth=f"{OWN}/depth.npy",
         objects=f"{OWN}/objects.json",
@@ -94,7 +94,7 @@ rule estimate_rotations:
 
 rule rotation_estimator:
     input:
-        sources("tabulate_rotation_estimator"),
+        code=sources("tabulate_rotation_estimator"),
         pairs=rotation_pairs,
     output:
         csv="<results>/tables/rotation_estimator.csv",
@@ -115,7 +115,7 @@ rule rotation_estimator:
 
 use rule evaluate_rotations as evaluate_own_rotations with:
     input:
-        sources("evaluate_rotations"),
+        code=sources("evaluate_rotations"),
         pairs=f"{OWN_FOLD}/pairs.csv",
         models_info=[],
     output:

@@ -4,7 +4,7 @@
 
 rule evaluate_rotations:
     input:
-        sources("evaluate_rotations"),
+        code=sources("evaluate_rotations"),
         pairs=lambda wildcards: rotation_file("pairs"),
         models_info=lambda wildcards: rotation_file("models_info"),
     output:
@@ -26,7 +26,7 @@ rule evaluate_rotations:
 
 rule rotations:
     input:
-        sources("tabulate_rotations"),
+        code=sources("tabulate_rotations"),
         figures=rotation_figures,
         models_info=lambda wildcards: rotation_file("models_info"),
     output:

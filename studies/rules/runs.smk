@@ -3,7 +3,7 @@
 
 rule runs:
     input:
-        sources("tabulate_runs"),
+        code=sources("tabulate_runs"),
         estimates=lambda wildcards: compared_files("estimates"),
         evaluations=lambda wildcards: compared_files("evaluation"),
     output:

@@ -12,7 +12,9 @@ TRANSFER_KEYS = [
 
 use rule render from paper as transfer_render with:
     input:
-        lambda wildcards: sources("render_depth", condition_of(wildcards.condition)),
+        code=lambda wildcards: sources(
+            "render_depth", condition_of(wildcards.condition)
+        ),
         meshes="<results>/meshes/{category}.npz",
     output:
         depth="<results>/transfer/{condition}/depth/{category}/el{elevation}.npy",
@@ -32,7 +34,7 @@ use rule render from paper as transfer_render with:
 
 use rule train from paper as transfer_train with:
     input:
-        sources("train_estimator"),
+        code=sources("train_estimator"),
         splits="<results>/splits/{category}.csv",
         depth=lambda wildcards: condition_images(wildcards.trained, ".npy"),
         objects=lambda wildcards: condition_images(wildcards.trained, "_objects.json"),
@@ -44,13 +46,15 @@ use rule train from paper as transfer_train with:
         "<logs>/transfer/train/{trained}/{category}/el{elevation}/fold{fold}.log",
     benchmark:
         "<benchmarks>/transfer/train/{trained}/{category}/el{elevation}/fold{fold}.tsv"
+    wildcard_constraints:
+        fold=FOLDS,
     params:
         estimator=lambda wildcards: settings_of("training"),
 
 
 use rule estimate from paper as transfer_estimate with:
     input:
-        sources("estimate_views"),
+        code=sources("estimate_views"),
         splits="<results>/splits/{category}.csv",
         depth=lambda wildcards: condition_images(wildcards.tested, ".npy"),
         objects=lambda wildcards: condition_images(wildcards.tested, "_objects.json"),
@@ -63,11 +67,13 @@ use rule estimate from paper as transfer_estimate with:
         "<logs>/transfer/estimate/{trained}/{tested}/{category}/el{elevation}/fold{fold}.log",
     benchmark:
         "<benchmarks>/transfer/estimate/{trained}/{tested}/{category}/el{elevation}/fold{fold}.tsv"
+    wildcard_constraints:
+        fold=FOLDS,
 
 
 use rule lookup from paper as transfer_lookup with:
     input:
-        sources("build_lookup"),
+        code=sources("build_lookup"),
         splits="<results>/splits/{category}.csv",
         calibration="<results>/transfer/{trained}/{tested}/estimates/{category}/el{elevation}/fold{fold}/calibration.csv",
     output:
@@ -80,7 +86,7 @@ use rule lookup from paper as transfer_lookup with:
 
 use rule evaluate_baselines from paper as transfer_baselines with:
     input:
-        sources("evaluate_baselines"),
+        code=sources("evaluate_baselines"),
         splits="<results>/splits/{category}.csv",
         test="<results>/transfer/{trained}/{tested}/estimates/{category}/el{elevation}/fold{fold}/test.csv",
     output:
@@ -97,7 +103,7 @@ use rule evaluate_baselines from paper as transfer_baselines with:
 
 use rule evaluate_recommended from paper as transfer_recommended with:
     input:
-        sources("evaluate_recommended"),
+        code=sources("evaluate_recommended"),
         splits="<results>/splits/{category}.csv",
         test="<results>/transfer/{trained}/{tested}/estimates/{category}/el{elevation}/fold{fold}/test.csv",
         lookup=lambda wildcards: (
@@ -114,7 +120,7 @@ use rule evaluate_recommended from paper as transfer_recommended with:
 
 rule transfer_table:
     input:
-        sources("tabulate_transfer"),
+        code=sources("tabulate_transfer"),
         evaluations=paths(
             "<results>/transfer/{trained}/{tested}/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
             [

@@ -18,7 +18,7 @@ TRAVEL_CURVES = [
 
 rule travel:
     input:
-        sources("tabulate_travel"),
+        code=sources("tabulate_travel"),
         rows=paths(
             "<results>/extensions/{category}/el{elevation}/fold{fold}/travel.csv",
             PLAN.folds_of(PLAN.reference_units),

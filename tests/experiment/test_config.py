@@ -132,8 +132,9 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
         ("dataset.up=up", "dataset.up=up: use an axis such as +y, a vector such as 0,0,1, or auto"),
         ("estimator", "is not of the form key=value"),
         ("methods={}", "methods={} changes nothing; ~methods.<key> leaves a key out"),
-        ("seed=1,2", "override 'seed=1,2' holds several values; write a list as [1,2]"),
-        ("seed=" + "9" * 5000, "cannot be read: "),
+        ("seed=1,2", "'++seed=1,2'; 1. To use it as a list, use key=[value1,value2]"),
+        ("seed=[1", "override 'seed=[1' cannot be read: "),
+        ("seed=" + "9" * 5000, "configuration: Exceeds the limit"),
         ("dataset.root=???", "configuration key 'dataset.root': Missing mandatory value"),
     ],
 )

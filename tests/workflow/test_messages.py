@@ -25,6 +25,14 @@ def test_a_wrong_setting_is_one_line_and_writes_nothing(fresh, override, message
     assert {path.relative_to(fresh.folder).parts[0] for path in written} <= {".snakemake", "src"}
 
 
+@pytest.mark.parametrize("name", ["depth/mug/el33.npy", "estimates/mug/el00/fold9/test.csv"])
+def test_a_fold_or_an_elevation_that_does_not_exist_is_one_line(fresh, name):
+    done = fresh.run("--cores", "1", "--dry-run", f"results/tiny/{name}", fails=True)
+    line = done.stderr.splitlines()[-1]
+    assert line.startswith(f"nbv: error: results/tiny/{name} is not of this run")
+    assert line.endswith("which has mug/el00, chair/el00, each with fold1 to fold2")
+
+
 def test_a_bad_mesh_stops_the_run_before_anything_is_rendered(fresh):
     folder = fresh.folder / "things/mug"
     folder.mkdir(parents=True)

@@ -76,6 +76,13 @@ def test_a_finished_run_has_nothing_to_do(finished):
     assert finished.would_run() == {}
 
 
+def test_a_run_in_a_fresh_clone_whose_sources_are_newer_has_nothing_to_do(scratch):
+    for source in scratch.folder.rglob("*.py"):
+        source.touch()
+    done = scratch.run("--cores", "1", "--dry-run")
+    assert "Nothing to be done" in done.stdout + done.stderr
+
+
 def test_another_bandwidth_reruns_lookups_and_what_follows(finished):
     assert finished.would_run("density.bandwidths_deg=[11]") == {
         "lookup": 4,

@@ -4,7 +4,7 @@
 
 rule render_bundle:
     input:
-        sources("render_bundle"),
+        code=sources("render_bundle"),
         meshes="<results>/meshes/{category}.npz",
         splits="<results>/splits/{category}.csv",
     output:
@@ -33,7 +33,7 @@ rule render_bundle:
 
 rule train_bundle:
     input:
-        sources("train_bundle"),
+        code=sources("train_bundle"),
         splits="<results>/splits/{category}.csv",
         depth=lambda wildcards: bundle_elevations(
             wildcards, "<results>/bundles/depth/{category}/el{elevation}.npy"
@@ -65,7 +65,7 @@ rule train_bundle:
 
 rule bundle:
     input:
-        sources("make_bundle"),
+        code=sources("make_bundle"),
         splits="<results>/splits/{category}.csv",
         depth=lambda wildcards: bundle_elevations(
             wildcards, "<results>/bundles/depth/{category}/el{elevation}.npy"

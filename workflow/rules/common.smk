@@ -50,6 +50,8 @@ with one_line():
     check_folders(PLAN.results)
 
 CONFIG, UNITS = PLAN.config, PLAN.units
+FOLDS = "|".join(map(str, PLAN.folds))
+ELEVATIONS = "|".join(sorted({f"{elevation:02d}" for _, elevation in UNITS}))
 METHODS = CONFIG["methods"]
 REFERENCES = Path(os.path.relpath(ROOT / "docs/reference"))
 # Used with --software-deployment-method conda; otherwise jobs run where snakemake does.
@@ -64,8 +66,8 @@ pathvars:
 
 wildcard_constraints:
     category="|".join(map(re.escape, CONFIG["categories"])),
-    elevation=r"\d\d",
-    fold="|".join(map(str, PLAN.folds)),
+    elevation=ELEVATIONS,
+    fold=FOLDS,
     part="|".join(map(str, PLAN.parts)) or "none",
     method="|".join(map(re.escape, PLAN.lookup_methods)) or "none",
     criterion="|".join(PLAN.lookup_criteria) or "none",
@@ -105,7 +107,30 @@ def estimates_of_fold(below="<results>"):
 
 def estimates_of_training(below="<results>"):
     """The estimates that a training makes: a fold's, or none where `estimate` makes them."""
-    return {} if PLAN.crossfit or PLAN.external else estimates_of_fold(below)
+    return {} if PLAN.estimates_apart else estimates_of_fold(below)
+
+
+def folds_if(made):
+    """All folds, or none where another rule makes the files."""
+    return FOLDS if made else "none"
+
+
+def estimated_from(wildcards):
+    """What a fold's estimates are made of: another program's file, or images and estimators."""
+    splits = "<results>/splits/{category}.csv"
+    if PLAN.external:
+        return {"splits": splits, "pairs": CONFIG["estimator"]["pairs"]}
+    images = "<results>/depth/{category}/el{elevation}"
+    estimators = "<results>/estimators/{category}/el{elevation}/fold{fold}"
+    return {
+        "splits": splits,
+        "depth": f"{images}.npy",
+        "objects": f"{images}_objects.json",
+        "estimator": f"{estimators}/estimator.safetensors",
+        "of_parts": [
+            f"{estimators}/without_part{part}.safetensors" for part in PLAN.parts
+        ],
+    }
 
 
 def training_start(wildcards, below="<results>"):
@@ -144,6 +169,16 @@ def bundle_elevations(wildcards, pattern):
     PLAN.check_bundle(wildcards.category)
     elevations = CONFIG["elevations_deg"][wildcards.category]
     return paths(pattern, [(wildcards.category, each) for each in elevations])
+
+
+@one_line()
+def what_exists(wildcards):
+    """No input: a path is of a fold or an elevation that the run does not have."""
+    units = ", ".join(paths("{category}/el{elevation}", UNITS))
+    raise UserError(
+        f"{PLAN.results}/{wildcards.missing} is not of this run, which has {units}, each with "
+        f"fold1 to fold{CONFIG['n_folds']}"
+    )
 
 
 @one_line()

@@ -3,7 +3,7 @@
 
 rule settings:
     input:
-        sorted(
+        code=sorted(
             {
                 file
                 for script in ROOT.glob("workflow/scripts/*.py")
@@ -28,7 +28,7 @@ rule settings:
 
 rule meshes:
     input:
-        mesh_sources,
+        code=mesh_sources,
     output:
         "<results>/meshes/{category}.npz",
     log:
@@ -52,7 +52,7 @@ rule meshes:
 
 rule splits:
     input:
-        sources("split_objects"),
+        code=sources("split_objects"),
         meshes=[] if PLAN.external else "<results>/meshes/{category}.npz",
     output:
         "<results>/splits/{category}.csv",
@@ -80,7 +80,7 @@ rule splits:
 
 rule render:
     input:
-        sources("render_depth"),
+        code=sources("render_depth"),
         meshes="<results>/meshes/{category}.npz",
     output:
         depth="<results>/depth/{category}/el{elevation}.npy",

@@ -4,7 +4,7 @@
 # The network of all categories that a fold's estimators can start from, at lowest elevations.
 rule pretrain:
     input:
-        sources("pretrain_network"),
+        code=sources("pretrain_network"),
         splits=paths("<results>/splits/{category}.csv", zip(CONFIG["categories"])),
         depth=paths("<results>/depth/{category}/el{elevation}.npy", PLAN.lowest_units),
         objects=paths(
@@ -44,7 +44,7 @@ use rule pretrain as pretrain_part with:
 # It estimates, too, what its estimator has not seen: a job of its own would load torch once more.
 rule train:
     input:
-        sources("train_estimator"),
+        code=sources("train_estimator"),
         splits="<results>/splits/{category}.csv",
         depth="<results>/depth/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
@@ -56,6 +56,8 @@ rule train:
         "<logs>/train/{category}/el{elevation}/fold{fold}.log",
     benchmark:
         "<benchmarks>/train/{category}/el{elevation}/fold{fold}.tsv"
+    wildcard_constraints:
+        fold=folds_if(not PLAN.linear),
     # Longest jobs first: short ones fill the gaps at the end, when cores would stand idle.
     priority: 50
     conda:
@@ -81,62 +83,36 @@ use rule train as train_part with:
         "<benchmarks>/train_part/{category}/el{elevation}/fold{fold}/{part}.tsv"
 
 
-if PLAN.external:
+# A job of its own where another program estimated, and where calibration is cross-fitted: several
+# estimators answer for a fold.
+ESTIMATE = "take_estimates" if PLAN.external else "estimate_views"
+# Columns of probabilities take ten times as much in memory as in the file.
+PAIRS_MB = (
+    Path(CONFIG["estimator"]["pairs"]).stat().st_size // 10**6 if PLAN.external else 0
+)
 
-    rule estimate:
-        input:
-            sources("take_estimates"),
-            splits="<results>/splits/{category}.csv",
-            pairs=CONFIG["estimator"]["pairs"],
-        output:
-            **estimates_of_fold(),
-        log:
-            "<logs>/estimate/{category}/el{elevation}/fold{fold}.log",
-        benchmark:
-            "<benchmarks>/estimate/{category}/el{elevation}/fold{fold}.tsv"
-        conda:
-            ENVIRONMENT
-        resources:
-            # Columns of probabilities take ten times as much in memory as in the file.
-            mem_mb=per_attempt(
-                1000 + 12 * Path(CONFIG["estimator"]["pairs"]).stat().st_size // 10**6
-            ),
-            runtime=per_attempt(10),
-        script:
-            "../scripts/take_estimates.py"
 
-else:
-
-    ruleorder: train > estimate
-
-    # Where calibration is cross-fitted, several estimators answer for a fold.
-    rule estimate:
-        input:
-            sources("estimate_views"),
-            splits="<results>/splits/{category}.csv",
-            depth="<results>/depth/{category}/el{elevation}.npy",
-            objects="<results>/depth/{category}/el{elevation}_objects.json",
-            estimator="<results>/estimators/{category}/el{elevation}/fold{fold}/estimator.safetensors",
-            of_parts=expand(
-                "<results>/estimators/{category}/el{elevation}/fold{fold}/without_part{part}.safetensors",
-                part=PLAN.parts,
-                allow_missing=True,
-            ),
-        output:
-            **estimates_of_fold(),
-        log:
-            "<logs>/estimate/{category}/el{elevation}/fold{fold}.log",
-        benchmark:
-            "<benchmarks>/estimate/{category}/el{elevation}/fold{fold}.tsv"
-        conda:
-            ENVIRONMENT
-        resources:
-            mem_mb=per_attempt(2000),
-        params:
-            device=CONFIG["estimator"].get("device"),
-            precision=CONFIG["estimator"].get("precision"),
-        script:
-            "../scripts/estimate_views.py"
+rule estimate:
+    input:
+        unpack(estimated_from),
+        code=sources(ESTIMATE),
+    output:
+        **estimates_of_fold(),
+    log:
+        "<logs>/estimate/{category}/el{elevation}/fold{fold}.log",
+    benchmark:
+        "<benchmarks>/estimate/{category}/el{elevation}/fold{fold}.tsv"
+    wildcard_constraints:
+        fold=folds_if(PLAN.estimates_apart),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=per_attempt(2000 + 12 * PAIRS_MB),
+    params:
+        device=CONFIG["estimator"].get("device"),
+        precision=CONFIG["estimator"].get("precision"),
+    script:
+        f"../scripts/{ESTIMATE}.py"
 
 
 rule estimators:

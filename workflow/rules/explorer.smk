@@ -3,7 +3,7 @@
 
 rule explorer:
     input:
-        sources("build_explorer"),
+        code=sources("build_explorer"),
         evaluations=paths(
             "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
             PLAN.evaluations_of(UNITS),

@@ -28,7 +28,7 @@ use rule render as render_for_features with:
 
 rule train_features:
     input:
-        sources("train_features"),
+        code=sources("train_features"),
         depth=paths("<results>/feature_training/{category}/el{elevation}.npy", UNITS),
         objects=paths(
             "<results>/feature_training/{category}/el{elevation}_objects.json", UNITS

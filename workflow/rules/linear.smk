@@ -1,13 +1,10 @@
 # Linear estimators: the depth features of a unit's images, and a fit for each fold.
 
 
-ruleorder: fit > train > estimate
-
-
 rule extract:
     input:
-        sources("extract_features"),
-        os.path.relpath(SHIPPED),
+        code=sources("extract_features"),
+        network=os.path.relpath(SHIPPED),
         depth="<results>/depth/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",
     output:
@@ -27,7 +24,7 @@ rule extract:
 
 rule fit:
     input:
-        sources("fit_linear"),
+        code=sources("fit_linear"),
         splits="<results>/splits/{category}.csv",
         features="<results>/features/{category}/el{elevation}.npy",
         objects="<results>/depth/{category}/el{elevation}_objects.json",

@@ -3,7 +3,7 @@
 
 rule lookup:
     input:
-        sources("build_lookup"),
+        code=sources("build_lookup"),
         splits="<results>/splits/{category}.csv",
         calibration="<results>/estimates/{category}/el{elevation}/fold{fold}/calibration.csv",
     output:
@@ -22,7 +22,7 @@ rule lookup:
 
 rule evaluate_baselines:
     input:
-        sources("evaluate_baselines"),
+        code=sources("evaluate_baselines"),
         splits="<results>/splits/{category}.csv",
         test="<results>/estimates/{category}/el{elevation}/fold{fold}/test.csv",
     output:
@@ -46,7 +46,7 @@ rule evaluate_baselines:
 
 rule evaluate_recommended:
     input:
-        sources("evaluate_recommended"),
+        code=sources("evaluate_recommended"),
         splits="<results>/splits/{category}.csv",
         test="<results>/estimates/{category}/el{elevation}/fold{fold}/test.csv",
         lookup=lambda wildcards: (

@@ -4,7 +4,7 @@
 
 rule compare:
     input:
-        sources("compare_with_reference"),
+        code=sources("compare_with_reference"),
         reference=reference_of_run,
         report="<results>/report.html",
     log:
@@ -19,7 +19,7 @@ rule compare:
 
 rule reference:
     input:
-        sources("keep_reference"),
+        code=sources("keep_reference"),
         report="<results>/report.html",
     log:
         "<logs>/reference.log",

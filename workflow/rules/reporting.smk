@@ -20,7 +20,7 @@ include: "shown.smk"
 
 rule table:
     input:
-        sources("tabulate_paper"),
+        code=sources("tabulate_paper"),
         evaluations=lambda wildcards: paths(
             "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
             evaluations_for(wildcards.table),
@@ -49,8 +49,8 @@ rule table:
 
 rule figure:
     input:
-        sources("plot_paper"),
         unpack(figure_inputs),
+        code=sources("plot_paper"),
     output:
         png=in_report(
             "<results>/figures/{figure}.png",
@@ -80,7 +80,7 @@ rule figure:
 
 rule claims:
     input:
-        sources("judge_claims"),
+        code=sources("judge_claims"),
         evaluations=paths(
             "<results>/evaluation/{category}/el{elevation}/fold{fold}/{method}.csv",
             PLAN.evaluations_of(UNITS),
@@ -108,7 +108,7 @@ rule claims:
 
 rule runtime:
     input:
-        sources("tabulate_runtime"),
+        code=sources("tabulate_runtime"),
         benchmarks=[f"<benchmarks>/{job}.tsv" for _, job in JOBS],
         logs=[f"<logs>/{job}.log" for _, job in JOBS],
     output:
@@ -132,7 +132,7 @@ rule runtime:
 
 rule report:
     input:
-        sources("build_report"),
+        code=sources("build_report"),
         configuration=rules.settings.output.configuration,
         provenance=rules.settings.output.provenance,
         claims=rules.claims.output.csv,

@@ -1,4 +1,15 @@
-# Whether every file of the run is what was written; run only where somebody asks for it.
+# Whether a file that somebody asks for can be of the run, and whether every file of the run is what
+# was written.
+
+
+rule missing:
+    input:
+        what_exists,
+    output:
+        "<results>/{missing}",
+    wildcard_constraints:
+        # Kept estimates may have elevations that this run does not have.
+        missing=rf"(?!confirmation/).*/(?:el(?!(?:{ELEVATIONS})(?!\d))|fold(?!(?:{FOLDS})(?!\d)))\d+.*",
 
 
 rule verify:

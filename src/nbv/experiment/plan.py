@@ -102,6 +102,11 @@ class Plan:
         return bool(self.config["calibration"] == "crossfit")
 
     @property
+    def estimates_apart(self) -> bool:
+        """Whether a job of its own estimates; otherwise the one that makes the estimator does."""
+        return self.external or (self.crossfit and not self.linear)
+
+    @property
     def folds(self) -> Sequence[int]:
         """The folds, from 1."""
         return range(1, self.config["n_folds"] + 1)
@@ -322,7 +327,7 @@ class Plan:
         pretrains = self.config["estimator"].get("warm_start") in ("categories", "both")
         pretrained = self.folds if pretrains else ()
         parts = () if self.linear else self.parts
-        estimated = folds if parts or self.external else []
+        estimated = folds if self.estimates_apart else []
         fold = "{category}/el{elevation}/fold{fold}"
         logs = {
             "meshes": paths("{category}", zip(categories)),
@@ -348,7 +353,7 @@ class Plan:
         return sorted(found, key=lambda job: Path(job[1]).parts)
 
     def sources(self, script: Path, settings: Mapping[str, Any] | None = None) -> list[str]:
-        """Return the source files that a script depends on, relative to the working directory.
+        """Return a script and what it depends on in nbv, relative to the working directory.
 
         Parameters
         ----------
@@ -368,7 +373,7 @@ class Plan:
         here = Path.cwd()
         return [
             str(Path(file).relative_to(here)) if Path(file).is_relative_to(here) else file
-            for file in provenance.source_files(script, chosen.get(script.stem, ()))
+            for file in (str(script), *provenance.source_files(script, chosen.get(script.stem, ())))
         ]
 
 

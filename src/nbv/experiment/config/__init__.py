@@ -125,9 +125,7 @@ def load_config(directory: str | Path, overrides: Sequence[str] = ()) -> dict[st
 
 
 def _checked(folder: Path, override: str) -> str:
-    """Return an override as Hydra takes it, after a check of its key, choice and grammar."""
-    from hydra.core.override_parser.overrides_parser import OverridesParser
-
+    """Return an override as Hydra takes it, after a check of its key and choice."""
     key, separator, value = override.partition("=")
     bare = key.lstrip("+~")
     if not separator and not key.startswith("~"):
@@ -145,18 +143,6 @@ def _checked(folder: Path, override: str) -> str:
         # backslash stands for itself, except before a quote.
         escaped = re.sub(r"(\\*)('|$)", lambda m: 2 * m[1] + m[2].replace("'", r"\'"), value)
         taken = f"{key}='{escaped}'"
-    try:
-        has_several = OverridesParser.create().parse_override(taken).is_sweep_override()
-    # No list of what a parser may raise on arbitrary text is complete.
-    except Exception as error:
-        raise UserError(
-            f"override {shortened(override)!r} cannot be read: {_first_line(error)}; put text in "
-            "quotes"
-        ) from error
-    if has_several:
-        raise UserError(
-            f"override {shortened(override)!r} holds several values; write a list as [1,2]"
-        )
     # The schema decides which keys exist, not the files that are composed.
     return f"++{taken}" if key == bare else taken
 
@@ -169,12 +155,24 @@ def _check_choice(folder: Path, group: str, choice: str, key: str) -> None:
 
 def _compose(folder: Path, overrides: list[str]) -> Any:
     from hydra import compose, initialize_config_dir
+    from hydra.errors import HydraException, OverrideParseException
     from omegaconf import OmegaConf
 
     try:
         with initialize_config_dir(str(folder), version_base="1.3"):
             composed = compose("config", overrides=overrides)
         return OmegaConf.to_container(composed, resolve=True, throw_on_missing=True)
+    except OverrideParseException as error:
+        override = shortened(error.override.removeprefix("++"))
+        raise UserError(
+            f"override {override!r} cannot be read: {_first_line(error)}; put text in quotes"
+        ) from error
+    except HydraException as error:
+        _check_files(folder)
+        # Of several values, Hydra's further lines say how to write a list.
+        lines = "; ".join(map(shortened, str(error).splitlines()))
+        raise UserError(f"configuration: {lines}") from error
+    # No list of what arbitrary text may raise is complete.
     except Exception as error:
         _check_files(folder)
         key = getattr(error, "full_key", None)
