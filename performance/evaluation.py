@@ -11,7 +11,7 @@ from nbv.core.angles import circular_distance_deg
 from nbv.core.estimates import Estimates
 from nbv.core.evidence import gather_evidence
 from nbv.core.fusion import average
-from nbv.core.lookup import LookupTable, build_lookup
+from nbv.core.lookup import CostTable, build_lookup
 from nbv.experiment.results import COLUMNS, evaluate_method
 from performance.figures import Figure, Target
 from performance.lookup import calibration_estimates
@@ -56,7 +56,7 @@ def run(quick: bool) -> list[Figure]:
     ]
 
 
-def loop_over_images(test: Estimates, table: LookupTable) -> pd.DataFrame:
+def loop_over_images(test: Estimates, table: CostTable) -> pd.DataFrame:
     """Return what `evaluate_method` does, its functions called for one image at a time."""
     rows = []
     for name, estimates in zip(test.object_ids, test.estimate_deg, strict=True):

@@ -13,7 +13,7 @@ import pandas as pd
 from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
 from nbv.core.fusion import OF_DISTRIBUTIONS
-from nbv.core.lookup import LookupTable
+from nbv.core.lookup import CostTable
 from nbv.core.selection import (
     DensityParams,
     Methods,
@@ -47,7 +47,7 @@ class ExtensionEvaluations:
     """
 
     frames: dict[str, pd.DataFrame]
-    lookups: dict[str, LookupTable]
+    lookups: dict[str, CostTable]
     choices: pd.DataFrame
     travel: pd.DataFrame
 

@@ -252,6 +252,7 @@ def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: boo
     from nbv.core.offset import FOR_PAIRS, Offset
     from nbv.core.selection import DENSITY, chosen_lookup
     from nbv.robot.distribution_table import DistributionTable
+    from nbv.robot.lookup import LookupTable
     from nbv.robot.pairs import PairTable
 
     if criterion not in CRITERIA:
@@ -261,7 +262,7 @@ def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: boo
     views, thin = (pairs.estimates, ()) if sweeps else pairs.thin_estimates
     estimates = views.estimate_deg
     table = DistributionTable.from_pairs(sweeps) if sweeps else None
-    lookup = chosen_lookup(estimates, criterion, DENSITY)
+    lookup = LookupTable.of(chosen_lookup(estimates, criterion, DENSITY))
     if table is None:
         lookup.save(output)
     else:

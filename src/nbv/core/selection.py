@@ -26,7 +26,7 @@ from nbv.core.evidence import (
     gather_evidence,
 )
 from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
-from nbv.core.lookup import LookupTable, build_lookup
+from nbv.core.lookup import CostTable, build_lookup
 from nbv.core.policies import ORACLE, POLICIES, SINGLE, HeldOutViews, needs_lookup, two_views
 from nbv.errors import UserError, nearest
 
@@ -216,7 +216,7 @@ def chosen_evidence(
 
 def chosen_lookup(
     estimate_deg: NDArray[np.float64], criterion: str, settings: Mapping[str, Any]
-) -> LookupTable:
+) -> CostTable:
     """Return `build_lookup` with the best density for fusion by averages."""
     method = {"policy": criterion, "fusion": "average"}
     density = choose_densities(estimate_deg, {criterion: method}, settings)[criterion]
@@ -246,7 +246,7 @@ class SelectedMethod:
     density : DensityParams
     evidence : Evidence
         Evidence from all calibration objects with this density.
-    lookup : LookupTable or None
+    lookup : CostTable or None
         None for a policy without a table.
     """
 
@@ -254,7 +254,7 @@ class SelectedMethod:
     fusion: str
     density: DensityParams
     evidence: Evidence
-    lookup: LookupTable | None
+    lookup: CostTable | None
 
 
 def check_methods(methods: Methods, extensions: Methods, gives_distributions: bool) -> None:
