@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.evidence import gather_evidence
-from nbv.core.lookup import LookupTable, build_lookup
+from nbv.core.lookup import CostTable, build_lookup
 from performance.figures import Figure, Target
 from performance.settings import configuration
 from performance.timing import median_ratio
@@ -62,7 +62,7 @@ def calibration_estimates(n_objects: int, n_views: int) -> NDArray[np.float64]:
     return (azimuth + rng.normal(0.0, spread, (n_objects, n_views))) % 360.0
 
 
-def _own(estimate_deg: NDArray[np.float64], n_bins: int) -> LookupTable:
+def _own(estimate_deg: NDArray[np.float64], n_bins: int) -> CostTable:
     return build_lookup(
         gather_evidence(
             estimate_deg,
@@ -76,7 +76,7 @@ def _own(estimate_deg: NDArray[np.float64], n_bins: int) -> LookupTable:
 
 
 def _loops(
-    estimate_deg: NDArray[np.float64], n_bins: int, sample: Sample, table: LookupTable
+    estimate_deg: NDArray[np.float64], n_bins: int, sample: Sample, table: CostTable
 ) -> float:
     """Return the seconds that loops over numbers would take for the whole table."""
     estimates = estimate_deg.tolist()

@@ -13,7 +13,7 @@ import pandas as pd
 from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
 from nbv.core.fusion import OF_DISTRIBUTIONS
-from nbv.core.lookup import LookupTable
+from nbv.core.lookup import CostTable
 from nbv.core.selection import DensityParams, chosen_evidence
 from nbv.experiment.methods import Methods
 from nbv.experiment.results import evaluate_method
@@ -43,7 +43,7 @@ class ExtensionEvaluations:
     """
 
     frames: dict[str, pd.DataFrame]
-    lookups: dict[str, LookupTable]
+    lookups: dict[str, CostTable]
     choices: pd.DataFrame
     travel: pd.DataFrame
 

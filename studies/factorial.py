@@ -21,7 +21,7 @@ from nbv.core.criteria import POSE_LIKELIHOODS
 from nbv.core.estimates import Posteriors
 from nbv.core.evidence import COARSE_BINS, Evidence, evidence_of_distributions
 from nbv.core.fusion import ESTIMATE_FUSIONS
-from nbv.core.lookup import LookupTable, build_lookup
+from nbv.core.lookup import CostTable, build_lookup
 from nbv.core.policies import needs_lookup
 from nbv.core.selection import (
     DensityParams,
@@ -183,7 +183,7 @@ def _lookups(
     estimate_deg: NDArray[np.float64],
     densities: Mapping[Pair, DensityParams],
     settings: Mapping[str, Any],
-) -> dict[Pair, LookupTable]:
+) -> dict[Pair, CostTable]:
     """Build the coarse tables of all pairs whose policy has one."""
     lookups = {}
     for (choice, fusion), policy in METHODS.items():

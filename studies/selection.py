@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence, evidence_of_distributions
 from nbv.core.fusion import OF_DISTRIBUTIONS
-from nbv.core.lookup import LookupTable, build_lookup
+from nbv.core.lookup import CostTable, build_lookup
 from nbv.core.policies import ORACLE, needs_lookup
 from nbv.core.selection import DensityParams, choose_densities, chosen_evidence
 from nbv.experiment.methods import SELECTED, Methods, selectable
@@ -35,7 +35,7 @@ class SelectedMethod:
     density : DensityParams
     evidence : Evidence
         Evidence from all calibration objects with this density.
-    lookup : LookupTable or None
+    lookup : CostTable or None
         None for a policy without a table.
     """
 
@@ -43,7 +43,7 @@ class SelectedMethod:
     fusion: str
     density: DensityParams
     evidence: Evidence
-    lookup: LookupTable | None
+    lookup: CostTable | None
 
 
 def select_methods(

@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from nbv.core.evidence import gather_evidence as gather_evidence
     from nbv.core.fusion import average as average
     from nbv.core.fusion import posterior as posterior
-    from nbv.core.lookup import LookupTable as LookupTable
-    from nbv.core.lookup import build_lookup as build_lookup
     from nbv.errors import BundleError as BundleError
     from nbv.errors import FrameError as FrameError
     from nbv.errors import UserError as UserError
     from nbv.robot.depth_files import read_depth as read_depth
     from nbv.robot.distribution_table import DistributionTable as DistributionTable
     from nbv.robot.intrinsics import Intrinsics as Intrinsics
+    from nbv.robot.lookup import LookupTable as LookupTable
+    from nbv.robot.lookup import build_lookup as build_lookup
     from nbv.robot.moves import check_axis as check_axis
     from nbv.robot.moves import moved_camera as moved_camera
     from nbv.robot.next_camera import PoseEstimate as PoseEstimate
@@ -73,8 +73,8 @@ _MODULES = {
     "gather_evidence": "nbv.core.evidence",
     "average": "nbv.core.fusion",
     "posterior": "nbv.core.fusion",
-    "LookupTable": "nbv.core.lookup",
-    "build_lookup": "nbv.core.lookup",
+    "LookupTable": "nbv.robot.lookup",
+    "build_lookup": "nbv.robot.lookup",
 }
 
 # Former names, for one release.

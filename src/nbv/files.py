@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+Arrays = dict[str, NDArray[Any]]
+
 RUN_AGAIN = "delete the file and run the same command again"
 """Remedy for a damaged file of a run."""
 
@@ -129,6 +131,30 @@ def calibrated_file(path: str | Path) -> Path:
     if not file.is_file():
         raise UserError(f"{path} {missing(path)}; name the file that nbv calibrate wrote")
     return file
+
+
+@contextmanager
+def stored_table(path: str | Path, names: Iterable[str], kind: str) -> Iterator[Arrays]:
+    """Yield the arrays of a table of nbv calibrate or of a run, for checks with its remedy.
+
+    Parameters
+    ----------
+    path : path
+    names : iterable of str
+        Arrays that every table of this kind has.
+    kind : str
+        What such a table holds, for messages.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, is of another kind, or the block raises any error.
+    """
+    arrays = read_arrays(calibrated_file(path), (), CALIBRATE_AGAIN)
+    if not set(names) <= set(arrays):
+        raise damaged(path, f"holds no {kind}", CALIBRATE_AGAIN)
+    with readable(path, CALIBRATE_AGAIN):
+        yield arrays
 
 
 def read_csv(path: str | Path) -> pd.DataFrame:

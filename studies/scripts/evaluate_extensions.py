@@ -10,6 +10,7 @@ with job(snakemake):
     from nbv.experiment.estimates import read_estimates, read_posteriors
     from nbv.experiment.splits import check_role, read_splits
     from nbv.files import read_csv, write_csv
+    from nbv.robot.lookup import LookupTable
 
     given, output = snakemake.input, snakemake.output
     params, wildcards = snakemake.params, snakemake.wildcards
@@ -30,7 +31,7 @@ with job(snakemake):
     for name, path in zip(params.extensions, output.evaluations, strict=True):
         write_csv(path, made.frames[name])
     for name, path in zip(params.lookups, output.lookups, strict=True):
-        made.lookups[name].save(path)
+        LookupTable.of(made.lookups[name]).save(path)
     write_csv(output.choices, made.choices)
     methods = dict(zip(params.methods, map(read_csv, given.methods), strict=True))
     write_csv(output.objects, object_means(methods | made.frames))

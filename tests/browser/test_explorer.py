@@ -21,10 +21,10 @@ from nbv.core.density import Conditionals
 from nbv.core.distributions import FLAT, mean_direction_deg
 from nbv.core.estimates import posteriors_of
 from nbv.core.evidence import Evidence
-from nbv.core.lookup import LookupTable
 from nbv.experiment.estimates import write_posteriors
 from nbv.experiment.explorer import ExplorerInputs, build_explorer
 from nbv.experiment.explorer.data import page_table
+from nbv.robot.lookup import LookupTable
 
 METHODS = synthetic.METHODS
 EXPLORED = (("mug", 0), ("mug", 30), ("chair", 0))

@@ -23,13 +23,13 @@ from nbv.cli.answers import print_offset
 from nbv.cli.arguments import as_paragraphs
 from nbv.core.angles import signed_difference_deg
 from nbv.core.criteria import CRITERIA
-from nbv.core.lookup import LookupTable
 from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
 from nbv.core.selection import DENSITY, chosen_lookup
 from nbv.robot.bundle import FORMAT, Bundle
 from nbv.robot.calibration import recalibrated
 from nbv.robot.depth_files import read_depth
 from nbv.robot.evaluation import calibration_errors_deg, count_ood, evaluate
+from nbv.robot.lookup import LookupTable
 from nbv.robot.moves import elevation_from_gravity, moved_camera
 from nbv.robot.pairs import PairTable
 from nbv.robot.recommender import Recommender
@@ -374,7 +374,7 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
     assert printed == wanted
     assert Path("json.npz").read_bytes() == Path("t.npz").read_bytes()
     estimate_deg = PairTable.load(pairs).estimates.estimate_deg
-    chosen_lookup(estimate_deg, criterion, DENSITY).save("wanted.npz")
+    LookupTable.of(chosen_lookup(estimate_deg, criterion, DENSITY)).save("wanted.npz")
     assert Path("t.npz").read_bytes() == Path("wanted.npz").read_bytes()
     table = LookupTable.load("t.npz")
     for estimate in (0.0, 123.4, -30.0, 719.6):

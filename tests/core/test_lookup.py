@@ -7,6 +7,7 @@ from tests.core.made import evidence_of, hidden_range_estimates
 from nbv.core import lookup
 from nbv.errors import UserError
 from nbv.files import read_arrays, write_arrays
+from nbv.robot.lookup import LookupTable, build_lookup
 from nbv.robot.rotations import ranked_rotations
 
 
@@ -28,18 +29,16 @@ def test_a_cost_that_is_not_a_number_is_never_the_least(travel_cost):
 
 
 def test_a_stored_table_comes_back_whole(tmp_path):
-    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    table = build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     table.save(tmp_path / "pose_ambiguity.npz")
-    read = lookup.LookupTable.load(tmp_path / "pose_ambiguity.npz")
+    read = LookupTable.load(tmp_path / "pose_ambiguity.npz")
     for name, value in vars(table).items():
         np.testing.assert_array_equal(getattr(read, name), value)
     assert read.cost.dtype == np.float32
 
 
 def test_recommendations_are_read_at_the_nearest_bin():
-    table = lookup.build_lookup(
-        evidence_of(hidden_range_estimates(4), 8, 10, 360), "pose_ambiguity"
-    )
+    table = build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 360), "pose_ambiguity")
     for rotations in (table.recommend, table.least_cost):
         assert rotations([359.6, 0.2, 89.5]).tolist() == [
             table.recommended_delta_deg[k] for k in (0, 0, 90)
@@ -48,7 +47,7 @@ def test_recommendations_are_read_at_the_nearest_bin():
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300, "123", None])
 def test_an_estimate_that_is_no_number_has_no_rotation(bad):
-    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    table = build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     for rotations in (table.recommend, table.least_cost):
         for estimate in (bad, [0.0, bad]):
             with pytest.raises(UserError, match="not a finite number"):
@@ -65,7 +64,7 @@ def test_a_view_from_the_same_place_is_not_recommended(rng, n_bins):
         cost[row, (0, 1, -1)[near[row]]] = 0
     deltas = lookup.least_cost_delta(cost)
     rows = np.full((n_bins, n_bins), 1 / n_bins, np.float32)
-    table = lookup.LookupTable(rows, rows, cost, deltas, 8, 3, "given_estimate", "entropy", "made")
+    table = LookupTable(rows, rows, cost, deltas, 8, 3, "given_estimate", "entropy", "made")
     every = np.arange(n_bins) * width
     assert table.least_cost(every).tolist() == deltas.tolist()
     found = table.recommend(every)
@@ -105,8 +104,8 @@ def test_the_next_view_obeys_the_limits_of_its_table(rng, tmp_path, max_travel_d
     assert (deltas == 0).sum() >= 18
     rows = np.full((36, 36), 1 / 36, np.float32)
     names = "given_estimate", "entropy", "pose_ambiguity"
-    lookup.LookupTable(rows, rows, cost, deltas, 8, 3, *names, **limits).save(tmp_path / "t.npz")
-    table = lookup.LookupTable.load(tmp_path / "t.npz")
+    LookupTable(rows, rows, cost, deltas, 8, 3, *names, **limits).save(tmp_path / "t.npz")
+    table = LookupTable.load(tmp_path / "t.npz")
     turns = np.arange(36) * 10
     travel = np.minimum(turns, 360 - turns)
     may = (travel > 10) & (travel <= max_travel_deg)
@@ -146,7 +145,7 @@ def test_the_next_view_obeys_the_limits_of_its_table(rng, tmp_path, max_travel_d
 )
 def test_a_table_that_cannot_be_is_refused(tmp_path, name, value):
     path = tmp_path / "pose_ambiguity.npz"
-    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    table = build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     table.save(path)
     arrays = read_arrays(path)
     if value is None:
@@ -157,7 +156,7 @@ def test_a_table_that_cannot_be_is_refused(tmp_path, name, value):
         arrays[name] = value
     write_arrays(path, arrays)
     with pytest.raises(UserError, match=r"pose_ambiguity\.npz: .*; make it again with nbv calib"):
-        lookup.LookupTable.load(path)
+        LookupTable.load(path)
 
 
 @pytest.mark.parametrize("pseudo_observations", [1, 1000])
@@ -172,17 +171,17 @@ def test_a_table_that_knows_nothing_is_told_from_one_that_is_cautious(
         (np.tile(rng.normal(100, 5, 360), (8, 1)), True),
     ):
         evidence = evidence_of(estimates, 8, pseudo_observations, 36)
-        _, warnings = ranked_rotations(lookup.build_lookup(evidence, criterion), 90.0)
+        _, warnings = ranked_rotations(build_lookup(evidence, criterion), 90.0)
         assert any("a guess" in warning for warning in warnings) == is_guess
 
 
 def test_a_table_without_limits_has_none(tmp_path):
-    table = lookup.build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
+    table = build_lookup(evidence_of(hidden_range_estimates(4), 8, 10, 36), "pose_ambiguity")
     table.save(tmp_path / "t.npz")
     arrays = read_arrays(tmp_path / "t.npz")
     del arrays["travel_cost"], arrays["max_travel_deg"]
     write_arrays(tmp_path / "t.npz", arrays)
-    loaded = lookup.LookupTable.load(tmp_path / "t.npz")
+    loaded = LookupTable.load(tmp_path / "t.npz")
     assert (loaded.travel_cost, loaded.max_travel_deg) == (0, 180)
 
 
@@ -198,5 +197,5 @@ def test_a_file_that_is_no_table_is_to_be_made_with_the_program(tmp_path, name, 
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(UserError, match="nbv calibrate") as error:
-        lookup.LookupTable.load(tmp_path / name)
+        LookupTable.load(tmp_path / name)
     assert message in str(error.value)

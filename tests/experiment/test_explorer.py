@@ -16,7 +16,6 @@ from PIL import Image
 
 import synthetic
 from conftest import N_FOLDS, UNITS
-from nbv.core.lookup import LookupTable
 from nbv.errors import UserError
 from nbv.experiment.explorer import ExplorerInputs, build_explorer, coarse_bins
 from nbv.experiment.explorer.data import (
@@ -33,6 +32,7 @@ from nbv.experiment.explorer.data import (
     wrapped,
 )
 from nbv.experiment.report.figures.views import depth_limits, shade
+from nbv.robot.lookup import LookupTable
 
 FOLDS = range(1, N_FOLDS + 1)
 POLICIES = {

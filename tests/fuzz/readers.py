@@ -231,7 +231,8 @@ def densities(n_bins: int) -> np.ndarray:
 
 
 def make_lookup(path: Path) -> None:
-    from nbv.core.lookup import LookupTable, least_cost_delta
+    from nbv.core.lookup import least_cost_delta
+    from nbv.robot.lookup import LookupTable
 
     table = densities(36).astype(np.float32)
     settings = 8.0, 10.0, "given_estimate", "entropy", "pose_ambiguity"
@@ -239,7 +240,7 @@ def make_lookup(path: Path) -> None:
 
 
 def read_lookup(path: Path) -> Any:
-    from nbv.core.lookup import LookupTable
+    from nbv.robot.lookup import LookupTable
 
     return LookupTable.load(path)
 

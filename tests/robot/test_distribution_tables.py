@@ -16,11 +16,11 @@ from tests.core.made import unclear_turns
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from nbv.core.angles import circular_distance_deg
-from nbv.core.lookup import LookupTable
 from nbv.core.selection import AFFINITY
 from nbv.errors import FrameError, UserError
 from nbv.experiment.config import load_config
 from nbv.robot.distribution_table import DistributionTable
+from nbv.robot.lookup import LookupTable
 from nbv.robot.moves import moved_camera
 from nbv.robot.pairs import PairTable, read_distributions
 from nbv.robot.recommender import Recommender
@@ -273,7 +273,7 @@ def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
         capsys, "recommend", "--estimate", "20", "--table", "plain.npz"
     )
     message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "plain.npz")
-    assert "plain.npz holds no distributions: make it with nbv calibrate" in message
+    assert "plain.npz: holds no distributions, which pairs have in columns p0, p1" in message
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,9 @@ from nbv.core.density import conditionals
 from nbv.core.distributions import mean_direction_deg
 from nbv.core.fusion import product
 from nbv.core.logits import fit_temperature
-from nbv.core.lookup import LookupTable
 from nbv.core.selection import DENSITY
 from nbv.errors import UserError
+from nbv.robot.lookup import LookupTable
 from nbv.robot.pairs import PairTable
 from projects import STUDIES, TINY, Project, copy_of_project, finished_project
 

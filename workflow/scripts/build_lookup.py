@@ -6,6 +6,7 @@ with job(snakemake):
     from nbv.core.selection import chosen_lookup
     from nbv.experiment.estimates import read_estimates
     from nbv.experiment.splits import check_role, read_splits
+    from nbv.robot.lookup import LookupTable
 
     calibration = read_estimates(snakemake.input.calibration)
     splits = read_splits(snakemake.input.splits)
@@ -13,4 +14,4 @@ with job(snakemake):
     table = chosen_lookup(
         calibration.estimate_deg, snakemake.wildcards.criterion, snakemake.params.density
     )
-    table.save(snakemake.output[0])
+    LookupTable.of(table).save(snakemake.output[0])

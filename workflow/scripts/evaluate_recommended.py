@@ -3,11 +3,11 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from nbv.core.lookup import LookupTable
     from nbv.experiment.estimates import read_estimates
     from nbv.experiment.results import evaluate_method
     from nbv.experiment.splits import check_role, read_splits
     from nbv.files import write_csv
+    from nbv.robot.lookup import LookupTable
 
     test = read_estimates(snakemake.input.test)
     splits = read_splits(snakemake.input.splits)

@@ -249,6 +249,7 @@ def _calibrate_table(pairs: PairTable, output: Path, criterion: str, *, as_json:
     from nbv.core.offset import FOR_PAIRS, Offset
     from nbv.core.selection import DENSITY, chosen_lookup
     from nbv.robot.distribution_table import DistributionTable
+    from nbv.robot.lookup import LookupTable
 
     if criterion not in CRITERIA:
         raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
@@ -256,7 +257,7 @@ def _calibrate_table(pairs: PairTable, output: Path, criterion: str, *, as_json:
     views, thin = (pairs.estimates, ()) if sweeps else pairs.thin_estimates
     estimates = views.estimate_deg
     table = DistributionTable.from_pairs(sweeps) if sweeps else None
-    lookup = chosen_lookup(estimates, criterion, DENSITY)
+    lookup = LookupTable.of(chosen_lookup(estimates, criterion, DENSITY))
     if table is None:
         lookup.save(output)
     else:

@@ -289,8 +289,8 @@ def _recommend_by_table(
             "--estimate and --table belong together; give both, or --distribution and --table"
         )
     from nbv.core.criteria import cost_unit
-    from nbv.core.lookup import LookupTable
     from nbv.files import CALIBRATE_AGAIN, calibrated_file
+    from nbv.robot.lookup import LookupTable
     from nbv.robot.moves import check_axis
     from nbv.robot.rotations import ranked_rotations
 

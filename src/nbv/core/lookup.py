@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Container, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import is_angle, nearest_bin, travel_deg
-from nbv.core.criteria import CRITERIA, POSE_LIKELIHOODS, SPREADS, cost_unit, tabulate
+from nbv.core.criteria import tabulate
 from nbv.core.evidence import Evidence
 from nbv.errors import UserError
-from nbv.files import (
-    CALIBRATE_AGAIN,
-    calibrated_file,
-    check_distributions,
-    damaged,
-    read_arrays,
-    readable,
-    write_arrays,
-)
 
 
 @dataclass(frozen=True)
-class LookupTable:
-    """A criterion tabulated for one estimator.
+class CostTable:
+    """A criterion tabulated for one estimator; `nbv.LookupTable` adds files.
 
     Attributes
     ----------
@@ -49,17 +38,6 @@ class LookupTable:
         Parameters of the criterion; see `nbv.core.criteria`.
     travel_cost, max_travel_deg : float
         Parameters of the recommended rotations; see `least_cost_delta`.
-
-    Examples
-    --------
-    >>> import numpy as np, nbv
-    >>> estimates = np.arange(0.0, 360.0, 10.0)[None]  # one object, always right
-    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-    >>> params = {"bandwidth_deg": 8, "pseudo_observations": 3, "n_bins": 36}
-    >>> evidence = nbv.gather_evidence(estimates, density, **params)
-    >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
-    >>> table.criterion, table.cost.shape
-    ('pose_ambiguity', (36, 36))
     """
 
     viewpoint_likelihood: NDArray[np.float32]
@@ -73,63 +51,6 @@ class LookupTable:
     criterion: str
     travel_cost: float = 0.0
     max_travel_deg: float = 180.0
-
-    @classmethod
-    def load(cls, path: str | Path) -> LookupTable:
-        """Read a file of `save`.
-
-        Raises
-        ------
-        UserError
-            If the file cannot be read, or a value is not one that `build_lookup` makes. A file
-            without `travel_cost` and `max_travel_deg` has no such limits.
-        """
-        names = [item.name for item in fields(cls)]
-        stored = read_arrays(calibrated_file(path), names[: -len(_LIMITS)], CALIBRATE_AGAIN)
-        with readable(path, CALIBRATE_AGAIN):
-            # An array without axes holds a number or a text.
-            values: dict[str, Any] = {
-                name: stored[name] if stored[name].ndim else stored[name].item()
-                for name in names
-                if name in stored
-            }
-            table = cls(**values)
-            n_bins = len(table.cost)
-            for density in (table.viewpoint_likelihood, table.estimate_likelihood):
-                check_distributions(path, density, (n_bins, n_bins), CALIBRATE_AGAIN)
-            if problem := table._problem():
-                raise damaged(path, problem, CALIBRATE_AGAIN)
-        return table
-
-    def _problem(self) -> str | None:
-        """Return what `build_lookup` does not make, or None."""
-        known: dict[str, Container[str]]
-        known = {"criterion": CRITERIA, "spread": SPREADS, "pose_likelihood": POSE_LIKELIHOODS}
-        wrong = [name for name, choices in known.items() if str(getattr(self, name)) not in choices]
-        for name in ("bandwidth_deg", "pseudo_observations", *_LIMITS):
-            value = getattr(self, name)
-            if type(value) not in (int, float) or not 0 <= value < math.inf:
-                wrong.append(name)
-        if wrong:
-            return f"{wrong[0]} is {getattr(self, wrong[0])!r}"
-        n_bins = len(self.cost)
-        if self.cost.dtype.kind != "f" or self.cost.shape != (n_bins, n_bins) or n_bins < 4:
-            return f"costs are {self.cost.dtype} of shape {self.cost.shape}"
-        unit = cost_unit(self.criterion, {"spread": self.spread})
-        # A cost without a unit may be that of a user's criterion.
-        most = {"nats": math.log(n_bins), "degrees": 180.0}.get(unit, 1e6)
-        least = -most if unit == "1" else 0.0
-        # Beyond the rounding of single precision; NaN is wrong too.
-        if not ((self.cost > least - 1e-3) & (self.cost < most + 1e-3)).all():
-            return f"a cost is not between {least:g} and {most:.4g}"
-        best_deg = recommended_delta(self.cost, vars(self))
-        is_least = np.array_equal(self.recommended_delta_deg, best_deg)
-        return None if is_least else "a recommended rotation is not that of least cost"
-
-    def save(self, path: str | Path, further: Mapping[str, NDArray[Any]] | None = None) -> None:
-        """Write the attributes, and `further` arrays, as ``.npz``."""
-        arrays = {item.name: np.asarray(getattr(self, item.name)) for item in fields(self)}
-        write_arrays(path, arrays | dict(further or {}))
 
     def recommend(self, estimate_deg: ArrayLike) -> NDArray[np.int64]:
         """Return the rotation to the next view for each estimate, degrees in [0, 360).
@@ -175,7 +96,8 @@ class LookupTable:
         return delta_deg
 
 
-_LIMITS = ("travel_cost", "max_travel_deg")
+LIMITS = ("travel_cost", "max_travel_deg")
+"""Attributes of a table that tables of earlier versions lack; they have no such limits."""
 
 
 def least_cost_delta(
@@ -223,29 +145,16 @@ def recommended_delta(
     cost: NDArray[np.floating[Any]], settings: Mapping[str, Any]
 ) -> NDArray[np.int64]:
     """Return `least_cost_delta` with the ``travel_cost`` and ``max_travel_deg`` of `settings`."""
-    return least_cost_delta(cost, **{key: settings[key] for key in _LIMITS if key in settings})
+    return least_cost_delta(cost, **{key: settings[key] for key in LIMITS if key in settings})
 
 
-def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") -> LookupTable:
+def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") -> CostTable:
     """Tabulate a criterion and find the rotations of least cost.
 
     Same parameters and errors as `nbv.core.criteria.tabulate`.
-
-    Examples
-    --------
-    >>> import numpy as np, nbv
-    >>> truth = np.arange(360.0)
-    >>> estimates = np.where(np.abs(truth - 90) < 60, 90.0, truth)  # blind around 90 degrees
-    >>> density = {"pose_likelihood": "given_estimate", "spread": "entropy"}
-    >>> evidence = nbv.gather_evidence(
-    ...     estimates[None], density, bandwidth_deg=8, pseudo_observations=3
-    ... )
-    >>> table = nbv.build_lookup(evidence, "pose_ambiguity")
-    >>> bool(60 < table.recommend(90.0) < 300)  # it leaves the blind range
-    True
     """
     cost = tabulate(criterion, evidence, fusion)
-    return LookupTable(
+    return CostTable(
         viewpoint_likelihood=evidence.conditionals.viewpoint.astype(np.float32),
         estimate_likelihood=evidence.conditionals.estimate.astype(np.float32),
         cost=cost,
@@ -255,5 +164,5 @@ def build_lookup(evidence: Evidence, criterion: str, fusion: str = "average") ->
         pose_likelihood=evidence.settings["pose_likelihood"],
         spread=evidence.settings["spread"],
         criterion=criterion,
-        **{key: float(evidence.settings[key]) for key in _LIMITS if key in evidence.settings},
+        **{key: float(evidence.settings[key]) for key in LIMITS if key in evidence.settings},
     )

@@ -20,7 +20,7 @@ from nbv.core.fusion import (
     at_second_view,
     rotation_errors_deg,
 )
-from nbv.core.lookup import LookupTable, build_lookup, least_cost_delta, recommended_delta
+from nbv.core.lookup import CostTable, build_lookup, least_cost_delta, recommended_delta
 from nbv.errors import UserError, nearest
 
 Angles = NDArray[np.float64]
@@ -42,7 +42,7 @@ class HeldOutViews:
         by the fusion ``posterior``.
     rng : numpy.random.Generator, optional
         Required by ``random``.
-    lookup : LookupTable, optional
+    lookup : CostTable, optional
         The policy's table, if it exists already.
     distributions : ndarray (n_objects, n_views, B), optional
         p(azimuth | image) of each view; criteria then use them instead of the estimates.
@@ -51,7 +51,7 @@ class HeldOutViews:
     estimate_deg: Angles
     evidence: Evidence | None = None
     rng: np.random.Generator | None = None
-    lookup: LookupTable | None = None
+    lookup: CostTable | None = None
     distributions: Angles | None = None
 
 

@@ -22,7 +22,7 @@ from nbv.core.evidence import (
     Evidence,
     gather_evidence,
 )
-from nbv.core.lookup import LookupTable, build_lookup
+from nbv.core.lookup import CostTable, build_lookup
 from nbv.core.policies import HeldOutViews, two_views
 from nbv.errors import UserError
 
@@ -212,7 +212,7 @@ def chosen_evidence(
 
 def chosen_lookup(
     estimate_deg: NDArray[np.float64], criterion: str, settings: Mapping[str, Any]
-) -> LookupTable:
+) -> CostTable:
     """Return `build_lookup` with the best density for fusion by averages."""
     method = {"policy": criterion, "fusion": "average"}
     density = choose_densities(estimate_deg, {criterion: method}, settings)[criterion]

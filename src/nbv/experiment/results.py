@@ -12,7 +12,7 @@ import pandas as pd
 from nbv.core.angles import circular_distance_deg
 from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence
-from nbv.core.lookup import LookupTable
+from nbv.core.lookup import CostTable
 from nbv.core.policies import HeldOutViews, two_views
 from nbv.errors import UserError
 from nbv.experiment.estimates import check_azimuths, read_estimates, sweep_objects
@@ -34,7 +34,7 @@ def evaluate_method(
     method: Mapping[str, Any],
     test: Estimates,
     rng: np.random.Generator | None = None,
-    lookup: LookupTable | None = None,
+    lookup: CostTable | None = None,
     evidence: Evidence | None = None,
     posteriors: Posteriors | None = None,
 ) -> pd.DataFrame:

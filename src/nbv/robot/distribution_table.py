@@ -13,18 +13,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import is_angle
 from nbv.core.logits import TEMPERATURES, fit_temperature, from_logits, on_degrees
-from nbv.core.lookup import LookupTable
 from nbv.core.selection import AFFINITY
 from nbv.errors import UserError
 from nbv.files import (
-    calibrated_file,
+    CALIBRATE_AGAIN,
     check_distributions,
     damaged,
-    read_arrays,
-    readable,
+    stored_table,
     write_arrays,
 )
 from nbv.labels import counted
+from nbv.robot.lookup import LookupTable
 from nbv.robot.next_view import (
     AfterRotations,
     Recommendation,
@@ -37,10 +36,10 @@ from nbv.robot.pairs import FEWEST_CLASSES, as_distributions, bin_apart
 WIDEST_BIN_DEG = 6.0
 """Widest bin of a table, because an estimator errs by up to half a class between its classes."""
 
-_AGAIN = "make it again with nbv calibrate"
-
-_PREFIX = "distribution."
-_NAMES = tuple(_PREFIX + name for name in ("object_ids", "temperature", "n_classes", "of_views"))
+_NAMES = tuple(
+    f"distribution.{name}" for name in ("object_ids", "temperature", "n_classes", "of_views")
+)
+"""Names of the arrays in a file; the others in it are those of a lookup table."""
 
 
 @dataclass(frozen=True)
@@ -180,35 +179,26 @@ class DistributionTable:
         UserError
             Where the file cannot be read, or has no such table.
         """
-        stored = read_arrays(calibrated_file(path), (), _AGAIN)
-        if any(name not in stored for name in _NAMES):
-            raise UserError(
-                f"{path} holds no distributions: make it with nbv calibrate, from pairs that have "
-                "columns p0, p1, …"
-            )
-        with readable(path, _AGAIN):
+        kind = "distributions, which pairs have in columns p0, p1, …"
+        with stored_table(path, _NAMES, kind) as stored:
             object_ids, temperature, n_classes, rows = (stored[name] for name in _NAMES)
             n_bins = rows.shape[-1]
-            check_distributions(path, rows, (len(object_ids), n_bins, n_bins), _AGAIN)
+            check_distributions(path, rows, (len(object_ids), n_bins, n_bins), CALIBRATE_AGAIN)
             least, most = TEMPERATURES
             if not len(rows) or not (rows > 0).all() or not least <= float(temperature) <= most:
                 what = "its distributions or their temperature are out of range"
-                raise damaged(path, what, _AGAIN)
+                raise damaged(path, what, CALIBRATE_AGAIN)
             is_number = n_classes.shape == () and n_classes.dtype.kind in "iu"
             if not is_number or n_classes < FEWEST_CLASSES or _n_bins(int(n_classes)) != n_bins:
                 what = "its number of classes does not fit its distributions"
-                raise damaged(path, what, _AGAIN)
+                raise damaged(path, what, CALIBRATE_AGAIN)
             return cls(tuple(map(str, object_ids)), float(temperature), rows, int(n_classes))
 
     def save(self, path: str | Path, lookup: LookupTable | None = None) -> None:
         """Write the table as ``.npz``, with the lookup table of the same estimator if given."""
-        numbers = np.asarray(self.temperature), np.asarray(self.n_classes)
-        kept = np.asarray(self.object_ids), *numbers, self.distributions
-        arrays = dict(zip(_NAMES, kept, strict=True))
-        if lookup is None:
-            write_arrays(path, arrays)
-        else:
-            lookup.save(path, arrays)
+        values = (self.object_ids, self.temperature, self.n_classes, self.distributions)
+        arrays = {} if lookup is None else lookup.arrays()
+        write_arrays(path, arrays | dict(zip(_NAMES, map(np.asarray, values), strict=True)))
 
 
 def _n_bins(n_classes: int) -> int:

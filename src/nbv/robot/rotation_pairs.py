@@ -24,14 +24,7 @@ from nbv.core.rotations import (
     viewing_direction,
 )
 from nbv.errors import UserError, nearest
-from nbv.files import (
-    CALIBRATE_AGAIN,
-    calibrated_file,
-    damaged,
-    read_arrays,
-    readable,
-    write_arrays,
-)
+from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
 
 FLIP_DEG = OrientationErrors.flip_deg
 _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "ray", "symmetries")
@@ -233,12 +226,7 @@ class OrientationTable:
         UserError
             If the file cannot be read, or holds what `save` does not write.
         """
-        stored = read_arrays(calibrated_file(path), (), CALIBRATE_AGAIN)
-        if any(name not in stored for name in _NAMES):
-            raise UserError(
-                f"{path} holds no orientations: make it with nbv calibrate, from 3-D pairs"
-            )
-        with readable(path, CALIBRATE_AGAIN):
+        with stored_table(path, _NAMES, "orientations") as stored:
             names, index, group, estimate, truth, score, straightened, texts = (
                 stored[n] for n in _NAMES
             )

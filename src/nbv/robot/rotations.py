@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import circular_distance_deg, is_angle, nearest_bin, wrap_deg
 from nbv.core.criteria import IN_DEGREES
-from nbv.core.lookup import LookupTable
+from nbv.core.lookup import CostTable
 from nbv.errors import UserError, check_number
 from nbv.robot.moves import as_rotations
 
@@ -124,14 +124,14 @@ def with_first(
 
 
 def ranked_rotations(
-    lookup: LookupTable,
+    lookup: CostTable,
     estimate_deg: float,
     allowed_deg: ArrayLike | None = None,
     max_travel_deg: float = 180.0,
 ) -> tuple[list[tuple[float, float]], tuple[str, ...]]:
     """Return a lookup table's rotations for an estimate and their costs, best first; and warnings.
 
-    As in `LookupTable.recommend`, a rotation travels more than a bin, at most the table's
+    As in `nbv.LookupTable.recommend`, a rotation travels more than a bin, at most the table's
     `max_travel_deg`, and the table's cost of travel counts in the order. The limits are those of
     `nbv.Recommender.recommend`. Warnings are those of `flat_warnings`, and one where calibration
     estimates do not follow azimuths.
@@ -165,7 +165,7 @@ def ranked_rotations(
     return best, flat_warnings(best[0][1], cost) if is_error else ()
 
 
-def _agreement(lookup: LookupTable) -> float:
+def _agreement(lookup: CostTable) -> float:
     """Return how well calibration estimates followed azimuths, either way round, in about [0, 1].
 
     It is the resultant length of their differences by L, freed of the uniform pseudo-observations,

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from nbv.core.criteria import CRITERIA
-from nbv.core.lookup import LookupTable
 from nbv.data.depth_images import open_depth
 from nbv.errors import UserError
 from nbv.experiment.estimates import read_posteriors
@@ -31,6 +30,7 @@ from nbv.experiment.report.table import HTML
 from nbv.experiment.results import EvaluationFile, Unit, load_evaluations
 from nbv.files import existing
 from nbv.labels import category_label, method_label
+from nbv.robot.lookup import LookupTable
 from nbv.robot.style import method_style
 
 LookupFile = tuple[str, int, int, str]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nbv.core.angles import nearest_bin, wrap_deg
 from nbv.core.criteria import SPREADS, pose_likelihood, two_view_poses
 from nbv.core.density import Conditionals
-from nbv.core.lookup import LookupTable
+from nbv.core.lookup import CostTable
 from nbv.experiment.report.figures.inputs import (
     ExampleView,
     FigureInputs,
@@ -144,12 +144,12 @@ def idea(inputs: FigureInputs) -> Figure:
     return figure
 
 
-def two_view_belief(lookup: LookupTable, first: int, second: int, delta: int) -> Likelihood:
+def two_view_belief(lookup: CostTable, first: int, second: int, delta: int) -> Likelihood:
     """Return p(θ | e₁, e₂, δ) by bin, both estimates combined by Bayes' rule.
 
     Parameters
     ----------
-    lookup : LookupTable
+    lookup : CostTable
         The table with the likelihoods.
     first, second : int
         Bins of the two estimates.

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from nbv.core.criteria import cost_unit
-from nbv.core.lookup import LookupTable
 from nbv.data.depth_images import Codes, open_depth
 from nbv.errors import UserError
 from nbv.experiment.report.settings import (
@@ -24,6 +23,7 @@ from nbv.experiment.report.settings import (
 )
 from nbv.experiment.results import Unit
 from nbv.files import existing
+from nbv.robot.lookup import LookupTable
 from nbv.robot.style import MethodStyle, method_style
 
 Key = TypeVar("Key")

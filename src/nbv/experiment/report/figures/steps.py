@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from nbv.core.angles import circular_distance_deg, nearest_bin, wrap_deg
-from nbv.core.lookup import LookupTable
+from nbv.core.lookup import CostTable
 from nbv.experiment.report.figures.choice import two_view_belief
 from nbv.experiment.report.figures.inputs import (
     CostWords,
@@ -46,7 +46,7 @@ class _Scene:
     """
 
     shown: ExampleView
-    lookup: LookupTable
+    lookup: CostTable
     estimates_deg: dict[int, float]
     words: CostWords
     color: str
