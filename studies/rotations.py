@@ -20,7 +20,7 @@ from nbv.core.rotation_criteria import CRITERIA, NextViews, costs_of, ranking, v
 from nbv.core.rotation_errors import OrientationErrors
 from nbv.files import read_rows
 from nbv.robot.bop import groups_of, orientation_table
-from nbv.robot.next_camera import PoseEstimate, recommend_camera
+from nbv.robot.next_camera import PoseEstimate
 from nbv.robot.rotation_pairs import OrientationTable
 from nbv.robot.rotations import MIN_SEPARATION_DEG
 
@@ -185,7 +185,7 @@ def recommended_view(case: HeldOut, first: int) -> int:
     cameras[:, :3, :3] = np.swapaxes(moves[admissible], 1, 2)
     cameras[:, :3, 3] = ahead - cameras[:, :3, :3] @ ahead
     estimate = PoseEstimate(images.estimate[first], 1000 * ahead, case.scores[first])
-    answer = recommend_camera(case.known, [estimate], list(cameras), object_id=images.object_ids[0])
+    answer = case.known.recommend([estimate], list(cameras), object_id=images.object_ids[0])
     return int(admissible[answer.moves[0].index])
 
 

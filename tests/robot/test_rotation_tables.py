@@ -16,7 +16,7 @@ from nbv.errors import UserError
 from nbv.numbers import read_poses
 from nbv.robot.bop import read_orientation_table
 from nbv.robot.bop_example import HALF_TURN, write_example
-from nbv.robot.next_camera import PoseEstimate, as_view, read_views, recommend_camera
+from nbv.robot.next_camera import PoseEstimate, as_view, read_views
 from nbv.robot.rotation_pairs import OrientationTable
 
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "estimates"
@@ -177,7 +177,7 @@ def test_files_that_are_not_bops_are_named(tmp_path, file, text, message):
 
 def test_a_hidden_mark_is_looked_for(pairs):
     view = PoseEstimate(HIDDEN @ HALF_TURN, np.array([10.0, -20.0, 700.0]), 0.4)
-    answer = recommend_camera(pairs, [view], 50)
+    answer = pairs.recommend([view], 50)
     costs = [move.expected_error_deg for move in answer.moves]
     assert costs == sorted(costs)
     assert costs[0] < 0.7 * answer.expected_error_deg
@@ -196,8 +196,8 @@ def test_turning_the_base_frame_changes_no_rank(pairs):
     turn = np.eye(4)
     turn[:3, :3] = Rotation.from_euler("xyz", [20, 50, 70], degrees=True).as_matrix()
     turn[:3, 3] = [1, 2, 3]
-    wanted = recommend_camera(pairs, [VIEW], poses)
-    turned = recommend_camera(pairs, [VIEW], [turn @ pose for pose in poses], camera_pose=turn)
+    wanted = pairs.recommend([VIEW], poses)
+    turned = pairs.recommend([VIEW], [turn @ pose for pose in poses], camera_pose=turn)
     assert [m.index for m in wanted.moves] == [m.index for m in turned.moves]
     for a, b in zip(wanted.moves, turned.moves, strict=True):
         assert a.expected_error_deg == pytest.approx(b.expected_error_deg, abs=1e-4)
@@ -209,7 +209,7 @@ VIEW = PoseEstimate(HIDDEN @ HALF_TURN, np.array([10.0, -20.0, 700.0]), 0.4)
 
 
 def _answer(pairs, **options):
-    return recommend_camera(pairs, [VIEW], 20, **options)
+    return pairs.recommend([VIEW], 20, **options)
 
 
 def test_a_second_view_that_sees_the_mark_decides(pairs):
@@ -217,16 +217,16 @@ def test_a_second_view_that_sees_the_mark_decides(pairs):
     relative = target[:3, :3].T
     seen = PoseEstimate(relative @ HIDDEN, np.array([0.0, 0.0, 700.0]), 0.9, target)
     both = [PoseEstimate(VIEW.rotation, VIEW.position_mm, 0.4, np.eye(4)), seen]
-    fused = recommend_camera(pairs, both, 20)
+    fused = pairs.recommend(both, 20)
     assert pairs.symmetry("1").distance_deg(fused.rotation, seen.rotation) < 5
     assert fused.expected_error_deg < 0.5 * _answer(pairs).expected_error_deg
 
 
 def test_two_hypotheses_share_the_belief(pairs):
     other = PoseEstimate(HIDDEN, VIEW.position_mm, 0.4)
-    both = recommend_camera(pairs, [VIEW, other], 20)
+    both = pairs.recommend([VIEW, other], 20)
     assert both.probability_within["30"] == pytest.approx(0.5, abs=0.1)
-    surer = recommend_camera(pairs, [VIEW, PoseEstimate(HIDDEN, VIEW.position_mm, 0.95)], 20)
+    surer = pairs.recommend([VIEW, PoseEstimate(HIDDEN, VIEW.position_mm, 0.95)], 20)
     assert np.allclose(surer.rotation, HIDDEN, atol=1e-6)
     assert surer.probability_within["30"] > both.probability_within["30"]
 
@@ -236,7 +236,7 @@ def test_a_small_travel_keeps_near_candidates(pairs):
     assert min(move.travel_deg for move in answer.moves) >= 15
     assert max(move.travel_deg for move in answer.moves) <= 60
     with pytest.raises(UserError, match="none of 1 candidate"):
-        recommend_camera(pairs, [VIEW], [np.eye(4)])
+        pairs.recommend([VIEW], [np.eye(4)])
 
 
 @pytest.mark.parametrize(
@@ -249,19 +249,19 @@ def test_a_small_travel_keeps_near_candidates(pairs):
 )
 def test_a_wrong_candidate_is_named(pairs, pose, message):
     with pytest.raises(UserError, match=f"^candidate 0.*{message}"):
-        recommend_camera(pairs, [VIEW], [np.asarray(pose)])
+        pairs.recommend([VIEW], [np.asarray(pose)])
 
 
 def test_independence_of_the_view_is_said(tmp_path):
     rows = orientation_pairs().assign(scene_id=1).drop(columns="instance")
     rows.to_csv(tmp_path / "p.csv", index=False)
     pairs = read_orientation_table(tmp_path / "p.csv")
-    answer = recommend_camera(pairs, [PoseEstimate(np.eye(3))], 20, object_id="1")
+    answer = pairs.recommend([PoseEstimate(np.eye(3))], 20, object_id="1")
     assert not answer.depends_on_view
     assert "no dependence" in answer.warnings[0]
     assert answer.moves[0].target_camera_pose is None
     with pytest.raises(UserError, match="2 objects"):
-        recommend_camera(pairs, [PoseEstimate(np.eye(3))], 20)
+        pairs.recommend([PoseEstimate(np.eye(3))], 20)
 
 
 @pytest.mark.parametrize(

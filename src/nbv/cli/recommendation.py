@@ -342,14 +342,13 @@ def _recommend_camera(
     if candidates is not None and sphere is not None:
         raise UserError("--candidates and --sphere: give one of them")
     from nbv.numbers import read_pose, read_poses
-    from nbv.robot.next_camera import as_view, read_views, recommend_camera
+    from nbv.robot.next_camera import as_view, read_views
     from nbv.robot.rotation_pairs import OrientationTable
 
     views = (
         read_views(estimate) if isinstance(estimate, Path) else [as_view(estimate, "--estimate")]
     )
-    answer = recommend_camera(
-        OrientationTable.load(table),
+    answer = OrientationTable.load(table).recommend(
         views,
         read_poses(candidates) if candidates is not None else sphere or 0,
         object_id=object_id,

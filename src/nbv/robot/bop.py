@@ -21,6 +21,7 @@ from nbv.core.rotations import (
 from nbv.errors import UserError, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
+from nbv.robot.next_camera import check_position
 from nbv.robot.pairs import PairTable
 from nbv.robot.rotation_pairs import FLIP_DEG, OrientationTable
 
@@ -32,9 +33,6 @@ NEAREST_MM = 50.0
 
 FEWEST_PAIRS = 12
 """An object with fewer says too little about where it flips."""
-
-LEAST_MM = 10.0
-"""No camera sees an object from nearer: such distances are metres."""
 
 
 def read_calibration(
@@ -260,17 +258,6 @@ def _positions(path: Path, rows: pd.DataFrame, name: str) -> Array:
     for row, position in zip(rows.index, positions, strict=True):
         check_position(f"{path}, row {row + 2}: {name}", position)
     return positions
-
-
-def check_position(name: str, position_mm: Array) -> None:
-    """Raise UserError where an object at a position (3,) in the camera cannot be seen."""
-    if position_mm[2] <= 0:
-        raise UserError(
-            f"{name} is behind the camera (z = {position_mm[2]:g}): give the pose object to "
-            "camera, not camera to object"
-        )
-    if (away := float(np.linalg.norm(position_mm))) < LEAST_MM:
-        raise UserError(f"{name} is {away:g} mm away; give mm, not metres")
 
 
 def _check_way_round(

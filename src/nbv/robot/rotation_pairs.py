@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.rotation_errors import OrientationErrors, ScoreRatio
 from nbv.core.rotations import (
@@ -25,6 +25,8 @@ from nbv.core.rotations import (
 )
 from nbv.errors import UserError, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
+from nbv.numbers import Pose
+from nbv.robot.next_camera import CameraRecommendation, PoseEstimate, recommend_camera
 
 FLIP_DEG = OrientationErrors.flip_deg
 _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "ray", "symmetries")
@@ -164,6 +166,60 @@ class OrientationTable:
             estimate=self.estimate[rows],
             truth=self.truth[rows],
             score=None if self.score is None else self.score[rows],
+        )
+
+    def recommend(
+        self,
+        estimates: Sequence[PoseEstimate],
+        candidates: Sequence[Pose] | int,
+        *,
+        object_id: str | None = None,
+        camera_pose: ArrayLike | None = None,
+        max_travel_deg: float = 180.0,
+    ) -> CameraRecommendation:
+        """Rank camera poses by the expected error of the pose that two views, or more, give.
+
+        Parameters
+        ----------
+        estimates : sequence of PoseEstimate
+            Estimates of views in succession if each has its camera pose, else hypotheses of one
+            view.
+        candidates : sequence of (4, 4), or int
+            Camera poses that can be reached; or how many even ones on a sphere about the object.
+        object_id : str, optional
+            Needed where the table has several objects.
+        camera_pose : (4, 4), optional
+            Pose of the only view: optical frame in the base frame, metres. By default the base
+            frame is the camera's.
+        max_travel_deg : float
+            Largest angle to the last view, about the object.
+
+        Returns
+        -------
+        CameraRecommendation
+
+        Raises
+        ------
+        UserError
+            Where estimates, poses and table do not fit each other, or no candidate is admissible.
+
+        Examples
+        --------
+        >>> import nbv, numpy as np
+        >>> poses = np.stack([np.eye(3)] * 12)
+        >>> cups = np.array(["cup"] * 12)
+        >>> table = nbv.OrientationTable(cups, group=cups, estimate=poses, truth=poses)
+        >>> answer = table.recommend([nbv.PoseEstimate(np.eye(3))], 50)
+        >>> answer.depends_on_view, answer.probability_within["30"] > 0.9
+        (False, True)
+        """
+        return recommend_camera(
+            self,
+            estimates,
+            candidates,
+            object_id=object_id,
+            camera_pose=camera_pose,
+            max_travel_deg=max_travel_deg,
         )
 
     def depends_on_view(self, name: str) -> bool:
