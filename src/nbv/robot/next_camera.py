@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.look_alikes import WITHIN_DEG
+from nbv.core.alike.compare import WITHIN_DEG
 from nbv.core.rotation_views import (
     NextViews,
     belief,
