@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.core.choose import is_surely_less
 from nbv.core.estimates import Estimates, Posteriors
 from nbv.core.evidence import Evidence, evidence_of_distributions
 from nbv.core.fusion import OF_DISTRIBUTIONS
@@ -148,4 +149,4 @@ def surely_better(density: DensityParams, other: DensityParams) -> bool:
     from scipy import stats
 
     quantile = stats.t.ppf(stats.norm.cdf(1.0), gaps.size - 1)
-    return bool(gaps.mean() < -quantile * gaps.std(ddof=1) / np.sqrt(gaps.size))
+    return is_surely_less(gaps, float(quantile))

@@ -13,7 +13,6 @@ from scipy.special import softmax as softmax_of_scipy
 from scipy.stats import circstd
 from tests.core.made import product_by_loops
 
-from nbv.core import look_alikes
 from nbv.core.angles import circular_distance_deg
 from nbv.core.distributions import (
     direction_and_spread_deg,
@@ -110,7 +109,6 @@ def test_the_object_frame_rotates_each_view_by_its_azimuth():
     for i, view in np.ndindex(2, BINS):
         assert np.array_equal(found[i, view], rotated(sweeps[i, view], view * WIDTH))
     assert np.array_equal(in_view_frame(found), sweeps)
-    assert np.array_equal(found, look_alikes.in_object_frame(sweeps))
 
 
 # Fused

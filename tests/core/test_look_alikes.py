@@ -9,22 +9,19 @@ from hypothesis import strategies as st
 from scipy.optimize import isotonic_regression
 from tests.core.made import product_by_loops, sharp_turns, unclear_turns
 
+from nbv.core.alike.compare import WITHIN_DEG, CalibrationViews, compared_step, first_bins
+from nbv.core.alike.expected import Expected, expected_errors
+from nbv.core.alike.reliability import N_GROUPS, observed_error
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
 from nbv.core.criteria import expected_error
-from nbv.core.distributions import log_bayes_factor, mean_direction_deg
+from nbv.core.distributions import (
+    log_bayes_factor,
+    mean_direction_deg,
+    product_directions_deg,
+)
 from nbv.core.evidence import evidence_of_distributions
 from nbv.core.fusion import product
-from nbv.core.look_alikes import (
-    N_GROUPS,
-    WITHIN_DEG,
-    Expected,
-    LookAlikes,
-    compared_step,
-    error_after_deg,
-    first_views,
-    near_first_views,
-)
 
 SETTINGS = {"affinity": {"power": 5.0, "pseudo_observations": 30.0}}
 
@@ -35,14 +32,19 @@ def turns(rng: np.random.Generator, n: int = 3, bins: int = 24) -> np.ndarray:
 
 
 def expected_of(
-    alike: LookAlikes, beliefs: np.ndarray, *options: float | np.ndarray
+    alike: CalibrationViews, beliefs: np.ndarray, *options: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the expected errors now, and after a view at every rotation, of beliefs (n, B)."""
-    found = [alike.expected(belief, *options) for belief in beliefs]
+    found = [expected_errors(alike, belief, *options) for belief in beliefs]
     return np.array([one.now_deg for one in found]), np.stack([one.after_deg for one in found])
 
 
-def share_of(alike: LookAlikes, agreement: float = 0.0) -> np.ndarray:
+def errors_of(alike: CalibrationViews) -> np.ndarray:
+    """Return the errors after a view at each rotation, and now, (S, K, M + 1)."""
+    return alike.outcomes[..., : alike.roots.shape[2] + 1]
+
+
+def share_of(alike: CalibrationViews, agreement: float = 0.0) -> np.ndarray:
     """How much each sequence of views counts for one with a log Bayes factor."""
     apart = np.minimum(alike.agreement, 0.0) - min(agreement, 0.0)
     return np.exp(-0.5 * apart.astype(np.float64) ** 2)
@@ -55,7 +57,7 @@ def test_after_one_view_it_is_the_criterion(rng: np.random.Generator, n_turns: i
     evidence = evidence_of_distributions(distributions, SETTINGS)
     rows = turns(rng)[0].astype(np.float32)
     wanted = expected_error(Belief(rows, evidence), evidence, "product")
-    alike = LookAlikes.of_views(distributions)
+    alike = CalibrationViews.of_sweeps(distributions)
     _, found = expected_of(alike, rows, 5.0, 30.0)
     assert found == pytest.approx(wanted, rel=1e-4)
 
@@ -63,7 +65,7 @@ def test_after_one_view_it_is_the_criterion(rng: np.random.Generator, n_turns: i
 @pytest.mark.parametrize("n_views", [1, 2])
 def test_where_nothing_is_alike_and_nothing_is_added_the_mean_of_all_is_expected(rng, n_views):
     """A power so large that all weights are 0: no NaN."""
-    alike = LookAlikes.of_views(turns(rng))
+    alike = CalibrationViews.of_sweeps(turns(rng))
     alike = alike if n_views == 1 else alike.after(7)
     (now,), (after,) = expected_of(alike, turns(rng)[0][:1], 1e5, 0.0)
     (wanted_now,), (wanted,) = expected_of(alike, turns(rng)[0][:1], 5.0, 1e12)
@@ -73,39 +75,35 @@ def test_where_nothing_is_alike_and_nothing_is_added_the_mean_of_all_is_expected
 
 def test_errors_after_three_views_are_those_of_the_product(rng: np.random.Generator) -> None:
     distributions, bins, first = turns(rng), 24, 5
-    alike = LookAlikes.of_views(distributions).after(3).after(10)
+    alike = CalibrationViews.of_sweeps(distributions).after(3).after(10)
     rotations = np.array([0, 3, 10])
     own = product_by_loops(distributions[1, (first + rotations) % bins], rotations)
     own /= own.sum()
-    assert alike.seen[1, first] == pytest.approx(own, rel=1e-4)
+    assert alike.fused[1, first] == pytest.approx(own, rel=1e-4)
     for turn in range(bins):
         other = distributions[1, (first + turn) % bins]
         pose = product(own, other, 15.0 * turn)
         wanted = circular_distance_deg(pose, 15.0 * first)
-        assert alike.errors_deg[1, first, turn] == pytest.approx(wanted, abs=0.05)
-    assert alike.errors_deg[..., -1] == pytest.approx(alike.error_now_deg, abs=1e-3)
+        assert errors_of(alike)[1, first, turn] == pytest.approx(wanted, abs=0.05)
+    assert errors_of(alike)[..., -1] == pytest.approx(alike.error_now_deg, abs=1e-3)
 
 
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    n=st.integers(0, 12),
-    n_groups=st.integers(1, 5),
-    n_further=st.sampled_from([1, 6, 12, 24]),
-)
-def test_errors_with_further_views_are_those_of_each_product(
-    seed: int, n: int, n_groups: int, n_further: int
-) -> None:
-    """Whatever the order of the groups, and which of them have members."""
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(0, 6), n_further=st.integers(1, 6))
+def test_directions_of_products_are_those_of_each_pair(seed: int, n: int, n_further: int) -> None:
     rng = np.random.default_rng(seed)
-    so_far, further = rng.dirichlet(np.ones(24), n), rng.dirichlet(np.ones(24), (n_groups, 24))
-    further = further[:, :n_further]
-    group, ahead = rng.integers(0, n_groups, n), rng.integers(0, n_further, n)
-    found = error_after_deg(so_far.astype(np.float32), further.astype(np.float32), group, ahead)
+    so_far, further = rng.dirichlet(np.ones(24), n), rng.dirichlet(np.ones(24), n_further)
+    found = product_directions_deg(so_far, further, 90.0)
     assert found.shape == (n, n_further)
-    for row in range(n):
-        others = np.roll(further[group[row]], -ahead[row], axis=0)
-        wanted = circular_distance_deg(mean_direction_deg(so_far[row] * others), 0.0)
-        assert found[row] == pytest.approx(wanted, abs=0.1)
+    for i, j in np.ndindex(found.shape):
+        wanted = mean_direction_deg((so_far[i] * further[j])[None])[0]
+        assert circular_distance_deg(found[i, j], wanted) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_product_without_a_direction_has_the_other_one() -> None:
+    halves = np.eye(24)[[0, 12]].sum(axis=0)[None] / 2
+    rest = np.eye(24)[[5]]
+    assert product_directions_deg(halves, halves, 90.0).item() == 90.0
+    assert product_directions_deg(halves, rest, [[45.0]]).item() == 45.0
 
 
 @pytest.mark.parametrize(
@@ -121,7 +119,7 @@ def test_finer_bins_are_compared_at_six_degrees_at_most(bins: int, step: int) ->
     most=st.integers(1, 30_000),
 )
 def test_first_views_are_evenly_apart_and_everywhere(n_turns: int, n_bins: int, most: int) -> None:
-    first = first_views(n_turns, n_bins, most)
+    first = first_bins(n_turns, n_bins, most)
     of_turn = first.shape[1]
     apart = np.diff(first, axis=1, append=first[:, :1] + n_bins)
     assert np.all(apart == n_bins / of_turn)
@@ -135,18 +133,18 @@ def test_first_views_are_evenly_apart_and_everywhere(n_turns: int, n_bins: int, 
 
 
 def test_without_a_limit_every_view_is_a_first_one() -> None:
-    assert np.array_equal(first_views(3, 24), np.tile(np.arange(24), (3, 1)))
+    assert np.array_equal(first_bins(3, 24), np.tile(np.arange(24), (3, 1)))
 
 
 @pytest.mark.parametrize(("n_bins", "most"), [(24, 500), (24, 40), (24, 12), (15, 15), (30, 3)])
 def test_errors_near_first_views_are_those_within_half_the_way(
     rng: np.random.Generator, n_bins: int, most: int
 ) -> None:
-    first = first_views(3, n_bins, most)
-    apart = n_bins // first.shape[1]
-    errors = rng.uniform(0, 180, (3, n_bins, 2)).astype(np.float32)
-    found = near_first_views(errors, first)
-    for turn, places in enumerate(first):
+    distributions = turns(rng, bins=n_bins)
+    errors = errors_of(CalibrationViews.of_sweeps(distributions))
+    fewer = CalibrationViews.of_sweeps(distributions, most)
+    found, apart = errors_of(fewer), n_bins // fewer.first.shape[1]
+    for turn, places in enumerate(fewer.first):
         for row, place in enumerate(places):
             # Half a bin at a time, so that a bin that two share is counted once by each.
             ways = (2 * place + np.arange(-apart + 0.5, apart)) / 2
@@ -162,12 +160,12 @@ def test_fewer_first_views_are_the_same_views(
 ) -> None:
     """After further views their distributions and errors are those of the same views among all."""
     distributions = turns(rng, bins=n_bins)
-    everything = LookAlikes.of_views(distributions).after(5)
-    fewer = LookAlikes.of_views(distributions, most).after(5)
+    everything = CalibrationViews.of_sweeps(distributions).after(5)
+    fewer = CalibrationViews.of_sweeps(distributions, most).after(5)
     assert fewer.first.size <= most
     rows = np.arange(3)[:, None], fewer.first
-    assert fewer.seen == pytest.approx(everything.seen[rows], rel=1e-6)
-    assert fewer.errors_deg == pytest.approx(everything.errors_deg[rows], abs=0.01)
+    assert fewer.fused == pytest.approx(everything.fused[rows], rel=1e-6)
+    assert errors_of(fewer) == pytest.approx(errors_of(everything)[rows], abs=0.01)
 
 
 @pytest.mark.parametrize("rotations", [[], [5], [5, 17]])
@@ -176,17 +174,16 @@ def test_expected_errors_of_fewer_first_views_are_means_by_affinity(
 ) -> None:
     """Of the errors of all views near each one, or of its own after further views."""
     distributions, belief = turns(rng), turns(rng)[0, :2]
-    everything = LookAlikes.of_views(distributions)
-    fewer = LookAlikes.of_views(distributions, most=40)
+    everything = CalibrationViews.of_sweeps(distributions)
+    fewer = CalibrationViews.of_sweeps(distributions, most=40)
     for turn in rotations:
         everything, fewer = everything.after(turn), fewer.after(turn)
     assert fewer.first.tolist() == [[k + 2 * n for n in range(12)] for k in (0, 1, 0)]
     rows = np.arange(3)[:, None], fewer.first
-    every_error = everything.errors_deg
-    errors = every_error[rows] if rotations else near_first_views(every_error, fewer.first)
+    errors = errors_of(everything)[rows] if rotations else errors_of(fewer)
     now, after = expected_of(fewer, belief, 5.0, 30.0)
     for own, own_now, own_after in zip(belief, now, after, strict=True):
-        weight = 30.0 * (np.sqrt(everything.seen[rows]) @ np.sqrt(own)) ** 5.0 * share_of(fewer)
+        weight = 30.0 * (np.sqrt(everything.fused[rows]) @ np.sqrt(own)) ** 5.0 * share_of(fewer)
         weight += 30.0 / weight.size
         wanted = np.tensordot(weight / weight.sum(), errors)
         assert own_after == pytest.approx(wanted[:-1], rel=1e-4)
@@ -196,10 +193,10 @@ def test_expected_errors_of_fewer_first_views_are_means_by_affinity(
 def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.Generator) -> None:
     """In bins of 3 degrees: affinities of pairs of bins, and errors linear between whole steps."""
     distributions, beliefs = turns(rng, 2, 120), turns(rng, 1, 120)[0, :2]
-    alike = LookAlikes.of_views(distributions).after(7)
+    alike = CalibrationViews.of_sweeps(distributions).after(7)
     now, after = expected_of(alike, beliefs, 5.0, 30.0)
-    views = np.concatenate(alike.seen)
-    errors = np.concatenate(alike.errors_deg[..., :-1])
+    views = np.concatenate(alike.fused)
+    errors = np.concatenate(errors_of(alike)[..., :-1])
     for belief, own_now, own in zip(beliefs, now, after, strict=True):
         pairs = [np.sqrt(rows[..., ::2] + rows[..., 1::2]) for rows in (belief, views)]
         weight = 3.0 * (pairs[1] @ pairs[0]) ** 5.0 * share_of(alike).ravel()
@@ -216,18 +213,18 @@ def test_in_fine_bins_the_expected_error_is_that_of_joined_ones(rng: np.random.G
 def test_what_is_left_out_hardly_counts(rng: np.random.Generator, sharpness: float) -> None:
     """After two views: sums over all first views, but 400 at most for the pseudo-observations."""
     distributions = sharp_turns(rng, 20, sharpness)
-    alike = LookAlikes.of_views(distributions).after(5)
+    alike = CalibrationViews.of_sweeps(distributions).after(5)
     share = rng.uniform(0.1, 1, 20)
     belief = product_by_loops(distributions[3, [7, 12]], [0, 5])
     belief /= belief.sum()
-    weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 16.0
+    weight = 15.0 * (np.sqrt(alike.fused) @ np.sqrt(belief)) ** 16.0
     weight *= share[:, None] * share_of(alike)
-    errors = alike.errors_deg
-    averaged = errors[np.arange(20)[:, None], first_views(20, 24, 400)].mean(axis=1)
+    errors = errors_of(alike)
+    averaged = errors[np.arange(20)[:, None], first_bins(20, 24, 400)].mean(axis=1)
     averaged[:, -1] = errors[..., -1].mean(axis=1)
     mean = share @ averaged / share.sum()
     wanted = (np.tensordot(weight, errors) + 30.0 * mean) / (weight.sum() + 30.0)
-    found = alike.expected(belief, 16.0, 30.0, share)
+    found = expected_errors(alike, belief, 16.0, 30.0, share)
     assert found.now_deg == pytest.approx(wanted[-1], rel=1e-3)
     assert found.after_deg == pytest.approx(wanted[:-1], rel=1e-3)
     assert averaged.mean(axis=0) == pytest.approx(errors.mean(axis=(0, 1)), rel=0.1)
@@ -281,11 +278,11 @@ def test_where_one_rotation_is_best_for_all_objects_nothing_is_added() -> None:
 
 def test_where_no_view_is_alike_the_mean_of_all_is_expected() -> None:
     distributions = sharp_turns(np.random.default_rng(2), 4, 60.0)
-    alike = LookAlikes.of_views(distributions).after(5)
+    alike = CalibrationViews.of_sweeps(distributions).after(5)
     # A belief that no turn has: of views that contradict each other.
     belief = np.where(np.arange(24) % 12 == 0, 0.5, 1e-30)
-    found = alike.expected(belief, 64.0, 90.0)
-    errors = alike.errors_deg.mean(axis=(0, 1))
+    found = expected_errors(alike, belief, 64.0, 90.0)
+    errors = errors_of(alike).mean(axis=(0, 1))
     assert found.now_deg == pytest.approx(errors[-1], rel=1e-3)
     assert found.after_deg == pytest.approx(errors[:-1], rel=1e-3)
     assert found.optimism_deg(np.ones(24, dtype=bool)) == pytest.approx(0.0, abs=1e-3)
@@ -298,14 +295,14 @@ def test_the_least_weights_count_as_they_are(
 ) -> None:
     """Whatever the power: those that are no normal number in single precision count nothing."""
     distributions = sharp_turns(rng, 5, 6.0)
-    alike, belief = LookAlikes.of_views(distributions), distributions[2, 3]
+    alike, belief = CalibrationViews.of_sweeps(distributions), distributions[2, 3]
     for turn in rotations:
         alike = alike.after(turn)
-    affinity = (np.sqrt(alike.seen) @ np.sqrt(belief)).astype(np.float64)
-    weight, errors = 15.0 * affinity**power * share_of(alike), alike.errors_deg
+    affinity = (np.sqrt(alike.fused) @ np.sqrt(belief)).astype(np.float64)
+    weight, errors = 15.0 * affinity**power * share_of(alike), errors_of(alike)
     mean = errors.mean(axis=(0, 1))
     wanted = (np.tensordot(weight, errors) + 30.0 * mean) / (weight.sum() + 30.0)
-    found = alike.expected(belief, power, 30.0)
+    found = expected_errors(alike, belief, power, 30.0)
     assert found.now_deg == pytest.approx(wanted[-1], rel=2e-3)
     assert found.after_deg == pytest.approx(wanted[:-1], rel=2e-3)
 
@@ -314,21 +311,21 @@ def test_the_least_weights_count_as_they_are(
 def test_what_was_given_may_be_changed_later(rng: np.random.Generator, most: int | None) -> None:
     distributions = turns(rng).astype(np.float32)
     belief = distributions[1, 4].copy()
-    alike = LookAlikes.of_views(distributions, most)
-    before = alike.after(7).expected(belief, 5.0, 30.0)
+    alike = CalibrationViews.of_sweeps(distributions, most)
+    before = expected_errors(alike.after(7), belief, 5.0, 30.0)
     distributions[:] = 1.0 / distributions.shape[-1]
-    after = alike.after(7).expected(belief, 5.0, 30.0)
+    after = expected_errors(alike.after(7), belief, 5.0, 30.0)
     assert np.array_equal(after.after_deg, before.after_deg)
 
 
 def test_the_errors_of_a_belief_do_not_depend_on_those_before_it(rng: np.random.Generator) -> None:
     """What was found for other beliefs is kept."""
     distributions, beliefs = sharp_turns(rng, 6, 6.0), sharp_turns(rng, 1, 12.0)[0]
-    kept = LookAlikes.of_views(distributions).after(5)
+    kept = CalibrationViews.of_sweeps(distributions).after(5)
     for belief in beliefs:
         found, alone = (
-            one.expected(belief, 16.0, 30.0)
-            for one in (kept, LookAlikes.of_views(distributions).after(5))
+            expected_errors(one, belief, 16.0, 30.0)
+            for one in (kept, CalibrationViews.of_sweeps(distributions).after(5))
         )
         assert found.after_deg == pytest.approx(alone.after_deg, rel=1e-5)
         assert found.now_deg == pytest.approx(alone.now_deg, rel=1e-5)
@@ -341,24 +338,26 @@ def test_sums_are_of_whole_objects(
 ) -> None:
     distributions, belief = turns(rng, 6), turns(rng)[0, 0]
     ids = ["b", "a", "b", "c", "a", "c"]
-    alike, of_turns = (LookAlikes.of_views(distributions, most, names) for names in (ids, None))
+    alike, of_turns = (
+        CalibrationViews.of_sweeps(distributions, most, names) for names in (ids, None)
+    )
     for turn in rotations:
         alike, of_turns = alike.after(turn), of_turns.after(turn)
     share = rng.uniform(0.1, 1, 6)
-    found = alike.expected(belief, 5.0, 30.0, share)
+    found = expected_errors(alike, belief, 5.0, 30.0, share)
     assert found.total / found.weight == pytest.approx(found.after_deg, rel=1e-5)
     assert len(found.by_object) == 3
-    assert len(of_turns.expected(belief, 5.0, 30.0).by_object) == 6
+    assert len(expected_errors(of_turns, belief, 5.0, 30.0).by_object) == 6
     for place, name in enumerate("abc"):
         own = np.where(np.array(ids) == name, share, 0.0)
-        alone = alike.expected(belief, 5.0, 30.0, own)
+        alone = expected_errors(alike, belief, 5.0, 30.0, own)
         assert found.by_object[place] == pytest.approx(alone.by_object.sum(axis=0), rel=1e-3)
 
 
 def test_agreement_is_the_log_bayes_factor_of_the_views(rng: np.random.Generator) -> None:
     distributions = turns(rng)
     for rotations in ([], [5], [5, 17]):
-        alike = LookAlikes.of_views(distributions, 40)
+        alike = CalibrationViews.of_sweeps(distributions, 40)
         for turn in rotations:
             alike = alike.after(turn)
         for turn, views in enumerate(alike.first):
@@ -371,12 +370,12 @@ def test_agreement_is_the_log_bayes_factor_of_the_views(rng: np.random.Generator
 
 def test_where_views_contradict_each_other_those_that_did_count(rng: np.random.Generator) -> None:
     distributions, belief = turns(rng, 6), turns(rng)[0, 0]
-    alike = LookAlikes.of_views(distributions).after(5)
+    alike = CalibrationViews.of_sweeps(distributions).after(5)
     for agreement in (2.0, 0.0, -1.5):
-        weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 5.0 * share_of(alike, agreement)
-        errors = alike.errors_deg
+        weight = 15.0 * (np.sqrt(alike.fused) @ np.sqrt(belief)) ** 5.0 * share_of(alike, agreement)
+        errors = errors_of(alike)
         sums = np.tensordot(weight, errors) + 30.0 * errors.mean(axis=(0, 1))
-        found = alike.expected(belief, 5.0, 30.0, agreement=agreement)
+        found = expected_errors(alike, belief, 5.0, 30.0, agreement=agreement)
         assert found.now_deg == pytest.approx(sums[-1] / (weight.sum() + 30.0), rel=1e-3)
 
 
@@ -384,13 +383,16 @@ def test_where_views_contradict_each_other_those_that_did_count(rng: np.random.G
 def test_probabilities_are_the_shares_of_errors_that_are_not_larger(
     rng: np.random.Generator, rotations: list[int]
 ) -> None:
-    alike, belief = LookAlikes.of_views(sharp_turns(rng, 6, 3.0)), sharp_turns(rng, 1, 3.0)[0, 0]
+    alike, belief = (
+        CalibrationViews.of_sweeps(sharp_turns(rng, 6, 3.0)),
+        sharp_turns(rng, 1, 3.0)[0, 0],
+    )
     for turn in rotations:
         alike = alike.after(turn)
-    found = alike.expected(belief, 5.0, 30.0)
-    weight = 15.0 * (np.sqrt(alike.seen) @ np.sqrt(belief)) ** 5.0 * share_of(alike)
+    found = expected_errors(alike, belief, 5.0, 30.0)
+    weight = 15.0 * (np.sqrt(alike.fused) @ np.sqrt(belief)) ** 5.0 * share_of(alike)
     for limit, now, after in zip(WITHIN_DEG, found.within_now, found.within_after, strict=True):
-        within = (alike.errors_deg <= limit).astype(float)
+        within = (errors_of(alike) <= limit).astype(float)
         sums = np.tensordot(weight, within) + 30.0 * within.mean(axis=(0, 1))
         assert [*after, now] == pytest.approx(sums / (weight.sum() + 30.0), abs=1e-3)
     assert (np.diff(found.within_after, axis=0) >= 0).all()
@@ -417,17 +419,19 @@ def test_what_is_observed_was_expected_by_the_other_objects(
     ids = np.array([f"{k // 2}" for k in range(16)])
     # Groups of equal weight are then groups of equal size.
     share = np.full(16, 0.3) if by_share else None
-    alike = LookAlikes.of_views(distributions, None, ids.tolist())
+    alike = CalibrationViews.of_sweeps(distributions, None, ids.tolist())
     expected = []
     for turn, own in enumerate(ids):
         others = np.where(ids != own, 1.0 if share is None else share, 0.0)
-        expected += [alike.expected(view, 6.0, 3.0, others).now_deg for view in distributions[turn]]
+        expected += [
+            expected_errors(alike, view, 6.0, 3.0, others).now_deg for view in distributions[turn]
+        ]
     happened = alike.error_now_deg.reshape(-1)
     outcomes = np.column_stack([happened, *(happened <= limit for limit in WITHIN_DEG)])
     groups = np.array_split(np.argsort(expected), N_GROUPS)
     places = [np.array(expected)[group].mean() for group in groups]
     means = np.array([outcomes[group].mean(axis=0) for group in groups])
-    observed = np.array([alike.observed(place, 6.0, 3.0, share) for place in places])
+    observed = np.array([observed_error(alike, place, 6.0, 3.0, share) for place in places])
     for column, increasing in enumerate([True, False, False, False]):
         wanted = isotonic_regression(means[:, column], increasing=increasing).x
         assert observed[:, column] == pytest.approx(wanted, rel=1e-3, abs=1e-3)
@@ -438,22 +442,28 @@ def test_views_that_do_not_count_are_not_observed() -> None:
     """As of frames at another elevation, where a share is next to nothing."""
     rng = np.random.default_rng(5)
     own, other = unclear_turns(rng, 12), np.full((12, 24, 24), 1 / 24)
-    both = LookAlikes.of_views(np.concatenate([own, other]))
-    alone = LookAlikes.of_views(own)
+    both = CalibrationViews.of_sweeps(np.concatenate([own, other]))
+    alone = CalibrationViews.of_sweeps(own)
     share = np.repeat([1.0, 1e-12], 12)
     for place in (10.0, 30.0, 60.0):
-        wanted = alone.observed(place, 6.0, 3.0)
-        assert both.observed(place, 6.0, 3.0, share) == pytest.approx(wanted, rel=1e-3, abs=1e-3)
-    assert both.observed(60.0, 6.0, 3.0)[0] != pytest.approx(alone.observed(60.0, 6.0, 3.0)[0])
+        wanted = observed_error(alone, place, 6.0, 3.0)
+        assert observed_error(both, place, 6.0, 3.0, share) == pytest.approx(
+            wanted, rel=1e-3, abs=1e-3
+        )
+    assert observed_error(both, 60.0, 6.0, 3.0)[0] != pytest.approx(
+        observed_error(alone, 60.0, 6.0, 3.0)[0]
+    )
 
 
 def test_small_and_large_errors_are_observed_as_they_are_on_fresh_objects() -> None:
     """In thirds of what is expected; a mean over look-alikes alone is drawn towards the middle."""
     rng = np.random.default_rng(4)
-    alike, fresh = LookAlikes.of_views(unclear_turns(rng, 150)), unclear_turns(rng, 150)
-    errors = LookAlikes.of_views(fresh).error_now_deg.reshape(-1)
-    expected = np.array([alike.expected(v, 6.0, 3.0).now_deg for v in fresh.reshape(-1, 24)])
-    observed = np.array([alike.observed(value, 6.0, 3.0)[0] for value in expected])
+    alike, fresh = CalibrationViews.of_sweeps(unclear_turns(rng, 150)), unclear_turns(rng, 150)
+    errors = CalibrationViews.of_sweeps(fresh).error_now_deg.reshape(-1)
+    expected = np.array(
+        [expected_errors(alike, v, 6.0, 3.0).now_deg for v in fresh.reshape(-1, 24)]
+    )
+    observed = np.array([observed_error(alike, value, 6.0, 3.0)[0] for value in expected])
     for third in np.array_split(expected.argsort(), 3):
         assert observed[third].mean() == pytest.approx(errors[third].mean(), rel=0.15, abs=1.0)
     least, _, most = np.array_split(expected.argsort(), 3)

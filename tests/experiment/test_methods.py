@@ -41,7 +41,7 @@ def test_policies_that_need_estimates_are_refused_for_distributions(policy):
     ("policy", "fusion", "message"),
     [
         ("oracle", "average", "belong under extensions"),
-        ("none", "averge", r"methods\.x\.fusion=averge is unknown: did you mean"),
+        ("none", "averge", r"methods\.x: fusion 'averge' is unknown: did you mean"),
     ],
 )
 def test_a_method_of_the_paper_that_cannot_be(policy, fusion, message):

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
+from nbv.core.alike.compare import CalibrationViews
 from nbv.core.angles import circular_distance_deg
 from nbv.core.fusion import product
 from nbv.core.logits import from_logits
-from nbv.core.look_alikes import LookAlikes
 from nbv.errors import UserError
 from nbv.robot.evaluation import (
     FIXED,
@@ -184,11 +184,11 @@ def test_the_best_fixed_step_keeps_views_apart_and_errs_least(bundle, n_views):
                 pose = np.degrees(np.angle(np.exp(sum(views) - sum(views).max()) @ angles))
                 wanted.append(abs(error(pose, first * WIDTH)))
         errors[step] = np.mean(wanted)
-    found = fixed_errors_deg(LookAlikes.of_views(bundle.distributions), n_views).mean(axis=0)
+    found = fixed_errors_deg(CalibrationViews.of_sweeps(bundle.distributions), n_views).mean(axis=0)
     assert np.flatnonzero(np.isfinite(found)).tolist() == list(errors)
     assert found[list(errors)] == pytest.approx(list(errors.values()), rel=1e-3)
     share = np.ones(len(bundle.distributions))
-    found = fixed_errors_deg(LookAlikes.of_views(bundle.distributions), n_views)
+    found = fixed_errors_deg(CalibrationViews.of_sweeps(bundle.distributions), n_views)
     assert errors[round(best_fixed_deg(found, share) / WIDTH)] == pytest.approx(
         min(errors.values()), rel=1e-3
     )

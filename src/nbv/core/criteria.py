@@ -29,20 +29,13 @@ from numpy.typing import NDArray
 
 from nbv.core.angles import direction_deg, nearest_bin
 from nbv.core.belief import Belief, every_belief
+from nbv.core.choose import entropy, expected_entropy, mixed, named
 from nbv.core.density import Conditionals, von_mises_kernel
 from nbv.core.evidence import Evidence, Float32Array
 from nbv.core.fusion import OF_DISTRIBUTIONS, calibration_errors_deg
-from nbv.errors import UserError, nearest
 
 Criterion = Callable[[Belief, Evidence, str], Float32Array]
 Spread = Callable[[Float32Array], Float32Array]
-
-
-def entropy(distributions: Float32Array) -> Float32Array:
-    """Return the entropy of each row in nats, with 0 log 0 = 0 (Eq. 1)."""
-    tiny = np.finfo(np.float32).tiny
-    logs = np.log(np.maximum(distributions, tiny))
-    return np.asarray(-np.einsum("ij,ij->i", distributions, logs), dtype=np.float32)
 
 
 def circular_variance(distributions: Float32Array) -> Float32Array:
@@ -84,9 +77,7 @@ def pose_likelihood(conditionals: Conditionals, name: str) -> Float32Array:
     ``through_estimate``: the belief about the pose that a true viewpoint leads to, through the
     estimates of it: T = L V, sum_e p(e | viewpoint) p(pose | e).
     """
-    if name not in POSE_LIKELIHOODS:
-        raise UserError(f"density.pose_likelihood={name}: {nearest(name, POSE_LIKELIHOODS)}")
-    return POSE_LIKELIHOODS[name](conditionals).astype(np.float32)
+    return named("pose likelihood", name, POSE_LIKELIHOODS)(conditionals).astype(np.float32)
 
 
 def two_view_poses(viewpoint: Float32Array, pose: Float32Array, delta_bins: int) -> Float32Array:
@@ -95,18 +86,7 @@ def two_view_poses(viewpoint: Float32Array, pose: Float32Array, delta_bins: int)
     It is a mixture by V[estimate, viewpoint] (n, B) of products of T[viewpoint, pose] (B, B), that
     of the estimator that takes both views. A product of factors that exclude each other is uniform.
     """
-    return _mixed(viewpoint, pose, np.roll(pose, (-delta_bins, -delta_bins), axis=(0, 1)))
-
-
-def _mixed(viewpoint: Float32Array, first: Float32Array, second: Float32Array) -> Float32Array:
-    """Mix the products of both factors (Eq. 6), in the frame of the first view, by Eq. 3."""
-    product = first * second
-    total = product.sum(axis=1)
-    impossible = total <= 0
-    if impossible.any():
-        product[impossible] = 1.0 / len(product)
-        total[impossible] = 1.0
-    return np.asarray((viewpoint / total) @ product)
+    return mixed(viewpoint, pose, np.roll(pose, (-delta_bins, -delta_bins), axis=(0, 1)))
 
 
 def pose_ambiguity(belief: Belief, evidence: Evidence, fusion: str) -> Float32Array:
@@ -129,10 +109,8 @@ def pose_ambiguity(belief: Belief, evidence: Evidence, fusion: str) -> Float32Ar
     """
     if belief.n_views != 1:
         raise ValueError(f"pose_ambiguity is defined for two views, not {belief.n_views + 1}")
-    name, interpretation = evidence.settings["spread"], evidence.settings["pose_likelihood"]
-    spread = SPREADS.get(name)
-    if spread is None:
-        raise UserError(f"density.spread={name}: {nearest(name, SPREADS)}")
+    interpretation = evidence.settings["pose_likelihood"]
+    spread = named("spread", evidence.settings["spread"], SPREADS)
     rows, n_bins = belief.probabilities, evidence.n_bins
     first = pose_likelihood(belief.evidence.conditionals, interpretation)
     second = pose_likelihood(evidence.conditionals, interpretation)
@@ -140,7 +118,7 @@ def pose_ambiguity(belief: Belief, evidence: Evidence, fusion: str) -> Float32Ar
     twice = np.concatenate([np.concatenate([second, second])] * 2, axis=1)
     ambiguity = np.empty(rows.shape, dtype=np.float32)
     for deltas in rotation_groups(n_bins, rows.size):
-        poses = [_mixed(rows, first, twice[d : d + n_bins, d : d + n_bins]) for d in deltas]
+        poses = [mixed(rows, first, twice[d : d + n_bins, d : d + n_bins]) for d in deltas]
         spreads = spread(np.concatenate(poses)).reshape(len(deltas), len(rows))
         ambiguity[:, deltas.start : deltas.stop] = spreads.T
     return ambiguity
@@ -159,13 +137,13 @@ def information_gain(belief: Belief, evidence: Evidence, fusion: str) -> Float32
     """
     rows, n_bins = belief.probabilities, evidence.n_bins
     prior = entropy(rows)
-    noise = evidence.once("entropy of L", lambda: entropy(evidence.second))
+    noise_of = evidence.once("entropy of L", lambda: entropy(evidence.second))
     cost = np.empty(rows.shape, dtype=np.float32)
     for deltas in rotation_groups(n_bins, rows.size):
         predicted = evidence.predicted(rows, deltas)
-        marginal = entropy(predicted.reshape(-1, n_bins)).reshape(len(deltas), len(rows))
         for i, delta in enumerate(deltas):
-            cost[:, delta] = prior + rows @ noise[delta : delta + n_bins] - marginal[i]
+            noise = rows @ noise_of[delta : delta + n_bins]
+            cost[:, delta] = expected_entropy(prior, noise, predicted[i])
     return cost
 
 
@@ -387,7 +365,6 @@ def tabulate(criterion: str, evidence: Evidence, fusion: str) -> Float32Array:
     UserError
         For an unknown criterion.
     """
-    if criterion not in CRITERIA:
-        raise UserError(f"criterion {criterion!r} is unknown: {nearest(criterion, CRITERIA)}")
+    made = named("criterion", criterion, CRITERIA)
     key = (criterion, fusion if criterion in FOR_A_FUSION else None)
-    return evidence.once(key, lambda: CRITERIA[criterion](every_belief(evidence), evidence, fusion))
+    return evidence.once(key, lambda: made(every_belief(evidence), evidence, fusion))

@@ -15,7 +15,12 @@ from nbv.core.angles import (
     nearest_bin,
     wrap_deg,
 )
-from nbv.core.distributions import FLAT, in_object_frame, mean_direction_deg, product_of
+from nbv.core.distributions import (
+    in_object_frame,
+    mean_direction_deg,
+    product_directions_deg,
+    product_of,
+)
 from nbv.core.evidence import Evidence
 
 Angles = NDArray[np.float64]
@@ -239,28 +244,18 @@ def rotation_errors_deg(
 
 
 def _product_errors_deg(distributions: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
-    """Return `rotation_errors_deg` of `product` for distributions (n_objects, n_views, B).
-
-    In the object frame the product of the distributions c and c' of two views has the mean
-    direction of ``sum_u c(u) c'(u) exp(i u)``. So one matrix product serves all pairs of an
-    object's views.
-    """
+    """Return `rotation_errors_deg` of `product` for distributions (n_objects, n_views, B)."""
     n_objects, n_views, n_bins = distributions.shape
     n_sweeps = n_views // n_bins
     # Interleaved sweeps of views that are whole bins apart.
     sweeps = distributions.reshape(n_objects, n_bins, n_sweeps, n_bins).swapaxes(1, 2)
-    angles = 2 * np.pi * np.arange(n_bins) / n_bins
     width_deg = 360.0 / n_bins
     errors = np.empty((n_bins, n_objects, n_bins, n_sweeps), dtype=np.float32)
     for i, start in np.ndindex(n_objects, n_sweeps):
         sweep = np.asarray(sweeps[i, start], dtype=np.float64)
         rows = in_object_frame(sweep)
-        cosine, sine = (rows * part @ rows.T for part in (np.cos(angles), np.sin(angles)))
-        both_deg = direction_deg(cosine, sine)
-        is_flat = np.hypot(cosine, sine) <= FLAT * (rows @ rows.T)
-        if is_flat.any():
-            own_deg = wrap_deg(mean_direction_deg(sweep) - np.arange(n_bins) * width_deg)
-            both_deg = np.where(is_flat, own_deg[:, None], both_deg)
+        own_deg = wrap_deg(mean_direction_deg(sweep) - np.arange(n_bins) * width_deg)
+        both_deg = product_directions_deg(rows, rows, own_deg[:, None])
         # From [view, view] to [view, rotation].
         pose_deg = in_object_frame(both_deg)
         errors[:, i, :, start] = circular_distance_deg(pose_deg, start * width_deg / n_sweeps).T

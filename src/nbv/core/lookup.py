@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.angles import is_angle, nearest_bin, travel_deg
+from nbv.core.choose import least_cost
 from nbv.core.criteria import tabulate
 from nbv.core.evidence import Evidence
 from nbv.errors import UserError
@@ -129,14 +130,10 @@ def least_cost_delta(
     n_bins = cost.shape[1]
     deltas = np.arange(n_bins) * (360.0 / n_bins)
     travel = travel_deg(deltas)
-    order = np.lexsort((deltas, travel))
-    order = order[travel[order] <= max_travel_deg]
-    candidates = cost[:, order]
-    if travel_cost:
-        candidates = candidates + travel_cost * travel[order]
-    if np.isnan(candidates).any():
+    total = np.where(travel <= max_travel_deg, cost + travel_cost * travel, np.inf)
+    if np.isnan(total).any():
         raise UserError("a rotation's cost is NaN: the estimates are damaged; make them again")
-    best = order[np.argmin(candidates, axis=1)]
+    best = least_cost(total, travel)
     recommended: NDArray[np.int64] = np.rint(deltas[best]).astype(np.int64)
     return recommended
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from nbv.core.angles import circular_distance_deg
 from nbv.core.belief import Belief
+from nbv.core.choose import named
 from nbv.core.criteria import CRITERIA
 from nbv.core.evidence import Evidence
 from nbv.core.fusion import (
@@ -21,7 +22,6 @@ from nbv.core.fusion import (
     rotation_errors_deg,
 )
 from nbv.core.lookup import CostTable, build_lookup, least_cost_delta, recommended_delta
-from nbv.errors import UserError, nearest
 
 Angles = NDArray[np.float64]
 
@@ -141,9 +141,7 @@ def needs_lookup(policy: str) -> bool:
     UserError
         For an unknown policy.
     """
-    if policy != SINGLE and policy not in POLICIES:
-        known = [SINGLE, *POLICIES]
-        raise UserError(f"policy {policy!r} is unknown: {nearest(policy, known)}")
+    named("policy", policy, {SINGLE: None, **POLICIES})
     return policy in CRITERIA
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from nbv.core.choose import named
 from nbv.core.criteria import CRITERIA, FOR_ESTIMATES
 from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
 from nbv.core.policies import ORACLE, POLICIES, SINGLE, needs_lookup
-from nbv.errors import UserError, nearest
+from nbv.errors import UserError
 
 SELECTED = "selected"
 """As a policy or a fusion: that of the method selected on calibration objects."""
@@ -57,14 +58,12 @@ def check_methods(methods: Methods, extensions: Methods, gives_distributions: bo
 
 
 def _check_names(key: str, method: Mapping[str, Any]) -> None:
-    if "policy" in method:
-        try:
+    try:
+        if "policy" in method:
             needs_lookup(method["policy"])
-        except UserError as error:
-            raise UserError(f"{key}: {error}") from error
-    if method.get("fusion", "average") not in FUSIONS:
-        given = f"{key}.fusion={method['fusion']}"
-        raise UserError(f"{given} is unknown: {nearest(method['fusion'], FUSIONS)}")
+        named("fusion", method.get("fusion", "average"), FUSIONS)
+    except UserError as error:
+        raise error.about(key) from error
 
 
 def _check_distributions(key: str, method: Mapping[str, Any], gives_distributions: bool) -> None:

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import softmax
 
+from nbv.core.alike.compare import CalibrationViews
 from nbv.core.angles import (
     circular_distance_deg,
     signed_difference_deg,
@@ -18,7 +19,6 @@ from nbv.core.angles import (
 )
 from nbv.core.distributions import mean_direction_deg, rotated
 from nbv.core.logits import from_logits
-from nbv.core.look_alikes import LookAlikes, error_after_deg, in_object_frame
 from nbv.core.offset import constant_offset_deg, frame_warning
 from nbv.errors import UserError
 from nbv.labels import counted
@@ -62,24 +62,18 @@ class Predictions:
     sweep_weights: NDArray[np.float64]
 
 
-def fixed_errors_deg(views: LookAlikes, n_views: int) -> NDArray[np.float64]:
+def fixed_errors_deg(views: CalibrationViews, n_views: int) -> NDArray[np.float64]:
     """Return each calibration sweep's mean error (S, B) after n views at equal steps.
 
     `views` holds single views, all of which serve as first views. The columns are steps in bins. A
     step is infinitely bad where two views are closer than `MIN_SEPARATION_DEG`, which no choice
     allows; even spacing is always allowed.
     """
-    n_sweeps, _, n_bins = views.seen.shape
+    n_sweeps, _, n_bins = views.fused.shape
     steps = np.arange(n_bins)
     apart = travel_deg(np.arange(1, n_views)[:, None] * steps * (360.0 / n_bins)).min(axis=0)
     is_allowed = (apart >= MIN_SEPARATION_DEG) | (steps == round(n_bins / n_views))
     errors = np.full((n_sweeps, n_bins), np.inf)
-    if n_views == 2:
-        group, ahead = np.zeros(n_bins, dtype=int), np.arange(n_bins)
-        for sweep, rows in enumerate(in_object_frame(views.seen)):
-            after = error_after_deg(rows, rows[None], group, ahead)
-            errors[sweep, is_allowed] = after.mean(axis=0)[is_allowed]
-        return errors
     for step in steps[is_allowed]:
         fused = views
         for view in range(1, n_views):
@@ -144,7 +138,7 @@ def follow(
     def choose(taken: NDArray[np.intp], turned_deg: NDArray[np.float64]) -> NDArray[np.float64]:
         chosen = np.empty(n)
         bins = np.rint(turned_deg * (n_bins / 360.0)) % n_bins
-        # Sorted, so that neighbouring sequences share the look-alikes of their first rotations.
+        # Sorted, so that neighbouring sequences share their cached calibration views.
         for row in np.lexsort(bins.T[::-1]):
             answer = next_view(
                 distributions[taken[row]],
@@ -273,7 +267,7 @@ def evaluate(
                 f"{counted(len(sweep.azimuth_deg), 'frame')}, too few for {max(numbers)} views"
             )
     rows, calibrated = [], after_rotations(bundle.distributions, bundle.object_ids)
-    single_views = LookAlikes.of_views(bundle.distributions)
+    single_views = CalibrationViews.of_sweeps(bundle.distributions)
     fixed_errors = {number: fixed_errors_deg(single_views, number) for number in numbers}
     for n_done, sweep in enumerate(sweeps, start=1):
         predictions = predict(bundle, sweep)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nbv.core.look_alikes import WITHIN_DEG
+from nbv.core.alike.compare import WITHIN_DEG
 from nbv.core.rotation_belief import belief, hypotheses_belief
 from nbv.core.rotation_criteria import (
     NextViews,

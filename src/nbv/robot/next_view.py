@@ -10,19 +10,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nbv.core.alike.compare import MOST_COMPARED, WITHIN_DEG, CalibrationViews
+from nbv.core.alike.expected import Expected, expected_errors
+from nbv.core.alike.reliability import FEWEST_OBJECTS, observed_error
 from nbv.core.angles import circular_distance_deg, is_angle, nearest_bin, wrap_deg
 from nbv.core.distributions import (
     direction_and_spread_deg,
     log_bayes_factor,
     product_of_views,
     rotated,
-)
-from nbv.core.look_alikes import (
-    FEWEST_OBJECTS,
-    MOST_COMPARED,
-    WITHIN_DEG,
-    Expected,
-    LookAlikes,
 )
 from nbv.errors import FrameError, UserError
 from nbv.labels import counted
@@ -42,12 +38,12 @@ LEAST_BAYES_FACTOR = 0.05
 """Below it views contradict each other: with exact distributions at most 1 in 20 right sets."""
 
 N_KEPT = 6
-"""Number of cached sequences of rotations; the look-alikes of `mug` take 4 MB each."""
+"""Number of cached sequences of rotations; those of `mug` take 6 MB each."""
 
 _LARGEST_LOG = 700.0
 """Below the log of the largest float, which many agreeing views would exceed."""
 
-AfterRotations = Callable[[tuple[int, ...]], LookAlikes]
+AfterRotations = Callable[[tuple[int, ...]], CalibrationViews]
 """Maps rotations from the first view, in bins, to the calibration sweeps after them."""
 
 
@@ -168,9 +164,9 @@ def after_rotations(
     """
 
     @lru_cache(maxsize=n_kept)
-    def after(bins: tuple[int, ...]) -> LookAlikes:
+    def after(bins: tuple[int, ...]) -> CalibrationViews:
         if not bins:
-            return LookAlikes.of_views(distributions, MOST_COMPARED, object_ids)
+            return CalibrationViews.of_sweeps(distributions, MOST_COMPARED, object_ids)
         return after(bins[:-1]).after(bins[-1])
 
     return after
@@ -194,7 +190,7 @@ def next_view(
     """Return the estimated pose and the next view.
 
     Views are fused by product. The next one has the least expected error, which is the mean error
-    of calibration objects after the same rotations (`nbv.core.look_alikes`), unless it is not
+    of calibration objects after the same rotations (`nbv.core.alike`), unless it is not
     surely better than the view farthest from all so far. Choosing the least value makes it too low
     by the optimism of the choice, which is added. If a recommendation chose the last view, the same
     holds for the current expected error.
@@ -228,7 +224,7 @@ def next_view(
     bins = [round(rotation / width) % n_bins for rotation in rotations_deg[1:]]
     log_factor = log_bayes_factor(distributions, rotations_deg)
     alike = calibrated(tuple(bins))
-    expected = alike.expected(belief, **affinity, share=share, agreement=log_factor)
+    expected = expected_errors(alike, belief, **affinity, share=share, agreement=log_factor)
     last = rotations_deg[-1]
     taken = tuple(rotation - last for rotation in rotations_deg)
     n_steps = len(expected.total)
@@ -242,9 +238,10 @@ def next_view(
         )
     now_deg, within_now = expected.now_deg, expected.within_now
     if not bins and len(alike.is_of_object) >= FEWEST_OBJECTS:
-        now_deg, *within_now = alike.observed(now_deg, **affinity, share=share).tolist()
+        now_deg, *within_now = observed_error(alike, now_deg, **affinity, share=share).tolist()
     if followed and len(distributions) > 1:
-        before = calibrated(tuple(bins[:-1])).expected(
+        before = expected_errors(
+            calibrated(tuple(bins[:-1])),
             product_of_views(distributions[:-1], rotations_deg[:-1]),
             **affinity,
             share=share,

@@ -1,0 +1,1 @@
+"""Expected error of the next view by kernel regression on calibration sweeps."""
