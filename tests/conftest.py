@@ -21,7 +21,8 @@ from nbv.robot.recommender import Recommender
 from projects import Project, copy_of_project, finished_project
 
 # Machines are noisy, and a first example may import a library: no test is timed.
-hypothesis.settings.register_profile("untimed", deadline=None)
+EXAMPLES = 200 if os.environ.get("CI") else 50
+hypothesis.settings.register_profile("untimed", deadline=None, max_examples=EXAMPLES)
 # A mutant is caught by any failing example: the smallest one is not looked for.
 hypothesis.settings.register_profile(
     "mutation",
@@ -31,6 +32,12 @@ hypothesis.settings.register_profile(
     phases=(hypothesis.Phase.explicit, hypothesis.Phase.generate),
 )
 hypothesis.settings.load_profile("untimed")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What needs the finished project comes first: one process makes it, others have units."""
+    items.sort(key=lambda item: not {"finished", "scratch"} & set(item.fixturenames))
+
 
 UNITS = (("mug", 0), ("mug", 30), ("chair", 0))
 N_FOLDS = 3
