@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -284,41 +285,47 @@ def test_the_commands_of_the_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     write_example("example")
     assert main(["calibrate", "example/results.csv", "--output", "table.npz"]) == 0
-    options = ["recommend", "--estimate", "example/estimate.json", "--table", "table.npz"]
+    options = ["next", "table.npz", "--estimate", "example/estimate.json"]
     options += ["--sphere", "50", "--until", "5"]
     assert main(options) == 0
-    assert "one more view" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "one more view" in out
+    assert "seen from the direction " in out
+    rows = re.findall(r"^ +(-?\d\.\d{5}) +(-?\d\.\d{5}) +(-?\d\.\d{5})$", out, re.M)
     assert main([*options, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["enough"] is False
+    assert np.allclose(np.array(rows, dtype=float), answer["rotation"], atol=1e-5)
     assert answer["move"]["expected_error_deg"] < answer["expected_error_deg"]
     poses = np.array([m["target_camera_pose"] for m in [answer["move"], *answer["alternatives"]]])
     np.save("poses.npy", poses)
     assert len(read_poses("poses.npy")) == len(poses)
-    options = ["recommend", "--estimate", *map(str, np.eye(3).ravel()), "--table", "table.npz"]
+    options = ["next", "table.npz", "--estimate", *map(str, np.eye(3).ravel())]
     assert main([*options, "--candidates", "poses.npy"]) == 0
     assert main(options) == 2
-    assert "needs --candidates or --sphere" in capsys.readouterr().err
+    assert "--candidates and --sphere: give one of them" in capsys.readouterr().err
 
 
 def test_the_keys_of_an_azimuth_are_a_subset(tmp_path, monkeypatch, capsys, pairs):
     monkeypatch.chdir(tmp_path)
     pairs.save("table.npz")
-    options = ["recommend", "--json", "--estimate"]
+    options = ["--json", "--estimate"]
     np.save("r.npy", np.eye(3))
     assert np.array_equal(read_views("r.npy")[0].rotation, np.eye(3))
-    assert main([*options, "r.npy", "--table", "table.npz", "--sphere", "9"]) == 0
+    assert main(["next", "table.npz", *options, "r.npy", "--sphere", "9"]) == 0
     answer = json.loads(capsys.readouterr().out)
     azimuths = "object_id,azimuth_deg,estimate_deg\n" + "".join(f"a,{k},{k}\n" for k in range(360))
     Path("pairs.csv").write_text(azimuths)
     assert main(["calibrate", "pairs.csv", "--output", "circle.npz"]) == 0
     capsys.readouterr()
-    assert main([*options, "10", "--table", "circle.npz"]) == 0
+    assert main(["next", "circle.npz", *options, "10"]) == 0
     one_axis = json.loads(capsys.readouterr().out)
     assert set(one_axis) - {"criterion", "cost_unit"} <= set(answer)
     assert set(one_axis["move"]) - {"cost"} <= set(answer["move"])
-    assert main([*options, "r.npy", "--table", "circle.npz", "--sphere", "9"]) == 2
-    assert "holds no orientations" in capsys.readouterr().err
+    assert main(["next", "circle.npz", *options, "r.npy", "--sphere", "9"]) == 2
+    assert "circle.npz holds azimuths" in capsys.readouterr().err
+    with pytest.raises(UserError, match="holds no orientations"):
+        OrientationTable.load("circle.npz")
 
 
 @pytest.mark.parametrize(

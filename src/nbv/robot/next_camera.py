@@ -24,6 +24,7 @@ from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted
 from nbv.numbers import Pose, as_pose
+from nbv.robot.answers import Answer, RankedMove
 from nbv.robot.bop import check_position
 from nbv.robot.next_view import as_chances
 from nbv.robot.rotation_pairs import OrientationTable
@@ -67,8 +68,8 @@ class PoseEstimate:
     camera_pose: Pose | None = None
 
 
-@dataclass(frozen=True)
-class CameraMove:
+@dataclass(frozen=True, kw_only=True)
+class CameraMove(RankedMove):
     """A candidate camera pose.
 
     Attributes
@@ -90,24 +91,33 @@ class CameraMove:
     """
 
     index: int
-    travel_deg: float
     travel_m: float | None
-    expected_error_deg: float
-    probability_within: dict[str, float]
-    target_camera_pose: Pose | None
     direction: Array
 
+    @property
+    def name(self) -> str:
+        """The move in a list."""
+        return f"candidate {self.index}"
 
-@dataclass(frozen=True)
-class CameraRecommendation:
+    @property
+    def extent(self) -> str:
+        """How far the move goes, and from which direction the object is seen then."""
+        metres = "" if self.travel_m is None else f", {self.travel_m:.2f} m"
+        x, y, z = self.direction
+        return f"{super().extent}{metres}; seen from the direction {x:.2f} {y:.2f} {z:.2f}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraRecommendation(Answer[CameraMove]):
     """The pose (3, 3) in the last camera, its error, and candidates, best first."""
 
     rotation: Orientations
-    expected_error_deg: float
-    probability_within: dict[str, float]
-    moves: tuple[CameraMove, ...]
     depends_on_view: bool
-    warnings: tuple[str, ...]
+
+    def pose_lines(self, seen: str) -> list[str]:
+        """Return the pose of the object, which is called `seen`, in a few lines of text."""
+        rows = ("  " + " ".join(f"{value:8.5f}" for value in row) for row in self.rotation)
+        return [f"rotation, {seen} to camera", *rows, self.value(self)]
 
 
 def recommend_camera(
@@ -199,26 +209,27 @@ def recommend_camera(
     cost, within = bayes_error(ahead) + small, chances_within(ahead, WITHIN_DEG)
     ranked = [
         CameraMove(
-            int(i),
-            float(travel[i]),
-            float(np.linalg.norm(targets[i][:3, 3] - poses[-1][:3, 3])) if known else None,
-            float(cost[k]),
-            as_chances(within[:, k]),
-            targets[i] if known else None,
-            -turned[i][2],
+            index=int(i),
+            travel_deg=float(travel[i]),
+            travel_m=float(np.linalg.norm(targets[i][:3, 3] - poses[-1][:3, 3])) if known else None,
+            expected_error_deg=float(cost[k]),
+            probability_within=as_chances(within[:, k]),
+            target_camera_pose=targets[i] if known else None,
+            direction=-turned[i][2],
         )
         for k, i in ((k, free[k]) for k in ranking(cost, travel[free]))
     ]
     distance = errors.symmetry.distance_deg(now.support, now.pose)
     unused = bool(scores) and errors.ratio is None
     depends = pairs.depends_on_view(name)
+    within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
     return CameraRecommendation(
-        rays[-1].T @ cameras[-1] @ cameras[0].T @ now.pose,
-        float(now.probability @ distance) + small,
-        as_chances(np.array([now.probability_within(error_deg) for error_deg in WITHIN_DEG])),
-        tuple(ranked),
-        depends,
-        (*(() if depends else (NO_DEPENDENCE,)), *([NO_SCORES] if unused else [])),
+        rotation=rays[-1].T @ cameras[-1] @ cameras[0].T @ now.pose,
+        expected_error_deg=float(now.probability @ distance) + small,
+        probability_within=as_chances(within_now),
+        moves=tuple(ranked),
+        depends_on_view=depends,
+        warnings=(*(() if depends else (NO_DEPENDENCE,)), *([NO_SCORES] if unused else [])),
     )
 
 
