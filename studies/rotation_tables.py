@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from nbv.labels import category_label, counted, interval_text, method_label, num
 from studies.solids import SOLIDS, solid
 
 FIGURES = ("mean_deg", "median_deg", "above_30", "within_15")
-"""Of every instance and method; an object's are the means over its instances."""
+"""Columns of every instance and method; an object's are the means over its instances."""
 FUSION_LABELS = {
     "average": "averaged (Eq. 7)",
     "posterior": "posterior",
@@ -64,13 +64,12 @@ def _sample(values: pd.DataFrame, rng: np.random.Generator, n_resamples: int) ->
     return _Sample(values, weights)
 
 
-def by_symmetry(objects: Iterable[str], symmetries: Mapping[str, Symmetry]) -> dict[str, list[str]]:
-    """Return objects in two groups: those that turn freely about an axis, and others."""
-    turning = {name for name, symmetry in symmetries.items() if symmetry.axis is not None}
-    names = list(objects)
+def by_symmetry(objects: Sequence[str], models_info: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return objects in two groups: those with an axis of continuous symmetry, and others."""
+    axis = {name: Symmetry.from_bop(models_info.get(name, {})).axis for name in objects}
     return {
-        "no symmetry or a discrete one": [name for name in names if name not in turning],
-        "turning freely": [name for name in names if name in turning],
+        "no symmetry or a discrete one": [name for name in objects if axis[name] is None],
+        "turning freely": [name for name in objects if axis[name] is not None],
     }
 
 
@@ -182,7 +181,7 @@ def estimator_table(pairs: pd.DataFrame, n_poses: int) -> Table:
         found["median_deg"] = part["error_deg"].median()
         found["above_30"] = (part["error_deg"] > 30).mean()
         symmetry = solid(str(name))[1] if name in SOLIDS else ASYMMETRIC
-        # What turns freely has a bound of its own, which depends on the grid.
+        # With an axis of symmetry the bound depends on the grid.
         if symmetry.axis is None:
             found["most"] = np.log(n_poses / VOLUME / len(symmetry.discrete))
         cells.append(found)

@@ -51,6 +51,11 @@ def test_a_former_name_warns_of_the_new_name(old, new):
         assert getattr(nbv, old) is getattr(nbv, new)
 
 
+def test_the_former_function_warns_of_the_method():
+    with pytest.warns(DeprecationWarning, match=r"is now nbv\.OrientationTable\.recommend"):
+        assert callable(nbv.recommend_camera)
+
+
 def test_all_public_names_are_listed():
     assert set(nbv.__all__) <= set(dir(nbv))
 

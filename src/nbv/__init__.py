@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from nbv.robot.moves import check_axis as check_axis
     from nbv.robot.moves import moved_camera as moved_camera
     from nbv.robot.next_camera import PoseEstimate as PoseEstimate
-    from nbv.robot.next_camera import recommend_camera as recommend_camera
     from nbv.robot.next_view import Move as Move
     from nbv.robot.next_view import Recommendation as Recommendation
     from nbv.robot.recommender import Recommender as Recommender
@@ -58,7 +57,6 @@ _MODULES = {
     "DistributionTable": "nbv.robot.distribution_table",
     "OrientationTable": "nbv.robot.rotation_pairs",
     "PoseEstimate": "nbv.robot.next_camera",
-    "recommend_camera": "nbv.robot.next_camera",
     "moved_camera": "nbv.robot.moves",
     "check_axis": "nbv.robot.moves",
     "BundleError": "nbv.errors",
@@ -77,19 +75,27 @@ _MODULES = {
     "build_lookup": "nbv.robot.lookup",
 }
 
-# Former names, for one release.
-_RENAMED = {"RotationPairs": "OrientationTable", "View": "PoseEstimate"}
+# Former names, for one release: what to use now, and where the object is.
+_FORMER = {
+    "RotationPairs": ("OrientationTable", "nbv.robot.rotation_pairs", "OrientationTable"),
+    "View": ("PoseEstimate", "nbv.robot.next_camera", "PoseEstimate"),
+    "recommend_camera": (
+        "OrientationTable.recommend",
+        "nbv.robot.next_camera",
+        "recommend_camera",
+    ),
+}
 
 __all__ = list(_MODULES)
 
 
 def __getattr__(name: str) -> Any:
     """Import what the public API names when it is first asked for."""
-    if name in _RENAMED:
-        new = _RENAMED[name]
+    if name in _FORMER:
+        new, module, attribute = _FORMER[name]
         message = f"nbv.{name} is now nbv.{new}; the old name goes with the next release"
         warnings.warn(message, DeprecationWarning, stacklevel=2)
-        name = new
+        return getattr(import_module(module), attribute)
     if name not in _MODULES:
         raise AttributeError(f"module 'nbv' has no attribute {name!r}")
     return getattr(import_module(_MODULES[name]), name)

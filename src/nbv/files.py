@@ -250,8 +250,9 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
     """
     import pandas as pd  # here, so that loading a lookup table costs no import of pandas
 
+    wanted = ", ".join(needed) or "a row of column names"
     if not path.is_file():
-        raise UserError(f"{path} {missing(path)}; name a file with {', '.join(needed)}")
+        raise UserError(f"{path} {missing(path)}; name a file with {wanted}")
     try:
         opened = _COMPRESSED.get(path.suffix)
         text = opened(path, "rt", encoding="utf-8-sig").read() if opened else read_text(path)
@@ -260,7 +261,7 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
     except (OSError, ValueError, EOFError, csv.Error, lzma.LZMAError) as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     if not rows:
-        raise UserError(f"{path} is empty; it needs {', '.join(needed)}")
+        raise UserError(f"{path} is empty; it needs {wanted}")
     head = rows[0]
     for i, row in enumerate(rows, start=1):
         if len(row) != len(head):
@@ -271,14 +272,21 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
     if twice := [name for name in head if name and head.count(name) > 1]:
         raise UserError(f"{path}: two columns {twice[0]!r}; leave one of them out")
     table = pd.DataFrame(rows[1:], columns=head, dtype=str)
+    need_columns(path, table, needed, frames_hint)
+    if table.empty:
+        raise UserError(f"{path} has no rows")
+    return table
+
+
+def need_columns(
+    path: Path, table: pd.DataFrame, needed: Sequence[str], frames_hint: str = ""
+) -> None:
+    """Raise UserError if a user's table lacks a needed column; see `read_rows`."""
     for name in needed:
         if name not in table:
             hint = "; separate columns by commas" if table.shape[1] == 1 else ""
             hint = frames_hint if "file" in table else hint
             raise UserError(f"{path}: no column {name!r}; it needs {', '.join(needed)}{hint}")
-    if table.empty:
-        raise UserError(f"{path} has no rows")
-    return table
 
 
 def read_numbers(path: Path) -> NDArray[Any]:

@@ -28,14 +28,10 @@ rule rotations:
     input:
         sources("tabulate_rotations"),
         figures=rotation_figures,
-        pairs=lambda wildcards: rotation_file("pairs"),
         models_info=lambda wildcards: rotation_file("models_info"),
     output:
         csv="<results>/tables/rotations.csv",
         md="<results>/tables/rotations.md",
-        png="<results>/figures/rotations.png",
-        pdf="<results>/figures/rotations.pdf",
-        svg="<results>/figures/rotations.svg",
     log:
         "<logs>/rotations.log",
     benchmark:
@@ -47,6 +43,5 @@ rule rotations:
     params:
         n_resamples=CONFIG["n_resamples"],
         seed=CONFIG["seed"],
-        settings=CONFIG["rotations"],
     script:
         "../scripts/tabulate_rotations.py"

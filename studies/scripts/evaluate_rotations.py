@@ -3,11 +3,10 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from studies.rotations import evaluate, read_symmetries
+    from studies.rotations import evaluate
 
     from nbv.files import write_csv
 
     given = snakemake.input
-    symmetries = read_symmetries(given.models_info) if given.models_info else {}
-    figures = evaluate(given.pairs, symmetries, snakemake.params.settings)
+    figures = evaluate(given.pairs, given.models_info or None, snakemake.params.settings)
     write_csv(snakemake.output[0], figures)

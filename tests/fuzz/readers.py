@@ -390,20 +390,19 @@ def read_bop_truth(path: Path) -> Any:
 
 
 def bop_problem(result: Any) -> str:
-    pairs, _ = result
-    determinant = np.linalg.det(np.concatenate([pairs.estimate, pairs.truth]))
+    determinant = np.linalg.det(np.concatenate([result.estimate, result.truth]))
     return "" if np.allclose(determinant, 1.0, atol=0.01) else "a matrix is no rotation"
 
 
 def make_rotation_table(path: Path) -> None:
     make_bop_results(path.parent / "results.csv")
-    read_bop_results(path.parent / "results.csv")[0].save(path)
+    read_bop_results(path.parent / "results.csv").save(path)
 
 
 def read_rotation_table(path: Path) -> Any:
     from nbv.robot.rotation_pairs import OrientationTable
 
-    return OrientationTable.load(path), ()
+    return OrientationTable.load(path)
 
 
 READERS: Mapping[str, Reader] = {

@@ -17,7 +17,7 @@ from nbv.errors import UserError
 from nbv.numbers import read_poses
 from nbv.robot.bop import read_orientation_table
 from nbv.robot.bop_example import HALF_TURN, write_example
-from nbv.robot.next_camera import PoseEstimate, as_view, read_views, recommend_camera
+from nbv.robot.next_camera import PoseEstimate, as_view, read_views
 from nbv.robot.rotation_pairs import OrientationTable
 
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "estimates"
@@ -33,7 +33,7 @@ def example(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def pairs(example) -> OrientationTable:
-    return read_orientation_table(example / "results.csv")[0]
+    return read_orientation_table(example / "results.csv")
 
 
 def table(path: Path, edit=lambda rows: rows) -> Path:
@@ -54,9 +54,9 @@ def test_results_find_the_nearest_instance_once(example, tmp_path):
     far["score"] = "3"
     path = tmp_path / "results.csv"
     pd.concat([worse, rows, better, far]).to_csv(path, index=False)
-    found, said = read_orientation_table(path, example)
+    found = read_orientation_table(path, example)
     assert len(found.estimate) == len(rows)
-    assert said == ("3 of 163 estimates found no partner",)
+    assert found.left_out == ("3 of 163 estimates found no partner",)
     assert (found.score == 2).sum() == 1
     assert np.allclose(found.score.max(), 2)
 
@@ -69,8 +69,8 @@ def test_truth_may_be_a_csv_file_in_the_form_of_results(example, tmp_path, pairs
             rows.append((int(file.parent.name), image, entry["obj_id"], 1, r, t, -1))
     columns = ["scene_id", "im_id", "obj_id", "score", "R", "t", "time"]
     pd.DataFrame(rows, columns=columns).to_csv(tmp_path / "truth.csv", index=False)
-    found, said = read_orientation_table(example / "results.csv", tmp_path / "truth.csv")
-    assert not said
+    found = read_orientation_table(example / "results.csv", tmp_path / "truth.csv")
+    assert not found.left_out
     assert np.allclose(found.truth, pairs.truth)
     assert np.allclose(found.estimate, pairs.estimate)
 
@@ -85,19 +85,19 @@ def test_a_table_is_read_as_it_was_written(pairs, tmp_path):
 
 def test_what_is_thin_or_suspicious_is_said(example, pairs, tmp_path):
     (about,) = pairs.about()
-    assert about["n_pairs"] == 160
-    assert about["directions_covered"] > 0.95
-    assert about["depends_on_view"]
-    assert "by 180°" in " ".join(about["warnings"])  # a half turn without an entry
+    assert about.n_pairs == 160
+    assert about.directions_covered > 0.95
+    assert about.depends_on_view
+    assert "by 180°" in " ".join(about.warnings)  # a half turn without an entry
     half_turn = np.eye(4)
     half_turn[:3, :3] = HALF_TURN
     entry = {"1": {"symmetries_discrete": [half_turn.ravel().tolist()]}}
     (tmp_path / "m.json").write_text(json.dumps(entry))
-    known, _ = read_orientation_table(example / "results.csv", None, tmp_path / "m.json")
+    known = read_orientation_table(example / "results.csv", None, tmp_path / "m.json")
     (about,) = known.about()
-    assert about["n_flips"] == 0
-    assert not about["depends_on_view"]
-    assert "180°" not in " ".join(about["warnings"])
+    assert about.n_flips == 0
+    assert not about.depends_on_view
+    assert "180°" not in " ".join(about.warnings)
 
 
 def first(column, change):
@@ -168,9 +168,9 @@ def test_files_that_are_not_bops_are_named(tmp_path, file, text, message):
     write_example(tmp_path)
     (tmp_path / file).write_text(text)
     with pytest.raises(UserError, match=message):
-        read_orientation_table(tmp_path / "results.csv", None, tmp_path / "models_info.json")[
-            0
-        ].about()
+        read_orientation_table(
+            tmp_path / "results.csv", None, tmp_path / "models_info.json"
+        ).about()
 
 
 # The next camera pose
@@ -178,7 +178,7 @@ def test_files_that_are_not_bops_are_named(tmp_path, file, text, message):
 
 def test_a_hidden_mark_is_looked_for(pairs):
     view = PoseEstimate(HIDDEN @ HALF_TURN, np.array([10.0, -20.0, 700.0]), 0.4)
-    answer = recommend_camera(pairs, [view], 50)
+    answer = pairs.recommend([view], 50)
     costs = [move.expected_error_deg for move in answer.moves]
     assert costs == sorted(costs)
     assert costs[0] < 0.7 * answer.expected_error_deg
@@ -197,8 +197,8 @@ def test_turning_the_base_frame_changes_no_rank(pairs):
     turn = np.eye(4)
     turn[:3, :3] = Rotation.from_euler("xyz", [20, 50, 70], degrees=True).as_matrix()
     turn[:3, 3] = [1, 2, 3]
-    wanted = recommend_camera(pairs, [VIEW], poses)
-    turned = recommend_camera(pairs, [VIEW], [turn @ pose for pose in poses], camera_pose=turn)
+    wanted = pairs.recommend([VIEW], poses)
+    turned = pairs.recommend([VIEW], [turn @ pose for pose in poses], camera_pose=turn)
     assert [m.index for m in wanted.moves] == [m.index for m in turned.moves]
     for a, b in zip(wanted.moves, turned.moves, strict=True):
         assert a.expected_error_deg == pytest.approx(b.expected_error_deg, abs=1e-4)
@@ -210,7 +210,7 @@ VIEW = PoseEstimate(HIDDEN @ HALF_TURN, np.array([10.0, -20.0, 700.0]), 0.4)
 
 
 def _answer(pairs, **options):
-    return recommend_camera(pairs, [VIEW], 20, **options)
+    return pairs.recommend([VIEW], 20, **options)
 
 
 def test_a_second_view_that_sees_the_mark_decides(pairs):
@@ -218,16 +218,16 @@ def test_a_second_view_that_sees_the_mark_decides(pairs):
     relative = target[:3, :3].T
     seen = PoseEstimate(relative @ HIDDEN, np.array([0.0, 0.0, 700.0]), 0.9, target)
     both = [PoseEstimate(VIEW.rotation, VIEW.position_mm, 0.4, np.eye(4)), seen]
-    fused = recommend_camera(pairs, both, 20)
+    fused = pairs.recommend(both, 20)
     assert pairs.symmetry("1").distance_deg(fused.rotation, seen.rotation) < 5
     assert fused.expected_error_deg < 0.5 * _answer(pairs).expected_error_deg
 
 
 def test_two_hypotheses_share_the_belief(pairs):
     other = PoseEstimate(HIDDEN, VIEW.position_mm, 0.4)
-    both = recommend_camera(pairs, [VIEW, other], 20)
+    both = pairs.recommend([VIEW, other], 20)
     assert both.probability_within["30"] == pytest.approx(0.5, abs=0.1)
-    surer = recommend_camera(pairs, [VIEW, PoseEstimate(HIDDEN, VIEW.position_mm, 0.95)], 20)
+    surer = pairs.recommend([VIEW, PoseEstimate(HIDDEN, VIEW.position_mm, 0.95)], 20)
     assert np.allclose(surer.rotation, HIDDEN, atol=1e-6)
     assert surer.probability_within["30"] > both.probability_within["30"]
 
@@ -237,7 +237,7 @@ def test_a_small_travel_keeps_near_candidates(pairs):
     assert min(move.travel_deg for move in answer.moves) >= 15
     assert max(move.travel_deg for move in answer.moves) <= 60
     with pytest.raises(UserError, match="none of 1 candidate"):
-        recommend_camera(pairs, [VIEW], [np.eye(4)])
+        pairs.recommend([VIEW], [np.eye(4)])
 
 
 @pytest.mark.parametrize(
@@ -250,19 +250,19 @@ def test_a_small_travel_keeps_near_candidates(pairs):
 )
 def test_a_wrong_candidate_is_named(pairs, pose, message):
     with pytest.raises(UserError, match=f"^candidate 0.*{message}"):
-        recommend_camera(pairs, [VIEW], [np.asarray(pose)])
+        pairs.recommend([VIEW], [np.asarray(pose)])
 
 
 def test_independence_of_the_view_is_said(tmp_path):
     rows = orientation_pairs().assign(scene_id=1).drop(columns="instance")
     rows.to_csv(tmp_path / "p.csv", index=False)
-    pairs, _ = read_orientation_table(tmp_path / "p.csv")
-    answer = recommend_camera(pairs, [PoseEstimate(np.eye(3))], 20, object_id="1")
+    pairs = read_orientation_table(tmp_path / "p.csv")
+    answer = pairs.recommend([PoseEstimate(np.eye(3))], 20, object_id="1")
     assert not answer.depends_on_view
     assert "no dependence" in answer.warnings[0]
     assert answer.moves[0].target_camera_pose is None
     with pytest.raises(UserError, match="2 objects"):
-        recommend_camera(pairs, [PoseEstimate(np.eye(3))], 20)
+        pairs.recommend([PoseEstimate(np.eye(3))], 20)
 
 
 @pytest.mark.parametrize(
@@ -351,11 +351,11 @@ def test_a_damaged_table_is_refused(pairs, tmp_path, name, value):
 @pytest.mark.skipif(not SHARED.is_dir(), reason="../shared/data/estimates is absent")
 def test_a_published_estimators_files_give_its_table():
     models = SHARED / "bop" / "models_info.json"
-    whole, _ = read_orientation_table(SHARED / "tless_megapose.csv", None, models)
-    scenes, _ = read_orientation_table(SHARED / "bop" / "megapose_tless-test.csv", None, models)
-    about = {one["object_id"]: one for one in whole.about()}
-    assert round(about["23"]["mean_error_deg"], 1) == 44.7
-    assert about["23"]["n_flips"] == 49
+    whole = read_orientation_table(SHARED / "tless_megapose.csv", None, models)
+    scenes = read_orientation_table(SHARED / "bop" / "megapose_tless-test.csv", None, models)
+    about = {summary.object_id: summary for summary in whole.about()}
+    assert round(about["23"].mean_error_deg, 1) == 44.7
+    assert about["23"].n_flips == 49
     # The same pairs, as far as these scenes go.
     texts = {r.tobytes() for r in np.round(whole.truth, 3) + 0.0}
     found = [r.tobytes() in texts for r in np.round(scenes.truth, 3) + 0.0]

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from studies.rotation_figure import example, rotation_figure
 from studies.rotation_tables import by_symmetry, orientation_table
 from studies.rotations import (
     FUSIONS,
     TwoViews,
     chosen_views,
     evaluate,
-    read_instances,
-    read_symmetries,
+    held_out,
+    recommended_view,
 )
 
 from nbv.core.rotation_belief import belief
-from nbv.core.rotation_criteria import NextViews, bayes_error
-from nbv.core.rotations import ASYMMETRIC, Symmetry
+from nbv.core.rotation_criteria import NextViews, bayes_error, view_angle_deg
 from nbv.errors import UserError
 from rotation_pairs import orientation_pairs
 
@@ -36,7 +35,7 @@ def pairs(tmp_path_factory):
 
 
 def test_every_method_is_evaluated_on_every_instance(pairs):
-    figures = evaluate(pairs, {}, {**SETTINGS, "objects": [], "score_objects": []})
+    figures = evaluate(pairs, None, {**SETTINGS, "objects": [], "score_objects": []})
     wide = figures.pivot_table(values="mean_deg", index="method", columns="fusion")
     assert set(wide.columns) == set(FUSIONS)
     assert wide.notna().all(axis=None)
@@ -45,8 +44,8 @@ def test_every_method_is_evaluated_on_every_instance(pairs):
     assert np.ptp(wide.loc["single"]) == 0
     assert (wide.loc["hindsight"] <= wide.drop(index="single") + 1e-9).all(axis=None)
 
-    turning = {"1": Symmetry(np.eye(3)[None], np.array([0.0, 0, 1]))}
-    groups = by_symmetry(["0", "1"], turning)
+    freely = {"symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]}
+    groups = by_symmetry(["0", "1"], {"1": freely})
     table = orientation_table(figures, groups, 100, np.random.default_rng(0))
     cells = table.cells.set_index(["group", "fusion", "method"])
     for object_id, group in (("0", "no symmetry or a discrete one"), ("1", "turning freely")):
@@ -102,49 +101,22 @@ def test_methods_choose_by_cost_turn_and_hindsight():
     error = np.array([[9, 1, 5, 3], [1, 9, 5, 3], [2, 2, 9, 1], [4, 1, 8, 9.0]])
     cost = np.array([[0, 2, 2, 1], [3, 0, 3, 3], [1, 2, 0, 3], [1, 1, 0.5, 0.0]])
     costs = {"bayes_error": cost}
-    found = TwoViews({"posterior": error}, costs, angle, True)
-    chosen = chosen_views(found, "posterior")
+    views = TwoViews(
+        {"posterior": error}, costs, angle, np.array([1, 2, 3, 0]), depends_on_view=True
+    )
+    chosen = chosen_views(views, "posterior")
     assert chosen["single"].ravel().tolist() == [0, 1, 2, 3]
     assert chosen["random"].tolist() == [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
     assert chosen["opposite"].ravel().tolist() == [2, 2, 0, 0]
     # Never the first view again; of equal costs the nearest.
     assert chosen["bayes_error"].ravel().tolist() == [3, 0, 0, 2]
     assert chosen["farthest_if_independent"].tolist() == chosen["bayes_error"].tolist()
+    assert chosen["nbv_recommend"].ravel().tolist() == [1, 2, 3, 0]
     assert chosen["hindsight"].ravel().tolist() == [1, 0, 3, 1]
     # The best of one half of the images, and the image of the other half nearest to it.
     assert chosen["oracle"].tolist() == [[3, 2], [3, 2], [0, 1], [0, 1]]
-    independent = chosen_views(TwoViews({"posterior": error}, costs, angle, False), "posterior")
+    independent = chosen_views(replace(views, depends_on_view=False), "posterior")
     assert independent["farthest_if_independent"].ravel().tolist() == [2, 2, 0, 0]
-
-
-def test_the_figure_shows_the_first_flip_of_the_instance_of_most_flips(tmp_path):
-    pairs = tmp_path / "pairs.csv"
-    # The instance of most flips is not the first one.
-    later_first = orientation_pairs().sort_values("instance", ascending=False, kind="stable")
-    later_first.to_csv(pairs, index=False)
-    symmetries = {"1": Symmetry(np.eye(3)[None], np.array([0.0, 0, 1]))}
-    settings = {**SETTINGS, "objects": [], "score_objects": []}
-    shown = example(pairs, symmetries, settings)
-    # Object 1 has more flips, but turns freely.
-    error = {
-        one.name: ASYMMETRIC.distance_deg(one.estimate, one.truth)
-        for one in read_instances(pairs, ["0"])
-    }
-    n_flips = {name: sum(angle > 20 for angle in angles) for name, angles in error.items()}
-    own = error[shown.one.name]
-    assert n_flips[shown.one.name] == max(n_flips.values())
-    assert shown.first == [angle > 20 for angle in own].index(True)
-    assert shown.error_deg["single"] == pytest.approx(own[shown.first])
-
-    truth, first = shown.one.truth, shown.one.estimate[[shown.first]]
-    rest = [i for i in range(len(truth)) if i != shown.first]
-    moves = truth[rest] @ truth[shown.first].T
-    costs = bayes_error(NextViews(belief(shown.errors, first, np.eye(3)[None]), moves))
-    assert costs[rest.index(shown.second)] == pytest.approx(costs.min())
-
-    (title,) = [axes.get_title() for axes in rotation_figure(shown).axes if axes.get_title()]
-    for method in ("single", "bayes_error", "random"):
-        assert f"{shown.error_deg[method]:.1f}°" in title
 
 
 @pytest.mark.parametrize(
@@ -157,20 +129,38 @@ def test_the_figure_shows_the_first_flip_of_the_instance_of_most_flips(tmp_path)
 def test_a_wrong_table_is_refused(pairs, tmp_path, damage, said):
     path = tmp_path / "pairs.csv"
     damage(pd.read_csv(pairs)).to_csv(path, index=False)
+    settings = {**SETTINGS, "objects": [], "score_objects": []}
     with pytest.raises(UserError, match=said):
-        read_instances(path, [])
+        evaluate(path, None, settings)
+    settings |= {"objects": ["7"], "score_objects": ["0"]}
     with pytest.raises(UserError, match="no object 7"):
-        read_instances(pairs, ["7"])
+        evaluate(pairs, None, settings)
 
 
 @pytest.mark.skipif(not PAIRS.is_file(), reason="../shared/data/estimates is absent")
 def test_a_published_estimators_pairs_are_read_with_their_symmetries():
-    symmetries = read_symmetries(PAIRS.parent / "bop/models_info.json")
-    error = {}
-    for object_id in ("5", "27", "17", "22"):
-        own = symmetries.get(object_id, ASYMMETRIC)
-        instances = read_instances(PAIRS, [object_id])
-        errors = [own.distance_deg(one.estimate, one.truth) for one in instances]
-        error[object_id] = np.concatenate(errors).mean()
-    # The page of this data says so.
-    assert error == pytest.approx({"5": 8.2, "27": 16.1, "17": 54.6, "22": 20.2}, abs=0.06)
+    wanted = {"5": 8.2, "27": 16.1, "17": 54.6, "22": 20.2}  # The page of this data says so.
+    settings = {**SETTINGS, "objects": [*wanted], "score_objects": [*wanted]}
+    errors: dict[str, list[float]] = {name: [] for name in wanted}
+    for case in held_out(PAIRS, PAIRS.parent / "bop/models_info.json", settings):
+        errors[case.images.object_ids[0]].extend(case.images.errors().error_deg)
+    assert {name: np.mean(each) for name, each in errors.items()} == pytest.approx(wanted, abs=0.06)
+
+
+def test_the_products_recommendation_is_its_choice(pairs):
+    """By the scores too, among images that are not too near to the first one."""
+    settings = {**SETTINGS, "objects": [], "score_objects": []}
+    for case in held_out(pairs, None, settings):
+        images = case.images
+        assert not set(zip(case.known.object_id, case.known.group, strict=True)) & {
+            (images.object_id[0], images.group[0])
+        }
+        for i in range(2):
+            chosen = recommended_view(case, i)
+            moves = images.truth @ images.truth[i].T
+            angle = view_angle_deg(moves)
+            assert angle[chosen] >= 15
+            errors = case.known.errors(images.object_ids[0])
+            first = belief(errors, images.estimate[[i]], np.eye(3)[None], case.scores[[i]])
+            cost = np.where(angle < 15, np.inf, bayes_error(NextViews(first, moves)))
+            assert cost[chosen] == pytest.approx(cost.min(), abs=1e-4)

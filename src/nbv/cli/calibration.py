@@ -24,7 +24,9 @@ from nbv.labels import counted
 if TYPE_CHECKING:
     from nbv.errors import FrameError
     from nbv.robot.network import Sweep
+    from nbv.robot.pairs import PairTable
     from nbv.robot.recommender import Recommender
+    from nbv.robot.rotation_pairs import OrientationTable
 
 
 @as_paragraphs
@@ -99,21 +101,16 @@ def calibrate(
                 "--bundle mug; pairs make a table, an .npz file"
             )
         check_writable("--output", output, [".npz"])
-        from nbv.robot.bop import is_orientation_table
+        from nbv.robot.bop import read_calibration
+        from nbv.robot.rotation_pairs import OrientationTable
 
-        if is_orientation_table(source):
-            if criterion is not None:
-                raise UserError("--criterion is for azimuths; rotations rank by expected error")
-            _calibrate_rotations(
-                source, output, ground_truth, models_info, objects or [], as_json=json
-            )
+        pairs = read_calibration(source, ground_truth, models_info, objects or [])
+        if not isinstance(pairs, OrientationTable):
+            _calibrate_table(pairs, output, criterion or "pose_ambiguity", as_json=json)
             return
-        if any((ground_truth, models_info, objects)):
-            raise UserError(
-                "--ground-truth, --models-info and --object are for rotations, which need columns "
-                "such as R_true and R_estimate"
-            )
-        _calibrate_table(source, output, criterion or "pose_ambiguity", as_json=json)
+        if criterion is not None:
+            raise UserError("--criterion is for azimuths; orientations rank by expected error")
+        _calibrate_orientations(pairs, output, as_json=json)
         return
     if criterion is not None:
         raise UserError("--criterion is for pairs, which need no --bundle; leave one of them out")
@@ -243,7 +240,7 @@ def evaluate(
     print_evaluation(errors, ood)
 
 
-def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: bool) -> None:
+def _calibrate_table(pairs: PairTable, output: Path, criterion: str, *, as_json: bool) -> None:
     """Make the tables of ``nbv calibrate`` from calibration pairs."""
     import numpy as np
 
@@ -253,11 +250,9 @@ def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: boo
     from nbv.core.selection import DENSITY, chosen_lookup
     from nbv.robot.distribution_table import DistributionTable
     from nbv.robot.lookup import LookupTable
-    from nbv.robot.pairs import PairTable
 
     if criterion not in CRITERIA:
         raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
-    pairs = PairTable.load(source)
     sweeps = pairs.distributions
     views, thin = (pairs.estimates, ()) if sweeps else pairs.thin_estimates
     estimates = views.estimate_deg
@@ -271,7 +266,7 @@ def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: boo
     about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)}
     about |= asdict(pairs.offset) | {"thin": list(thin)}
     if not as_json:
-        print_offset(str(source), number, pairs.offset)
+        print_offset(str(pairs.path), number, pairs.offset)
         print_warnings(thin)
         print_line(f"{output}: {criterion} from {number}")
     if table is not None:
@@ -286,35 +281,30 @@ def _calibrate_table(source: Path, output: Path, criterion: str, *, as_json: boo
         print_json(about)
 
 
-def _calibrate_rotations(
-    source: Path,
-    output: Path,
-    truth: Path | None,
-    models_info: Path | None,
-    objects: list[str],
-    *,
-    as_json: bool,
-) -> None:
+def _calibrate_orientations(pairs: OrientationTable, output: Path, *, as_json: bool) -> None:
     """Make the table of ``nbv calibrate`` from estimates in three dimensions."""
-    from nbv.robot.bop import read_orientation_table
-
-    pairs, said = read_orientation_table(source, truth, models_info, objects)
     about = pairs.about()
     pairs.save(output)
     if as_json:
-        print_json({"file": str(output), "objects": about, "left_out": list(said)})
-        return
-    print_warnings(said)
-    for one in about:
-        depends = "depend" if one["depends_on_view"] else "are not shown to depend"
-        print_line(
-            f"object {one['object_id']}: {counted(one['n_pairs'], 'pair')} "
-            f"of {counted(one['n_groups'], 'instance')} or scenes, "
-            f"{one['directions_covered']:.0%} of directions covered; "
-            f"error {one['mean_error_deg']:.1f}°, {counted(one['n_flips'], 'flip')}, "
-            f"which {depends} on the view"
+        print_json(
+            {
+                "file": str(output),
+                "objects": [asdict(summary) for summary in about],
+                "left_out": list(pairs.left_out),
+            }
         )
-        print_warnings(one["warnings"])
+        return
+    print_warnings(pairs.left_out)
+    for summary in about:
+        depends = "flips depend" if summary.depends_on_view else "no evidence that flips depend"
+        print_line(
+            f"object {summary.object_id}: {counted(summary.n_pairs, 'pair')} "
+            f"of {counted(summary.n_groups, 'instance')}, "
+            f"{summary.directions_covered:.0%} of directions covered; "
+            f"error {summary.mean_error_deg:.1f}°, {counted(summary.n_flips, 'flip')}; "
+            f"{depends} on the view"
+        )
+        print_warnings(summary.warnings)
     print_line(f"{output}: {counted(len(pairs.object_id), 'pair')}")
 
 

@@ -185,11 +185,10 @@ def _ranked_cameras(
     if (around.candidates is None) == (around.sphere is None):
         raise UserError("--candidates and --sphere: give one of them")
     from nbv.numbers import read_pose, read_poses
-    from nbv.robot.next_camera import as_view, read_views, recommend_camera
+    from nbv.robot.next_camera import as_view, read_views
     from nbv.robot.rotation_pairs import OrientationTable
 
-    return recommend_camera(
-        OrientationTable.load(table),
+    return OrientationTable.load(table).recommend(
         read_views(estimate) if isinstance(estimate, Path) else [as_view(estimate, "--estimate")],
         read_poses(around.candidates) if around.candidates is not None else around.sphere or 0,
         object_id=around.object_id,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from nbv.core.rotations import (
     ASYMMETRIC,
@@ -18,8 +19,10 @@ from nbv.core.rotations import (
     inverse,
 )
 from nbv.errors import UserError, nearest
-from nbv.files import damaged, read_given_json, read_rows
+from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
+from nbv.robot.next_camera import check_position
+from nbv.robot.pairs import PairTable
 from nbv.robot.rotation_pairs import FLIP_DEG, OrientationTable
 
 BOP_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
@@ -31,17 +34,26 @@ NEAREST_MM = 50.0
 FEWEST_PAIRS = 12
 """An object with fewer says too little about where it flips."""
 
-LEAST_MM = 10.0
-"""No camera sees an object from nearer: such distances are metres."""
 
+def read_calibration(
+    path: str | Path,
+    truth: str | Path | None = None,
+    models_info: str | Path | None = None,
+    objects: Sequence[str] = (),
+) -> PairTable | OrientationTable:
+    """Read calibration pairs, of azimuths or of orientations as the columns say.
 
-def is_orientation_table(path: Path) -> bool:
-    """Return whether the head of a file names rotations: BOP's results, or a table of pairs."""
-    try:
-        columns = set(read_rows(path, ()))
-    except UserError:
-        return False  # whose reader says what is wrong
-    return {"obj_id", "R"} <= columns or "R_true" in columns
+    The parameters and errors are those of `read_orientation_table`; azimuths have `path` alone.
+    """
+    rows = read_rows(Path(path), ())
+    if {"obj_id", "R"} <= set(rows) or "R_true" in rows:
+        return orientation_table(path, rows, truth, models_info, objects)
+    if truth is not None or models_info is not None or objects:
+        raise UserError(
+            f"{path}: `ground_truth`, `models_info` and `object` are for orientations, which need "
+            "columns such as R_true and R_estimate"
+        )
+    return PairTable.from_rows(path, rows)
 
 
 def read_orientation_table(
@@ -49,8 +61,8 @@ def read_orientation_table(
     truth: str | Path | None = None,
     models_info: str | Path | None = None,
     objects: Sequence[str] = (),
-) -> tuple[OrientationTable, tuple[str, ...]]:
-    """Read pairs, and what was left out of them.
+) -> OrientationTable:
+    """Read pairs of orientations.
 
     Parameters
     ----------
@@ -58,8 +70,8 @@ def read_orientation_table(
         BOP's results, or a table with `TABLE_COLUMNS` and perhaps score, t_true_mm, scene_id and
         instance. Orientations are object to camera, row by row; positions are in millimetres.
     truth : path, optional
-        Of BOP's results: a folder with ``<scene>/scene_gt.json``, or a CSV file in the form of
-        results. By default the folder of the results.
+        Truths of BOP's results: a folder with ``<scene>/scene_gt.json``, or a CSV file in the form
+        of results. By default the folder of the results.
     models_info : path, optional
         BOP's symmetries; without an entry an object is asymmetric.
     objects : sequence of str
@@ -70,17 +82,25 @@ def read_orientation_table(
     UserError
         Names the file and the row.
     """
+    return orientation_table(path, read_rows(Path(path), ()), truth, models_info, objects)
+
+
+def orientation_table(
+    path: str | Path,
+    rows: pd.DataFrame,
+    truth: str | Path | None = None,
+    models_info: str | Path | None = None,
+    objects: Sequence[str] = (),
+) -> OrientationTable:
+    """Return the table of a file's rows, as `read_orientation_table` does."""
     path = Path(path)
-    rows = read_rows(path, ())
-    said: list[str] = []
+    left_out: list[str] = []
     if "obj_id" in rows:
-        rows, said = _matched(path, Path(truth) if truth else path.parent)
+        rows, left_out = _matched(path, rows, Path(truth) if truth else path.parent)
     elif truth is not None:
         raise UserError(f"{path} has its own truths (R_true); leave `ground_truth` out")
-    symmetries = {} if models_info is None else _read_entries(Path(models_info))
-    for name in TABLE_COLUMNS:
-        if name not in rows:
-            raise UserError(f"{path}: no column {name!r}; it needs {', '.join(TABLE_COLUMNS)}")
+    symmetries = {} if models_info is None else read_models_info(models_info)
+    need_columns(path, rows, TABLE_COLUMNS)
     known = list(dict.fromkeys(rows["object_id"]))
     for name in objects:
         if name not in known:
@@ -97,27 +117,35 @@ def read_orientation_table(
             )
             if name in objects or counts.max() < FEWEST_PAIRS:
                 raise UserError(f"{path}: {few}")
-            said.append(f"{few}: left out")
+            left_out.append(f"{few}: left out")
     rows = rows[rows["object_id"].map(counts) >= FEWEST_PAIRS]
-    both = [_rotations(path, rows, name) for name in TABLE_COLUMNS[1:]]
-    _check_way_round(path, rows, *both)
+    truths, estimates = (_orientations(path, rows, name) for name in TABLE_COLUMNS[1:])
+    _check_way_round(path, rows, truths, estimates)
     straightened = "t_true_mm" in rows
     if straightened:
         straightening = along_ray(_positions(path, rows, "t_true_mm"))
-        both = [straightening @ poses for poses in both]
-    score = _numbers(path, rows, "score", 1)[:, 0] if "score" in rows else None
-    keys = [name for name in ("scene_id", "instance") if name in rows]
-    group = rows[keys].agg("/".join, axis=1).to_numpy(dtype=str) if keys else [""] * len(rows)
-    names = rows["object_id"].to_numpy(dtype=str)
-    table = OrientationTable(
-        names, np.array(group), both[1], both[0], score, straightened, symmetries
+        truths, estimates = straightening @ truths, straightening @ estimates
+    return OrientationTable(
+        rows["object_id"].to_numpy(dtype=str),
+        groups_of(rows),
+        estimates,
+        truths,
+        _numbers(path, rows, "score", 1)[:, 0] if "score" in rows else None,
+        straightened,
+        symmetries,
+        tuple(left_out),
     )
-    return table, tuple(said)
 
 
-def _matched(path: Path, truth: Path) -> tuple[pd.DataFrame, list[str]]:
-    """Return BOP's results with the truths of their instances."""
-    rows = read_rows(path, BOP_COLUMNS)
+def groups_of(rows: pd.DataFrame) -> NDArray[np.str_]:
+    """Return the group (n,) of each row: its scene and instance, as far as columns name them."""
+    keys = [name for name in ("scene_id", "instance") if name in rows]
+    return rows[keys].agg("/".join, axis=1).to_numpy(dtype=str) if keys else np.full(len(rows), "")
+
+
+def _matched(path: Path, rows: pd.DataFrame, truth: Path) -> tuple[pd.DataFrame, list[str]]:
+    """Return BOP's results with the truths of their instances, and what was left out."""
+    need_columns(path, rows, BOP_COLUMNS)
     keys = ["scene_id", "im_id", "obj_id"]
     for name in keys:
         rows[name] = _numbers(path, rows, name, 1)[:, 0].astype(int).astype(str)
@@ -138,10 +166,10 @@ def _matched(path: Path, truth: Path) -> tuple[pd.DataFrame, list[str]]:
                 f"{path}, row {i + 2}: scene {key[0]} has no image {key[1]} in {truth}: are "
                 "estimates and truths of different images?"
             )
-        if (own := by_key.get(key)) is None:
+        if (same := by_key.get(key)) is None:
             continue
-        apart = np.linalg.norm(positions[own] - position[i], axis=1)
-        j = own[int(apart.argmin())]
+        apart = np.linalg.norm(positions[same] - position[i], axis=1)
+        j = same[int(apart.argmin())]
         if apart.min() <= NEAREST_MM and (j not in best or score[i] > score[best[j]]):
             best[j] = i
     if not best:
@@ -149,18 +177,18 @@ def _matched(path: Path, truth: Path) -> tuple[pd.DataFrame, list[str]]:
             f"{path}: none of {len(rows)} estimates is within {NEAREST_MM:g} mm of an instance of "
             f"its object in {truth}: are both of the same images, and object to camera in mm?"
         )
-    truths, own = list(best), list(best.values())
-    matched = rows.iloc[own].assign(
-        object_id=rows["obj_id"].iloc[own],
-        R_estimate=rows["R"].iloc[own],
+    truths, estimates = list(best), list(best.values())
+    matched = rows.iloc[estimates].assign(
+        object_id=rows["obj_id"].iloc[estimates],
+        R_estimate=rows["R"].iloc[estimates],
         R_true=known["R"].to_numpy()[truths],
         t_true_mm=known["t"].to_numpy()[truths],
     )
-    n_free = len(rows) - len(own) - n_elsewhere
-    said = [f"{n_free} of {len(rows)} estimates found no partner"] if n_free else []
+    n_free = len(rows) - len(estimates) - n_elsewhere
+    left_out = [f"{n_free} of {len(rows)} estimates found no partner"] if n_free else []
     if n_elsewhere:
-        said.append(f"{n_elsewhere} of {len(rows)} estimates are of scenes without truth")
-    return matched.sort_index(), said
+        left_out.append(f"{n_elsewhere} of {len(rows)} estimates are of scenes without truth")
+    return matched.sort_index(), left_out
 
 
 def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
@@ -170,7 +198,7 @@ def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
         for name in keys:
             known[name] = _numbers(truth, known, name, 1)[:, 0].astype(int).astype(str)
         return known
-    found = []
+    truths = []
     for scene in sorted(scenes):
         file = truth / f"{int(scene):06d}" / "scene_gt.json"
         if not file.is_file():
@@ -179,14 +207,19 @@ def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
             try:
                 for entry in entries:
                     r, t = (" ".join(map(str, entry[f"cam_{k}_m2c"])) for k in "Rt")
-                    found.append((scene, str(int(image)), str(int(entry["obj_id"])), r, t))
+                    truths.append((scene, str(int(image)), str(int(entry["obj_id"])), r, t))
             except (KeyError, TypeError, ValueError):
                 raise UserError(
                     f"{file}, image {image}: an instance lacks obj_id, cam_R_m2c or cam_t_m2c"
                 ) from None
-    if not found:
+    if not truths:
         raise UserError(f"{truth} has no <scene>/scene_gt.json of a scene of the estimates")
-    return pd.DataFrame(found, columns=[*keys, "R", "t"])
+    return pd.DataFrame(truths, columns=[*keys, "R", "t"])
+
+
+def read_models_info(path: str | Path) -> dict[str, Any]:
+    """Read the entries of BOP's ``models_info.json`` by object."""
+    return _read_entries(Path(path))
 
 
 def _read_entries(path: Path) -> dict[str, Any]:
@@ -210,7 +243,7 @@ def _numbers(path: Path, rows: pd.DataFrame, name: str, n: int) -> Array:
     return numbers
 
 
-def _rotations(path: Path, rows: pd.DataFrame, name: str) -> Orientations:
+def _orientations(path: Path, rows: pd.DataFrame, name: str) -> Orientations:
     matrices = _numbers(path, rows, name, 9).reshape(-1, 3, 3)
     try:
         return check_orientations(name, matrices)
@@ -225,17 +258,6 @@ def _positions(path: Path, rows: pd.DataFrame, name: str) -> Array:
     for row, position in zip(rows.index, positions, strict=True):
         check_position(f"{path}, row {row + 2}: {name}", position)
     return positions
-
-
-def check_position(name: str, position_mm: Array) -> None:
-    """Raise UserError where an object at a position (3,) in the camera cannot be seen."""
-    if position_mm[2] <= 0:
-        raise UserError(
-            f"{name} is behind the camera (z = {position_mm[2]:g}): give the pose object to "
-            "camera, not camera to object"
-        )
-    if (away := float(np.linalg.norm(position_mm))) < LEAST_MM:
-        raise UserError(f"{name} is {away:g} mm away; give mm, not metres")
 
 
 def _check_way_round(

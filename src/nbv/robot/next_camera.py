@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,13 +25,17 @@ from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted
 from nbv.numbers import Pose, as_pose
 from nbv.robot.answers import Answer, RankedMove
-from nbv.robot.bop import check_position
 from nbv.robot.next_view import as_chances
-from nbv.robot.rotation_pairs import OrientationTable
 from nbv.robot.rotations import MIN_SEPARATION_DEG, as_travel
+
+if TYPE_CHECKING:
+    from nbv.robot.rotation_pairs import OrientationTable
 
 FARTHEST_M = 50.0
 """No arm looks at an object from farther: such camera poses are in millimetres."""
+
+LEAST_MM = 10.0
+"""No camera sees an object from nearer: such distances are metres."""
 
 NO_DEPENDENCE = (
     "calibration shows no dependence of this object's flips on the view; the ranking may be no "
@@ -120,131 +124,137 @@ class CameraRecommendation(Answer[CameraMove]):
         return [f"rotation, {seen} to camera", *rows, self.value(self)]
 
 
+@dataclass(frozen=True)
+class _Camera:
+    """A camera in the base frame, and the camera at its place that looks straight at the object.
+
+    Attributes
+    ----------
+    pose : ndarray (4, 4)
+        Camera to base.
+    straight_from_camera : ndarray (3, 3)
+        The identity where the object's position or that of calibration is unknown.
+    """
+
+    pose: Pose
+    straight_from_camera: Orientations
+
+    @property
+    def straight_from_base(self) -> Orientations:
+        return np.asarray(self.straight_from_camera @ self.pose[:3, :3].T)
+
+
 def recommend_camera(
-    pairs: OrientationTable,
-    views: Sequence[PoseEstimate],
+    table: OrientationTable,
+    estimates: Sequence[PoseEstimate],
     candidates: Sequence[Pose] | int,
     *,
     object_id: str | None = None,
     camera_pose: ArrayLike | None = None,
     max_travel_deg: float = 180.0,
 ) -> CameraRecommendation:
-    """Rank camera poses by the expected error of the pose that two views, or more, give.
-
-    Parameters
-    ----------
-    pairs : OrientationTable
-    views : sequence of PoseEstimate
-        Views in succession if each has its camera pose, else hypotheses of one view.
-    candidates : sequence of (4, 4), or int
-        Camera poses that can be reached; or how many even ones on a sphere about the object.
-    object_id : str, optional
-        Needed where the table has several objects.
-    camera_pose : (4, 4), optional
-        Of the only view: optical frame in the base frame, metres. By default the base frame is
-        the camera's.
-
-    Raises
-    ------
-    UserError
-        Where views, poses and table do not fit each other, or no candidate can be reached.
-
-    Examples
-    --------
-    >>> import nbv, numpy as np
-    >>> poses = np.stack([np.eye(3)] * 12)
-    >>> cups = np.array(["cup"] * 12)
-    >>> pairs = nbv.OrientationTable(cups, group=cups, estimate=poses, truth=poses)
-    >>> answer = nbv.recommend_camera(pairs, [nbv.PoseEstimate(np.eye(3))], 50)
-    >>> answer.depends_on_view, answer.probability_within["30"] > 0.9
-    (False, True)
-    """
-    errors = pairs.errors(object_id)
-    name = pairs.object_ids[0] if object_id is None else object_id
-    if not views:
-        raise UserError("no estimate; give one")
-    scores = [view.score for view in views if view.score is not None]
-    if scores and len(scores) < len(views):
-        raise UserError("some estimates have a score and others none; give all, or none")
-    if len({view.position_mm is None for view in views}) > 1:
-        raise UserError("some estimates have a position and others none; give all, or none")
-    n_posed = sum(view.camera_pose is not None for view in views)
-    if n_posed not in (0, len(views)):
-        raise UserError("some estimates have a camera pose and others none; give all, or none")
-    if n_posed and camera_pose is not None:
+    """Rank camera poses; see `nbv.OrientationTable.recommend`."""
+    name = table.name_of(object_id)
+    errors = table.errors(name)
+    scores = _checked_scores(estimates)
+    is_posed = estimates[0].camera_pose is not None
+    if is_posed and camera_pose is not None:
         raise UserError("the estimates have camera poses; leave `camera_pose` out")
-    start = np.eye(4) if camera_pose is None else as_pose(camera_pose)
-    poses = [start if view.camera_pose is None else view.camera_pose for view in views]
-    rays = [_ray(pairs, view.position_mm) for view in views]
-    cameras = np.stack(
-        [ray @ pose[:3, :3].T for ray, pose in zip(rays, poses, strict=True)]
-    )  # base to a camera that looks straight at the object
-    seen = np.stack([ray @ view.rotation for ray, view in zip(rays, views, strict=True)])
-    if n_posed:
-        now = belief(errors, seen, cameras @ cameras[0].T, scores or None)
-    else:
-        order = np.argsort([-score for score in scores], kind="stable") if scores else slice(None)
-        now = hypotheses_belief(errors, seen[order], np.array(scores)[order] if scores else None)
-    last = views[-1].position_mm
-    place = None if last is None else (poses[-1] @ np.append(last / 1000, 1.0))[:3]
-    if isinstance(candidates, int):
-        targets = _sphere(candidates, place, poses[-1], camera_pose is None and not n_posed)
-        known = place is not None
-    else:
-        targets, known = (
-            [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)],
-            True,
+    base = np.eye(4) if camera_pose is None else as_pose(camera_pose)
+    cameras = [
+        _Camera(
+            base if e.camera_pose is None else e.camera_pose, _straightening(table, e.position_mm)
         )
-    turned = np.stack([_camera_at(pose, place, pairs, i) for i, pose in enumerate(targets)])
-    travel = view_angle_deg(turned @ cameras[-1].T)
-    apart = np.min([view_angle_deg(turned @ camera.T) for camera in cameras], axis=0)
+        for e in estimates
+    ]
+    straight_from_base = np.stack([camera.straight_from_base for camera in cameras])
+    first, last = straight_from_base[0], straight_from_base[-1]
+    seen = np.stack(
+        [c.straight_from_camera @ e.rotation for c, e in zip(cameras, estimates, strict=True)]
+    )
+    if is_posed:
+        now = belief(errors, seen, straight_from_base @ first.T, scores)
+    else:
+        order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
+        now = hypotheses_belief(errors, seen[order], None if scores is None else scores[order])
+    position = estimates[-1].position_mm
+    place = None if position is None else (cameras[-1].pose @ np.append(position / 1000, 1.0))[:3]
+    if isinstance(candidates, int):
+        is_level = camera_pose is None and not is_posed
+        poses, is_known = _sphere(candidates, place, cameras[-1].pose, is_level), place is not None
+    else:
+        poses = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
+        is_known = True
+    targets = np.stack(
+        [_target(pose, place, table, i).straight_from_base for i, pose in enumerate(poses)]
+    )
+    travel = view_angle_deg(targets @ last.T)
+    apart = np.min([view_angle_deg(targets @ taken.T) for taken in straight_from_base], axis=0)
     free = np.flatnonzero((apart >= MIN_SEPARATION_DEG) & (travel <= as_travel(max_travel_deg)))
     if not len(free):
         raise UserError(
-            f"none of {counted(len(targets), 'candidate')} is {MIN_SEPARATION_DEG:g}° or more from "
+            f"none of {counted(len(poses), 'candidate')} is {MIN_SEPARATION_DEG:g}° or more from "
             "every view so far and within `max_travel_deg`: the same view repeats its error"
         )
-    ahead = NextViews(now, turned[free] @ cameras[0].T)
+    ahead = NextViews(now, targets[free] @ first.T)
     small = float(errors.error_deg[~errors.is_flip].mean()) if not errors.is_flip.all() else 0.0
     cost, within = bayes_error(ahead) + small, chances_within(ahead, WITHIN_DEG)
-    ranked = [
+    moves = [
         CameraMove(
-            index=int(i),
-            travel_deg=float(travel[i]),
-            travel_m=float(np.linalg.norm(targets[i][:3, 3] - poses[-1][:3, 3])) if known else None,
+            index=int(free[k]),
+            travel_deg=float(travel[free[k]]),
+            travel_m=float(np.linalg.norm(pose[:3, 3] - cameras[-1].pose[:3, 3]))
+            if is_known
+            else None,
             expected_error_deg=float(cost[k]),
             probability_within=as_chances(within[:, k]),
-            target_camera_pose=targets[i] if known else None,
-            direction=-turned[i][2],
+            target_camera_pose=pose if is_known else None,
+            direction=-targets[free[k]][2],
         )
-        for k, i in ((k, free[k]) for k in ranking(cost, travel[free]))
+        for k, pose in ((k, poses[free[k]]) for k in ranking(cost, travel[free]))
     ]
     distance = errors.symmetry.distance_deg(now.support, now.pose)
-    unused = bool(scores) and errors.ratio is None
-    depends = pairs.depends_on_view(name)
+    depends = table.depends_on_view(name)
+    warnings = () if depends else (NO_DEPENDENCE,)
+    if scores is not None and errors.ratio is None:
+        warnings = (*warnings, NO_SCORES)
     within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
     return CameraRecommendation(
-        rotation=rays[-1].T @ cameras[-1] @ cameras[0].T @ now.pose,
+        rotation=cameras[-1].straight_from_camera.T @ last @ first.T @ now.pose,
         expected_error_deg=float(now.probability @ distance) + small,
         probability_within=as_chances(within_now),
-        moves=tuple(ranked),
+        moves=tuple(moves),
         depends_on_view=depends,
-        warnings=(*(() if depends else (NO_DEPENDENCE,)), *([NO_SCORES] if unused else [])),
+        warnings=warnings,
     )
 
 
-def _ray(pairs: OrientationTable, position: Array | None) -> Orientations:
-    if position is None:
+def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:
+    """Return the scores (n,) of estimates, if they have any; refuse estimates that differ."""
+    if not estimates:
+        raise UserError("no estimate; give one")
+    for what, name in (
+        ("a score", "score"),
+        ("a position", "position_mm"),
+        ("a camera pose", "camera_pose"),
+    ):
+        if len({getattr(estimate, name) is None for estimate in estimates}) > 1:
+            raise UserError(f"some estimates have {what} and others none; give all, or none")
+    scores = [estimate.score for estimate in estimates if estimate.score is not None]
+    return np.array(scores) if scores else None
+
+
+def _straightening(table: OrientationTable, position: Array | None) -> Orientations:
+    if position is None or not table.straightened:
         return np.eye(3)
-    return along_ray(position) if pairs.straightened else np.eye(3)
+    return along_ray(position)
 
 
-def _camera_at(pose: Pose, place: Array | None, pairs: OrientationTable, i: int) -> Orientations:
-    """Return base to camera (3, 3), turned straight at the object if its place is known."""
-    turned = pose[:3, :3].T
+def _target(pose: Pose, place: Array | None, table: OrientationTable, i: int) -> _Camera:
+    """Return a candidate's camera; `place` (3,) is the object's in the base frame, if known."""
     if place is None:
-        return turned
-    position = turned @ (place - pose[:3, 3])
+        return _Camera(pose, np.eye(3))
+    position = pose[:3, :3].T @ (place - pose[:3, 3])
     if position[2] <= 0:
         raise UserError(
             f"candidate {i}: the object is behind this camera: give poses of the optical frame "
@@ -255,7 +265,7 @@ def _camera_at(pose: Pose, place: Array | None, pairs: OrientationTable, i: int)
             f"candidate {i}: the object is {away:.0f} m away: give camera poses in metres, not "
             "millimetres"
         )
-    return _ray(pairs, position) @ turned
+    return _Camera(pose, _straightening(table, position))
 
 
 def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> list[Pose]:
@@ -305,6 +315,17 @@ def as_view(given: Any, name: str) -> PoseEstimate:
     if (pose := entry.get("camera_pose")) is not None:
         view = replace(view, camera_pose=as_pose(pose, f"{name}: camera_pose"))
     return view
+
+
+def check_position(name: str, position_mm: Array) -> None:
+    """Raise UserError where an object at a position (3,) in the camera cannot be seen."""
+    if position_mm[2] <= 0:
+        raise UserError(
+            f"{name} is behind the camera (z = {position_mm[2]:g}): give the pose object to "
+            "camera, not camera to object"
+        )
+    if (away := float(np.linalg.norm(position_mm))) < LEAST_MM:
+        raise UserError(f"{name} is {away:g} mm away; give mm, not metres")
 
 
 def _array(values: Any, name: str, n: int) -> Array:

@@ -17,7 +17,7 @@ from nbv.core.estimates import COLUMNS, Estimates
 from nbv.core.logits import LEAST_PROBABILITY
 from nbv.core.offset import FOR_PAIRS, Offset
 from nbv.errors import UserError
-from nbv.files import read_numbers, read_rows
+from nbv.files import need_columns, read_numbers, read_rows
 from nbv.labels import counted
 from nbv.numbers import column
 
@@ -63,8 +63,13 @@ class PairTable:
         UserError
             Where the file cannot be read, a column is missing, or a value is empty or not an angle.
         """
+        return cls.from_rows(path, read_rows(Path(path), COLUMNS, _OF_FRAMES))
+
+    @classmethod
+    def from_rows(cls, path: str | Path, rows: pd.DataFrame) -> PairTable:
+        """Return the pairs of a file's rows, as `load` does."""
         path = Path(path)
-        rows = read_rows(path, COLUMNS, _OF_FRAMES)
+        need_columns(path, rows, COLUMNS, _OF_FRAMES)
         if (is_empty := rows["object_id"].str.strip() == "").any():
             raise UserError(
                 f"{path}, row {int(is_empty.argmax()) + 2}: object_id is empty; give it"

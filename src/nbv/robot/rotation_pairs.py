@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.rotation_errors import OrientationErrors, ScoreRatio
 from nbv.core.rotations import (
@@ -24,9 +25,38 @@ from nbv.core.rotations import (
 )
 from nbv.errors import UserError, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
+from nbv.numbers import Pose
+from nbv.robot.next_camera import CameraRecommendation, PoseEstimate, recommend_camera
 
 FLIP_DEG = OrientationErrors.flip_deg
 _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "ray", "symmetries")
+
+
+@dataclass(frozen=True)
+class ObjectSummary:
+    """The calibration pairs of one object.
+
+    Attributes
+    ----------
+    object_id : str
+    n_pairs, n_groups, n_flips : int
+        Groups are instances or scenes; a flip errs by more than `FLIP_DEG`.
+    mean_error_deg : float
+    directions_covered : float
+        Share of the viewing directions that have pairs nearby.
+    depends_on_view : bool
+        Whether calibration shows that flips depend on the view.
+    warnings : tuple of str
+    """
+
+    object_id: str
+    n_pairs: int
+    n_groups: int
+    n_flips: int
+    mean_error_deg: float
+    directions_covered: float
+    depends_on_view: bool
+    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -45,6 +75,8 @@ class OrientationTable:
         Whether poses were rotated onto the optical axis (positions known).
     symmetries : mapping
         Entries of BOP's models_info by object; an object without one is asymmetric.
+    left_out : tuple of str
+        Which pairs of the file are not in the table, and why.
 
     Examples
     --------
@@ -62,6 +94,7 @@ class OrientationTable:
     score: Array | None = None
     straightened: bool = False
     symmetries: Mapping[str, Any] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
 
     @property
     def object_ids(self) -> list[str]:
@@ -82,69 +115,147 @@ class OrientationTable:
                 "and symmetries_continuous"
             ) from None
 
-    def errors(self, name: str | None = None) -> OrientationErrors:
-        """Return the errors on an object, which may be unnamed if it is the only one.
+    def name_of(self, object_id: str | None) -> str:
+        """Return the name of an object, which may be None if the table has only one.
 
         Raises
         ------
         UserError
-            For an unknown object, or none where there are several.
+            For an unknown object, or None where there are several.
         """
         known = self.object_ids
-        if name is None and len(known) > 1:
+        if object_id is None and len(known) > 1:
             raise UserError(f"the table has {len(known)} objects; name one of {', '.join(known)}")
-        name = known[0] if name is None else name
+        name = known[0] if object_id is None else object_id
         if name not in known:
             raise UserError(f"object {name} is not in the table: {nearest(name, known)}")
-        ratio = None
-        if self.score is not None and np.isfinite(self.score).all():
-            flips = [self._plain(other).is_flip for other in known]
-            scores = [self.score[self.object_id == other] for other in known]
-            ratio = ScoreRatio.fit(np.concatenate(scores), np.concatenate(flips))
-        is_named = self.object_id == name
-        return OrientationErrors(
-            self.estimate[is_named], self.truth[is_named], self.symmetry(name), ratio=ratio
+        return name
+
+    def errors(self, object_id: str | None = None) -> OrientationErrors:
+        """Return the errors on an object; its name and errors are those of `name_of`."""
+        return self._errors[self.name_of(object_id)]
+
+    @cached_property
+    def _errors(self) -> dict[str, OrientationErrors]:
+        ratio = self.score_ratio()
+        rows = {name: self.object_id == name for name in self.object_ids}
+        return {
+            name: OrientationErrors(
+                self.estimate[k], self.truth[k], self.symmetry(name), ratio=ratio
+            )
+            for name, k in rows.items()
+        }
+
+    def score_ratio(self, flip_deg: float = FLIP_DEG) -> ScoreRatio | None:
+        """Return what a score says about a flip of any object, if the pairs have scores."""
+        if self.score is None or not np.isfinite(self.score).all():
+            return None
+        rows = [(name, self.object_id == name) for name in self.object_ids]
+        error_deg = [
+            self.symmetry(name).distance_deg(self.estimate[k], self.truth[k]) for name, k in rows
+        ]
+        scores = np.concatenate([self.score[k] for _, k in rows])
+        return ScoreRatio.fit(scores, np.concatenate(error_deg) > flip_deg)
+
+    def where(self, rows: NDArray[np.bool_]) -> OrientationTable:
+        """Return the table of some of the pairs (n,)."""
+        return replace(
+            self,
+            object_id=self.object_id[rows],
+            group=self.group[rows],
+            estimate=self.estimate[rows],
+            truth=self.truth[rows],
+            score=None if self.score is None else self.score[rows],
         )
 
-    def _plain(self, name: str) -> OrientationErrors:
-        is_named = self.object_id == name
-        return OrientationErrors(self.estimate[is_named], self.truth[is_named], self.symmetry(name))
+    def recommend(
+        self,
+        estimates: Sequence[PoseEstimate],
+        candidates: Sequence[Pose] | int,
+        *,
+        object_id: str | None = None,
+        camera_pose: ArrayLike | None = None,
+        max_travel_deg: float = 180.0,
+    ) -> CameraRecommendation:
+        """Rank camera poses by the expected error of the pose that two views, or more, give.
+
+        Parameters
+        ----------
+        estimates : sequence of PoseEstimate
+            Estimates of views in succession if each has its camera pose, else hypotheses of one
+            view.
+        candidates : sequence of (4, 4), or int
+            Camera poses that can be reached; or how many even ones on a sphere about the object.
+        object_id : str, optional
+            Needed where the table has several objects.
+        camera_pose : (4, 4), optional
+            Pose of the only view: optical frame in the base frame, metres. By default the base
+            frame is the camera's.
+        max_travel_deg : float
+            Largest angle to the last view, about the object.
+
+        Returns
+        -------
+        CameraRecommendation
+
+        Raises
+        ------
+        UserError
+            Where estimates, poses and table do not fit each other, or no candidate is admissible.
+
+        Examples
+        --------
+        >>> import nbv, numpy as np
+        >>> poses = np.stack([np.eye(3)] * 12)
+        >>> cups = np.array(["cup"] * 12)
+        >>> table = nbv.OrientationTable(cups, group=cups, estimate=poses, truth=poses)
+        >>> answer = table.recommend([nbv.PoseEstimate(np.eye(3))], 50)
+        >>> answer.depends_on_view, answer.probability_within["30"] > 0.9
+        (False, True)
+        """
+        return recommend_camera(
+            self,
+            estimates,
+            candidates,
+            object_id=object_id,
+            camera_pose=camera_pose,
+            max_travel_deg=max_travel_deg,
+        )
 
     def depends_on_view(self, name: str) -> bool:
         """Return whether calibration shows that an object's flips depend on the view."""
-        errors, groups = self._plain(name), self.group[self.object_id == name]
+        errors, groups = self.errors(name), self.group[self.object_id == name]
         is_known = bool((groups != "").all() and errors.is_flip.any())
         return is_known and errors.depends_on_view(groups)
 
-    def about(self) -> list[dict[str, Any]]:
-        """Return what is known of each object, and what is thin or suspicious."""
+    def about(self) -> list[ObjectSummary]:
+        """Return a summary of each object."""
         return [self._about(name) for name in self.object_ids]
 
-    def _about(self, name: str) -> dict[str, Any]:
-        errors, is_named = self._plain(name), self.object_id == name
-        n, flips = int(is_named.sum()), errors.is_flip
-        seen = viewing_direction(spiral(500))
-        cosine = errors.symmetry.direction_cosine(seen, viewing_direction(errors.truth))
+    def _about(self, name: str) -> ObjectSummary:
+        errors = self.errors(name)
+        directions = viewing_direction(spiral(500))
+        cosine = errors.symmetry.direction_cosine(directions, viewing_direction(errors.truth))
         weight = np.exp(errors.concentration * (cosine - 1)).sum(axis=1)
-        said = []
-        if (known := float((weight > 1).mean())) < 0.5:
-            said.append(f"{1 - known:.0%} of the directions are seen by no pair nearby")
-        if (n_groups := len(set(self.group[is_named]) - {""})) < 2:
-            said.append("pairs are of one instance or scene: dependence on the view is unknown")
-        if not flips.any():
-            said.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
+        warnings = []
+        if (covered := float((weight > 1).mean())) < 0.5:
+            warnings.append(f"{1 - covered:.0%} of the directions are seen by no pair nearby")
+        if (n_groups := len(set(self.group[self.object_id == name]) - {""})) < 2:
+            warnings.append("pairs are of one instance or scene: dependence on the view is unknown")
+        if not errors.is_flip.any():
+            warnings.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
         elif hint := _common_axis(errors):
-            said.append(hint)
-        return {
-            "object_id": name,
-            "n_pairs": n,
-            "n_groups": n_groups,
-            "n_flips": int(flips.sum()),
-            "mean_error_deg": float(errors.error_deg.mean()),
-            "directions_covered": known,
-            "depends_on_view": self.depends_on_view(name),
-            "warnings": said,
-        }
+            warnings.append(hint)
+        return ObjectSummary(
+            object_id=name,
+            n_pairs=len(errors.estimate),
+            n_groups=n_groups,
+            n_flips=int(errors.is_flip.sum()),
+            mean_error_deg=float(errors.error_deg.mean()),
+            directions_covered=covered,
+            depends_on_view=self.depends_on_view(name),
+            warnings=tuple(warnings),
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the pairs as ``.npz``."""
