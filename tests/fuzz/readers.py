@@ -368,7 +368,7 @@ def of_mesh(name: str, make: Callable[[Path], object]) -> Reader:
 
 
 def make_bop_results(path: Path) -> None:
-    from nbv.robot.bop_example import write_example
+    from examples.bop_example import write_example
 
     write_example(path.parent)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from examples.bop_example import HALF_TURN, write_example
 from scipy.spatial.transform import Rotation
 from tests.rotation_pairs import orientation_pairs
 
@@ -16,7 +17,6 @@ from nbv.cli import main
 from nbv.errors import UserError
 from nbv.numbers import read_poses
 from nbv.robot.bop import read_orientation_table
-from nbv.robot.bop_example import HALF_TURN, write_example
 from nbv.robot.next_camera import PoseEstimate, as_view, read_views
 from nbv.robot.rotation_pairs import OrientationTable
 

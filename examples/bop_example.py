@@ -1,7 +1,7 @@
-"""A small example in BOP's form: ``python -m nbv.robot.bop_example FOLDER``.
+"""A small example in BOP's form: ``python examples/bop_example.py FOLDER``.
 
-The object has a half turn that a mark on one side tells apart. An estimator that does not see the
-mark takes the wrong one of two poses half of the time, and its score is lower.
+The object looks the same after a rotation by 180° but for a mark on one side. An estimator that
+does not see the mark takes the wrong pose half of the time, and its score is lower.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def write_example(folder: str | Path) -> None:
         write_text(folder / f"{scene:06d}" / "scene_gt.json", json.dumps(known))
     write_text(folder / "results.csv", "\n".join(lines) + "\n")
     write_text(folder / "models_info.json", json.dumps({"1": {"diameter": 100.0}}))
-    # From its back: which of two poses it has is open.
+    # Seen from the back, where both poses look the same.
     seen = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
     pose = (seen @ HALF_TURN).ravel().tolist()
     view = {"R": pose, "t": shift.tolist(), "score": 0.4}
