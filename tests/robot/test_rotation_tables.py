@@ -128,11 +128,11 @@ def transposed(rows):
     ("edit", "message"),
     [
         (first("R_true", matrix(lambda r: r * [1, 1, -1])), "row 2: R_true is a reflection"),
-        (first("R_estimate", matrix(lambda r: 2 * r)), "row 2: R_estimate is no rotation"),
+        (first("R_estimate", matrix(lambda r: 2 * r)), "row 2: R_estimate is not a rotation"),
         (first("R_true", lambda text: text[:20]), "row 2: R_true"),
         (first("t_true_mm", lambda _: "0 0 0.7"), "row 2: t_true_mm is 0.7 mm away; give mm"),
         (first("t_true_mm", lambda _: "0 0 -700"), "object to camera, not camera to object"),
-        (first("score", lambda _: "high"), "row 2: score 'high' is not 1 finite number"),
+        (first("score", lambda _: "high"), "row 2: score 'high' is not a finite number"),
         (transposed, "transposed"),
         (lambda rows: rows[rows["instance"] == 0], "row 2: 6 pairs"),
         (lambda rows: rows.drop(columns="R_estimate"), "no column 'R_estimate'"),
