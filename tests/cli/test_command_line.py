@@ -250,7 +250,7 @@ def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
     for line, about in zip(lines[2:4], (answer, answer.move), strict=True):
         within = f"({about.probability_within['5']:.0%} within 5°)"
         assert f"expected error {about.expected_error_deg:.1f}° {within}" in line
-    assert f"turn by {answer.move.rotation_deg:+.0f}°" in lines[3]
+    assert f"rotate by {answer.move.rotation_deg:+.0f}°" in lines[3]
     for move in answer.alternatives:
         assert f"{move.rotation_deg:+.0f}° ({move.expected_error_deg:.1f}°)" in lines[4]
     assert lines[5] == "target camera pose in the base frame"
@@ -378,8 +378,8 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
     assert Path("t.npz").read_bytes() == Path("wanted.npz").read_bytes()
     table = LookupTable.load("t.npz")
     for estimate in (0.0, 123.4, -30.0, 719.6):
-        options = ("--estimate", estimate, "--table", "t.npz")
-        printed = json.loads(run(capsys, "recommend", *options, "--json"))
+        options = ("next", "t.npz", "--estimate", estimate)
+        printed = json.loads(run(capsys, *options, "--json"))
         move = printed["move"]
         rotation = move["rotation_deg"]
         assert rotation % 360 == table.recommend(estimate)
@@ -388,8 +388,8 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
         assert printed["criterion"] == criterion
         cost = table.cost[round(estimate) % 360, int(rotation) % 360]
         assert move["cost"] == pytest.approx(float(cost))
-        told = run(capsys, "recommend", *options)
-        assert told.startswith(f"turn the camera by {rotation:+g}°, travel {abs(rotation):g}°")
+        told = run(capsys, *options).splitlines()[1]
+        assert told.startswith(f"next view  rotate by {rotation:+g}° (travel {abs(rotation):g}°)")
 
 
 def test_the_help_names_every_criterion(here, capsys):
@@ -935,7 +935,7 @@ def test_paths_are_checked_before_a_network_runs(here, capsys, monkeypatch):
 
 def test_help_and_version_succeed(capsys):
     text = run(capsys, "--help")
-    for command in ("recommend", "calibrate", "evaluate", "inspect", "export"):
+    for command in ("recommend", "next", "calibrate", "evaluate", "inspect", "export"):
         assert command in text
         told = run(capsys, command, "--help")
         assert "Usage: nbv" in told
@@ -1030,7 +1030,7 @@ EXPERIMENT += ("snakemake", "jinja2", "onnx")
     "arguments",
     [
         ("recommend", "f0.npy", "--bundle", "b.safetensors", "--plot", "plot.png"),
-        ("recommend", "--estimate", "90", "--table", "table.npz"),
+        ("next", "table.npz", "--estimate", "90"),
         ("calibrate", "pairs.csv", "--output", "new.npz"),
         ("evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2"),
         ("inspect", "b.safetensors"),
@@ -1047,27 +1047,33 @@ def test_a_robot_needs_no_package_of_the_experiment(manifest, pairs, arguments):
     assert done.returncode == 0, done.stderr
 
 
+def test_what_does_not_go_with_a_table_is_refused(pairs, capsys):
+    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    options = ("next", "t.npz", "--estimate")
+    for more in (("--until", "5"), ("--not-followed",), ("--sphere", "9"), ("--object", "1")):
+        message = fails(capsys, *options, "90", *more)
+        assert f"{more[0]} does not go with t.npz, which holds azimuths" in message
+    for estimate in (("views.csv",), ("1", "2")):
+        message = fails(capsys, *options, *estimate)
+        assert "--estimate: t.npz holds azimuths; give one number of degrees" in message
+
+
 @pytest.mark.parametrize(
-    "more",
-    [
-        ("f0.npy",),
-        ("--plot", "x.png"),
-        ("--elevation", "10"),
-        ("--bundle", "b.safetensors"),
-        ("--not-followed",),
-    ],
+    "table", [("--table", "t.npz"), ("--table=t.npz",)], ids=["separate", "joined"]
 )
-def test_what_an_estimate_cannot_use_is_refused(pairs, capsys, more):
-    main(["calibrate", "pairs.csv", "--output", "table.npz"])
-    capsys.readouterr()
-    options = ("recommend", "--estimate", "90", "--table", "table.npz")
-    message = fails(capsys, *options, *more)
-    assert f"{'FRAME' if more == ('f0.npy',) else more[0]} does not go with --estimate" in message
+def test_the_former_form_of_next_gives_its_answer_and_a_hint(pairs, capsys, table):
+    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+    wanted = run(capsys, "next", "t.npz", "--estimate", "-30", "--allowed", "-60:60", "--json")
+    former = ["recommend", *table, "--estimate", "-30", "--allowed", "-60:60", "--json"]
+    assert main(former) == 0
+    out, err = capsys.readouterr()
+    assert out == wanted
+    assert "is now `nbv next TABLE`" in err
 
 
 def test_an_estimate_has_target_poses_where_camera_and_axis_are_known(pairs, capsys):
     run(capsys, "calibrate", "pairs.csv", "--output", "table.npz")
-    options = ("recommend", "--estimate", "90", "--table", "table.npz")
+    options = ("next", "table.npz", "--estimate", "90")
     bare = json.loads(run(capsys, *options, "--json"))
     placed = (*options, "--camera-pose", "pose.json", "--axis", "0.1,-0.2,0.3")
     printed = json.loads(run(capsys, *placed, "--json"))
@@ -1091,7 +1097,7 @@ def test_an_estimate_has_target_poses_where_camera_and_axis_are_known(pairs, cap
 def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, criterion, unit):
     main(["calibrate", "pairs.csv", "--output", "t.npz", "--criterion", criterion])
     capsys.readouterr()
-    options = ("recommend", "--estimate", "90", "--table", "t.npz")
+    options = ("next", "t.npz", "--estimate", "90")
     cost = LookupTable.load("t.npz").cost[90].astype(float)
     turns = np.arange(360)
     travel = np.minimum(turns, 360 - turns)
@@ -1111,8 +1117,8 @@ def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, crite
         assert cost[found].tolist() == sorted(cost[found])
         assert len(moves) == may.sum() if may.sum() < 5 else len(moves) > 1
         told = run(capsys, *options, *limits).splitlines()
-        assert told[0].endswith(f"({criterion} {moves[0]['cost']:.3f}{unit})")
-        assert told[1:] == [] if len(moves) == 1 else told[1].startswith("or ")
+        assert told[1].endswith(f"): {criterion} {moves[0]['cost']:.3f}{unit}")
+        assert told[2:] == [] if len(moves) == 1 else told[2].startswith("or ")
     for limits in (("--allowed", "0", "1", "-1"), ("--max-travel", "1")):
         assert "no admissible rotation" in fails(capsys, *options, *limits)
 
@@ -1125,15 +1131,13 @@ def test_a_range_allows_every_degree_between_its_ends(pairs, capsys):
         (("150:210",), range(150, 211)),
         (("-3.5:0",), (-3.5, -2.5, -1.5, -0.5, 0)),
     ):
-        for of_what in (("--estimate", "90", "--table", "t.npz"), ("f0.npy", *OWN)):
-            if of_what[0] == "f0.npy" and len(wanted) == 5:
+        for of_what in (("next", "t.npz", "--estimate", "90"), ("recommend", "f0.npy", *OWN)):
+            if of_what[0] == "recommend" and len(wanted) == 5:
                 continue
-            options = ("recommend", *of_what, "--json", "--allowed")
+            options = (*of_what, "--json", "--allowed")
             assert run(capsys, *options, *given) == run(capsys, *options, *map(str, wanted))
     for given in ("60:-60", "0:361", "5:nan"):
-        message = fails(
-            capsys, "recommend", "--estimate", "90", "--table", "t.npz", "--allowed", given
-        )
+        message = fails(capsys, "next", "t.npz", "--estimate", "90", "--allowed", given)
         assert given in message
 
 
@@ -1141,7 +1145,7 @@ def test_a_table_that_knows_nothing_recommends_nothing_without_a_word(pairs, cap
     known = pd.read_csv(pairs)
     known.assign(estimate_deg=np.random.default_rng(1).uniform(0, 360, len(known))).to_csv("g.csv")
     run(capsys, "calibrate", "g.csv", "--output", "t.npz")
-    options = ("recommend", "--estimate", "90", "--table", "t.npz")
+    options = ("next", "t.npz", "--estimate", "90")
     (warning,) = json.loads(run(capsys, *options, "--json"))["warnings"]
     assert f"warning: {warning}" in run(capsys, *options).splitlines()
     assert "no view is better than another" in warning
@@ -1149,7 +1153,7 @@ def test_a_table_that_knows_nothing_recommends_nothing_without_a_word(pairs, cap
 
 def test_angles_beyond_all_turns_are_one_line(pairs, capsys):
     run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
-    table = ("recommend", "--table", "t.npz", "--estimate")
+    table = ("next", "t.npz", "--estimate")
     assert "--estimate=1e+300" in fails(capsys, *table, "1e300")
     assert "allowed rotations" in fails(capsys, *table, "3", "--allowed", "1e300")
     frames = ("recommend", "f0.npy", "f1.npy", *OWN, "--rotations", "0", "1e300")
@@ -1160,12 +1164,12 @@ def test_the_reason_why_a_table_is_refused_is_told(pairs, capsys):
     run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     with np.load("t.npz") as stored:
         np.savez("d.npz", **(dict(stored) | {"spread": np.array("width")}))
-    message = fails(capsys, "recommend", "--estimate", "90", "--table", "d.npz")
-    assert "d.npz: spread is 'width'; give the .npz file that nbv calibrate wrote" in message
+    message = fails(capsys, "next", "d.npz", "--estimate", "90")
+    assert "d.npz: spread is 'width'; make it again with nbv calibrate" in message
 
 
 def test_what_is_no_lookup_table_is_not_to_be_deleted(pairs, capsys):
-    message = fails(capsys, "recommend", "--estimate", "90", "--table", "pairs.csv")
+    message = fails(capsys, "next", "pairs.csv", "--estimate", "90")
     assert "pairs.csv: cannot be read (it is not an array of numbers)" in message
     assert "give the .npz file that nbv calibrate wrote" in message
     assert "delete" not in message

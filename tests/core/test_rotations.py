@@ -10,11 +10,11 @@ from nbv.core.rotations import (
     ASYMMETRIC,
     Symmetry,
     along_ray,
-    check_orientations,
     spiral,
     viewing_direction,
 )
 from nbv.errors import UserError
+from nbv.numbers import as_orientations
 
 
 def bop(*turns):
@@ -128,7 +128,7 @@ def test_a_camera_that_looks_straight_sees_the_object_on_its_axis():
     np.testing.assert_allclose(
         seen, np.linalg.norm(position, axis=1)[:, None] * [0, 0, 1], atol=1e-9
     )
-    np.testing.assert_allclose(check_orientations("turns", turns)[1], np.eye(3))
+    np.testing.assert_allclose(as_orientations(turns, "turns")[1], np.eye(3))
 
 
 @pytest.mark.parametrize(
@@ -155,12 +155,12 @@ def test_an_impossible_symmetry_is_refused(entry, said):
     ("rotations", "said"),
     [
         ([np.eye(3), -np.eye(3)], r"R\[1\] is a reflection"),
-        ([np.eye(3), np.full((3, 3), np.nan)], r"R\[1\] is no rotation"),
-        (1000 * np.eye(3), "R is no rotation"),
+        ([np.eye(3), np.full((3, 3), np.nan)], r"R\[1\] is not a rotation"),
+        (1000 * np.eye(3), "R is not a rotation"),
         (np.eye(4), r"\(4, 4\) instead of"),
         ([["x"] * 3] * 3, "not a number"),
     ],
 )
 def test_what_is_no_rotation_is_named(rotations, said):
     with pytest.raises(UserError, match=said):
-        check_orientations("R", rotations)
+        as_orientations(rotations, "R")

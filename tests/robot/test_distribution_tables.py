@@ -269,11 +269,13 @@ def test_one_file_holds_the_lookup_table_and_the_distributions(here, capsys):
     run(capsys, "calibrate", "plain.csv", "--output", "plain.npz")
     same, plain = LookupTable.load("t.npz"), LookupTable.load("plain.npz")
     assert np.array_equal(same.cost, plain.cost)
-    assert run(capsys, "recommend", "--estimate", "20", "--table", "t.npz") == run(
-        capsys, "recommend", "--estimate", "20", "--table", "plain.npz"
+    assert run(capsys, "next", "t.npz", "--estimate", "20") == run(
+        capsys, "next", "plain.npz", "--estimate", "20"
     )
-    message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "plain.npz")
-    assert "plain.npz: holds no distributions, which pairs have in columns p0, p1" in message
+    message = fails(capsys, "next", "plain.npz", "--estimate", "views.csv")
+    assert "plain.npz holds azimuths; give one number of degrees" in message
+    with pytest.raises(UserError, match="holds no distributions, which pairs have in columns p0"):
+        DistributionTable.load("plain.npz")
 
 
 @pytest.mark.parametrize(
@@ -305,7 +307,7 @@ def test_a_damaged_table_is_one_line(here, capsys):
         ("n_classes", np.array(BINS + 0.5), "number of classes"),
     ):
         np.savez("d.npz", **(stored | {f"distribution.{name}": value}))
-        message = fails(capsys, "recommend", "--distribution", "views.csv", "--table", "d.npz")
+        message = fails(capsys, "next", "d.npz", "--estimate", "views.csv")
         assert "d.npz: " in message
         assert reason in message
 
@@ -313,9 +315,9 @@ def test_a_damaged_table_is_one_line(here, capsys):
 @pytest.mark.parametrize("file", ["views.csv", "views.npy"])
 def test_the_command_answers_as_python_does(here, capsys, file):
     run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
-    options = ("--distribution", file, "--table", "t.npz", "--rotations", "0", "90")
+    options = ("t.npz", "--estimate", file, "--rotations", "0", "90")
     limits = ("--max-travel", "120", "--camera-pose", "pose.json", "--axis", "0.5", "0", "0.1")
-    printed = json.loads(run(capsys, "recommend", *options, *limits, "--json"))
+    printed = json.loads(run(capsys, "next", *options, *limits, "--json"))
     table = DistributionTable.load("t.npz")
     answer = table.recommend(read_distributions(file), [0.0, 90.0], max_travel_deg=120.0)
     assert printed["azimuth_deg"] == answer.azimuth_deg
@@ -324,21 +326,20 @@ def test_the_command_answers_as_python_does(here, capsys, file):
     assert printed["assumed_focal_px"] is None
     target = moved_camera(np.array(POSE), [0.5, 0, 0.1], [0, 0, 1], answer.move.rotation_deg)
     assert printed["target_camera_pose"] == pytest.approx(target)
-    told = run(capsys, "recommend", *options, "--allowed", "45,120")
+    told = run(capsys, "next", *options, "--allowed", "45,120")
     only = table.recommend(read_distributions(file), [0.0, 90.0], allowed_deg=[45, 120])
     assert f"azimuth {only.azimuth_deg:.1f}° (camera around object;" in told
     assert "; 2 views)" in told
-    assert f"turn by {only.move.rotation_deg:+g}°" in told
+    assert f"rotate by {only.move.rotation_deg:+g}°" in told
 
 
 def test_what_a_user_gets_wrong_is_one_line(here, capsys):
     run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
-    both = ("--distribution", "views.csv", "--table", "t.npz")
+    both = ("t.npz", "--estimate", "views.csv")
     Path("bad.npy").write_bytes(b"PK\3\4 not a zip")
     for arguments, message in (
-        (("--distribution", "views.csv"), "--distribution and --table belong together"),
-        ((*both, "--estimate", "3"), "give one of them"),
-        ((*both, "--plot", "p.png"), "--plot does not go with --distribution"),
+        ((*both, "--sphere", "3"), "--sphere does not go with t.npz, which holds distributions"),
+        ((*both[:-1], "1", "2"), "t.npz holds azimuths; give one number of degrees"),
         (
             (
                 *both,
@@ -357,15 +358,15 @@ def test_what_a_user_gets_wrong_is_one_line(here, capsys):
             ),
             "does the direction point up",
         ),
-        (("--distribution", "views.csv", "--table", "no.npz"), "no.npz does not exist"),
-        (("--distribution", "pose.json", "--table", "t.npz"), "pose.json"),
+        (("no.npz", "--estimate", "views.csv"), "no.npz does not exist"),
+        (("t.npz", "--estimate", "pose.json"), "pose.json"),
         (
-            ("--distribution", "views.csv", "--table", "pairs.csv"),
+            ("pairs.csv", "--estimate", "views.csv"),
             "pairs.csv: cannot be read (it is not an array of numbers)",
         ),
-        (("--distribution", "bad.npy", "--table", "t.npz"), "bad.npy cannot be read"),
+        (("t.npz", "--estimate", "bad.npy"), "bad.npy cannot be read"),
     ):
-        assert message in fails(capsys, "recommend", *arguments)
+        assert message in fails(capsys, "next", *arguments)
 
 
 @pytest.mark.parametrize(

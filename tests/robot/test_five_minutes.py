@@ -54,7 +54,7 @@ def test_the_commands_print_what_the_page_shows(printed):
 
 def test_the_text_follows_the_answer():
     """The second frame is where the first answer sends the camera from 75°."""
-    (first, *_) = re.findall(r"turn by ([+-]\d+)°", "\n".join(ANSWERS))
+    (first, *_) = re.findall(r"rotate by ([+-]\d+)°", "\n".join(ANSWERS))
     there = 75 + int(first)
     assert f"--rotations 0 {int(first)}" in COMMANDS[-1]
     assert f"--azimuth {there % 360} " in COMMANDS[-2]

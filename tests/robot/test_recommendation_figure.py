@@ -25,8 +25,10 @@ def recommendation(rotation_deg: float = 90.0, n_frames: int = 1) -> Recommendat
         azimuth_deg=86.1,
         spread_deg=20.0,
         expected_error_deg=12.3,
-        move=Move(rotation_deg, abs(rotation_deg), 6.0),
-        alternatives=(Move(-45.0, 45.0, 9.0),),
+        moves=(
+            Move(rotation_deg=rotation_deg, travel_deg=abs(rotation_deg), expected_error_deg=6.0),
+            Move(rotation_deg=-45.0, travel_deg=45.0, expected_error_deg=9.0),
+        ),
         belief=np.full(BINS, 1 / BINS),
         error_after_deg=error,
         ood_score=0.5,
@@ -110,7 +112,7 @@ def test_an_allowed_rotation_without_neighbours_is_seen(drawn):
 def test_without_a_next_view_there_is_no_circle_of_errors(drawn):
     whole = recommendation(n_frames=4)
     nowhere = np.full(BINS, np.inf)
-    root = drawn(replace(whole, move=None, alternatives=(), error_after_deg=nowhere))
+    root = drawn(replace(whole, moves=(), error_after_deg=nowhere))
     found = " ".join(texts(root))
     assert "Azimuth (camera around mug): 86°" in found
     assert "best" not in found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -127,11 +128,11 @@ def transposed(rows):
     ("edit", "message"),
     [
         (first("R_true", matrix(lambda r: r * [1, 1, -1])), "row 2: R_true is a reflection"),
-        (first("R_estimate", matrix(lambda r: 2 * r)), "row 2: R_estimate is no rotation"),
+        (first("R_estimate", matrix(lambda r: 2 * r)), "row 2: R_estimate is not a rotation"),
         (first("R_true", lambda text: text[:20]), "row 2: R_true"),
         (first("t_true_mm", lambda _: "0 0 0.7"), "row 2: t_true_mm is 0.7 mm away; give mm"),
         (first("t_true_mm", lambda _: "0 0 -700"), "object to camera, not camera to object"),
-        (first("score", lambda _: "high"), "row 2: score 'high' is not 1 finite number"),
+        (first("score", lambda _: "high"), "row 2: score 'high' is not a finite number"),
         (transposed, "transposed"),
         (lambda rows: rows[rows["instance"] == 0], "row 2: 6 pairs"),
         (lambda rows: rows.drop(columns="R_estimate"), "no column 'R_estimate'"),
@@ -284,41 +285,47 @@ def test_the_commands_of_the_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     write_example("example")
     assert main(["calibrate", "example/results.csv", "--output", "table.npz"]) == 0
-    options = ["recommend", "--estimate", "example/estimate.json", "--table", "table.npz"]
+    options = ["next", "table.npz", "--estimate", "example/estimate.json"]
     options += ["--sphere", "50", "--until", "5"]
     assert main(options) == 0
-    assert "one more view" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "one more view" in out
+    assert "seen from the direction " in out
+    rows = re.findall(r"^ +(-?\d\.\d{5}) +(-?\d\.\d{5}) +(-?\d\.\d{5})$", out, re.M)
     assert main([*options, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["enough"] is False
+    assert np.allclose(np.array(rows, dtype=float), answer["rotation"], atol=1e-5)
     assert answer["move"]["expected_error_deg"] < answer["expected_error_deg"]
     poses = np.array([m["target_camera_pose"] for m in [answer["move"], *answer["alternatives"]]])
     np.save("poses.npy", poses)
     assert len(read_poses("poses.npy")) == len(poses)
-    options = ["recommend", "--estimate", *map(str, np.eye(3).ravel()), "--table", "table.npz"]
+    options = ["next", "table.npz", "--estimate", *map(str, np.eye(3).ravel())]
     assert main([*options, "--candidates", "poses.npy"]) == 0
     assert main(options) == 2
-    assert "needs --candidates or --sphere" in capsys.readouterr().err
+    assert "--candidates and --sphere: give one of them" in capsys.readouterr().err
 
 
 def test_the_keys_of_an_azimuth_are_a_subset(tmp_path, monkeypatch, capsys, pairs):
     monkeypatch.chdir(tmp_path)
     pairs.save("table.npz")
-    options = ["recommend", "--json", "--estimate"]
+    options = ["--json", "--estimate"]
     np.save("r.npy", np.eye(3))
     assert np.array_equal(read_views("r.npy")[0].rotation, np.eye(3))
-    assert main([*options, "r.npy", "--table", "table.npz", "--sphere", "9"]) == 0
+    assert main(["next", "table.npz", *options, "r.npy", "--sphere", "9"]) == 0
     answer = json.loads(capsys.readouterr().out)
     azimuths = "object_id,azimuth_deg,estimate_deg\n" + "".join(f"a,{k},{k}\n" for k in range(360))
     Path("pairs.csv").write_text(azimuths)
     assert main(["calibrate", "pairs.csv", "--output", "circle.npz"]) == 0
     capsys.readouterr()
-    assert main([*options, "10", "--table", "circle.npz"]) == 0
+    assert main(["next", "circle.npz", *options, "10"]) == 0
     one_axis = json.loads(capsys.readouterr().out)
     assert set(one_axis) - {"criterion", "cost_unit"} <= set(answer)
     assert set(one_axis["move"]) - {"cost"} <= set(answer["move"])
-    assert main([*options, "r.npy", "--table", "circle.npz", "--sphere", "9"]) == 2
-    assert "holds no orientations" in capsys.readouterr().err
+    assert main(["next", "circle.npz", *options, "r.npy", "--sphere", "9"]) == 2
+    assert "circle.npz holds azimuths" in capsys.readouterr().err
+    with pytest.raises(UserError, match="holds no orientations"):
+        OrientationTable.load("circle.npz")
 
 
 @pytest.mark.parametrize(

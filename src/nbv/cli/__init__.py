@@ -1,4 +1,4 @@
-"""The command line: ``nbv recommend``, ``calibrate``, ``evaluate`` and others.
+"""The command line: ``nbv recommend``, ``next``, ``calibrate``, ``evaluate`` and others.
 
 Commands import their modules when they run, so that ``nbv --help`` is fast.
 """
@@ -22,6 +22,7 @@ from nbv.cli.answers import print_json
 from nbv.cli.arguments import in_flags, joined_numbers
 from nbv.cli.bundles import export, inspect, render
 from nbv.cli.calibration import calibrate, evaluate
+from nbv.cli.estimates import next_view
 from nbv.cli.recommendation import recommend
 from nbv.errors import NamedError, UserError
 
@@ -37,7 +38,9 @@ app = App(
     help_format="plaintext",
     result_action="return_value",
 )
-for command in (recommend, calibrate, evaluate, render, inspect, export):
+app.command(recommend)
+app.command(next_view, name="next")
+for command in (calibrate, evaluate, render, inspect, export):
     app.command(command)
 
 # Errors of a full disk or file.
@@ -51,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return 0, or 2 after printing one line about a mistake in the input."""
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        app(joined_numbers(given), exit_on_error=False, print_error=False)
+        app(_with_next(joined_numbers(given)), exit_on_error=False, print_error=False)
         sys.stdout.flush()
     except BrokenPipeError:
         # The reader of the output has closed it.
@@ -70,6 +73,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _drop_output()
         return _print_error(message)
     return 0
+
+
+def _with_next(arguments: list[str]) -> list[str]:
+    """Return arguments in which ``recommend --table TABLE`` is ``next TABLE``, for one release."""
+    spaced = [part for item in arguments for part in _option_and_value(item)]
+    if arguments[:1] != ["recommend"] or "--table" not in spaced[:-1]:
+        return arguments
+    at = spaced.index("--table")
+    hint = "`nbv recommend --table TABLE` is now `nbv next TABLE`, and --distribution --estimate"
+    print(f"nbv: {hint}; the old form goes with the next release", file=sys.stderr)  # noqa: T201
+    others = spaced[1:at] + spaced[at + 2 :]
+    others = ["--estimate" if item == "--distribution" else item for item in others]
+    return joined_numbers(["next", spaced[at + 1], *others])
+
+
+def _option_and_value(item: str) -> list[str]:
+    return item.split("=", 1) if item.startswith(("--table=", "--distribution=")) else [item]
 
 
 def _drop_output() -> None:

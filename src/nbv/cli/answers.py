@@ -5,23 +5,24 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields, replace
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from nbv.errors import printable
 from nbv.labels import counted
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
-    from numpy.typing import NDArray
 
+    from nbv.cli.arguments import Placement
     from nbv.core.offset import Offset
-    from nbv.robot.next_camera import CameraMove, CameraRecommendation
-    from nbv.robot.next_view import Move, Recommendation
+    from nbv.robot.answers import Answer
 
-Placement = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
-"""Camera pose in the base frame, point on the object's axis, and direction of the axis."""
+AnyAnswer = TypeVar("AnyAnswer", bound="Answer[Any]")
+
+N_ALTERNATIVES = 5
+"""Number of other moves in a line of text; JSON has all."""
 
 
 def print_line(line: str) -> None:
@@ -40,42 +41,32 @@ def print_assumed_camera(focal_px: float, n_frames: int | None = None) -> None:
     print_line(f"camera     not given{frames}: a focal length of {focal_px:g} px is assumed")
 
 
-def target_poses(
-    rotations_deg: Iterable[float], placement: Placement | None
-) -> list[NDArray[np.float64]] | None:
-    """Return the camera's pose (4, 4) after each rotation; None without a placement."""
-    from nbv.robot.moves import moved_camera
+def with_targets(
+    answer: AnyAnswer,
+    placement: Placement | None,
+    object_position_m: Sequence[float] | None = None,
+    diagonal_m: float | None = None,
+) -> AnyAnswer:
+    """Return an answer with the camera's pose after each rotation, if its placement is known.
+
+    Parameters and errors are those of `nbv.check_axis`, whose warnings are added.
+    """
+    from nbv.robot.moves import check_axis, moved_camera
 
     if placement is None:
-        return None
-    return [moved_camera(*placement, rotation_deg) for rotation_deg in rotations_deg]
-
-
-def with_targets(
-    moves: Sequence[Mapping[str, Any]], targets: Sequence[NDArray[np.float64]] | None
-) -> list[dict[str, Any]]:
-    """Return moves for JSON, each with the camera's pose after it if that is known."""
-    if targets is None:
-        return [dict(move) for move in moves]
-    return [
-        {**move, "target_camera_pose": target.tolist()}
-        for move, target in zip(moves, targets, strict=True)
-    ]
+        return answer
+    warnings = check_axis(*placement, object_position_m, diagonal_m)
+    moves: Any = tuple(
+        replace(move, target_camera_pose=moved_camera(*placement, move.rotation_deg))
+        for move in answer.moves
+    )
+    return replace(answer, moves=moves, warnings=(*answer.warnings, *warnings))
 
 
 def print_warnings(warnings: Iterable[str]) -> None:
     """Print one line for each warning."""
     for warning in warnings:
         print_line(f"warning: {warning}")
-
-
-def print_target(targets: Sequence[NDArray[np.float64]] | None) -> None:
-    """Print the camera's pose after the best move, if both exist."""
-    if not targets:
-        return
-    print_line("target camera pose in the base frame")
-    for row in targets[0]:
-        print_line("  " + " ".join(f"{value:9.5f}" for value in row))
 
 
 _KEYS = (
@@ -97,156 +88,78 @@ _KEYS = (
 """Keys of every answer, in this order; the values of unknown ones are None."""
 
 
-def _as_json(
-    known: Mapping[str, Any],
-    moves: Sequence[Mapping[str, Any]],
-    warnings: Iterable[str],
-    targets: Sequence[NDArray[np.float64]] | None,
+_MOVE_KEYS = ("rotation_deg", "travel_deg", "expected_error_deg", "probability_within")
+"""Keys of every move, in this order."""
+
+_NOT_IN_JSON = ("crops", "n_views", "moves")
+
+
+def answer_as_json(
+    answer: Answer[Any],
+    enough: bool | None,
+    assumed_focal_px: float | None = None,
+    *,
+    has_targets: bool,
 ) -> dict[str, Any]:
-    """Return an answer for JSON from known values and moves, best first."""
-    listed = with_targets(moves, targets)
-    best = listed[0] if listed else None
-    given = {"move": best, "alternatives": listed[1:], "warnings": list(warnings)}
-    about = dict.fromkeys(_KEYS) | dict(known) | given
-    if targets is not None:
-        about["target_camera_pose"] = best["target_camera_pose"] if best else None
+    """Return an answer for JSON.
+
+    Parameters
+    ----------
+    answer : Answer
+    enough : bool or None
+        None without ``--until``.
+    assumed_focal_px : float or None
+        None if intrinsics were given.
+    has_targets : bool
+        Whether there are keys for the camera's pose after each move.
+    """
+    target = "target_camera_pose"
+    moves = [dict.fromkeys(_MOVE_KEYS) | _plain(move) for move in answer.moves]
+    best = moves[0] if moves else None
+    about = dict.fromkeys(_KEYS) | _plain(answer)
+    about |= {"enough": enough, "move": best, "alternatives": moves[1:]}
+    about["assumed_focal_px"] = assumed_focal_px
+    if has_targets:
+        about[target] = best and best[target]
+        return about
+    for move in moves:
+        del move[target]
     return about
 
 
-def recommendation_as_json(
-    answer: Recommendation,
-    warnings: Iterable[str],
-    targets: Sequence[NDArray[np.float64]] | None,
-    assumed_focal_px: float | None = None,
-    enough: bool | None = None,
-) -> dict[str, Any]:
-    """Return a recommendation for JSON, with all warnings and the camera's poses after its moves.
-
-    `assumed_focal_px` is None if intrinsics were given, `enough` without ``--until``.
-    """
-    known = {
-        "azimuth_deg": answer.azimuth_deg,
-        "spread_deg": answer.spread_deg,
-        "expected_error_deg": answer.expected_error_deg,
-        "probability_within": answer.probability_within,
-        "enough": enough,
-        "ood_score": None if math.isnan(answer.ood_score) else answer.ood_score,
-        "bayes_factor": answer.bayes_factor,
-        "assumed_focal_px": assumed_focal_px,
-        "object_position_m": answer.object_position_m,
-        "belief": answer.belief.tolist(),
-        "error_after_deg": [None if e == float("inf") else e for e in answer.error_after_deg],
-    }
-    return _as_json(known, [asdict(move) for move in answer.moves], warnings, targets)
+def _plain(item: Any) -> dict[str, Any]:
+    """Return the attributes of an answer or a move for JSON; what is unknown is None."""
+    values = {each.name: getattr(item, each.name) for each in fields(item)}
+    return {name: _value(values[name]) for name in values if name not in _NOT_IN_JSON}
 
 
-def table_answer_as_json(
-    estimate_deg: float,
-    criterion: str,
-    cost_unit: str,
-    ranked: Iterable[tuple[float, float]],
-    warnings: Iterable[str],
-    targets: Sequence[NDArray[np.float64]] | None,
-) -> dict[str, Any]:
-    """Return a lookup table's rotations and costs, best first, for JSON.
-
-    The keys are those of `recommendation_as_json`, and the criterion, the unit of its cost, and the
-    cost of each move.
-    """
-    moves = [
-        {"rotation_deg": rotation, "travel_deg": abs(rotation), "cost": cost}
-        | dict.fromkeys(("expected_error_deg", "probability_within"))
-        for rotation, cost in ranked
-    ]
-    about = {"criterion": criterion, "cost_unit": cost_unit}
-    return _as_json({"azimuth_deg": estimate_deg % 360.0}, moves, warnings, targets) | about
+def _value(value: Any) -> Any:
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list):
+        return [_value(each) for each in value]
+    is_unknown = value == {} or (isinstance(value, float) and not math.isfinite(value))
+    return None if is_unknown else value
 
 
-def camera_answer_as_json(answer: CameraRecommendation, enough: bool | None) -> dict[str, Any]:
-    """Return ranked camera poses for JSON: the keys of every answer, and those of rotations."""
-    moves = [
-        asdict(move)
-        | {"rotation_deg": None, "direction": move.direction.tolist()}
-        | {"target_camera_pose": None if (t := move.target_camera_pose) is None else t.tolist()}
-        for move in answer.moves
-    ]
-    known = {
-        "expected_error_deg": answer.expected_error_deg,
-        "rotation": answer.rotation.tolist(),
-        "probability_within": answer.probability_within,
-        "depends_on_view": answer.depends_on_view,
-        "enough": enough,
-        "target_camera_pose": moves[0]["target_camera_pose"],
-    }
-    return _as_json(known, moves, answer.warnings, None)
-
-
-def print_camera_answer(answer: CameraRecommendation, enough: bool | None) -> None:
-    """Print ranked camera poses in a few lines."""
-    print_line(f"pose       expected error {answer.expected_error_deg:.1f}°, {_chances(answer)}")
-    _print_enough(enough)
-    for move, head in zip(answer.moves[:6], ["next view", *[""] * 5], strict=False):
-        metres = "" if move.travel_m is None else f", {move.travel_m:.2f} m"
-        print_line(
-            f"{head:<10} candidate {move.index}, travel {move.travel_deg:.0f}°{metres}: "
-            f"expected error {move.expected_error_deg:.1f}°, {_chances(move)}"
-        )
-    print_warnings(answer.warnings)
-    best = answer.moves[0].target_camera_pose
-    print_target(None if best is None else [best])
-
-
-def _chances(about: CameraRecommendation | CameraMove) -> str:
-    chances = about.probability_within.items()
-    return ", ".join(f"{_percent(p)} within {error}°" for error, p in chances)
-
-
-def _chance(about: Recommendation | Move) -> str:
-    """Return the probability of the smallest error."""
-    error, p = next(iter(about.probability_within.items()))
-    return f" ({_percent(p)} within {error}°)"
-
-
-def _percent(p: float) -> str:
-    return ">99%" if p > 0.994 else f"{p:.0%}"
-
-
-def _print_enough(enough: bool | None) -> None:
+def print_answer(answer: Answer[Any], enough: bool | None, seen: str = "object") -> None:
+    """Print an answer about an object, which is called `seen`, in a few lines."""
+    for head, line in zip_longest(["pose"], answer.pose_lines(seen), fillvalue=""):
+        print_line(f"{head:<10} {line}")
     if enough is not None:
         print_line(f"           {'enough: stop here' if enough else 'one more view'}")
-
-
-def print_recommendation(
-    answer: Recommendation,
-    category: str,
-    warnings: Iterable[str],
-    targets: Sequence[NDArray[np.float64]] | None,
-    enough: bool | None = None,
-) -> None:
-    """Print a recommendation for an object of a category in a few lines."""
-    print_line(
-        f"pose       azimuth {answer.azimuth_deg:.1f}° (camera around {category}; "
-        f"{counted(answer.n_views, 'view')})"
-    )
-    print_line(
-        f"           expected error {answer.expected_error_deg:.1f}°{_chance(answer)}, "
-        f"spread {answer.spread_deg:.1f}°"
-    )
-    _print_enough(enough)
     if (move := answer.move) is None:
         print_line("next view  none: all candidates are within 15° of an existing view")
     else:
-        print_line(
-            f"next view  turn by {move.rotation_deg:+g}° (travel {move.travel_deg:g}°): "
-            f"expected error {move.expected_error_deg:.1f}°{_chance(move)}"
-        )
-    if answer.alternatives:
-        others = (
-            f"{m.rotation_deg:+g}° ({m.expected_error_deg:.1f}°)" for m in answer.alternatives
-        )
-        print_line(f"or         {', '.join(others)}")
-    print_warnings(warnings)
-    print_target(targets)
+        print_line(f"next view  {move.instruction} ({move.extent}): {answer.value(move)}")
+    if others := answer.alternatives[:N_ALTERNATIVES]:
+        listed = (f"{other.name} ({answer.short_value(other)})" for other in others)
+        print_line(f"or         {', '.join(listed)}")
+    print_warnings(answer.warnings)
+    if move is not None and move.target_camera_pose is not None:
+        print_line("target camera pose in the base frame")
+        for row in move.target_camera_pose:
+            print_line("  " + " ".join(f"{value:9.5f}" for value in row))
 
 
 def print_offset(name: str, number: str, offset: Offset, *, is_added: bool = False) -> None:

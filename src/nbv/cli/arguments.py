@@ -7,14 +7,19 @@ import math
 import os
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter, Token
 
 from nbv.errors import UserError
 
-Command = TypeVar("Command", bound=Callable[..., None])
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 def as_whole_number(_kind: Any, tokens: Sequence[Token]) -> int:
@@ -120,6 +125,95 @@ def as_paragraphs(command: Command) -> Command:
     return command
 
 
+Placement = tuple["NDArray[np.float64]", "list[float]", "list[float]"]
+"""Camera pose in the base frame, point on the object's axis, and direction of the axis."""
+
+
+@as_paragraphs
+@Parameter(name="*")
+@dataclass(frozen=True)
+class FrameOptions:
+    """Options that say how frames are read.
+
+    Parameters
+    ----------
+    intrinsics
+        fx,fy,cx,cy in pixels, only the focal length, or a camera file (BOP, ROS CameraInfo). Give
+        only the focal length for a frame that was cut out of a larger image.
+    depth_scale
+        Metres per unit of depth. Default: 1 for floating-point depth; for integer depth the value
+        of the camera file, or 0.001.
+    near
+        Least depth of the object, metres.
+    far
+        Largest depth of the object, metres.
+    """
+
+    intrinsics: str | None = None
+    depth_scale: float | None = None
+    near: float | None = None
+    far: float | None = None
+
+
+ANY_FRAME = FrameOptions()
+
+
+@as_paragraphs
+@Parameter(name="*")
+@dataclass(frozen=True)
+class MoveOptions:
+    """Options that say where the camera is, and where it may go.
+
+    Parameters
+    ----------
+    allowed
+        Admissible rotations from the last view: degrees, ranges such as -60:60, or a .npy file of
+        degrees or of n booleans, where entry k selects the rotation 360 k / n.
+    max_travel
+        Largest angle between the last view and the next, degrees.
+    camera_pose
+        The camera's pose at the last view, for which the target pose is printed too: the pose of
+        the optical frame (x right, y down, z forward) in the base frame, metres; the 16 numbers of
+        a 4 x 4 matrix, row by row, in a .txt, .npy or .json file.
+    axis
+        The object's upright axis in the base frame: a point, metres, or a point and a direction.
+        Default direction: 0 0 1.
+    """
+
+    allowed: Rotations = None
+    max_travel: float = 180.0
+    camera_pose: Path | None = None
+    axis: Numbers = None
+
+    def allowed_deg(self) -> Any:
+        """Return the rotations of ``--allowed``, read from a file if it names one."""
+        from nbv.robot.moves import read_rotations
+
+        return read_rotations(self.allowed) if isinstance(self.allowed, Path) else self.allowed
+
+    def placement(self) -> Placement | None:
+        """Return where camera and object are, if both are given.
+
+        Raises
+        ------
+        UserError
+            If only one is given, or is not a pose or an axis.
+        """
+        if self.camera_pose is None and self.axis is None:
+            return None
+        if self.camera_pose is None or self.axis is None:
+            raise UserError("--camera-pose and --axis belong together; give both, or neither")
+        if len(self.axis) not in (3, 6):
+            raise UserError(
+                f"--axis has {len(self.axis)} numbers; give a point, or a point and a direction"
+            )
+        from nbv.numbers import read_pose
+
+        return read_pose(self.camera_pose), self.axis[:3], self.axis[3:] or [0.0, 0.0, 1.0]
+
+
+ANY_MOVE = MoveOptions()
+
 # Minus, hyphens and dashes that typesetting puts for the minus sign.
 _MINUS = re.compile("[\u2010-\u2015\u2212\ufe63\uff0d]")
 
@@ -163,13 +257,6 @@ def _is_numbers(text: str) -> bool:
         return bool([float(part) for part in parts])
     except ValueError:
         return False
-
-
-def allowed_rotations(given: list[float] | Path | None) -> Any:
-    """Return the rotations of ``--allowed``, read from a file if it names one."""
-    from nbv.robot.moves import read_rotations
-
-    return read_rotations(given) if isinstance(given, Path) else given
 
 
 def check_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.errors import UserError
+from nbv.numbers import ORIENTATION_TOLERANCE, as_orientations
 
 Array = NDArray[np.float64]
 Orientations = NDArray[np.float64]
@@ -23,41 +24,10 @@ Orientations = NDArray[np.float64]
 MOST_ELEMENTS = 60
 """Orientations of an icosahedron, the largest finite group that is not that of a prism."""
 
-NOT_A_ROTATION = 1e-3
-"""Most that an entry of R Rᵀ may differ from the identity: files have six digits."""
-
 VOLUME = np.pi**2
 """Volume of SO(3); densities are per unit of it."""
 
 _SAME = 1e-5  # Difference of traces below which two elements are the same: 0.2 degrees.
-
-
-def check_orientations(name: str, orientations: ArrayLike) -> Orientations:
-    """Return orientations (..., 3, 3) as float64.
-
-    Raises
-    ------
-    UserError
-        Names the first matrix that is not a rotation, and why.
-    """
-    try:
-        array = np.asarray(orientations, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise UserError(f"{name} has an entry that is not a number") from None
-    if array.shape[-2:] != (3, 3):
-        raise UserError(f"{name} is {array.shape} instead of (..., 3, 3)")
-    flat = array.reshape(-1, 3, 3)
-    skewed = np.abs(flat @ inverse(flat) - np.eye(3)).max(axis=(1, 2))
-    skewed = np.asarray(~(skewed <= NOT_A_ROTATION))
-    reflected = ~skewed & (np.linalg.det(np.where(skewed[:, None, None], 0, flat)) < 0)
-    for bad, reason in (
-        (skewed, "no rotation: its rows are not perpendicular unit vectors"),
-        (reflected, "a reflection: its determinant is -1; give right-handed axes"),
-    ):
-        if bad.any():
-            row = f"[{np.argmax(bad)}]" if array.ndim > 2 else ""
-            raise UserError(f"{name}{row} is {reason}")
-    return array
 
 
 def inverse(orientations: Orientations) -> Orientations:
@@ -133,7 +103,7 @@ class Symmetry:
             if np.size(matrix) != 16:
                 raise UserError("symmetries_discrete has a matrix without 16 numbers")
             corner = np.reshape(matrix, (4, 4))[:3, :3]
-            generators.append(check_orientations("a matrix of symmetries_discrete", corner))
+            generators.append(as_orientations(corner, "a matrix of symmetries_discrete"))
         axes = entry.get("symmetries_continuous", ())
         if len(axes) > 1:
             raise UserError(
@@ -147,7 +117,7 @@ class Symmetry:
             raise UserError("symmetries_continuous has an axis without three numbers")
         axis = axis / np.linalg.norm(axis)
         images = group @ axis
-        if (np.abs(images @ axis) < 1 - NOT_A_ROTATION).any():
+        if (np.abs(images @ axis) < 1 - ORIENTATION_TOLERANCE).any():
             raise UserError("symmetries_discrete moves the axis of symmetries_continuous")
         # Up to rotations about the axis, an element keeps the axis or flips it.
         flips = images @ axis < 0

@@ -15,12 +15,12 @@ from nbv.core.rotations import (
     Array,
     Orientations,
     along_ray,
-    check_orientations,
     inverse,
 )
 from nbv.errors import UserError, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
+from nbv.numbers import as_orientations, column
 from nbv.robot.next_camera import check_position
 from nbv.robot.pairs import PairTable
 from nbv.robot.rotation_pairs import FLIP_DEG, OrientationTable
@@ -130,7 +130,7 @@ def orientation_table(
         groups_of(rows),
         estimates,
         truths,
-        _numbers(path, rows, "score", 1)[:, 0] if "score" in rows else None,
+        column(path, rows, "score")[:, 0] if "score" in rows else None,
         straightened,
         symmetries,
         tuple(left_out),
@@ -148,8 +148,8 @@ def _matched(path: Path, rows: pd.DataFrame, truth: Path) -> tuple[pd.DataFrame,
     need_columns(path, rows, BOP_COLUMNS)
     keys = ["scene_id", "im_id", "obj_id"]
     for name in keys:
-        rows[name] = _numbers(path, rows, name, 1)[:, 0].astype(int).astype(str)
-    position, score = _positions(path, rows, "t"), _numbers(path, rows, "score", 1)[:, 0]
+        rows[name] = column(path, rows, name)[:, 0].astype(int).astype(str)
+    position, score = _positions(path, rows, "t"), column(path, rows, "score")[:, 0]
     known = _read_truths(truth, set(rows["scene_id"]))
     positions = _positions(truth, known, "t")
     by_key = {k: list(v) for k, v in known.groupby(keys).indices.items()}
@@ -196,7 +196,7 @@ def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
     if truth.suffix.lower() == ".csv":
         known = read_rows(truth, (*keys, "R", "t"))
         for name in keys:
-            known[name] = _numbers(truth, known, name, 1)[:, 0].astype(int).astype(str)
+            known[name] = column(truth, known, name)[:, 0].astype(int).astype(str)
         return known
     truths = []
     for scene in sorted(scenes):
@@ -229,32 +229,18 @@ def _read_entries(path: Path) -> dict[str, Any]:
     return given
 
 
-def _numbers(path: Path, rows: pd.DataFrame, name: str, n: int) -> Array:
-    numbers = np.empty((len(rows), n))
-    for i, (row, text) in enumerate(zip(rows.index, rows[name], strict=True)):
-        try:
-            numbers[i] = np.array(text.split(), dtype=np.float64).reshape(n)
-            if not np.isfinite(numbers[i]).all():
-                raise ValueError
-        except ValueError:
-            raise UserError(
-                f"{path}, row {row + 2}: {name} {text!r} is not {counted(n, 'finite number')}"
-            ) from None
-    return numbers
-
-
 def _orientations(path: Path, rows: pd.DataFrame, name: str) -> Orientations:
-    matrices = _numbers(path, rows, name, 9).reshape(-1, 3, 3)
+    matrices = column(path, rows, name, 9).reshape(-1, 3, 3)
     try:
-        return check_orientations(name, matrices)
+        return as_orientations(matrices, name)
     except UserError:
         for row, matrix in zip(rows.index, matrices, strict=True):
-            check_orientations(f"{path}, row {row + 2}: {name}", matrix)
+            as_orientations(matrix, f"{path}, row {row + 2}: {name}")
         raise
 
 
 def _positions(path: Path, rows: pd.DataFrame, name: str) -> Array:
-    positions = _numbers(path, rows, name, 3)
+    positions = column(path, rows, name, 3)
     for row, position in zip(rows.index, positions, strict=True):
         check_position(f"{path}, row {row + 2}: {name}", position)
     return positions

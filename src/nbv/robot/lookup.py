@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nbv.core import lookup
 from nbv.core.criteria import CRITERIA, POSE_LIKELIHOODS, SPREADS, cost_unit
@@ -22,6 +23,46 @@ from nbv.files import (
     stored_table,
     write_arrays,
 )
+from nbv.robot.answers import Answer
+from nbv.robot.next_view import Move
+from nbv.robot.rotations import ranked_rotations
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostMove(Move):
+    """A rotation with its cost in a lookup table instead of an expected error."""
+
+    cost: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostRecommendation(Answer[CostMove]):
+    """The rotations for an estimated azimuth, best first.
+
+    Attributes
+    ----------
+    azimuth_deg : float
+        The estimate, in [0, 360).
+    criterion, cost_unit : str
+        What the cost of a move is, and its unit.
+    """
+
+    azimuth_deg: float
+    criterion: str
+    cost_unit: str
+
+    def pose_lines(self, seen: str) -> list[str]:
+        """Return the pose of the object, which is called `seen`, in a few lines of text."""
+        return [f"azimuth {self.azimuth_deg:.1f}° (camera around {seen}, as estimated)"]
+
+    def value(self, about: CostMove) -> str:
+        """Return the cost of a move as text."""
+        unit = "" if self.cost_unit == "1" else f" {self.cost_unit}"
+        return f"{self.criterion} {about.cost:.3f}{unit}"
+
+    def short_value(self, move: CostMove) -> str:
+        """Return the cost of a move as a number."""
+        return f"{move.cost:.3f}"
 
 
 class LookupTable(CostTable):
@@ -72,6 +113,26 @@ class LookupTable(CostTable):
             if problem := table._problem():
                 raise damaged(path, problem, CALIBRATE_AGAIN)
         return table
+
+    def rank(
+        self,
+        estimate_deg: float,
+        allowed_deg: ArrayLike | None = None,
+        max_travel_deg: float = 180.0,
+    ) -> CostRecommendation:
+        """Return the rotations for an estimate by their cost; see `ranked_rotations`."""
+        ranked, warnings = ranked_rotations(self, estimate_deg, allowed_deg, max_travel_deg)
+        moves = (
+            CostMove(rotation_deg=rotation, travel_deg=abs(rotation), cost=cost)
+            for rotation, cost in ranked
+        )
+        return CostRecommendation(
+            azimuth_deg=estimate_deg % 360.0,
+            criterion=self.criterion,
+            cost_unit=cost_unit(self.criterion, {"spread": self.spread}),
+            moves=tuple(moves),
+            warnings=warnings,
+        )
 
     def arrays(self) -> Arrays:
         """Return the attributes by name, as arrays."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,16 +19,15 @@ from nbv.core.rotation_criteria import (
     ranking,
     view_angle_deg,
 )
-from nbv.core.rotations import Array, Orientations, along_ray, check_orientations
+from nbv.core.rotation_errors import OrientationErrors
+from nbv.core.rotations import Array, Orientations, along_ray
 from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted
-from nbv.numbers import Pose, as_pose
+from nbv.numbers import Pose, as_finite, as_orientations, as_pose
+from nbv.robot.answers import Answer, RankedMove
 from nbv.robot.next_view import as_chances
 from nbv.robot.rotations import MIN_SEPARATION_DEG, as_travel
-
-if TYPE_CHECKING:
-    from nbv.robot.rotation_pairs import OrientationTable
 
 FARTHEST_M = 50.0
 """No arm looks at an object from farther: such camera poses are in millimetres."""
@@ -42,6 +41,23 @@ NO_DEPENDENCE = (
 )
 
 NO_SCORES = "scores are not used: calibration pairs had none"
+
+
+class CalibratedErrors(Protocol):
+    """What a ranking takes from an `nbv.OrientationTable`, whose module imports this one."""
+
+    @property
+    def straightened(self) -> bool:
+        """Whether poses were rotated onto the optical axis."""
+
+    def name_of(self, object_id: str | None) -> str:
+        """Return the name of an object."""
+
+    def errors(self, object_id: str | None = None) -> OrientationErrors:
+        """Return the errors on an object."""
+
+    def depends_on_view(self, name: str) -> bool:
+        """Return whether an object's flips depend on the view."""
 
 
 @dataclass(frozen=True)
@@ -71,8 +87,8 @@ class PoseEstimate:
     camera_pose: Pose | None = None
 
 
-@dataclass(frozen=True)
-class CameraMove:
+@dataclass(frozen=True, kw_only=True)
+class CameraMove(RankedMove):
     """A candidate camera pose.
 
     Attributes
@@ -94,24 +110,33 @@ class CameraMove:
     """
 
     index: int
-    travel_deg: float
     travel_m: float | None
-    expected_error_deg: float
-    probability_within: dict[str, float]
-    target_camera_pose: Pose | None
     direction: Array
 
+    @property
+    def name(self) -> str:
+        """The move in a list."""
+        return f"candidate {self.index}"
 
-@dataclass(frozen=True)
-class CameraRecommendation:
+    @property
+    def extent(self) -> str:
+        """How far the move goes, and from which direction the object is seen then."""
+        metres = "" if self.travel_m is None else f", {self.travel_m:.2f} m"
+        x, y, z = self.direction
+        return f"{super().extent}{metres}; seen from the direction {x:.2f} {y:.2f} {z:.2f}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraRecommendation(Answer[CameraMove]):
     """The pose (3, 3) in the last camera, its error, and candidates, best first."""
 
     rotation: Orientations
-    expected_error_deg: float
-    probability_within: dict[str, float]
-    moves: tuple[CameraMove, ...]
     depends_on_view: bool
-    warnings: tuple[str, ...]
+
+    def pose_lines(self, seen: str) -> list[str]:
+        """Return the pose of the object, which is called `seen`, in a few lines of text."""
+        rows = ("  " + " ".join(f"{value:8.5f}" for value in row) for row in self.rotation)
+        return [f"rotation, {seen} to camera", *rows, self.value(self)]
 
 
 @dataclass(frozen=True)
@@ -135,7 +160,7 @@ class _Camera:
 
 
 def recommend_camera(
-    table: OrientationTable,
+    table: CalibratedErrors,
     estimates: Sequence[PoseEstimate],
     candidates: Sequence[Pose] | int,
     *,
@@ -191,13 +216,15 @@ def recommend_camera(
     cost, within = bayes_error(ahead) + small, chances_within(ahead, WITHIN_DEG)
     moves = [
         CameraMove(
-            int(free[k]),
-            float(travel[free[k]]),
-            float(np.linalg.norm(pose[:3, 3] - cameras[-1].pose[:3, 3])) if is_known else None,
-            float(cost[k]),
-            as_chances(within[:, k]),
-            pose if is_known else None,
-            -targets[free[k]][2],
+            index=int(free[k]),
+            travel_deg=float(travel[free[k]]),
+            travel_m=float(np.linalg.norm(pose[:3, 3] - cameras[-1].pose[:3, 3]))
+            if is_known
+            else None,
+            expected_error_deg=float(cost[k]),
+            probability_within=as_chances(within[:, k]),
+            target_camera_pose=pose if is_known else None,
+            direction=-targets[free[k]][2],
         )
         for k, pose in ((k, poses[free[k]]) for k in ranking(cost, travel[free]))
     ]
@@ -206,13 +233,14 @@ def recommend_camera(
     warnings = () if depends else (NO_DEPENDENCE,)
     if scores is not None and errors.ratio is None:
         warnings = (*warnings, NO_SCORES)
+    within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
     return CameraRecommendation(
-        cameras[-1].straight_from_camera.T @ last @ first.T @ now.pose,
-        float(now.probability @ distance) + small,
-        as_chances(np.array([now.probability_within(error_deg) for error_deg in WITHIN_DEG])),
-        tuple(moves),
-        depends,
-        warnings,
+        rotation=cameras[-1].straight_from_camera.T @ last @ first.T @ now.pose,
+        expected_error_deg=float(now.probability @ distance) + small,
+        probability_within=as_chances(within_now),
+        moves=tuple(moves),
+        depends_on_view=depends,
+        warnings=warnings,
     )
 
 
@@ -231,13 +259,13 @@ def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:
     return np.array(scores) if scores else None
 
 
-def _straightening(table: OrientationTable, position: Array | None) -> Orientations:
+def _straightening(table: CalibratedErrors, position: Array | None) -> Orientations:
     if position is None or not table.straightened:
         return np.eye(3)
     return along_ray(position)
 
 
-def _target(pose: Pose, place: Array | None, table: OrientationTable, i: int) -> _Camera:
+def _target(pose: Pose, place: Array | None, table: CalibratedErrors, i: int) -> _Camera:
     """Return a candidate's camera; `place` (3,) is the object's in the base frame, if known."""
     if place is None:
         return _Camera(pose, np.eye(3))
@@ -291,14 +319,14 @@ def as_view(given: Any, name: str) -> PoseEstimate:
     if "R" not in entry or (odd := set(entry) - {"R", "t", "score", "camera_pose"}):
         what = "has no R" if "R" not in entry else f"has {min(odd)!r}"
         raise UserError(f"{name} {what}; give R, t (mm), score, camera_pose")
-    rotation = _array(entry["R"], f"{name}: R", 9).reshape(3, 3)
-    view = PoseEstimate(check_orientations(f"{name}: R", rotation))
+    rotation = as_finite(entry["R"], f"{name}: R", 9).reshape(3, 3)
+    view = PoseEstimate(as_orientations(rotation, f"{name}: R"))
     if (t := entry.get("t")) is not None:
-        position = _array(t, f"{name}: t", 3)
+        position = as_finite(t, f"{name}: t", 3)
         check_position(f"{name}: t", position)
         view = replace(view, position_mm=position)
     if (score := entry.get("score")) is not None:
-        view = replace(view, score=float(_array(score, f"{name}: score", 1)[0]))
+        view = replace(view, score=as_finite(score, f"{name}: score", 1).item())
     if (pose := entry.get("camera_pose")) is not None:
         view = replace(view, camera_pose=as_pose(pose, f"{name}: camera_pose"))
     return view
@@ -313,16 +341,6 @@ def check_position(name: str, position_mm: Array) -> None:
         )
     if (away := float(np.linalg.norm(position_mm))) < LEAST_MM:
         raise UserError(f"{name} is {away:g} mm away; give mm, not metres")
-
-
-def _array(values: Any, name: str, n: int) -> Array:
-    try:
-        numbers = np.asarray(values, dtype=np.float64).ravel()
-    except (TypeError, ValueError):
-        numbers = np.empty(0)
-    if len(numbers) != n or not np.isfinite(numbers).all():
-        raise UserError(f"{name} is not {counted(n, 'finite number')}")
-    return numbers
 
 
 def read_views(path: str | Path) -> list[PoseEstimate]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -22,6 +22,7 @@ from nbv.core.distributions import (
 )
 from nbv.errors import FrameError, UserError
 from nbv.labels import counted
+from nbv.robot.answers import Answer, RankedMove
 from nbv.robot.rotations import (
     MIN_SEPARATION_DEG,
     as_allowed,
@@ -47,20 +48,16 @@ AfterRotations = Callable[[tuple[int, ...]], CalibrationViews]
 """Maps rotations from the first view, in bins, to the calibration sweeps after them."""
 
 
-@dataclass(frozen=True)
-class Move:
+@dataclass(frozen=True, kw_only=True)
+class Move(RankedMove):
     """A rotation of the camera around the object, and the expected error after it.
 
     Attributes
     ----------
     rotation_deg : float
         From the camera's current position, counter-clockwise seen from above, in (-180, 180].
-    travel_deg : float
-        Its absolute value, in [0, 180].
-    expected_error_deg : float
-        Expected error of the pose once the new view is added.
-    probability_within : dict of str to float
-        How likely that error is at most 5, 15 and 30 degrees.
+    travel_deg, expected_error_deg, probability_within, target_camera_pose
+        See `nbv.robot.answers.RankedMove`.
 
     Examples
     --------
@@ -70,13 +67,20 @@ class Move:
     """
 
     rotation_deg: float
-    travel_deg: float
-    expected_error_deg: float
-    probability_within: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The move in a list."""
+        return f"{self.rotation_deg:+g}°"
+
+    @property
+    def instruction(self) -> str:
+        """What to do, in a few words."""
+        return f"rotate by {self.name}"
 
 
-@dataclass(frozen=True)
-class Recommendation:
+@dataclass(frozen=True, kw_only=True)
+class Recommendation(Answer[Move]):
     """The estimated pose of an object, and the recommended next view.
 
     Attributes
@@ -89,12 +93,12 @@ class Recommendation:
         Expected error of `azimuth_deg`: the mean calibration error of objects that looked alike,
         after one view recalibrated: the mean error of calibration views that promised as much.
         It is raised if the last view was recommended, because the same errors chose that view.
-    move : Move, or None
-        The next view: that of least expected error if it is better than the view farthest from
-        all so far by more than its uncertainty, else the farthest. None if every candidate is
-        within 15° of an existing view.
-    alternatives : tuple of Move
-        Other local optima, best first.
+    moves : tuple of Move
+        First the next view: that of least expected error if it is better than the view farthest
+        from all so far by more than its uncertainty, else the farthest. Then other local optima,
+        best first. Empty if every candidate is within 15° of an existing view.
+    move, alternatives
+        The first of `moves`, or None, and the others.
     belief : ndarray (B,)
         p(azimuth of the camera at the last frame); index b is 360 b / B degrees.
     error_after_deg : ndarray (B,)
@@ -130,28 +134,26 @@ class Recommendation:
 
     azimuth_deg: float
     spread_deg: float
-    expected_error_deg: float
-    move: Move | None
-    alternatives: tuple[Move, ...]
     belief: NDArray[np.float64]
     error_after_deg: NDArray[np.float64]
-    ood_score: float
     bayes_factor: float
-    warnings: tuple[str, ...]
     n_views: int
-    probability_within: dict[str, float] = field(default_factory=dict)
+    ood_score: float = math.nan
     crops: tuple[NDArray[np.uint8], ...] = ()
     object_position_m: tuple[float, float, float] | None = None
-
-    @property
-    def moves(self) -> tuple[Move, ...]:
-        """`move` and `alternatives`, best first; empty if there is no further view."""
-        return () if self.move is None else (self.move, *self.alternatives)
 
     @property
     def is_ood(self) -> bool:
         """Whether a frame is out of distribution."""
         return self.ood_score > 1.0
+
+    def pose_lines(self, seen: str) -> list[str]:
+        """Return the pose of the object, which is called `seen`, in a few lines of text."""
+        views = counted(self.n_views, "view")
+        return [
+            f"azimuth {self.azimuth_deg:.1f}° (camera around {seen}; {views})",
+            f"{self.value(self)}, spread {self.spread_deg:.1f}°",
+        ]
 
 
 def after_rotations(
@@ -182,10 +184,6 @@ def next_view(
     allowed_deg: ArrayLike | None = None,
     max_travel_deg: float = 180.0,
     followed: bool = True,
-    ood_score: float = math.nan,
-    warnings: tuple[str, ...] = (),
-    crops: tuple[NDArray[np.uint8], ...] = (),
-    object_position_m: tuple[float, float, float] | None = None,
 ) -> Recommendation:
     """Return the estimated pose and the next view.
 
@@ -209,8 +207,6 @@ def next_view(
         Weights of the calibration sweeps.
     allowed_deg, max_travel_deg, followed
         See `nbv.Recommender.recommend`.
-    ood_score, warnings, crops, object_position_m
-        Attributes of the `Recommendation` for views from frames.
 
     Raises
     ------
@@ -269,28 +265,28 @@ def next_view(
     taken_deg = np.array([rotation for rotation, _ in ranked])
     chances = np.transpose([at_rotations(each, taken_deg) for each in within])
     moves = [
-        Move(rotation, abs(rotation), error_deg, as_chances(own))
-        for (rotation, error_deg), own in zip(ranked, chances, strict=True)
+        Move(
+            rotation_deg=rotation,
+            travel_deg=abs(rotation),
+            expected_error_deg=error_deg,
+            probability_within=as_chances(p),
+        )
+        for (rotation, error_deg), p in zip(ranked, chances, strict=True)
     ]
-    if moves:
-        warnings += flat_warnings(moves[0].expected_error_deg, cost)
+    warnings = flat_warnings(moves[0].expected_error_deg, cost) if moves else ()
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_factor, _LARGEST_LOG))
     return Recommendation(
         azimuth_deg=float(wrap_deg(direction_deg + last)),
         spread_deg=spread_deg,
         expected_error_deg=now_deg,
-        move=moves[0] if moves else None,
-        alternatives=tuple(moves[1:]),
+        moves=tuple(moves),
         belief=rotated(belief, -last),
         error_after_deg=error_after_deg,
-        ood_score=ood_score,
         bayes_factor=bayes_factor,
         warnings=(*warnings, *_contradictions(bayes_factor, distributions, rotations_deg)),
         n_views=len(distributions),
         probability_within=as_chances(within_now),
-        crops=crops,
-        object_position_m=object_position_m,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -308,7 +309,7 @@ class Recommender:
             )
         logits = self.network(codes)
         score = float(ood_score(self.bundle.ood, codes, logits).max())
-        return next_view(
+        answer = next_view(
             from_logits(logits, self.bundle.temperature),
             rotations_deg,
             self._calibrated,
@@ -317,6 +318,9 @@ class Recommender:
             allowed_deg=allowed_deg,
             max_travel_deg=max_travel_deg,
             followed=followed,
+        )
+        return replace(
+            answer,
             ood_score=score,
             warnings=(
                 *doubts,
@@ -324,6 +328,7 @@ class Recommender:
                 *self.lying_warnings(codes, logits),
                 *_elevation_warnings(self.bundle, elevation_deg),
                 *rolled,
+                *answer.warnings,
             ),
             crops=tuple(codes),
             object_position_m=object_position_m,

@@ -18,14 +18,13 @@ from nbv.core.rotations import (
     Array,
     Orientations,
     Symmetry,
-    check_orientations,
     inverse,
     spiral,
     viewing_direction,
 )
 from nbv.errors import UserError, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
-from nbv.numbers import Pose
+from nbv.numbers import Pose, as_orientations
 from nbv.robot.next_camera import CameraRecommendation, PoseEstimate, recommend_camera
 
 FLIP_DEG = OrientationErrors.flip_deg
@@ -295,7 +294,7 @@ class OrientationTable:
             if index.min() < 0 or sorted(set(index.tolist())) != list(range(len(names))):
                 raise damaged(path, "its objects do not fit its pairs", CALIBRATE_AGAIN)
             estimate, truth = (
-                check_orientations(f"{path}: {name}", a)
+                as_orientations(a, f"{path}: {name}")
                 for name, a in (("estimate", estimate), ("truth", truth))
             )
             symmetries = json.loads(str(texts))
