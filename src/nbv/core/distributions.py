@@ -73,7 +73,7 @@ def product_of(
     """Return first(theta) second(theta + delta), (n, B), in the frame of the first view.
 
     This is Bayes' rule for images that are independent given the pose, with a uniform prior. If the
-    two distributions exclude each second, the result is `first`.
+    two distributions exclude each other, the result is `first`.
     """
     n_bins = first.shape[1]
     index = (np.arange(n_bins) + nearest_bin(delta_deg, n_bins).reshape(-1, 1)) % n_bins
