@@ -28,7 +28,7 @@ from nbv.core.selection import DENSITY, chosen_lookup
 from nbv.robot.bundle import FORMAT, Bundle
 from nbv.robot.calibration import recalibrated
 from nbv.robot.depth_files import read_depth
-from nbv.robot.evaluation import calibration_errors_deg, count_ood, evaluate
+from nbv.robot.evaluation import bundle_errors_deg, count_ood, evaluate
 from nbv.robot.lookup import LookupTable
 from nbv.robot.moves import elevation_from_gravity, moved_camera
 from nbv.robot.pairs import PairTable
@@ -709,7 +709,7 @@ def test_inspect_shows_what_a_bundle_holds(here, bundle, capsys):
     assert about["ood_threshold"] == bundle.ood.threshold
     assert about["extent_m"] == list(bundle.extent_m)
     assert {key: about[key] for key in bundle.provenance} == bundle.provenance
-    assert about["calibration_error_deg"] == pytest.approx(calibration_errors_deg(bundle), abs=0.1)
+    assert about["calibration_error_deg"] == pytest.approx(bundle_errors_deg(bundle), abs=0.1)
     lines = run(capsys, "inspect", "b.safetensors").splitlines()
     assert lines[0].split() == [
         "calibration_error_deg.one_view",

@@ -104,12 +104,12 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
         Print JSON.
     """
     from nbv.robot.bundle import FORMAT, Bundle
-    from nbv.robot.evaluation import calibration_errors_deg
+    from nbv.robot.evaluation import bundle_errors_deg
     from nbv.robot.recommender import bundle_path
 
     path = bundle_path(bundle)
     content = Bundle.load(path)
-    errors_deg = calibration_errors_deg(content)
+    errors_deg = bundle_errors_deg(content)
     about: dict[str, Any] = {
         "calibration_error_deg": {name: round(error, 1) for name, error in errors_deg.items()},
         "file": str(path),

@@ -66,19 +66,19 @@ def _rotated_by_view(sweep: NDArray[np.floating], sign: int) -> NDArray[np.float
 
 
 def product_of(
-    own: NDArray[np.floating[Any]],
-    other: NDArray[np.floating[Any]],
+    first: NDArray[np.floating[Any]],
+    second: NDArray[np.floating[Any]],
     delta_deg: NDArray[np.floating[Any]] | NDArray[np.int64],
 ) -> NDArray[np.floating[Any]]:
-    """Return own(theta) other(theta + delta), (n, B), in the frame of the first view.
+    """Return first(theta) second(theta + delta), (n, B), in the frame of the first view.
 
     This is Bayes' rule for images that are independent given the pose, with a uniform prior. If the
-    two distributions exclude each other, the result is `own`.
+    two distributions exclude each other, the result is `first`.
     """
-    n_bins = own.shape[1]
+    n_bins = first.shape[1]
     index = (np.arange(n_bins) + nearest_bin(delta_deg, n_bins).reshape(-1, 1)) % n_bins
-    product = own * np.take_along_axis(other, index, axis=1)
-    return np.where(product.sum(axis=1, keepdims=True) > 0, product, own)
+    product = first * np.take_along_axis(second, index, axis=1)
+    return np.where(product.sum(axis=1, keepdims=True) > 0, product, first)
 
 
 def product_of_views(
@@ -127,14 +127,14 @@ def mean_direction_deg(
     n_bins = probabilities.shape[1]
     angles = 2 * np.pi * np.arange(n_bins) / n_bins
     cosine, sine = probabilities @ np.cos(angles), probabilities @ np.sin(angles)
-    found_deg = direction_deg(cosine, sine)
+    mean_deg = direction_deg(cosine, sine)
     is_flat = np.hypot(cosine, sine) <= FLAT * probabilities.sum(axis=1)
     if is_flat.any():
         if otherwise_deg is None:
             is_likeliest = probabilities >= (1 - FLAT) * probabilities.max(axis=1, keepdims=True)
             otherwise_deg = is_likeliest.argmax(axis=1) * (360.0 / n_bins)
-        found_deg = np.where(is_flat, otherwise_deg, found_deg)
-    return found_deg
+        mean_deg = np.where(is_flat, otherwise_deg, mean_deg)
+    return mean_deg
 
 
 def product_directions_deg(

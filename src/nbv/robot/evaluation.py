@@ -120,7 +120,7 @@ def replay(predictions: Predictions, choose: Chooser, n_views: int) -> NDArray[n
     return np.stack(errors, axis=1)
 
 
-def follow(
+def replay_recommended(
     calibrated: AfterRotations,
     predictions: Predictions,
     affinity: Mapping[str, float],
@@ -135,21 +135,23 @@ def follow(
     n, n_bins = len(azimuth_deg), distributions.shape[-1]
     expected = np.empty((n, n_views - 1))
 
-    def choose(taken: NDArray[np.intp], turned_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    def choose(taken: NDArray[np.intp], rotations_deg: NDArray[np.float64]) -> NDArray[np.float64]:
         chosen = np.empty(n)
-        bins = np.rint(turned_deg * (n_bins / 360.0)) % n_bins
+        bins = np.rint(rotations_deg * (n_bins / 360.0)) % n_bins
         # Sorted, so that neighbouring sequences share their cached calibration views.
         for row in np.lexsort(bins.T[::-1]):
             answer = next_view(
                 distributions[taken[row]],
-                turned_deg[row].tolist(),
+                rotations_deg[row].tolist(),
                 calibrated,
                 affinity,
                 predictions.sweep_weights,
             )
             expected[row, taken.shape[1] - 1] = answer.expected_error_deg
             # Where no view is admissible, any will do.
-            chosen[row] = turned_deg[row, -1] + (answer.move.rotation_deg if answer.move else 180.0)
+            chosen[row] = rotations_deg[row, -1] + (
+                answer.move.rotation_deg if answer.move else 180.0
+            )
         return chosen
 
     return replay(predictions, choose, n_views), expected
@@ -161,13 +163,13 @@ def at_random(rng: np.random.Generator) -> Chooser:
     If `_MOST_DRAWS` draws find no such rotation among many views, the last draw counts.
     """
 
-    def choose(taken: NDArray[np.intp], turned_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    def choose(taken: NDArray[np.intp], rotations_deg: NDArray[np.float64]) -> NDArray[np.float64]:
         def draw(n: int) -> NDArray[np.float64]:
             return rng.uniform(MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG, n)
 
         chosen = draw(len(taken))
         for _ in range(_MOST_DRAWS):
-            apart = circular_distance_deg(chosen[:, None], turned_deg).min(axis=1)
+            apart = circular_distance_deg(chosen[:, None], rotations_deg).min(axis=1)
             is_near = apart < MIN_SEPARATION_DEG
             if not is_near.any():
                 break
@@ -184,7 +186,7 @@ def baselines(n_views: int, fixed_deg: float, rng: np.random.Generator) -> dict[
     """
 
     def at_steps(step_deg: float) -> Chooser:
-        return lambda taken, turned_deg: np.full(len(taken), taken.shape[1] * step_deg)
+        return lambda taken, rotations_deg: np.full(len(taken), taken.shape[1] * step_deg)
 
     return {
         RANDOM: at_random(rng),
@@ -272,7 +274,9 @@ def evaluate(
     for n_done, sweep in enumerate(sweeps, start=1):
         predictions = predict(bundle, sweep)
         # The first views are the same for every number of views.
-        errors, expected = follow(calibrated, predictions, bundle.affinity, max(numbers) + 1)
+        errors, expected = replay_recommended(
+            calibrated, predictions, bundle.affinity, max(numbers) + 1
+        )
         single = errors[:, 0]
         offset = constant_offset_deg(single)
         rows.append(_row(predictions, SINGLE, 1, single, offset, expected[:, 0]))
@@ -292,13 +296,13 @@ def evaluate(
                 last = [replay(predictions, choose, number)[:, -1] for _ in range(repeats)]
                 rows.append(_row(predictions, name, number, np.concatenate(last), offset))
             place = np.s_[:, number - 1]
-            own = _row(predictions, RECOMMENDED, number, errors[place], offset, expected[place])
-            rows.append(own)
+            row = _row(predictions, RECOMMENDED, number, errors[place], offset, expected[place])
+            rows.append(row)
         report(n_done)
     return pd.DataFrame(rows)
 
 
-def calibration_errors_deg(bundle: Bundle, most: int = 30) -> dict[str, float]:
+def bundle_errors_deg(bundle: Bundle, most: int = 30) -> dict[str, float]:
     """Return the mean errors of up to `most` calibration sweeps, whose objects are not trained on.
 
     The keys are ``one_view``, ``two_views`` (recommended) and ``opposite``. Frames are 15° apart.
@@ -314,7 +318,7 @@ def calibration_errors_deg(bundle: Bundle, most: int = 30) -> dict[str, float]:
         weights = bundle.weights_at(None) * (others if others.any() else 1.0)
         rows = bundle.distributions[i, ::step].astype(np.float64)
         views = Predictions(bundle.object_ids[i], "", azimuth_deg, rows, weights)
-        best, _ = follow(calibrated, views, bundle.affinity, 2)
+        best, _ = replay_recommended(calibrated, views, bundle.affinity, 2)
         errors.append(np.abs([*best.T, replay(views, opposite, 2)[:, 1]]).mean(axis=1))
     return dict(zip(("one_view", "two_views", "opposite"), np.mean(errors, axis=0), strict=True))
 

@@ -154,8 +154,8 @@ class CalibrationViews:
         errors = np.empty((*self.first.shape, len(rotations) + 1), dtype=np.float32)
         errors[:, :, -1] = self.error_now_deg
         for error, rows, others, first in zip(errors, self.fused, further, self.first, strict=True):
-            own = np.take_along_axis(rows, (first[:, None] + bins) % n_bins, axis=1)
-            poses_deg = product_directions_deg(own, others, _FLAT_ERROR_DEG)
+            in_object = np.take_along_axis(rows, (first[:, None] + bins) % n_bins, axis=1)
+            poses_deg = product_directions_deg(in_object, others, _FLAT_ERROR_DEG)
             views = (first[:, None] + rotations) % n_bins
             error[:, :-1] = travel_deg(np.take_along_axis(poses_deg, views, axis=1))
         within = (errors <= np.float32(limit) for limit in WITHIN_DEG)

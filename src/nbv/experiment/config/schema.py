@@ -18,6 +18,7 @@ from pydantic import (
 )
 
 from nbv.core.seeds import FIRST_FEATURE_SEED
+from nbv.core.selection import AFFINITY
 from nbv.errors import UserError, nearest
 from nbv.experiment.splits import enough_objects
 
@@ -400,7 +401,7 @@ class Config(Section):
     sensor: Sensor
     estimator: Estimator
     density: Density
-    affinity: Affinity = Affinity(power=16, pseudo_observations=90)
+    affinity: Affinity = Affinity(**AFFINITY)
     recommendation: Recommendation
     more_views: MoreViews
     transfer: Transfer
