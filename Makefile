@@ -1,5 +1,7 @@
 # make quick       the paper, in minutes        make reproduce the paper, with a network for every fold
-# make test        the test suite               make check   lint, types, imports, workflow lint
+# make test        the test suite, in minutes   make check   lint, types, imports, workflow lint
+# make test-studies the studies and the estimators beside the default one, run small
+# make test-faults the workflow after kills and on a full disk
 # make bench       the speed benchmarks         make compare a finished run with docs/reference
 # make confirm     several trainings of all data sets, for hours (tools/confirm.sh)
 # make bundles     the bundles that the package ships, for an hour or more
@@ -28,7 +30,7 @@ PYTEST := $(BIN)/pytest --numprocesses $(CORES) --dist worksteal
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
 
-.PHONY: reproduce quick confirm bundles features compare reference bench test test-quick test-slurm test-browser test-site soak coverage mutation \
+.PHONY: reproduce quick confirm bundles features compare reference bench test test-quick test-studies test-faults test-slurm test-browser test-site soak coverage mutation \
 	check lock audit licences docs tables clean
 
 reproduce: $(READY)
@@ -67,6 +69,13 @@ test: $(READY)
 
 test-quick: $(READY)
 	$(PYTEST) -m "not slow"
+
+test-studies: $(READY)
+	$(PYTEST) tests/workflow/studies
+
+# Not in parallel: the kills are timed by an undisturbed run.
+test-faults: $(READY)
+	$(BIN)/pytest tests/faults
 
 # Not where it can be neither found nor installed: one line then says why.
 test-slurm: $(READY)

@@ -32,6 +32,7 @@ TINY = (
     "density.n_parts=2",
     "name=tiny",
 )
+MUGS = tuple("categories=[mug]" if item.startswith("categories=") else item for item in TINY)
 
 
 @dataclass(frozen=True)

@@ -13,15 +13,9 @@ from safetensors import safe_open
 from nbv.cli import main
 from nbv.data.meshes import load_meshes
 from nbv.data.procedural import generate
-from nbv.experiment.estimation.features import SHIPPED
-from nbv.files import sha256_of
 from nbv.robot.bundle import Bundle
-from nbv.robot.depth_files import write_depth
-from nbv.robot.evaluation import evaluate
 from nbv.robot.recommender import Recommender
-from nbv.robot.recordings import read_manifest, run_network
-from nbv.robot.synthetic import example_frame
-from projects import STUDIES, TINY, Project, copy_of_project, finished_project
+from projects import TINY, Project, copy_of_project, finished_project
 
 pytestmark = pytest.mark.slow
 
@@ -53,21 +47,6 @@ def test_an_edit_of_the_renderer_renders_a_bundles_images_again(made: Project) -
     jobs = made.would_run(*CAMERA[len(TINY) :], targets=("bundles",))
     path.write_text(text)
     assert jobs["render_bundle"] == 2
-
-
-def test_its_network_may_start_from_the_depth_features(tmp_path: Path) -> None:
-    project = copy_of_project(tmp_path)
-    start = ("estimator.warm_start=features", "camera.image_side=64", "elevations_deg.mug=[0]")
-    still = ("fine_tuning.epochs=1", "fine_tuning.learning_rate=1.0e-9", "weight_decay=0")
-    settings = (*CAMERA, *start, *(f"estimator.{each}" for each in still))
-    path = "results/tiny/bundles/estimators/mug.safetensors"
-    project.run("--cores", "1", path, overrides=settings)
-    with safe_open(tmp_path / path, framework="numpy") as made, safe_open(SHIPPED, "numpy") as own:
-        history = json.loads(made.metadata()["nbv"])
-        assert history["started_from"]["sha256"] == sha256_of(SHIPPED)
-        for name in ("0.0.weight", "2.weight"):
-            features = own.get_tensor(name).astype(np.float32)
-            assert made.get_tensor(name) == pytest.approx(features, abs=1e-3, rel=1e-2)
 
 
 def test_its_mugs_have_handles_that_stand_out(made: Project) -> None:
@@ -113,16 +92,16 @@ def test_calibration_distributions_are_those_of_the_network(made: Project) -> No
 
 
 def test_a_bundle_is_tested_on_a_view_every_15_degrees(made: Project) -> None:
-    assert_tested_with_all(made, made.results / "bundles")
+    assert_tested_with_all(made, made.results / "bundles", ("00", "30"))
 
 
-def assert_tested_with_all(made: Project, folder: Path) -> None:
+def assert_tested_with_all(made: Project, folder: Path, elevations: tuple[str, ...]) -> None:
     """A bundle's errors of one view are those on the images of the bundle with all ingredients."""
     recommender = Recommender.load(folder / "mug.safetensors")
     found = pd.read_csv(folder / "mug.csv", dtype={"sequence": str})
     single = found[found["choice"] == "single"].set_index(["sequence", "object_id"])["mae_deg"]
     azimuth_deg = np.arange(24) * 15.0
-    for elevation in ("00", "30"):
+    for elevation in elevations:
         images = np.load(made.results / f"bundles/depth/mug/el{elevation}.npy", mmap_mode="r")
         names = json.loads(
             (made.results / f"bundles/depth/mug/el{elevation}_objects.json").read_text()
@@ -132,59 +111,6 @@ def assert_tested_with_all(made: Project, folder: Path) -> None:
             poses = np.degrees(np.angle(beliefs @ np.exp(1j * np.radians(azimuth_deg)))) % 360
             apart = np.abs(poses - azimuth_deg)
             assert np.minimum(apart, 360 - apart).mean() == pytest.approx(mae_deg, abs=1e-3)
-
-
-def test_ingredients_are_left_out_of_training_and_not_of_the_test(made: Project) -> None:
-    frames = made.folder / "frames"
-    frames.mkdir()
-    rows = []
-    for azimuth_deg in range(0, 360, 45):
-        write_depth(frames / f"{azimuth_deg}.npy", example_frame(azimuth_deg).depth_m)
-        rows.append({"file": f"{azimuth_deg}.npy", "azimuth_deg": azimuth_deg})
-    manifest = frames / "manifest.csv"
-    pd.DataFrame(rows).assign(object_id="mug", sequence="1").to_csv(manifest, index=False)
-    left_out = (
-        *CAMERA,
-        "++bundles.ingredients.size.size=0",
-        "++bundles.replicates=[0,2]",
-        f"bundles.frames={manifest}",
-    )
-    made.run("--cores", "2", *STUDIES, "ingredients", overrides=left_out)
-    table = pd.read_csv(made.results / "tables/ingredients.csv")
-    assert table["without"].tolist() == ["nothing", "size"]
-    folders = [
-        [made.results / "bundles" / without / replicate for replicate in ("", "replicate2")]
-        for without in ("", "without_size")
-    ]
-    (recording,) = read_manifest(manifest)
-    single = []
-    for folder in folders[0]:
-        bundle = Recommender.load(folder / "mug.safetensors")
-        seen = run_network(bundle, recording, None, None, lambda path, error: None)
-        errors = evaluate(bundle.bundle, [seen], n_views=(2,)).set_index("choice")
-        single.append(errors["mae_deg"]["single"])
-    assert table["one_view_real"][0] == pytest.approx(np.mean(single), abs=1e-3)
-    assert table["one_view_real_least"][0] == pytest.approx(min(single), abs=1e-3)
-    maes = [np.mean([two_view_mae(folder) for folder in each]) for each in folders]
-    assert table["two_views"][0] == pytest.approx(maes[0], abs=1e-3)
-    assert table["two_views"][1] == pytest.approx(maes[1] - maes[0], abs=1e-3)
-    networks = {folder: network_of(folder) for each in folders for folder in each}
-    assert len(set(networks.values())) == len(networks)
-    images = [np.load(each[0] / "depth/mug/el30.npy", mmap_mode="r") for each in folders]
-    assert not np.array_equal(images[0], images[1])
-    assert not (made.results / "bundles/replicate2/depth").exists()
-    for folder in folders[1]:
-        assert_tested_with_all(made, folder)
-
-
-def two_view_mae(folder: Path) -> float:
-    rows = pd.read_csv(folder / "mug.csv")
-    rows = rows[(rows["choice"] == "recommended") & (rows["n_views"] == 2)]
-    return float(rows.groupby("object_id")["mae_deg"].mean().mean())
-
-
-def network_of(folder: Path) -> bytes:
-    return (folder / "estimators/mug.safetensors").read_bytes()
 
 
 def test_a_folder_of_meshes_becomes_a_bundle_that_answers(tmp_path, capsys, monkeypatch) -> None:

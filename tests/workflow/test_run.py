@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from snakemake.utils import Paramspace
 from studies.ablation import ablation_space
 
-from projects import STUDIES, TINY
+from projects import STUDIES
 
 pytestmark = pytest.mark.slow
 
@@ -72,12 +71,19 @@ def test_every_file_is_there_with_its_columns(finished):
         assert small in (results / name).read_text()
 
 
-def test_a_finished_run_has_nothing_to_do(finished):
-    assert finished.would_run() == {}
+def test_a_finished_run_has_nothing_to_do_and_the_explorer_is_made_of_what_it_has(finished):
+    assert finished.would_run(targets=("all", "explorer")) == {"explorer": 1}
 
 
-def test_another_bandwidth_reruns_lookups_and_what_follows(finished):
-    assert finished.would_run("density.bandwidths_deg=[11]") == {
+def test_another_bandwidth_and_an_object_less_rerun_what_follows(finished):
+    """The lookups of both categories, and the images and trainings of the object's alone."""
+    changed = ("density.bandwidths_deg=[11]", "dataset.exclude=[chair-0003]")
+    assert finished.would_run(*changed) == {
+        "meshes": 1,
+        "render": 1,
+        "splits": 1,
+        "train": 2,
+        "evaluate_baselines": 2,
         "lookup": 4,
         "evaluate_recommended": 4,
         "settings": 1,
@@ -97,18 +103,10 @@ def test_another_training_length_reruns_training_and_what_follows(finished):
 
 
 def test_another_number_of_resamples_reruns_what_shows_intervals(finished):
+    """An object and a size that no image of the run has rerun nothing else."""
     shown = {name: jobs for name, jobs in SHOWN.items() if name != "figure"}
-    assert finished.would_run("n_resamples=200") == {"settings": 1, **shown}
-
-
-def test_leaving_out_an_object_changes_its_category_alone(finished):
-    jobs = finished.would_run("dataset.exclude=[chair-0003]")
-    assert (jobs["meshes"], jobs["train"]) == (1, 2)
-    assert finished.would_run("dataset.exclude=[bottle-0003]") == {
-        "settings": 1,
-        "runtime": 1,
-        "report": 1,
-    }
+    idle = ("dataset.exclude=[bottle-0003]", "sensor.diagonal_m.mug=0.3")
+    assert finished.would_run("n_resamples=200", *idle) == {"settings": 1, **shown}
 
 
 def test_an_edit_reruns_what_runs_that_code_and_what_follows(scratch):
@@ -143,54 +141,22 @@ def test_proposed_without_a_lookup_table_plans_no_figure_of_one(fresh):
     assert jobs["figure"] == 7
 
 
-def test_the_explorer_is_made_on_request_of_what_a_finished_run_has(finished):
-    assert finished.would_run(targets=("explorer",)) == {"explorer": 1}
-
-
-def test_the_studies_find_the_run_finished_too(finished):
-    assert finished.would_run(targets=(*STUDIES, "all")) == {}
-
-
-def test_extensions_are_made_and_leave_the_paper_alone(scratch):
-    targets = (*STUDIES, "extensions")
-    assert not {"meshes", "render", "train"} & set(scratch.would_run(targets=targets))
-    before = scratch.outcome()
-    scratch.run("--cores", "2", *targets, overrides=(*TINY, "categories=[mug]"))
-    after = scratch.outcome()
-    assert {name: after[name] for name in before} == before
-    tables = scratch.results / "tables"
-    for name in ("leaderboard", "more_views"):
-        for kind in ("csv", "md", "tex"):
-            assert (tables / f"{name}.{kind}").stat().st_size > 100
-    for name in ("more_views", "travel"):
-        assert (scratch.results / f"figures/{name}.png").stat().st_size > 1000
-    board = pd.read_csv(tables / "leaderboard.csv")
-    assert {"single", "proposed", "selected", "oracle_posterior"} <= set(board["method"])
-    (mine,) = board.loc[board["method"] == "proposed", "value"]
-    found = scratch.results.glob("evaluation/mug/el00/*/proposed.csv")
-    errors = pd.concat(pd.read_csv(path) for path in found)
-    assert abs(mine - errors["error_deg"].mean()) < 1e-3
-
-
-def test_a_new_extension_trains_nothing(finished):
+def test_the_studies_train_nothing_and_leave_the_run_alone(finished):
+    """A new extension is in the run's settings; each setting of the ablation is a file."""
     jobs = finished.would_run(
-        "extensions.mine={policy: bayes_error,fusion: average}", targets=(*STUDIES, "leaderboard")
+        "extensions.mine={policy: bayes_error,fusion: average}",
+        targets=(*STUDIES, "all", "extensions", "ablation"),
     )
-    assert jobs == {"evaluate_extensions": 4, "leaderboard": 1}
-
-
-def test_the_ablation_trains_nothing_and_each_of_its_settings_is_a_file(scratch):
-    jobs = scratch.would_run(targets=(*STUDIES, "ablation"))
-    assert jobs == {"evaluate_ablation": len(ablation_space()), "ablation": 1}
-    patterns = Paramspace(ablation_space(), filename_params="*", filename_sep=",").instance_patterns
-    target = f"results/tiny/ablation/{next(iter(patterns))}.csv"
-    scratch.run("--cores", "1", *STUDIES, target)
-    found = pd.read_csv(scratch.folder / target)
-    plain = pd.concat(
-        pd.read_csv(path).assign(fold=fold)
-        for fold in (1, 2)
-        for path in scratch.results.glob(f"evaluation/mug/el00/fold{fold}/proposed.csv")
-    )
-    expected = plain.groupby(["fold", "object_id"])["error_deg"].mean().to_numpy()
-    mine = found.sort_values(["fold", "object_id"])["error_deg"]
-    assert abs(mine.to_numpy() - expected).max() < 1e-3
+    assert jobs == {
+        "evaluate_extensions": 4,
+        "evaluate_more_views": 4,
+        "leaderboard": 1,
+        "more_views": 1,
+        "travel": 1,
+        "extensions": 1,
+        "evaluate_ablation": len(ablation_space()),
+        "ablation": 1,
+        "settings": 1,
+        "runtime": 1,
+        "report": 1,
+    }

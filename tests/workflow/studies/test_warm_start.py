@@ -6,11 +6,16 @@ import hashlib
 import json
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from safetensors import safe_open
 
+from nbv.experiment.estimation.features import SHIPPED
+from nbv.files import sha256_of
 from projects import TINY, Project, finished_project
+
+from ..test_bundles import CAMERA
 
 pytestmark = pytest.mark.slow
 
@@ -99,3 +104,19 @@ def test_a_changed_start_trains_what_follows_again(warm):
     }
     # From random weights.
     assert planned("estimator.warm_start=elevations") == made_again
+
+
+def test_the_network_of_a_bundle_may_start_from_the_depth_features(fresh: Project) -> None:
+    start = ("estimator.warm_start=features", "camera.image_side=64", "elevations_deg.mug=[0]")
+    still = ("fine_tuning.epochs=1", "fine_tuning.learning_rate=1.0e-9", "weight_decay=0")
+    settings = (*CAMERA, *start, *(f"estimator.{each}" for each in still))
+    path = "results/tiny/bundles/estimators/mug.safetensors"
+    fresh.run("--cores", "1", path, overrides=settings)
+    with (
+        safe_open(fresh.folder / path, framework="numpy") as made,
+        safe_open(SHIPPED, "numpy") as own,
+    ):
+        assert json.loads(made.metadata()["nbv"])["started_from"]["sha256"] == sha256_of(SHIPPED)
+        for name in ("0.0.weight", "2.weight"):
+            features = own.get_tensor(name).astype(np.float32)
+            assert made.get_tensor(name) == pytest.approx(features, abs=1e-3, rel=1e-2)

@@ -8,21 +8,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from projects import STUDIES, TINY
+from projects import TINY
+
+from .conftest import STUDIED
 
 pytestmark = pytest.mark.slow
 
-MORE = (
-    "transfer.folds=[2]",
-    "~transfer.conditions.stereo",
-    "~transfer.conditions.axis",
-)
 PLACE = "mug/el00/fold2"
 
 
-def test_trained_on_and_tested_on(scratch):
-    scratch.run("--cores", "2", *STUDIES, "transfer", overrides=(*TINY, *MORE))
-    results = scratch.results
+def test_trained_on_and_tested_on(studied):
+    results = studied.results
     made = sorted(
         str(path.relative_to(results)) for path in results.glob("transfer/*/depth/*/*.npy")
     )
@@ -50,8 +46,5 @@ def test_trained_on_and_tested_on(scratch):
     text = (results / "tables/transfer.md").read_text()
     assert len(re.findall(r"^\| (Single|Random|Opposite|Proposed) \|", text, re.M)) == 8
     # The run itself is as finished as it was, and a size concerns its own sensor and category.
-    assert scratch.would_run(*MORE, "sensor.diagonal_m.mug=0.3") == {
-        "settings": 1,
-        "runtime": 1,
-        "report": 1,
-    }
+    more = (*STUDIED[len(TINY) :], "categories=[mug]", "sensor.diagonal_m.mug=0.3")
+    assert studied.would_run(*more, targets=("evaluation",)) == {"settings": 1, "evaluation": 1}

@@ -20,21 +20,19 @@ from nbv.core.lookup import LookupTable
 from nbv.core.selection import DENSITY
 from nbv.errors import UserError
 from nbv.robot.pairs import PairTable
-from projects import STUDIES, TINY, Project, copy_of_project, finished_project
+from projects import MUGS, STUDIES, TINY, Project, copy_of_project, finished_project
 
 pytestmark = pytest.mark.slow
 
-
-MUGS = tuple("categories=[mug]" if "categories=" in one else one for one in TINY)
 FOREIGN = (*MUGS, "estimator=external", "estimator.pairs=pairs.csv")
 
 
 @pytest.fixture(scope="module")
-def foreign(finished: Project, tmp_path_factory) -> Project:
+def foreign(evaluated: Project, tmp_path_factory) -> Project:
     """A run on the tiny run's own test estimates, written as another program would."""
 
     def write_pairs(folder: Path) -> None:
-        found = sorted((finished.results / "estimates/mug").rglob("test.csv"))
+        found = sorted((evaluated.results / "estimates/mug").rglob("test.csv"))
         table = pd.concat(pd.read_csv(path) for path in found)
         table.sample(frac=1.0, random_state=0).to_csv(folder / "pairs.csv", index=False)
 
@@ -51,10 +49,10 @@ def errors_of(project: Project, method: str) -> pd.Series:
 
 @pytest.mark.parametrize("method", ["single", "opposite"])
 def test_methods_without_calibration_get_the_errors_of_the_run_itself(
-    foreign, finished: Project, method: str
+    foreign, evaluated: Project, method: str
 ) -> None:
     found = errors_of(foreign, method)
-    wanted = errors_of(finished, method)
+    wanted = errors_of(evaluated, method)
     pd.testing.assert_series_equal(found, wanted)
 
 

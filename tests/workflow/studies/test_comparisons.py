@@ -11,13 +11,12 @@ import pandas as pd
 import pytest
 import safetensors
 
-from projects import STUDIES, TINY, Project, finished_project
+from projects import MUGS, STUDIES, Project, finished_project
 
 pytestmark = pytest.mark.slow
 
 OTHER = (
-    *(item for item in TINY if not item.startswith(("name=", "categories="))),
-    "categories=[mug]",
+    *MUGS,
     "name=other",
     "estimator=classifier",
     "estimator.n_classes=24",
@@ -28,7 +27,7 @@ PLACES = [f"mug/el00/fold{fold}" for fold in (1, 2)]
 
 
 @pytest.fixture(scope="module")
-def other(finished: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def other(evaluated: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of a cross-fitted classifier; the default run lies in the same folder."""
     made = finished_project(
         tmp_path_factory,
@@ -36,7 +35,7 @@ def other(finished: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
         *(*STUDIES, "runs"),
         overrides=(*OTHER, "compared_runs=[tiny]"),
         prepare=lambda folder: shutil.copytree(
-            finished.folder, folder, symlinks=True, dirs_exist_ok=True
+            evaluated.folder, folder, symlinks=True, dirs_exist_ok=True
         ),
     )
     return made.folder / "results/other"
