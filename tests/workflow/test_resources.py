@@ -12,31 +12,30 @@ from projects import ROOT, STUDIES, TINY
 pytestmark = pytest.mark.slow
 
 
-def asked(project, attempt: int) -> dict[str, tuple[int, int]]:
-    """Return the memory in MB and the minutes that each rule asks for at that attempt."""
-    targets = (*STUDIES, "report", "leaderboard", "more_views", "travel", "ablation")
+PROFILE = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text("utf-8"))
+GROUPED = set(PROFILE["groups"])
+
+
+def test_every_rule_asks_for_memory_and_time_in_proportion_to_the_attempt(fresh):
+    """The profile for SLURM groups those of one unit's folds, and all others of the paper."""
+    # No rule's memory or time at its first attempt is a multiple of this prime.
+    attempt = 17
+    studies = ("leaderboard", "more_views", "travel", "ablation")
     dry = ("--cores", "2", "--dry-run", "--quiet", "host", "--attempt", str(attempt))
-    printed = project.run(*targets, *dry).stdout
-    found = {}
+    printed = fresh.run(*STUDIES, "report", *studies, *dry).stdout
+    rules = set()
     for rule, line in re.findall(r"^rule (\w+):\n(?: .*\n)*? +resources: (.*)$", printed, re.M):
         resources = dict(re.findall(r"(mem_mb|runtime)=(\d+)", line))
-        found[rule] = (int(resources["mem_mb"]), int(resources["runtime"]))
-    return found
+        mb, minutes = int(resources["mem_mb"]), int(resources["runtime"])
+        assert mb % attempt == minutes % attempt == 0, rule
+        assert mb >= attempt * 1000, rule
+        rules.add(rule)
+    assert {"settings", "meshes", "render", "train", "lookup", "report", "ablation"} <= rules
+    assert rules - GROUPED == {"evaluate_ablation", *studies}
 
 
-def test_every_rule_asks_for_memory_and_time_and_for_more_when_it_is_tried_again(fresh):
-    first, third = asked(fresh, 1), asked(fresh, 3)
-    assert {"settings", "meshes", "render", "train", "lookup", "report", "ablation"} <= set(first)
-    assert first == {rule: (mb // 3, minutes // 3) for rule, (mb, minutes) in third.items()}
-    assert min(mb for mb, _ in first.values()) >= 1000
-
-
-def test_the_slurm_profile_groups_every_rule_of_the_paper_and_no_other_name(fresh):
-    profile = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text("utf-8"))
-    grouped = set(profile["groups"])
-    rules: set[str] = set()
-    for estimator in ((), ("estimator=linear", "camera.image_side=64")):
-        printed = fresh.run(*STUDIES, "--list-rules", overrides=(*TINY, *estimator)).stdout
-        rules |= set(printed.split())
-        assert set(fresh.would_run(*estimator)) <= grouped
-    assert grouped <= rules
+def test_the_slurm_profile_groups_the_rules_of_linear_estimators_and_no_other_name(fresh):
+    linear = ("estimator=linear", "camera.image_side=64")
+    assert set(fresh.would_run(*linear)) <= GROUPED
+    printed = fresh.run(*STUDIES, "--list-rules", overrides=(*TINY, *linear)).stdout
+    assert set(printed.split()) >= GROUPED
