@@ -33,6 +33,12 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("untimed")
 
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What needs the finished project comes first: one process makes it, others have units."""
+    items.sort(key=lambda item: not {"finished", "scratch"} & set(item.fixturenames))
+
+
 UNITS = (("mug", 0), ("mug", 30), ("chair", 0))
 N_FOLDS = 3
 
