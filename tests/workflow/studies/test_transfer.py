@@ -47,4 +47,4 @@ def test_trained_on_and_tested_on(studied):
     assert len(re.findall(r"^\| (Single|Random|Opposite|Proposed) \|", text, re.M)) == 8
     # The run itself is as finished as it was, and a size concerns its own sensor and category.
     more = (*STUDIED[len(TINY) :], "categories=[mug]", "sensor.diagonal_m.mug=0.3")
-    assert studied.would_run(*more, targets=("evaluation",)) == {}
+    assert studied.would_run(*more, targets=("evaluation",)) == {"settings": 1, "evaluation": 1}
