@@ -18,8 +18,10 @@ With an estimator of one's own, by the lookup table of its errors::
 `build_lookup` makes a table of the evidence that `gather_evidence` makes of calibration estimates.
 """
 
+import sys
 import warnings
 from importlib import import_module
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 # What type checkers see of the names below.
@@ -75,15 +77,11 @@ _MODULES = {
     "build_lookup": "nbv.robot.lookup",
 }
 
-# Former names, for one release: what to use now, and where the object is.
+# Former names, for one release.
 _FORMER = {
-    "RotationPairs": ("OrientationTable", "nbv.robot.rotation_pairs", "OrientationTable"),
-    "View": ("PoseEstimate", "nbv.robot.next_camera", "PoseEstimate"),
-    "recommend_camera": (
-        "OrientationTable.recommend",
-        "nbv.robot.next_camera",
-        "recommend_camera",
-    ),
+    "RotationPairs": "OrientationTable",
+    "View": "PoseEstimate",
+    "recommend_camera": "OrientationTable.recommend",
 }
 
 __all__ = list(_MODULES)
@@ -92,10 +90,10 @@ __all__ = list(_MODULES)
 def __getattr__(name: str) -> Any:
     """Import what the public API names when it is first asked for."""
     if name in _FORMER:
-        new, module, attribute = _FORMER[name]
+        new = _FORMER[name]
         message = f"nbv.{name} is now nbv.{new}; the old name goes with the next release"
         warnings.warn(message, DeprecationWarning, stacklevel=2)
-        return getattr(import_module(module), attribute)
+        return attrgetter(new)(sys.modules[__name__])
     if name not in _MODULES:
         raise AttributeError(f"module 'nbv' has no attribute {name!r}")
     return getattr(import_module(_MODULES[name]), name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,23 +41,6 @@ NO_DEPENDENCE = (
 )
 
 NO_SCORES = "scores are not used: calibration pairs had none"
-
-
-class CalibratedErrors(Protocol):
-    """What a ranking takes from an `nbv.OrientationTable`, whose module imports this one."""
-
-    @property
-    def straightened(self) -> bool:
-        """Whether poses were rotated onto the optical axis."""
-
-    def name_of(self, object_id: str | None) -> str:
-        """Return the name of an object."""
-
-    def errors(self, object_id: str | None = None) -> OrientationErrors:
-        """Return the errors on an object."""
-
-    def depends_on_view(self, name: str) -> bool:
-        """Return whether an object's flips depend on the view."""
 
 
 @dataclass(frozen=True)
@@ -160,17 +143,16 @@ class _Camera:
 
 
 def recommend_camera(
-    table: CalibratedErrors,
+    errors: OrientationErrors,
     estimates: Sequence[PoseEstimate],
     candidates: Sequence[Pose] | int,
     *,
-    object_id: str | None = None,
-    camera_pose: ArrayLike | None = None,
-    max_travel_deg: float = 180.0,
+    straightened: bool,
+    depends_on_view: bool,
+    camera_pose: ArrayLike | None,
+    max_travel_deg: float,
 ) -> CameraRecommendation:
-    """Rank camera poses; see `nbv.OrientationTable.recommend`."""
-    name = table.name_of(object_id)
-    errors = table.errors(name)
+    """Rank camera poses by an object's errors; see `nbv.OrientationTable.recommend`."""
     scores = _checked_scores(estimates)
     is_posed = estimates[0].camera_pose is not None
     if is_posed and camera_pose is not None:
@@ -178,7 +160,8 @@ def recommend_camera(
     base = np.eye(4) if camera_pose is None else as_pose(camera_pose)
     cameras = [
         _Camera(
-            base if e.camera_pose is None else e.camera_pose, _straightening(table, e.position_mm)
+            base if e.camera_pose is None else e.camera_pose,
+            _straightening(e.position_mm, straightened),
         )
         for e in estimates
     ]
@@ -201,7 +184,7 @@ def recommend_camera(
         poses = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
         is_known = True
     targets = np.stack(
-        [_target(pose, place, table, i).straight_from_base for i, pose in enumerate(poses)]
+        [_target(pose, place, straightened, i).straight_from_base for i, pose in enumerate(poses)]
     )
     travel = view_angle_deg(targets @ last.T)
     apart = np.min([view_angle_deg(targets @ taken.T) for taken in straight_from_base], axis=0)
@@ -229,8 +212,7 @@ def recommend_camera(
         for k, pose in ((k, poses[free[k]]) for k in ranking(cost, travel[free]))
     ]
     distance = errors.symmetry.distance_deg(now.support, now.pose)
-    depends = table.depends_on_view(name)
-    warnings = () if depends else (NO_DEPENDENCE,)
+    warnings = () if depends_on_view else (NO_DEPENDENCE,)
     if scores is not None and errors.ratio is None:
         warnings = (*warnings, NO_SCORES)
     within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
@@ -239,7 +221,7 @@ def recommend_camera(
         expected_error_deg=float(now.probability @ distance) + small,
         probability_within=as_chances(within_now),
         moves=tuple(moves),
-        depends_on_view=depends,
+        depends_on_view=depends_on_view,
         warnings=warnings,
     )
 
@@ -259,13 +241,13 @@ def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:
     return np.array(scores) if scores else None
 
 
-def _straightening(table: CalibratedErrors, position: Array | None) -> Orientations:
-    if position is None or not table.straightened:
+def _straightening(position: Array | None, straightened: bool) -> Orientations:
+    if position is None or not straightened:
         return np.eye(3)
     return along_ray(position)
 
 
-def _target(pose: Pose, place: Array | None, table: CalibratedErrors, i: int) -> _Camera:
+def _target(pose: Pose, place: Array | None, straightened: bool, i: int) -> _Camera:
     """Return a candidate's camera; `place` (3,) is the object's in the base frame, if known."""
     if place is None:
         return _Camera(pose, np.eye(3))
@@ -280,7 +262,7 @@ def _target(pose: Pose, place: Array | None, table: CalibratedErrors, i: int) ->
             f"candidate {i}: the object is {away:.0f} m away: give camera poses in metres, not "
             "millimetres"
         )
-    return _Camera(pose, _straightening(table, position))
+    return _Camera(pose, _straightening(position, straightened))
 
 
 def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> list[Pose]:

@@ -212,11 +212,13 @@ class OrientationTable:
         >>> answer.depends_on_view, answer.probability_within["30"] > 0.9
         (False, True)
         """
+        name = self.name_of(object_id)
         return recommend_camera(
-            self,
+            self.errors(name),
             estimates,
             candidates,
-            object_id=object_id,
+            straightened=self.straightened,
+            depends_on_view=self.depends_on_view(name),
             camera_pose=camera_pose,
             max_travel_deg=max_travel_deg,
         )

@@ -17,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 
+from nbv.core.rotation_errors import OrientationErrors
 from nbv.core.seeds import FIRST_FEATURE_SEED
 from nbv.errors import UserError, nearest
 from nbv.experiment.splits import enough_objects
@@ -366,9 +367,9 @@ class Rotations(Section):
     models_info: DataPath | None = None
     objects: Annotated[list[Text], Distinct] = []
     score_objects: Annotated[list[Text], Distinct] = []
-    concentration: Annotated[Number, Field(gt=0)] = 25.0
-    pseudo_observations: Annotated[Number, Field(gt=0)] = 3.0
-    flip_deg: Annotated[Number, Field(gt=0, lt=180)] = 20.0
+    concentration: Annotated[Number, Field(gt=0)] = OrientationErrors.concentration
+    pseudo_observations: Annotated[Number, Field(gt=0)] = OrientationErrors.pseudo_observations
+    flip_deg: Annotated[Number, Field(gt=0, lt=180)] = OrientationErrors.flip_deg
     turns: Annotated[Whole, Field(ge=2, le=10_000)] = 16
     views: Annotated[Whole, Field(ge=1, le=360)] = 24
     poses: Annotated[Whole, Field(ge=24, le=100_000)] = 4608
