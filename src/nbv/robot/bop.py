@@ -20,8 +20,7 @@ from nbv.core.rotations import (
 from nbv.errors import UserError, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
-from nbv.numbers import as_orientations, column
-from nbv.robot.next_camera import check_position
+from nbv.numbers import as_orientations, as_position, column
 from nbv.robot.rotation_pairs import FLIP_DEG, OrientationTable
 
 BOP_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
@@ -220,7 +219,7 @@ def _orientations(path: Path, rows: pd.DataFrame, name: str) -> Orientations:
 def _positions(path: Path, rows: pd.DataFrame, name: str) -> Array:
     positions = column(path, rows, name, 3)
     for row, position in zip(rows.index, positions, strict=True):
-        check_position(f"{path}, row {row + 2}: {name}", position)
+        as_position(position, f"{path}, row {row + 2}: {name}")
     return positions
 
 
