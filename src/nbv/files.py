@@ -231,7 +231,7 @@ def read_text(path: Path) -> str:
         raise UserError(f"{path}, line {line}: {what}") from error
 
 
-def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.DataFrame:
+def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
     """Read a user's CSV file as text, so that an object may be called NA.
 
     Parameters
@@ -239,8 +239,6 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
     path : path
     needed : sequence of str
         Required columns.
-    frames_hint : str
-        Hint for a missing column if a column ``file`` names frames.
 
     Raises
     ------
@@ -272,20 +270,17 @@ def read_rows(path: Path, needed: Sequence[str], frames_hint: str = "") -> pd.Da
     if twice := [name for name in head if name and head.count(name) > 1]:
         raise UserError(f"{path}: two columns {twice[0]!r}; leave one of them out")
     table = pd.DataFrame(rows[1:], columns=head, dtype=str)
-    need_columns(path, table, needed, frames_hint)
+    need_columns(path, table, needed)
     if table.empty:
         raise UserError(f"{path} has no rows")
     return table
 
 
-def need_columns(
-    path: Path, table: pd.DataFrame, needed: Sequence[str], frames_hint: str = ""
-) -> None:
+def need_columns(path: Path, table: pd.DataFrame, needed: Sequence[str]) -> None:
     """Raise UserError if a user's table lacks a needed column; see `read_rows`."""
     for name in needed:
         if name not in table:
             hint = "; separate columns by commas" if table.shape[1] == 1 else ""
-            hint = frames_hint if "file" in table else hint
             raise UserError(f"{path}: no column {name!r}; it needs {', '.join(needed)}{hint}")
 
 

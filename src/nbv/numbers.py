@@ -27,6 +27,12 @@ ORIENTATION_TOLERANCE = 1e-3
 LARGEST_M = 1e6
 """Largest coordinate of a pose or an axis in the base frame; a larger one is in another unit."""
 
+LEAST_MM = 10.0
+"""No camera sees an object from nearer: such distances are metres."""
+
+FARTHEST_M = 50.0
+"""No arm looks at an object from farther: such distances are millimetres."""
+
 
 def as_finite(values: ArrayLike, name: str, n: int, hint: str = "") -> Array:
     """Return n finite numbers (n,), from an array of any shape or from texts.
@@ -53,6 +59,25 @@ def as_point(values: ArrayLike, name: str) -> Array:
     if (largest := float(np.abs(point).max())) > LARGEST_M:
         raise UserError(f"{name}: {largest:g} m away; give metres")
     return point
+
+
+def as_position(values: ArrayLike, name: str) -> Array:
+    """Return the position (3,) of an object in the camera's frame, millimetres.
+
+    Raises
+    ------
+    UserError
+        If the camera cannot see an object there.
+    """
+    position = as_finite(values, name, 3)
+    if position[2] <= 0:
+        raise UserError(
+            f"{name} is behind the camera (z = {position[2]:g}): give the pose object to camera, "
+            "not camera to object"
+        )
+    if (distance := float(np.linalg.norm(position))) < LEAST_MM:
+        raise UserError(f"{name} is {distance:g} mm away; give mm, not metres")
+    return position
 
 
 def as_orientations(values: ArrayLike, name: str) -> Array:

@@ -15,6 +15,7 @@ from tests.cli.test_command_line import POSE, fails, run, same_move
 from tests.core.made import unclear_turns
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
+from nbv.cli import main
 from nbv.core.angles import circular_distance_deg
 from nbv.core.selection import AFFINITY
 from nbv.errors import FrameError, UserError
@@ -326,6 +327,11 @@ def test_the_command_answers_as_python_does(here, capsys, file):
     assert printed["assumed_focal_px"] is None
     target = moved_camera(np.array(POSE), [0.5, 0, 0.1], [0, 0, 1], answer.move.rotation_deg)
     assert printed["target_camera_pose"] == pytest.approx(target)
+    former = ("--distribution", file, "--table", "t.npz", "--rotations", "0", "90")
+    assert main(["recommend", *former, *limits, "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out) == printed
+    assert "--distribution --estimate" in err
     told = run(capsys, "next", *options, "--allowed", "45,120")
     only = table.recommend(read_distributions(file), [0.0, 90.0], allowed_deg=[45, 120])
     assert f"azimuth {only.azimuth_deg:.1f}° (camera around object;" in told

@@ -6,7 +6,7 @@ import inspect
 import math
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -75,6 +75,10 @@ Rotations = Annotated[
 ]
 
 Json = Annotated[bool, Parameter(negative=())]
+
+AZIMUTHS, DISTRIBUTIONS, ORIENTATIONS = "azimuths", "distributions", "orientations"
+FRAMES = "frames"
+"""Kinds of content of a file or a table."""
 
 SHIPPED = "mug"
 """The default bundle."""
@@ -257,6 +261,13 @@ def _is_numbers(text: str) -> bool:
         return bool([float(part) for part in parts])
     except ValueError:
         return False
+
+
+def check_options(given: Mapping[str, object], known: Sequence[str], of_what: str) -> None:
+    """Raise UserError if an option is given, not None, that is not known for an input."""
+    for option, value in given.items():
+        if value is not None and option not in known:
+            raise UserError(f"{option} does not go with {of_what}; leave it out")
 
 
 def check_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:

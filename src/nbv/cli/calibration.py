@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,16 +18,70 @@ from nbv.cli.answers import (
     print_offset,
     print_warnings,
 )
-from nbv.cli.arguments import SHIPPED, Json, WholeNumbers, as_paragraphs, check_writable, in_flags
+from nbv.cli.arguments import (
+    ANY_FRAME,
+    AZIMUTHS,
+    FRAMES,
+    ORIENTATIONS,
+    SHIPPED,
+    FrameOptions,
+    Json,
+    WholeNumbers,
+    as_paragraphs,
+    check_options,
+    check_writable,
+    in_flags,
+)
 from nbv.errors import UserError, nearest
 from nbv.labels import counted
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from nbv.errors import FrameError
     from nbv.robot.network import Sweep
-    from nbv.robot.pairs import PairTable
     from nbv.robot.recommender import Recommender
-    from nbv.robot.rotation_pairs import OrientationTable
+    from nbv.robot.recordings import Recording
+
+
+OPTIONS = {
+    AZIMUTHS: ("--criterion",),
+    ORIENTATIONS: ("--ground-truth", "--models-info", "--object"),
+    FRAMES: ("--bundle", "--intrinsics", "--depth-scale", "--near", "--far"),
+}
+"""Options for some files only."""
+
+
+@as_paragraphs
+@Parameter(name="*")
+@dataclass(frozen=True)
+class CalibrationOptions:
+    """Options that depend on what the file holds.
+
+    Parameters
+    ----------
+    criterion
+        Criterion of the lookup table of azimuths: pose_ambiguity (default), information_gain,
+        expected_dispersion, bayes_error, expected_error or fixed.
+    ground_truth
+        The truth of BOP's results: the folder that has the scenes' scene_gt.json, or a CSV file in
+        the form of results. Default: the folder of the results.
+    models_info
+        BOP's models_info.json, for the symmetries of the objects of orientations.
+    objects
+        Keep this object of orientations; give the option again for more. Default: all.
+    bundle
+        The bundle to calibrate on frames: the name of a shipped one (default: mug), or a file.
+    """
+
+    criterion: str | None = None
+    ground_truth: Path | None = None
+    models_info: Path | None = None
+    objects: Annotated[list[str] | None, Parameter(name="--object", negative=())] = None
+    bundle: str | None = None
+
+
+NO_OPTIONS = CalibrationOptions()
 
 
 @as_paragraphs
@@ -35,26 +90,18 @@ def calibrate(
     /,
     *,
     output: Path,
-    bundle: str | None = None,
-    criterion: str | None = None,
-    ground_truth: Path | None = None,
-    models_info: Path | None = None,
-    objects: Annotated[list[str] | None, Parameter(name="--object", negative=())] = None,
-    intrinsics: str | None = None,
-    depth_scale: float | None = None,
-    near: float | None = None,
-    far: float | None = None,
+    options: CalibrationOptions = NO_OPTIONS,
+    camera: FrameOptions = ANY_FRAME,
     json: Json = False,
 ) -> None:
-    """Calibrate an estimator's error model from ground-truth azimuths.
+    """Calibrate an estimator's error model from ground truth, as the file's columns say.
 
     From pairs (object_id, azimuth_deg, estimate_deg) of any estimator it makes
-    a lookup table for nbv recommend --estimate. With columns p0, p1, ..., the
-    probabilities of the azimuths 360 k / B, the table also serves nbv recommend
-    --distribution. From rotations, BOP's results or pairs (object_id, R_true,
-    R_estimate), it makes a table for camera poses. From a manifest of frames
-    (object_id, sequence, file, azimuth_deg) and a bundle it makes a bundle for
-    your camera.
+    a table for nbv next. With columns p0, p1, ..., the probabilities of the
+    azimuths 360 k / B, the table also serves distributions. From orientations,
+    BOP's results or pairs (object_id, R_true, R_estimate), it makes a table for
+    camera poses. From a manifest of frames (object_id, sequence, file,
+    azimuth_deg) it makes a bundle for your camera.
 
     Example: nbv calibrate pairs.csv --output table.npz
 
@@ -66,63 +113,56 @@ def calibrate(
         A CSV file of pairs or of frames.
     output
         The file to write: .npz for a table, .safetensors for a bundle.
-    bundle
-        The bundle to calibrate on the frames: the name of a shipped one, or a file.
-    criterion
-        Criterion of the lookup table: pose_ambiguity (default), information_gain,
-        expected_dispersion, bayes_error, expected_error or fixed.
-    ground_truth
-        The truth of BOP's results: the folder that has the scenes' scene_gt.json, or a CSV file in
-        the form of results. Default: the folder of the results.
-    models_info
-        BOP's models_info.json, for the symmetries of the objects of rotations.
-    objects
-        Keep this object of rotations; give the option again for more. Default: all.
-    intrinsics
-        Camera of the frames: fx,fy,cx,cy in pixels, only the focal length, or a camera file.
-    depth_scale
-        Metres per unit of depth. Default: 1 for floating-point depth; for integer depth the value
-        of the camera file, or 0.001.
-    near
-        Least depth of the object, metres.
-    far
-        Largest depth of the object, metres.
     json
         Print JSON.
     """
-    if bundle is None:
-        frame_options = {"--intrinsics": intrinsics, "--depth-scale": depth_scale}
-        frame_options |= {"--near": near, "--far": far}
-        if ignored := [name for name, value in frame_options.items() if value is not None]:
-            raise UserError(f"{ignored[0]} is for frames, which need --bundle: --bundle mug")
-        if output.suffix.lower() == ".safetensors":
-            raise UserError(
-                f"--output={output} is a bundle, and frames make one with --bundle: add "
-                "--bundle mug; pairs make a table, an .npz file"
-            )
-        check_writable("--output", output, [".npz"])
-        from nbv.robot.bop import read_calibration
-        from nbv.robot.rotation_pairs import OrientationTable
+    from nbv.files import read_rows
 
-        pairs = read_calibration(source, ground_truth, models_info, objects or [])
-        if not isinstance(pairs, OrientationTable):
-            _calibrate_table(pairs, output, criterion or "pose_ambiguity", as_json=json)
-            return
-        if criterion is not None:
-            raise UserError("--criterion is for azimuths; orientations rank by expected error")
-        _calibrate_orientations(pairs, output, as_json=json)
-        return
-    if criterion is not None:
-        raise UserError("--criterion is for pairs, which need no --bundle; leave one of them out")
-    check_writable("--output", output, [".safetensors"])
+    rows = read_rows(source, ())
+    kind = _kind(rows.columns)
+    given = {
+        "--criterion": options.criterion,
+        "--ground-truth": options.ground_truth,
+        "--models-info": options.models_info,
+        "--object": options.objects,
+        "--bundle": options.bundle,
+        "--intrinsics": camera.intrinsics,
+        "--depth-scale": camera.depth_scale,
+        "--near": camera.near,
+        "--far": camera.far,
+    }
+    check_options(given, OPTIONS[kind], f"{source}, which holds {kind}")
+    check_writable("--output", output, [".safetensors" if kind == FRAMES else ".npz"])
+    CALIBRATIONS[kind](source, rows, output, options, camera, json)
+
+
+def _kind(columns: Iterable[Hashable]) -> str:
+    """Return what a file with these columns holds."""
+    known = set(columns)
+    if "R_true" in known or {"obj_id", "R"} <= known:
+        return ORIENTATIONS
+    return FRAMES if "file" in known and "estimate_deg" not in known else AZIMUTHS
+
+
+def _calibrate_bundle(
+    source: Path,
+    rows: pd.DataFrame,
+    output: Path,
+    options: CalibrationOptions,
+    camera: FrameOptions,
+    as_json: bool,
+) -> None:
+    """Make the bundle of ``nbv calibrate`` from the rows of a manifest."""
     from nbv.core.distributions import mean_direction_deg
     from nbv.core.logits import from_logits
     from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
     from nbv.robot.calibration import recalibrated
+    from nbv.robot.recordings import recordings_of
 
-    run = _run_on_manifest(bundle, source, intrinsics, depth_scale, near, far, as_json=json)
+    of_rows = recordings_of(source, rows)
+    run = _run_on_recordings(options.bundle or SHIPPED, of_rows, camera, as_json=as_json)
     used, sweeps = run.recommender.bundle, run.sweeps
-    if run.n_assumed and not json:
+    if run.n_assumed and not as_json:
         print_assumed_camera(used.focal_px, run.n_assumed)
     recordings: list[dict[str, Any]] = []
     for sweep in sweeps:
@@ -132,13 +172,13 @@ def calibrate(
         about = {"object_id": sweep.object_id, "sequence": sweep.sequence}
         counts = {"n_frames": len(estimate_deg)}
         recordings.append(about | counts | asdict(offset) | {"is_added": is_added})
-        if not json:
+        if not as_json:
             # Before making the tables, which takes up to a minute.
             name = f"{sweep.object_id}, sequence {sweep.sequence}"
             print_offset(name, counted(len(estimate_deg), "frame"), offset, is_added=is_added)
     sys.stdout.flush()
     recalibrated(used, sweeps, str(source)).save(output)
-    if json:
+    if as_json:
         print_json(
             {
                 "file": str(output),
@@ -160,10 +200,7 @@ def evaluate(
     bundle: str = SHIPPED,
     views: WholeNumbers = None,
     until: float | None = None,
-    intrinsics: str | None = None,
-    depth_scale: float | None = None,
-    near: float | None = None,
-    far: float | None = None,
+    camera: FrameOptions = ANY_FRAME,
     output: Path | None = None,
     json: Json = False,
 ) -> None:
@@ -183,15 +220,6 @@ def evaluate(
     until
         Also stop as soon as the expected error is at most this, degrees, or after the largest
         number of views.
-    intrinsics
-        fx,fy,cx,cy in pixels, only the focal length, or a camera file.
-    depth_scale
-        Metres per unit of depth. Default: 1 for floating-point depth; for integer depth the value
-        of the camera file, or 0.001.
-    near
-        Least depth of the object, metres.
-    far
-        Largest depth of the object, metres.
     output
         Also write the errors to this CSV file.
     json
@@ -201,8 +229,9 @@ def evaluate(
         check_writable("--output", output, [".csv"])
     from nbv.files import write_csv
     from nbv.robot import evaluation
+    from nbv.robot.recordings import read_manifest
 
-    run = _run_on_manifest(bundle, manifest, intrinsics, depth_scale, near, far, as_json=json)
+    run = _run_on_recordings(bundle, read_manifest(manifest), camera, as_json=json)
     used, sweeps = run.recommender.bundle, run.sweeps
 
     def report(n_done: int) -> None:
@@ -240,7 +269,14 @@ def evaluate(
     print_evaluation(errors, ood)
 
 
-def _calibrate_table(pairs: PairTable, output: Path, criterion: str, *, as_json: bool) -> None:
+def _calibrate_table(
+    source: Path,
+    rows: pd.DataFrame,
+    output: Path,
+    options: CalibrationOptions,
+    _camera: FrameOptions,
+    as_json: bool,
+) -> None:
     """Make the tables of ``nbv calibrate`` from calibration pairs."""
     import numpy as np
 
@@ -250,9 +286,12 @@ def _calibrate_table(pairs: PairTable, output: Path, criterion: str, *, as_json:
     from nbv.core.selection import DENSITY, chosen_lookup
     from nbv.robot.distribution_table import DistributionTable
     from nbv.robot.lookup import LookupTable
+    from nbv.robot.pairs import PairTable
 
+    criterion = options.criterion or "pose_ambiguity"
     if criterion not in CRITERIA:
         raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
+    pairs = PairTable.from_rows(source, rows)
     sweeps = pairs.distributions
     views, thin = (pairs.estimates, ()) if sweeps else pairs.thin_estimates
     estimates = views.estimate_deg
@@ -264,14 +303,15 @@ def _calibrate_table(pairs: PairTable, output: Path, criterion: str, *, as_json:
         table.save(output, lookup)
     number = counted(len(estimates), "object")
     about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)}
-    about |= asdict(pairs.offset) | {"thin": list(thin)}
+    of_estimates = pairs.offset
+    about |= asdict(of_estimates) | {"thin": list(thin)}
     if not as_json:
-        print_offset(str(pairs.path), number, pairs.offset)
+        print_offset(str(source), number, of_estimates)
         print_warnings(thin)
         print_line(f"{output}: {criterion} from {number}")
     if table is not None:
-        azimuth_deg, rows = (np.concatenate(parts) for parts in zip(*sweeps.values(), strict=True))
-        offset = Offset.of(azimuth_deg, mean_direction_deg(rows), FOR_PAIRS)
+        azimuth_deg, of_views = map(np.concatenate, zip(*sweeps.values(), strict=True))
+        offset = Offset.of(azimuth_deg, mean_direction_deg(of_views), FOR_PAIRS)
         offset = replace(offset, warning=offset.warning or table.warning or None)
         about["distributions"] = {"temperature": table.temperature} | asdict(offset)
         if not as_json:
@@ -281,8 +321,19 @@ def _calibrate_table(pairs: PairTable, output: Path, criterion: str, *, as_json:
         print_json(about)
 
 
-def _calibrate_orientations(pairs: OrientationTable, output: Path, *, as_json: bool) -> None:
+def _calibrate_orientations(
+    source: Path,
+    rows: pd.DataFrame,
+    output: Path,
+    options: CalibrationOptions,
+    _camera: FrameOptions,
+    as_json: bool,
+) -> None:
     """Make the table of ``nbv calibrate`` from estimates in three dimensions."""
+    from nbv.robot.bop import orientation_table
+
+    truth = options.ground_truth, options.models_info, options.objects or []
+    pairs = orientation_table(source, rows, *truth)
     about = pairs.about()
     pairs.save(output)
     if as_json:
@@ -306,6 +357,14 @@ def _calibrate_orientations(pairs: OrientationTable, output: Path, *, as_json: b
         )
         print_warnings(summary.warnings)
     print_line(f"{output}: {counted(len(pairs.object_id), 'pair')}")
+
+
+CALIBRATIONS: Mapping[str, Callable[..., None]] = {
+    AZIMUTHS: _calibrate_table,
+    ORIENTATIONS: _calibrate_orientations,
+    FRAMES: _calibrate_bundle,
+}
+"""What makes a table or a bundle of each kind of file."""
 
 
 @dataclass(frozen=True)
@@ -332,19 +391,12 @@ class ManifestRun:
         }
 
 
-def _run_on_manifest(
-    bundle: str,
-    manifest: Path,
-    intrinsics: str | None,
-    depth_scale: float | None,
-    near: float | None,
-    far: float | None,
-    *,
-    as_json: bool,
+def _run_on_recordings(
+    bundle: str, recordings: Sequence[Recording], camera: FrameOptions, *, as_json: bool
 ) -> ManifestRun:
-    """Run a bundle's network on the frames of a manifest, and print which frames are skipped."""
+    """Run a bundle's network on the frames of recordings, and print which frames are skipped."""
     from nbv.robot.recommender import Recommender
-    from nbv.robot.recordings import read_manifest, run_network
+    from nbv.robot.recordings import run_network
 
     left_out: dict[str, FrameError] = {}
 
@@ -356,17 +408,15 @@ def _run_on_manifest(
         line = in_flags(message)
         print(line, file=sys.stderr) if as_json else print_line(line)  # noqa: T201
 
-    recommender, recordings = Recommender.load(bundle), read_manifest(manifest)
-    sweeps = [
-        run_network(recommender, recording, intrinsics, depth_scale, report, near, far)
-        for recording in recordings
-    ]
+    recommender = Recommender.load(bundle)
+    options = camera.intrinsics, camera.depth_scale, report, camera.near, camera.far
+    sweeps = [run_network(recommender, recording, *options) for recording in recordings]
     for sweep in sweeps:
         for warning in sweep.warnings:
             say(f"warning: {warning}")
     n_assumed = sum(
-        camera is None and intrinsics is None and path not in left_out
+        known is None and camera.intrinsics is None and path not in left_out
         for recording in recordings
-        for path, camera in zip(recording.frames["path"], recording.intrinsics, strict=True)
+        for path, known in zip(recording.frames["path"], recording.intrinsics, strict=True)
     )
     return ManifestRun(recommender, sweeps, n_assumed, left_out)

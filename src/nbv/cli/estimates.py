@@ -11,18 +11,20 @@ from cyclopts import Parameter
 from nbv.cli.answers import answer_as_json, print_answer, print_json, with_targets
 from nbv.cli.arguments import (
     ANY_MOVE,
+    AZIMUTHS,
+    DISTRIBUTIONS,
+    ORIENTATIONS,
     Json,
     MoveOptions,
     Numbers,
     Rotations,
     as_paragraphs,
+    check_options,
 )
 from nbv.errors import UserError
 
 if TYPE_CHECKING:
     from nbv.robot.answers import Answer
-
-AZIMUTHS, DISTRIBUTIONS, ORIENTATIONS = "azimuths", "distributions", "orientations"
 
 KINDS = {AZIMUTHS: "cost", DISTRIBUTIONS: "distribution.of_views", ORIENTATIONS: "truth"}
 """What a table may hold, and the name of an array by which it is known."""
@@ -120,9 +122,7 @@ def next_view(
         "--sphere": around.sphere,
         "--until": until,
     }
-    for option, value in given.items():
-        if value is not None and option not in OPTIONS[kind]:
-            raise UserError(f"{option} does not go with {table}, which holds {kind}; leave it out")
+    check_options(given, OPTIONS[kind], f"{table}, which holds {kind}")
     answer: Answer[Any]
     if kind == ORIENTATIONS:
         answer, has_targets = _ranked_cameras(table, estimate, limits, around), True

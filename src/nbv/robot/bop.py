@@ -20,9 +20,7 @@ from nbv.core.rotations import (
 from nbv.errors import UserError, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
-from nbv.numbers import as_orientations, column
-from nbv.robot.next_camera import check_position
-from nbv.robot.pairs import PairTable
+from nbv.numbers import as_orientations, as_position, column
 from nbv.robot.rotation_pairs import FLIP_DEG, OrientationTable
 
 BOP_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
@@ -33,27 +31,6 @@ NEAREST_MM = 50.0
 
 FEWEST_PAIRS = 12
 """An object with fewer says too little about where it flips."""
-
-
-def read_calibration(
-    path: str | Path,
-    truth: str | Path | None = None,
-    models_info: str | Path | None = None,
-    objects: Sequence[str] = (),
-) -> PairTable | OrientationTable:
-    """Read calibration pairs, of azimuths or of orientations as the columns say.
-
-    The parameters and errors are those of `read_orientation_table`; azimuths have `path` alone.
-    """
-    rows = read_rows(Path(path), ())
-    if {"obj_id", "R"} <= set(rows) or "R_true" in rows:
-        return orientation_table(path, rows, truth, models_info, objects)
-    if truth is not None or models_info is not None or objects:
-        raise UserError(
-            f"{path}: `ground_truth`, `models_info` and `object` are for orientations, which need "
-            "columns such as R_true and R_estimate"
-        )
-    return PairTable.from_rows(path, rows)
 
 
 def read_orientation_table(
@@ -242,7 +219,7 @@ def _orientations(path: Path, rows: pd.DataFrame, name: str) -> Orientations:
 def _positions(path: Path, rows: pd.DataFrame, name: str) -> Array:
     positions = column(path, rows, name, 3)
     for row, position in zip(rows.index, positions, strict=True):
-        check_position(f"{path}, row {row + 2}: {name}", position)
+        as_position(position, f"{path}, row {row + 2}: {name}")
     return positions
 
 

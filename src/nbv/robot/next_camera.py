@@ -24,16 +24,10 @@ from nbv.core.rotations import Array, Orientations, along_ray
 from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted
-from nbv.numbers import Pose, as_finite, as_orientations, as_pose
+from nbv.numbers import FARTHEST_M, Pose, as_finite, as_orientations, as_pose, as_position
 from nbv.robot.answers import Answer, RankedMove
 from nbv.robot.next_view import as_chances
 from nbv.robot.rotations import MIN_SEPARATION_DEG, as_travel
-
-FARTHEST_M = 50.0
-"""No arm looks at an object from farther: such camera poses are in millimetres."""
-
-LEAST_MM = 10.0
-"""No camera sees an object from nearer: such distances are metres."""
 
 NO_DEPENDENCE = (
     "calibration shows no dependence of this object's flips on the view; the ranking may be no "
@@ -304,25 +298,12 @@ def as_view(given: Any, name: str) -> PoseEstimate:
     rotation = as_finite(entry["R"], f"{name}: R", 9).reshape(3, 3)
     view = PoseEstimate(as_orientations(rotation, f"{name}: R"))
     if (t := entry.get("t")) is not None:
-        position = as_finite(t, f"{name}: t", 3)
-        check_position(f"{name}: t", position)
-        view = replace(view, position_mm=position)
+        view = replace(view, position_mm=as_position(t, f"{name}: t"))
     if (score := entry.get("score")) is not None:
         view = replace(view, score=as_finite(score, f"{name}: score", 1).item())
     if (pose := entry.get("camera_pose")) is not None:
         view = replace(view, camera_pose=as_pose(pose, f"{name}: camera_pose"))
     return view
-
-
-def check_position(name: str, position_mm: Array) -> None:
-    """Raise UserError where an object at a position (3,) in the camera cannot be seen."""
-    if position_mm[2] <= 0:
-        raise UserError(
-            f"{name} is behind the camera (z = {position_mm[2]:g}): give the pose object to "
-            "camera, not camera to object"
-        )
-    if (away := float(np.linalg.norm(position_mm))) < LEAST_MM:
-        raise UserError(f"{name} is {away:g} mm away; give mm, not metres")
 
 
 def read_views(path: str | Path) -> list[PoseEstimate]:

@@ -31,8 +31,6 @@ WIDEST_GAP_DEG = 15.0
 
 N_VIEWS = 360
 
-_OF_FRAMES = "; frames need a `bundle`, such as mug, and an `output` that ends in .safetensors"
-
 Sweeps = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 """Maps each object to the azimuths (n,) of its views and their distributions (n, B)."""
 
@@ -63,13 +61,13 @@ class PairTable:
         UserError
             Where the file cannot be read, a column is missing, or a value is empty or not an angle.
         """
-        return cls.from_rows(path, read_rows(Path(path), COLUMNS, _OF_FRAMES))
+        return cls.from_rows(path, read_rows(Path(path), COLUMNS))
 
     @classmethod
     def from_rows(cls, path: str | Path, rows: pd.DataFrame) -> PairTable:
         """Return the pairs of a file's rows, as `load` does."""
         path = Path(path)
-        need_columns(path, rows, COLUMNS, _OF_FRAMES)
+        need_columns(path, rows, COLUMNS)
         if (is_empty := rows["object_id"].str.strip() == "").any():
             raise UserError(
                 f"{path}, row {int(is_empty.argmax()) + 2}: object_id is empty; give it"

@@ -13,7 +13,7 @@ import pandas as pd
 
 from nbv.core.angles import MOST_DEG
 from nbv.errors import FrameError, UserError
-from nbv.files import missing, read_rows
+from nbv.files import missing, need_columns, read_rows
 from nbv.labels import counted
 from nbv.numbers import column
 from nbv.robot.depth_files import read_depth, read_mask
@@ -74,8 +74,12 @@ def read_manifest(path: str | Path) -> list[Recording]:
         Where a column or a file is missing, a file occurs twice in a sequence, or a cell holds an
         invalid value; it names the row.
     """
-    path = Path(path)
-    table = read_rows(path, REQUIRED)
+    return recordings_of(Path(path), read_rows(Path(path), REQUIRED))
+
+
+def recordings_of(path: Path, table: pd.DataFrame) -> list[Recording]:
+    """Return the recordings of a manifest's rows, as `read_manifest` does."""
+    need_columns(path, table, REQUIRED)
     absent = [name for name in OPTIONAL if name not in table]
     for name in map(str, table):
         plain = name.strip().lower()
