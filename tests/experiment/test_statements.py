@@ -79,7 +79,7 @@ def test_among_equal_verdicts_the_kth_most_favoured_decides():
 def test_a_comparison_is_decided_where_what_favours_it_excludes_zero(ends, statistic):
     low, value, high = ends
     is_better, is_worse = (high < 0, low > 0) if statistic == "mae" else (low > 0, high < 0)
-    is_inside, is_outside = -1 < low and high < 1, low > 1 or high < -1
+    is_inside, is_outside = low > -1 and high < 1, low > 1 or high < -1
     for part, holds, fails in (
         (Better(statistic, *TERMS), is_better, is_worse),
         (Comparable(statistic, *TERMS, 1.0), is_inside, is_outside),
