@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 from nbv.core.criteria import CRITERIA
 from nbv.data.sensors import check_sensor
 from nbv.errors import UserError
-from nbv.experiment.config import load_condition, read_configuration
+from nbv.experiment.config import load_config, read_configuration
 from nbv.experiment.plan import Fold, Plan
 from nbv.experiment.results import ESTIMATED_ROLES, Unit
 from studies.kept_estimates import kept_settings
@@ -335,10 +336,24 @@ def _settings_of(run: str) -> Mapping[str, Any]:
 
 @functools.cache
 def _under_condition(run: Plan, name: str) -> Mapping[str, Any]:
+    """Return a run's configuration with another sensor and framing.
+
+    The run's overrides hold here too, except for the parameters of its sensor where the sensor
+    differs.
+    """
     conditions = run.config["transfer"]["conditions"]
     if name not in conditions:
         raise UserError(f"transfer.conditions has no {name}")
-    return load_condition(run.folder, run.overrides, run.config, conditions[name])
+    sensor, framing = conditions[name]["sensor"], conditions[name]["framing"]
+    replaced = r"sensor|camera\.framing"
+    if sensor != run.config["sensor"]["name"]:
+        replaced += r"|sensor\.parameters.*"
+    kept = [
+        override
+        for override in run.overrides
+        if not re.fullmatch(replaced, override.partition("=")[0].lstrip("+~"))
+    ]
+    return load_config(run.folder, [*kept, f"sensor={sensor}", f"camera.framing={framing}"])
 
 
 def _kept_settings(path: str) -> tuple[dict[str, Any], list[tuple[int, int, str, int]]]:

@@ -27,7 +27,7 @@ from nbv.data.depth_images import Codes
 from nbv.data.meshes import Surface
 from nbv.data.render import Renderer
 from nbv.experiment.estimation.hardware import Hardware
-from nbv.experiment.estimation.networks import classifier
+from nbv.experiment.estimation.networks import strided_network
 from nbv.experiment.estimation.training import fit_network
 from nbv.experiment.estimation.weights import Estimator
 
@@ -109,7 +109,7 @@ def train_orientations(
         return nn.functional.cross_entropy(outputs, target)
 
     torch.manual_seed(seed)
-    network = classifier(dict(settings), codes.shape[-1])
+    network = strided_network(settings, codes.shape[-1], settings["n_classes"])
     network.to(hardware.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
     of_mirrored = None if plane_deg is None else _flat(mirrored(poses, plane_deg)).numpy()
     targets = _flat(poses).numpy()

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from nbv.core.angles import circular_distance_deg
+from nbv.experiment.estimates import read_estimates
 from nbv.experiment.report.settings import (
     CELL_COLUMNS,
     ReportSettings,
@@ -25,7 +28,11 @@ from nbv.experiment.report.settings import (
 from nbv.experiment.report.table import DECIDED, Cell, Row, Table, difference_cell
 from nbv.experiment.results import Unit
 from nbv.experiment.statistics.paired import PairedErrors, pair_methods, pool
+from nbv.files import existing
 from nbv.labels import MINUS, category_label, method_label, number
+
+EstimatesFile = tuple[str, int, int, str]
+"""The key of a file of estimates: category, elevation in degrees, fold (from 1) and role."""
 
 RunErrors = Mapping[str, Mapping[Unit, pd.DataFrame]]
 """The errors of all images, by run and unit."""
@@ -40,6 +47,44 @@ _NOTES = (
 )
 
 
+def load_estimate_errors(files: Mapping[EstimatesFile, Path]) -> dict[Unit, pd.DataFrame]:
+    """Read the errors of estimates from one view.
+
+    Parameters
+    ----------
+    files : mapping of (category, elevation_deg, fold, role) to path
+        Files of `nbv.experiment.estimates.write_estimates`, the role ``calibration`` or
+        ``test``.
+
+    Returns
+    -------
+    dict of (category, elevation_deg) to pandas.DataFrame
+        Frames with the columns ``method, fold, object_id, initial_deg, error_deg``; ``method`` is
+        the role. An object calibrates in several folds.
+
+    Raises
+    ------
+    UserError
+        Where a file is missing or damaged.
+    """
+    parts: dict[Unit, list[pd.DataFrame]] = {}
+    for (category, elevation_deg, fold, role), path in files.items():
+        estimates = read_estimates(existing(path))
+        errors = circular_distance_deg(estimates.estimate_deg, estimates.azimuth_deg)
+        n_objects, n_views = errors.shape
+        frame = pd.DataFrame(
+            {
+                "method": role,
+                "fold": fold,
+                "object_id": np.repeat(np.asarray(estimates.object_ids, dtype=object), n_views),
+                "initial_deg": np.tile(estimates.azimuth_deg, n_objects),
+                "error_deg": errors.ravel(),
+            }
+        )
+        parts.setdefault((category, elevation_deg), []).append(frame)
+    return {unit: pd.concat(frames, ignore_index=True) for unit, frames in parts.items()}
+
+
 def runs_table(estimates: RunErrors, evaluations: RunErrors, settings: ReportSettings) -> Table:
     """Return the MAE of Single and of every method in every run, with differences to the first run.
 
@@ -48,7 +93,7 @@ def runs_table(estimates: RunErrors, evaluations: RunErrors, settings: ReportSet
     Parameters
     ----------
     estimates : mapping of str to mapping of (category, elevation_deg) to DataFrame
-        Errors of one view from `nbv.experiment.results.load_estimate_errors`. All runs have the
+        Errors of one view from `load_estimate_errors`. All runs have the
         same units and roles.
     evaluations : mapping of str to mapping of (category, elevation_deg) to DataFrame
         Errors of two views from `nbv.experiment.results.load_evaluations`. Runs may have different

@@ -3,11 +3,11 @@
 from nbv.experiment.jobs import job
 
 with job(snakemake):
-    from studies.runs import files_by_run, runs_table
+    from studies.runs import files_by_run, load_estimate_errors, runs_table
 
     from nbv.experiment.report.settings import ReportSettings
     from nbv.experiment.report.table import write_table
-    from nbv.experiment.results import load_estimate_errors, load_evaluations
+    from nbv.experiment.results import load_evaluations
 
     given, params = snakemake.input, snakemake.params
     estimates = files_by_run(params.estimates, given.estimates)

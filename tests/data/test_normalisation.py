@@ -112,11 +112,6 @@ def test_axes_without_sense_are_refused(up, front, named):
     assert "\n" not in str(caught.value)
 
 
-def test_an_unknown_centre_is_refused():
-    with pytest.raises(UserError, match=r"centre=boxx: .*did you mean 'box'"):
-        normalise(tetrahedron(np.eye(4, 3)), "+z", "+x", 0.0, "boxx")
-
-
 @pytest.mark.parametrize(
     ("vertices", "faces", "named"),
     [

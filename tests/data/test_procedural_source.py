@@ -53,4 +53,3 @@ def test_what_it_cannot_make_is_refused():
     source = source_of("procedural")
     refused(lambda: source.object_ids("mugg"), "no category mugg", "did you mean 'mug'")
     refused(lambda: select_objects(source, "mug", None), "set n_objects")
-    refused(lambda: source.load("mug", "mug-x"), "mug-x is not an id like mug-0000")

@@ -48,7 +48,6 @@ class TestShapeNetCore:
         self.tree(tmp_path, "v2")
         source = source_of("shapenet", root=str(tmp_path))
         refused(lambda: source.object_ids("chair"), tmp_path / "03001627", "dataset.categories")
-        refused(lambda: source_of("shapenet", root="x", layout="v3"), "layout=v3")
 
 
 class TestShapeNetSem:

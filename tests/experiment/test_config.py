@@ -17,7 +17,6 @@ from nbv.errors import UserError
 from nbv.experiment.config import (
     default_of,
     equal_cost_epochs,
-    load_condition,
     load_config,
     read_configuration,
     snakemake_overrides,
@@ -245,31 +244,6 @@ def test_conditions_can_be_left_out_and_added():
         ],
     )
     assert list(config["transfer"]["conditions"]) == ["ideal", "kinect", "stereo", "both"]
-
-
-def test_a_condition_is_the_run_but_for_sensor_and_framing():
-    overrides = ["experiment=small", "camera.framing=axis", "camera.image_side=16", "seed=3"]
-    run = load_config(CONFIG, overrides)
-    for name, condition in run["transfer"]["conditions"].items():
-        found = load_condition(CONFIG, overrides, run, condition)
-        assert found["camera"] == run["camera"] | {"framing": condition["framing"]}
-        assert found["sensor"] == load_config(CONFIG, [f"sensor={condition['sensor']}"])["sensor"]
-        same = {key: value for key, value in found.items() if key not in ("camera", "sensor")}
-        assert same == {key: run[key] for key in same}, name
-
-
-def test_parameters_belong_to_the_sensor_that_they_were_given_for():
-    overrides = ["sensor=stereo", "sensor.parameters.baseline_m=0.1", "sensor.diagonal_m.mug=0.2"]
-    run = load_config(CONFIG, overrides)
-
-    def seen_by(sensor):
-        condition = {"sensor": sensor, "framing": "silhouette"}
-        return load_condition(CONFIG, overrides, run, condition)
-
-    assert seen_by("stereo") == run
-    kinect = seen_by("kinect")["sensor"]
-    assert kinect["parameters"] == load_config(CONFIG, ["sensor=kinect"])["sensor"]["parameters"]
-    assert kinect["diagonal_m"] == run["sensor"]["diagonal_m"]
 
 
 @pytest.mark.parametrize(

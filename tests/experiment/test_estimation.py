@@ -258,8 +258,3 @@ def test_the_processors_own_precision_is_one_of_two_and_mps_computes_in_float32(
     assert hw.choose_hardware("cpu").dtype in (torch.bfloat16, torch.float32)
     monkeypatch.setattr(torch.backends.mps, "is_available", lambda: True)
     assert hw.choose_hardware("mps").dtype == torch.float32
-
-
-def test_an_unknown_network():
-    with pytest.raises(UserError, match=r"estimator\.kind=regresor: did you mean 'regressor'"):
-        build_network(SETTINGS | {"kind": "regresor"}, 16)

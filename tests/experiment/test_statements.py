@@ -17,12 +17,11 @@ from nbv.experiment.paper.statements import (
     Better,
     Comparable,
     Term,
-    better_verdict,
     combine,
     combine_statement,
-    comparable_verdict,
     deciding,
     in_favour,
+    interval_verdict,
     leaves,
 )
 
@@ -79,13 +78,16 @@ def test_among_equal_verdicts_the_kth_most_favoured_decides():
 @given(st.tuples(*[st.floats(-5, 5)] * 3).map(sorted), st.sampled_from(["mae", "pauc"]))
 def test_a_comparison_is_decided_where_what_favours_it_excludes_zero(ends, statistic):
     low, value, high = ends
-    for part, verdict in (
-        (Better(statistic, *TERMS), better_verdict(statistic, low, high)),
-        (Comparable(statistic, *TERMS, 1.0), comparable_verdict(low, high, 1.0)),
+    is_better, is_worse = (high < 0, low > 0) if statistic == "mae" else (low > 0, high < 0)
+    is_inside, is_outside = low > -1 and high < 1, low > 1 or high < -1
+    for part, holds, fails in (
+        (Better(statistic, *TERMS), is_better, is_worse),
+        (Comparable(statistic, *TERMS, 1.0), is_inside, is_outside),
     ):
         favour, least, most = in_favour(part, value, low, high)
         assert least <= favour <= most
-        assert verdict == (HOLDS if least > 0 else FAILS if most < 0 else UNDECIDED)
+        expected = HOLDS if holds else FAILS if fails else UNDECIDED
+        assert interval_verdict(part, low, high) == expected
 
 
 @given(st.tuples(*[st.floats(-5, 5)] * 2).map(sorted))

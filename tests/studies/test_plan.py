@@ -78,6 +78,32 @@ def test_extensions_that_follow_a_table_have_one():
         studies_of("~extensions.opposite_posterior").check_posterior("random", "opposite")
 
 
+def test_a_condition_changes_sensor_and_framing_alone():
+    studies = studies_of("camera.framing=axis", "camera.image_side=16", "seed=3")
+    run = studies.run.config
+    for name, condition in run["transfer"]["conditions"].items():
+        found = studies.condition(name)
+        assert found["camera"] == run["camera"] | {"framing": condition["framing"]}
+        chosen = Plan.load(ROOT / "config", (f"sensor={condition['sensor']}",)).config
+        assert found["sensor"] == chosen["sensor"]
+        same = {key: value for key, value in found.items() if key not in ("camera", "sensor")}
+        assert same == {key: run[key] for key in same}, name
+
+
+def test_parameters_belong_to_the_sensor_that_they_were_given_for():
+    given = ("sensor=stereo", "sensor.parameters.baseline_m=0.1", "sensor.diagonal_m.mug=0.2")
+    conditions = [
+        f"transfer.conditions.{s}={{sensor:{s},framing:silhouette}}" for s in ("stereo", "kinect")
+    ]
+    studies = studies_of(*given, *conditions)
+    run = studies.run.config
+    assert studies.condition("stereo") == run
+    kinect = studies.condition("kinect")["sensor"]
+    default = Plan.load(ROOT / "config", ("sensor=kinect",)).config["sensor"]
+    assert kinect["parameters"] == default["parameters"]
+    assert kinect["diagonal_m"] == run["sensor"]["diagonal_m"]
+
+
 def test_the_run_is_used_where_it_was_made_under_the_condition():
     studies = studies_of()
     assert studies.condition_folder("ideal") == studies.estimator_folder("ideal") == ""

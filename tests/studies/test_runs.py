@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from studies.runs import files_by_run, runs_table
+from studies.runs import files_by_run, load_estimate_errors, runs_table
 
 from nbv.core.estimates import Estimates
 from nbv.errors import UserError
 from nbv.experiment.estimates import write_estimates
 from nbv.experiment.report.settings import ReportSettings
-from nbv.experiment.results import load_estimate_errors
 
 from .made import texts
 

@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.errors import UserError, nearest
+from nbv.errors import UserError
 from nbv.files import damaged, read_arrays, write_arrays
 
 if TYPE_CHECKING:
     import trimesh
 
 Centre = Literal["box", "origin"]
-CENTRES = ("box", "origin")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 # Vectors may be rounded; 0.02 is about one degree.
@@ -153,12 +152,10 @@ def normalise(
     Raises
     ------
     UserError
-        If an axis or `centre` is not valid.
+        If an axis is not valid.
     """
     import trimesh
 
-    if centre not in CENTRES:
-        raise UserError(f"centre={centre}: no such centre; {nearest(centre, CENTRES)}")
     used, faces = np.unique(np.asarray(mesh.faces), return_inverse=True)
     rotation = frame_rotation(up, front, azimuth_deg)
     # The rounding of BLAS depends on the machine.

@@ -360,7 +360,7 @@ class Plan:
         script : Path
             Of the workflow or of the studies.
         settings : mapping, optional
-            A configuration with another sensor; see `nbv.experiment.config.load_condition`.
+            A configuration with another sensor.
         """
         settings = settings or self.config
         sensor = SENSORS.get(settings["sensor"]["name"])

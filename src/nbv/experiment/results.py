@@ -15,7 +15,7 @@ from nbv.core.evidence import Evidence
 from nbv.core.lookup import CostTable
 from nbv.core.policies import HeldOutViews, two_views
 from nbv.errors import UserError
-from nbv.experiment.estimates import check_azimuths, read_estimates, sweep_objects
+from nbv.experiment.estimates import check_azimuths, sweep_objects
 from nbv.experiment.splits import read_splits
 from nbv.files import check_columns, damaged, existing, read_csv, readable
 
@@ -83,9 +83,6 @@ Unit = tuple[str, int]
 EvaluationFile = tuple[str, int, int, str]
 """The key of a file of errors: category, elevation in degrees, fold (from 1) and method."""
 
-EstimatesFile = tuple[str, int, int, str]
-"""The key of a file of estimates: category, elevation in degrees, fold (from 1) and role."""
-
 ESTIMATED_ROLES = ("calibration", "test")
 """The roles of objects that have estimates."""
 
@@ -134,43 +131,6 @@ def _join(name: Unit, by_method: Mapping[str, list[pd.DataFrame]]) -> pd.DataFra
         )
     unit["method"] = pd.Categorical(unit["method"], categories=list(by_method), ordered=True)
     return unit[["method", "fold", *COLUMNS]]
-
-
-def load_estimate_errors(files: Mapping[EstimatesFile, Path]) -> dict[Unit, pd.DataFrame]:
-    """Read the errors of estimates from one view.
-
-    Parameters
-    ----------
-    files : mapping of (category, elevation_deg, fold, role) to path
-        Files of `nbv.experiment.estimates.write_estimates`, with a role of `ESTIMATED_ROLES`.
-
-    Returns
-    -------
-    dict of (category, elevation_deg) to pandas.DataFrame
-        Frames with the columns ``method, fold, object_id, initial_deg, error_deg``; ``method`` is
-        the role. An object calibrates in several folds.
-
-    Raises
-    ------
-    UserError
-        Where a file is missing or damaged.
-    """
-    parts: dict[Unit, list[pd.DataFrame]] = {}
-    for (category, elevation_deg, fold, role), path in files.items():
-        estimates = read_estimates(existing(path))
-        errors = circular_distance_deg(estimates.estimate_deg, estimates.azimuth_deg)
-        n_objects, n_views = errors.shape
-        frame = pd.DataFrame(
-            {
-                "method": role,
-                "fold": fold,
-                "object_id": np.repeat(np.asarray(estimates.object_ids, dtype=object), n_views),
-                "initial_deg": np.tile(estimates.azimuth_deg, n_objects),
-                "error_deg": errors.ravel(),
-            }
-        )
-        parts.setdefault((category, elevation_deg), []).append(frame)
-    return {unit: pd.concat(frames, ignore_index=True) for unit, frames in parts.items()}
 
 
 def load_object_ids(splits: Path) -> tuple[str, ...]:

@@ -14,7 +14,6 @@ import numpy as np
 import trimesh
 
 from nbv.data.procedural import airplane, car, chair, mug, toilet
-from nbv.errors import UserError, nearest
 
 __all__ = ["CATEGORIES", "generate"]
 
@@ -25,9 +24,6 @@ CATEGORIES: dict[str, Callable[[np.random.Generator], trimesh.Trimesh]] = {
     "mug": mug.mug,
     "toilet": toilet.toilet,
 }
-
-MOST_LEAST_REACH = 0.5
-"""About every eighth mug has a reach of 0.5; a larger one would need many draws."""
 
 
 def generate(
@@ -45,7 +41,8 @@ def generate(
         Number of the object, >= 0.
     least_reach : float
         Least reach of a mug's handle, in widths of the body, 0 to 0.5
-        (`nbv.data.procedural.mug.handle_reach`); ignored for other categories.
+        (`nbv.data.procedural.mug.handle_reach`); ignored for other categories. About every eighth
+        mug has a reach of 0.5; a larger one would need many draws.
     square_share : float
         The probability that a mug has a square body, 0 to 1; ignored for other categories.
 
@@ -53,23 +50,7 @@ def generate(
     -------
     trimesh.Trimesh
         A concatenation of watertight parts with outward faces, 1,000 to 20,000 faces in all.
-
-    Raises
-    ------
-    UserError
-        If the category is unknown, seed or index is negative, or the least reach or the
-        share is out of range.
     """
-    if category not in CATEGORIES:
-        message = f"no procedural category {category!r}: {nearest(category, CATEGORIES)}"
-        raise UserError(message)
-    if seed < 0 or index < 0:
-        message = f"procedural {category}: seed {seed} and index {index} must not be negative"
-        raise UserError(message)
-    if not 0 <= least_reach <= MOST_LEAST_REACH:
-        raise UserError(f"a least reach of {least_reach:g}: 0 to {MOST_LEAST_REACH:g} expected")
-    if not 0 <= square_share <= 1:
-        raise UserError(f"a share of square mugs of {square_share:g}: 0 to 1 expected")
     # crc32, not hash(): Python's hash of a string differs between processes.
     rng = np.random.default_rng([seed, zlib.crc32(category.encode()), index])
     if category == "mug":

@@ -142,20 +142,18 @@ def build_sensor(name: str, parameters: Mapping[str, float]) -> Sensor:
     Raises
     ------
     UserError
-        For an unknown sensor or parameter, or a parameter that is missing or not above 0.
+        For an unknown sensor, or a parameter that is unknown or missing.
     """
     if name not in SENSORS:
         raise UserError(f"sensor={name} is unknown: {nearest(name, [IDEAL, *SENSORS])}")
     module, _, attribute = SENSORS[name].partition(":")
     kind = getattr(import_module(module), attribute)
     known = [field.name for field in fields(kind)]
-    for key, value in parameters.items():
+    for key in parameters:
         if key not in known:
             raise UserError(
                 f"sensor.parameters.{key}: {name} has no such parameter; {nearest(key, known)}"
             )
-        if not value > 0:
-            raise UserError(f"sensor.parameters.{key}={value:g} is out of range: above 0")
     absent = [key for key in known if key not in parameters]
     if absent:
         raise UserError(f"sensor.parameters.{absent[0]}: {name} needs it; add it")

@@ -47,7 +47,7 @@ class FileSource(ABC):
         self.settings = settings
         if not settings["root"]:
             raise UserError(f"dataset={self.name}: dataset.root is not set; give the data's folder")
-        self.root = expanded(settings["root"], "dataset.root")
+        self.root = Path(settings["root"]).expanduser()
         self._excluded = exclusions(settings)
         self._files: dict[str, dict[str, Path]] = {}
 
@@ -155,7 +155,7 @@ def exclusions(settings: Mapping[str, Any]) -> frozenset[str]:
     """
     listed = list(settings["exclude"])
     if settings["exclude_file"]:
-        path = expanded(settings["exclude_file"], "dataset.exclude_file")
+        path = Path(settings["exclude_file"]).expanduser()
         try:
             if path.exists() and not path.is_file():
                 raise OSError(errno.EINVAL, "it is not a regular file")
@@ -175,14 +175,6 @@ def readable_paths(source: str) -> Iterator[None]:
     except OSError as error:
         path = ascii(str(error.filename))[1:-1]
         raise UserError(f"dataset={source}: {path} cannot be read: {error.strerror}") from error
-
-
-def expanded(path: str, key: str) -> Path:
-    """Return a path with its ``~`` expanded; raise UserError if there is no such home."""
-    try:
-        return Path(path).expanduser()
-    except RuntimeError as error:
-        raise UserError(f"{key}={path}: there is no such home folder") from error
 
 
 class FolderSource(FileSource):
@@ -235,12 +227,9 @@ _SEM_FOLDERS = (Path("models"), Path("models-OBJ", "models"))
 
 def open_shapenet(settings: Mapping[str, Any], seed: int) -> FileSource:
     """Return the source for the layout in `settings`; ``auto`` recognises it by its files."""
-    layout, layouts = settings["layout"], ("auto", *_AXES)
-    if layout not in layouts:
-        raise UserError(f"dataset.layout={layout}: no such layout; {nearest(layout, layouts)}")
-    root = settings["root"]
+    layout, root = settings["layout"], settings["root"]
     with readable_paths("shapenet"):
-        has_metadata = bool(root) and (expanded(root, "dataset.root") / _METADATA).is_file()
+        has_metadata = bool(root) and (Path(root).expanduser() / _METADATA).is_file()
     if layout == "sem" or (layout == "auto" and has_metadata):
         return ShapeNetSemSource(settings, seed)
     return ShapeNetCoreSource(settings, seed)

@@ -47,14 +47,11 @@ class ProceduralSource:
         """Generate an object and normalise it."""
         from nbv.data.procedural import generate
 
-        number = object_id.removeprefix(f"{category}-")
-        if not number.isdecimal():
-            raise UserError(f"dataset=procedural: {object_id} is not an id like {category}-0000")
         settings = self._settings
         mesh = generate(
             category,
             self.seed,
-            int(number),
+            int(object_id.removeprefix(f"{category}-")),
             least_reach=settings["handle_reach"],
             square_share=settings["square_share"],
         )

@@ -225,32 +225,6 @@ def equal_cost_epochs(epochs: int, calibration_fraction: float, parts: int) -> i
     return int(round(epochs * (1.0 - calibration_fraction) / parts, 9))
 
 
-def load_condition(
-    directory: str | Path,
-    overrides: Sequence[str],
-    run: Mapping[str, Any],
-    condition: Mapping[str, str],
-) -> dict[str, Any]:
-    """Return a run's configuration with another sensor and framing; see `load_config`.
-
-    Parameters
-    ----------
-    directory, overrides
-        The arguments of `load_config` for the run. The overrides hold here too, except for the
-        parameters of the run's sensor where the sensor differs.
-    run : mapping
-        Its configuration.
-    condition : mapping
-        ``sensor`` and ``framing``, from ``transfer.conditions``.
-    """
-    replaced = r"sensor|camera\.framing"
-    if condition["sensor"] != run["sensor"]["name"]:
-        replaced += r"|sensor\.parameters.*"
-    kept = [o for o in overrides if not re.fullmatch(replaced, o.partition("=")[0].lstrip("+~"))]
-    chosen = [f"sensor={condition['sensor']}", f"camera.framing={condition['framing']}"]
-    return load_config(directory, [*kept, *chosen])
-
-
 def read_configuration(root: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
     """Read ``configuration.yaml`` of a run or reference as plain values.
 

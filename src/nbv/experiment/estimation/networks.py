@@ -12,7 +12,6 @@ from itertools import pairwise
 import torch
 from torch import nn
 
-from nbv.errors import UserError, nearest
 from nbv.experiment.estimation.outputs import (
     Settings,
     Targets,
@@ -21,7 +20,21 @@ from nbv.experiment.estimation.outputs import (
 )
 
 
-def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.Module:
+def strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.Module:
+    """Return a network in the spirit of Pose-CyclicR-Net (paper, Sec. 3.2.1).
+
+    Strided convolutions, with batch normalisation from the second on, one hidden layer and linear
+    outputs. The outputs (cos, sin) of a regressor are not normalised: trained on squared error they
+    tend to the mean direction, whose length measures the network's certainty.
+
+    Parameters
+    ----------
+    settings : mapping
+        ``channels`` (list of int) and ``hidden`` (int).
+    image_side : int
+        Pixels.
+    n_outputs : int
+    """
     channels = settings["channels"]
     # The first layer's maps are the largest: normalising them took a sixth of the training time and
     # did not improve estimates.
@@ -44,28 +57,6 @@ def _strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.
     )
 
 
-def regressor(settings: Settings, image_side: int) -> nn.Module:
-    """Return a network in the spirit of Pose-CyclicR-Net with the outputs (cos, sin).
-
-    Strided convolutions, with batch normalisation from the second on, one hidden layer, two linear
-    outputs (paper, Sec. 3.2.1). The outputs are not normalised: trained on squared error they tend
-    to the mean direction, whose length measures the network's certainty.
-
-    Parameters
-    ----------
-    settings : mapping
-        ``channels`` (list of int) and ``hidden`` (int).
-    image_side : int
-        Pixels.
-    """
-    return _strided_network(settings, image_side, 2)
-
-
-def classifier(settings: Settings, image_side: int) -> nn.Module:
-    """Return the regressor's network with one logit for each of ``n_classes`` azimuths."""
-    return _strided_network(settings, image_side, settings["n_classes"])
-
-
 Loss = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 
 
@@ -76,44 +67,32 @@ class Kind:
     Attributes
     ----------
     network : callable
-        ``network(settings, image_side)``, untrained.
+        ``network(settings, image_side, k)``, untrained.
     targets : callable
         ``targets(settings, n_views)``: the targets of the views of a sweep, (n_views, k).
     loss : callable
         ``loss(outputs, targets)``, a scalar tensor.
     """
 
-    network: Callable[[Settings, int], nn.Module]
+    network: Callable[[Settings, int, int], nn.Module]
     targets: Callable[[Settings, int], Targets]
     loss: Loss
 
 
 KINDS: dict[str, Kind] = {
-    "regressor": Kind(regressor, direction_targets, nn.functional.mse_loss),
-    "classifier": Kind(classifier, class_targets, nn.functional.cross_entropy),
+    "regressor": Kind(strided_network, direction_targets, nn.functional.mse_loss),
+    "classifier": Kind(strided_network, class_targets, nn.functional.cross_entropy),
 }
 
 
-def kind_of(settings: Settings) -> Kind:
-    """Return the kind that ``settings["kind"]`` names.
-
-    Raises
-    ------
-    UserError
-        For an unknown kind.
-    """
-    name = settings["kind"]
-    if name not in KINDS:
-        raise UserError(f"estimator.kind={name}: {nearest(name, KINDS)}")
-    return KINDS[name]
-
-
 def build_network(settings: Settings, image_side: int) -> nn.Module:
-    """Return an untrained network of the kind that `kind_of` finds.
+    """Return an untrained network of the kind that ``settings["kind"]`` names.
 
     Its weights come from torch's global generator; seed that first.
     """
-    network = kind_of(settings).network(settings, image_side)
+    kind = KINDS[settings["kind"]]
+    n_outputs = kind.targets(settings, 1).shape[1]
+    network = kind.network(settings, image_side, n_outputs)
     # torch's annotations lack this form of `to`, which works in place.
     network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     return network

@@ -17,7 +17,7 @@ from nbv.core.angles import mirrored_bins
 from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.experiment.estimation.hardware import Hardware, scaled
-from nbv.experiment.estimation.networks import Loss, build_network, kind_of
+from nbv.experiment.estimation.networks import KINDS, Loss, build_network
 from nbv.experiment.estimation.outputs import Targets
 from nbv.experiment.estimation.weights import Estimator, Start
 
@@ -112,7 +112,7 @@ def train_network(
         Where the loss or a weight becomes non-finite, or the start has another size.
     """
     n_objects, n_views, side, _ = codes.shape
-    kind = kind_of(settings)
+    kind = KINDS[settings["kind"]]
     torch.manual_seed(seed)
     network = build_network(settings, side).to(hardware.device)
     if start is not None:

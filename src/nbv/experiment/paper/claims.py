@@ -1,4 +1,4 @@
-"""Every checkable sentence of the paper's Section 3.3 and Conclusion, as data.
+"""Every checkable sentence of the paper's Section 3.3 and Conclusion, from ``claims.csv``.
 
 "Best" means better than each of the other three methods. Where a sentence says "comparable" and
 gives no margin, ours is 1 degree of MAE or median, and 1 percentage point of pAUC.
@@ -6,8 +6,10 @@ gives no margin, ours is 1 degree of MAE or median, and 1 percentage point of pA
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import csv
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from nbv.experiment.paper.published import FOCUS_CATEGORY, METHODS
 from nbv.experiment.paper.statements import (
@@ -81,255 +83,60 @@ def _two_views_parts(statistic: str) -> tuple[Statement, ...]:
     )
 
 
-_MAE, _PEA = "3.3.1", "3.3.2"
-_EXAMPLES, _BOXES, _CONCLUSION = "3.3.3", "3.3.4", "4"
-_FOLD_NOTE = "Our folds hold other objects than the paper's."
+_STATEMENTS: Mapping[str, Statement] = {
+    "mae-categories": AtLeast(4, _best_by_category("mae", CATEGORIES)),
+    "mae-chair-third": ranked("mae", _of("chair"), 3),
+    "mae-elevations": AtLeast(4, _best_by_elevation("mae")),
+    "mae-75-opposite": all_of(
+        [
+            *(Better("mae", _at(e), _at(e, OPPOSITE)) for e in ELEVATIONS_DEG[:-1]),
+            Better("mae", _at(75, OPPOSITE), _at(75)),
+        ]
+    ),
+    "mae-75-comparable": _not_best_but_comparable("mae", _at(75)),
+    "hidden-range": Better("mae", Term(PROPOSED, (_MUG,), group=2), Term(SINGLE, (_MUG,), group=2)),
+    "two-views": all_of(_two_views_parts("mae")),
+    "two-views-pauc": all_of(_two_views_parts("pauc")),
+    "better-than-recommenders": all_of(
+        [
+            Better("mae", Term(PROPOSED, _ALL_CATEGORIES), Term(m, _ALL_CATEGORIES))
+            for m in (RANDOM, OPPOSITE)
+        ]
+    ),
+    "pauc-categories": AtLeast(4, _best_by_category("pauc", CATEGORIES)),
+    "pauc-elevations": AtLeast(5, _best_by_elevation("pauc")),
+    "pauc-75-comparable": _not_best_but_comparable("pauc", _at(75)),
+    "high-elevation-easy": Better("mae", _at(75, SINGLE), _at(0, SINGLE)),
+    "groups": AtLeast(
+        3,
+        tuple(best("mae", Term(PROPOSED, (_MUG,), group=g), f"group {g}") for g in (1, 2, 3, 4)),
+    ),
+    "examples": best("mae", Term(PROPOSED, (_MUG,), initial_deg=(0, 30, 210, 330))),
+    "median-airplane": best("median", _of("airplane")),
+    "median-mug": best("median", _of("mug")),
+    "median-car": Comparable("median", _of("car"), _of("car", OPPOSITE), MARGIN),
+    "median-toilet": Comparable("median", _of("toilet"), _of("toilet", OPPOSITE), MARGIN),
+    "median-chair": ranked("median", _of("chair"), 3),
+    "outliers": all_of([FreeOfOutliers(_of(name)) for name in CATEGORIES]),
+    "sigma-mae": ranked("mae_sigma", _of("mug"), 2),
+    "pauc-folds": all_of(
+        [best("pauc", Term(PROPOSED, (_MUG,), fold=f), f"fold {f}") for f in (2, 3, 4, 5)]
+    ),
+    "sigma-pauc": best("pauc_sigma", _of("mug")),
+    "outperforms-all": best("mae", Term(PROPOSED, _ALL_CATEGORIES)),
+    "stable": all_of(
+        [
+            Better("mae", _of("mug"), _of("mug", SINGLE)),
+            Better("mae_sigma", _of("mug"), _of("mug", SINGLE)),
+        ]
+    ),
+}
 
-CLAIMS: tuple[Claim, ...] = (
-    Claim(
-        "mae-categories",
-        _MAE,
-        "“the proposed method almost outperforms the comparative methods for different target "
-        "objects” (Table 1: all but Chair)",
-        "Proposed has the lowest MAE in at least four of the five categories at 0°.",
-        AtLeast(4, _best_by_category("mae", CATEGORIES)),
-        title="MAE: best in 4 of 5 categories",
-    ),
-    Claim(
-        "mae-chair-third",
-        _MAE,
-        "“Only in the ‘Chair’ category, the proposed method ranks the third”",
-        "Chair at 0°: exactly two methods have a lower MAE than Proposed.",
-        ranked("mae", _of("chair"), 3),
-        title="MAE of Chair: third",
-    ),
-    Claim(
-        "mae-elevations",
-        _MAE,
-        "“For most of the elevation angles, the proposed method almost outperforms the "
-        "comparative methods” (Table 2)",
-        "Mug: Proposed has the lowest MAE at four or more of the six elevations.",
-        AtLeast(4, _best_by_elevation("mae")),
-        title="MAE: best at 4 of 6 elevations",
-    ),
-    Claim(
-        "mae-75-opposite",
-        _MAE,
-        "“The ‘Opposite’ method outperforms the proposed method only in the case of 75°”",
-        "Mug: Opposite has the lower MAE at 75°, Proposed at each other elevation.",
-        all_of(
-            [
-                *(Better("mae", _at(e), _at(e, OPPOSITE)) for e in ELEVATIONS_DEG[:-1]),
-                Better("mae", _at(75, OPPOSITE), _at(75)),
-            ]
-        ),
-        title="MAE: Opposite wins at 75° alone",
-    ),
-    Claim(
-        "mae-75-comparable",
-        _MAE,
-        "At 75° “the proposed method is not the best but still could be considered comparable”",
-        "Mug at 75°: another method has a lower MAE than Proposed, whose MAE is within 1° of "
-        "Opposite's.",
-        _not_best_but_comparable("mae", _at(75)),
-        title="MAE at 75°: not best, within 1°",
-    ),
-    Claim(
-        "hidden-range",
-        _MAE,
-        "“We successfully managed to reduce the pose ambiguity in the difficult observation”",
-        "Mug at 0°, viewpoint group 2 (handle hidden): Proposed's MAE is below Single's.",
-        Better("mae", Term(PROPOSED, (_MUG,), group=2), Term(SINGLE, (_MUG,), group=2)),
-        title="MAE, handle hidden: below Single",
-    ),
-    Claim(
-        "two-views",
-        _MAE,
-        "“estimating an object's pose from two viewpoints yields a better result than that from "
-        "a single viewpoint”",
-        "Each two-view method has a lower MAE than Single, in each category at 0° and at each "
-        "elevation of Mug.",
-        all_of(_two_views_parts("mae")),
-        title="MAE: two views beat one",
-    ),
-    Claim(
-        "two-views-pauc",
-        _MAE,
-        "The same sentence, judged by the pAUC",
-        "Each two-view method has a higher pAUC than Single, in each category at 0° and at each "
-        "elevation of Mug.",
-        all_of(_two_views_parts("pauc")),
-        "The mean of two opposite estimates is 90° from both. So averaging can turn one error of "
-        "180° into two of 90°, which have the same MAE and a lower pAUC. Car in the paper's own "
-        "Table 3 shows it.",
-        title="pAUC: two views beat one",
-    ),
-    Claim(
-        "better-than-recommenders",
-        _MAE,
-        "“By comparing with the other pose recommendation methods, the proposed method achieves "
-        "better results”",
-        "All five categories at 0°, pooled: Proposed's MAE is below Random's and Opposite's.",
-        all_of(
-            [
-                Better("mae", Term(PROPOSED, _ALL_CATEGORIES), Term(m, _ALL_CATEGORIES))
-                for m in (RANDOM, OPPOSITE)
-            ]
-        ),
-        title="MAE: below Random and Opposite",
-    ),
-    Claim(
-        "pauc-categories",
-        _PEA,
-        "“The proposed method achieved the highest pAUCs … for the four object categories”",
-        "Proposed has the highest pAUC in at least four of the five categories at 0°.",
-        AtLeast(4, _best_by_category("pauc", CATEGORIES)),
-        title="pAUC: best in 4 of 5 categories",
-    ),
-    Claim(
-        "pauc-elevations",
-        _PEA,
-        "“In five out of six elevation angles, the proposed method achieved the most accurate "
-        "results” (Table 4)",
-        "Mug: Proposed has the highest pAUC at five or more of the six elevations.",
-        AtLeast(5, _best_by_elevation("pauc")),
-        title="pAUC: best at 5 of 6 elevations",
-    ),
-    Claim(
-        "pauc-75-comparable",
-        _PEA,
-        "At 75° “not the best but could be considered comparable to the comparative methods”",
-        "Mug at 75°: another method has a higher pAUC than Proposed, whose pAUC is within 1 point "
-        "of Opposite's.",
-        _not_best_but_comparable("pauc", _at(75)),
-        title="pAUC at 75°: not best, within 1",
-    ),
-    Claim(
-        "high-elevation-easy",
-        _PEA,
-        "At 75° “object poses are easily distinguishable from the initial viewpoints”",
-        "Mug: Single's MAE at 75° is below Single's at 0°.",
-        Better("mae", _at(75, SINGLE), _at(0, SINGLE)),
-        title="MAE of Single: lower at 75°",
-    ),
-    Claim(
-        "groups",
-        _EXAMPLES,
-        "“The proposed method outperforms the comparative methods in most viewpoint groups”",
-        "Mug at 0°: Proposed has the lowest MAE in at least three of the four groups.",
-        AtLeast(
-            3,
-            tuple(
-                best("mae", Term(PROPOSED, (_MUG,), group=g), f"group {g}") for g in (1, 2, 3, 4)
-            ),
-        ),
-        "The published Table 5 appears to be fold 3 alone.",
-        title="MAE: best in 3 of 4 groups",
-    ),
-    Claim(
-        "examples",
-        _EXAMPLES,
-        "Examples (Table 6): “the proposed method achieves better pose estimation results”",
-        "Mug at 0°, all test objects from initial azimuths 0°, 30°, 210° and 330°: Proposed has "
-        "the lowest MAE.",
-        best("mae", Term(PROPOSED, (_MUG,), initial_deg=(0, 30, 210, 330))),
-        "The paper shows one object; a claim about one object is not a claim about the method.",
-        title="MAE of Table 6's views: best",
-    ),
-    *(
-        Claim(
-            f"median-{name}",
-            _BOXES,
-            "“The median values of the results of the proposed method shows the lowest value for "
-            f"‘Airplane’ and ‘Mug’” ({category_label(name)})",
-            f"{category_label(name)} at 0°: Proposed has the lowest median error.",
-            best("median", _of(name)),
-            title=f"Median of {category_label(name)}: lowest",
-        )
-        for name in ("airplane", "mug")
-    ),
-    *(
-        Claim(
-            f"median-{name}",
-            _BOXES,
-            "“For ‘Car’ and ‘Toilet’ the proposed method performs compatively with the ‘Opposite’ "
-            f"method” ({category_label(name)})",
-            f"{category_label(name)} at 0°: the median errors differ by less than 1°.",
-            Comparable("median", _of(name), _of(name, OPPOSITE), MARGIN),
-            title=f"Median of {category_label(name)}: as Opposite",
-        )
-        for name in ("car", "toilet")
-    ),
-    Claim(
-        "median-chair",
-        _BOXES,
-        "“However, for ‘Chair’, the proposed method ranked the third”",
-        "Chair at 0°: exactly two methods have a lower median error than Proposed.",
-        ranked("median", _of("chair"), 3),
-        title="Median of Chair: third",
-    ),
-    Claim(
-        "outliers",
-        _BOXES,
-        "“The outlier's absence shows that the proposed method delivers a promising approach”",
-        "No category at 0° has an error of Proposed above the upper quartile by more than 1.5 "
-        "interquartile ranges.",
-        all_of([FreeOfOutliers(_of(name)) for name in CATEGORIES]),
-        "The paper's whiskers reach to the minimum and maximum, so its boxplot cannot show any "
-        "outlier.",
-        title="No outliers of Proposed",
-    ),
-    Claim(
-        "sigma-mae",
-        _BOXES,
-        "“The standard deviation of the proposed method is 3.92 which shows that the proposed "
-        "method is the second stable”",
-        "Mug at 0°: exactly one method has a lower σ of MAE over folds than Proposed.",
-        ranked("mae_sigma", _of("mug"), 2),
-        "σ of five folds is itself known poorly: the intervals resample objects within folds.",
-        title="σ of MAE: second lowest",
-    ),
-    Claim(
-        "pauc-folds",
-        _BOXES,
-        "“for the fold numbers 2 to 5, the proposed method gained the highest estimation accuracy”",
-        "Mug at 0°: Proposed has the highest pAUC in each of folds 2 to 5.",
-        all_of([best("pauc", Term(PROPOSED, (_MUG,), fold=f), f"fold {f}") for f in (2, 3, 4, 5)]),
-        f"{_FOLD_NOTE} In the published Table 7 it is highest in fold 1 as well.",
-        title="pAUC: best in folds 2 to 5",
-    ),
-    Claim(
-        "sigma-pauc",
-        _BOXES,
-        "“The standard deviation of the proposed method, for the PEA analysis, is 3.05 … the most "
-        "stable method among all the methods”",
-        "Mug at 0°: Proposed has the lowest σ of pAUC over folds.",
-        best("pauc_sigma", _of("mug")),
-        "σ of five folds is itself known poorly: the intervals resample objects within folds.",
-        title="σ of pAUC: lowest",
-    ),
-    Claim(
-        "outperforms-all",
-        _CONCLUSION,
-        "“the proposed method statistically outperforms three comparative methods in the "
-        "category-level pose estimation through five-fold cross-validation”",
-        "All five categories at 0°, pooled: Proposed's MAE is below each other method's.",
-        best("mae", Term(PROPOSED, _ALL_CATEGORIES)),
-        "The paper reports no test of significance.",
-        title="MAE, all categories: best",
-    ),
-    Claim(
-        "stable",
-        _CONCLUSION,
-        "“By using the recommended viewpoints, a high pose estimation accuracy was stably "
-        "achievable”",
-        "Mug at 0°: Proposed has a lower MAE and a lower σ over folds than Single.",
-        all_of(
-            [
-                Better("mae", _of("mug"), _of("mug", SINGLE)),
-                Better("mae_sigma", _of("mug"), _of("mug", SINGLE)),
-            ]
-        ),
-        title="MAE and σ: below Single's",
-    ),
-)
+
+def _read_claims() -> tuple[Claim, ...]:
+    """Return the claims of the CSV file with their statements."""
+    with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+        return tuple(Claim(**row, statement=_STATEMENTS[row["id"]]) for row in csv.DictReader(file))
+
+
+CLAIMS = _read_claims()

@@ -132,23 +132,12 @@ def if_enough(verdict: Verdict, n_objects: int) -> Verdict:
     return UNDECIDED if verdict != NOT_RUN and n_objects < FEWEST_OBJECTS else verdict
 
 
-def better_verdict(statistic: str, low: float, high: float) -> Verdict:
-    """Return the verdict of *Better* from the interval of a - b."""
+def interval_verdict(part: Better | Comparable, low: float, high: float) -> Verdict:
+    """Return the verdict of a comparison from the interval of a - b."""
     if not (low <= high):
         return NOT_RUN
-    favours_a, favours_b = (
-        (high < 0, low > 0) if LOWER_IS_BETTER[statistic] else (low > 0, high < 0)
-    )
-    return HOLDS if favours_a else FAILS if favours_b else UNDECIDED
-
-
-def comparable_verdict(low: float, high: float, margin: float) -> Verdict:
-    """Return the verdict of *Comparable* from the interval of a - b."""
-    if not (low <= high):
-        return NOT_RUN
-    if -margin < low and high < margin:
-        return HOLDS
-    return FAILS if low > margin or high < -margin else UNDECIDED
+    _, least, most = in_favour(part, low, low, high)
+    return HOLDS if least > 0 else FAILS if most < 0 else UNDECIDED
 
 
 def combine(count: int, verdicts: Sequence[Verdict]) -> Verdict:
@@ -186,6 +175,14 @@ def in_favour(part: Better | Comparable, value: float, low: float, high: float) 
             part.margin - inside,
         )
     return (-value, -high, -low) if LOWER_IS_BETTER[part.statistic] else (value, low, high)
+
+
+def favour_of(part: Comparison, row: Mapping[Any, Any]) -> Interval:
+    """Return how far a comparison is favoured by its row of the claims' table; see `in_favour`."""
+    if isinstance(part, FreeOfOutliers):
+        return (-float(row["value"]),) * 3
+    value, low, high = (float(row[name]) for name in ("difference", "ci_low", "ci_high"))
+    return in_favour(part, value, low, high)
 
 
 def deciding(
@@ -268,13 +265,17 @@ def summarise(statement: Statement, measured: Measured) -> str:
         isinstance(part, AtLeast) and part.label for part in statement.parts
     ):
         verdicts = {leaf: row["part_verdict"] for leaf, row in measured.items()}
+
+        def favour(leaf: Comparison) -> float:
+            return favour_of(leaf, measured[leaf])[0]
+
         texts = []
         for part in statement.parts:
             label = part.label if isinstance(part, AtLeast) else ""
             verdict = combine_statement(part, verdicts)
             run = [leaf for leaf in leaves(part) if "value" in measured[leaf]]
             like_it = [leaf for leaf in run if verdicts[leaf] == verdict] or run
-            decides = _competition([_closest(like_it, measured)], measured, False) if run else ""
+            decides = _competition([min(like_it, key=favour)], measured, False) if run else ""
             texts.append(f"{label}: {verdict}" + (f" ({decides})" if decides else ""))
         return "; ".join(texts)
     return _competition(leaves(statement), measured)
@@ -321,17 +322,6 @@ STATISTIC_LABELS: Mapping[str, str] = {
     "pauc_sigma": "σ of pAUC",
 }
 """Labels of the statistics."""
-
-
-def _closest(leaves: Sequence[Comparison], measured: Measured) -> Comparison:
-    """Return the comparison that favours its subject least."""
-
-    def advantage(leaf: Comparison) -> float:
-        difference = float(measured[leaf].get("difference", 0.0))
-        lower = not isinstance(leaf, Better) or LOWER_IS_BETTER[leaf.statistic]
-        return -difference if lower else difference
-
-    return min(leaves, key=advantage)
 
 
 def images_text(term: Term) -> str:

@@ -14,9 +14,7 @@ from nbv.experiment.paper import published, statements
 from nbv.experiment.paper.claims import CLAIMS
 from nbv.experiment.paper.statements import (
     VERDICTS,
-    Better,
     Claim,
-    Comparable,
     Comparison,
     FreeOfOutliers,
     Term,
@@ -171,7 +169,7 @@ class _Evaluator:
         difference = a.minus(b)
         samples = self._sample(part.a), self._sample(part.b)
         fewest = min(paired.fewest_resampled(part.statistic, sample) for sample in samples)
-        verdict = _interval_verdict(part, difference.low, difference.high)
+        verdict = statements.interval_verdict(part, difference.low, difference.high)
         return row | {
             "value": a.value,
             "versus_value": b.value,
@@ -265,7 +263,7 @@ def _published_verdict(part: Comparison) -> Verdict:
     if isinstance(part, FreeOfOutliers):
         return statements.NOT_RUN
     a, b = _published(part.statistic, part.a), _published(part.statistic, part.b)
-    return _interval_verdict(part, a - b, a - b)
+    return statements.interval_verdict(part, a - b, a - b)
 
 
 def _point_verdict(part: Comparison, row: Mapping[str, Any]) -> Verdict:
@@ -273,10 +271,4 @@ def _point_verdict(part: Comparison, row: Mapping[str, Any]) -> Verdict:
         return statements.NOT_RUN
     if isinstance(part, FreeOfOutliers):
         return statements.FAILS if row["value"] > 0 else statements.HOLDS
-    return _interval_verdict(part, row["difference"], row["difference"])
-
-
-def _interval_verdict(part: Better | Comparable, low: float, high: float) -> Verdict:
-    if isinstance(part, Comparable):
-        return statements.comparable_verdict(low, high, part.margin)
-    return statements.better_verdict(part.statistic, low, high)
+    return statements.interval_verdict(part, row["difference"], row["difference"])

@@ -200,15 +200,8 @@ def deciding_comparison(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> Co
         From `comparisons_of`.
     """
     verdicts = {part: row["part_verdict"] for part, row in rows.items()}
-    values = {part: _favour(part, row)[0] for part, row in rows.items()}
+    values = {part: statements.favour_of(part, row)[0] for part, row in rows.items()}
     return statements.deciding(claim.statement, verdicts, values)
-
-
-def _favour(part: Comparison, row: ClaimRow) -> Interval:
-    if isinstance(part, FreeOfOutliers):
-        return (-float(row["value"]),) * 3
-    value, low, high = (float(row[name]) for name in ("difference", "ci_low", "ci_high"))
-    return statements.in_favour(part, value, low, high)
 
 
 def _decided(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> _Decided:
@@ -217,7 +210,7 @@ def _decided(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> _Decided:
     if isinstance(part, FreeOfOutliers):
         text = f"{number(rows[part]['value'], 0)} % outliers"
         return _Decided(claim.title, verdict, None, text)
-    return _Decided(claim.title, verdict, _favour(part, rows[part]))
+    return _Decided(claim.title, verdict, statements.favour_of(part, rows[part]))
 
 
 @dataclass(frozen=True)
