@@ -20,6 +20,7 @@ from made_bundles import (
     random_estimator,
 )
 from made_bundles import settings as made_settings
+from nbv.core.alike.expected import expected_errors
 from nbv.core.angles import circular_distance_deg, travel_deg
 from nbv.core.distributions import direction_and_spread_deg, mean_direction_deg
 from nbv.core.logits import from_logits
@@ -356,8 +357,8 @@ def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
     recommender = Recommender(rough)
     # What is added, by hand, of two rotations that may be chosen.
     (belief,) = recommender.distributions(codes_of(0, 1))
-    alike = after_rotations(rough.distributions, rough.object_ids)(())
-    expected = alike.expected(belief, **rough.affinity, share=np.ones(2))
+    views = after_rotations(rough.distributions, rough.object_ids)(())
+    expected = expected_errors(views, belief, **rough.affinity, share=np.ones(2))
     parts, total = expected.by_object[:, [10, 25]], expected.total[[10, 25]]
     more = sum(own[np.argmin(total - own)] - own[np.argmin(total)] for own in parts)
     limited = recommender.recommend_crops(codes_of(0, 1), allowed_deg=[60.0, 150.0])
