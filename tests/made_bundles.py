@@ -11,6 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from nbv.core.logits import from_logits
+from nbv.core.sweeps import bin_apart
 from nbv.data.camera import Camera
 from nbv.experiment.estimation.make_bundle import bundled_model
 from nbv.experiment.estimation.networks import build_network
@@ -18,7 +19,6 @@ from nbv.experiment.estimation.weights import Estimator
 from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.network import Sweep
 from nbv.robot.ood import fit_ood
-from nbv.robot.pairs import bin_apart
 
 CONFIG = Path(__file__).parents[1] / "config"
 BINS = 24

@@ -15,6 +15,7 @@ from nbv.core.angles import circular_distance_deg
 from nbv.core.distributions import mean_direction_deg, rotated
 from nbv.core.logits import from_logits
 from nbv.core.selection import chosen_lookup
+from nbv.core.sweeps import WIDEST_GAP_DEG, bin_apart
 from nbv.errors import UserError
 from nbv.robot.bundle import ELEVATION_BANDWIDTH_DEG, elevation_weights
 from nbv.robot.calibration import (
@@ -27,7 +28,6 @@ from nbv.robot.calibration import (
 )
 from nbv.robot.network import Sweep
 from nbv.robot.ood import ood_score
-from nbv.robot.pairs import WIDEST_GAP_DEG, bin_apart
 from nbv.robot.recommender import Recommender
 
 AZIMUTHS = np.arange(BINS) * WIDTH

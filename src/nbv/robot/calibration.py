@@ -14,11 +14,11 @@ from nbv.core.distributions import mean_direction_deg
 from nbv.core.logits import LEAST_PROBABILITY, fit_temperature, from_logits
 from nbv.core.offset import constant_offset_deg, frame_warning
 from nbv.core.selection import DENSITY, chosen_lookup
+from nbv.core.sweeps import bin_apart, full_sweep
 from nbv.errors import UserError
 from nbv.robot.bundle import Bundle, PaperTables
 from nbv.robot.network import Sweep
 from nbv.robot.ood import IN_DISTRIBUTION_SHARE, ood_score
-from nbv.robot.pairs import bin_apart, full_turn
 
 ENOUGH_VIEWS = 24
 """Views of a sweep that suffice to fit one temperature, because neighbouring views are alike."""
@@ -67,7 +67,7 @@ def _paper_rotations(
     """Return the rotations (360,) of the paper's lookup table for sweeps (S, B, B)."""
     n_bins = distributions.shape[-1]
     azimuth_deg = np.arange(n_bins) * (360.0 / n_bins)
-    estimates = [full_turn(azimuth_deg, mean_direction_deg(sweep)) for sweep in distributions]
+    estimates = [full_sweep(azimuth_deg, mean_direction_deg(sweep)) for sweep in distributions]
     table = chosen_lookup(np.stack(estimates), PAPER, density)
     return table.recommended_delta_deg.astype(np.int16)
 

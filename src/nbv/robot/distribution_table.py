@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.core.angles import is_angle
 from nbv.core.logits import TEMPERATURES, fit_temperature, from_logits, on_degrees
 from nbv.core.selection import AFFINITY
+from nbv.core.sweeps import bin_apart
 from nbv.errors import UserError
 from nbv.files import (
     CALIBRATE_AGAIN,
@@ -31,7 +32,7 @@ from nbv.robot.next_view import (
     as_rotation_list,
     next_view,
 )
-from nbv.robot.pairs import FEWEST_CLASSES, as_distributions, bin_apart
+from nbv.robot.pairs import FEWEST_CLASSES, as_distributions
 
 WIDEST_BIN_DEG = 6.0
 """Widest bin of a table, because an estimator errs by up to half a class between its classes."""

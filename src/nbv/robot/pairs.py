@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.angles import MOST_DEG, signed_difference_deg, wrap_deg
-from nbv.core.distributions import rotated
+from nbv.core.angles import MOST_DEG, wrap_deg
 from nbv.core.estimates import COLUMNS, Estimates
 from nbv.core.logits import LEAST_PROBABILITY
 from nbv.core.offset import FOR_PAIRS, Offset
+from nbv.core.sweeps import WIDEST_GAP_DEG, full_sweep, radians_hint, widest_gap_deg
 from nbv.errors import UserError
 from nbv.files import need_columns, read_numbers, read_rows
 from nbv.labels import counted
@@ -25,11 +25,6 @@ FEWEST_CLASSES = 8
 
 SUM_TOLERANCE = 0.05
 """Tolerance of a row's sum: rounded probabilities are normalised again."""
-
-WIDEST_GAP_DEG = 15.0
-"""Widest gap between neighbouring views of a calibration object."""
-
-N_VIEWS = 360
 
 Sweeps = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 """Maps each object to the azimuths (n,) of its views and their distributions (n, B)."""
@@ -107,7 +102,7 @@ class PairTable:
             `WIDEST_GAP_DEG`.
         """
         for name, rows in self.rows.groupby("object_id", sort=False):
-            _check_full_turn(self.path, str(name), rows["azimuth_deg"].to_numpy(dtype=np.float64))
+            _check_full_sweep(self.path, str(name), rows["azimuth_deg"].to_numpy(dtype=np.float64))
         return self.thin_estimates[0]
 
     @property
@@ -125,7 +120,7 @@ class PairTable:
             if hint := radians_hint(azimuth):
                 gap = widest_gap_deg(azimuth)
                 raise UserError(f"{self.path}: object {name!r} leaves a gap of {gap:.0f}°{hint}")
-            turns[str(name)] = full_turn(wrap_deg(azimuth), estimate)
+            turns[str(name)] = full_sweep(wrap_deg(azimuth), estimate)
             gaps[str(name)] = widest_gap_deg(azimuth)
         said = []
         worst = max(gaps, key=gaps.__getitem__)
@@ -227,7 +222,7 @@ class PairTable:
             )
 
 
-def _check_full_turn(path: Path, name: str, azimuth_deg: NDArray[np.float64]) -> None:
+def _check_full_sweep(path: Path, name: str, azimuth_deg: NDArray[np.float64]) -> None:
     values, counts = np.unique(wrap_deg(azimuth_deg), return_counts=True)
     if counts.max() > 1:
         raise UserError(
@@ -240,22 +235,6 @@ def _check_full_turn(path: Path, name: str, azimuth_deg: NDArray[np.float64]) ->
             f"{path}: the views of object {name!r} leave a gap of {gap:.0f}°; calibration needs a "
             f"view every {WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
         )
-
-
-def full_turn(
-    azimuth_deg: NDArray[np.float64], estimate_deg: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the estimates (360,) of views one degree apart, from views (n,) at any azimuths.
-
-    Each view has the error of the nearest given view; those at one azimuth take turns.
-    """
-    apart = signed_difference_deg(np.arange(N_VIEWS)[:, None], azimuth_deg)
-    nearest = np.abs(apart).argmin(axis=1)
-    moved = apart[np.arange(N_VIEWS), nearest]
-    twins = apart == moved[:, None]
-    turn = np.arange(N_VIEWS) % twins.sum(axis=1) + 1
-    nearest = (twins & (twins.cumsum(axis=1) == turn[:, None])).argmax(axis=1)
-    return wrap_deg(np.where(moved == 0.0, estimate_deg[nearest], estimate_deg[nearest] + moved))
 
 
 def as_distributions(
@@ -310,50 +289,6 @@ def as_distributions(
     smallest = np.where(rows > 0, rows, np.inf).min(axis=1, keepdims=True)
     rows = np.where(rows > 0, rows, np.minimum(smallest, LEAST_PROBABILITY))
     return np.asarray(rows / rows.sum(axis=1, keepdims=True))
-
-
-def widest_gap_deg(azimuth_deg: NDArray[np.float64]) -> float:
-    """Return the widest gap between neighbouring azimuths (n,) on the circle, degrees."""
-    ordered = np.sort(wrap_deg(azimuth_deg))
-    return float(np.diff(ordered, append=ordered[0] + 360.0).max())
-
-
-def radians_hint(azimuth_deg: NDArray[np.float64]) -> str:
-    """Return a hint for a message about a gap if azimuths (n,) seem to be radians, else ""."""
-    is_small = np.abs(azimuth_deg).max() <= 2 * np.pi
-    if is_small and widest_gap_deg(np.degrees(azimuth_deg)) <= 2 * WIDEST_GAP_DEG:
-        return "; these azimuths seem to be radians: multiply them by 180/π"
-    return ""
-
-
-def evenly_apart(
-    azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64], n_views: int
-) -> NDArray[np.float64]:
-    """Return distributions (n_views, B) of evenly spaced views, from views (n,) at any azimuths.
-
-    Each view has the distribution of the nearest given view, rotated by the angle between them.
-
-    Raises
-    ------
-    UserError
-        Where neighbouring views are farther than `WIDEST_GAP_DEG` apart.
-    """
-    if (gap := widest_gap_deg(azimuth_deg)) > WIDEST_GAP_DEG + 1e-6:
-        raise UserError(
-            f"views leave a gap of {gap:.0f}°; calibration needs one every "
-            f"{WIDEST_GAP_DEG:g}°{radians_hint(azimuth_deg)}"
-        )
-    distributions = np.empty((n_views, rows.shape[1]))
-    for i, azimuth in enumerate(np.arange(n_views) * (360.0 / n_views)):
-        apart = signed_difference_deg(azimuth_deg, azimuth)
-        nearest = int(np.abs(apart).argmin())
-        distributions[i] = rotated(rows[nearest], float(apart[nearest]))
-    return distributions
-
-
-def bin_apart(azimuth_deg: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return distributions (B, B) of views a bin apart; see `evenly_apart`."""
-    return evenly_apart(azimuth_deg, rows, rows.shape[1]).astype(np.float32)
 
 
 def read_distributions(path: str | Path) -> NDArray[np.float64]:

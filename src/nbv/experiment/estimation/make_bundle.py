@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from nbv.core.angles import mirrored_bins
 from nbv.core.logits import from_logits
+from nbv.core.sweeps import bin_apart
 from nbv.data.camera import Camera
 from nbv.data.depth_images import DepthImages
 from nbv.experiment.estimation.export import onnx_model
@@ -19,7 +20,6 @@ from nbv.robot.calibration import paper_tables, temperature_of
 from nbv.robot.crop import pixel_step
 from nbv.robot.network import Network, Sweep, open_network
 from nbv.robot.ood import fit_ood
-from nbv.robot.pairs import bin_apart
 
 DEFAULT_FOCAL_PX = 600.0
 """The focal length of a bundle whose training simulated no sensor."""
