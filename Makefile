@@ -50,8 +50,8 @@ compare: $(READY)
 bundles: $(READY)
 	$(BIN)/snakemake --cores $(CORES) bundles --config experiment=bundles estimator=classifier \
 		randomisation=camera sensor=kinect
-	mkdir -p src/nbv/robot/shipped
-	cp results/bundles-classifier/bundles/mug.safetensors src/nbv/robot/shipped/
+	mkdir -p src/nbv/bundles/shipped
+	cp results/bundles-classifier/bundles/mug.safetensors src/nbv/bundles/shipped/
 
 # On another machine the weights differ in their last bits: compare the errors of make quick with both.
 features: $(READY)
@@ -129,7 +129,7 @@ check: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/mypy --python-version 3.10 --no-warn-return-any --package nbv.core --package nbv.data --package nbv.robot
+	$(BIN)/mypy --python-version 3.10 --no-warn-return-any --package nbv.core --package nbv.data --package nbv.frames --package nbv.choice --package nbv.bundles --package nbv.tables
 	$(BIN)/lint-imports
 	$(BIN)/snakefmt --check Snakefile workflow studies
 	$(BIN)/snakemake --lint

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nbv.core.rotations import Orientations, viewing_direction
+from nbv.core.orientations.group import Orientations, viewing_direction
 from nbv.files import write_text
 
 N_SCENES, N_IMAGES = 4, 40

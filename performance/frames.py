@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from nbv.bundles.bundle import Bundle
+from nbv.bundles.recommender import Recommender, bundle_path
 from nbv.experiment.estimation.hardware import use_one_thread
 from nbv.experiment.estimation.networks import build_network
+from nbv.frames.synthetic import Frame, example_frame
 from nbv.labels import counted
-from nbv.robot.bundle import Bundle
-from nbv.robot.recommender import Recommender, bundle_path
-from nbv.robot.synthetic import Frame, example_frame
 from performance.figures import Figure, Target
 from performance.timing import take_turns
 
@@ -30,7 +30,7 @@ IN_A_ROW = 20
 
 _START = """
 import sys, numpy as np
-from nbv.robot.recommender import Recommender
+from nbv.bundles.recommender import Recommender
 answer = Recommender.load("mug").recommend(np.load(sys.argv[1]))
 assert "torch" not in sys.modules
 """

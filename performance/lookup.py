@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.evidence import gather_evidence
-from nbv.core.lookup import CostTable, build_lookup
+from nbv.core.circle.evidence import gather_evidence
+from nbv.core.circle.lookup import CostTable, build_lookup
 from performance.figures import Figure, Target
 from performance.settings import configuration
 from performance.timing import median_ratio

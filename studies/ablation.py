@@ -7,11 +7,16 @@ from typing import Any
 
 import pandas as pd
 
-from nbv.core.criteria import CRITERIA
-from nbv.core.estimates import Estimates
-from nbv.core.fusion import ESTIMATE_FUSIONS
-from nbv.core.policies import HeldOutViews, two_views
-from nbv.core.selection import DensityParams, choose_densities, chosen_evidence, most_likely_density
+from nbv.core.circle.criteria import CRITERIA
+from nbv.core.circle.estimates import Estimates
+from nbv.core.circle.fusion import ESTIMATE_FUSIONS
+from nbv.core.circle.policies import HeldOutViews, two_views
+from nbv.core.circle.selection import (
+    DensityParams,
+    choose_densities,
+    chosen_evidence,
+    most_likely_density,
+)
 from nbv.experiment.report.table import DECIDED, Cell, Table, difference_cell
 from nbv.experiment.statistics.paired import Resampler
 from nbv.labels import number

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from nbv.labels import category_label, interval_text
-from nbv.robot.style import AGAINST, FOR, INK, OPEN, RC, label_rows, new_figure
+from nbv.style import AGAINST, FOR, INK, OPEN, RC, label_rows, new_figure
 from studies.confirmation import ALL
 
 _DIFFERENCE = "Difference of MAE (degrees), below 0 is better"

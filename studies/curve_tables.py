@@ -14,7 +14,7 @@ from nbv.experiment.report.table import DECIDED, Cell, Table, difference_cell
 from nbv.experiment.statistics.paired import Resampler
 from nbv.files import existing, read_csv
 from nbv.labels import category_label, method_label, number
-from nbv.robot.style import RC, Panels, method_style, panel_grid
+from nbv.style import RC, Panels, method_style, panel_grid
 from studies.curves import ANY_DIRECTION, pooled_travel
 from studies.object_errors import mae_difference, mae_interval, paired_objects
 

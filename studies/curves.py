@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.core.angles import nearest_bin, travel_deg
-from nbv.core.criteria import FOR_MORE_VIEWS
-from nbv.core.estimates import Estimates, Posteriors
-from nbv.core.evidence import COARSE_BINS, Evidence
-from nbv.core.fusion import ESTIMATE_FUSIONS, Rotations, rotation_errors_deg
-from nbv.core.lookup import least_cost_delta
-from nbv.core.policies import HeldOutViews, take_second_views
+from nbv.core.circle.angles import nearest_bin, travel_deg
+from nbv.core.circle.criteria import FOR_MORE_VIEWS
+from nbv.core.circle.estimates import Estimates, Posteriors
+from nbv.core.circle.evidence import COARSE_BINS, Evidence
+from nbv.core.circle.fusion import ESTIMATE_FUSIONS, Rotations, rotation_errors_deg
+from nbv.core.circle.lookup import least_cost_delta
+from nbv.core.circle.policies import HeldOutViews, take_second_views
 from nbv.experiment.statistics.metrics import above_90, accuracy_area
 from studies.selection import SelectedMethod
 from studies.simulation import (

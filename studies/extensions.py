@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.core.estimates import Estimates, Posteriors
-from nbv.core.evidence import Evidence
-from nbv.core.fusion import OF_DISTRIBUTIONS
-from nbv.core.lookup import CostTable
-from nbv.core.selection import DensityParams, chosen_evidence
+from nbv.core.circle.estimates import Estimates, Posteriors
+from nbv.core.circle.evidence import Evidence
+from nbv.core.circle.fusion import OF_DISTRIBUTIONS
+from nbv.core.circle.lookup import CostTable
+from nbv.core.circle.selection import DensityParams, chosen_evidence
 from nbv.experiment.methods import Methods
 from nbv.experiment.results import evaluate_method
 from studies.curves import travel_rows

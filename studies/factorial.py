@@ -17,13 +17,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.core.criteria import POSE_LIKELIHOODS
-from nbv.core.estimates import Posteriors
-from nbv.core.evidence import COARSE_BINS, Evidence, evidence_of_distributions
-from nbv.core.fusion import ESTIMATE_FUSIONS
-from nbv.core.lookup import CostTable, build_lookup
-from nbv.core.policies import needs_lookup
-from nbv.core.selection import (
+from nbv.core.circle.criteria import POSE_LIKELIHOODS
+from nbv.core.circle.estimates import Posteriors
+from nbv.core.circle.evidence import COARSE_BINS, Evidence, evidence_of_distributions
+from nbv.core.circle.fusion import ESTIMATE_FUSIONS
+from nbv.core.circle.lookup import CostTable, build_lookup
+from nbv.core.circle.policies import needs_lookup
+from nbv.core.circle.selection import (
     DensityParams,
     choose_densities,
     chosen_evidence,

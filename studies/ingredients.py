@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nbv.bundles.evaluation import RECOMMENDED, SINGLE
 from nbv.experiment.report.table import DECIDED, Cell, Table, difference_cell
 from nbv.labels import category_label, counted, number
-from nbv.robot.evaluation import RECOMMENDED, SINGLE
 from studies.trainings import crossed_mean
 
 ALL = ""
@@ -21,7 +21,7 @@ _SHOWN = ((SINGLE, 1, "one view"), (RECOMMENDED, 2, "two views"))
 Key = tuple[str, str]
 """Category and left-out ingredient."""
 Replicates = Sequence[pd.DataFrame]
-"""Results of `nbv.robot.evaluation.evaluate` by training; every key has equally many."""
+"""Results of `nbv.bundles.evaluation.evaluate` by training; every key has equally many."""
 
 
 def ingredient_table(rendered: Mapping[Key, Replicates], real: Mapping[Key, Replicates]) -> Table:

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.angles import signed_difference_deg
-from nbv.core.distributions import in_object_frame, in_view_frame
-from nbv.core.estimates import Estimates, Posteriors
+from nbv.core.circle.angles import signed_difference_deg
+from nbv.core.circle.distributions import in_object_frame, in_view_frame
+from nbv.core.circle.estimates import Estimates, Posteriors
 from nbv.errors import UserError
 from nbv.experiment.estimates import read_estimates, read_posteriors
 from nbv.files import damaged, readable, write_arrays

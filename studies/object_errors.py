@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from nbv.core.angles import travel_deg
+from nbv.core.circle.angles import travel_deg
 from nbv.errors import UserError
 from nbv.experiment.statistics.metrics import Interval, above_90, accuracy_area
 from nbv.experiment.statistics.paired import PairedErrors, Resampler, estimate

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nbv.core.criteria import CRITERIA
+from nbv.core.circle.criteria import CRITERIA
 from nbv.data.sensors import check_sensor
 from nbv.errors import UserError
 from nbv.experiment.config import load_config, read_configuration
@@ -318,7 +318,7 @@ def variant_folder(without: str = "", replicate: int = 0) -> str:
 
 def files_of_manifest(path: str) -> list[str]:
     """Return a manifest, and the frames and masks that it names."""
-    from nbv.robot.recordings import read_manifest  # only here: it is slow
+    from nbv.bundles.recordings import read_manifest  # only here: it is slow
 
     try:
         recordings = read_manifest(path)

@@ -18,8 +18,8 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 from torch import nn
 
-from nbv.core.logits import TEMPERATURES, log_softmax, softmax
-from nbv.core.rotations import VOLUME, Orientations, chordal_mean, spiral
+from nbv.core.circle.logits import TEMPERATURES, log_softmax, softmax
+from nbv.core.orientations.group import VOLUME, Orientations, chordal_mean, spiral
 from nbv.core.seeds import rng_for
 from nbv.data.camera import Camera, viewpoint_frames
 from nbv.data.depth_codes import encode_depth

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.rotations import ASYMMETRIC, VOLUME, Symmetry
+from nbv.core.orientations.group import ASYMMETRIC, VOLUME, Symmetry
 from nbv.experiment.report.table import DECIDED, Cell, Part, Row, Table, difference_cell
 from nbv.experiment.statistics.metrics import percentile_interval
 from nbv.labels import category_label, counted, interval_text, method_label, number

@@ -15,14 +15,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.core.rotation_belief import average, belief, posterior
-from nbv.core.rotation_criteria import CRITERIA, NextViews, costs_of, ranking, view_angle_deg
-from nbv.core.rotation_errors import OrientationErrors
+from nbv.choice.rotations import MIN_SEPARATION_DEG
+from nbv.core.orientations.belief import average, belief, posterior
+from nbv.core.orientations.criteria import CRITERIA, NextViews, costs_of, ranking, view_angle_deg
+from nbv.core.orientations.errors import OrientationErrors
 from nbv.files import read_rows
-from nbv.robot.bop import groups_of, orientation_table
-from nbv.robot.next_camera import PoseEstimate
-from nbv.robot.rotation_pairs import OrientationTable
-from nbv.robot.rotations import MIN_SEPARATION_DEG
+from nbv.tables.bop import groups_of, orientation_table
+from nbv.tables.next_camera import PoseEstimate
+from nbv.tables.orientation_table import OrientationTable
 
 Array = NDArray[np.float64]
 
@@ -230,7 +230,7 @@ def evaluate(
 ) -> pd.DataFrame:
     """Return the figures of every instance, fusion and method.
 
-    The table of pairs has `COLUMNS` and those of `nbv.robot.bop.read_orientation_table`. With a
+    The table of pairs has `COLUMNS` and those of `nbv.tables.bop.read_orientation_table`. With a
     column ``role`` an instance is for calibration or tested, else both. ``settings`` has
     ``objects``, which are evaluated, and ``score_objects``, which say what a score is worth; and
     those of `OrientationErrors`.

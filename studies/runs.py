@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.core.angles import circular_distance_deg
+from nbv.core.circle.angles import circular_distance_deg
 from nbv.experiment.estimates import read_estimates
 from nbv.experiment.report.settings import (
     CELL_COLUMNS,

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.choose import is_surely_less
-from nbv.core.estimates import Estimates, Posteriors
-from nbv.core.evidence import Evidence, evidence_of_distributions
-from nbv.core.fusion import OF_DISTRIBUTIONS
-from nbv.core.lookup import CostTable, build_lookup
-from nbv.core.policies import ORACLE, needs_lookup
-from nbv.core.selection import DensityParams, choose_densities, chosen_evidence
+from nbv.core.circle.estimates import Estimates, Posteriors
+from nbv.core.circle.evidence import Evidence, evidence_of_distributions
+from nbv.core.circle.fusion import OF_DISTRIBUTIONS
+from nbv.core.circle.lookup import CostTable, build_lookup
+from nbv.core.circle.policies import ORACLE, needs_lookup
+from nbv.core.circle.selection import DensityParams, choose_densities, chosen_evidence
 from nbv.experiment.methods import SELECTED, Methods, selectable
 
 OPPOSITE = {"policy": "opposite", "fusion": "average"}

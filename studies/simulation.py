@@ -9,13 +9,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.angles import circular_distance_deg, nearest_bin, travel_deg
-from nbv.core.belief import Belief, coarser, first_belief, multiplied, updated
-from nbv.core.criteria import CRITERIA
-from nbv.core.distributions import NEGLIGIBLE_PROBABILITY, mean_direction_deg, region_coverage
-from nbv.core.evidence import Evidence
-from nbv.core.fusion import Rotations
-from nbv.core.lookup import least_cost_delta
+from nbv.core.circle.angles import circular_distance_deg, nearest_bin, travel_deg
+from nbv.core.circle.belief import Belief, coarser, first_belief, multiplied, updated
+from nbv.core.circle.criteria import CRITERIA
+from nbv.core.circle.distributions import (
+    NEGLIGIBLE_PROBABILITY,
+    mean_direction_deg,
+    region_coverage,
+)
+from nbv.core.circle.evidence import Evidence
+from nbv.core.circle.fusion import Rotations
+from nbv.core.circle.lookup import least_cost_delta
 
 Floats = NDArray[np.floating]
 Indices = NDArray[np.intp]
@@ -36,7 +40,7 @@ def recommended_next(criterion: str, coarse: Evidence, min_separation_deg: float
     Parameters
     ----------
     criterion : str
-        A name in `nbv.core.criteria.FOR_MORE_VIEWS`.
+        A name in `nbv.core.circle.criteria.FOR_MORE_VIEWS`.
     coarse : Evidence
         Evidence with fewer bins than the beliefs; rotations are multiples of its bin.
     min_separation_deg : float
@@ -125,7 +129,7 @@ class EstimatedViews:
     def further(
         self, belief: Belief, objects: Indices, views: Indices, delta_deg: NDArray[np.int64]
     ) -> Belief:
-        """Return `nbv.core.belief.updated`."""
+        """Return `nbv.core.circle.belief.updated`."""
         return updated(belief, self.estimate_deg[objects, views], delta_deg, self.evidence)
 
 
@@ -148,7 +152,7 @@ class DistributionViews:
     def further(
         self, belief: Belief, objects: Indices, views: Indices, delta_deg: NDArray[np.int64]
     ) -> Belief:
-        """Return `nbv.core.belief.multiplied`."""
+        """Return `nbv.core.circle.belief.multiplied`."""
         return multiplied(belief, self.distributions[objects, views], delta_deg)
 
 
@@ -189,7 +193,7 @@ def follow(
     ndarray (5, n_objects, n_starts, n_views)
         `METRICS` after each view: error and total travel in degrees; the log density of the true
         pose, nats per degree; whether the regions of 50 and 90 % contain it, percent
-        (`nbv.core.distributions.region_coverage`).
+        (`nbv.core.circle.distributions.region_coverage`).
     """
     n_objects, n_azimuths = views.shape[:2]
     objects, starts, belief = first_views(views, start_every_deg)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from nbv.core.rotations import Symmetry
+from nbv.core.orientations.group import Symmetry
 
 if TYPE_CHECKING:
     import trimesh

@@ -15,9 +15,9 @@ import pytest
 
 import synthetic
 from made_bundles import made_bundle
+from nbv.bundles.bundle import Bundle
+from nbv.bundles.recommender import Recommender
 from nbv.experiment.results import load_evaluations
-from nbv.robot.bundle import Bundle
-from nbv.robot.recommender import Recommender
 from projects import Project, copy_of_project, finished_project
 
 # Machines are noisy, and a first example may import a library: no test is timed.

@@ -10,15 +10,15 @@ import torch
 import yaml
 from numpy.typing import NDArray
 
-from nbv.core.logits import from_logits
-from nbv.core.sweeps import bin_apart
+from nbv.bundles.bundle import Bundle, PaperTables
+from nbv.bundles.network import Sweep
+from nbv.bundles.ood import fit_ood
+from nbv.core.circle.logits import from_logits
+from nbv.core.circle.sweeps import bin_apart
 from nbv.data.camera import Camera
 from nbv.experiment.estimation.make_bundle import bundled_model
 from nbv.experiment.estimation.networks import build_network
 from nbv.experiment.estimation.weights import Estimator
-from nbv.robot.bundle import Bundle, PaperTables
-from nbv.robot.network import Sweep
-from nbv.robot.ood import fit_ood
 
 CONFIG = Path(__file__).parents[1] / "config"
 BINS = 24

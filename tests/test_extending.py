@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from core.made import evidence_of
-from nbv.core import criteria
-from nbv.core.belief import every_belief
+from nbv.core.circle import criteria
+from nbv.core.circle.belief import every_belief
 from projects import Project
 
 TEXT = (Path(__file__).parents[1] / "docs/extending.md").read_text("utf-8")
@@ -57,7 +57,7 @@ def test_the_criterion_of_the_example_is_the_expected_entropy_of_the_next_estima
 
 @pytest.mark.slow
 def test_the_example_adds_a_method_to_the_leaderboard_and_trains_nothing(scratch: Project):
-    add_the_criterion(scratch.folder / "src/nbv/core/criteria.py")
+    add_the_criterion(scratch.folder / "src/nbv/core/circle/criteria.py")
     (configuration,) = blocks("yaml")
     replace_line(scratch.folder / "config/config.yaml", configuration)
 

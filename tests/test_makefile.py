@@ -21,7 +21,7 @@ def test_the_package_ships_the_bundles_that_make_bundles_made_and_no_others():
     shown = shown.replace("\\\n", " ")
     (made,) = re.findall(r"snakemake .* bundles --config (.+)", shown)
     settings = load_config(ROOT / "config", made.split())
-    (copied,) = re.findall(r"^cp (.+) src/nbv/robot/shipped/$", shown, re.MULTILINE)
+    (copied,) = re.findall(r"^cp (.+) src/nbv/bundles/shipped/$", shown, re.MULTILINE)
     assert copied.split() == [
         f"results/{settings['name']}/bundles/{category}.safetensors"
         for category in settings["categories"]

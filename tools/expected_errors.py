@@ -23,7 +23,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.core.angles import circular_distance_deg
+from nbv.bundles.recommender import Recommender
+from nbv.choice.next_view import N_KEPT, after_rotations, next_view
+from nbv.core.circle.angles import circular_distance_deg
 from nbv.core.seeds import rng_for
 from nbv.data.camera import Camera
 from nbv.data.meshes import Surface
@@ -32,8 +34,6 @@ from nbv.data.render import open_renderer
 from nbv.data.sensors import build_sensor
 from nbv.data.sources import open_source
 from nbv.experiment.config import load_config
-from nbv.robot.next_view import N_KEPT, after_rotations, next_view
-from nbv.robot.recommender import Recommender
 
 CONFIG = Path(__file__).parents[1] / "config"
 SETTINGS = ("experiment=bundles", "estimator=classifier", "randomisation=camera", "sensor=kinect")

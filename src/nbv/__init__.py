@@ -26,55 +26,55 @@ from typing import TYPE_CHECKING, Any
 
 # What type checkers see of the names below.
 if TYPE_CHECKING:
-    from nbv.core.density import Conditionals as Conditionals
-    from nbv.core.density import conditionals as conditionals
-    from nbv.core.evidence import Evidence as Evidence
-    from nbv.core.evidence import gather_evidence as gather_evidence
-    from nbv.core.fusion import average as average
-    from nbv.core.fusion import posterior as posterior
+    from nbv.bundles.recommender import Recommender as Recommender
+    from nbv.choice.moves import check_axis as check_axis
+    from nbv.choice.moves import moved_camera as moved_camera
+    from nbv.choice.next_view import Move as Move
+    from nbv.choice.next_view import Recommendation as Recommendation
+    from nbv.core.circle.density import Conditionals as Conditionals
+    from nbv.core.circle.density import conditionals as conditionals
+    from nbv.core.circle.evidence import Evidence as Evidence
+    from nbv.core.circle.evidence import gather_evidence as gather_evidence
+    from nbv.core.circle.fusion import average as average
+    from nbv.core.circle.fusion import posterior as posterior
     from nbv.errors import BundleError as BundleError
     from nbv.errors import FrameError as FrameError
     from nbv.errors import UserError as UserError
-    from nbv.robot.depth_files import read_depth as read_depth
-    from nbv.robot.distribution_table import DistributionTable as DistributionTable
-    from nbv.robot.intrinsics import Intrinsics as Intrinsics
-    from nbv.robot.lookup import LookupTable as LookupTable
-    from nbv.robot.lookup import build_lookup as build_lookup
-    from nbv.robot.moves import check_axis as check_axis
-    from nbv.robot.moves import moved_camera as moved_camera
-    from nbv.robot.next_camera import PoseEstimate as PoseEstimate
-    from nbv.robot.next_view import Move as Move
-    from nbv.robot.next_view import Recommendation as Recommendation
-    from nbv.robot.recommender import Recommender as Recommender
-    from nbv.robot.rotation_pairs import OrientationTable as OrientationTable
-    from nbv.robot.synthetic import example_frame as example_frame
+    from nbv.frames.depth_files import read_depth as read_depth
+    from nbv.frames.intrinsics import Intrinsics as Intrinsics
+    from nbv.frames.synthetic import example_frame as example_frame
+    from nbv.tables.distribution_table import DistributionTable as DistributionTable
+    from nbv.tables.lookup import LookupTable as LookupTable
+    from nbv.tables.lookup import build_lookup as build_lookup
+    from nbv.tables.next_camera import PoseEstimate as PoseEstimate
+    from nbv.tables.orientation_table import OrientationTable as OrientationTable
 
 __version__ = "0.2.0"
 
 # Names and not imports: `import nbv` stays quick, and no job depends on all of these modules.
 _MODULES = {
-    "Recommender": "nbv.robot.recommender",
-    "Recommendation": "nbv.robot.next_view",
-    "Move": "nbv.robot.next_view",
-    "DistributionTable": "nbv.robot.distribution_table",
-    "OrientationTable": "nbv.robot.rotation_pairs",
-    "PoseEstimate": "nbv.robot.next_camera",
-    "moved_camera": "nbv.robot.moves",
-    "check_axis": "nbv.robot.moves",
+    "Recommender": "nbv.bundles.recommender",
+    "Recommendation": "nbv.choice.next_view",
+    "Move": "nbv.choice.next_view",
+    "DistributionTable": "nbv.tables.distribution_table",
+    "OrientationTable": "nbv.tables.orientation_table",
+    "PoseEstimate": "nbv.tables.next_camera",
+    "moved_camera": "nbv.choice.moves",
+    "check_axis": "nbv.choice.moves",
     "BundleError": "nbv.errors",
     "FrameError": "nbv.errors",
-    "Intrinsics": "nbv.robot.intrinsics",
-    "read_depth": "nbv.robot.depth_files",
-    "example_frame": "nbv.robot.synthetic",
-    "Conditionals": "nbv.core.density",
-    "conditionals": "nbv.core.density",
+    "Intrinsics": "nbv.frames.intrinsics",
+    "read_depth": "nbv.frames.depth_files",
+    "example_frame": "nbv.frames.synthetic",
+    "Conditionals": "nbv.core.circle.density",
+    "conditionals": "nbv.core.circle.density",
     "UserError": "nbv.errors",
-    "Evidence": "nbv.core.evidence",
-    "gather_evidence": "nbv.core.evidence",
-    "average": "nbv.core.fusion",
-    "posterior": "nbv.core.fusion",
-    "LookupTable": "nbv.robot.lookup",
-    "build_lookup": "nbv.robot.lookup",
+    "Evidence": "nbv.core.circle.evidence",
+    "gather_evidence": "nbv.core.circle.evidence",
+    "average": "nbv.core.circle.fusion",
+    "posterior": "nbv.core.circle.fusion",
+    "LookupTable": "nbv.tables.lookup",
+    "build_lookup": "nbv.tables.lookup",
 }
 
 # Former names, for one release.

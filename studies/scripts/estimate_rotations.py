@@ -1,6 +1,6 @@
 """Train one fold's estimator of orientations, and estimate held-out views, one per orientation."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import numpy as np
@@ -15,7 +15,7 @@ with job(snakemake):
     from studies.rotations import pairs_table
     from studies.solids import SOLIDS, solid
 
-    from nbv.core.rotations import ASYMMETRIC
+    from nbv.core.orientations.group import ASYMMETRIC
     from nbv.core.seeds import seed_for
     from nbv.data.depth_images import open_depth
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread

@@ -1,6 +1,6 @@
 """Evaluate one setting of the ablation on every fold of a category."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import pandas as pd

@@ -1,6 +1,6 @@
 """Evaluate the extensions on the test objects of one fold."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from studies.extensions import evaluate_extensions
@@ -10,7 +10,7 @@ with job(snakemake):
     from nbv.experiment.estimates import read_estimates, read_posteriors
     from nbv.experiment.splits import check_role, read_splits
     from nbv.files import read_csv, write_csv
-    from nbv.robot.lookup import LookupTable
+    from nbv.tables.lookup import LookupTable
 
     given, output = snakemake.input, snakemake.output
     params, wildcards = snakemake.params, snakemake.wildcards

@@ -1,6 +1,6 @@
 """Evaluate every choice with every fusion on the test objects of one unit, after one training."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import pandas as pd

@@ -1,12 +1,12 @@
 """Take more than two views of the test objects of one fold, by every policy."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from studies.curves import more_views_rows
     from studies.extensions import stored_evidence
 
-    from nbv.core.evidence import evidence_of_distributions
+    from nbv.core.circle.evidence import evidence_of_distributions
     from nbv.core.seeds import rng_for
     from nbv.experiment.estimates import read_estimates, read_posteriors
     from nbv.experiment.splits import check_role, read_splits

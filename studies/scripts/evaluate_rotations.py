@@ -1,6 +1,6 @@
 """Evaluate every pair of views of every instance, with calibration on other instances."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from studies.rotations import evaluate

@@ -1,6 +1,6 @@
 """Join the kept estimates of all trainings in one file."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from studies.kept_estimates import join_kept

@@ -1,6 +1,6 @@
 """Keep the held-out estimates of one training of every fold in one file."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from studies.kept_estimates import keep_estimates, read_held_out

@@ -1,6 +1,6 @@
 """Make a solid that has a symmetry group, as objects that are all the same."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from studies.solids import solid

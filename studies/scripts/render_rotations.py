@@ -1,6 +1,6 @@
 """Render each object of one category in random orientations."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from studies.rotation_estimator import orientations_of, oriented_views

@@ -1,6 +1,6 @@
 """Tabulate the effect of each choice in the paper's method."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import numpy as np

@@ -1,6 +1,6 @@
 """Tabulate means and contrasts over all trainings, and draw the contrasts."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import pandas as pd
@@ -16,7 +16,7 @@ with job(snakemake):
     )
 
     from nbv.files import read_csv, write_csv
-    from nbv.robot.style import save_figure
+    from nbv.style import save_figure
 
     output = snakemake.output
     read = {

@@ -1,6 +1,6 @@
 """Compare bundles that lack an ingredient of the randomisation with the one that has all."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import logging
@@ -8,12 +8,12 @@ with job(snakemake):
     import pandas as pd
     from studies.ingredients import ingredient_table
 
+    from nbv.bundles.evaluation import evaluate
+    from nbv.bundles.recommender import Recommender
+    from nbv.bundles.recordings import read_manifest, run_network
     from nbv.errors import FrameError
     from nbv.experiment.report.table import write_table
     from nbv.files import read_csv
-    from nbv.robot.evaluation import evaluate
-    from nbv.robot.recommender import Recommender
-    from nbv.robot.recordings import read_manifest, run_network
 
     params, given = snakemake.params, snakemake.input
     log = logging.getLogger("nbv")

@@ -1,6 +1,6 @@
 """Rank all methods on one run or on several."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import numpy as np

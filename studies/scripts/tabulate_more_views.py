@@ -1,6 +1,6 @@
 """Tabulate and draw error and travel against the number of views."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import numpy as np
@@ -8,7 +8,7 @@ with job(snakemake):
 
     from nbv.experiment.report.table import write_table
     from nbv.experiment.statistics.paired import Resampler
-    from nbv.robot.style import save_figure
+    from nbv.style import save_figure
 
     params, output = snakemake.params, snakemake.output
     files = dict(zip(params.folds, snakemake.input.rows, strict=True))

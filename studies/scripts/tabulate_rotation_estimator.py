@@ -1,6 +1,6 @@
 """Tabulate the single views of the study's own estimators in three dimensions."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import pandas as pd

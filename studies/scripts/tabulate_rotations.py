@@ -1,6 +1,6 @@
 """Tabulate two views in three dimensions, pooled over objects."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import numpy as np
@@ -9,7 +9,7 @@ with job(snakemake):
 
     from nbv.experiment.report.table import write_table
     from nbv.files import read_csv
-    from nbv.robot.bop import read_models_info
+    from nbv.tables.bop import read_models_info
 
     given, params = snakemake.input, snakemake.params
     figures = [read_csv(path) for path in given.figures]

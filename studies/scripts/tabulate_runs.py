@@ -1,6 +1,6 @@
 """Tabulate the errors of several runs side by side."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from studies.runs import files_by_run, load_estimate_errors, runs_table

@@ -1,6 +1,6 @@
 """Tabulate the errors of estimators trained under one condition and tested under another."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from studies.transfer import load_transfer, transfer_table

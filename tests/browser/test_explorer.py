@@ -14,17 +14,17 @@ from studies.simulation import bisecting_next, recommended_next
 
 import synthetic
 from conftest import UNITS
-from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import coarser, first_belief, updated
-from nbv.core.criteria import CRITERIA
-from nbv.core.density import Conditionals
-from nbv.core.distributions import FLAT, mean_direction_deg
-from nbv.core.estimates import posteriors_of
-from nbv.core.evidence import Evidence
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.belief import coarser, first_belief, updated
+from nbv.core.circle.criteria import CRITERIA
+from nbv.core.circle.density import Conditionals
+from nbv.core.circle.distributions import FLAT, mean_direction_deg
+from nbv.core.circle.estimates import posteriors_of
+from nbv.core.circle.evidence import Evidence
 from nbv.experiment.estimates import write_posteriors
 from nbv.experiment.explorer import ExplorerInputs, build_explorer
 from nbv.experiment.explorer.data import page_table
-from nbv.robot.lookup import LookupTable
+from nbv.tables.lookup import LookupTable
 
 METHODS = synthetic.METHODS
 EXPLORED = (("mug", 0), ("mug", 30), ("chair", 0))

@@ -18,7 +18,7 @@ from nbv.experiment.report.runtime import load_jobs, runtime_table
 from nbv.experiment.report.settings import ReportSettings
 from nbv.experiment.report.table import write_table
 from nbv.experiment.report.tables import TABLES, build_table, claims_table
-from nbv.robot.style import save_figure
+from nbv.style import save_figure
 
 WIDTHS = (390, 768, 1280)
 N_FOLDS = 3

@@ -18,22 +18,22 @@ from made_bundles import BINS, COLUMNS, FOCAL_PX, ROWS, WIDTH, frame
 
 pytest.importorskip("cyclopts")
 
+from nbv.bundles.bundle import FORMAT, Bundle
+from nbv.bundles.calibration import recalibrated
+from nbv.bundles.evaluation import bundle_errors_deg, count_ood, evaluate
+from nbv.bundles.recommender import Recommender
+from nbv.bundles.recordings import read_manifest, run_network
+from nbv.choice.moves import elevation_from_gravity, moved_camera
 from nbv.cli import main
 from nbv.cli.answers import print_offset
 from nbv.cli.arguments import as_paragraphs
-from nbv.core.angles import signed_difference_deg
-from nbv.core.criteria import CRITERIA
-from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
-from nbv.core.selection import DENSITY, chosen_lookup
-from nbv.robot.bundle import FORMAT, Bundle
-from nbv.robot.calibration import recalibrated
-from nbv.robot.depth_files import read_depth
-from nbv.robot.evaluation import bundle_errors_deg, count_ood, evaluate
-from nbv.robot.lookup import LookupTable
-from nbv.robot.moves import elevation_from_gravity, moved_camera
-from nbv.robot.pairs import PairTable
-from nbv.robot.recommender import Recommender
-from nbv.robot.recordings import read_manifest, run_network
+from nbv.core.circle.angles import signed_difference_deg
+from nbv.core.circle.criteria import CRITERIA
+from nbv.core.circle.offset import FOR_FRAMES, Offset, frame_warning
+from nbv.core.circle.selection import DENSITY, chosen_lookup
+from nbv.frames.depth_files import read_depth
+from nbv.tables.lookup import LookupTable
+from nbv.tables.pairs import PairTable
 
 OWN = ("--bundle", "b.safetensors")
 POSE = [[0.0, 0.0, 1.0, -0.6], [-1.0, 0.0, 0.0, 0.1], [0.0, -1.0, 0.0, 0.2], [0.0, 0.0, 0.0, 1.0]]

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.estimates import Estimates
-from nbv.core.evidence import gather_evidence
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.estimates import Estimates
+from nbv.core.circle.evidence import gather_evidence
 
 N_BINS = 24
 SETTINGS = {"pose_likelihood": "given_estimate", "spread": "entropy"}

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nbv.core import angles
+from nbv.core.circle import angles
 from nbv.errors import UserError
 
 degrees = st.floats(-1e4, 1e4, allow_nan=False)

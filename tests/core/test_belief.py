@@ -10,9 +10,9 @@ from tests.core.made import (
     product_by_loops,
 )
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import Belief, coarser, every_belief, first_belief, updated
-from nbv.core.distributions import mean_direction_deg
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.belief import Belief, coarser, every_belief, first_belief, updated
+from nbv.core.circle.distributions import mean_direction_deg
 
 
 def test_beliefs_follow_bayes_rule_view_by_view():

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from tests.core.made import N_BINS, SETTINGS, estimates, evidence_of
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import Belief, coarser, every_belief, first_belief, updated
-from nbv.core.criteria import (
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.belief import Belief, coarser, every_belief, first_belief, updated
+from nbv.core.circle.criteria import (
     CRITERIA,
     FOR_MORE_VIEWS,
     POSE_LIKELIHOODS,
@@ -22,9 +22,9 @@ from nbv.core.criteria import (
     tabulate,
     two_view_poses,
 )
-from nbv.core.density import Conditionals, conditionals
-from nbv.core.evidence import Evidence, gather_evidence
-from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS
+from nbv.core.circle.density import Conditionals, conditionals
+from nbv.core.circle.evidence import Evidence, gather_evidence
+from nbv.core.circle.fusion import ESTIMATE_FUSIONS, FUSIONS
 from nbv.errors import UserError
 
 ANGLES = 2 * np.pi * np.arange(N_BINS) / N_BINS

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import i0e, i1e
 
-from nbv.core import density
+from nbv.core.circle import density
 
 B = 24
 

@@ -12,9 +12,9 @@ from tests.core.made import (
     objects,
 )
 
-from nbv.core.lookup import build_lookup
-from nbv.core.policies import HeldOutViews, take_second_views
-from nbv.core.selection import choose_densities, chosen_lookup, most_likely_density
+from nbv.core.circle.lookup import build_lookup
+from nbv.core.circle.policies import HeldOutViews, take_second_views
+from nbv.core.circle.selection import choose_densities, chosen_lookup, most_likely_density
 from nbv.errors import UserError
 
 

@@ -13,8 +13,8 @@ from scipy.special import softmax as softmax_of_scipy
 from scipy.stats import circstd
 from tests.core.made import product_by_loops
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.distributions import (
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.distributions import (
     direction_and_spread_deg,
     in_object_frame,
     in_view_frame,
@@ -24,8 +24,8 @@ from nbv.core.distributions import (
     product_of_views,
     rotated,
 )
-from nbv.core.estimates import posteriors_of
-from nbv.core.logits import LEAST_PROBABILITY, from_logits, on_degrees
+from nbv.core.circle.estimates import posteriors_of
+from nbv.core.circle.logits import LEAST_PROBABILITY, from_logits, on_degrees
 
 BINS = 24
 WIDTH = 360.0 / BINS
@@ -96,7 +96,7 @@ def test_it_is_the_density_between_the_bins(seed, rotation):
 
 @given(seed=st.integers(0, 10**6), degrees=st.integers(-400, 400))
 def test_a_rotation_on_a_finer_grid_is_a_roll_too(seed, degrees):
-    """The density between bins is that of `nbv.core.logits.on_degrees`."""
+    """The density between bins is that of `nbv.core.circle.logits.on_degrees`."""
     rows = beliefs(seed)
     fine = on_degrees(rotated(rows, float(degrees)))[:, :: int(WIDTH)]
     rolled = np.roll(on_degrees(rows), -degrees, axis=1)[:, :: int(WIDTH)]

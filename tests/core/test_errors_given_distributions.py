@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import Belief
-from nbv.core.criteria import CRITERIA, affinity
-from nbv.core.evidence import evidence_of_distributions
-from nbv.core.fusion import product, rotation_errors_deg
-from nbv.core.policies import HeldOutViews, two_views
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.belief import Belief
+from nbv.core.circle.criteria import CRITERIA, affinity
+from nbv.core.circle.evidence import evidence_of_distributions
+from nbv.core.circle.fusion import product, rotation_errors_deg
+from nbv.core.circle.policies import HeldOutViews, two_views
 
 N_BINS, N_VIEWS = 12, 24
 AFFINITY = {"power": 4.0, "pseudo_observations": 5.0}

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.core.made import N_BINS, direction_by_loops, estimates, evidence_of, product_by_loops
 
-from nbv.core import fusion
-from nbv.core.angles import circular_distance_deg
-from nbv.core.density import Conditionals
-from nbv.core.fusion import ESTIMATE_FUSIONS, average, posterior, product
+from nbv.core.circle import fusion
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.density import Conditionals
+from nbv.core.circle.fusion import ESTIMATE_FUSIONS, average, posterior, product
 
 angle = st.integers(0, 3599).map(lambda tenths: tenths / 10)
 turn = st.integers(0, 359)

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import log_softmax
 
-from nbv.core.distributions import estimate_likelihood, region_coverage
-from nbv.core.logits import TEMPERATURES, fit_temperature, log_likelihood, on_degrees
+from nbv.core.circle.distributions import estimate_likelihood, region_coverage
+from nbv.core.circle.logits import TEMPERATURES, fit_temperature, log_likelihood, on_degrees
 
 
 def random_logits(seed: int, shape=(6, 24)) -> np.ndarray:

@@ -12,16 +12,16 @@ from tests.core.made import product_by_loops, sharp_turns, unclear_turns
 from nbv.core.alike.compare import WITHIN_DEG, CalibrationViews, compared_step, first_bins
 from nbv.core.alike.expected import Expected, expected_errors
 from nbv.core.alike.reliability import N_GROUPS, observed_error
-from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import Belief
-from nbv.core.criteria import expected_error
-from nbv.core.distributions import (
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.belief import Belief
+from nbv.core.circle.criteria import expected_error
+from nbv.core.circle.distributions import (
     log_bayes_factor,
     mean_direction_deg,
     product_directions_deg,
 )
-from nbv.core.evidence import evidence_of_distributions
-from nbv.core.fusion import product
+from nbv.core.circle.evidence import evidence_of_distributions
+from nbv.core.circle.fusion import product
 
 SETTINGS = {"affinity": {"power": 5.0, "pseudo_observations": 30.0}}
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from tests.core.made import evidence_of, hidden_range_estimates
 
-from nbv.core import lookup
+from nbv.choice.rotations import ranked_rotations
+from nbv.core.circle import lookup
 from nbv.errors import UserError
 from nbv.files import read_arrays, write_arrays
-from nbv.robot.lookup import LookupTable, build_lookup
-from nbv.robot.rotations import ranked_rotations
+from nbv.tables.lookup import LookupTable, build_lookup
 
 
 def test_ties_go_to_the_smallest_travel_and_then_to_the_smaller_delta():

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.offset import constant_offset_deg, frame_warning
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.offset import constant_offset_deg, frame_warning
 
 ERRORS = st.lists(st.floats(-1000.0, 1000.0), min_size=1, max_size=12)
 

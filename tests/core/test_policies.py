@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from tests.core.made import estimates, evidence_of
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import Belief
-from nbv.core.criteria import CRITERIA
-from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS, rotation_errors_deg
-from nbv.core.lookup import build_lookup
-from nbv.core.policies import HeldOutViews, needs_lookup, take_second_views, two_views
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.belief import Belief
+from nbv.core.circle.criteria import CRITERIA
+from nbv.core.circle.fusion import ESTIMATE_FUSIONS, FUSIONS, rotation_errors_deg
+from nbv.core.circle.lookup import build_lookup
+from nbv.core.circle.policies import HeldOutViews, needs_lookup, take_second_views, two_views
 from nbv.errors import UserError
 
 

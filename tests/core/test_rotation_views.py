@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from nbv.core import belief as circle_belief
 from nbv.core import criteria, fusion
-from nbv.core.angles import circular_distance_deg, direction_deg
-from nbv.core.density import von_mises_kernel
-from nbv.core.evidence import gather_evidence
-from nbv.core.rotation_belief import average, belief, posterior
-from nbv.core.rotation_criteria import CRITERIA, NextViews, costs_of, ranking, view_angle_deg
-from nbv.core.rotation_errors import OrientationErrors, ScoreRatio
-from nbv.core.rotations import ASYMMETRIC, Symmetry, viewing_direction
+from nbv.core.circle import belief as circle_belief
+from nbv.core.circle.angles import circular_distance_deg, direction_deg
+from nbv.core.circle.density import von_mises_kernel
+from nbv.core.circle.evidence import gather_evidence
+from nbv.core.orientations.belief import average, belief, posterior
+from nbv.core.orientations.criteria import CRITERIA, NextViews, costs_of, ranking, view_angle_deg
+from nbv.core.orientations.errors import OrientationErrors, ScoreRatio
+from nbv.core.orientations.group import ASYMMETRIC, Symmetry, viewing_direction
 from nbv.errors import UserError
 
 N_BINS, BANDWIDTH_DEG, ALPHA = 36, 12.0, 4.0

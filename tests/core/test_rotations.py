@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from nbv.core.rotations import (
+from nbv.core.orientations.group import (
     ASYMMETRIC,
     Symmetry,
     along_ray,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from nbv.errors import UserError
-from nbv.experiment import jobs
+from nbv.experiment.run import jobs
 
 PATH = "results/tiny/estimates/mug/el00/fold1/test.csv"
 CONTENT = b"object_id,azimuth_deg,estimate_deg\n" + bytes(range(256))

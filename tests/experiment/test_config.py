@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nbv.core.criteria import POSE_LIKELIHOODS, SPREADS
+from nbv.core.circle.criteria import POSE_LIKELIHOODS, SPREADS
 from nbv.data.camera import FRAMINGS
 from nbv.data.sources.files import open_shapenet
 from nbv.errors import UserError
@@ -23,7 +23,7 @@ from nbv.experiment.config import (
 )
 from nbv.experiment.config.schema import LINEAR, NAME_RULE, Dataset
 from nbv.experiment.estimation import networks
-from nbv.experiment.reference import differing_settings
+from nbv.experiment.run.reference import differing_settings
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "config"

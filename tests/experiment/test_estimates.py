@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import log_softmax
 
-from nbv.core.estimates import Estimates, posteriors_of
+from nbv.core.circle.estimates import Estimates, posteriors_of
 from nbv.errors import UserError
 from nbv.experiment.estimates import (
     read_estimates,

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from clock_faces import CLASSES, CPU, NAMES, SETTINGS, clock_faces, named, untrained
-from nbv.core.angles import circular_distance_deg
+from nbv.core.circle.angles import circular_distance_deg
 from nbv.errors import UserError
 from nbv.experiment.estimation import hardware as hw
 from nbv.experiment.estimation.hardware import to_input

@@ -32,7 +32,7 @@ from nbv.experiment.explorer.data import (
     wrapped,
 )
 from nbv.experiment.report.figures.views import depth_limits, shade
-from nbv.robot.lookup import LookupTable
+from nbv.tables.lookup import LookupTable
 
 FOLDS = range(1, N_FOLDS + 1)
 POLICIES = {

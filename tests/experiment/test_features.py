@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from clock_faces import CPU, SETTINGS, clock_faces
-from nbv.core.angles import circular_distance_deg
+from nbv.core.circle.angles import circular_distance_deg
 from nbv.core.seeds import FIRST_FEATURE_SEED
 from nbv.data.depth_images import DepthImages
 from nbv.data.procedural import CATEGORIES, generate

@@ -12,15 +12,15 @@ from PIL import Image
 
 import synthetic
 from conftest import N_FOLDS, UNITS
-from nbv.core.angles import circular_distance_deg
-from nbv.core.evidence import gather_evidence
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.evidence import gather_evidence
 from nbv.errors import UserError
 from nbv.experiment.report.figures import FIGURES, FigureInputs, build_figure, steps
 from nbv.experiment.report.figures.inputs import example_view
 from nbv.experiment.report.figures.views import depth_limits, shade
 from nbv.experiment.report.settings import ReportSettings, hardest_azimuth_deg
-from nbv.robot.lookup import LookupTable, build_lookup
-from nbv.robot.style import save_figure
+from nbv.style import save_figure
+from nbv.tables.lookup import LookupTable, build_lookup
 
 FOLD = 2  # of the examples
 

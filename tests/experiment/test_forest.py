@@ -9,7 +9,7 @@ from nbv.experiment.report.forest import claim_figure, claims_forest, comparison
 from nbv.experiment.report.settings import ReportSettings
 from nbv.experiment.report.tables import build_table
 from nbv.labels import method_label
-from nbv.robot.style import AGAINST, FOR, OPEN
+from nbv.style import AGAINST, FOR, OPEN
 
 CLAIM = {claim.id: claim for claim in CLAIMS}
 MARKS = {"holds": (FOR, "o"), "undecided": (OPEN, "s"), "does not hold": (AGAINST, "X")}

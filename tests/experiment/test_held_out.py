@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import torch
 
-from nbv.core.logits import fit_temperature
+from nbv.core.circle.logits import fit_temperature
 from nbv.data.depth_images import DepthImages
 from nbv.experiment.estimation.hardware import Hardware
 from nbv.experiment.estimation.inference import estimate_fold, network_outputs

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from nbv.errors import UserError
-from nbv.experiment.jobs import (
+from nbv.experiment.run.jobs import (
     LAST_ERROR,
     NO_SPACE,
     begin_run,
@@ -105,13 +105,15 @@ def test_a_crash_keeps_its_traceback_in_the_log_alone(snakemake, capsys):
 
 def test_progress_goes_to_the_log_and_once_a_minute_to_the_terminal(snakemake, capsys, monkeypatch):
     clock_s = [1000.0]
-    monkeypatch.setattr("nbv.experiment.jobs.time.monotonic", lambda: clock_s[0])
+    monkeypatch.setattr("nbv.experiment.run.jobs.time.monotonic", lambda: clock_s[0])
     with job(snakemake):
         for epoch in range(1, 10):
             clock_s[0] += 20.0
             logging.getLogger("nbv.experiment.estimation").info("epoch %d", epoch)
         logging.getLogger("nbv.experiment.estimation").warning("no depth")
-        logging.getLogger("nbv.experiment.reference").info("agrees", extra={"for_terminal": True})
+        logging.getLogger("nbv.experiment.run.reference").info(
+            "agrees", extra={"for_terminal": True}
+        )
     shown = [line.partition("] ")[2] for line in capsys.readouterr().err.splitlines()]
     assert shown == ["epoch 3", "epoch 6", "epoch 9", "no depth", "agrees"]
     assert Path(snakemake.log[0]).read_text().count("epoch") == 9

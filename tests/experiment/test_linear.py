@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nbv.core.angles import circular_distance_deg, mirrored_bins
-from nbv.core.logits import softmax
+from nbv.core.circle.angles import circular_distance_deg, mirrored_bins
+from nbv.core.circle.logits import softmax
 from nbv.experiment.estimation.linear import (
     N_PARTS,
     PENALTIES,

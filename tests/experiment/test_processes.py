@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from nbv.errors import UserError
-from nbv.experiment.jobs import begin_run, check_folders
+from nbv.experiment.run.jobs import begin_run, check_folders
 
 # A run that starts a job through a shell, which outlives a killed run.
 RUN = """
 import subprocess, sys
-from nbv.experiment.jobs import begin_run
+from nbv.experiment.run.jobs import begin_run
 begin_run("results/tiny")
 if len(sys.argv) > 1:
     subprocess.run(["bash", "-c", f"{sys.executable} {sys.argv[1]}; true"])
@@ -25,7 +25,7 @@ sys.stdin.read()
 JOB = """
 import time
 from pathlib import Path
-from nbv.experiment.jobs import end_with_run
+from nbv.experiment.run.jobs import end_with_run
 end_with_run(Path("results/tiny/logs"))
 for beat in range(600):
     Path("next.txt").write_text(str(beat))

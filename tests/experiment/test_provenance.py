@@ -12,7 +12,7 @@ from omegaconf import OmegaConf
 import nbv
 from nbv.data.render import RENDERERS
 from nbv.data.sources import SOURCES
-from nbv.experiment import provenance
+from nbv.experiment.run import provenance
 
 ROOT = Path(__file__).parents[2]
 
@@ -58,12 +58,12 @@ def test_the_paper_depends_on_no_study(script):
 def test_a_study_depends_on_its_own_modules_and_on_no_plan(script):
     found = names(script)
     assert [name for name in found if name.startswith("studies/")]
-    assert not {"studies/plan.py", "experiment/plan.py", "experiment/jobs.py"} & found
+    assert not {"studies/plan.py", "experiment/plan.py", "experiment/run/jobs.py"} & found
 
 
 def test_what_reads_another_programs_pairs_trains_nothing_again():
-    assert "robot/pairs.py" in names("take_estimates")
-    assert "robot/pairs.py" not in names("train_estimator") | names("estimate_views")
+    assert "tables/pairs.py" in names("take_estimates")
+    assert "tables/pairs.py" not in names("train_estimator") | names("estimate_views")
 
 
 def test_only_the_chosen_renderer_counts():

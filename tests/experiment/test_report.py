@@ -21,7 +21,7 @@ from nbv.experiment.report.runtime import load_jobs, runtime_table
 from nbv.experiment.report.settings import ReportSettings
 from nbv.experiment.report.table import write_table
 from nbv.experiment.report.tables import TABLES, build_table, claims_table
-from nbv.robot.style import INK, RC, new_figure, save_figure
+from nbv.style import INK, RC, new_figure, save_figure
 
 VOID = {"meta", "img", "br", "link", "hr"}
 FACTS = '<dl class="facts">'

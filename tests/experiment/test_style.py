@@ -8,7 +8,7 @@ DRAW = """
 import sys
 from pathlib import Path
 import matplotlib as mpl
-from nbv.robot.style import RC, new_figure, save_figure
+from nbv.style import RC, new_figure, save_figure
 with mpl.rc_context(RC):
     figure = new_figure(3.0, 2.0)
     figure.subplots().plot([0, 1], [0, 1], label="x")

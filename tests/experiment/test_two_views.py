@@ -6,11 +6,11 @@ from studies.extensions import evaluate_extensions
 from studies.selection import select_methods
 from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.estimates import Estimates, Posteriors
-from nbv.core.evidence import gather_evidence
-from nbv.core.fusion import FUSIONS
-from nbv.core.lookup import build_lookup
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.estimates import Estimates, Posteriors
+from nbv.core.circle.evidence import gather_evidence
+from nbv.core.circle.fusion import FUSIONS
+from nbv.core.circle.lookup import build_lookup
 from nbv.experiment.results import COLUMNS, evaluate_method
 
 RNG = np.random.default_rng(0)

@@ -166,7 +166,7 @@ def splits_problem(splits: pd.DataFrame) -> str:
 
 
 def make_estimates(path: Path) -> None:
-    from nbv.core.estimates import Estimates
+    from nbv.core.circle.estimates import Estimates
     from nbv.experiment.estimates import write_estimates
 
     estimate_deg = np.random.default_rng(0).uniform(0, 360, (len(IDS), 8))
@@ -187,7 +187,7 @@ def estimates_problem(estimates: Any) -> str:
 
 
 def make_evaluation(path: Path) -> None:
-    from nbv.core.estimates import Estimates
+    from nbv.core.circle.estimates import Estimates
     from nbv.experiment.results import evaluate_method
     from nbv.files import write_csv
 
@@ -212,7 +212,7 @@ def make_claims(path: Path) -> None:
 
 
 def read_claims(path: Path) -> Any:
-    from nbv.experiment.reference import read_verdicts
+    from nbv.experiment.run.reference import read_verdicts
 
     return read_verdicts(path.parent)
 
@@ -231,8 +231,8 @@ def densities(n_bins: int) -> np.ndarray:
 
 
 def make_lookup(path: Path) -> None:
-    from nbv.core.lookup import least_cost_delta
-    from nbv.robot.lookup import LookupTable
+    from nbv.core.circle.lookup import least_cost_delta
+    from nbv.tables.lookup import LookupTable
 
     table = densities(36).astype(np.float32)
     settings = 8.0, 10.0, "given_estimate", "entropy", "pose_ambiguity"
@@ -240,7 +240,7 @@ def make_lookup(path: Path) -> None:
 
 
 def read_lookup(path: Path) -> Any:
-    from nbv.robot.lookup import LookupTable
+    from nbv.tables.lookup import LookupTable
 
     return LookupTable.load(path)
 
@@ -259,7 +259,7 @@ def lookup_problem(table: Any) -> str:
 
 
 def make_posteriors(path: Path) -> None:
-    from nbv.core.estimates import posteriors_of
+    from nbv.core.circle.estimates import posteriors_of
     from nbv.experiment.estimates import write_posteriors
 
     logits = np.random.default_rng(0).normal(size=(len(IDS), 8, 36))
@@ -378,7 +378,7 @@ def make_bop_truth(path: Path) -> None:
 
 
 def read_bop_results(path: Path) -> Any:
-    from nbv.robot.bop import read_orientation_table
+    from nbv.tables.bop import read_orientation_table
 
     return read_orientation_table(
         path.parent / "results.csv", None, path.parent / "models_info.json"
@@ -400,7 +400,7 @@ def make_rotation_table(path: Path) -> None:
 
 
 def read_rotation_table(path: Path) -> Any:
-    from nbv.robot.rotation_pairs import OrientationTable
+    from nbv.tables.orientation_table import OrientationTable
 
     return OrientationTable.load(path)
 

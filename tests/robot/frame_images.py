@@ -13,7 +13,7 @@ from nbv.data.depth_codes import encode_depth
 from nbv.data.meshes import normalise
 from nbv.data.procedural import generate
 from nbv.data.render import open_renderer
-from nbv.robot.crop import pixel_step
+from nbv.frames.crop import pixel_step
 
 TRAINING = Camera()
 

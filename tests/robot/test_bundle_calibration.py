@@ -11,14 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
-from nbv.core.angles import circular_distance_deg
-from nbv.core.distributions import mean_direction_deg, rotated
-from nbv.core.logits import from_logits
-from nbv.core.selection import chosen_lookup
-from nbv.core.sweeps import WIDEST_GAP_DEG, bin_apart
-from nbv.errors import UserError
-from nbv.robot.bundle import ELEVATION_BANDWIDTH_DEG, elevation_weights
-from nbv.robot.calibration import (
+from nbv.bundles.bundle import ELEVATION_BANDWIDTH_DEG, elevation_weights
+from nbv.bundles.calibration import (
     DENSITY,
     PRIOR_SWEEPS,
     paper_tables,
@@ -26,9 +20,15 @@ from nbv.robot.calibration import (
     temperature_of,
     without_offset,
 )
-from nbv.robot.network import Sweep
-from nbv.robot.ood import ood_score
-from nbv.robot.recommender import Recommender
+from nbv.bundles.network import Sweep
+from nbv.bundles.ood import ood_score
+from nbv.bundles.recommender import Recommender
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.distributions import mean_direction_deg, rotated
+from nbv.core.circle.logits import from_logits
+from nbv.core.circle.selection import chosen_lookup
+from nbv.core.circle.sweeps import WIDEST_GAP_DEG, bin_apart
+from nbv.errors import UserError
 
 AZIMUTHS = np.arange(BINS) * WIDTH
 # Where the choice of a density does not matter.

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from made_bundles import made_bundle, random_codes
-from nbv.errors import UserError
-from nbv.robot.bundle import (
+from nbv.bundles.bundle import (
     FORMAT,
     PROBABILITY_STEP,
     Bundle,
@@ -25,8 +24,9 @@ from nbv.robot.bundle import (
     dequantize_logp,
     quantize_logp,
 )
-from nbv.robot.ood import ood_score
-from nbv.robot.recommender import Recommender, bundle_path
+from nbv.bundles.ood import ood_score
+from nbv.bundles.recommender import Recommender, bundle_path
+from nbv.errors import UserError
 
 # Round trips
 
@@ -388,7 +388,7 @@ def test_a_bundle_is_found_by_its_file(bundle_file, tmp_path, monkeypatch):
 
 
 def test_shipped_bundles_are_found_by_their_names(tmp_path, monkeypatch):
-    from nbv.robot import recommender as module
+    from nbv.bundles import recommender as module
 
     (tmp_path / "shipped").mkdir()
     for name in ("mug.safetensors", "chair.safetensors", "README.md"):
@@ -403,7 +403,7 @@ def test_shipped_bundles_are_found_by_their_names(tmp_path, monkeypatch):
 
 
 def test_without_shipped_bundles_a_name_is_one_line(tmp_path, monkeypatch):
-    from nbv.robot import recommender as module
+    from nbv.bundles import recommender as module
 
     monkeypatch.setattr(module.resources, "files", lambda package: tmp_path)
     with pytest.raises(UserError, match="this nbv ships no bundle"):

@@ -11,8 +11,9 @@ import pytest
 import torch
 
 from made_bundles import SIDE, random_codes, random_estimator, settings
-from nbv.core.angles import circular_distance_deg
-from nbv.core.logits import from_logits
+from nbv.bundles.network import open_network, open_session
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.logits import from_logits
 from nbv.data.depth_images import DepthImages
 from nbv.errors import BundleError, UserError
 from nbv.experiment.estimation.hardware import choose_hardware
@@ -20,7 +21,6 @@ from nbv.experiment.estimation.inference import network_outputs
 from nbv.experiment.estimation.make_bundle import bundled_model, bundled_network, sweeps_of
 from nbv.experiment.estimation.outputs import decode_classes
 from nbv.experiment.estimation.weights import Estimator, save_estimator
-from nbv.robot.network import open_network, open_session
 
 KINDS = {
     "small": (settings(), SIDE),

@@ -13,10 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from nbv.data.camera import viewpoint_frames
-from nbv.errors import FrameError, UserError
-from nbv.numbers import as_pose, read_pose
-from nbv.robot.moves import (
+from nbv.choice.moves import (
     ROLL_LIMIT_DEG,
     as_rotations,
     check_axis,
@@ -27,6 +24,9 @@ from nbv.robot.moves import (
     roll_warnings,
     rotation_about,
 )
+from nbv.data.camera import viewpoint_frames
+from nbv.errors import FrameError, UserError
+from nbv.numbers import as_pose, read_pose
 
 points = arrays(np.float64, (3,), elements=st.floats(-3, 3))
 directions = points.filter(lambda axis: np.linalg.norm(axis) > 1e-3)

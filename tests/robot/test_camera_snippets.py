@@ -18,7 +18,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import nbv
-from nbv.robot.synthetic import Frame
+from nbv.frames.synthetic import Frame
 
 PAGE = Path(__file__).parents[2] / "docs/drivers.md"
 SNIPPETS = re.findall(r"^```python\n(.*?)^```", PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE)

@@ -14,8 +14,8 @@ from scipy import ndimage
 from nbv.data.camera import Camera, viewpoint_frames
 from nbv.data.depth_codes import STEP, ZERO_CODE
 from nbv.errors import FrameError
-from nbv.robot.crop import BEHIND_SURFACE, crop_frame, pixel_step
-from nbv.robot.intrinsics import Intrinsics
+from nbv.frames.crop import BEHIND_SURFACE, crop_frame, pixel_step
+from nbv.frames.intrinsics import Intrinsics
 
 DIAGONAL_M = 0.125
 FOCAL = Intrinsics(575.0, 575.0)

@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from PIL import Image
 
 from nbv.errors import FrameError, UserError
-from nbv.robot.depth_files import read_depth, read_mask, to_metres, write_depth
+from nbv.frames.depth_files import read_depth, read_mask, to_metres, write_depth
 
 MILLIMETRES = np.array([[0, 1, 400], [1234, 10000, 65534]], dtype=np.uint16)
 METRES = MILLIMETRES.astype(np.float32) * np.float32(0.001)

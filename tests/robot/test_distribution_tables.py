@@ -15,16 +15,16 @@ from tests.cli.test_command_line import POSE, fails, run, same_move
 from tests.core.made import unclear_turns
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
+from nbv.bundles.recommender import Recommender
+from nbv.choice.moves import moved_camera
 from nbv.cli import main
-from nbv.core.angles import circular_distance_deg
-from nbv.core.selection import AFFINITY
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.selection import AFFINITY
 from nbv.errors import FrameError, UserError
 from nbv.experiment.config import load_config
-from nbv.robot.distribution_table import DistributionTable
-from nbv.robot.lookup import LookupTable
-from nbv.robot.moves import moved_camera
-from nbv.robot.pairs import PairTable, read_distributions
-from nbv.robot.recommender import Recommender
+from nbv.tables.distribution_table import DistributionTable
+from nbv.tables.lookup import LookupTable
+from nbv.tables.pairs import PairTable, read_distributions
 
 AZIMUTHS = np.arange(BINS) * WIDTH
 CONFIG = Path(__file__).parents[2] / "config"

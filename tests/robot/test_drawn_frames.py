@@ -9,8 +9,8 @@ from frame_images import shape
 from nbv.data.camera import Camera
 from nbv.data.meshes import Mesh
 from nbv.errors import UserError
-from nbv.robot.crop import crop_frame
-from nbv.robot.synthetic import HEIGHT, WIDTH, draw_frame, example_frame, read_mesh
+from nbv.frames.crop import crop_frame
+from nbv.frames.synthetic import HEIGHT, WIDTH, draw_frame, example_frame, read_mesh
 
 DIAGONAL_M = 0.2
 

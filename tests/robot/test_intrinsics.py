@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.errors import FrameError, UserError
-from nbv.robot.intrinsics import DepthCamera, Intrinsics, as_intrinsics, camera_of
+from nbv.frames.intrinsics import DepthCamera, Intrinsics, as_intrinsics, camera_of
 
 FX, FY, CX, CY = 572.41, 573.57, 325.26, 242.05
 K = [FX, 0.0, CX, 0.0, FY, CY, 0.0, 0.0, 1.0]

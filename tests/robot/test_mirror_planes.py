@@ -8,13 +8,13 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nbv.core.angles import mirrored_bins
+from nbv.bundles.network import Sweep, find_mirror_plane
+from nbv.core.circle.angles import mirrored_bins
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import encode_depth
 from nbv.data.meshes import normalise
 from nbv.data.procedural import generate
 from nbv.data.render import open_renderer
-from nbv.robot.network import Sweep, find_mirror_plane
 
 CAMERA = Camera(image_side=32)
 N_CLASSES = 60

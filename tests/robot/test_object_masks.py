@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.errors import FrameError, UserError
-from nbv.robot.masks import object_mask
+from nbv.frames.masks import object_mask
 
 ROWS, COLUMNS = 48, 64
 REACH = 0.1

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from made_bundles import BINS, random_codes, soft_turns
-from nbv.robot.network import Sweep
-from nbv.robot.ood import (
+from nbv.bundles.network import Sweep
+from nbv.bundles.ood import (
     IN_DISTRIBUTION_SHARE,
     MOST_REFERENCES,
     NEIGHBOUR,

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nbv.core.angles import circular_distance_deg, wrap_deg
-from nbv.core.estimates import Estimates
-from nbv.core.selection import DENSITY
-from nbv.core.sweeps import N_VIEWS, WIDEST_GAP_DEG
+from nbv.core.circle.angles import circular_distance_deg, wrap_deg
+from nbv.core.circle.estimates import Estimates
+from nbv.core.circle.selection import DENSITY
+from nbv.core.circle.sweeps import N_VIEWS, WIDEST_GAP_DEG
 from nbv.errors import UserError
 from nbv.experiment.config import load_config
 from nbv.experiment.estimates import write_estimates
-from nbv.robot.pairs import PairTable
+from nbv.tables.pairs import PairTable
 
 CONFIG = Path(__file__).parents[2] / "config"
 

@@ -8,9 +8,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from nbv.core.selection import DENSITY
-from nbv.robot.calibration import recalibrated
-from nbv.robot.evaluation import (
+from nbv.bundles.calibration import recalibrated
+from nbv.bundles.evaluation import (
     FIXED,
     OPPOSITE,
     PAPER,
@@ -19,8 +18,9 @@ from nbv.robot.evaluation import (
     SINGLE,
     evaluate,
 )
-from nbv.robot.recommender import Recommender, shipped_bundles
-from nbv.robot.recordings import read_manifest, run_network
+from nbv.bundles.recommender import Recommender, shipped_bundles
+from nbv.bundles.recordings import read_manifest, run_network
+from nbv.core.circle.selection import DENSITY
 
 ROOT = Path(__file__).parents[2]
 FRAMES = Path(os.environ.get("NBV_FRAMES", ROOT.parent / "shared/data/frames"))

@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from nbv.robot.next_view import Move, Recommendation
-from nbv.robot.plot import draw_recommendation
+from nbv.bundles.plot import draw_recommendation
+from nbv.choice.next_view import Move, Recommendation
 
 SVG = "{http://www.w3.org/2000/svg}"
 BINS = 60

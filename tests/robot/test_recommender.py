@@ -20,19 +20,19 @@ from made_bundles import (
     random_estimator,
 )
 from made_bundles import settings as made_settings
+from nbv.bundles.bundle import elevation_weights
+from nbv.bundles.ood import ood_score
+from nbv.bundles.recommender import Recommender
+from nbv.choice.next_view import after_rotations, next_view
+from nbv.choice.rotations import MIN_SEPARATION_DEG, N_ALTERNATIVES
 from nbv.core.alike.expected import expected_errors
-from nbv.core.angles import circular_distance_deg, travel_deg
-from nbv.core.distributions import direction_and_spread_deg, mean_direction_deg
-from nbv.core.logits import from_logits
+from nbv.core.circle.angles import circular_distance_deg, travel_deg
+from nbv.core.circle.distributions import direction_and_spread_deg, mean_direction_deg
+from nbv.core.circle.logits import from_logits
 from nbv.errors import FrameError, UserError
 from nbv.experiment.estimation.make_bundle import bundled_model
-from nbv.robot.bundle import elevation_weights
-from nbv.robot.intrinsics import Intrinsics
-from nbv.robot.next_view import after_rotations, next_view
-from nbv.robot.ood import ood_score
-from nbv.robot.recommender import Recommender
-from nbv.robot.rotations import MIN_SEPARATION_DEG, N_ALTERNATIVES
-from nbv.robot.synthetic import draw_frame, example_frame, example_mesh
+from nbv.frames.intrinsics import Intrinsics
+from nbv.frames.synthetic import draw_frame, example_frame, example_mesh
 
 HERE = np.arange(BINS) * WIDTH
 FRAMES = [frame(seed) for seed in range(4)]

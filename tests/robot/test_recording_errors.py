@@ -10,12 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
-from nbv.core.alike.compare import CalibrationViews
-from nbv.core.angles import circular_distance_deg
-from nbv.core.fusion import product
-from nbv.core.logits import from_logits
-from nbv.errors import UserError
-from nbv.robot.evaluation import (
+from nbv.bundles.evaluation import (
     FIXED,
     OPPOSITE,
     PAPER,
@@ -30,9 +25,14 @@ from nbv.robot.evaluation import (
     evaluate,
     fixed_errors_deg,
 )
-from nbv.robot.network import Sweep
-from nbv.robot.ood import ood_score
-from nbv.robot.recommender import Recommender
+from nbv.bundles.network import Sweep
+from nbv.bundles.ood import ood_score
+from nbv.bundles.recommender import Recommender
+from nbv.core.alike.compare import CalibrationViews
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.fusion import product
+from nbv.core.circle.logits import from_logits
+from nbv.errors import UserError
 
 COLUMNS = [
     *("object_id", "sequence", "choice", "n_views", "mae_deg", "median_deg", "above_45_percent"),

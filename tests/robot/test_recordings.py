@@ -11,10 +11,10 @@ import pytest
 from PIL import Image
 
 from made_bundles import FOCAL_PX, frame
+from nbv.bundles.recordings import read_manifest, run_network
 from nbv.errors import FrameError, UserError
-from nbv.robot.depth_files import read_depth
-from nbv.robot.intrinsics import Intrinsics
-from nbv.robot.recordings import read_manifest, run_network
+from nbv.frames.depth_files import read_depth
+from nbv.frames.intrinsics import Intrinsics
 
 AZIMUTHS = (0.0, 10.0, 20.0, 350.0)
 

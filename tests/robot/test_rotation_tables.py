@@ -16,9 +16,9 @@ from tests.rotation_pairs import orientation_pairs
 from nbv.cli import main
 from nbv.errors import UserError
 from nbv.numbers import read_poses
-from nbv.robot.bop import read_orientation_table
-from nbv.robot.next_camera import PoseEstimate, as_view, read_views
-from nbv.robot.rotation_pairs import OrientationTable
+from nbv.tables.bop import read_orientation_table
+from nbv.tables.next_camera import PoseEstimate, as_view, read_views
+from nbv.tables.orientation_table import OrientationTable
 
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "estimates"
 HIDDEN = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from nbv.core.angles import circular_distance_deg
+from nbv.core.circle.angles import circular_distance_deg
 from nbv.data.camera import Camera, object_views
 
 PAGE = Path(__file__).parents[2] / "docs/your-estimator.md"

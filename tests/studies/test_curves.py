@@ -14,11 +14,11 @@ from studies.curves import more_views_rows, pooled_travel, travel_rows
 from studies.extensions import choices_frame, stored_evidence
 from studies.selection import select_methods
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.estimates import Posteriors
-from nbv.core.evidence import evidence_of_distributions
-from nbv.core.logits import log_likelihood
-from nbv.core.policies import HeldOutViews, two_views
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.estimates import Posteriors
+from nbv.core.circle.evidence import evidence_of_distributions
+from nbv.core.circle.logits import log_likelihood
+from nbv.core.circle.policies import HeldOutViews, two_views
 from nbv.errors import UserError
 from nbv.experiment.report.table import write_table
 from nbv.experiment.statistics.paired import Resampler

@@ -17,10 +17,10 @@ from studies.factorial import (
 )
 from studies.kept_estimates import held_out
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.evidence import COARSE_BINS
-from nbv.core.fusion import ESTIMATE_FUSIONS
-from nbv.core.policies import needs_lookup
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.evidence import COARSE_BINS
+from nbv.core.circle.fusion import ESTIMATE_FUSIONS
+from nbv.core.circle.policies import needs_lookup
 from tests.core.made import FEW_DENSITIES
 from tests.experiment.test_two_views import N_CLASSES, hidden_handle, mean_directions
 

@@ -8,7 +8,7 @@ import pytest
 from studies.ingredients import ALL, ingredient_table
 from studies.trainings import crossed_mean
 
-from nbv.robot.evaluation import RECOMMENDED, SINGLE
+from nbv.bundles.evaluation import RECOMMENDED, SINGLE
 
 
 def training(errors_deg: np.ndarray) -> pd.DataFrame:

@@ -15,8 +15,8 @@ from studies.kept_estimates import (
     read_kept,
 )
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.estimates import Estimates, Posteriors
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.estimates import Estimates, Posteriors
 from nbv.errors import UserError
 from nbv.experiment.estimates import write_estimates, write_posteriors
 from tests.core.made import objects

@@ -20,7 +20,7 @@ from studies.rotation_estimator import (
 from studies.rotation_tables import estimator_table
 from studies.solids import SOLIDS, solid
 
-from nbv.core.rotations import ASYMMETRIC, spiral
+from nbv.core.orientations.group import ASYMMETRIC, spiral
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import STEP, ZERO_CODE
 from nbv.data.meshes import normalise

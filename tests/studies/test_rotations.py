@@ -18,8 +18,8 @@ from studies.rotations import (
     recommended_view,
 )
 
-from nbv.core.rotation_belief import belief
-from nbv.core.rotation_criteria import NextViews, bayes_error, view_angle_deg
+from nbv.core.orientations.belief import belief
+from nbv.core.orientations.criteria import NextViews, bayes_error, view_angle_deg
 from nbv.errors import UserError
 from rotation_pairs import orientation_pairs
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from studies.runs import files_by_run, load_estimate_errors, runs_table
 
-from nbv.core.estimates import Estimates
+from nbv.core.circle.estimates import Estimates
 from nbv.errors import UserError
 from nbv.experiment.estimates import write_estimates
 from nbv.experiment.report.settings import ReportSettings

@@ -7,8 +7,8 @@ import pytest
 from studies.extensions import choices_frame, stored_evidence
 from studies.selection import select_methods, surely_better
 
-from nbv.core.estimates import Posteriors
-from nbv.core.selection import DensityParams
+from nbv.core.circle.estimates import Posteriors
+from nbv.core.circle.selection import DensityParams
 from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 

@@ -8,8 +8,8 @@ from studies.simulation import (
     recommended_next,
 )
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.belief import Belief
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.belief import Belief
 from tests.core.made import evidence_of, objects
 
 

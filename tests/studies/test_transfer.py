@@ -10,10 +10,10 @@ import pytest
 from studies.transfer import load_transfer, transfer_table
 
 from nbv.errors import UserError
-from nbv.experiment.reference import read_cells
 from nbv.experiment.report.settings import CELL_COLUMNS, ReportSettings
 from nbv.experiment.report.table import write_table
 from nbv.experiment.results import COLUMNS
+from nbv.experiment.run.reference import read_cells
 
 CONDITIONS = {
     "clean": {"sensor": "ideal", "framing": "silhouette"},

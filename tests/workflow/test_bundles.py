@@ -10,11 +10,11 @@ import pandas as pd
 import pytest
 from safetensors import safe_open
 
+from nbv.bundles.bundle import Bundle
+from nbv.bundles.recommender import Recommender
 from nbv.cli import main
 from nbv.data.meshes import load_meshes
 from nbv.data.procedural import generate
-from nbv.robot.bundle import Bundle
-from nbv.robot.recommender import Recommender
 from projects import TINY, Project, copy_of_project, finished_project
 
 pytestmark = pytest.mark.slow

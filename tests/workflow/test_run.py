@@ -118,7 +118,7 @@ def test_another_number_of_resamples_reruns_what_shows_intervals(finished):
 
 def test_an_edit_reruns_what_runs_that_code_and_what_follows(scratch):
     metrics = scratch.folder / "src/nbv/experiment/statistics/metrics.py"
-    criteria = scratch.folder / "src/nbv/core/criteria.py"
+    criteria = scratch.folder / "src/nbv/core/circle/criteria.py"
     metrics.touch()
     for name in ("src/nbv/data/pyrender.py", "Snakefile", "config/config.yaml"):
         path = scratch.folder / name

@@ -18,10 +18,10 @@ except ModuleNotFoundError:
 from nbv.data.sensors import sensor_settings
 from nbv.errors import UserError
 from nbv.experiment.config import snakemake_overrides
-from nbv.experiment.jobs import begin_run, check_folders, why_stopped
+from nbv.experiment.run.jobs import begin_run, check_folders, why_stopped
 from nbv.experiment.estimation.features import SHIPPED
 from nbv.experiment.plan import Plan, paths
-from nbv.experiment.reference import find_reference
+from nbv.experiment.run.reference import find_reference
 from nbv.experiment.results import ESTIMATED_ROLES
 from nbv.experiment.stages import FEATURES, PRETRAINED, stage_from
 

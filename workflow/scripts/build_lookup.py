@@ -1,12 +1,12 @@
 """Build the lookup table of one criterion from the calibration pairs of one fold."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
-    from nbv.core.selection import chosen_lookup
+    from nbv.core.circle.selection import chosen_lookup
     from nbv.experiment.estimates import read_estimates
     from nbv.experiment.splits import check_role, read_splits
-    from nbv.robot.lookup import LookupTable
+    from nbv.tables.lookup import LookupTable
 
     calibration = read_estimates(snakemake.input.calibration)
     splits = read_splits(snakemake.input.splits)

@@ -3,11 +3,11 @@
 import logging
 from pathlib import Path
 
-from nbv.experiment.jobs import job, need_intact
+from nbv.experiment.run.jobs import job, need_intact
 
 with job(snakemake):
     from nbv.errors import UserError
-    from nbv.experiment.compare import compare_runs
+    from nbv.experiment.run.compare import compare_runs
 
     reference, run = Path(snakemake.input.reference).parent, Path(snakemake.params.run)
     need_intact(snakemake.params.run)

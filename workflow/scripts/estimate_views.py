@@ -1,6 +1,6 @@
 """Estimate every view of the calibration and the test objects of one fold."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.data.depth_images import open_depth

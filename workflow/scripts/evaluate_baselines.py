@@ -1,6 +1,6 @@
 """Evaluate the methods that need no lookup table on the test objects of one fold."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.core.seeds import rng_for

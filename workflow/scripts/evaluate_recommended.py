@@ -1,13 +1,13 @@
 """Evaluate one method that follows a lookup table on the test objects of one fold."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.experiment.estimates import read_estimates
     from nbv.experiment.results import evaluate_method
     from nbv.experiment.splits import check_role, read_splits
     from nbv.files import write_csv
-    from nbv.robot.lookup import LookupTable
+    from nbv.tables.lookup import LookupTable
 
     test = read_estimates(snakemake.input.test)
     splits = read_splits(snakemake.input.splits)

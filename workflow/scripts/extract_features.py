@@ -1,6 +1,6 @@
 """Compute the depth features of every image of one category at one elevation."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import numpy as np

@@ -1,6 +1,6 @@
 """Fit the linear estimator of one fold to depth features, and estimate held-out objects."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.experiment.estimates import write_fold

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import numpy as np

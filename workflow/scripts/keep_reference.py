@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from nbv.experiment.jobs import job, need_intact
+from nbv.experiment.run.jobs import job, need_intact
 
 with job(snakemake):
-    from nbv.experiment.reference import collect_reference
+    from nbv.experiment.run.reference import collect_reference
 
     need_intact(snakemake.params.run)
     collect_reference(Path(snakemake.params.run), Path(snakemake.params.reference))

@@ -1,12 +1,14 @@
 """Make a bundle of a network and its calibration with held-out objects; test it on others."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import json
     import logging
     from pathlib import Path
 
+    from nbv.bundles.evaluation import evaluate
+    from nbv.bundles.network import find_mirror_plane
     from nbv.data.camera import Camera
     from nbv.data.depth_images import open_depth
     from nbv.experiment.estimation.hardware import choose_hardware, use_one_thread
@@ -14,8 +16,6 @@ with job(snakemake):
     from nbv.experiment.estimation.weights import load_estimator
     from nbv.experiment.splits import objects_with_role, read_splits
     from nbv.files import write_csv
-    from nbv.robot.evaluation import evaluate
-    from nbv.robot.network import find_mirror_plane
 
     params, wildcards, given = snakemake.params, snakemake.wildcards, snakemake.input
     use_one_thread()

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.experiment.report.figures import FigureInputs, build_figure
     from nbv.experiment.report.figures.steps import save_animation
     from nbv.experiment.report.settings import ReportSettings
     from nbv.experiment.results import load_evaluations
-    from nbv.robot.style import save_figure
+    from nbv.style import save_figure
 
     given, params = snakemake.input, snakemake.params
 

@@ -1,6 +1,6 @@
 """Load, check and normalise the chosen objects of one category."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.data.meshes import save_meshes

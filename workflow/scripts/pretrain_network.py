@@ -1,6 +1,6 @@
 """Train one network on the training objects that all categories have in a fold."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import numpy as np

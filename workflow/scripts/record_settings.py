@@ -1,11 +1,11 @@
 """Record the configuration, commit and versions that made the results."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from omegaconf import OmegaConf
 
-    from nbv.experiment.provenance import git_commit, versions
+    from nbv.experiment.run.provenance import git_commit, versions
     from nbv.files import write_json, write_text
 
     write_text(snakemake.output.configuration, OmegaConf.to_yaml(snakemake.params.configuration))

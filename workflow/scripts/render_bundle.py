@@ -1,6 +1,6 @@
 """Render a sweep of each object of one category near one elevation, as a real camera sees it."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from dataclasses import replace

@@ -1,6 +1,6 @@
 """Render a full sweep of each object of one category at one elevation."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.data.camera import Camera

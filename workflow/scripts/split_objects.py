@@ -1,6 +1,6 @@
 """Divide one category's objects into folds."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.core.seeds import rng_for

@@ -1,12 +1,12 @@
 """Take the estimates of one fold's calibration and test objects from a file of another program."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.experiment.estimates import write_fold
     from nbv.experiment.external import take_fold
     from nbv.experiment.splits import read_splits
-    from nbv.robot.pairs import PairTable
+    from nbv.tables.pairs import PairTable
 
     given, output, wildcards = snakemake.input, snakemake.output, snakemake.wildcards
     pairs = PairTable.load(given.pairs)

@@ -1,6 +1,6 @@
 """Train the network of a bundle on all elevations of one fold's training objects."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import numpy as np

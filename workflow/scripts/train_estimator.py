@@ -4,7 +4,7 @@ A fold's estimator then estimates the calibration and the test objects, where th
 outputs.
 """
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     from nbv.core.seeds import seed_for

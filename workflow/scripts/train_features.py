@@ -1,6 +1,6 @@
 """Train the network of the depth features on objects that no experiment has."""
 
-from nbv.experiment.jobs import job
+from nbv.experiment.run.jobs import job
 
 with job(snakemake):
     import json

@@ -1,6 +1,6 @@
 """Compare every file of a run with the checksum that was recorded when it was written."""
 
-from nbv.experiment.jobs import SOUND, job, states_of_files
+from nbv.experiment.run.jobs import SOUND, job, states_of_files
 
 with job(snakemake):
     import logging

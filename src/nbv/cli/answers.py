@@ -15,9 +15,9 @@ from nbv.labels import counted
 if TYPE_CHECKING:
     import pandas as pd
 
+    from nbv.choice.answers import Answer
     from nbv.cli.arguments import Placement
-    from nbv.core.offset import Offset
-    from nbv.robot.answers import Answer
+    from nbv.core.circle.offset import Offset
 
 AnyAnswer = TypeVar("AnyAnswer", bound="Answer[Any]")
 
@@ -51,7 +51,7 @@ def with_targets(
 
     Parameters and errors are those of `nbv.check_axis`, whose warnings are added.
     """
-    from nbv.robot.moves import check_axis, moved_camera
+    from nbv.choice.moves import check_axis, moved_camera
 
     if placement is None:
         return answer
@@ -173,9 +173,9 @@ def print_offset(name: str, number: str, offset: Offset, *, is_added: bool = Fal
 def print_evaluation(errors: pd.DataFrame, ood: pd.DataFrame) -> None:
     """Print the errors of every recording, one line for each way to choose views.
 
-    The frames are those of `evaluate` and `count_ood` in `nbv.robot.evaluation`.
+    The frames are those of `evaluate` and `count_ood` in `nbv.bundles.evaluation`.
     """
-    from nbv.robot.evaluation import RECOMMENDED, SINGLE, UNTIL
+    from nbv.bundles.evaluation import RECOMMENDED, SINGLE, UNTIL
 
     for about in ood.to_dict("records"):
         is_recording = (errors["object_id"] == about["object_id"]) & (

@@ -191,7 +191,7 @@ class MoveOptions:
 
     def allowed_deg(self) -> Any:
         """Return the rotations of ``--allowed``, read from a file if it names one."""
-        from nbv.robot.moves import read_rotations
+        from nbv.choice.moves import read_rotations
 
         return read_rotations(self.allowed) if isinstance(self.allowed, Path) else self.allowed
 

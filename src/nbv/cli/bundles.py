@@ -73,8 +73,8 @@ def render(
     if example and (up, front) != (UP, FRONT):
         raise UserError("--up and --front are for a mesh file; leave them out with --example")
     check_writable("--output", output, [".npy", ".png"])
-    from nbv.robot.depth_files import write_depth
-    from nbv.robot.synthetic import draw_frame, example_mesh, read_mesh
+    from nbv.frames.depth_files import write_depth
+    from nbv.frames.synthetic import draw_frame, example_mesh, read_mesh
 
     shape = example_mesh() if mesh is None else read_mesh(mesh, up, front)
     frame = draw_frame(shape, azimuth, elevation, distance, diagonal, seed, sensor=sensor)
@@ -103,9 +103,9 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
     json
         Print JSON.
     """
-    from nbv.robot.bundle import FORMAT, Bundle
-    from nbv.robot.evaluation import bundle_errors_deg
-    from nbv.robot.recommender import bundle_path
+    from nbv.bundles.bundle import FORMAT, Bundle
+    from nbv.bundles.evaluation import bundle_errors_deg
+    from nbv.bundles.recommender import bundle_path
 
     path = bundle_path(bundle)
     content = Bundle.load(path)
@@ -155,10 +155,10 @@ def export(bundle: str = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
         Print JSON.
     """
     check_writable("--onnx", onnx, [".onnx"])
+    from nbv.bundles.bundle import Bundle
+    from nbv.bundles.network import open_session
+    from nbv.bundles.recommender import bundle_path
     from nbv.files import replacing
-    from nbv.robot.bundle import Bundle
-    from nbv.robot.network import open_session
-    from nbv.robot.recommender import bundle_path
 
     model = Bundle.load(bundle_path(bundle)).network
     session = open_session(model)

@@ -38,10 +38,10 @@ from nbv.labels import counted
 if TYPE_CHECKING:
     import pandas as pd
 
+    from nbv.bundles.network import Sweep
+    from nbv.bundles.recommender import Recommender
+    from nbv.bundles.recordings import Recording
     from nbv.errors import FrameError
-    from nbv.robot.network import Sweep
-    from nbv.robot.recommender import Recommender
-    from nbv.robot.recordings import Recording
 
 
 OPTIONS = {
@@ -153,11 +153,11 @@ def _calibrate_bundle(
     as_json: bool,
 ) -> None:
     """Make the bundle of ``nbv calibrate`` from the rows of a manifest."""
-    from nbv.core.distributions import mean_direction_deg
-    from nbv.core.logits import from_logits
-    from nbv.core.offset import FOR_FRAMES, Offset, frame_warning
-    from nbv.robot.calibration import recalibrated
-    from nbv.robot.recordings import recordings_of
+    from nbv.bundles.calibration import recalibrated
+    from nbv.bundles.recordings import recordings_of
+    from nbv.core.circle.distributions import mean_direction_deg
+    from nbv.core.circle.logits import from_logits
+    from nbv.core.circle.offset import FOR_FRAMES, Offset, frame_warning
 
     of_rows = recordings_of(source, rows)
     run = _run_on_recordings(options.bundle or SHIPPED, of_rows, camera, as_json=as_json)
@@ -227,9 +227,9 @@ def evaluate(
     """
     if output is not None:
         check_writable("--output", output, [".csv"])
+    from nbv.bundles import evaluation
+    from nbv.bundles.recordings import read_manifest
     from nbv.files import write_csv
-    from nbv.robot import evaluation
-    from nbv.robot.recordings import read_manifest
 
     run = _run_on_recordings(bundle, read_manifest(manifest), camera, as_json=json)
     used, sweeps = run.recommender.bundle, run.sweeps
@@ -280,13 +280,13 @@ def _calibrate_table(
     """Make the tables of ``nbv calibrate`` from calibration pairs."""
     import numpy as np
 
-    from nbv.core.criteria import CRITERIA
-    from nbv.core.distributions import mean_direction_deg
-    from nbv.core.offset import FOR_PAIRS, Offset
-    from nbv.core.selection import DENSITY, chosen_lookup
-    from nbv.robot.distribution_table import DistributionTable
-    from nbv.robot.lookup import LookupTable
-    from nbv.robot.pairs import PairTable
+    from nbv.core.circle.criteria import CRITERIA
+    from nbv.core.circle.distributions import mean_direction_deg
+    from nbv.core.circle.offset import FOR_PAIRS, Offset
+    from nbv.core.circle.selection import DENSITY, chosen_lookup
+    from nbv.tables.distribution_table import DistributionTable
+    from nbv.tables.lookup import LookupTable
+    from nbv.tables.pairs import PairTable
 
     criterion = options.criterion or "pose_ambiguity"
     if criterion not in CRITERIA:
@@ -330,7 +330,7 @@ def _calibrate_orientations(
     as_json: bool,
 ) -> None:
     """Make the table of ``nbv calibrate`` from estimates in three dimensions."""
-    from nbv.robot.bop import orientation_table
+    from nbv.tables.bop import orientation_table
 
     truth = options.ground_truth, options.models_info, options.objects or []
     pairs = orientation_table(source, rows, *truth)
@@ -395,8 +395,8 @@ def _run_on_recordings(
     bundle: str, recordings: Sequence[Recording], camera: FrameOptions, *, as_json: bool
 ) -> ManifestRun:
     """Run a bundle's network on the frames of recordings, and print which frames are skipped."""
-    from nbv.robot.recommender import Recommender
-    from nbv.robot.recordings import run_network
+    from nbv.bundles.recommender import Recommender
+    from nbv.bundles.recordings import run_network
 
     left_out: dict[str, FrameError] = {}
 

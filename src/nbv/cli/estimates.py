@@ -24,7 +24,7 @@ from nbv.cli.arguments import (
 from nbv.errors import UserError
 
 if TYPE_CHECKING:
-    from nbv.robot.answers import Answer
+    from nbv.choice.answers import Answer
 
 KINDS = {AZIMUTHS: "cost", DISTRIBUTIONS: "distribution.of_views", ORIENTATIONS: "truth"}
 """What a table may hold, and the name of an array by which it is known."""
@@ -159,7 +159,7 @@ def _kind(table: Path, estimate: list[float] | Path | None) -> str:
 
 
 def _ranked_rotations(table: Path, estimate: Any, limits: MoveOptions) -> Answer[Any]:
-    from nbv.robot.lookup import LookupTable
+    from nbv.tables.lookup import LookupTable
 
     return LookupTable.load(table).rank(estimate[0], limits.allowed_deg(), limits.max_travel)
 
@@ -167,8 +167,8 @@ def _ranked_rotations(table: Path, estimate: Any, limits: MoveOptions) -> Answer
 def _recommended(
     table: Path, estimate: Any, limits: MoveOptions, rotations: list[float], followed: bool
 ) -> Answer[Any]:
-    from nbv.robot.distribution_table import DistributionTable
-    from nbv.robot.pairs import read_distributions
+    from nbv.tables.distribution_table import DistributionTable
+    from nbv.tables.pairs import read_distributions
 
     return DistributionTable.load(table).recommend(
         read_distributions(estimate),
@@ -185,8 +185,8 @@ def _ranked_cameras(
     if (around.candidates is None) == (around.sphere is None):
         raise UserError("--candidates and --sphere: give one of them")
     from nbv.numbers import read_pose, read_poses
-    from nbv.robot.next_camera import as_view, read_views
-    from nbv.robot.rotation_pairs import OrientationTable
+    from nbv.tables.next_camera import as_view, read_views
+    from nbv.tables.orientation_table import OrientationTable
 
     return OrientationTable.load(table).recommend(
         read_views(estimate) if isinstance(estimate, Path) else [as_view(estimate, "--estimate")],

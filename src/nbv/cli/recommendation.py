@@ -94,10 +94,10 @@ def recommend(
         # Before frames are read, because text after the option is taken for a frame.
         noun = counted(len(gravity), "number")
         raise UserError(f"--gravity has {noun}; give three, the direction down: x,y,z")
-    from nbv.robot.depth_files import read_depth, read_mask
-    from nbv.robot.intrinsics import camera_of
-    from nbv.robot.moves import elevation_from_gravity
-    from nbv.robot.recommender import Recommender
+    from nbv.bundles.recommender import Recommender
+    from nbv.choice.moves import elevation_from_gravity
+    from nbv.frames.depth_files import read_depth, read_mask
+    from nbv.frames.intrinsics import camera_of
 
     if placement is not None and gravity is not None and elevation is None:
         # The axis gives the roll too, and the target pose needs the axis.
@@ -128,7 +128,7 @@ def recommend(
     if plot is not None:
         # Importing matplotlib fails with an unknown backend.
         os.environ.pop("MPLBACKEND", None)
-        from nbv.robot.plot import draw_recommendation
+        from nbv.bundles.plot import draw_recommendation
 
         draw_recommendation(answer, plot, used.category)
     focal_px = used.focal_px if camera.intrinsics is None else None

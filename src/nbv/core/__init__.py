@@ -1,1 +1,1 @@
-"""Distributions on the circle, criteria, fusion and lookup tables: arrays in, arrays out."""
+"""Distributions, beliefs, criteria and fusion of poses, on arrays alone."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from nbv.core.estimates import COLUMNS, Estimates, Posteriors
+from nbv.core.circle.estimates import COLUMNS, Estimates, Posteriors
 from nbv.errors import UserError
 from nbv.files import (
     check_columns,

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from nbv.core.estimates import Estimates, Posteriors, posteriors_of
-from nbv.core.logits import fit_temperature
-from nbv.core.sweeps import evenly_apart
+from nbv.core.circle.estimates import Estimates, Posteriors, posteriors_of
+from nbv.core.circle.logits import fit_temperature
+from nbv.core.circle.sweeps import evenly_apart
 from nbv.experiment.estimates import FoldEstimates
 from nbv.experiment.splits import check_objects, objects_with_role
-from nbv.robot.pairs import Sweeps
+from nbv.tables.pairs import Sweeps
 
 
 def take_fold(
@@ -33,7 +33,7 @@ def take_fold(
     ------
     UserError
         Where the objects differ from those in the splits, or the azimuths do not allow evenly
-        spaced views (`nbv.core.sweeps.evenly_apart`).
+        spaced views (`nbv.core.circle.sweeps.evenly_apart`).
     """
     check_objects(splits, estimates.object_ids)
     names = {role: objects_with_role(splits, fold, role) for role in ("calibration", "test")}

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from nbv.core.choose import named
-from nbv.core.criteria import CRITERIA, FOR_ESTIMATES
-from nbv.core.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
-from nbv.core.policies import ORACLE, POLICIES, SINGLE, needs_lookup
+from nbv.core.circle.criteria import CRITERIA, FOR_ESTIMATES
+from nbv.core.circle.fusion import ESTIMATE_FUSIONS, FUSIONS, OF_DISTRIBUTIONS
+from nbv.core.circle.policies import ORACLE, POLICIES, SINGLE, needs_lookup
 from nbv.errors import UserError
 
 SELECTED = "selected"

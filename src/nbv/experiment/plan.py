@@ -9,20 +9,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nbv.core.policies import needs_lookup
+from nbv.core.circle.policies import needs_lookup
 from nbv.data.meshes import load_meshes
 from nbv.data.render import RENDERERS
 from nbv.data.sensors import SENSORS, check_sensor
 from nbv.data.sources import SOURCES, open_source, select_objects
 from nbv.errors import UserError
-from nbv.experiment import provenance
 from nbv.experiment.config import load_config
 from nbv.experiment.config.schema import LINEAR
 from nbv.experiment.methods import check_methods
 from nbv.experiment.report import settings as report
 from nbv.experiment.results import Unit
+from nbv.experiment.run import provenance
 from nbv.experiment.stages import FEATURES, Stage, Start, stage_settings, start_of
-from nbv.robot.pairs import PairTable
+from nbv.tables.pairs import PairTable
 
 Fold = tuple[str, int, int]
 """Category, elevation in degrees, and fold, from 1."""

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.core.angles import circular_distance_deg
-from nbv.core.estimates import Estimates, Posteriors
-from nbv.core.evidence import Evidence
-from nbv.core.lookup import CostTable
-from nbv.core.policies import HeldOutViews, two_views
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.estimates import Estimates, Posteriors
+from nbv.core.circle.evidence import Evidence
+from nbv.core.circle.lookup import CostTable
+from nbv.core.circle.policies import HeldOutViews, two_views
 from nbv.errors import UserError
 from nbv.experiment.estimates import check_azimuths, sweep_objects
 from nbv.experiment.splits import read_splits
@@ -43,11 +43,11 @@ def evaluate_method(
     Parameters
     ----------
     method : mapping
-        ``policy`` and ``fusion``; see `nbv.core.policies.two_views`.
+        ``policy`` and ``fusion``; see `nbv.core.circle.policies.two_views`.
     test : Estimates
         360 / n_views must be a whole number of degrees.
     rng, lookup, evidence : optional
-        Inputs of the policy or the fusion; see `nbv.core.policies.HeldOutViews`.
+        Inputs of the policy or the fusion; see `nbv.core.circle.policies.HeldOutViews`.
     posteriors : Posteriors, optional
         The distributions of the test objects, where the fusion needs them.
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from conftest import N_FOLDS
 from nbv.errors import UserError
-from nbv.experiment.compare import (
+from nbv.experiment.report.tables import TABLES
+from nbv.experiment.run.compare import (
     IDENTICAL,
     OUTSIDE,
     UNJUDGED,
@@ -20,11 +21,10 @@ from nbv.experiment.compare import (
     judge_cell,
     sigma_ratio,
 )
-from nbv.experiment.reference import (
+from nbv.experiment.run.reference import (
     UNSET,
     read_cells,
 )
-from nbv.experiment.report.tables import TABLES
 
 
 def change(run, table, row, method, **columns):

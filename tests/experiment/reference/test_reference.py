@@ -7,17 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nbv.errors import UserError
-from nbv.experiment.compare import (
+from nbv.experiment.config import read_configuration
+from nbv.experiment.report.tables import TABLES
+from nbv.experiment.run.compare import (
     compare_runs,
 )
-from nbv.experiment.config import read_configuration
-from nbv.experiment.reference import (
+from nbv.experiment.run.reference import (
     UNSET,
     collect_reference,
     differing_settings,
     find_reference,
 )
-from nbv.experiment.report.tables import TABLES
 
 
 def files(folder):

@@ -11,15 +11,15 @@ import pytest
 from scipy.special import log_softmax
 
 from nbv.cli import main
-from nbv.core.angles import circular_distance_deg
-from nbv.core.density import conditionals
-from nbv.core.distributions import mean_direction_deg
-from nbv.core.fusion import product
-from nbv.core.logits import fit_temperature
-from nbv.core.selection import DENSITY
+from nbv.core.circle.angles import circular_distance_deg
+from nbv.core.circle.density import conditionals
+from nbv.core.circle.distributions import mean_direction_deg
+from nbv.core.circle.fusion import product
+from nbv.core.circle.logits import fit_temperature
+from nbv.core.circle.selection import DENSITY
 from nbv.errors import UserError
-from nbv.robot.lookup import LookupTable
-from nbv.robot.pairs import PairTable
+from nbv.tables.lookup import LookupTable
+from nbv.tables.pairs import PairTable
 from projects import MUGS, STUDIES, TINY, Project, copy_of_project, finished_project
 
 pytestmark = pytest.mark.slow

@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nbv.robot.depth_files import write_depth
-from nbv.robot.evaluation import evaluate
-from nbv.robot.recommender import Recommender
-from nbv.robot.recordings import read_manifest, run_network
-from nbv.robot.synthetic import example_frame
+from nbv.bundles.evaluation import evaluate
+from nbv.bundles.recommender import Recommender
+from nbv.bundles.recordings import read_manifest, run_network
+from nbv.frames.depth_files import write_depth
+from nbv.frames.synthetic import example_frame
 from projects import STUDIES, Project
 
 from ..test_bundles import CAMERA, assert_tested_with_all

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from safetensors import safe_open
 
-from nbv.core.angles import circular_distance_deg
+from nbv.core.circle.angles import circular_distance_deg
 from nbv.experiment.splits import objects_with_role, read_splits
 from projects import TINY, Project, finished_project
 

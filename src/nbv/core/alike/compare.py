@@ -10,9 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.angles import circular_distance_deg, travel_deg
-from nbv.core.distributions import in_object_frame, mean_direction_deg, product_directions_deg
-from nbv.core.evidence import Float32Array as Table
+from nbv.core.circle.angles import circular_distance_deg, travel_deg
+from nbv.core.circle.distributions import (
+    in_object_frame,
+    mean_direction_deg,
+    product_directions_deg,
+)
+from nbv.core.circle.evidence import Float32Array as Table
 
 COMPARED_DEG = 6.0
 """Width of the bins in which beliefs are compared and rotations tabulated, at most."""
@@ -70,7 +74,7 @@ class CalibrationViews:
     is_of_object : ndarray (O, S)
         Whether each sweep shows each object.
     agreement : ndarray (S, K)
-        Log Bayes factors of the fused views; see `nbv.core.distributions.log_bayes_factor`.
+        Log Bayes factors of the fused views; see `nbv.core.circle.distributions.log_bayes_factor`.
     near : ndarray (S, K, 4 M + 5) float32, or None
         After one view: means of `outcomes` over the first views nearest to each of K.
     cache : dict

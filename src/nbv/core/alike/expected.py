@@ -1,8 +1,8 @@
 """Expected errors of the next view: a kernel regression on calibration views.
 
 Calibration sweeps are fused after the same rotations as the views at hand. Each first view is
-weighted by the affinity of its product with the belief. It is `nbv.core.criteria.expected_error`
-with the fusion ``product`` after any number of views.
+weighted by the affinity of its product with the belief. It is
+`nbv.core.circle.criteria.expected_error` with the fusion ``product`` after any number of views.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.alike.compare import AGREEMENT_NATS, CalibrationViews
-from nbv.core.angles import nearest_bin
 from nbv.core.choose import is_surely_less
+from nbv.core.circle.angles import nearest_bin
 
 N_PARTS = 5
 """Parts of the calibration objects for `Expected.optimism_deg`."""
@@ -109,7 +109,7 @@ def expected_errors(
     belief : ndarray (B,)
         In the frame of the first view.
     power, pseudo_observations : float
-        See `nbv.core.criteria`.
+        See `nbv.core.circle.criteria`.
     share : ndarray (S,), optional
         Weights of the sweeps; 1 without it.
     agreement : float

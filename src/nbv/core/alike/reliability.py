@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.alike.compare import WITHIN_DEG, CalibrationViews
-from nbv.core.evidence import Float32Array as Table
+from nbv.core.circle.evidence import Float32Array as Table
 
 FEWEST_OBJECTS = 10
 """Calibration objects from which `observed_error` is more accurate than the expected error."""

@@ -17,9 +17,9 @@ from pydantic import (
     model_validator,
 )
 
-from nbv.core.rotation_errors import OrientationErrors
+from nbv.core.circle.selection import AFFINITY
+from nbv.core.orientations.errors import OrientationErrors
 from nbv.core.seeds import FIRST_FEATURE_SEED
-from nbv.core.selection import AFFINITY
 from nbv.errors import UserError, nearest
 from nbv.experiment.splits import enough_objects
 
@@ -239,7 +239,7 @@ class Estimator(Section):
 
 
 class Density(Section):
-    """The density of calibration pairs; see `nbv.core.selection`."""
+    """The density of calibration pairs; see `nbv.core.circle.selection`."""
 
     pose_likelihood: Literal["given_estimate", "given_truth", "through_estimate"]
     spread: Literal["entropy", "circular_variance"]
@@ -249,14 +249,14 @@ class Density(Section):
 
 
 class Affinity(Section):
-    """How similar two distributions must be to count; see `nbv.core.criteria`."""
+    """How similar two distributions must be to count; see `nbv.core.circle.criteria`."""
 
     power: Annotated[Number, Field(gt=0, le=10**4)]
     pseudo_observations: PseudoObservations
 
 
 class Recommendation(Section):
-    """The cost of travel; see `nbv.core.lookup.least_cost_delta`."""
+    """The cost of travel; see `nbv.core.circle.lookup.least_cost_delta`."""
 
     travel_cost: Annotated[Number, Field(ge=0, le=10**6)]  # the criterion's unit per degree
     max_travel_deg: Annotated[Number, Field(ge=0, le=180)]

@@ -16,9 +16,9 @@ import numpy as np
 import safetensors
 from numpy.typing import NDArray
 
+from nbv.bundles.network import Network, open_network
 from nbv.errors import UserError
 from nbv.files import damaged, readable
-from nbv.robot.network import Network, open_network
 
 SHIPPED: Final = Path(__file__).with_name("features.safetensors")
 

@@ -11,7 +11,7 @@ import safetensors.torch
 import torch
 from torch import nn
 
-from nbv.core.angles import mirrored_bins
+from nbv.core.circle.angles import mirrored_bins
 from nbv.data.depth_images import DepthImages
 from nbv.experiment.estimation.export import onnx_model
 from nbv.experiment.estimation.hardware import Hardware

@@ -114,7 +114,7 @@ def estimate_fold(
         For cross-fitted calibration: the estimators that have not seen each part.
     distributions : bool
         Whether outputs are logits of distributions. Calibration objects then choose one
-        temperature (`nbv.core.logits.fit_temperature`).
+        temperature (`nbv.core.circle.logits.fit_temperature`).
 
     Returns
     -------

@@ -18,8 +18,8 @@ import pandas as pd
 import safetensors.numpy
 from numpy.typing import NDArray
 
-from nbv.core.angles import mirrored_bins
-from nbv.core.logits import log_softmax
+from nbv.core.circle.angles import mirrored_bins
+from nbv.core.circle.logits import log_softmax
 from nbv.experiment.estimation.outputs import Outputs, Settings, Targets, class_targets
 from nbv.experiment.splits import (
     calibration_roles,

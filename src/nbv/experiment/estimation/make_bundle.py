@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.angles import mirrored_bins
-from nbv.core.logits import from_logits
-from nbv.core.sweeps import bin_apart
+from nbv.bundles.bundle import Bundle
+from nbv.bundles.calibration import paper_tables, temperature_of
+from nbv.bundles.network import Network, Sweep, open_network
+from nbv.bundles.ood import fit_ood
+from nbv.core.circle.angles import mirrored_bins
+from nbv.core.circle.logits import from_logits
+from nbv.core.circle.sweeps import bin_apart
 from nbv.data.camera import Camera
 from nbv.data.depth_images import DepthImages
 from nbv.experiment.estimation.export import onnx_model
 from nbv.experiment.estimation.weights import Estimator
-from nbv.robot.bundle import Bundle
-from nbv.robot.calibration import paper_tables, temperature_of
-from nbv.robot.crop import pixel_step
-from nbv.robot.network import Network, Sweep, open_network
-from nbv.robot.ood import fit_ood
+from nbv.frames.crop import pixel_step
 
 DEFAULT_FOCAL_PX = 600.0
 """The focal length of a bundle whose training simulated no sensor."""
@@ -35,7 +35,7 @@ def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -
     ----------
     estimator : Estimator
     mirror_plane_deg : float, optional
-        From `nbv.robot.network.find_mirror_plane`.
+        From `nbv.bundles.network.find_mirror_plane`.
     """
     if mirror_plane_deg is None:
         return onnx_model(estimator)
@@ -118,7 +118,7 @@ def make_bundle(
     extent_px : (float, float)
         From `sweeps_of`.
     mirror_plane_deg : float or None
-        From `nbv.robot.network.find_mirror_plane`.
+        From `nbv.bundles.network.find_mirror_plane`.
     camera : Camera
         The camera of the training images.
     sensor : mapping

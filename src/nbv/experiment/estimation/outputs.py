@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.angles import direction_deg, mirrored_bins
-from nbv.core.estimates import Estimates, posteriors_of
-from nbv.core.logits import fit_temperature, softmax
+from nbv.core.circle.angles import direction_deg, mirrored_bins
+from nbv.core.circle.estimates import Estimates, posteriors_of
+from nbv.core.circle.logits import fit_temperature, softmax
 from nbv.experiment.estimates import FoldEstimates
 
 Settings = Mapping[str, Any]
@@ -88,7 +88,7 @@ def estimates_of(
         (n, n_views, k) for their sweeps.
     distributions : bool
         Whether outputs are logits of distributions. Calibration objects then choose one
-        temperature (`nbv.core.logits.fit_temperature`).
+        temperature (`nbv.core.circle.logits.fit_temperature`).
     """
     if not distributions:
         return {

@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from nbv.core.angles import mirrored_bins
+from nbv.core.circle.angles import mirrored_bins
 from nbv.data.depth_images import DepthImages
 from nbv.errors import UserError
 from nbv.experiment.estimation.hardware import Hardware, scaled

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nbv.core.criteria import CRITERIA
+from nbv.core.circle.criteria import CRITERIA
 from nbv.data.depth_images import open_depth
 from nbv.errors import UserError
 from nbv.experiment.estimates import read_posteriors
@@ -30,8 +30,8 @@ from nbv.experiment.report.table import HTML
 from nbv.experiment.results import EvaluationFile, Unit, load_evaluations
 from nbv.files import existing
 from nbv.labels import category_label, method_label
-from nbv.robot.lookup import LookupTable
-from nbv.robot.style import method_style
+from nbv.style import method_style
+from nbv.tables.lookup import LookupTable
 
 LookupFile = tuple[str, int, int, str]
 """The key of a lookup table: category, elevation in degrees, fold and criterion."""
@@ -167,7 +167,7 @@ def _each_table(criteria: list[str], outcomes: Outcomes) -> Iterator[tuple[int, 
 def coarse_bins(n_bins: int, n_views: int) -> int:
     """Return the number of bins that the page uses to choose further views.
 
-    At most 120, as in `nbv.core.evidence`; a rotation by a bin leads from view to view,
+    At most 120, as in `nbv.core.circle.evidence`; a rotation by a bin leads from view to view,
     and each bin is an odd number of the table's, so that the centres agree.
     """
     return max(

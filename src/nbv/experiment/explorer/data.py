@@ -18,13 +18,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from PIL import Image
 
-from nbv.core.criteria import cost_unit
-from nbv.core.estimates import Posteriors
+from nbv.core.circle.criteria import cost_unit
+from nbv.core.circle.estimates import Posteriors
 from nbv.errors import UserError
 from nbv.experiment.report.figures.views import depth_limits, shade
 from nbv.experiment.results import Unit
 from nbv.experiment.statistics.metrics import FRONT_BACK_DEG
-from nbv.robot.lookup import LookupTable
+from nbv.tables.lookup import LookupTable
 
 Codes = NDArray[np.uint8]
 Hundredths = NDArray[np.int64]

@@ -32,7 +32,7 @@ from nbv.experiment.paper.statements import (
 )
 from nbv.experiment.statistics.paired import LOWER_IS_BETTER, UNIT_OF
 from nbv.labels import MINUS, method_label, number
-from nbv.robot.style import (
+from nbv.style import (
     AGAINST,
     FOR,
     INK,

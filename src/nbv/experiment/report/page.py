@@ -48,7 +48,7 @@ from nbv.experiment.results import load_object_ids
 from nbv.experiment.statistics.paired import UNIT_OF
 from nbv.files import existing, read_csv, read_json, readable
 from nbv.labels import category_label, interval_text, number
-from nbv.robot.style import AGAINST, FOR, GRID, INK, MUTED, OPEN, RC, SAVED, SHADE
+from nbv.style import AGAINST, FOR, GRID, INK, MUTED, OPEN, RC, SAVED, SHADE
 
 _COLOURS: Mapping[str, str] = {
     INK: "var(--ink)",
@@ -75,7 +75,7 @@ def svg_text(figure: Figure) -> str:
 
 
 def inline_svg(text: str, name: str, label: str) -> Markup:
-    """Return an SVG file of `nbv.robot.style.save_figure` as an element of an HTML page.
+    """Return an SVG file of `nbv.style.save_figure` as an element of an HTML page.
 
     Parameters
     ----------

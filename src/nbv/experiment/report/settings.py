@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nbv.core.angles import circular_distance_deg
+from nbv.core.circle.angles import circular_distance_deg
 from nbv.errors import UserError, nearest
 from nbv.experiment.paper import published
 from nbv.experiment.results import Unit

@@ -1,5 +1,5 @@
 // What is believed after several views, and where the information gain takes the next one: as
-// nbv.core.belief and nbv.core.next_views do it. Tests compare the two.
+// nbv.core.circle.belief and nbv.core.next_views do it. Tests compare the two.
 
 /** Divide an array by its sum, in place. */
 function toSumOne(values) {
@@ -64,7 +64,7 @@ function meanDirection(belief) {
     x += belief[i] * Math.cos(angle);
     y += belief[i] * Math.sin(angle);
   }
-  // FLAT of nbv.core.distributions.
+  // FLAT of nbv.core.circle.distributions.
   if (Math.hypot(x, y) <= 1e-5) return null;
   return modulo((Math.atan2(y, x) * 180) / Math.PI, 360);
 }

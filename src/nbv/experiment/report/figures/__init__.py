@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from nbv.errors import UserError, nearest
 from nbv.experiment.report.figures import choice, errors, steps, views
 from nbv.experiment.report.figures.inputs import FigureInputs
-from nbv.robot.style import RC
+from nbv.style import RC
 
 __all__ = ["FIGURES", "FigureInputs", "FigureKind", "build_figure"]
 

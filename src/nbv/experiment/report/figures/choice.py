@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from nbv.core.angles import nearest_bin, wrap_deg
-from nbv.core.criteria import SPREADS, pose_likelihood, two_view_poses
-from nbv.core.density import Conditionals
-from nbv.core.lookup import CostTable
+from nbv.core.circle.angles import nearest_bin, wrap_deg
+from nbv.core.circle.criteria import SPREADS, pose_likelihood, two_view_poses
+from nbv.core.circle.density import Conditionals
+from nbv.core.circle.lookup import CostTable
 from nbv.experiment.report.figures.inputs import (
     ExampleView,
     FigureInputs,
@@ -21,7 +21,7 @@ from nbv.experiment.report.figures.inputs import (
 )
 from nbv.experiment.report.figures.views import depth_limits, draw_depth
 from nbv.labels import method_label
-from nbv.robot.style import INK, MUTED, azimuth_axis, mark_azimuth, method_style, new_figure
+from nbv.style import INK, MUTED, azimuth_axis, mark_azimuth, method_style, new_figure
 
 Likelihood = NDArray[np.float32]
 

@@ -17,7 +17,7 @@ from nbv.experiment.statistics import metrics
 from nbv.experiment.statistics.metrics import PAUC_LIMIT_DEG
 from nbv.experiment.statistics.paired import PairedErrors, pair_methods
 from nbv.labels import method_label
-from nbv.robot.style import INK, MUTED, azimuth_axis, new_figure, panel_grid
+from nbv.style import INK, MUTED, azimuth_axis, new_figure, panel_grid
 
 _WINDOW_DEG = 15
 _PANEL_IN = (2.9, 2.6)

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
-from nbv.core.criteria import cost_unit
+from nbv.core.circle.criteria import cost_unit
 from nbv.data.depth_images import Codes, open_depth
 from nbv.errors import UserError
 from nbv.experiment.report.settings import (
@@ -23,8 +23,8 @@ from nbv.experiment.report.settings import (
 )
 from nbv.experiment.results import Unit
 from nbv.files import existing
-from nbv.robot.lookup import LookupTable
-from nbv.robot.style import MethodStyle, method_style
+from nbv.style import MethodStyle, method_style
+from nbv.tables.lookup import LookupTable
 
 Key = TypeVar("Key")
 

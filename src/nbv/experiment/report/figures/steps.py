@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from nbv.core.angles import circular_distance_deg, nearest_bin, wrap_deg
-from nbv.core.lookup import CostTable
+from nbv.core.circle.angles import circular_distance_deg, nearest_bin, wrap_deg
+from nbv.core.circle.lookup import CostTable
 from nbv.experiment.report.figures.choice import two_view_belief
 from nbv.experiment.report.figures.inputs import (
     CostWords,
@@ -26,7 +26,7 @@ from nbv.experiment.report.figures.inputs import (
 )
 from nbv.experiment.report.figures.views import depth_limits, draw_depth
 from nbv.files import replacing
-from nbv.robot.style import INK, MUTED, RC, azimuth_axis, mark_azimuth, method_style, new_figure
+from nbv.style import INK, MUTED, RC, azimuth_axis, mark_azimuth, method_style, new_figure
 
 Curve = NDArray[np.float32]
 

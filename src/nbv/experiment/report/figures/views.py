@@ -14,7 +14,7 @@ from nbv.data.depth_images import Codes
 from nbv.experiment.report.figures.inputs import FigureInputs, cost_words
 from nbv.experiment.report.settings import common_elevation_deg, reference_units, unit_label
 from nbv.experiment.statistics.paired import VIEWPOINT_GROUPS
-from nbv.robot.style import INK, MUTED, SHADE, azimuth_axis, new_figure
+from nbv.style import INK, MUTED, SHADE, azimuth_axis, new_figure
 
 _FAR_GREY, _NEAR_GREY = 0.12, 0.86
 _BACKGROUND = 0

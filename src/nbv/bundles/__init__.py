@@ -1,0 +1,1 @@
+"""Bundles, a network with its calibration: from frames to the next view."""

@@ -1,0 +1,1 @@
+"""The next view: limits, ranking and camera poses."""

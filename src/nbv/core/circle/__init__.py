@@ -1,0 +1,1 @@
+"""Azimuths about one axis: Eqs. 1 to 9 of the paper, and what goes beyond them."""

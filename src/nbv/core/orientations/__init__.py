@@ -1,0 +1,1 @@
+"""Orientations in three dimensions: symmetries, errors, beliefs and criteria."""

@@ -1,0 +1,164 @@
+"""Beliefs and fusion of orientations (docs/method.md).
+
+The next camera pose is a move M (3, 3) from the first camera: what is seen as R there is M R. Every
+pose here is in the first camera, so a rotation of the world changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.core.orientations.errors import OrientationErrors
+from nbv.core.orientations.group import Array, Orientations, chordal_mean, inverse
+
+AGREE_DEG = 25.0
+"""Estimates nearer than this are of the same pose; their mean has a smaller error than each."""
+
+_AGREE = np.cos(np.radians(AGREE_DEG))
+
+
+@dataclass(frozen=True)
+class OrientationBelief:
+    """A distribution of the pose after one view or more.
+
+    Attributes
+    ----------
+    support : ndarray (m, 3, 3)
+        Possible poses in the first camera.
+    probability : ndarray (m,)
+        Sums to 1.
+    votes : ndarray (n_views,) int
+        Index of the pose of the support that each view's estimate supports.
+    errors : OrientationErrors
+    """
+
+    support: Orientations
+    probability: Array
+    votes: NDArray[np.intp]
+    errors: OrientationErrors
+
+    @property
+    def pose(self) -> Orientations:
+        """The fused pose (3, 3).
+
+        It is the most probable pose among those the estimates support; ties go to the earlier
+        view. Where all errors are one density (`flip_deg` = 0), it is the mean.
+        """
+        if not self.errors.flip_deg:
+            return chordal_mean(self.support, self.probability)
+        voted = self.probability[self.votes]
+        return np.asarray(self.support[self.votes[np.argmax(voted)]])
+
+    def probability_within(self, error_deg: float) -> float:
+        """Return the probability that the fused pose errs by less."""
+        distance = self.errors.symmetry.distance_deg(self.support, self.pose)
+        near = float(self.probability[distance < max(error_deg, AGREE_DEG)].sum())
+        right = self.errors.error_deg[~self.errors.is_flip]
+        # Small errors have a size, but no direction.
+        return near * float((right < error_deg).mean()) if len(right) else near
+
+
+def belief(
+    errors: OrientationErrors,
+    estimates: Orientations,
+    moves: Orientations,
+    scores: Sequence[float] | Array | None = None,
+) -> OrientationBelief:
+    """Return the belief after n views: V of the first estimate, times L of each further one.
+
+    Parameters
+    ----------
+    errors : OrientationErrors
+    estimates : ndarray (n, 3, 3)
+        The estimate in each view.
+    moves : ndarray (n, 3, 3)
+        Moves from the first camera to each camera; the first is the identity.
+    scores : (n,), optional
+        The estimator's scores.
+    """
+    support, votes = _support(errors, inverse(moves) @ estimates)
+    weights = _weights(errors, support, votes, np.arange(len(support)), moves, scores)
+    return OrientationBelief(support, weights / weights.sum(), votes, errors)
+
+
+def _weights(
+    errors: OrientationErrors,
+    support: Orientations,
+    votes: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    moves: Orientations,
+    scores: Sequence[float] | Array | None,
+) -> Array:
+    """Return V L … L, up to a factor, at some poses of the support, rows (r,)."""
+    ratios = np.ones(len(votes))
+    if scores is not None and errors.ratio is not None:
+        ratios = errors.ratio(scores)
+    weights = errors.conditional("estimate", support, None, votes[:1], ratios[0])[0, 0, rows]
+    for vote, move, ratio in zip(votes[1:], moves[1:], ratios[1:], strict=True):
+        likelihood = errors.conditional("truth", support, move[None], rows)[0, :, vote]
+        # The score rates the estimate; without a flip the estimate is the truth.
+        weights = weights * likelihood * np.where(rows == vote, 1.0, ratio)
+        weights = weights / weights.sum()
+    return np.asarray(weights)
+
+
+def _support(
+    errors: OrientationErrors, seen: Orientations
+) -> tuple[Orientations, NDArray[np.intp]]:
+    """Return the support, and the index in it of each of the estimates (n, 3, 3)."""
+    symmetry, possible = errors.symmetry, errors.possible_poses(seen[0])
+    if not errors.flip_deg:
+        return possible, symmetry.cosine(seen, possible).argmax(axis=1)
+    votes = np.full(len(seen), -1)
+    means: list[Orientations] = []
+    for i in range(len(seen)):
+        if votes[i] < 0:
+            near = (votes < 0) & (symmetry.cosine(seen[i : i + 1], seen)[0] > _AGREE)
+            votes[near] = len(means)
+            means.append(symmetry.mean(seen[near]))
+    return np.concatenate([np.stack(means), possible[1:]]), votes
+
+
+def average(
+    errors: OrientationErrors, estimates: Orientations, moves: Orientations
+) -> Orientations:
+    """Return the mean (3, 3) of estimates (n, 3, 3), each moved back to the first view (Eq. 7)."""
+    return errors.symmetry.mean(inverse(moves) @ estimates)
+
+
+def posterior(
+    errors: OrientationErrors,
+    estimates: Orientations,
+    moves: Orientations,
+    scores: Sequence[float] | Array | None = None,
+) -> Orientations:
+    """Return the pose (3, 3) of `belief` after all views, V of the first and L of the others."""
+    if not errors.flip_deg:
+        return belief(errors, estimates, moves, scores).pose
+    support, votes = _support(errors, inverse(moves) @ estimates)
+    voted = np.unique(votes)  # The belief is needed nowhere else.
+    if len(voted) == 1:
+        return np.asarray(support[voted[0]])
+    weights = _weights(errors, support, votes, voted, moves, scores)
+    return np.asarray(support[voted[np.argmax(weights)]])
+
+
+def hypotheses_belief(
+    errors: OrientationErrors,
+    hypotheses: Orientations,
+    scores: Sequence[float] | Array | None = None,
+) -> OrientationBelief:
+    """Return the belief after one view whose estimator gave several poses (n, 3, 3), best first.
+
+    It is the mean of V of each, weighted by the likelihood that it is no flip, given its score.
+    """
+    support, votes = _support(errors, hypotheses)
+    ratios = np.ones(len(hypotheses))
+    if scores is not None and errors.ratio is not None:
+        ratios = errors.ratio(scores)
+    rows = errors.conditional("estimate", support, None, votes, ratios[:, None])[0]
+    return OrientationBelief(support, (1 / ratios / (1 / ratios).sum()) @ rows, votes, errors)

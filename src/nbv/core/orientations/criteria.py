@@ -1,0 +1,156 @@
+"""Criteria for the next camera pose, by orientations (docs/method.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief
+from nbv.core.orientations.group import Array, Orientations, chordal_mean, viewing_direction
+from nbv.errors import UserError, nearest
+
+
+def _entropy(distributions: Array) -> Array:
+    """Return the entropy along the last axis, in nats, with 0 log 0 = 0."""
+    logs = np.log(np.maximum(distributions, np.finfo(float).tiny))
+    return -np.asarray((distributions * logs).sum(axis=-1))
+
+
+@dataclass(frozen=True)
+class NextViews:
+    """Candidates for the next view, and the belief before it.
+
+    Attributes
+    ----------
+    belief : OrientationBelief
+        Its support has m poses.
+    moves : ndarray (k, 3, 3)
+        Moves from the first camera to each of the views.
+    """
+
+    belief: OrientationBelief
+    moves: Orientations
+
+    @cached_property
+    def likelihood(self) -> Array:
+        """L of each pose of the support in each view, (k, m, m)."""
+        return self.belief.errors.conditional("truth", self.belief.support, self.moves)
+
+
+def pose_ambiguity(ahead: NextViews) -> Array:
+    """Return the entropy of the pose after two views, by Eqs. 1 to 6 with T = V, (k,) in nats.
+
+    Raises
+    ------
+    ValueError
+        If the belief is after more than one view: Eq. 6 has one factor for each of two views.
+    """
+    first = ahead.belief
+    if len(first.votes) > 1:
+        raise ValueError(f"pose_ambiguity is defined for two views, not {len(first.votes) + 1}")
+    pose = first.errors.conditional("estimate", first.support)[0]
+    product = pose * first.errors.conditional("estimate", first.support, ahead.moves)
+    total = product.sum(axis=2, keepdims=True)
+    uniform = np.full_like(product, 1 / product.shape[2])
+    np.divide(product, total, out=uniform, where=total > 0)
+    return _entropy(first.probability @ uniform)
+
+
+def information_gain(ahead: NextViews) -> Array:
+    """Return the expected entropy of the pose after the next view, (k,) in nats."""
+    first, likelihood = ahead.belief, ahead.likelihood
+    noise = _entropy(likelihood) @ first.probability
+    gained = _entropy(first.probability @ likelihood) - noise
+    return np.asarray(_entropy(first.probability) - gained)
+
+
+def bayes_error(ahead: NextViews) -> Array:
+    """Return the Bayes risk of the posterior fusion after the next view, (k,) in degrees.
+
+    It is the expectation under V and L, as `nbv.core.circle.criteria.bayes_error` is on the circle.
+
+    Errors below `flip_deg` are not counted: they do not depend on the view.
+    """
+    first = ahead.belief
+    errors, support = first.errors, first.support
+    if not errors.flip_deg:
+        joint = first.probability[:, None] * ahead.likelihood
+        weights = np.swapaxes(joint, 1, 2).reshape(-1, len(support))
+        fused = chordal_mean(support, np.maximum(weights, np.finfo(float).tiny))
+        angles = np.degrees(np.arccos(errors.symmetry.cosine(fused, support)))
+        return np.asarray((weights * angles).reshape(len(ahead.moves), -1).sum(axis=1))
+    return np.asarray(expected_losses(ahead, _distances(first)[None])[0])
+
+
+def _distances(belief: OrientationBelief) -> Array:
+    """Return the angles (m, m) between the poses of the support, degrees."""
+    support = belief.support
+    distance = np.degrees(np.arccos(belief.errors.symmetry.cosine(support, support)))
+    np.fill_diagonal(distance, 0)
+    return np.asarray(distance)
+
+
+def expected_losses(ahead: NextViews, losses: Array) -> Array:
+    """Return expected losses of the fusion after the next view, (n, k).
+
+    `losses` (n, m, m) are symmetric: the loss of one pose of the support where another is true. The
+    answer is the pose of the next estimate, or one that an earlier estimate supports.
+    """
+    first = ahead.belief
+    joint = first.probability[:, None] * ahead.likelihood
+    voted = np.unique(first.votes)
+    before = joint[:, voted].argmax(axis=1)[:, None]
+    chance = np.take_along_axis(joint[:, voted], before, axis=1)[:, 0]
+    at_estimate = np.diagonal(joint, axis1=1, axis2=2)
+    result = []
+    for loss in losses:
+        cost = np.take_along_axis(loss[voted] @ joint, before, axis=1)[:, 0]
+        result.append(np.where(at_estimate > chance, (loss * joint).sum(axis=1), cost).sum(axis=1))
+    return np.stack(result)
+
+
+def chances_within(ahead: NextViews, errors_deg: Sequence[float]) -> Array:
+    """Return the probability that the pose after the next view errs by less, (n, k)."""
+    first = ahead.belief
+    distance = _distances(first)
+    losses = np.stack([1.0 * (distance >= max(e, AGREE_DEG)) for e in errors_deg])
+    small = first.errors.error_deg[~first.errors.is_flip]
+    shares = [(small < error_deg).mean() if len(small) else 1.0 for error_deg in errors_deg]
+    return np.asarray((1 - expected_losses(ahead, losses)) * np.reshape(shares, (-1, 1)))
+
+
+Criterion = Callable[[NextViews], Array]
+CRITERIA: dict[str, Criterion] = {
+    "pose_ambiguity": pose_ambiguity,
+    "information_gain": information_gain,
+    "bayes_error": bayes_error,
+}
+"""Criteria: the cost (k,) of each of the next views, lower is better."""
+
+
+def view_angle_deg(moves: Orientations) -> Array:
+    """Return the angle (k,) between the viewing directions before and after moves, in [0, 180]."""
+    forward = viewing_direction(moves)[..., 2]
+    return np.degrees(np.arccos(np.clip(-forward, -1, 1)))
+
+
+def costs_of(criterion: str, ahead: NextViews) -> Array:
+    """Return the costs (k,) of the next views by a criterion's name.
+
+    Raises
+    ------
+    UserError
+        For an unknown criterion.
+    """
+    if criterion not in CRITERIA:
+        raise UserError(f"criterion {criterion!r} is unknown: {nearest(criterion, CRITERIA)}")
+    return CRITERIA[criterion](ahead)
+
+
+def ranking(costs: Array, travel_deg: Array) -> NDArray[np.intp]:
+    """Return the order of moves (..., k) by costs (..., k), least first; ties go by travel."""
+    return np.lexsort((travel_deg, np.round(costs, 9)), axis=-1)

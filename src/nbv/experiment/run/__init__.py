@@ -1,0 +1,1 @@
+"""What all runs share: jobs, provenance, and comparison with kept references."""

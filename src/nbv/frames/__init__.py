@@ -1,0 +1,1 @@
+"""A depth frame, cropped to the object as a network sees it."""

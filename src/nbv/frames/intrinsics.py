@@ -1,0 +1,325 @@
+"""Intrinsic parameters of a pinhole camera, from numbers or from BOP and ROS files."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nbv.errors import FrameError, UserError, check_number, reason_of
+from nbv.files import missing, read_text
+from nbv.frames.depth_files import MILLIMETRE
+
+OFF_CENTRE = 0.2
+"""Offset of a principal point from the image centre that is suspicious, as a share of the side."""
+
+_SAME_SCALE = 0.03
+"""Relative tolerance between the horizontal and the vertical scale of an image."""
+
+# Names of the coefficients in ROS's, OpenCV's and other files.
+_DISTORTION = re.compile(
+    r"d|[kp]\d|cam_d|coeffs|dist(ortion)?(_?(coeffs?|coefficients?|params|parameters))?", re.I
+)
+
+_LEAST_SCALE = 0.2
+"""Below it a principal point is near a corner and cannot be the centre of a scaled image."""
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """Focal lengths and principal point, in pixels.
+
+    Attributes
+    ----------
+    fx, fy : float
+    cx, cy : float, optional
+        None: the centre of the object, as if the camera pointed at it.
+    width, height : int, optional
+        Size of the images that they belong to, if known.
+
+    Examples
+    --------
+    >>> import nbv
+    >>> camera = nbv.Intrinsics(585.0, 585.0, cx=319.5, cy=239.5)
+    >>> camera.check_resolution(rows=480, columns=640)
+    >>> try:
+    ...     camera.check_resolution(rows=240, columns=320)
+    ... except nbv.FrameError as error:
+    ...     error.name
+    'other-resolution'
+    """
+
+    fx: float
+    fy: float
+    cx: float | None = None
+    cy: float | None = None
+    width: int | None = None
+    height: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("fx", "fy", "cx", "cy", "width", "height"):
+            if (value := getattr(self, name)) is not None or name in ("fx", "fy"):
+                check_number(f"intrinsics: {name}", value)
+        for name in ("fx", "fy"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise UserError(f"intrinsics: {name}={value:g} must be above 0 (pixels)")
+        for name in ("cx", "cy"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise UserError(f"intrinsics: {name}={value:g} is not a number")
+        if (self.cx is None) != (self.cy is None):
+            known, missing = ("cy", "cx") if self.cx is None else ("cx", "cy")
+            raise UserError(f"intrinsics: {known} without {missing}; give both, or neither")
+        for name in ("width", "height"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise UserError(
+                    f"intrinsics: {name}={value:g} must be above 0 (pixels); give the size of the "
+                    "depth image, or leave out width and height"
+                )
+
+    def check_resolution(self, rows: int, columns: int) -> None:
+        """Check that the intrinsics belong to images of a size.
+
+        Raises
+        ------
+        FrameError
+            ``other-resolution``.
+        """
+        known = self.width is not None and self.height is not None
+        if known and (self.height, self.width) != (rows, columns):
+            raise FrameError(
+                "other-resolution",
+                f"the intrinsics are for {self.width} × {self.height} pixels, the frame has "
+                f"{columns} × {rows}: scale them, or give those of the depth image",
+            )
+        for name, value, size in (("cx", self.cx, columns), ("cy", self.cy, rows)):
+            if value is not None and not -0.5 * size <= value <= 1.5 * size:
+                raise FrameError(
+                    "other-resolution",
+                    f"the principal point {name}={value:g} is far outside a frame of {columns} × "
+                    f"{rows} pixels: give the intrinsics of this resolution; for a frame cut out "
+                    "of a larger one, only the focal length",
+                )
+        if known or self.cx is None or self.cy is None:
+            return
+        # A cut-out frame is unlikely to have the same scale in both directions.
+        scale, other = (2 * self.cx + 1) / columns, (2 * self.cy + 1) / rows
+        is_whole = scale > _LEAST_SCALE and abs(scale - other) < _SAME_SCALE * scale
+        if is_whole and abs(scale - 1) > OFF_CENTRE:
+            raise FrameError(
+                "other-resolution",
+                f"the principal point ({self.cx:g}, {self.cy:g}) is the centre of an image of "
+                f"{scale * columns:.0f} × {scale * rows:.0f} pixels, and the frame has {columns} × "
+                f"{rows}: give the intrinsics of this resolution; for a frame cut out of a larger "
+                "one, only the focal length, or also its own width and height",
+            )
+
+    def doubts(self, rows: int, columns: int) -> tuple[str, ...]:
+        """Return a sentence if the intrinsics may belong to an image of another size, else ()."""
+        off = [
+            value is not None and abs(value - (size - 1) / 2) > OFF_CENTRE * size
+            for value, size in ((self.cx, columns), (self.cy, rows))
+        ]
+        if not any(off):
+            return ()
+        return (
+            f"the principal point ({self.cx:g}, {self.cy:g}) is far from the centre of {columns} × "
+            f"{rows} pixels: is the frame cut out of a larger one, or do the intrinsics belong to "
+            "another camera or resolution?",
+        )
+
+
+def as_intrinsics(value: Intrinsics | float | ArrayLike) -> Intrinsics:
+    """Return intrinsics from (f), (fx, fy, cx, cy), or a 3 × 3 matrix of numbers.
+
+    Raises
+    ------
+    UserError
+        Where the value has none of these forms.
+    """
+    if isinstance(value, Intrinsics):
+        return value
+    if isinstance(value, str | bytes | Path):
+        raise UserError(f"intrinsics: {str(value)!r} is text; give numbers: f, or (fx, fy, cx, cy)")
+    try:
+        numbers = [float(number) for number in np.ravel(np.asarray(value, dtype=np.float64))]
+    except (TypeError, ValueError, OverflowError):
+        raise UserError(f"intrinsics: {value!r:.60} are not numbers; give fx,fy,cx,cy") from None
+    if len(numbers) == 1:
+        return Intrinsics(numbers[0], numbers[0])
+    if len(numbers) == 4:
+        return Intrinsics(numbers[0], numbers[1], numbers[2], numbers[3])
+    if len(numbers) == 9 and not any(numbers):
+        raise UserError(
+            "intrinsics: all 9 numbers of the matrix are 0: the camera is not calibrated (a ROS "
+            "driver says so); calibrate it, or give fx,fy,cx,cy"
+        )
+    if len(numbers) == 9:
+        if not np.allclose([numbers[3], *numbers[6:]], [0, 0, 0, 1]):
+            raise UserError(
+                "intrinsics: a 3x3 matrix is fx 0 cx, 0 fy cy, 0 0 1; is this one transposed?"
+            )
+        return Intrinsics(numbers[0], numbers[4], numbers[2], numbers[5])
+    raise UserError(f"intrinsics: {len(numbers)} numbers; give f, or fx,fy,cx,cy, or a 3x3 matrix")
+
+
+@dataclass(frozen=True)
+class DepthCamera:
+    """Intrinsics and depth unit of the camera that took a frame.
+
+    Attributes
+    ----------
+    intrinsics : Intrinsics, optional
+    unit_m : float
+        Metres per unit of integer depth.
+    warnings : tuple of str
+        Content of the camera file that has no effect, a sentence each.
+    """
+
+    intrinsics: Intrinsics | None = None
+    unit_m: float = MILLIMETRE
+    warnings: tuple[str, ...] = ()
+
+
+def camera_of(text: str | None, frame: str | Path = "") -> DepthCamera:
+    """Return the camera of a frame, from ``f``, ``fx,fy,cx,cy`` or the name of a camera file.
+
+    A camera file is JSON or YAML: BOP's ``camera.json`` (``fx, fy, cx, cy, width, height``) or
+    ``cam_K``, each with or without ``depth_scale``; BOP's ``scene_camera.json``, with a camera for
+    each image; ROS's ``CameraInfo`` (``k`` or ``K``); or ``camera_matrix`` of ROS or of OpenCV's
+    ``FileStorage``, with its numbers in ``data`` or nested.
+
+    Parameters
+    ----------
+    text : str or None
+        None if the camera is unknown.
+    frame : path
+        The number at the end of its stem selects the image in a ``scene_camera.json``, as BOP
+        names images. The name does not matter if all images have the same camera.
+
+    Raises
+    ------
+    UserError
+        Where the text has none of these forms, or the file has no camera for the frame.
+    """
+    if text is None:
+        return DepthCamera()
+    parts = text.replace(",", " ").split()
+    try:
+        return DepthCamera(as_intrinsics([float(part) for part in parts]))
+    except ValueError:
+        pass
+    path = Path(text)
+    try:
+        if not path.is_file():
+            raise UserError(f"`intrinsics`={text}: {_what_is_missing(path)}")
+        values = _read_mapping(path)
+        return _camera_of_mapping(_image_entry(values, path, Path(frame)), path)
+    except UserError:
+        raise
+    except Exception as error:
+        raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
+
+
+def _what_is_missing(path: Path) -> str:
+    if path.is_dir():
+        return "it is a folder; name a camera file in it, or give fx,fy,cx,cy"
+    if path.exists() or path.suffix or len(path.parts) > 1:
+        return f"the file {missing(path)}; name a camera file, or give fx,fy,cx,cy"
+    return "neither numbers nor a file; give fx,fy,cx,cy or a camera file"
+
+
+def _image_entry(values: Mapping[str, Any], path: Path, frame: Path) -> Mapping[str, Any]:
+    """Return the camera of a frame: its image's if each image has its own, else the file's."""
+    by_image: dict[int, Mapping[str, Any]] = {
+        int(key): value for key, value in values.items() if str(key).isdecimal()
+    }
+    if not by_image or len(by_image) < len(values):
+        return values
+    cameras = list(by_image.values())
+    if not all(isinstance(camera, Mapping) for camera in cameras):
+        raise UserError(f"{path} has images without a camera; give fx,fy,cx,cy")
+    known = [{key: camera.get(key) for key in ("cam_K", "depth_scale")} for camera in cameras]
+    if all(camera == known[0] for camera in known):
+        return known[0]
+    number = re.search(r"\d+$", frame.stem)
+    if number is None or int(number[0]) not in by_image:
+        raise UserError(
+            f"{path} has cameras for images {min(by_image)} to {max(by_image)} but not for "
+            f"{frame.name}: name the frame after its image, such as 000012.png, or give fx,fy,cx,cy"
+        )
+    return by_image[int(number[0])]
+
+
+def _read_mapping(path: Path) -> Mapping[str, Any]:
+    text = read_text(path)
+    if path.suffix.lower() == ".json":
+        values = json.loads(text)
+    else:
+        import yaml
+
+        # OpenCV's own directive and type are no YAML of others. `ros2 topic echo --once` ends with
+        # a separator of documents.
+        text = re.sub(r"^%YAML:.*|!!opencv-\w+", "", text)
+        values = next(iter(yaml.safe_load_all(text)), None)
+    if not isinstance(values, Mapping):
+        raise UserError(f"{path} is not a camera file; give names with values, or fx,fy,cx,cy")
+    return values
+
+
+def _camera_of_mapping(values: Mapping[str, Any], path: Path) -> DepthCamera:
+    size = (
+        values.get("width", values.get("image_width")),
+        values.get("height", values.get("image_height")),
+    )
+    matrix = next((values[k] for k in ("cam_K", "k", "K", "camera_matrix") if k in values), None)
+    if matrix is None:
+        absent = [name for name in ("fx", "fy", "cx", "cy") if name not in values]
+        if absent:
+            raise UserError(
+                f"{path} lacks {absent[0]}; give fx, fy, cx and cy, or cam_K, K or camera_matrix"
+            )
+        matrix = [values[name] for name in ("fx", "fy", "cx", "cy")]
+    try:
+        given = as_intrinsics(_numbers_of(matrix))
+        width, height = (int(side) if isinstance(side, float) else side for side in size)
+        intrinsics = Intrinsics(given.fx, given.fy, given.cx, given.cy, width, height)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+    unit_m = _unit_m(values.get("depth_scale"), path)
+    return DepthCamera(intrinsics, unit_m, _distortion_warnings(values, path))
+
+
+def _numbers_of(matrix: Any) -> Any:
+    # ROS and OpenCV keep them with the number of rows and columns.
+    return matrix.get("data") if isinstance(matrix, Mapping) else matrix
+
+
+def _distortion_warnings(values: Mapping[str, Any], path: Path) -> tuple[str, ...]:
+    """Return a sentence for coefficients of distortion that are not 0."""
+    return tuple(
+        f"{path}: the lens distortion ({name}) is not corrected: give rectified depth frames (ROS: "
+        "image_rect, OpenCV: undistort) and their intrinsics"
+        for name, value in values.items()
+        if _DISTORTION.fullmatch(str(name)) and value is not None
+        if np.any(np.asarray(_numbers_of(value), dtype=object) != 0)
+    )[:1]
+
+
+def _unit_m(depth_scale: Any, path: Path) -> float:
+    """Return metres per unit from BOP's millimetres per unit."""
+    if depth_scale is None:
+        return MILLIMETRE
+    is_number = isinstance(depth_scale, int | float) and not isinstance(depth_scale, bool)
+    if not (is_number and 0 < depth_scale < math.inf):
+        raise UserError(f"{path}: depth_scale={depth_scale!r} must be above 0 (BOP: millimetres)")
+    return float(depth_scale) * MILLIMETRE

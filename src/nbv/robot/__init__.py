@@ -1,1 +1,0 @@
-"""From a depth frame of a robot's camera to the pose and the next view."""

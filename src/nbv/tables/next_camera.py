@@ -1,0 +1,323 @@
+"""The next camera pose of an object in three dimensions, from a table of an estimator's errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nbv.choice.answers import Answer, RankedMove
+from nbv.choice.next_view import as_chances
+from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
+from nbv.core.alike.compare import WITHIN_DEG
+from nbv.core.orientations.belief import belief, hypotheses_belief
+from nbv.core.orientations.criteria import (
+    NextViews,
+    bayes_error,
+    chances_within,
+    ranking,
+    view_angle_deg,
+)
+from nbv.core.orientations.errors import OrientationErrors
+from nbv.core.orientations.group import Array, Orientations, along_ray
+from nbv.errors import UserError
+from nbv.files import read_given_json, read_numbers
+from nbv.labels import counted
+from nbv.numbers import FARTHEST_M, Pose, as_finite, as_orientations, as_pose, as_position
+
+NO_DEPENDENCE = (
+    "calibration shows no dependence of this object's flips on the view; the ranking may be no "
+    "better than random"
+)
+
+NO_SCORES = "scores are not used: calibration pairs had none"
+
+
+@dataclass(frozen=True)
+class PoseEstimate:
+    """The estimate of an object's pose in one image.
+
+    Attributes
+    ----------
+    rotation : ndarray (3, 3)
+        Object to camera.
+    position_mm : ndarray (3,) or None
+        The object in the camera.
+    score : float or None
+    camera_pose : ndarray (4, 4) or None
+        Camera to base. Estimates without it are hypotheses of the same image.
+
+    Examples
+    --------
+    >>> import nbv, numpy as np
+    >>> nbv.PoseEstimate(np.eye(3), score=0.4).position_mm is None
+    True
+    """
+
+    rotation: Orientations
+    position_mm: Array | None = None
+    score: float | None = None
+    camera_pose: Pose | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraMove(RankedMove):
+    """A candidate camera pose.
+
+    Attributes
+    ----------
+    index : int
+        The candidate's number, from 0.
+    travel_deg : float
+        Angle to the last view, about the object.
+    travel_m : float or None
+        Distance to the last view.
+    expected_error_deg : float
+        Expected error of the pose after a view there.
+    probability_within : dict of str to float
+        Probability that the error after this view is below 5, 15 and 30 degrees.
+    target_camera_pose : ndarray (4, 4) or None
+        None where the object's position is unknown.
+    direction : ndarray (3,)
+        Direction from which the object is seen, in the frame of the camera poses.
+    """
+
+    index: int
+    travel_m: float | None
+    direction: Array
+
+    @property
+    def name(self) -> str:
+        """The move in a list."""
+        return f"candidate {self.index}"
+
+    @property
+    def extent(self) -> str:
+        """How far the move goes, and from which direction the object is seen then."""
+        metres = "" if self.travel_m is None else f", {self.travel_m:.2f} m"
+        x, y, z = self.direction
+        return f"{super().extent}{metres}; seen from the direction {x:.2f} {y:.2f} {z:.2f}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraRecommendation(Answer[CameraMove]):
+    """The pose (3, 3) in the last camera, its error, and candidates, best first."""
+
+    rotation: Orientations
+    depends_on_view: bool
+
+    def pose_lines(self, seen: str) -> list[str]:
+        """Return the pose of the object, which is called `seen`, in a few lines of text."""
+        rows = ("  " + " ".join(f"{value:8.5f}" for value in row) for row in self.rotation)
+        return [f"rotation, {seen} to camera", *rows, self.value(self)]
+
+
+@dataclass(frozen=True)
+class _Camera:
+    """A camera in the base frame, and the camera at its place that looks straight at the object.
+
+    Attributes
+    ----------
+    pose : ndarray (4, 4)
+        Camera to base.
+    straight_from_camera : ndarray (3, 3)
+        The identity where the object's position or that of calibration is unknown.
+    """
+
+    pose: Pose
+    straight_from_camera: Orientations
+
+    @property
+    def straight_from_base(self) -> Orientations:
+        return np.asarray(self.straight_from_camera @ self.pose[:3, :3].T)
+
+
+def recommend_camera(
+    errors: OrientationErrors,
+    estimates: Sequence[PoseEstimate],
+    candidates: Sequence[Pose] | int,
+    *,
+    straightened: bool,
+    depends_on_view: bool,
+    camera_pose: ArrayLike | None,
+    max_travel_deg: float,
+) -> CameraRecommendation:
+    """Rank camera poses by an object's errors; see `nbv.OrientationTable.recommend`."""
+    scores = _checked_scores(estimates)
+    is_posed = estimates[0].camera_pose is not None
+    if is_posed and camera_pose is not None:
+        raise UserError("the estimates have camera poses; leave `camera_pose` out")
+    base = np.eye(4) if camera_pose is None else as_pose(camera_pose)
+    cameras = [
+        _Camera(
+            base if e.camera_pose is None else e.camera_pose,
+            _straightening(e.position_mm, straightened),
+        )
+        for e in estimates
+    ]
+    straight_from_base = np.stack([camera.straight_from_base for camera in cameras])
+    first, last = straight_from_base[0], straight_from_base[-1]
+    seen = np.stack(
+        [c.straight_from_camera @ e.rotation for c, e in zip(cameras, estimates, strict=True)]
+    )
+    if is_posed:
+        now = belief(errors, seen, straight_from_base @ first.T, scores)
+    else:
+        order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
+        now = hypotheses_belief(errors, seen[order], None if scores is None else scores[order])
+    position = estimates[-1].position_mm
+    place = None if position is None else (cameras[-1].pose @ np.append(position / 1000, 1.0))[:3]
+    if isinstance(candidates, int):
+        is_level = camera_pose is None and not is_posed
+        poses, is_known = _sphere(candidates, place, cameras[-1].pose, is_level), place is not None
+    else:
+        poses = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
+        is_known = True
+    targets = np.stack(
+        [_target(pose, place, straightened, i).straight_from_base for i, pose in enumerate(poses)]
+    )
+    travel = view_angle_deg(targets @ last.T)
+    apart = np.min([view_angle_deg(targets @ taken.T) for taken in straight_from_base], axis=0)
+    free = np.flatnonzero((apart >= MIN_SEPARATION_DEG) & (travel <= as_travel(max_travel_deg)))
+    if not len(free):
+        raise UserError(
+            f"none of {counted(len(poses), 'candidate')} is {MIN_SEPARATION_DEG:g}° or more from "
+            "every view so far and within `max_travel_deg`: the same view repeats its error"
+        )
+    ahead = NextViews(now, targets[free] @ first.T)
+    small = float(errors.error_deg[~errors.is_flip].mean()) if not errors.is_flip.all() else 0.0
+    cost, within = bayes_error(ahead) + small, chances_within(ahead, WITHIN_DEG)
+    moves = [
+        CameraMove(
+            index=int(free[k]),
+            travel_deg=float(travel[free[k]]),
+            travel_m=float(np.linalg.norm(pose[:3, 3] - cameras[-1].pose[:3, 3]))
+            if is_known
+            else None,
+            expected_error_deg=float(cost[k]),
+            probability_within=as_chances(within[:, k]),
+            target_camera_pose=pose if is_known else None,
+            direction=-targets[free[k]][2],
+        )
+        for k, pose in ((k, poses[free[k]]) for k in ranking(cost, travel[free]))
+    ]
+    distance = errors.symmetry.distance_deg(now.support, now.pose)
+    warnings = () if depends_on_view else (NO_DEPENDENCE,)
+    if scores is not None and errors.ratio is None:
+        warnings = (*warnings, NO_SCORES)
+    within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
+    return CameraRecommendation(
+        rotation=cameras[-1].straight_from_camera.T @ last @ first.T @ now.pose,
+        expected_error_deg=float(now.probability @ distance) + small,
+        probability_within=as_chances(within_now),
+        moves=tuple(moves),
+        depends_on_view=depends_on_view,
+        warnings=warnings,
+    )
+
+
+def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:
+    """Return the scores (n,) of estimates, if they have any; refuse estimates that differ."""
+    if not estimates:
+        raise UserError("no estimate; give one")
+    for what, name in (
+        ("a score", "score"),
+        ("a position", "position_mm"),
+        ("a camera pose", "camera_pose"),
+    ):
+        if len({getattr(estimate, name) is None for estimate in estimates}) > 1:
+            raise UserError(f"some estimates have {what} and others none; give all, or none")
+    scores = [estimate.score for estimate in estimates if estimate.score is not None]
+    return np.array(scores) if scores else None
+
+
+def _straightening(position: Array | None, straightened: bool) -> Orientations:
+    if position is None or not straightened:
+        return np.eye(3)
+    return along_ray(position)
+
+
+def _target(pose: Pose, place: Array | None, straightened: bool, i: int) -> _Camera:
+    """Return a candidate's camera; `place` (3,) is the object's in the base frame, if known."""
+    if place is None:
+        return _Camera(pose, np.eye(3))
+    position = pose[:3, :3].T @ (place - pose[:3, 3])
+    if position[2] <= 0:
+        raise UserError(
+            f"candidate {i}: the object is behind this camera: give poses of the optical frame "
+            "(z forward) in the base frame, camera to base, in metres"
+        )
+    if (away := float(np.linalg.norm(position))) > FARTHEST_M:
+        raise UserError(
+            f"candidate {i}: the object is {away:.0f} m away: give camera poses in metres, not "
+            "millimetres"
+        )
+    return _Camera(pose, _straightening(position, straightened))
+
+
+def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> list[Pose]:
+    """Return even camera poses that look at the object from its distance, level."""
+    if n < 1:
+        raise UserError(f"`sphere`={n}: give 1 or more")
+    up = -pose[:3, 1] if in_camera else np.array([0.0, 0.0, 1.0])
+    distance = 1.0 if place is None else float(np.linalg.norm(place - pose[:3, 3]))
+    centre = pose[:3, 3] + distance * pose[:3, 2] if place is None else place
+    z = 1 - (2 * np.arange(n) + 1) / n
+    angle = np.pi * (3 - np.sqrt(5)) * np.arange(n)
+    across = np.sqrt(1 - z**2)
+    outwards = np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+    poses = []
+    for direction in outwards:
+        right = np.cross(up, direction)
+        if np.linalg.norm(right) < 1e-6:
+            right = np.cross([1.0, 0.0, 0.0], direction)
+        right /= np.linalg.norm(right)
+        target = np.eye(4)
+        target[:3, :3] = np.stack([right, np.cross(-direction, right), -direction], axis=1)
+        target[:3, 3] = centre + distance * direction
+        poses.append(target)
+    return poses
+
+
+def as_view(given: Any, name: str) -> PoseEstimate:
+    """Return a view from R (9 numbers), or a mapping of R, t (mm), score and camera_pose.
+
+    Raises
+    ------
+    UserError
+        Names what is wrong.
+    """
+    entry = given if isinstance(given, dict) else {"R": given}
+    if "R" not in entry or (odd := set(entry) - {"R", "t", "score", "camera_pose"}):
+        what = "has no R" if "R" not in entry else f"has {min(odd)!r}"
+        raise UserError(f"{name} {what}; give R, t (mm), score, camera_pose")
+    rotation = as_finite(entry["R"], f"{name}: R", 9).reshape(3, 3)
+    view = PoseEstimate(as_orientations(rotation, f"{name}: R"))
+    if (t := entry.get("t")) is not None:
+        view = replace(view, position_mm=as_position(t, f"{name}: t"))
+    if (score := entry.get("score")) is not None:
+        view = replace(view, score=as_finite(score, f"{name}: score", 1).item())
+    if (pose := entry.get("camera_pose")) is not None:
+        view = replace(view, camera_pose=as_pose(pose, f"{name}: camera_pose"))
+    return view
+
+
+def read_views(path: str | Path) -> list[PoseEstimate]:
+    """Read estimates: JSON as of `as_view`, one or a list, or ``.npy`` of (..., 3, 3)."""
+    path = Path(path)
+    if path.suffix.lower() != ".json":
+        array = read_numbers(path)
+        if array.dtype.kind not in "iuf" or array.size % 9 or not array.size:
+            raise UserError(f"{path}: shape {array.shape} instead of (..., 3, 3)")
+        given: Any = list(array.reshape(-1, 9))
+    else:
+        given = read_given_json(path, "give JSON, or an .npy array")
+        is_one = isinstance(given, dict) or np.size(given) == 9
+        given = [given] if is_one else given
+    if not isinstance(given, list):
+        raise UserError(f"{path} is not an estimate or a list of them")
+    return [as_view(entry, f"{path}, estimate {i}") for i, entry in enumerate(given)]

@@ -1,0 +1,339 @@
+"""The table of an estimator's errors in three dimensions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nbv.core.orientations.errors import OrientationErrors, ScoreRatio
+from nbv.core.orientations.group import (
+    ASYMMETRIC,
+    Array,
+    Orientations,
+    Symmetry,
+    inverse,
+    spiral,
+    viewing_direction,
+)
+from nbv.errors import UserError, nearest
+from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
+from nbv.numbers import Pose, as_orientations
+from nbv.tables.next_camera import CameraRecommendation, PoseEstimate, recommend_camera
+
+FLIP_DEG = OrientationErrors.flip_deg
+_NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "ray", "symmetries")
+
+
+@dataclass(frozen=True)
+class ObjectSummary:
+    """The calibration pairs of one object.
+
+    Attributes
+    ----------
+    object_id : str
+    n_pairs, n_groups, n_flips : int
+        Groups are instances or scenes; a flip errs by more than `FLIP_DEG`.
+    mean_error_deg : float
+    directions_covered : float
+        Share of the viewing directions that have pairs nearby.
+    depends_on_view : bool
+        Whether calibration shows that flips depend on the view.
+    warnings : tuple of str
+    """
+
+    object_id: str
+    n_pairs: int
+    n_groups: int
+    n_flips: int
+    mean_error_deg: float
+    directions_covered: float
+    depends_on_view: bool
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class OrientationTable:
+    """Pairs of an estimate and the truth of the same image, and the objects' symmetries.
+
+    Attributes
+    ----------
+    object_id, group : ndarray (n,) str
+        A group is an instance or a scene; "" is unknown.
+    estimate, truth : ndarray (n, 3, 3)
+        Poses, object to camera.
+    score : ndarray (n,), optional
+        The estimator's scores; unused where one is NaN.
+    straightened : bool
+        Whether poses were rotated onto the optical axis (positions known).
+    symmetries : mapping
+        Entries of BOP's models_info by object; an object without one is asymmetric.
+    left_out : tuple of str
+        Which pairs of the file are not in the table, and why.
+
+    Examples
+    --------
+    >>> import nbv, numpy as np
+    >>> poses = np.stack([np.eye(3)] * 12)
+    >>> cups = np.array(["cup"] * 12)
+    >>> nbv.OrientationTable(cups, group=cups, estimate=poses, truth=poses).object_ids
+    ['cup']
+    """
+
+    object_id: NDArray[np.str_]
+    group: NDArray[np.str_]
+    estimate: Orientations
+    truth: Orientations
+    score: Array | None = None
+    straightened: bool = False
+    symmetries: Mapping[str, Any] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def object_ids(self) -> list[str]:
+        """The objects, in the order of the file."""
+        return list(dict.fromkeys(map(str, self.object_id)))
+
+    def symmetry(self, name: str) -> Symmetry:
+        """Return an object's symmetry; without an entry it is asymmetric."""
+        if name not in self.symmetries:
+            return ASYMMETRIC
+        try:
+            return Symmetry.from_bop(self.symmetries[name])
+        except UserError as error:
+            raise error.about(f"object {name} of models_info") from error
+        except (AttributeError, TypeError, ValueError):
+            raise UserError(
+                f"object {name} of models_info is not an entry of BOP: give symmetries_discrete "
+                "and symmetries_continuous"
+            ) from None
+
+    def name_of(self, object_id: str | None) -> str:
+        """Return the name of an object, which may be None if the table has only one.
+
+        Raises
+        ------
+        UserError
+            For an unknown object, or None where there are several.
+        """
+        known = self.object_ids
+        if object_id is None and len(known) > 1:
+            raise UserError(f"the table has {len(known)} objects; name one of {', '.join(known)}")
+        name = known[0] if object_id is None else object_id
+        if name not in known:
+            raise UserError(f"object {name} is not in the table: {nearest(name, known)}")
+        return name
+
+    def errors(self, object_id: str | None = None) -> OrientationErrors:
+        """Return the errors on an object; its name and errors are those of `name_of`."""
+        return self._errors[self.name_of(object_id)]
+
+    @cached_property
+    def _errors(self) -> dict[str, OrientationErrors]:
+        ratio = self.score_ratio()
+        rows = {name: self.object_id == name for name in self.object_ids}
+        return {
+            name: OrientationErrors(
+                self.estimate[k], self.truth[k], self.symmetry(name), ratio=ratio
+            )
+            for name, k in rows.items()
+        }
+
+    def score_ratio(self, flip_deg: float = FLIP_DEG) -> ScoreRatio | None:
+        """Return what a score says about a flip of any object, if the pairs have scores."""
+        if self.score is None or not np.isfinite(self.score).all():
+            return None
+        rows = [(name, self.object_id == name) for name in self.object_ids]
+        error_deg = [
+            self.symmetry(name).distance_deg(self.estimate[k], self.truth[k]) for name, k in rows
+        ]
+        scores = np.concatenate([self.score[k] for _, k in rows])
+        return ScoreRatio.fit(scores, np.concatenate(error_deg) > flip_deg)
+
+    def where(self, rows: NDArray[np.bool_]) -> OrientationTable:
+        """Return the table of some of the pairs (n,)."""
+        return replace(
+            self,
+            object_id=self.object_id[rows],
+            group=self.group[rows],
+            estimate=self.estimate[rows],
+            truth=self.truth[rows],
+            score=None if self.score is None else self.score[rows],
+        )
+
+    def recommend(
+        self,
+        estimates: Sequence[PoseEstimate],
+        candidates: Sequence[Pose] | int,
+        *,
+        object_id: str | None = None,
+        camera_pose: ArrayLike | None = None,
+        max_travel_deg: float = 180.0,
+    ) -> CameraRecommendation:
+        """Rank camera poses by the expected error of the pose that two views, or more, give.
+
+        Parameters
+        ----------
+        estimates : sequence of PoseEstimate
+            Estimates of views in succession if each has its camera pose, else hypotheses of one
+            view.
+        candidates : sequence of (4, 4), or int
+            Camera poses that can be reached; or how many even ones on a sphere about the object.
+        object_id : str, optional
+            Needed where the table has several objects.
+        camera_pose : (4, 4), optional
+            Pose of the only view: optical frame in the base frame, metres. By default the base
+            frame is the camera's.
+        max_travel_deg : float
+            Largest angle to the last view, about the object.
+
+        Returns
+        -------
+        CameraRecommendation
+
+        Raises
+        ------
+        UserError
+            Where estimates, poses and table do not fit each other, or no candidate is admissible.
+
+        Examples
+        --------
+        >>> import nbv, numpy as np
+        >>> poses = np.stack([np.eye(3)] * 12)
+        >>> cups = np.array(["cup"] * 12)
+        >>> table = nbv.OrientationTable(cups, group=cups, estimate=poses, truth=poses)
+        >>> answer = table.recommend([nbv.PoseEstimate(np.eye(3))], 50)
+        >>> answer.depends_on_view, answer.probability_within["30"] > 0.9
+        (False, True)
+        """
+        name = self.name_of(object_id)
+        return recommend_camera(
+            self.errors(name),
+            estimates,
+            candidates,
+            straightened=self.straightened,
+            depends_on_view=self.depends_on_view(name),
+            camera_pose=camera_pose,
+            max_travel_deg=max_travel_deg,
+        )
+
+    def depends_on_view(self, name: str) -> bool:
+        """Return whether calibration shows that an object's flips depend on the view."""
+        errors, groups = self.errors(name), self.group[self.object_id == name]
+        is_known = bool((groups != "").all() and errors.is_flip.any())
+        return is_known and errors.depends_on_view(groups)
+
+    def about(self) -> list[ObjectSummary]:
+        """Return a summary of each object."""
+        return [self._about(name) for name in self.object_ids]
+
+    def _about(self, name: str) -> ObjectSummary:
+        errors = self.errors(name)
+        directions = viewing_direction(spiral(500))
+        cosine = errors.symmetry.direction_cosine(directions, viewing_direction(errors.truth))
+        weight = np.exp(errors.concentration * (cosine - 1)).sum(axis=1)
+        warnings = []
+        if (covered := float((weight > 1).mean())) < 0.5:
+            warnings.append(f"{1 - covered:.0%} of the directions are seen by no pair nearby")
+        if (n_groups := len(set(self.group[self.object_id == name]) - {""})) < 2:
+            warnings.append("pairs are of one instance or scene: dependence on the view is unknown")
+        if not errors.is_flip.any():
+            warnings.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
+        elif hint := _common_axis(errors):
+            warnings.append(hint)
+        return ObjectSummary(
+            object_id=name,
+            n_pairs=len(errors.estimate),
+            n_groups=n_groups,
+            n_flips=int(errors.is_flip.sum()),
+            mean_error_deg=float(errors.error_deg.mean()),
+            directions_covered=covered,
+            depends_on_view=self.depends_on_view(name),
+            warnings=tuple(warnings),
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the pairs as ``.npz``."""
+        names, index = self.object_ids, {name: i for i, name in enumerate(self.object_ids)}
+        known = {n: self.symmetries[n] for n in names if n in self.symmetries}
+        values = (
+            np.array(names),
+            np.array([index[str(name)] for name in self.object_id]),
+            self.group,
+            self.estimate,
+            self.truth,
+            np.full(len(self.estimate), np.nan) if self.score is None else self.score,
+            np.array(self.straightened),
+            np.array(json.dumps(known, sort_keys=True)),
+        )
+        write_arrays(path, dict(zip(_NAMES, values, strict=True)))
+
+    @classmethod
+    def load(cls, path: str | Path) -> OrientationTable:
+        """Read a file of `save`.
+
+        Raises
+        ------
+        UserError
+            If the file cannot be read, or holds what `save` does not write.
+        """
+        with stored_table(path, _NAMES, "orientations") as stored:
+            names, index, group, estimate, truth, score, straightened, texts = (
+                stored[n] for n in _NAMES
+            )
+            n = len(index)
+            shapes = [a.shape for a in (index, group, score, estimate, truth)]
+            if not n or shapes != [(n,)] * 3 + [(n, 3, 3)] * 2:
+                raise damaged(path, "its arrays have different lengths", CALIBRATE_AGAIN)
+            if [a.dtype.kind for a in (names, index, group, score)] != ["U", "i", "U", "f"]:
+                raise damaged(path, "an array has another type", CALIBRATE_AGAIN)
+            if index.min() < 0 or sorted(set(index.tolist())) != list(range(len(names))):
+                raise damaged(path, "its objects do not fit its pairs", CALIBRATE_AGAIN)
+            estimate, truth = (
+                as_orientations(a, f"{path}: {name}")
+                for name, a in (("estimate", estimate), ("truth", truth))
+            )
+            symmetries = json.loads(str(texts))
+            if not isinstance(symmetries, dict):
+                raise damaged(path, "its symmetries are no entries by object", CALIBRATE_AGAIN)
+            table = cls(
+                names.astype(str)[index],
+                group,
+                estimate,
+                truth,
+                score,
+                bool(straightened),
+                symmetries,
+            )
+            for name in table.object_ids:
+                table.symmetry(name)
+        return table
+
+
+def _common_axis(errors: OrientationErrors) -> str:
+    """Return a hint if nearly all flips are about one axis of the object, else ""."""
+    flips = errors.is_flip
+    rotations = inverse(errors.estimate[flips]) @ errors.truth[flips]
+    angle = errors.error_deg[flips]
+    if errors.symmetry is not ASYMMETRIC or len(rotations) < 5:
+        return ""
+    from scipy.spatial.transform import Rotation
+
+    axes = Rotation.from_matrix(rotations).as_rotvec()
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    axis = np.linalg.eigh(axes.T @ axes)[1][:, -1]
+    about = np.abs(axes @ axis) > np.cos(np.radians(10))
+    if about.mean() < 0.8:
+        return ""
+    half = int((about & (angle > 175)).sum())
+    x, y, z = np.round(axis * np.sign(axis[np.abs(axis).argmax()]), 2) + 0.0
+    return (
+        f"{about.sum()} of {len(rotations)} flips are about the axis {x:g} {y:g} {z:g}, {half} of "
+        "them by 180°: if the object looks the same then, give its symmetry in models_info"
+    )
