@@ -112,7 +112,7 @@ def runs_table(estimates: RunErrors, evaluations: RunErrors, settings: ReportSet
     resampler = shared_resampler(settings)
     lines = _lines(estimates, evaluations)
     cells = []
-    for scope, scope_label, categories in _scopes(units, common_elevation_deg(units, settings)):
+    for scope, scope_label, categories in _scopes(units, common_elevation_deg(units)):
         for (method, role), errors in lines.items():
             sample = pool([_paired(errors, *category) for category in categories.items()])
             row = f"{scope} {method} {role}"

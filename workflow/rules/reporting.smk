@@ -1,11 +1,12 @@
 # What people read of the paper: tables, claims, figures, and the page that holds them all.
 
 from nbv.experiment.report.figures import FIGURES
+from nbv.experiment.report.settings import SUBJECT
 from nbv.experiment.report.tables import TABLES
 
 # Some figures show the lookup table of Proposed, which another policy does not have; some show
 # depth images, which an external estimator does not have.
-PROPOSED_LOOKUP = METHODS.get(PLAN.report_settings.subject, {}).get("policy")
+PROPOSED_LOOKUP = METHODS.get(SUBJECT, {}).get("policy")
 SHOWN_FIGURES = [
     name
     for name, kind in FIGURES.items()

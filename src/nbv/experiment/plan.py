@@ -278,24 +278,19 @@ class Plan:
     # What is shown
 
     @property
-    def report_settings(self) -> report.ReportSettings:
-        """The settings that decide which units are shown."""
-        return report.ReportSettings(focus_category=self.config["focus_category"])
-
-    @property
     def focus(self) -> str:
         """The category that the detailed tables and figures are about."""
-        return report.focus_category(self.units, self.report_settings)
+        return report.focus_category(self.units, self.config["focus_category"])
 
     @property
     def focus_unit(self) -> Unit:
         """The focus category at the reference elevation."""
-        return report.focus_unit(self.units, self.report_settings)
+        return report.focus_unit(self.units, self.config["focus_category"])
 
     @property
     def reference_units(self) -> list[Unit]:
         """The units that categories are compared by."""
-        return report.reference_units(self.units, self.report_settings)
+        return report.reference_units(self.units)
 
     def units_of(self, name: str) -> list[Unit]:
         """Return the units that a table or figure is about."""

@@ -20,6 +20,15 @@ from nbv.labels import category_label, method_label
 _BASELINE = "single"
 _SMOOTHING_DEG = 15.0
 
+SUBJECT = "proposed"
+"""The method that tables compare with the others, and whose lookup tables figures show."""
+
+EXAMPLE_INITIAL_DEG = (0, 30, 210, 330)
+"""Initial azimuths of Table 6."""
+
+_REFERENCE_ELEVATION_DEG = 0  # of Tables 1, 3 and 5 to 7
+_EXAMPLE_FOLD = 2  # of Table 6 and Figs. 2, 3 and 7
+
 TRANSFER = "transfer"
 """The table "trained on × tested on", which is made on request only."""
 
@@ -34,34 +43,21 @@ class ReportSettings:
         Columns of the tables, in order, without those that were not evaluated.
     focus_category : str or None
         The category of Tables 2 and 4 to 7; None chooses ``mug``, or else the first category.
-    reference_elevation_deg : int
-        The elevation of Tables 1, 3 and 5 to 7; a category's lowest elevation if it was not run.
-    example_fold : int
-        Fold of the examples (Table 6, Figs. 2, 3, 7); the first fold if it was not run.
-    example_initial_deg : tuple of int
-        Initial azimuths of Table 6.
-    criterion : str
-        The lookup table that figures show.
-    subject, reference : str
-        Tables close with the paired difference of `subject` to `reference`.
+    reference : str
+        Tables close with the paired difference of `SUBJECT` to it.
     n_resamples, seed : int
         Settings of the object bootstrap.
     """
 
     methods: tuple[str, ...] = published.METHODS
     focus_category: str | None = None
-    reference_elevation_deg: int = 0
-    example_fold: int = 2
-    example_initial_deg: tuple[int, ...] = (0, 30, 210, 330)
-    criterion: str = "pose_ambiguity"
-    subject: str = "proposed"
     reference: str = "opposite"
     n_resamples: int = 2000
     seed: int = 0
 
 
-def focus_category(units: Iterable[Unit], settings: ReportSettings) -> str:
-    """Return the category that the detailed tables and figures are about.
+def focus_category(units: Iterable[Unit], wanted: str | None) -> str:
+    """Return the category that the detailed tables and figures are about; see `ReportSettings`.
 
     Raises
     ------
@@ -71,7 +67,6 @@ def focus_category(units: Iterable[Unit], settings: ReportSettings) -> str:
     categories = list(dict.fromkeys(category for category, _ in units))
     if not categories:
         raise UserError("no evaluated category and elevation; run the workflow first")
-    wanted = settings.focus_category
     if wanted is None:
         mug = published.FOCUS_CATEGORY
         return mug if mug in categories else categories[0]
@@ -82,7 +77,7 @@ def focus_category(units: Iterable[Unit], settings: ReportSettings) -> str:
     return wanted
 
 
-def reference_units(units: Iterable[Unit], settings: ReportSettings) -> list[Unit]:
+def reference_units(units: Iterable[Unit]) -> list[Unit]:
     """Return one unit per category, in the order given.
 
     Each category is at the reference elevation, or at its lowest one if that was not run.
@@ -90,13 +85,13 @@ def reference_units(units: Iterable[Unit], settings: ReportSettings) -> list[Uni
     by_category: dict[str, list[Unit]] = {}
     for unit in units:
         by_category.setdefault(unit[0], []).append(unit)
-    return [(name, common_elevation_deg(every, settings)) for name, every in by_category.items()]
+    return [(name, common_elevation_deg(every)) for name, every in by_category.items()]
 
 
-def common_elevation_deg(units: Iterable[Unit], settings: ReportSettings) -> int:
+def common_elevation_deg(units: Iterable[Unit]) -> int:
     """Return the reference elevation, or the lowest one of the units if none has it."""
     elevations = {elevation for _, elevation in units}
-    wanted = settings.reference_elevation_deg
+    wanted = _REFERENCE_ELEVATION_DEG
     return wanted if wanted in elevations else min(elevations)
 
 
@@ -107,12 +102,12 @@ def unit_label(unit: Unit, common_deg: int) -> str:
     return label if elevation == common_deg else f"{label} ({elevation}°)"
 
 
-def focus_unit(units: Iterable[Unit], settings: ReportSettings) -> Unit:
+def focus_unit(units: Iterable[Unit], wanted: str | None) -> Unit:
     """Return the focus category at the reference elevation, or at its lowest one."""
     present = list(units)
-    category = focus_category(present, settings)
+    category = focus_category(present, wanted)
     of_category = [unit for unit in present if unit[0] == category]
-    return category, common_elevation_deg(of_category, settings)
+    return category, common_elevation_deg(of_category)
 
 
 @dataclass(frozen=True)
@@ -124,7 +119,13 @@ class Example:
     reason: str
 
 
-def choose_example(frame: pd.DataFrame, settings: ReportSettings) -> Example:
+def example_fold(frame: pd.DataFrame) -> int:
+    """Return the fold of the examples, or the first of a unit that was not run in it."""
+    folds = sorted(frame["fold"].unique())
+    return _EXAMPLE_FOLD if _EXAMPLE_FOLD in folds else int(folds[0])
+
+
+def choose_example(frame: pd.DataFrame) -> Example:
     """Return the test object with the median single-view error in the example fold.
 
     The lower median for an even number; the first by name where errors tie. The middle object is
@@ -135,11 +136,8 @@ def choose_example(frame: pd.DataFrame, settings: ReportSettings) -> Example:
     ----------
     frame : pandas.DataFrame
         One unit, from `results.load_evaluations`.
-    settings : ReportSettings
-        Gives the fold.
     """
-    folds = sorted(frame["fold"].unique())
-    fold = int(settings.example_fold if settings.example_fold in folds else folds[0])
+    fold = example_fold(frame)
     in_fold = frame[frame["fold"] == fold]
     method = _baseline(in_fold)
     errors = in_fold[in_fold["method"] == method].groupby("object_id")["error_deg"].mean()

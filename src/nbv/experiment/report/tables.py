@@ -21,6 +21,8 @@ from nbv.experiment.paper.published import PUBLISHED, SIGMA_ROW, Note
 from nbv.experiment.paper.statements import VERDICT_RULES, by_run
 from nbv.experiment.report.settings import (
     CELL_COLUMNS,
+    EXAMPLE_INITIAL_DEG,
+    SUBJECT,
     ReportSettings,
     cell,
     choose_example,
@@ -56,7 +58,7 @@ def comparison_body(cells: pd.DataFrame, settings: ReportSettings) -> Body:
         title = f"{label}: errors above 90°" if metric == ABOVE_90 else str(label)
         row = [Cell(title), *_values(part, methods)]
         if differs:
-            subject = part[part["method"] == settings.subject].iloc[0]
+            subject = part[part["method"] == SUBJECT].iloc[0]
             ends = subject["difference_low"], subject["difference_high"]
             row.append(difference_cell(subject["difference"], *ends))
         rows.append(tuple(row))
@@ -153,11 +155,11 @@ def _example_cells(estimates: pd.Series, errors: pd.Series) -> Iterator[Cell]:
 
 
 def _shows_difference(cells: pd.DataFrame, settings: ReportSettings) -> bool:
-    return {settings.subject, settings.reference} <= set(cells["method"])
+    return {SUBJECT, settings.reference} <= set(cells["method"])
 
 
 def _difference_title(settings: ReportSettings) -> str:
-    return f"{method_label(settings.subject)} {MINUS} {method_label(settings.reference)}"
+    return f"{method_label(SUBJECT)} {MINUS} {method_label(settings.reference)}"
 
 
 def _legend(cells: pd.DataFrame) -> str:
@@ -273,8 +275,8 @@ class _Kind:
 
 def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
     metric = "mae" if name == "table1" else "pauc"
-    units = reference_units(evaluations, settings)
-    elevation = common_elevation_deg(units, settings)
+    units = reference_units(evaluations)
+    elevation = common_elevation_deg(units)
     resampler = shared_resampler(settings)
     cells = []
     for unit in units:
@@ -289,7 +291,7 @@ def _by_category(name: str, evaluations: Evaluations, settings: ReportSettings) 
 
 def _by_elevation(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
     metric = "mae" if name == "table2" else "pauc"
-    category = focus_category(evaluations, settings)
+    category = focus_category(evaluations, settings.focus_category)
     resampler = shared_resampler(settings)
     cells = []
     for elevation in sorted(degrees for other, degrees in evaluations if other == category):
@@ -339,11 +341,11 @@ def _by_fold(name: str, evaluations: Evaluations, settings: ReportSettings) -> _
 
 
 def _examples(name: str, evaluations: Evaluations, settings: ReportSettings) -> _Measured:
-    unit = focus_unit(evaluations, settings)
+    unit = focus_unit(evaluations, settings.focus_category)
     frame = evaluations[unit]
-    example = choose_example(frame, settings)
+    example = choose_example(frame)
     cells = []
-    for azimuth in settings.example_initial_deg:
+    for azimuth in EXAMPLE_INITIAL_DEG:
         for method in settings.methods:
             outcome = example_row(frame, example, method, azimuth)
             if outcome is None:
@@ -358,7 +360,7 @@ def _examples(name: str, evaluations: Evaluations, settings: ReportSettings) -> 
 
 
 def _focus_sample(evaluations: Evaluations, settings: ReportSettings) -> tuple[Unit, PairedErrors]:
-    unit = focus_unit(evaluations, settings)
+    unit = focus_unit(evaluations, settings.focus_category)
     return unit, pair_methods(evaluations[unit], unit[0])
 
 

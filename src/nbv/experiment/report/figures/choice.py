@@ -20,6 +20,7 @@ from nbv.experiment.report.figures.inputs import (
     example_view,
 )
 from nbv.experiment.report.figures.views import depth_limits, draw_depth
+from nbv.experiment.report.settings import SUBJECT
 from nbv.labels import method_label
 from nbv.style import INK, MUTED, azimuth_axis, mark_azimuth, method_style, new_figure
 
@@ -98,7 +99,7 @@ def idea(inputs: FigureInputs) -> Figure:
     pair = Conditionals(viewpoint.astype(np.float64), estimates.astype(np.float64))
     given = pose_likelihood(pair, lookup.pose_likelihood)
     one_view_color = method_style("single", ()).color
-    two_view_color = inputs.style(inputs.settings.subject).color
+    two_view_color = inputs.style(SUBJECT).color
     curves: list[list[tuple[Likelihood, str, str, str]]] = [
         [(viewpoint[first], "p(φ | e)", one_view_color, "solid")],
         [
@@ -109,8 +110,8 @@ def idea(inputs: FigureInputs) -> Figure:
     titles = ["After one view", "Before a second view: p(θ | e, δ)"]
     rotations = [0, worst, best]
     captions = ["first view", "worst second", "recommended"]
-    seen = shown.outcomes.get(inputs.settings.subject)
-    if seen is not None and np.isfinite(_delta(shown, inputs.settings.subject)):
+    seen = shown.outcomes.get(SUBJECT)
+    if seen is not None and np.isfinite(_delta(shown, SUBJECT)):
         delta = round(float(seen["delta_deg"]) / step)
         second = int(nearest_bin(float(seen["next_estimate_deg"]), n_bins))
         belief = two_view_belief(lookup, first, second, delta)

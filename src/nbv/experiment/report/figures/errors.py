@@ -25,8 +25,8 @@ _PANEL_IN = (2.9, 2.6)
 
 def boxplots(inputs: FigureInputs) -> Figure:
     """Fig. 9: minimum, quartiles, median and maximum, and the same without the upper tail."""
-    units = reference_units(inputs.evaluations, inputs.settings)
-    common = common_elevation_deg(units, inputs.settings)
+    units = reference_units(inputs.evaluations)
+    common = common_elevation_deg(units)
     methods = inputs.methods(units[0])
     figure = new_figure(max(1.5 * len(units) + 1.2, 6.0), 6.4)
     whole, close = figure.subplots(2, 1)
@@ -83,8 +83,8 @@ def _close_limit_deg(errors_deg: NDArray[np.float64]) -> float:
 
 def accuracy(inputs: FigureInputs) -> Figure:
     """PEA by threshold, up to the 100 degrees that the pAUC integrates over (Eq. 10)."""
-    units = reference_units(inputs.evaluations, inputs.settings)
-    common = common_elevation_deg(units, inputs.settings)
+    units = reference_units(inputs.evaluations)
+    common = common_elevation_deg(units)
     grid = panel_grid(len(units), *_PANEL_IN)
     thresholds = np.linspace(0.0, np.sqrt(PAUC_LIMIT_DEG), 401) ** 2
     for axes, unit in zip(grid.panels, units, strict=True):
@@ -107,8 +107,8 @@ def accuracy(inputs: FigureInputs) -> Figure:
 
 def by_azimuth(inputs: FigureInputs) -> Figure:
     """Mean error by initial azimuth, smoothed over 15 degrees."""
-    units = reference_units(inputs.evaluations, inputs.settings)
-    common = common_elevation_deg(units, inputs.settings)
+    units = reference_units(inputs.evaluations)
+    common = common_elevation_deg(units)
     grid = panel_grid(len(units), *_PANEL_IN)
     for axes, unit in zip(grid.panels, units, strict=True):
         sample = _paired(inputs, unit)

@@ -14,6 +14,7 @@ from nbv.core.circle.criteria import cost_unit
 from nbv.data.depth_images import Codes, open_depth
 from nbv.errors import UserError
 from nbv.experiment.report.settings import (
+    SUBJECT,
     Example,
     ReportSettings,
     choose_example,
@@ -44,7 +45,7 @@ class FigureInputs:
     depth, objects : mapping of (category, elevation_deg) to Path
         Depth images, and the ids of their objects.
     lookups : mapping of (category, elevation_deg, fold) to Path
-        The lookup tables of the method ``settings.subject``.
+        The lookup tables of the method `SUBJECT`.
     """
 
     evaluations: Mapping[Unit, pd.DataFrame]
@@ -56,7 +57,7 @@ class FigureInputs:
     @property
     def focus(self) -> Unit:
         """The category and elevation of the detailed figures."""
-        return focus_unit(self.evaluations, self.settings)
+        return focus_unit(self.evaluations, self.settings.focus_category)
 
     def views(self, unit: Unit, object_id: str | None = None) -> Codes:
         """Return one object's depth codes, (n_viewpoints, side, side); the first by default.
@@ -82,7 +83,7 @@ class FigureInputs:
         UserError
             If the subject follows no table, or its file is missing.
         """
-        name = f"lookup table of {self.settings.subject}"
+        name = f"lookup table of {SUBJECT}"
         return LookupTable.load(existing(_given(self.lookups, (*self.focus, fold), name)))
 
     def methods(self, unit: Unit) -> tuple[str, ...]:
@@ -140,7 +141,7 @@ def example_view(inputs: FigureInputs) -> ExampleView:
     """Return the example of Figs. 2, 3 and 7."""
     unit = inputs.focus
     frame = inputs.evaluations[unit]
-    example = choose_example(frame, inputs.settings)
+    example = choose_example(frame)
     azimuth = hardest_azimuth_deg(frame)
     outcomes = {}
     for method in inputs.methods(unit):

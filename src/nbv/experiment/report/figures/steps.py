@@ -25,6 +25,7 @@ from nbv.experiment.report.figures.inputs import (
     example_view,
 )
 from nbv.experiment.report.figures.views import depth_limits, draw_depth
+from nbv.experiment.report.settings import SUBJECT
 from nbv.files import replacing
 from nbv.style import INK, MUTED, RC, azimuth_axis, mark_azimuth, method_style, new_figure
 
@@ -178,7 +179,7 @@ def _scene(inputs: FigureInputs) -> _Scene:
     columns = each["initial_deg"].astype(int), each["initial_estimate_deg"].astype(float)
     estimates = dict(zip(*columns, strict=True))
     lookup = inputs.lookup(example.fold)
-    color = inputs.style(inputs.settings.subject).color
+    color = inputs.style(SUBJECT).color
     return _Scene(shown, lookup, estimates, cost_words(lookup), color)
 
 

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from nbv.data.depth_images import Codes
 from nbv.experiment.report.figures.inputs import FigureInputs, cost_words
-from nbv.experiment.report.settings import common_elevation_deg, reference_units, unit_label
+from nbv.experiment.report.settings import (
+    common_elevation_deg,
+    example_fold,
+    reference_units,
+    unit_label,
+)
 from nbv.experiment.statistics.paired import VIEWPOINT_GROUPS
 from nbv.style import INK, MUTED, SHADE, azimuth_axis, new_figure
 
@@ -58,8 +63,8 @@ _RING_HEIGHT = 6.4 / 6.8
 
 def categories(inputs: FigureInputs) -> Figure:
     """Fig. 5: the first object of each category from eight azimuths."""
-    units = reference_units(inputs.evaluations, inputs.settings)
-    common = common_elevation_deg(units, inputs.settings)
+    units = reference_units(inputs.evaluations)
+    common = common_elevation_deg(units)
     labels = [unit_label(unit, common) for unit in units]
     title = f"First object of each category, elevation {common}°, by azimuth"
     return _view_rows(inputs, units, labels, title)
@@ -136,9 +141,7 @@ _DECADES = 3.0
 def lookup_maps(inputs: FigureInputs) -> Figure:
     """Draw V[estimate, viewpoint] and A[estimate, δ], with the recommended δ by estimate."""
     unit = inputs.focus
-    folds = sorted(inputs.evaluations[unit]["fold"].unique())
-    wanted = inputs.settings.example_fold
-    fold = int(wanted if wanted in folds else folds[0])
+    fold = example_fold(inputs.evaluations[unit])
     lookup = inputs.lookup(fold)
     words = cost_words(lookup)
     likelihood = np.asarray(lookup.viewpoint_likelihood, dtype=np.float64)
