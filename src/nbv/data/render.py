@@ -52,7 +52,6 @@ class Renderer(Protocol):
             In [-90, 90].
         azimuths_deg : (k,) float
             Azimuths of the images.
-        camera : Camera
 
         Returns
         -------
@@ -102,8 +101,6 @@ def render_objects(
         Normalised meshes by object id.
     elevation_deg : float
         In [-90, 90].
-    camera : Camera
-    renderer : Renderer
     measure : callable or None
         The sensor, from `nbv.data.sensors.open_sensor`, whose measurements are then cropped. None
         keeps the true depth.

@@ -26,7 +26,6 @@ def take_fold(
         choose one temperature.
     splits : DataFrame
         From `nbv.experiment.splits.read_splits`.
-    fold : int
 
     Raises
     ------

@@ -28,15 +28,7 @@ def start_of(warm_start: str, elevations_deg: Collection[int], elevation: int) -
     warm_start : str
         ``estimator.warm_start``: none, elevations, categories, both or features.
     elevations_deg : collection of int
-        All elevations of the category, degrees.
-    elevation : int
-        The elevation to train, degrees.
-
-    Returns
-    -------
-    int, "pretrained", "features" or None
-        The elevation whose estimator it starts from (the nearest lower one, degrees), the network
-        of all categories, that of the depth features, or random weights.
+        All elevations of the category.
     """
     if warm_start == "features":
         return FEATURES
@@ -63,8 +55,7 @@ def stage_settings(
     estimator : mapping
         The section ``estimator`` of a configuration.
     stage : str
-        ``training`` from random weights, ``pretraining`` of all categories together,
-        ``fine_tuning`` of the pretrained network or that of the features, or ``next_elevation``.
+        See `stage_from`; ``pretraining`` is that of all categories together.
     epochs : int, optional
         Epochs of a training from random weights, by default ``estimator.epochs``. Other stages
         scale their epochs in the same proportion, to at least one.

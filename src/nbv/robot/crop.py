@@ -97,7 +97,6 @@ def crop_frame(
         Metres.
     mask : (rows, columns) bool
         See `nbv.robot.masks.object_mask`.
-    intrinsics : Intrinsics
     camera : Camera
         The camera of the training images.
     diagonal_m : float

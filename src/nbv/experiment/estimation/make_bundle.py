@@ -33,7 +33,6 @@ def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -
 
     Parameters
     ----------
-    estimator : Estimator
     mirror_plane_deg : float, optional
         From `nbv.robot.network.find_mirror_plane`.
     """
@@ -109,7 +108,6 @@ def make_bundle(
 
     Parameters
     ----------
-    category : str
     estimator : Estimator
         A classifier, trained on ``<object id>/<elevation>``.
     sweeps : sequence of Sweep
@@ -125,7 +123,6 @@ def make_bundle(
         The configuration's ``sensor``.
     affinity : mapping
         The configuration's ``affinity``.
-    provenance : mapping
     """
     temperature = temperature_of(sweeps)
     # The estimator lists each object once for every elevation.

@@ -33,7 +33,6 @@ def strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.M
         ``channels`` (list of int) and ``hidden`` (int).
     image_side : int
         Pixels.
-    n_outputs : int
     """
     channels = settings["channels"]
     # The first layer's maps are the largest: normalising them took a sixth of the training time and

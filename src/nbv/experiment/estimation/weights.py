@@ -127,12 +127,10 @@ def read_start(
     path : str
         An estimator of the same category, a network that was pretrained on all categories, or the
         depth features, whose last layer the training does not take.
-    category : str
     object_ids : sequence of str
         The training objects.
     output : str
         The path of the new estimator.
-    hardware : Hardware
 
     Raises
     ------

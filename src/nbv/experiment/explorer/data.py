@@ -72,7 +72,6 @@ class Quantised:
 
     Attributes
     ----------
-    codes : ndarray uint8
     low, high : float
         The values of the codes 0 and 255.
     """
@@ -212,7 +211,6 @@ class Outcomes:
 
     Attributes
     ----------
-    object_ids : tuple of str
     folds : tuple of int
         The fold that tests each object.
     n_views : int
