@@ -68,13 +68,7 @@ class Renderer(Protocol):
 
 
 def open_renderer(name: str) -> Renderer:
-    """Return a renderer by name.
-
-    Raises
-    ------
-    UserError
-        For an unknown name, or if the renderer's libraries are missing.
-    """
+    """Return a renderer by name; raise UserError if it is unknown or its libraries are missing."""
     if name not in RENDERERS:
         raise UserError(f"renderer={name}: no such renderer; {nearest(name, RENDERERS)}")
     module, _, attribute = RENDERERS[name].partition(":")

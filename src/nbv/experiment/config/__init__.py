@@ -226,17 +226,10 @@ def equal_cost_epochs(epochs: int, calibration_fraction: float, parts: int) -> i
 
 
 def read_configuration(root: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
-    """Read ``configuration.yaml`` of a run or reference as plain values.
+    """Read ``configuration.yaml`` of a run or reference as plain values, with the keys `needed`.
 
     Its values are checked as in `load_config`. A file of another version may lack keys, and may
-    have keys that are unknown today.
-
-    Parameters
-    ----------
-    root : pathlib.Path
-        The folder of the run or reference.
-    needed : sequence of str
-        Required keys; ``n_folds`` is always required.
+    have keys that are unknown today; ``n_folds`` is always required.
 
     Raises
     ------

@@ -31,10 +31,7 @@ _MARGINS = (0.6, 1.5)
 def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -> bytes:
     """Return the ONNX model of a bundle, averaged over mirror images if there is a mirror plane.
 
-    Parameters
-    ----------
-    mirror_plane_deg : float, optional
-        From `nbv.robot.network.find_mirror_plane`.
+    The plane is that of `nbv.robot.network.find_mirror_plane`.
     """
     if mirror_plane_deg is None:
         return onnx_model(estimator)

@@ -51,14 +51,9 @@ class Estimator:
 
 @dataclass(frozen=True)
 class Start:
-    """Weights to start a training from.
+    """Weights of all layers, or of all but the last, to start a training from.
 
-    Attributes
-    ----------
-    weights : mapping of str to Tensor
-        Weights of all layers, or of all but the last.
-    origin : mapping
-        See `Estimator.started_from`.
+    `origin` is the new estimator's `Estimator.started_from`.
     """
 
     weights: Mapping[str, torch.Tensor]

@@ -100,18 +100,9 @@ class FigureInputs:
 class ExampleView:
     """The example object at the hardest initial azimuth, with the results of each method.
 
-    Attributes
-    ----------
-    unit, example : Unit, Example
-        The object.
-    azimuth_deg : int
-        Its initial viewpoint, where the category's single-view error is largest.
-    estimate_deg : float
-        The estimate from there.
-    views : (n_viewpoints, side, side) uint8
-        Depth codes of every viewpoint of the object.
-    outcomes : mapping of str to pandas.Series
-        The row of the evaluation by method.
+    The category's single-view error is largest at `azimuth_deg`; `estimate_deg` is the estimate
+    from there. `views` (n_viewpoints, side, side) are the depth codes of all viewpoints, and
+    `outcomes` the row of the evaluation by method.
     """
 
     unit: Unit
