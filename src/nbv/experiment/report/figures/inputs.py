@@ -67,13 +67,11 @@ class FigureInputs:
         UserError
             If a file is missing or the object is unknown.
         """
-        path = _given(self.depth, unit, "depth images")
-        images = open_depth(path, _given(self.objects, unit, "objects of depth images"))
+        objects = _given(self.objects, unit, "objects of depth images")
+        images = open_depth(_given(self.depth, unit, "depth images"), objects)
         if object_id is None:
             return np.asarray(images.codes[0])
-        if object_id not in images.object_ids:
-            raise UserError(f"{path}: no object {object_id!r}; evaluate the category again")
-        return np.asarray(images.codes[images.object_ids.index(object_id)])
+        return np.asarray(images.of([object_id])[0])
 
     def lookup(self, fold: int) -> LookupTable:
         """Return the lookup table of the focus unit in one fold.
