@@ -52,8 +52,8 @@ def test_progress_is_logged(root, caplog, monkeypatch):
     source = source_of("folder", root=str(root))
     with caplog.at_level(logging.INFO, logger="nbv"):
         prepare_meshes(source, "mug", source.object_ids("mug"))
-    assert "mug: mesh 3 of 12" in caplog.text
-    assert "mug: 12 meshes prepared" in caplog.text
+    assert "mug meshes: 3 of 12, 90 s left" in caplog.text
+    assert "mug meshes: 12 in 130.0 s" in caplog.text
 
 
 def finer(mesh, rng):

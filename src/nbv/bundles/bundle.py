@@ -73,7 +73,6 @@ class Bundle:
 
     Attributes
     ----------
-    category : str
     network : bytes
         From `nbv.experiment.estimation.export.onnx_model`.
     estimator : mapping
@@ -101,8 +100,6 @@ class Bundle:
         p(azimuth | image) of views a bin apart.
     affinity : mapping
         ``power`` and ``pseudo_observations`` of the expected error.
-    ood : OodModel
-    paper : PaperTables
     provenance : mapping
         Run, commit, versions, settings, and the source of the calibration.
     """

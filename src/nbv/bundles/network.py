@@ -33,7 +33,6 @@ class Sweep:
 
     Attributes
     ----------
-    object_id, sequence : str
     elevation_deg : float
         NaN where it is unknown.
     azimuth_deg : ndarray (n,)
@@ -122,7 +121,6 @@ def find_mirror_plane(network: Network, sweeps: Sequence[Sweep]) -> float | None
 
     Parameters
     ----------
-    network : callable
     sweeps : sequence of Sweep
         Sweeps of calibration objects, which were not trained on, with the logits of `network`. A
         view every 15 degrees is enough, because neighbouring views are similar.

@@ -34,7 +34,6 @@ def draw_recommendation(answer: Recommendation, path: str | Path, category: str 
 
     Parameters
     ----------
-    answer : Recommendation
     path : path
         Its suffix selects the format, one of `KINDS`.
     category : str

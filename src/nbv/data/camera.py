@@ -78,7 +78,6 @@ class Views:
 
     Attributes
     ----------
-    camera : Camera
     position : (k, 3) float
         Positions of the pinholes, in the object frame.
     right, up, forward : (k, 3) float

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import logging
-import time
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.data.progress import logged
 from nbv.errors import UserError
 from nbv.files import damaged, open_array, read_json, write_json, write_rows
 
 Codes = NDArray[np.uint8]
-
-logger = logging.getLogger(__name__)
-
-# Progress is logged at each tenth of the work, at most this often.
-_SECONDS_BETWEEN_LINES = 5.0
 
 
 class DepthImages(NamedTuple):
@@ -70,14 +64,14 @@ def write_depth(
     ----------
     path, objects_path : path
         Paths of the images and of the ids.
-    object_ids : collection of str
     images : iterable of (n_views, side, side) uint8
         The sweep of each object, such as from `nbv.data.render.render_objects`.
     shape : tuple of int
         (n_views, side, side).
     """
-    progress = _Progress(str(path), len(object_ids), shape[0])
-    write_rows(path, progress.of(images), (len(object_ids), *shape), np.uint8)
+    n_objects = len(object_ids)
+    sweeps = logged(images, n_objects, f"{path}, sweeps of {shape[0]} images")
+    write_rows(path, sweeps, (n_objects, *shape), np.uint8)
     write_json(objects_path, list(object_ids))
 
 
@@ -100,35 +94,3 @@ def open_depth(path: str | Path, objects_path: str | Path) -> DepthImages:
             objects_path, f"{len(set(names))} different objects, {path} has images of {len(codes)}"
         )
     return DepthImages(tuple(names), codes)
-
-
-class _Progress:
-    def __init__(self, name: str, n_objects: int, images_each: int) -> None:
-        self._name, self._n_objects, self._images_each = name, n_objects, images_each
-        self._start = self._last = time.monotonic()
-        self._tenth = 0
-
-    def of(self, images: Iterable[Codes]) -> Iterator[Codes]:
-        for index, codes in enumerate(images):
-            yield codes
-            self.advance(index + 1)
-
-    def advance(self, done: int) -> None:
-        now = time.monotonic()
-        elapsed = max(now - self._start, 1e-9)
-        rate = done * self._images_each / elapsed
-        if done == self._n_objects:
-            images = done * self._images_each
-            logger.info(
-                "%s: %d objects, %d images in %.1f s (%.0f images/s)",
-                *(self._name, done, images, elapsed, rate),
-            )
-            return
-        tenth = 10 * done // self._n_objects
-        if tenth > self._tenth and now - self._last >= _SECONDS_BETWEEN_LINES:
-            self._tenth, self._last = tenth, now
-            left = elapsed / done * (self._n_objects - done)
-            logger.info(
-                "%s: object %d of %d, %.0f images/s, %.0f s left",
-                *(self._name, done, self._n_objects, rate, left),
-            )

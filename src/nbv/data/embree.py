@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.data.camera import Camera, Views, object_views
+from nbv.data.camera import Views
+from nbv.data.render import Renderer
 from nbv.errors import UserError
 
 # Rays in a call of Embree: many to amortise the call, few to stay within the processor's cache.
@@ -18,7 +19,7 @@ _RAYS_PER_CALL = 65_536
 _NOTHING = 1e30
 
 
-class EmbreeRenderer:
+class EmbreeRenderer(Renderer):
     """The default renderer.
 
     Raises
@@ -41,19 +42,11 @@ class EmbreeRenderer:
         self._triangles = TriangleMesh
         self._device = EmbreeDevice()
 
-    def render(
-        self,
-        vertices: ArrayLike,
-        faces: ArrayLike,
-        elevation_deg: float,
-        azimuths_deg: ArrayLike,
-        camera: Camera,
-    ) -> NDArray[np.float32]:
-        """Return depth images (k, side, side): see `nbv.data.render.Renderer.render`.
+    def draw(self, vertices: ArrayLike, faces: ArrayLike, views: Views) -> NDArray[np.float32]:
+        """Return depth images (k, side, side): see `nbv.data.render.Renderer`.
 
         Depths are good to 1e-5 object diagonals (single precision).
         """
-        views = object_views(vertices, faces, elevation_deg, azimuths_deg, camera)
         # robust=True: a ray along an edge between two faces hits one of them.
         scene = self._scene(self._device, robust=True)
         self._triangles(
@@ -61,7 +54,7 @@ class EmbreeRenderer:
             np.ascontiguousarray(vertices, dtype=np.float32),
             np.ascontiguousarray(faces, dtype=np.int32),
         )
-        side = camera.image_side
+        side = views.camera.image_side
         depth = np.zeros((len(views.position), side, side), dtype=np.float32)
         windows = _pixel_windows(views)
         rays = _RayBuffer(views)

@@ -302,17 +302,10 @@ def _check_glb(data: bytes) -> None:
 
 
 def main(processor_s: int, clock_s: int, max_bytes: int) -> None:
-    """Read the files named on the standard input until it ends, within limits.
+    """Read the files named on the standard input until it ends, within the limits of `MeshReader`.
 
     Each line is a path as JSON. The answer is a line of JSON, with the reason of a refusal or the
     numbers of vertices and faces, followed by these arrays as raw float64 and int64.
-
-    Parameters
-    ----------
-    processor_s, clock_s : int
-        Seconds for a file.
-    max_bytes : int
-        Limit of memory.
     """
     _limit_memory(max_bytes)
     timers = {signal.ITIMER_PROF: processor_s, signal.ITIMER_REAL: clock_s}

@@ -44,14 +44,8 @@ class MeshReader:
     """Reads mesh files, one after the other, in one process.
 
     The process starts with the first file, and again after a file that ended it. It ends with this
-    object or with the calling process.
-
-    Parameters
-    ----------
-    processor_s, clock_s : int
-        Seconds for a file.
-    max_bytes : int
-        Limit of memory; ignored on systems without such limits, such as macOS.
+    object or with the calling process. The limits are those of a file, seconds, and of memory; the
+    last is ignored on systems without such limits, such as macOS.
     """
 
     def __init__(

@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.data.camera import Camera, Views, object_views
+from nbv.data.camera import Views
+from nbv.data.render import Renderer
 from nbv.errors import UserError
 
 # Between the object and the near and far planes, in object diagonals.
@@ -49,7 +50,7 @@ def _offscreen() -> Any:
     return pyrender.OffscreenRenderer(1, 1)
 
 
-class PyrenderRenderer:
+class PyrenderRenderer(Renderer):
     """The renderer that draws with OpenGL.
 
     Raises
@@ -72,22 +73,15 @@ class PyrenderRenderer:
             reason = " ".join(str(error).split())[:120] or type(error).__name__
             raise UserError(f"renderer=pyrender cannot start ({reason}): {_INSTALL}") from error
 
-    def render(
-        self,
-        vertices: ArrayLike,
-        faces: ArrayLike,
-        elevation_deg: float,
-        azimuths_deg: ArrayLike,
-        camera: Camera,
-    ) -> NDArray[np.float32]:
-        """Return depth images (k, side, side): see `nbv.data.render.Renderer.render`.
+    def draw(self, vertices: ArrayLike, faces: ArrayLike, views: Views) -> NDArray[np.float32]:
+        """Return depth images (k, side, side): see `nbv.data.render.Renderer`.
 
         Depths are accurate to 1e-5 object diagonals (24-bit depth buffer). A GPU samples them up to
         1/256 of a pixel off the centre, a median error of 1e-5.
         """
         import pyrender
 
-        views = object_views(vertices, faces, elevation_deg, azimuths_deg, camera)
+        camera = views.camera
         side = camera.image_side
         self._offscreen.viewport_width = self._offscreen.viewport_height = side
         front_faces = np.asarray(faces, dtype=np.uint32)

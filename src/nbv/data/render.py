@@ -7,14 +7,15 @@ only ones needed.
 from __future__ import annotations
 
 import logging
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from importlib import import_module
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.data.camera import Camera
+from nbv.data.camera import Camera, Views, object_views
 from nbv.data.depth_codes import Depths, crop_measured, encode_depth, sensor_camera
 from nbv.data.depth_images import Codes
 from nbv.data.meshes import Surface
@@ -29,8 +30,8 @@ RENDERERS: Mapping[str, str] = {
 }
 
 
-class Renderer(Protocol):
-    """The interface of a renderer."""
+class Renderer(ABC):
+    """A renderer, which draws the views that all renderers share."""
 
     def render(
         self,
@@ -52,7 +53,6 @@ class Renderer(Protocol):
             In [-90, 90].
         azimuths_deg : (k,) float
             Azimuths of the images.
-        camera : Camera
 
         Returns
         -------
@@ -65,17 +65,16 @@ class Renderer(Protocol):
         UserError
             If part of the object lies behind the camera or outside the image.
         """
-        ...
+        views = object_views(vertices, faces, elevation_deg, azimuths_deg, camera)
+        return self.draw(vertices, faces, views)
+
+    @abstractmethod
+    def draw(self, vertices: ArrayLike, faces: ArrayLike, views: Views) -> NDArray[np.float32]:
+        """Draw the depth images of `render`."""
 
 
 def open_renderer(name: str) -> Renderer:
-    """Return a renderer by name.
-
-    Raises
-    ------
-    UserError
-        For an unknown name, or if the renderer's libraries are missing.
-    """
+    """Return a renderer by name; raise UserError if it is unknown or its libraries are missing."""
     if name not in RENDERERS:
         raise UserError(f"renderer={name}: no such renderer; {nearest(name, RENDERERS)}")
     module, _, attribute = RENDERERS[name].partition(":")
@@ -102,8 +101,6 @@ def render_objects(
         Normalised meshes by object id.
     elevation_deg : float
         In [-90, 90].
-    camera : Camera
-    renderer : Renderer
     measure : callable or None
         The sensor, from `nbv.data.sensors.open_sensor`, whose measurements are then cropped. None
         keeps the true depth.

@@ -120,9 +120,7 @@ def read_posteriors(path: str | Path, object_ids: Sequence[str]) -> Posteriors:
     return posteriors
 
 
-def write_fold(
-    paths: Mapping[str, str], estimates: Mapping[str, tuple[Estimates, Posteriors | None]]
-) -> None:
+def write_fold(paths: Mapping[str, str], estimates: FoldEstimates) -> None:
     """Write a fold's estimates by role, with posteriors where there are any.
 
     Paths are those of ``calibration`` and ``test``, and where there are posteriors those of

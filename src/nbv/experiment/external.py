@@ -27,7 +27,6 @@ def take_fold(
         choose one temperature.
     splits : DataFrame
         From `nbv.experiment.splits.read_splits`.
-    fold : int
 
     Raises
     ------

@@ -47,18 +47,9 @@ OF_FOCUS = {
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What a run makes.
+    """What a run makes, from its configuration and the ids of each category's objects.
 
-    Attributes
-    ----------
-    folder : Path
-        The folder ``config`` that the configuration was composed of.
-    overrides : tuple of str
-        What it was composed with.
-    config : mapping
-        The configuration.
-    objects : mapping of str to sequence of str
-        The ids of each category's objects.
+    The configuration was composed of the files in `folder`, with the overrides.
     """
 
     folder: Path
@@ -350,12 +341,7 @@ class Plan:
     def sources(self, script: Path, settings: Mapping[str, Any] | None = None) -> list[str]:
         """Return a script and what it depends on in nbv, relative to the working directory.
 
-        Parameters
-        ----------
-        script : Path
-            Of the workflow or of the studies.
-        settings : mapping, optional
-            A configuration with another sensor.
+        `settings` is a configuration with another sensor.
         """
         settings = settings or self.config
         sensor = SENSORS.get(settings["sensor"]["name"])
@@ -414,12 +400,7 @@ def paths(pattern: str, keys: Iterable[Sequence[Any]]) -> list[str]:
 def too_small(n_objects: Mapping[str, int], epochs: int | None) -> tuple[str, ...]:
     """Return a sentence that says why a run's numbers mean nothing; none where it is large enough.
 
-    Parameters
-    ----------
-    n_objects : mapping of str to int
-        Objects of each category.
-    epochs : int or None
-        Of the estimator; None for estimates of another program.
+    `n_objects` is by category; `epochs` is None for estimates of another program.
     """
     reasons = []
     few = {category: n for category, n in n_objects.items() if n < FEWEST_OBJECTS}

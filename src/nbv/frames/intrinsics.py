@@ -178,7 +178,6 @@ class DepthCamera:
 
     Attributes
     ----------
-    intrinsics : Intrinsics, optional
     unit_m : float
         Metres per unit of integer depth.
     warnings : tuple of str

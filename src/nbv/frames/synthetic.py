@@ -55,7 +55,6 @@ class Frame:
         Metres; 0 where nothing was measured.
     mask : (480, columns) bool
         Pixels of the object with a depth.
-    intrinsics : Intrinsics
     azimuth_deg, elevation_deg : float
         Position of the camera around the object.
     """

@@ -40,7 +40,11 @@ DENSITY: Mapping[str, Any] = {
 """Settings of the paper's lookup tables; the defaults of ``density`` and ``recommendation``."""
 
 AFFINITY: Mapping[str, float] = {"power": 16.0, "pseudo_observations": 90.0}
-"""Settings of the expected error given a distribution; the defaults of ``affinity``."""
+"""Settings of the expected error given a distribution; the defaults of ``affinity``.
+
+A calibration view counts by the affinity of its distribution with the image's, to this power. So
+many pseudo-observations (one-degree views of affinity 1) shrink the error towards the mean over all
+views. Both were chosen on objects of other seeds (docs/method.md)."""
 
 Candidate = tuple[float, float]
 """A bandwidth (degrees) and a number of pseudo-observations."""

@@ -248,21 +248,10 @@ def _cockpit(rng: np.random.Generator, name: str, radius: float) -> Solids:
 
 
 def _panel(leading: ArrayLike, chords: ArrayLike, thickness: float) -> trimesh.Trimesh:
-    """Return a wing-like panel.
+    """Return a wing-like panel, blunt in front and sharp behind.
 
-    Parameters
-    ----------
-    leading : array_like
-        (m, 3): points of the leading edge, in one line as seen along x.
-    chords : array_like
-        (m,): from the leading edge towards -x.
-    thickness : float
-        In chords.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        The panel, blunt in front and sharp behind.
+    `leading` (m, 3) are points of the leading edge, in one line as seen along x, `chords` (m,)
+    extend from it towards -x, and the thickness is in chords.
     """
     edge, chord = np.asarray(leading, dtype=np.float64), np.asarray(chords, dtype=np.float64)
     across = np.cross((1.0, 0.0, 0.0), edge[-1] - edge[0])

@@ -272,18 +272,8 @@ def _hull(
 ) -> trimesh.Trimesh:
     """Return the body below the windows, cut away over the wheels.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        For the roundness of the ends.
-    line : array_like
-        (m, 2) of (x, height) along the upper edge, from the rear end at -x to the front at x.
-    half_width, clearance : float
-        Half the body's width, and its height above the road.
-    axles : tuple of float
-        Positions of the wheels along x.
-    wheel : float
-        Radius of the wheels.
+    `line` (m, 2) is (x, height) along the upper edge, from the rear end at -x to the front at x;
+    `axles` are the positions of the wheels along x, and `wheel` is their radius.
     """
     edge = np.asarray(line, dtype=np.float64)
     front = edge[-1, 0]
@@ -308,16 +298,8 @@ def _cabin(
 ) -> trimesh.Trimesh:
     """Return the part with the windows, from the belt line to the roof.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        For the lean of the walls and the roundness of the edges.
-    feet, tops : (float, float)
-        Rear and front end along x, at the belt line and at the roof.
-    heights : (float, float)
-        Heights of belt line and roof.
-    half_width : float
-        Half the body's width.
+    `feet` and `tops` are its rear and front end along x at the belt line and at the roof, `heights`
+    those of belt line and roof.
     """
     level = np.array([-0.12, 0.0, 0.5, 0.86, 0.96, 1.0])
     lean = np.clip(level, 0.0, None)

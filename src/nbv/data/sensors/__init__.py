@@ -107,7 +107,6 @@ def open_sensor(settings: Mapping[str, Any], camera: Camera, *labels: str | int)
     ----------
     settings : mapping
         The settings of `sensor_settings`.
-    camera : Camera
     *labels : str or int
         Category and elevation. With the seed and an object's id they determine its noise, which
         does not depend on other objects.

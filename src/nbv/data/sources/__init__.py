@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import time
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from nbv.data.meshes import Mesh, as_mesh
+from nbv.data.progress import logged
 from nbv.errors import UserError, nearest
 
 if TYPE_CHECKING:
@@ -123,9 +123,6 @@ def select_objects(source: MeshSource, category: str, n_objects: int | None) -> 
     return sorted(sorted(available, key=rank)[:n_objects])
 
 
-_SECONDS_BETWEEN_LINES = 5.0
-
-
 def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str]) -> dict[str, Mesh]:
     """Load, check and normalise meshes, in the order of `object_ids`.
 
@@ -137,19 +134,13 @@ def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str])
     """
     prepared: dict[str, Mesh] = {}
     bad: list[str] = []
-    start = last = time.monotonic()
-    for done, object_id in enumerate(object_ids, 1):
+    for object_id in logged(object_ids, len(object_ids), f"{category} meshes"):
         try:
             prepared[object_id] = as_mesh(source.load(category, object_id))
         except UserError as error:
             # Continue, so that a single run names every bad file.
             logger.error("%s", error)
             bad.append(str(error))
-        now = time.monotonic()
-        if now - last >= _SECONDS_BETWEEN_LINES:
-            last = now
-            left = (now - start) / done * (len(object_ids) - done)
-            logger.info("%s: mesh %d of %d, %.0f s left", category, done, len(object_ids), left)
     if bad:
         more = f" (and {len(bad) - 1} more, logged above)" if len(bad) > 1 else ""
         raise UserError(f"{bad[0]}{more}: mend the file or list its id in dataset.exclude")
@@ -162,6 +153,4 @@ def prepare_meshes(source: MeshSource, category: str, object_ids: Sequence[str])
             f"leave out copies, so that no test meets what a training saw: "
             f"dataset.exclude=[{','.join(copies)}]"
         )
-    seconds = time.monotonic() - start
-    logger.info("%s: %d meshes prepared in %.1f s", category, len(prepared), seconds)
     return prepared

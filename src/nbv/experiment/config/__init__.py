@@ -226,17 +226,10 @@ def equal_cost_epochs(epochs: int, calibration_fraction: float, parts: int) -> i
 
 
 def read_configuration(root: Path, needed: Sequence[str] = ()) -> dict[str, Any]:
-    """Read ``configuration.yaml`` of a run or reference as plain values.
+    """Read ``configuration.yaml`` of a run or reference as plain values, with the keys `needed`.
 
     Its values are checked as in `load_config`. A file of another version may lack keys, and may
-    have keys that are unknown today.
-
-    Parameters
-    ----------
-    root : pathlib.Path
-        The folder of the run or reference.
-    needed : sequence of str
-        Required keys; ``n_folds`` is always required.
+    have keys that are unknown today; ``n_folds`` is always required.
 
     Raises
     ------
@@ -249,24 +242,20 @@ def read_configuration(root: Path, needed: Sequence[str] = ()) -> dict[str, Any]
         for key in ("n_folds", *needed):
             if key not in settings:
                 raise UserError(f"{key} is missing")
-        _check_stored(settings)
+        try:
+            Config.model_validate(settings)
+        except ValidationError as error:
+            other_version = ("missing", "extra_forbidden")
+            mistakes = [each for each in error.errors() if each["type"] not in other_version]
+            if mistakes:
+                raise UserError(one_line(mistakes)) from error
+        # The schema compares keys with each other only where none is missing.
+        for category in settings.get("categories", []):
+            if category not in settings.get("elevations_deg", {}):
+                raise UserError(f"elevations_deg.{category} is missing")
     except UserError as error:
         raise UserError(f"{path}: {error}; the file is damaged: make it again") from error
     return settings | {"gives_distributions": "n_classes" in settings.get("estimator", {})}
-
-
-def _check_stored(settings: Mapping[str, Any]) -> None:
-    try:
-        Config.model_validate(settings)
-    except ValidationError as error:
-        other_version = ("missing", "extra_forbidden")
-        mistakes = [each for each in error.errors() if each["type"] not in other_version]
-        if mistakes:
-            raise UserError(one_line(mistakes)) from error
-    # The schema compares keys with each other only where none is missing.
-    for category in settings.get("categories", []):
-        if category not in settings.get("elevations_deg", {}):
-            raise UserError(f"elevations_deg.{category} is missing")
 
 
 def _fields_of(kind: Any) -> dict[str, FieldInfo]:

@@ -251,8 +251,8 @@ class Density(Section):
 class Affinity(Section):
     """How similar two distributions must be to count; see `nbv.core.circle.criteria`."""
 
-    power: Annotated[Number, Field(gt=0, le=10**4)]
-    pseudo_observations: PseudoObservations
+    power: Annotated[Number, Field(gt=0, le=10**4)] = AFFINITY["power"]
+    pseudo_observations: PseudoObservations = AFFINITY["pseudo_observations"]
 
 
 class Recommendation(Section):
@@ -402,7 +402,7 @@ class Config(Section):
     sensor: Sensor
     estimator: Estimator
     density: Density
-    affinity: Affinity = Affinity(**AFFINITY)
+    affinity: Affinity = Affinity()
     recommendation: Recommendation
     more_views: MoreViews
     transfer: Transfer

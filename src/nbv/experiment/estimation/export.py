@@ -28,7 +28,6 @@ def onnx_model(estimator: Estimator, mirrored_classes: NDArray[np.intp] | None =
 
     Parameters
     ----------
-    estimator : Estimator
     mirrored_classes : ndarray (B,), optional
         The class that each class has in a mirror image. The logits are then the mean of those for
         a crop and for its mirror image; otherwise those for the crop.

@@ -49,10 +49,8 @@ class Features:
     ----------
     network : callable
         Maps codes (n, side, side) to features (n, n_features).
-    n_features : int
     image_side : int
         Pixels.
-    provenance : mapping
     """
 
     network: Network

@@ -92,7 +92,6 @@ def to_input(codes: NDArray[np.uint8], hardware: Hardware) -> torch.Tensor:
     ----------
     codes : ndarray (..., side, side) uint8
         Depth codes of `nbv.data.depth_codes`: 0 is background, 128 the reference depth.
-    hardware : Hardware
 
     Returns
     -------

@@ -116,10 +116,6 @@ def estimate_fold(
         Whether outputs are logits of distributions. Calibration objects then choose one
         temperature (`nbv.core.circle.logits.fit_temperature`).
 
-    Returns
-    -------
-    FoldEstimates
-
     Raises
     ------
     UserError

@@ -97,15 +97,14 @@ def fit_fold(
         The n objects.
     splits : DataFrame
         From `nbv.experiment.splits.read_splits`.
-    fold : int
     settings, mirror_plane_deg
         See `fit_linear`.
 
     Returns
     -------
-    LinearEstimator
-    dict
-        For each role, ``calibration`` and ``test``, the objects and the outputs (m, n_views, k).
+    LinearEstimator, dict
+        The dict has for each role, ``calibration`` and ``test``, the objects and the outputs
+        (m, n_views, k).
 
     Raises
     ------

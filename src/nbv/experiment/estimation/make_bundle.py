@@ -109,7 +109,6 @@ def make_bundle(
 
     Parameters
     ----------
-    category : str
     estimator : Estimator
         A classifier, trained on ``<object id>/<elevation>``.
     sweeps : sequence of Sweep
@@ -125,7 +124,6 @@ def make_bundle(
         The configuration's ``sensor``.
     affinity : mapping
         The configuration's ``affinity``.
-    provenance : mapping
     """
     temperature = temperature_of(sweeps)
     # The estimator lists each object once for every elevation.

@@ -33,7 +33,6 @@ def strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.M
         ``channels`` (list of int) and ``hidden`` (int).
     image_side : int
         Pixels.
-    n_outputs : int
     """
     channels = settings["channels"]
     # The first layer's maps are the largest: normalising them took a sixth of the training time and
@@ -64,14 +63,9 @@ Loss = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 class Kind:
     """A kind of estimator.
 
-    Attributes
-    ----------
-    network : callable
-        ``network(settings, image_side, k)``, untrained.
-    targets : callable
-        ``targets(settings, n_views)``: the targets of the views of a sweep, (n_views, k).
-    loss : callable
-        ``loss(outputs, targets)``, a scalar tensor.
+    ``network(settings, image_side, k)`` returns an untrained network, ``targets(settings,
+    n_views)`` those of the views of a sweep, (n_views, k), and ``loss(outputs, targets)`` a scalar
+    tensor.
     """
 
     network: Callable[[Settings, int, int], nn.Module]

@@ -39,7 +39,6 @@ def class_targets(settings: Settings, n_views: int) -> Targets:
     ----------
     settings : mapping
         ``n_classes`` and ``target_bandwidth_deg``, the standard deviation of a narrow target.
-    n_views : int
     """
     n_classes = settings["n_classes"]
     centres = 2 * np.pi * np.arange(n_classes) / n_classes

@@ -90,7 +90,6 @@ def train_network(
     settings : mapping
         ``kind, channels, hidden, epochs, batch_size, learning_rate, weight_decay``, and further
         settings of the kind.
-    hardware : Hardware
     seed : int
         Seeds the weights and the order of the images: the same seed on the same machine gives the
         same bits.

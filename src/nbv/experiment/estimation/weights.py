@@ -51,14 +51,9 @@ class Estimator:
 
 @dataclass(frozen=True)
 class Start:
-    """Weights to start a training from.
+    """Weights of all layers, or of all but the last, to start a training from.
 
-    Attributes
-    ----------
-    weights : mapping of str to Tensor
-        Weights of all layers, or of all but the last.
-    origin : mapping
-        See `Estimator.started_from`.
+    `origin` is the new estimator's `Estimator.started_from`.
     """
 
     weights: Mapping[str, torch.Tensor]
@@ -127,12 +122,10 @@ def read_start(
     path : str
         An estimator of the same category, a network that was pretrained on all categories, or the
         depth features, whose last layer the training does not take.
-    category : str
     object_ids : sequence of str
         The training objects.
     output : str
         The path of the new estimator.
-    hardware : Hardware
 
     Raises
     ------

@@ -6,8 +6,9 @@ computes only the beliefs after several views (``explorer_beliefs.js``).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -149,19 +150,13 @@ def _add_tables(
     outcomes: Outcomes,
 ) -> list[dict[str, Any]]:
     facts = []
-    for i, (fold, criterion) in enumerate(_each_table(criteria, outcomes)):
+    for i, (fold, criterion) in enumerate(product(sorted(set(outcomes.folds)), criteria)):
         table = LookupTable.load(existing(inputs.lookups[*unit, fold, criterion]))
         stored = page_table(table)
         chunks[f"table-{index}-{i}"] = stored.text
         coarse = coarse_bins(len(table.cost), outcomes.n_views)
         facts.append({"fold": fold, "criterion": criterion, "coarse": coarse, **stored.facts})
     return facts
-
-
-def _each_table(criteria: list[str], outcomes: Outcomes) -> Iterator[tuple[int, str]]:
-    for fold in sorted(set(outcomes.folds)):
-        for criterion in criteria:
-            yield fold, criterion
 
 
 def coarse_bins(n_bins: int, n_views: int) -> int:

@@ -68,14 +68,7 @@ def as_text(*parts: bytes) -> str:
 
 @dataclass(frozen=True)
 class Quantised:
-    """A table in 256 steps.
-
-    Attributes
-    ----------
-    codes : ndarray uint8
-    low, high : float
-        The values of the codes 0 and 255.
-    """
+    """A table in 256 steps; `low` and `high` are the values of the codes 0 and 255."""
 
     codes: Codes
     low: float
@@ -113,12 +106,8 @@ _QUALITY = 30
 class Ring:
     """Depth images around one object, in one picture with `COLUMNS` images per row.
 
-    Attributes
-    ----------
-    data : str
-        A WebP picture in base64.
-    n_images, side : int
-        Number of images, evenly spaced from azimuth 0 on, and their side in pixels.
+    `data` is a WebP picture in base64. Its images are evenly spaced from azimuth 0 on, and `side`
+    is theirs in pixels.
     """
 
     data: str
@@ -148,19 +137,10 @@ def ring_of(codes: Codes) -> Ring:
 
 @dataclass(frozen=True)
 class PageTable:
-    """A lookup table as the page stores it.
+    """A lookup table as the page stores it: logs of L[viewpoint, estimate], and A[estimate, delta].
 
     Calibration sees every viewpoint equally often, so V[e] is L[., e] normalised to sum 1, and the
-    page stores L alone.
-
-    Attributes
-    ----------
-    logs : Quantised
-        Logs of L[viewpoint, estimate].
-    cost : Quantised
-        A[estimate, delta].
-    unit : str
-        Unit of the cost.
+    page stores L alone. `unit` is that of the cost.
     """
 
     logs: Quantised
@@ -212,7 +192,6 @@ class Outcomes:
 
     Attributes
     ----------
-    object_ids : tuple of str
     folds : tuple of int
         The fold that tests each object.
     n_views : int

@@ -169,7 +169,6 @@ def published_value(table: str, metric: str, row: str, method: str) -> float:
         ``mae`` (degrees), ``pauc`` (percent), or ``estimate`` and ``error`` (degrees, Table 6).
     row : str
         A category, elevation, group, initial azimuth or fold, or `AVERAGE_ROW`, `SIGMA_ROW`.
-    method : str
     """
     row_values = PUBLISHED[table].values.get(metric, {}).get(row)
     if row_values is None or method not in METHODS:

@@ -152,20 +152,10 @@ def combine(count: int, verdicts: Sequence[Verdict]) -> Verdict:
 
 
 def in_favour(part: Better | Comparable, value: float, low: float, high: float) -> Interval:
-    """Return how far a difference a - b, with its interval, favours a comparison.
+    """Return how far a difference a - b, with its 95 % interval, favours a comparison.
 
-    Parameters
-    ----------
-    part : Better or Comparable
-        The comparison.
-    value, low, high : float
-        The difference and its 95 % interval, in the statistic's unit.
-
-    Returns
-    -------
-    tuple of float
-        Value, low and high, in the same unit. The comparison holds where low is above 0 and does
-        not hold where high is below 0. For *Comparable* it is the distance inside the margin.
+    All are in the statistic's unit. The comparison holds where the low end is above 0 and does not
+    hold where the high end is below 0. For *Comparable* it is the distance inside the margin.
     """
     if isinstance(part, Comparable):
         inside = min(abs(low), abs(high)) if low * high > 0 else 0.0
@@ -193,16 +183,7 @@ def deciding(
     """Return the comparison that decides a statement; its verdict is the statement's.
 
     For *AtLeast(k, parts)* it is that of the k-th best part: by verdict, and within a verdict by
-    how far the difference favours it.
-
-    Parameters
-    ----------
-    statement : Statement
-        A statement with a verdict other than ``not run``.
-    verdicts : mapping of Comparison to str
-        The verdicts of its comparisons.
-    favours : mapping of Comparison to float
-        How far each is favoured; see `in_favour`.
+    `favours`, how far the difference favours it; see `in_favour`. The statement has been run.
     """
     if not isinstance(statement, AtLeast):
         return statement

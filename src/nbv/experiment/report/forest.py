@@ -74,10 +74,7 @@ class _Decided:
 def claims_forest(judged: pd.DataFrame) -> Figure:
     """Draw all claims that were run: how far each is favoured, with interval and verdict.
 
-    Parameters
-    ----------
-    judged : DataFrame
-        From `nbv.experiment.paper.verdicts.read_claims`.
+    `judged` comes from `nbv.experiment.paper.verdicts.read_claims`.
     """
     claims = [_decided(claim, rows) for claim, rows in _rows_of(judged)]
     groups = {
@@ -126,11 +123,7 @@ def _draw_decided(axes: Axes, claim: _Decided, row: int, color: str, marker: str
 def claim_figure(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> Figure:
     """Draw the comparisons of one claim: our differences with their intervals, and the paper's.
 
-    Parameters
-    ----------
-    claim : Claim
-    rows : mapping of Comparison to row
-        From `comparisons_of`.
+    `rows` are those of `comparisons_of`.
     """
     drawn = list(_differences(claim, rows))
     groups = list(dict.fromkeys(difference.group for difference in drawn))
@@ -191,14 +184,7 @@ def _rows_of(judged: pd.DataFrame) -> Iterator[tuple[Claim, dict[Comparison, Cla
 
 
 def deciding_comparison(claim: Claim, rows: Mapping[Comparison, ClaimRow]) -> Comparison:
-    """Return the comparison that decides a claim.
-
-    Parameters
-    ----------
-    claim : Claim
-    rows : mapping of Comparison to row
-        From `comparisons_of`.
-    """
+    """Return the comparison that decides a claim; `rows` are those of `comparisons_of`."""
     verdicts = {part: row["part_verdict"] for part, row in rows.items()}
     values = {part: statements.favour_of(part, row)[0] for part, row in rows.items()}
     return statements.deciding(claim.statement, verdicts, values)
@@ -306,13 +292,7 @@ def _key(difference: _Difference) -> Line2D:
 
 @mpl.rc_context(RC)
 def table_picture(cells: pd.DataFrame) -> Figure:
-    """Draw a table of MAE by row and method.
-
-    Parameters
-    ----------
-    cells : DataFrame
-        Rows of ``table1.csv``; see `nbv.experiment.report.settings`.
-    """
+    """Draw a table of MAE by row and method from the cells of ``table1.csv``."""
     shown = cells[cells["metric"] == "mae"]
     methods = tuple(dict.fromkeys(shown["method"].astype(str)))
     rows = list(shown.groupby("row_label", sort=False))

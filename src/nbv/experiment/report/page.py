@@ -172,8 +172,8 @@ def build_report(
 
     Parameters
     ----------
-    claims : path
-        CSV of `nbv.experiment.report.tables.claims_table`.
+    claims, table1 : path
+        CSV files of `nbv.experiment.report.tables.claims_table` and of Table 1.
     configuration, provenance : path
         ``configuration.yaml`` and ``provenance.json`` of the run.
     splits : mapping of category to path
@@ -183,8 +183,6 @@ def build_report(
         page lists the paper's tables that are absent.
     figures : mapping of name to path
         SVG files, in the order of the page.
-    table1 : path
-        CSV of Table 1.
     runtime : path
         HTML fragment of `nbv.experiment.report.runtime.runtime_table`.
     caution : sequence of str

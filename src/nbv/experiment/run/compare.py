@@ -121,17 +121,7 @@ class RunComparison:
 def compare_runs(reference: Path, run: Path) -> RunComparison:
     """Compare a run's tables and claims with a reference's.
 
-    Parameters
-    ----------
-    reference : pathlib.Path
-        ``docs/reference/<name>``, or another run's ``results/<name>``.
-    run : pathlib.Path
-        ``results/<name>``.
-
-    Returns
-    -------
-    RunComparison
-        Complete even where the settings differ.
+    The reference may be another run. The comparison is complete even where the settings differ.
 
     Raises
     ------

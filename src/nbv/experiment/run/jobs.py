@@ -116,10 +116,7 @@ def job(snakemake: Any) -> Iterator[None]:
 def why_stopped(results: str) -> list[str]:
     """Return the lines that say why a run stopped, of its jobs' logs; none where none says it.
 
-    Parameters
-    ----------
-    results : str
-        The folder of a run that `begin_run` began. Older logs are of earlier runs.
+    `results` is the folder of a run that `begin_run` began. Older logs are of earlier runs.
     """
     logs = Path(results, "logs")
     last_error = logs / LAST_ERROR
@@ -292,12 +289,9 @@ def _fail_unexpectedly(error: Exception, path: Path) -> None:
 
 
 def write_checksum(path: str) -> None:
-    """Write the SHA-256 of a run's file, in the format of ``sha256sum``.
+    """Write the SHA-256 of a run's file ``results/<name>/…``, in the format of ``sha256sum``.
 
-    Parameters
-    ----------
-    path : str
-        Relative to the project's folder: ``results/<name>/…``. Other files have no checksum.
+    Other files have no checksum.
     """
     record = _checksum_of(path)
     if record is not None:
@@ -347,10 +341,7 @@ def check(path: str) -> None:
 def states_of_files(root: str) -> dict[str, State]:
     """Return the state of every file of a run, and of those that are gone and have a checksum.
 
-    Parameters
-    ----------
-    root : str
-        ``results/<name>``.
+    `root` is ``results/<name>``.
     """
     checksums = Path(root, "checksums")
     recorded = (file.relative_to(checksums) for file in checksums.rglob("*.sha256"))
@@ -386,12 +377,8 @@ def _checksum_of(path: str) -> str | None:
 def end_with_run(logs: Path) -> None:
     """Let this process end with the run that started it on this machine; where none did, not.
 
-    A termination signal becomes an exception, so that a job removes its temporary file.
-
-    Parameters
-    ----------
-    logs : Path
-        The folder of the run's logs.
+    A termination signal becomes an exception, so that a job removes its temporary file. `logs` is
+    the folder of the run's logs.
     """
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     # On another machine, the lock may be free though the run lives.

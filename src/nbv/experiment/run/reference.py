@@ -117,14 +117,7 @@ def _kept_as(name: Path) -> Path:
 
 
 def find_reference(folder: Path, configuration: Mapping[str, Any]) -> Path:
-    """Return the reference to compare a run with, before the run is made.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        ``docs/reference``.
-    configuration : mapping
-        The run's; its ``name`` is that of the reference.
+    """Return the reference that has the name of a run, such as ``docs/reference/<name>``.
 
     Raises
     ------

@@ -178,11 +178,10 @@ def resampled_means(values: ArrayLike, objects: Ints, multiplicities: Ints) -> F
 
 
 def resampled_medians(values: ArrayLike, objects: Ints, multiplicities: Ints) -> Floats:
-    """Return the median over images in each resample of the objects.
+    """Return the median over images in each resample of the objects, as `resampled_means` does.
 
     Read from a grid of 1,001 pooled quantiles, so exact to one thousandth in rank: far finer than
-    the spread of the resamples, and a matrix product instead of a sort for each resample. Same
-    parameters and result as `resampled_means`.
+    the spread of the resamples, and a matrix product instead of a sort for each resample.
     """
     flat = np.asarray(values, dtype=np.float64)
     grid = np.quantile(flat, np.linspace(0.0, 1.0, _MEDIAN_GRID), method="inverted_cdf")

@@ -102,14 +102,7 @@ FIGURES: Mapping[str, FigureKind] = {
 
 
 def build_figure(name: str, inputs: FigureInputs) -> Figure:
-    """Draw one figure.
-
-    Parameters
-    ----------
-    name : str
-        A key of `FIGURES`.
-    inputs : FigureInputs
-        At least what `FigureKind.needs` names.
+    """Draw one of `FIGURES` from at least the inputs that `FigureKind.needs` names.
 
     Raises
     ------

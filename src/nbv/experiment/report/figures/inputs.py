@@ -67,13 +67,11 @@ class FigureInputs:
         UserError
             If a file is missing or the object is unknown.
         """
-        path = _given(self.depth, unit, "depth images")
-        images = open_depth(path, _given(self.objects, unit, "objects of depth images"))
+        objects = _given(self.objects, unit, "objects of depth images")
+        images = open_depth(_given(self.depth, unit, "depth images"), objects)
         if object_id is None:
             return np.asarray(images.codes[0])
-        if object_id not in images.object_ids:
-            raise UserError(f"{path}: no object {object_id!r}; evaluate the category again")
-        return np.asarray(images.codes[images.object_ids.index(object_id)])
+        return np.asarray(images.of([object_id])[0])
 
     def lookup(self, fold: int) -> LookupTable:
         """Return the lookup table of the focus unit in one fold.
@@ -100,18 +98,9 @@ class FigureInputs:
 class ExampleView:
     """The example object at the hardest initial azimuth, with the results of each method.
 
-    Attributes
-    ----------
-    unit, example : Unit, Example
-        The object.
-    azimuth_deg : int
-        Its initial viewpoint, where the category's single-view error is largest.
-    estimate_deg : float
-        The estimate from there.
-    views : (n_viewpoints, side, side) uint8
-        Depth codes of every viewpoint of the object.
-    outcomes : mapping of str to pandas.Series
-        The row of the evaluation by method.
+    The category's single-view error is largest at `azimuth_deg`; `estimate_deg` is the estimate
+    from there. `views` (n_viewpoints, side, side) are the depth codes of all viewpoints, and
+    `outcomes` the row of the evaluation by method.
     """
 
     unit: Unit
