@@ -1,6 +1,6 @@
 """A ROS 2 node that says how far to turn the camera; for Humble (Python 3.10) and Jazzy (3.12).
 
-No ROS 2 has run it: tests/robot/test_ros2_example.py runs it with stand-ins for rclpy,
+No ROS 2 has run it: tests/pages/test_ros2_example.py runs it with stand-ins for rclpy,
 message_filters, cv_bridge and their messages. It needs ros-<distribution>-cv-bridge,
 ros-<distribution>-message-filters, and nbv with numpy 1, since cv_bridge does not load with 2:
 

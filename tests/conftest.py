@@ -39,18 +39,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: not {"finished", "scratch"} & set(item.fixturenames))
 
 
-UNITS = (("mug", 0), ("mug", 30), ("chair", 0))
-N_FOLDS = 3
-
-
 @pytest.fixture(scope="session")
 def tree(tmp_path_factory):
-    return synthetic.build_tree(tmp_path_factory.mktemp("results") / "synthetic", UNITS)
+    return synthetic.build_tree(tmp_path_factory.mktemp("results") / "synthetic", synthetic.UNITS)
 
 
 @pytest.fixture(scope="session")
 def evaluations(tree):
-    return load_evaluations(synthetic.evaluation_files(tree, UNITS, N_FOLDS))
+    return load_evaluations(synthetic.evaluation_files(tree, synthetic.UNITS, synthetic.N_FOLDS))
 
 
 @pytest.fixture

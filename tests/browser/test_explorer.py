@@ -13,7 +13,6 @@ import pytest
 from studies.simulation import bisecting_next, recommended_next
 
 import synthetic
-from conftest import UNITS
 from nbv.core.circle.angles import circular_distance_deg
 from nbv.core.circle.belief import coarser, first_belief, updated
 from nbv.core.circle.criteria import CRITERIA
@@ -55,10 +54,10 @@ def inputs_of(root: Path, **more) -> ExplorerInputs:
     return ExplorerInputs(
         name="synthetic",
         policies=dict(zip(METHODS, ("none", "random", "opposite", "pose_ambiguity"), strict=True)),
-        evaluations=synthetic.evaluation_files(root, UNITS, 3),
+        evaluations=synthetic.evaluation_files(root, synthetic.UNITS, 3),
         lookups={
             (*fold, "pose_ambiguity"): path
-            for fold, path in synthetic.lookup_files(root, UNITS, 3).items()
+            for fold, path in synthetic.lookup_files(root, synthetic.UNITS, 3).items()
         },
         min_separation_deg=APART_DEG,
         n_views=5,
@@ -503,7 +502,7 @@ def test_larger_errors_are_darker(visit, path):
 
 def test_a_classifiers_own_distribution_is_shown(visit, tree, tmp_path):
     rng, files, kept = np.random.default_rng(0), {}, {}
-    for category, elevation in UNITS:
+    for category, elevation in synthetic.UNITS:
         for fold in (1, 2, 3):
             folder = tree / f"evaluation/{category}/el{elevation:02d}/fold{fold}"
             rows = pd.read_csv(folder / "single.csv", dtype={"object_id": str})
@@ -519,8 +518,8 @@ def test_a_classifiers_own_distribution_is_shown(visit, tree, tmp_path):
             inputs_of(
                 tree,
                 posteriors=files,
-                depth=synthetic.depth_files(tree, UNITS),
-                objects=synthetic.object_files(tree, UNITS),
+                depth=synthetic.depth_files(tree, synthetic.UNITS),
+                objects=synthetic.object_files(tree, synthetic.UNITS),
             )
         )
     )

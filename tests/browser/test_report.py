@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import synthetic
-from conftest import UNITS
 from nbv.experiment.paper.verdicts import evaluate_claims
 from nbv.experiment.plan import too_small
 from nbv.experiment.report.figures import FIGURES, FigureInputs, build_figure
@@ -21,7 +20,6 @@ from nbv.experiment.report.tables import TABLES, build_table, claims_table
 from nbv.style import save_figure
 
 WIDTHS = (390, 768, 1280)
-N_FOLDS = 3
 # The edges of the first two cells of a table's rows, and how far its box can be scrolled.
 CELLS = """box => {
     const row = box.querySelector('tbody tr');
@@ -60,9 +58,9 @@ def path(tree, evaluations, tmp_path_factory) -> Path:
         write_table(build_table(name, evaluations, settings), kinds)
     inputs = FigureInputs(
         evaluations,
-        depth=synthetic.depth_files(tree, UNITS),
-        objects=synthetic.object_files(tree, UNITS),
-        lookups=synthetic.lookup_files(tree, UNITS, N_FOLDS),
+        depth=synthetic.depth_files(tree, synthetic.UNITS),
+        objects=synthetic.object_files(tree, synthetic.UNITS),
+        lookups=synthetic.lookup_files(tree, synthetic.UNITS, synthetic.N_FOLDS),
     )
     for name in FIGURES:
         save_figure(build_figure(name, inputs), {"svg": root / f"{name}.svg"})
@@ -74,7 +72,7 @@ def path(tree, evaluations, tmp_path_factory) -> Path:
         claims=root / "claims.csv",
         configuration=tree / "configuration.yaml",
         provenance=tree / "provenance.json",
-        splits=synthetic.split_files(tree, UNITS),
+        splits=synthetic.split_files(tree, synthetic.UNITS),
         tables={name: root / f"{name}.html" for name in TABLES},
         figures={name: root / f"{name}.svg" for name in FIGURES},
         table1=root / "table1.csv",

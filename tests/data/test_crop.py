@@ -8,13 +8,13 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from rendering_shapes import shape_of
-from sensor_images import CONFIGURED
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import crop_measured, sensor_camera
 from nbv.data.render import open_renderer, render_objects
 from nbv.data.sensors import open_sensor, sensor_settings
+from rendering_shapes import shape_of
+from sensor_images import CONFIGURED
 
 SIDE = 9
 DEPTHS = arrays(

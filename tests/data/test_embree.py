@@ -7,11 +7,11 @@ import builtins
 import numpy as np
 import pytest
 import trimesh
-from rendering_shapes import procedural, rotated, shape_of, triangle_soup
 
 from nbv.data.camera import Camera, object_views
 from nbv.data.render import open_renderer
 from nbv.errors import UserError
+from rendering_shapes import procedural, rotated, shape_of, triangle_soup
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mesh_files import REAL, needs_real, pointer, points_to, put, refused, source_of
 
+from mesh_files import REAL, needs_real, pointer, points_to, put, refused, source_of
 from nbv.data.sources.files import EXTENSIONS
 
 

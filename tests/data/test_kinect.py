@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from sensor_images import CAMERA, DISTANCES_M, KINECT, kinect_sigma_m, measured, plane
 
 from nbv.data.sensors.triangulation import NEAREST_PER_M, STEP_PER_M, axial_m, lateral_px
+from sensor_images import CAMERA, DISTANCES_M, KINECT, kinect_sigma_m, measured, plane
 
 
 def test_noise_scales_with_the_size_of_the_object():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from mesh_files import pointer, points_to, put, refused, source_of
 
 

@@ -9,8 +9,8 @@ import time
 import numpy as np
 import pytest
 import trimesh
-from mesh_files import put, source_of
 
+from mesh_files import put, source_of
 from nbv.data.copies import find_copies
 from nbv.data.meshes import as_mesh
 from nbv.data.sources import prepare_meshes

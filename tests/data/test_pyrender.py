@@ -7,12 +7,12 @@ import sys
 
 import numpy as np
 import pytest
-from rendering_shapes import procedural
 from scipy import ndimage
 
 from nbv.data.camera import Camera
 from nbv.data.render import open_renderer
 from nbv.errors import UserError
+from rendering_shapes import procedural
 
 CATEGORIES = ("airplane", "car", "chair", "mug", "toilet")
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rendering_shapes import procedural
 from scipy import ndimage
 
 from nbv.data.camera import Camera, object_views
@@ -19,6 +18,7 @@ from nbv.data.randomisation import (
     randomised_sweep,
 )
 from nbv.data.render import open_renderer
+from rendering_shapes import procedural
 
 CAMERA = Camera(fov_deg=25.0, image_side=48)
 AZIMUTHS = np.arange(0.0, 360.0, 45.0)

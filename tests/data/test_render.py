@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from rendering_shapes import procedural, shape_of
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import decode_depth
 from nbv.data.render import open_renderer, render_objects
 from nbv.errors import UserError
+from rendering_shapes import procedural, shape_of
 
 CAMERA = Camera(image_side=16)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from mesh_files import REAL, needs_real, pointer, points_to, put, refused, source_of
 
 

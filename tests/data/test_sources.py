@@ -7,8 +7,8 @@ import sys
 from collections import Counter
 
 import trimesh
-from mesh_files import CONFIG, put, refused, settings_of, source_of
 
+from mesh_files import CONFIG, put, refused, settings_of, source_of
 from nbv.data.sources import SOURCES, open_source, select_objects
 from nbv.data.sources.files import EXTENSIONS
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from sensor_images import STEREO, measured, plane
 
 

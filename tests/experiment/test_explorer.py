@@ -15,7 +15,6 @@ from hypothesis.extra import numpy as arrays
 from PIL import Image
 
 import synthetic
-from conftest import N_FOLDS, UNITS
 from nbv.errors import UserError
 from nbv.experiment.explorer import ExplorerInputs, build_explorer, coarse_bins
 from nbv.experiment.explorer.data import (
@@ -34,7 +33,7 @@ from nbv.experiment.explorer.data import (
 from nbv.experiment.report.figures.views import depth_limits, shade
 from nbv.tables.lookup import LookupTable
 
-FOLDS = range(1, N_FOLDS + 1)
+FOLDS = range(1, synthetic.N_FOLDS + 1)
 POLICIES = {
     "single": "none",
     "random": "random",
@@ -48,15 +47,17 @@ def given_files(tree):
     return {
         "name": "synthetic",
         "policies": POLICIES,
-        "evaluations": synthetic.evaluation_files(tree, UNITS, N_FOLDS),
+        "evaluations": synthetic.evaluation_files(tree, synthetic.UNITS, synthetic.N_FOLDS),
         "lookups": {
             (*fold, "pose_ambiguity"): path
-            for fold, path in synthetic.lookup_files(tree, UNITS, N_FOLDS).items()
+            for fold, path in synthetic.lookup_files(
+                tree, synthetic.UNITS, synthetic.N_FOLDS
+            ).items()
         },
         "min_separation_deg": 15.0,
         "n_views": 5,
-        "depth": synthetic.depth_files(tree, UNITS),
-        "objects": synthetic.object_files(tree, UNITS),
+        "depth": synthetic.depth_files(tree, synthetic.UNITS),
+        "objects": synthetic.object_files(tree, synthetic.UNITS),
     }
 
 
@@ -74,7 +75,7 @@ def test_the_page_needs_nothing_but_itself_and_is_the_same_again(page, given_fil
 def test_the_page_has_every_object_of_every_unit(page, evaluations):
     found = re.search(r'<script type="application/json" id="facts">(.*?)</script>', page, re.S)
     units = json.loads(found[1])["units"]
-    assert [(unit["category"], unit["elevation"]) for unit in units] == list(UNITS)
+    assert [(unit["category"], unit["elevation"]) for unit in units] == list(synthetic.UNITS)
     for index, unit in enumerate(units):
         of_unit = evaluations[unit["category"], unit["elevation"]]
         folds = of_unit.drop_duplicates("object_id").set_index("object_id")["fold"]
@@ -183,7 +184,7 @@ def test_coarse_bins_lead_from_view_to_view_and_share_centres(n_views, n_bins, c
     ("n_views", "side", "n_images"), [(360, 20, 36), (360, 96, 36), (8, 16, 8)]
 )
 def test_a_ring_holds_the_figures_images(tree, n_views, side, n_images):
-    codes = np.load(synthetic.depth_files(tree, UNITS)["mug", 0], mmap_mode="r")[0]
+    codes = np.load(synthetic.depth_files(tree, synthetic.UNITS)["mug", 0], mmap_mode="r")[0]
     codes = np.repeat(np.repeat(codes, -(-side // 20), axis=1), -(-side // 20), axis=2)
     codes = codes[:: 360 // n_views, :side, :side]
     ring = ring_of(codes)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from tests.core.made import EXTENSIONS
 
+from made_estimates import EXTENSIONS
 from nbv.errors import UserError
 from nbv.experiment.methods import check_methods
 

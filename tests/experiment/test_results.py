@@ -4,7 +4,6 @@ import pandas as pd
 import pytest
 
 import synthetic
-from conftest import N_FOLDS
 from nbv.errors import UserError
 from nbv.experiment import results
 from nbv.experiment.results import COLUMNS
@@ -41,7 +40,7 @@ def test_what_a_file_is_about_is_told_and_not_read_from_its_path(tree, tmp_path)
 
 def test_units_and_methods_keep_the_order_of_the_files(tree):
     methods = synthetic.METHODS[::-1]
-    files = synthetic.evaluation_files(tree, [("chair", 0), MUG], N_FOLDS, methods)
+    files = synthetic.evaluation_files(tree, [("chair", 0), MUG], synthetic.N_FOLDS, methods)
     units = results.load_evaluations(files)
     assert list(units) == [("chair", 0), MUG]
     assert list(units[MUG]["method"].cat.categories) == list(methods)
@@ -55,7 +54,7 @@ def test_objects_come_in_the_order_of_the_splits(tree):
 
 def test_a_missing_file_is_named(tree):
     with pytest.raises(UserError, match=r"el00/fold4/single\.csv does not exist"):
-        results.load_evaluations(synthetic.evaluation_files(tree, [MUG], N_FOLDS + 1))
+        results.load_evaluations(synthetic.evaluation_files(tree, [MUG], synthetic.N_FOLDS + 1))
     with pytest.raises(UserError, match=r"spoon\.csv does not exist"):
         results.load_object_ids(tree / "splits/spoon.csv")
 

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-
 from tests.fuzz.mutations import mutate
 from tests.fuzz.readers import READERS, ROOT
 

@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from nbv.errors import UserError
 from tests.fuzz import worker
 from tests.fuzz.campaign import Campaign, Case, Worker, cases
 from tests.fuzz.readers import READERS, Reader
+
+from nbv.errors import UserError
 
 SEED = 20241
 

@@ -13,8 +13,9 @@ import traceback
 import warnings
 from pathlib import Path
 
-from nbv.errors import UserError
 from tests.fuzz.readers import READERS
+
+from nbv.errors import UserError
 
 PROCESSOR_S, CLOCK_S, MAX_BYTES = 60, 900, 6 * 2**30
 

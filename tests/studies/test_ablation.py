@@ -6,8 +6,8 @@ import pytest
 from studies.ablation import PAPER, ablate, ablation_space, ablation_table
 from studies.extensions import evaluate_extensions
 
+from made_estimates import FEW_DENSITIES, objects
 from nbv.experiment.statistics.paired import Resampler
-from tests.core.made import FEW_DENSITIES, objects
 
 
 def test_the_first_row_is_the_papers_method_and_every_other_changes_it():

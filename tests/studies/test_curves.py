@@ -14,6 +14,8 @@ from studies.curves import more_views_rows, pooled_travel, travel_rows
 from studies.extensions import choices_frame, stored_evidence
 from studies.selection import select_methods
 
+from made_estimates import EXTENSIONS, FEW_DENSITIES, objects
+from method_errors import texts
 from nbv.core.circle.angles import circular_distance_deg
 from nbv.core.circle.estimates import Posteriors
 from nbv.core.circle.evidence import evidence_of_distributions
@@ -22,9 +24,6 @@ from nbv.core.circle.policies import HeldOutViews, two_views
 from nbv.errors import UserError
 from nbv.experiment.report.table import write_table
 from nbv.experiment.statistics.paired import Resampler
-from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
-
-from .made import texts
 
 SETTINGS = {"n_views": 4, "start_every_deg": 60, "min_separation_deg": 15}
 WITH_THE_PAPERS = EXTENSIONS | {

@@ -16,13 +16,13 @@ from studies.factorial import (
     evaluate_more_views,
 )
 from studies.kept_estimates import held_out
+from tests.studies.test_extensions import N_CLASSES, hidden_handle, mean_directions
 
+from made_estimates import FEW_DENSITIES
 from nbv.core.circle.angles import circular_distance_deg
 from nbv.core.circle.evidence import COARSE_BINS
 from nbv.core.circle.fusion import ESTIMATE_FUSIONS
 from nbv.core.circle.policies import needs_lookup
-from tests.core.made import FEW_DENSITIES
-from tests.experiment.test_two_views import N_CLASSES, hidden_handle, mean_directions
 
 SETTINGS = FEW_DENSITIES | {
     "affinity": {"power": 16, "pseudo_observations": 90},

@@ -15,11 +15,11 @@ from studies.kept_estimates import (
     read_kept,
 )
 
+from made_estimates import objects
 from nbv.core.circle.angles import circular_distance_deg
 from nbv.core.circle.estimates import Estimates, Posteriors
 from nbv.errors import UserError
 from nbv.experiment.estimates import write_estimates, write_posteriors
-from tests.core.made import objects
 
 N_CLASSES = 24
 KEY = (1, 2, "coffee_mug", 15, 3, "test")

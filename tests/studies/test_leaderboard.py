@@ -6,9 +6,8 @@ import pytest
 from scipy import stats
 from studies.leaderboard import blocks_of, leaderboard_table
 
+from method_errors import METHODS, SHIFTS, blocks, object_rows, texts, without
 from nbv.experiment.statistics.paired import Resampler
-
-from .made import METHODS, SHIFTS, blocks, object_rows, texts, without
 
 
 def board(shifts=SHIFTS, methods=METHODS, **rest):

@@ -7,12 +7,11 @@ import pandas as pd
 import pytest
 from studies.runs import files_by_run, load_estimate_errors, runs_table
 
+from method_errors import texts
 from nbv.core.circle.estimates import Estimates
 from nbv.errors import UserError
 from nbv.experiment.estimates import write_estimates
 from nbv.experiment.report.settings import ReportSettings
-
-from .made import texts
 
 SETTINGS = ReportSettings(n_resamples=200)
 UNITS = (("mug", 0), ("mug", 30), ("chair", 0))

@@ -7,9 +7,9 @@ import pytest
 from studies.extensions import choices_frame, stored_evidence
 from studies.selection import select_methods, surely_better
 
+from made_estimates import EXTENSIONS, FEW_DENSITIES, objects
 from nbv.core.circle.estimates import Posteriors
 from nbv.core.circle.selection import DensityParams
-from tests.core.made import EXTENSIONS, FEW_DENSITIES, objects
 
 
 @pytest.fixture(scope="module")

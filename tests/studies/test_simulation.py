@@ -8,9 +8,9 @@ from studies.simulation import (
     recommended_next,
 )
 
+from made_estimates import evidence_of, objects
 from nbv.core.circle.angles import circular_distance_deg
 from nbv.core.circle.belief import Belief
-from tests.core.made import evidence_of, objects
 
 
 def test_recommended_views_keep_their_distance():

@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from itertools import permutations
+from pathlib import Path
+
+import grimp
+
+ROOT = Path(__file__).parents[2]
+CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+
+
+def test_the_import_contracts_are_kept():
+    # In a process of its own: import-linter turns off the loggers that other tests watch.
+    lint = "from importlinter.cli import lint_imports; sys.exit(lint_imports(no_cache=True))"
+    command = [sys.executable, "-c", f"import sys; {lint}"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_arrows_of_the_drawing_are_imports_and_lead_to_every_import():
+    *layers, _ground = CONTRACTS["contracts"][0]["layers"]
+    rooms = [room for layer in layers for room in layer.split(" | ")]
+    graph = grimp.build_graph("nbv", cache_dir=None)
+    for room in rooms:
+        graph.squash_module(f"nbv.{room}")
+    imports = {
+        (upper, lower)
+        for upper, lower in permutations(rooms, 2)
+        if graph.direct_import_exists(importer=f"nbv.{upper}", imported=f"nbv.{lower}")
+    }
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    arrows = set(re.findall(r"^ +(\w+) --> (\w+)$", text, re.MULTILINE))
+    assert arrows <= imports
+    reached = arrows
+    for middle in rooms:
+        into = {upper for upper, lower in reached if lower == middle}
+        reached = reached | {(a, b) for a in into for m, b in reached if m == middle}
+    assert imports <= reached
