@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from nbv.core import criteria, fusion
 from nbv.core.circle import belief as circle_belief
+from nbv.core.circle import criteria, fusion
 from nbv.core.circle.angles import circular_distance_deg, direction_deg
 from nbv.core.circle.density import von_mises_kernel
 from nbv.core.circle.evidence import gather_evidence
