@@ -196,8 +196,8 @@ def run_network(
             report(row["path"], error)
             first = first or (row["path"], error)
             continue
-        if found := (*crop.doubts, *(() if own_intrinsics else camera.warnings)):
-            doubts.append(f"{row['path']}: {found[0]}")
+        if reasons := (*crop.doubts, *(() if own_intrinsics else camera.warnings)):
+            doubts.append(f"{row['path']}: {reasons[0]}")
         codes.append(crop.codes)
         kept.append(i)
         focal_px.append(known.fx if known else float("nan"))
