@@ -93,8 +93,7 @@ def recordings_of(path: Path, table: pd.DataFrame) -> list[Recording]:
     for name in ("azimuth_deg", *OPTIONAL[1:]):
         if name in table:
             limit = _LIMITS.get(name, np.inf)
-            numbers = column(path, table, name, limit=limit, is_optional=name in OPTIONAL)
-            table[name] = numbers[:, 0]
+            table[name] = column(path, table, name, limit=limit, is_optional=name in OPTIONAL)
     table["path"] = _files(path, table["file"])
     if (again := table.duplicated(["object_id", "sequence", "file"])).any():
         row = int(again.to_numpy().argmax())

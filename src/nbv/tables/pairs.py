@@ -68,7 +68,7 @@ class PairTable:
                 f"{path}, row {int(is_empty.argmax()) + 2}: object_id is empty; give it"
             )
         for name in COLUMNS[1:]:
-            rows[name] = column(path, rows, name, limit=MOST_DEG)[:, 0]
+            rows[name] = column(path, rows, name, limit=MOST_DEG)
         if "elevation_deg" in rows:
             rows["elevation_deg"] = pd.to_numeric(rows["elevation_deg"], errors="coerce")
         return cls(path, rows)
