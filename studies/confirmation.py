@@ -296,9 +296,9 @@ def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     for (dataset, category), tables in _tables(objects):
-        own = objects[objects["dataset"] == dataset]
-        own = own if category == ALL else own[own["category"] == category]
-        trainings = [key for key, _ in own.groupby(list(TRAINING))]
+        part = objects[objects["dataset"] == dataset]
+        part = part if category == ALL else part[part["category"] == category]
+        trainings = [key for key, _ in part.groupby(list(TRAINING))]
         for contrast in contrasts_of(list(tables)):
             mine, other = (
                 tables[method]["error_deg"] for method in (contrast.method, contrast.other)

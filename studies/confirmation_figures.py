@@ -84,7 +84,7 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     """
     answers = _answers(contrasts)
     rows = [
-        (key, [own for _, own in part.groupby("dataset", sort=False)])
+        (key, [panel for _, panel in part.groupby("dataset", sort=False)])
         for key, part in answers.groupby(["question", "contrast", "fusion"], sort=False)
     ]
     n_columns = max(len(panels) for _, panels in rows)

@@ -165,12 +165,12 @@ def _densities(
         fusion: str, *choices: str, shared: DensityParams | None = None
     ) -> dict[Pair, DensityParams]:
         methods = {choice: {"policy": POLICIES[choice], "fusion": fusion} for choice in choices}
-        own = _settings_of(choices[0], settings)
-        chosen = choose_densities(estimate_deg, methods, own, shared=shared)
+        of_choice = _settings_of(choices[0], settings)
+        chosen = choose_densities(estimate_deg, methods, of_choice, shared=shared)
         return {(choice, fusion): density for choice, density in chosen.items()}
 
     apart = ("given_truth", "through_estimate")
-    average = best("average", *(one for one in CHOICES_WITH_TABLES if one not in apart))
+    average = best("average", *(c for c in CHOICES_WITH_TABLES if c not in apart))
     for choice in apart:
         average |= best("average", choice)
     posterior = best("posterior", "random")
@@ -191,8 +191,8 @@ def _lookups(
             continue
         density = densities.get(("random", fusion)) or densities[choice, fusion]
         kernel = densities.get((choice, fusion), density)
-        own = _settings_of(choice, settings)
-        evidence = chosen_evidence(estimate_deg, density, own, COARSE_BINS, kernel)
+        of_choice = _settings_of(choice, settings)
+        evidence = chosen_evidence(estimate_deg, density, of_choice, COARSE_BINS, kernel)
         lookups[choice, fusion] = build_lookup(evidence, policy, fusion)
     return lookups
 

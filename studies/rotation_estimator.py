@@ -14,11 +14,10 @@ from typing import Any, Final
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 from torch import nn
 
-from nbv.core.circle.logits import TEMPERATURES, log_softmax, softmax
+from nbv.core.circle.logits import likeliest_temperature, log_softmax, softmax
 from nbv.core.orientations.group import VOLUME, Orientations, chordal_mean, spiral
 from nbv.core.seeds import rng_for
 from nbv.data.camera import Camera, viewpoint_frames
@@ -150,12 +149,7 @@ def log_likelihood(logits: Array, truth: Orientations, temperature: float = 1.0)
 
 def fit_orientation_temperature(logits: Array, truth: Orientations) -> float:
     """Fit the temperature of logits (n, k) to true poses (n, 3, 3) by maximum likelihood."""
-
-    def loss(log_temperature: float) -> float:
-        return -float(log_likelihood(logits, truth, float(np.exp(log_temperature))).mean())
-
-    bounds = tuple(np.log(TEMPERATURES))
-    return float(np.exp(minimize_scalar(loss, bounds=bounds, method="bounded").x))
+    return likeliest_temperature(lambda t: float(log_likelihood(logits, truth, t).mean()))
 
 
 def predictions(logits: Array, truth: Orientations, temperature: float) -> Predictions:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
 
 from nbv.core.orientations.group import ASYMMETRIC, VOLUME, Symmetry
 from nbv.experiment.report.table import DECIDED, Cell, Part, Row, Table, difference_cell
-from nbv.experiment.statistics.metrics import percentile_interval
+from nbv.experiment.statistics.metrics import Floats, Interval, percentile_interval
 from nbv.labels import category_label, counted, interval_text, method_label, number
 from studies.solids import SOLIDS, solid
+from studies.trainings import crossed_mean
 
 FIGURES = ("mean_deg", "median_deg", "above_30", "within_15")
 """Columns of every instance and method; an object's are the means over its instances."""
@@ -25,43 +24,35 @@ FUSION_LABELS = {
 }
 
 
-@dataclass(frozen=True)
-class _Sample:
-    """A figure of every instance of some objects, and how often resamples draw each."""
+def _resample(index: pd.Index[Any], rng: np.random.Generator, n_resamples: int) -> Floats:
+    """Return the weights (n_resamples, n) of instances (n,) in resamples.
 
-    values: pd.DataFrame
-    weights: NDArray[np.float64]
-
-    def mean(self, method: str, less: str = "") -> tuple[float, float, float]:
-        """Return the mean over objects of a method's figure, less another's, with its interval."""
-        value = self.values[method] - (self.values[less] if less else 0.0)
-        numbers = value.to_numpy(dtype=np.float64)
-        objects = value.index.get_level_values("object_id")
-        center = float(value.groupby(objects).mean().mean())
-        return center, *percentile_interval(self.weights @ numbers)
-
-
-def _sample(values: pd.DataFrame, rng: np.random.Generator, n_resamples: int) -> _Sample:
-    """Draw units, then instances of each drawn unit, both with replacement.
-
-    Units are the objects; of categories that have several trainings, the trainings of each.
+    Each draws units, then instances of each drawn unit, both with replacement. Units are the
+    objects; of categories that have several trainings, the trainings of each.
     """
-    index = values.index.to_frame(index=False)
-    object_id = pd.factorize(index["object_id"])[0]
-    is_trained = "training" in index
-    unit = pd.factorize(index["training"])[0] if is_trained else object_id
+    names = index.to_frame(index=False)
+    object_id = pd.factorize(names["object_id"])[0]
+    is_trained = "training" in names
+    unit = pd.factorize(names["training"])[0] if is_trained else object_id
     parts = object_id if is_trained else np.zeros(len(index), dtype=np.intp)
     members = [
         [np.flatnonzero((parts == part) & (unit == k)) for k in np.unique(unit[parts == part])]
         for part in np.unique(parts)
     ]
-    weights = np.zeros((n_resamples, len(values)))
+    weights = np.zeros((n_resamples, len(index)))
     for row in weights:
         for units in members:
             for k in rng.integers(len(units), size=len(units)):
                 drawn = rng.choice(units[k], size=len(units[k]))
                 np.add.at(row, drawn, 1 / (len(drawn) * len(units) * len(members)))
-    return _Sample(values, weights)
+    return weights
+
+
+def _mean(values: pd.Series, weights: Floats) -> Interval:
+    """Return the mean over objects of values of instances (n,), with the resamples' interval."""
+    means = values.groupby(level="object_id").mean()
+    samples = weights @ values.to_numpy(dtype=np.float64)
+    return Interval(float(means.mean()), *percentile_interval(samples))
 
 
 def by_symmetry(objects: Sequence[str], models_info: Mapping[str, Any]) -> dict[str, list[str]]:
@@ -84,8 +75,8 @@ def orientation_table(
     Parameters
     ----------
     figures : DataFrame
-        Of `studies.rotations.evaluate`; with a column ``training`` where each object is a category
-        and its instances are judged by several trainings.
+        As of `studies.rotations.evaluate`; with a column ``training`` where each object is a
+        category and its instances are judged by several trainings.
     groups : mapping
         Objects by the name of their group.
     n_resamples : int
@@ -104,28 +95,33 @@ def orientation_table(
             wide = {
                 name: part.pivot_table(values=name, index=by, columns="method") for name in FIGURES
             }
-            draw = _sample(wide["mean_deg"], rng, n_resamples)
+            errors = wide["mean_deg"]
+            weights = _resample(errors.index, rng, n_resamples)
             rows: list[Row] = []
             for method in part["method"].unique():
-                mean = {name: _Sample(wide[name], draw.weights).mean(method) for name in FIGURES}
-                found: dict[str, object] = {"group": group, "fusion": fusion, "method": method}
-                found |= {name: values[0] for name, values in mean.items()}
-                found["ci_low"], found["ci_high"] = mean["mean_deg"][1:]
-                less = {other: draw.mean(method, other) for other in ("random", "opposite")}
-                for other, values in less.items():
-                    names = (f"less_{other}{end}" for end in ("", "_ci_low", "_ci_high"))
-                    found |= dict(zip(names, values, strict=True))
-                worse = [one for one, d in _objects(wide["mean_deg"], method) if d[1] > 0]
-                found["worse_objects"] = " ".join(worse)
-                cells.append(found)
+                mean = {name: _mean(wide[name][method], weights) for name in FIGURES}
+                error = mean["mean_deg"]
+                less = {
+                    other: _mean(errors[method] - errors[other], weights)
+                    for other in ("random", "opposite")
+                }
+                worse = _worse_objects(errors, method)
+                cells.append(
+                    {"group": group, "fusion": fusion, "method": method}
+                    | {name: figure.value for name, figure in mean.items()}
+                    | error.columns("mean_deg", "ci")
+                    | less["random"].columns("less_random", "less_random_ci")
+                    | less["opposite"].columns("less_opposite", "less_opposite_ci")
+                    | {"worse_objects": " ".join(worse)}
+                )
                 rows.append(
                     (
                         Cell(method_label(method)),
-                        Cell(interval_text(*mean["mean_deg"], decimals=1)),
-                        *(difference_cell(*less[other]) for other in less),
-                        Cell(number(mean["median_deg"][0], 1)),
-                        Cell(number(100 * mean["above_30"][0], 1)),
-                        Cell(number(100 * mean["within_15"][0], 1)),
+                        Cell(interval_text(error.value, error.low, error.high, 1)),
+                        *(difference_cell(d.value, d.low, d.high) for d in less.values()),
+                        Cell(number(mean["median_deg"].value, 1)),
+                        Cell(number(100 * mean["above_30"].value, 1)),
+                        Cell(number(100 * mean["within_15"].value, 1)),
                         Cell(", ".join(worse) or "none"),
                     )
                 )
@@ -151,11 +147,12 @@ def orientation_table(
     )
 
 
-def _objects(values: pd.DataFrame, method: str) -> list[tuple[str, tuple[float, float, float]]]:
-    """Return each object's error less that of one view, with Student's interval."""
+def _worse_objects(errors: pd.DataFrame, method: str) -> list[str]:
+    """Return the objects whose error is larger than that of one view, by Student's interval."""
     return [
-        (str(object_id), student(rows[method] - rows["single"]))
-        for object_id, rows in values.groupby(level="object_id")
+        str(object_id)
+        for object_id, rows in errors.groupby(level="object_id")
+        if _student(rows[method] - rows["single"]).low > 0
     ]
 
 
@@ -172,21 +169,21 @@ def estimator_table(pairs: pd.DataFrame, n_poses: int) -> Table:
     cells, rows = [], []
     for name, part in pairs[pairs["role"] == "test"].groupby("object_id", sort=False):
         objects = part.groupby("instance")
-        found: dict[str, Any] = {"object_id": name, "n_instances": len(objects)}
+        cell: dict[str, Any] = {"object_id": name, "n_instances": len(objects)}
         texts = [category_label(str(name))]
         for figure, decimals in (("log_likelihood", 2), ("error_deg", 1)):
-            mean, low, high = student(objects[figure].mean())
-            found |= {figure: mean, f"{figure}_low": low, f"{figure}_high": high}
-            texts.append(interval_text(mean, low, high, decimals))
-        found["median_deg"] = part["error_deg"].median()
-        found["above_30"] = (part["error_deg"] > 30).mean()
+            mean = _student(objects[figure].mean())
+            cell |= mean.columns(figure)
+            texts.append(interval_text(mean.value, mean.low, mean.high, decimals))
+        cell["median_deg"] = part["error_deg"].median()
+        cell["above_30"] = (part["error_deg"] > 30).mean()
         symmetry = solid(str(name))[1] if name in SOLIDS else ASYMMETRIC
         # With an axis of symmetry the bound depends on the grid.
         if symmetry.axis is None:
-            found["most"] = np.log(n_poses / VOLUME / len(symmetry.discrete))
-        cells.append(found)
-        texts.insert(2, number(found["most"]) if "most" in found else "–")
-        texts += [number(found["median_deg"], 1), number(100 * found["above_30"], 1)]
+            cell["most"] = np.log(n_poses / VOLUME / len(symmetry.discrete))
+        cells.append(cell)
+        texts.insert(2, number(cell["most"]) if "most" in cell else "–")
+        texts += [number(cell["median_deg"], 1), number(100 * cell["above_30"], 1)]
         rows.append(tuple(map(Cell, texts)))
     title = "One view in three dimensions"
     header = ("", "log-likelihood", "at most", "Error (°)", "median", "> 30° (%)")
@@ -201,13 +198,6 @@ def estimator_table(pairs: pd.DataFrame, n_poses: int) -> Table:
     return Table("rotation_estimator", title, title, frame, header, (Part(tuple(rows)),), notes)
 
 
-def student(values: ArrayLike) -> tuple[float, float, float]:
-    """Return a mean with Student's interval, unbounded for one value."""
-    from scipy import stats
-
-    numbers = np.asarray(values, dtype=np.float64)
-    half = np.inf
-    if len(numbers) > 1:
-        half = stats.t.ppf(0.975, len(numbers) - 1) * stats.sem(numbers)
-    mean = float(numbers.mean())
-    return mean, mean - half, mean + half
+def _student(values: pd.Series) -> Interval:
+    """Return the mean of values (n,) with Student's interval; its ends are NaN for one value."""
+    return crossed_mean([values]).interval()

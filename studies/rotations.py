@@ -206,7 +206,7 @@ def chosen_views(views: TwoViews, fusion: str) -> dict[str, NDArray[np.intp]]:
         chosen[name] = ranked[:, :1]
         chosen[f"{name}_five"] = ranked[:, :N_BEST]
     chosen["farthest_if_independent"] = chosen["bayes_error"] if views.depends_on_view else farthest
-    chosen["nbv_recommend"] = views.recommended[:, None]
+    chosen["nbv_next"] = views.recommended[:, None]
     chosen["hindsight"] = others[first, error.argmin(axis=1)[:, None]]
     chosen["oracle"] = np.concatenate(
         [_oracle(error, angle, others, views.angle_deg, half) for half in (0, 1)], axis=1

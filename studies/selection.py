@@ -70,8 +70,8 @@ def select_methods(
         which have no density and are not candidates.
     """
     estimate_deg = calibration.estimate_deg
-    own = {n: m for n, m in extensions.items() if m["fusion"] not in OF_DISTRIBUTIONS}
-    resolved, densities = _resolve(estimate_deg, own, settings)
+    of_estimates = {n: m for n, m in extensions.items() if m["fusion"] not in OF_DISTRIBUTIONS}
+    resolved, densities = _resolve(estimate_deg, of_estimates, settings)
     evidences: dict[tuple[float, float], Evidence] = {}
     image_evidence = None
     if posteriors is not None:
@@ -98,27 +98,27 @@ def _resolve(
     """Return each extension's policy and fusion without `SELECTED`, and its density."""
     open_names = [name for name, method in extensions.items() if SELECTED in method.values()]
     bounds = [n for n, m in extensions.items() if n not in open_names and m["policy"] == ORACLE]
-    own = {n: m for n, m in extensions.items() if n not in (*open_names, *bounds)}
-    if (open_names or bounds) and OPPOSITE not in own.values():
-        own = {"opposite (average)": OPPOSITE} | own
-    densities = choose_densities(estimate_deg, own, settings)
+    candidates = {n: m for n, m in extensions.items() if n not in (*open_names, *bounds)}
+    if (open_names or bounds) and OPPOSITE not in candidates.values():
+        candidates = {"opposite (average)": OPPOSITE} | candidates
+    densities = choose_densities(estimate_deg, candidates, settings)
     for name in bounds:
         fusion = extensions[name]["fusion"]
-        same_fusion = [densities[n] for n, m in own.items() if m["fusion"] == fusion]
+        same_fusion = [densities[n] for n, m in candidates.items() if m["fusion"] == fusion]
         # An oracle has no density; it takes that of the best method with the same fusion.
         densities[name] = min(same_fusion, key=lambda density: density.error_deg)
     if not open_names:
         return dict(extensions), densities
-    winner = own[_most_cautious({name: densities[name] for name in selectable(own)})]
+    winner = candidates[_most_cautious({name: densities[name] for name in selectable(candidates)})]
     followers = {
         name: {key: winner[key] if value == SELECTED else value for key, value in method.items()}
         for name, method in extensions.items()
         if name in open_names
     }
-    new = {n: m for n, m in followers.items() if m not in own.values()}
+    new = {n: m for n, m in followers.items() if m not in candidates.values()}
     densities |= choose_densities(estimate_deg, new, settings) if new else {}
     for name, method in followers.items():
-        same = next(n for n, m in (own | new).items() if m == method)
+        same = next(n for n, m in (candidates | new).items() if m == method)
         densities[name] = densities[same]
     return {**extensions, **followers}, densities
 

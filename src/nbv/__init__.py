@@ -12,7 +12,7 @@ frame to the next view::
 With an estimator of one's own, by the lookup table of its errors::
 
     table = nbv.LookupTable.load("results/paper/lookup/mug/el00/fold1/pose_ambiguity.npz")
-    delta_deg = table.recommend(first_deg)  # turn the camera, estimate again: second_deg
+    delta_deg = table.recommend(first_deg)  # rotate the camera, estimate again: second_deg
     pose_deg = nbv.average(first_deg, second_deg, delta_deg)
 
 `build_lookup` makes a table of the evidence that `gather_evidence` makes of calibration estimates.

@@ -158,7 +158,7 @@ def column(
     limit: float = np.inf,
     is_optional: bool = False,
 ) -> Array:
-    """Return the numbers (rows, n) in the cells of a column of a file.
+    """Return the numbers in the cells of a column of a file: (rows,), or (rows, n) where n > 1.
 
     Parameters
     ----------
@@ -188,4 +188,23 @@ def column(
         numbers[i] = as_finite(text.split(), cell, n, hint)
         if np.abs(numbers[i]).max() > limit:
             raise UserError(f"{cell} is not between {-limit:.9g} and {limit:.9g}")
-    return numbers
+    return numbers[:, 0] if n == 1 else numbers
+
+
+def orientation_column(path: Path, rows: pd.DataFrame, name: str) -> Array:
+    """Return the rotation matrices (rows, 3, 3) of a column with 9 numbers; see `column`."""
+    matrices = column(path, rows, name, 9).reshape(-1, 3, 3)
+    try:
+        return as_orientations(matrices, name)
+    except UserError:
+        for row, matrix in zip(rows.index, matrices, strict=True):
+            as_orientations(matrix, f"{path}, row {row + 2}: {name}")
+        raise
+
+
+def position_column(path: Path, rows: pd.DataFrame, name: str) -> Array:
+    """Return the positions (rows, 3) of `as_position` in a column; see `column`."""
+    positions = column(path, rows, name, 3)
+    for row, position in zip(rows.index, positions, strict=True):
+        as_position(position, f"{path}, row {row + 2}: {name}")
+    return positions

@@ -56,13 +56,13 @@ with job(snakemake):
     symmetry = solid(category)[1] if category in SOLIDS else ASYMMETRIC
     tables = []
     for role, names in held_out.items():
-        found = predictions(logits[role], truth[role], temperature)
+        predicted = predictions(logits[role], truth[role], temperature)
         columns = {
             "role": role,
             "instance": np.repeat(names, n_orientations),
-            "log_likelihood": found.log_likelihood,
-            "error_deg": symmetry.distance_deg(found.estimate, truth[role]),
-            "score": found.score,
+            "log_likelihood": predicted.log_likelihood,
+            "error_deg": symmetry.distance_deg(predicted.estimate, truth[role]),
+            "score": predicted.score,
         }
-        tables.append(pairs_table(category, truth[role], found.estimate, columns))
+        tables.append(pairs_table(category, truth[role], predicted.estimate, columns))
     write_csv(snakemake.output[0], pd.concat(tables), decimals=6)

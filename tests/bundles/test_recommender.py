@@ -544,7 +544,7 @@ def test_where_no_turn_gives_agreement_the_sign_is_not_doubted():
     rows[0, 3], rows[1, 9] = 1.0, 1.0
     bundle = Recommender.load("mug").bundle
     calibrated = after_rotations(rng.dirichlet(np.ones(BINS), (2, BINS)), ("a", "b"))
-    for bins, words in ((4, "one is likely wrong"), (-6, "agree if turned the other way")):
+    for bins, words in ((4, "one is likely wrong"), (-6, "agree if rotated the other way")):
         answer = next_view(
             rows / rows.sum(axis=1, keepdims=True),
             [0.0, bins * WIDTH],
@@ -592,7 +592,7 @@ def test_a_turn_the_wrong_way_contradicts_the_frames():
     assert wrong.bayes_factor < 0.05
     (warning,) = wrong.warnings
     assert "contradict" in warning
-    assert "agree if turned the other way" in warning
+    assert "agree if rotated the other way" in warning
 
 
 # Out of distribution

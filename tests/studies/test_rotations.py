@@ -111,7 +111,7 @@ def test_methods_choose_by_cost_turn_and_hindsight():
     # Never the first view again; of equal costs the nearest.
     assert chosen["bayes_error"].ravel().tolist() == [3, 0, 0, 2]
     assert chosen["farthest_if_independent"].tolist() == chosen["bayes_error"].tolist()
-    assert chosen["nbv_recommend"].ravel().tolist() == [1, 2, 3, 0]
+    assert chosen["nbv_next"].ravel().tolist() == [1, 2, 3, 0]
     assert chosen["hindsight"].ravel().tolist() == [1, 0, 3, 1]
     # The best of one half of the images, and the image of the other half nearest to it.
     assert chosen["oracle"].tolist() == [[3, 2], [3, 2], [0, 1], [0, 1]]

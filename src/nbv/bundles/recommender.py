@@ -143,7 +143,7 @@ class Recommender:
     def lying_warnings(
         self, codes: NDArray[np.uint8], logits: NDArray[np.floating[Any]]
     ) -> tuple[str, ...]:
-        """Return a sentence if crops (n, side, side) with logits (n, B) look turned by 90°.
+        """Return a sentence if crops (n, side, side) with logits (n, B) look rotated by 90°.
 
         It finds half or more of the views of a mug that are, and at most 3 % of upright ones.
         """
@@ -152,12 +152,12 @@ class Recommender:
         # Most upright frames end here, because a frame takes little longer than its network.
         if upright <= mean:
             return ()
-        turned = np.concatenate([np.rot90(codes, quarters, axes=(1, 2)) for quarters in (1, 3)])
-        sides = energy(self.network(turned)).reshape(2, -1).mean(axis=1)
+        rotated = np.concatenate([np.rot90(codes, quarters, axes=(1, 2)) for quarters in (1, 3)])
+        sides = energy(self.network(rotated)).reshape(2, -1).mean(axis=1)
         if upright - sides.min() <= deviation:
             return ()
         return (
-            "the object seems to lie on its side in the image: turn the frame by 90°, with its "
+            "the object seems to lie on its side in the image: rotate the frame by 90°, with its "
             "intrinsics, so that up is up in the image",
         )
 
@@ -237,9 +237,9 @@ class Recommender:
         # Here, because the limits hold for all frames: the message should not name one.
         check_depth_limits(near_m, far_m, self.bundle.diagonal_m)
         crops: list[Crop] = []
-        for frame, own, camera, name in zip(frames, masks, cameras, labels, strict=True):
+        for frame, pixels, camera, name in zip(frames, masks, cameras, labels, strict=True):
             try:
-                crop = self.crop(frame, mask=own, intrinsics=camera, near_m=near_m, far_m=far_m)
+                crop = self.crop(frame, mask=pixels, intrinsics=camera, near_m=near_m, far_m=far_m)
             except UserError as error:
                 if name is None:
                     raise

@@ -93,8 +93,7 @@ def recordings_of(path: Path, table: pd.DataFrame) -> list[Recording]:
     for name in ("azimuth_deg", *OPTIONAL[1:]):
         if name in table:
             limit = _LIMITS.get(name, np.inf)
-            numbers = column(path, table, name, limit=limit, is_optional=name in OPTIONAL)
-            table[name] = numbers[:, 0]
+            table[name] = column(path, table, name, limit=limit, is_optional=name in OPTIONAL)
     table["path"] = _files(path, table["file"])
     if (again := table.duplicated(["object_id", "sequence", "file"])).any():
         row = int(again.to_numpy().argmax())
@@ -196,8 +195,8 @@ def run_network(
             report(row["path"], error)
             first = first or (row["path"], error)
             continue
-        if found := (*crop.doubts, *(() if own_intrinsics else camera.warnings)):
-            doubts.append(f"{row['path']}: {found[0]}")
+        if reasons := (*crop.doubts, *(() if own_intrinsics else camera.warnings)):
+            doubts.append(f"{row['path']}: {reasons[0]}")
         codes.append(crop.codes)
         kept.append(i)
         focal_px.append(known.fx if known else float("nan"))

@@ -308,16 +308,16 @@ def _contradictions(
     """Return a sentence where views contradict each other, with the likeliest reason."""
     if bayes_factor >= LEAST_BAYES_FACTOR:
         return ()
-    said = f"the views contradict each other (Bayes factor {bayes_factor:.1g})"
-    turned_back = [-rotation for rotation in rotations_deg]
-    if log_bayes_factor(distributions, turned_back) > 0.0:
+    problem = f"the views contradict each other (Bayes factor {bayes_factor:.1g})"
+    reversed_deg = [-rotation for rotation in rotations_deg]
+    if log_bayes_factor(distributions, reversed_deg) > 0.0:
         return (
-            f"{said}, and agree if turned the other way: check that frames are not mirrored, and "
-            "the sign of the rotations (counter-clockwise seen from above)",
+            f"{problem}, and agree if rotated the other way: check that frames are not mirrored, "
+            "and the sign of the rotations (counter-clockwise seen from above)",
         )
     return (
-        f"{said}: one is likely wrong, and one more view helps; check too that the rotations are "
-        "right and that all frames show one object",
+        f"{problem}: one is likely wrong, and one more view helps; check too that the rotations "
+        "are right and that all frames show one object",
     )
 
 

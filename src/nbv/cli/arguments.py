@@ -70,6 +70,7 @@ Numbers = Annotated[list[float] | None, _list_parameter(as_numbers, "NUMBER...")
 FileAxis = Annotated[str, Parameter(allow_leading_hyphen=True)]
 WholeNumbers = Annotated[list[int] | None, _list_parameter(as_numbers, "NUMBER...")]
 WholeNumber = Annotated[int, Parameter(converter=as_whole_number, n_tokens=1, metavar="INT")]
+Estimate = Annotated[list[float] | Path, _list_parameter(as_rotations_or_file, "NUMBER...|FILE")]
 Rotations = Annotated[
     list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FROM:TO|FILE")
 ]

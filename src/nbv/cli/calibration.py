@@ -67,9 +67,9 @@ class CalibrationOptions:
         The truth of BOP's results: the folder that has the scenes' scene_gt.json, or a CSV file in
         the form of results. Default: the folder of the results.
     models_info
-        BOP's models_info.json, for the symmetries of the objects of orientations.
+        For orientations: BOP's models_info.json, which gives the objects' symmetries.
     objects
-        Keep this object of orientations; give the option again for more. Default: all.
+        Keep this object of a file of orientations; give the option again for more. Default: all.
     bundle
         The bundle to calibrate on frames: the name of a shipped one (default: mug), or a file.
     """

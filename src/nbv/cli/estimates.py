@@ -14,10 +14,10 @@ from nbv.cli.arguments import (
     AZIMUTHS,
     DISTRIBUTIONS,
     ORIENTATIONS,
+    Estimate,
     Json,
     MoveOptions,
     Numbers,
-    Rotations,
     as_paragraphs,
     check_options,
 )
@@ -58,7 +58,7 @@ class CandidateOptions:
         Camera poses that can be reached, for a table of orientations: 16 numbers each, like
         --camera-pose.
     sphere
-        Instead of --candidates: so many even camera poses about the object.
+        Instead of --candidates: the number of camera poses, spaced evenly around the object.
     """
 
     object_id: Annotated[str | None, Parameter(name="--object")] = None
@@ -74,7 +74,7 @@ def next_view(
     table: Annotated[Path, Parameter(name="TABLE")],
     /,
     *,
-    estimate: Rotations,
+    estimate: Estimate,
     rotations: Numbers = None,
     followed: Annotated[bool, Parameter(negative="--not-followed")] = True,
     limits: MoveOptions = ANY_MOVE,
@@ -98,8 +98,8 @@ def next_view(
         The file that nbv calibrate made for the estimator.
     estimate
         An azimuth, degrees; a file with distributions, one row for each view: CSV with columns p0,
-        p1, ..., or .npy; or the 9 numbers of a rotation, object to camera, or a .json or .npy file
-        with several hypotheses or views.
+        p1, ..., or .npy; or the 9 numbers of a rotation matrix, object to camera, or a .json or
+        .npy file with several hypotheses or views.
     rotations
         Rotation of each view from the first one: 0 90, or 0,90, for two distributions.
     followed
@@ -140,7 +140,7 @@ def next_view(
     print_answer(answer, enough)
 
 
-def _kind(table: Path, estimate: list[float] | Path | None) -> str:
+def _kind(table: Path, estimate: list[float] | Path) -> str:
     """Return the kind of a table; with distributions it holds azimuths too."""
     import numpy as np
 

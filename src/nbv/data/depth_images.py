@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+import logging
+import time
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.data.progress import logged
 from nbv.errors import UserError
 from nbv.files import damaged, open_array, read_json, write_json, write_rows
 
+T = TypeVar("T")
+
 Codes = NDArray[np.uint8]
+
+logger = logging.getLogger(__name__)
+
+_SECONDS_BETWEEN_LINES = 5.0
 
 
 class DepthImages(NamedTuple):
@@ -94,3 +101,16 @@ def open_depth(path: str | Path, objects_path: str | Path) -> DepthImages:
             objects_path, f"{len(set(names))} different objects, {path} has images of {len(codes)}"
         )
     return DepthImages(tuple(names), codes)
+
+
+def logged(items: Iterable[T], n_items: int, what: str) -> Iterator[T]:
+    """Yield items; log how many are done and the time left, and at last the time taken."""
+    start = last = time.monotonic()
+    for done, item in enumerate(items, 1):
+        yield item
+        now = time.monotonic()
+        if now - last >= _SECONDS_BETWEEN_LINES and done < n_items:
+            last = now
+            left = (now - start) / done * (n_items - done)
+            logger.info("%s: %d of %d, %.0f s left", what, done, n_items, left)
+    logger.info("%s: %d in %.1f s", what, n_items, time.monotonic() - start)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from nbv.core.orientations.group import (
     ASYMMETRIC,
-    Array,
     Orientations,
     along_ray,
     inverse,
@@ -20,10 +19,11 @@ from nbv.core.orientations.group import (
 from nbv.errors import UserError, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
-from nbv.numbers import as_orientations, as_position, column
+from nbv.numbers import column, orientation_column, position_column
 from nbv.tables.orientation_table import FLIP_DEG, OrientationTable
 
-BOP_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
+KEYS = ("scene_id", "im_id", "obj_id")
+BOP_COLUMNS = (*KEYS, "score", "R", "t")
 TABLE_COLUMNS = ("object_id", "R_true", "R_estimate")
 
 NEAREST_MM = 50.0
@@ -72,12 +72,13 @@ def orientation_table(
     """Return the table of a file's rows, as `read_orientation_table` does."""
     path = Path(path)
     left_out: list[str] = []
-    if "obj_id" in rows:
+    is_bop = "obj_id" in rows
+    need_columns(path, rows, BOP_COLUMNS if is_bop else TABLE_COLUMNS)
+    if is_bop:
         rows, left_out = _matched(path, rows, Path(truth) if truth else path.parent)
     elif truth is not None:
         raise UserError(f"{path} has its own truths (R_true); leave `ground_truth` out")
     symmetries = {} if models_info is None else read_models_info(models_info)
-    need_columns(path, rows, TABLE_COLUMNS)
     known = list(dict.fromkeys(rows["object_id"]))
     for name in objects:
         if name not in known:
@@ -96,19 +97,21 @@ def orientation_table(
                 raise UserError(f"{path}: {few}")
             left_out.append(f"{few}: left out")
     rows = rows[rows["object_id"].map(counts) >= FEWEST_PAIRS]
-    truths, estimates = (_orientations(path, rows, name) for name in TABLE_COLUMNS[1:])
+    truths, estimates = (orientation_column(path, rows, name) for name in TABLE_COLUMNS[1:])
+    score = column(path, rows, "score") if "score" in rows else None
+    positions = position_column(path, rows, "t_true_mm") if "t_true_mm" in rows else None
+    groups = groups_of(rows)
     _check_way_round(path, rows, truths, estimates)
-    straightened = "t_true_mm" in rows
-    if straightened:
-        straightening = along_ray(_positions(path, rows, "t_true_mm"))
+    if positions is not None:
+        straightening = along_ray(positions)
         truths, estimates = straightening @ truths, straightening @ estimates
     return OrientationTable(
         rows["object_id"].to_numpy(dtype=str),
-        groups_of(rows),
+        groups,
         estimates,
         truths,
-        column(path, rows, "score")[:, 0] if "score" in rows else None,
-        straightened,
+        score,
+        positions is not None,
         symmetries,
         tuple(left_out),
     )
@@ -122,19 +125,19 @@ def groups_of(rows: pd.DataFrame) -> NDArray[np.str_]:
 
 def _matched(path: Path, rows: pd.DataFrame, truth: Path) -> tuple[pd.DataFrame, list[str]]:
     """Return BOP's results with the truths of their instances, and what was left out."""
-    need_columns(path, rows, BOP_COLUMNS)
-    keys = ["scene_id", "im_id", "obj_id"]
-    for name in keys:
-        rows[name] = column(path, rows, name)[:, 0].astype(int).astype(str)
-    position, score = _positions(path, rows, "t"), column(path, rows, "score")[:, 0]
+    for name in KEYS:
+        rows[name] = column(path, rows, name).astype(int).astype(str)
+    position, score = position_column(path, rows, "t"), column(path, rows, "score")
     known = _read_truths(truth, set(rows["scene_id"]))
-    positions = _positions(truth, known, "t")
-    by_key = {k: list(v) for k, v in known.groupby(keys).indices.items()}
+    for name in KEYS:
+        known[name] = column(truth, known, name).astype(int).astype(str)
+    positions = position_column(truth, known, "t")
+    by_key = {k: list(v) for k, v in known.groupby(list(KEYS)).indices.items()}
     images = set(zip(known["scene_id"], known["im_id"], strict=True))
     scenes = set(known["scene_id"])
     best: dict[int, int] = {}
     n_elsewhere = 0
-    for i, key in enumerate(zip(*(rows[k] for k in keys), strict=True)):
+    for i, key in enumerate(zip(*(rows[k] for k in KEYS), strict=True)):
         if key[0] not in scenes:
             n_elsewhere += 1
             continue
@@ -169,29 +172,30 @@ def _matched(path: Path, rows: pd.DataFrame, truth: Path) -> tuple[pd.DataFrame,
 
 
 def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
-    keys = ["scene_id", "im_id", "obj_id"]
-    if truth.suffix.lower() == ".csv":
-        known = read_rows(truth, (*keys, "R", "t"))
-        for name in keys:
-            known[name] = column(truth, known, name)[:, 0].astype(int).astype(str)
-        return known
+    """Read the truths of scenes as texts, in the form of results."""
+    if truth.suffix.lower() != ".csv":
+        return _read_scenes(truth, scenes)
+    return read_rows(truth, (*KEYS, "R", "t"))
+
+
+def _read_scenes(folder: Path, scenes: set[str]) -> pd.DataFrame:
     truths = []
     for scene in sorted(scenes):
-        file = truth / f"{int(scene):06d}" / "scene_gt.json"
+        file = folder / f"{int(scene):06d}" / "scene_gt.json"
         if not file.is_file():
             continue
         for image, entries in _read_entries(file).items():
             try:
                 for entry in entries:
                     r, t = (" ".join(map(str, entry[f"cam_{k}_m2c"])) for k in "Rt")
-                    truths.append((scene, str(int(image)), str(int(entry["obj_id"])), r, t))
+                    truths.append((scene, image, str(int(entry["obj_id"])), r, t))
             except (KeyError, TypeError, ValueError):
                 raise UserError(
                     f"{file}, image {image}: an instance lacks obj_id, cam_R_m2c or cam_t_m2c"
                 ) from None
     if not truths:
-        raise UserError(f"{truth} has no <scene>/scene_gt.json of a scene of the estimates")
-    return pd.DataFrame(truths, columns=[*keys, "R", "t"])
+        raise UserError(f"{folder} has no <scene>/scene_gt.json of a scene of the estimates")
+    return pd.DataFrame(truths, columns=[*KEYS, "R", "t"])
 
 
 def read_models_info(path: str | Path) -> dict[str, Any]:
@@ -204,23 +208,6 @@ def _read_entries(path: Path) -> dict[str, Any]:
     if not isinstance(given, dict):
         raise damaged(path, "it is not a JSON object", remedy)
     return given
-
-
-def _orientations(path: Path, rows: pd.DataFrame, name: str) -> Orientations:
-    matrices = column(path, rows, name, 9).reshape(-1, 3, 3)
-    try:
-        return as_orientations(matrices, name)
-    except UserError:
-        for row, matrix in zip(rows.index, matrices, strict=True):
-            as_orientations(matrix, f"{path}, row {row + 2}: {name}")
-        raise
-
-
-def _positions(path: Path, rows: pd.DataFrame, name: str) -> Array:
-    positions = column(path, rows, name, 3)
-    for row, position in zip(rows.index, positions, strict=True):
-        as_position(position, f"{path}, row {row + 2}: {name}")
-    return positions
 
 
 def _check_way_round(

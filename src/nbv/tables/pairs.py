@@ -68,7 +68,7 @@ class PairTable:
                 f"{path}, row {int(is_empty.argmax()) + 2}: object_id is empty; give it"
             )
         for name in COLUMNS[1:]:
-            rows[name] = column(path, rows, name, limit=MOST_DEG)[:, 0]
+            rows[name] = column(path, rows, name, limit=MOST_DEG)
         if "elevation_deg" in rows:
             rows["elevation_deg"] = pd.to_numeric(rows["elevation_deg"], errors="coerce")
         return cls(path, rows)
@@ -114,24 +114,24 @@ class PairTable:
         UserError
             Where azimuths seem to be radians.
         """
-        turns, gaps = {}, {}
+        sweeps, gaps = {}, {}
         for name, rows in self.rows.groupby("object_id", sort=False):
             azimuth, estimate = (rows[key].to_numpy(dtype=np.float64) for key in COLUMNS[1:])
             if hint := radians_hint(azimuth):
                 gap = widest_gap_deg(azimuth)
                 raise UserError(f"{self.path}: object {name!r} leaves a gap of {gap:.0f}°{hint}")
-            turns[str(name)] = full_sweep(wrap_deg(azimuth), estimate)
+            sweeps[str(name)] = full_sweep(wrap_deg(azimuth), estimate)
             gaps[str(name)] = widest_gap_deg(azimuth)
-        said = []
+        warnings = []
         worst = max(gaps, key=gaps.__getitem__)
         if gaps[worst] > WIDEST_GAP_DEG + 1e-6:
             n_wide = sum(gap > WIDEST_GAP_DEG + 1e-6 for gap in gaps.values())
-            said.append(
+            warnings.append(
                 f"{n_wide} of {counted(len(gaps), 'object')} leave gaps above "
                 f"{WIDEST_GAP_DEG:g}° between views, {worst!r} one of {gaps[worst]:.0f}°: "
                 "inside, the errors of the nearest views are assumed"
             )
-        return Estimates(tuple(turns), np.stack(list(turns.values()))), tuple(said)
+        return Estimates(tuple(sweeps), np.stack(list(sweeps.values()))), tuple(warnings)
 
     @property
     def distributions(self) -> Sweeps:

@@ -175,10 +175,10 @@ def region_coverage(
     threshold belong to it in part, so that truths drawn from the distributions are inside with
     exactly the probability `level`.
     """
-    own = np.take_along_axis(probabilities, bins[:, None], axis=1)
-    denser = np.where(probabilities > own, probabilities, 0.0).sum(axis=1, dtype=np.float64)
-    equal = np.where(probabilities == own, probabilities, 0.0).sum(axis=1, dtype=np.float64)
-    share = np.zeros(len(own))
+    at_truth = np.take_along_axis(probabilities, bins[:, None], axis=1)
+    denser = np.where(probabilities > at_truth, probabilities, 0.0).sum(axis=1, dtype=np.float64)
+    equal = np.where(probabilities == at_truth, probabilities, 0.0).sum(axis=1, dtype=np.float64)
+    share = np.zeros(len(at_truth))
     np.divide(level - denser, equal, out=share, where=equal > 0)
     return np.clip(share, 0.0, 1.0)
 

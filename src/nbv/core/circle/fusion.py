@@ -179,12 +179,11 @@ def product(
         distributions exclude each other, or their product has a resultant of 0 up to rounding.
     """
     delta = np.asarray(delta_deg)
-    own, other = (
-        np.asarray(rows, dtype=np.float64).reshape(-1, np.shape(rows)[-1])
-        for rows in (first, second)
+    rows, second_rows = (
+        np.asarray(p, dtype=np.float64).reshape(-1, np.shape(p)[-1]) for p in (first, second)
     )
-    own_deg = mean_direction_deg(own)
-    return mean_direction_deg(product_of(own, other, delta), own_deg).reshape(delta.shape)
+    product = product_of(rows, second_rows, delta)
+    return mean_direction_deg(product, mean_direction_deg(rows)).reshape(delta.shape)
 
 
 Fusion = Callable[[ArrayLike, ArrayLike, ArrayLike, Evidence | None], Angles]

@@ -7,6 +7,8 @@ degree, so that log-likelihoods (nats per degree) do not depend on k: the unifor
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -104,10 +106,15 @@ def fit_temperature(logits: Floats, azimuth_deg: ArrayLike, weight: Floats | Non
     weight : ndarray (...), optional
         Weight of each image.
     """
+    return likeliest_temperature(lambda t: mean_log_likelihood(logits, azimuth_deg, t, weight))
+
+
+def likeliest_temperature(log_likelihood_at: Callable[[float], float]) -> float:
+    """Return the temperature within `TEMPERATURES` of the largest log-likelihood."""
     from scipy.optimize import minimize_scalar
 
     def loss(log_temperature: float) -> float:
-        return -mean_log_likelihood(logits, azimuth_deg, float(np.exp(log_temperature)), weight)
+        return -log_likelihood_at(float(np.exp(log_temperature)))
 
     bounds = tuple(np.log(TEMPERATURES))
     return float(np.exp(minimize_scalar(loss, bounds=bounds, method="bounded").x))

@@ -9,15 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from nbv.core.choose import entropy, expected_entropy, mixed, named
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief
 from nbv.core.orientations.group import Array, Orientations, chordal_mean, viewing_direction
-from nbv.errors import UserError, nearest
-
-
-def _entropy(distributions: Array) -> Array:
-    """Return the entropy along the last axis, in nats, with 0 log 0 = 0."""
-    logs = np.log(np.maximum(distributions, np.finfo(float).tiny))
-    return -np.asarray((distributions * logs).sum(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -53,19 +47,16 @@ def pose_ambiguity(ahead: NextViews) -> Array:
     if len(first.votes) > 1:
         raise ValueError(f"pose_ambiguity is defined for two views, not {len(first.votes) + 1}")
     pose = first.errors.conditional("estimate", first.support)[0]
-    product = pose * first.errors.conditional("estimate", first.support, ahead.moves)
-    total = product.sum(axis=2, keepdims=True)
-    uniform = np.full_like(product, 1 / product.shape[2])
-    np.divide(product, total, out=uniform, where=total > 0)
-    return _entropy(first.probability @ uniform)
+    moved = first.errors.conditional("estimate", first.support, ahead.moves)
+    return np.asarray(entropy(mixed(first.probability[None], pose, moved)[:, 0]))
 
 
 def information_gain(ahead: NextViews) -> Array:
     """Return the expected entropy of the pose after the next view, (k,) in nats."""
     first, likelihood = ahead.belief, ahead.likelihood
-    noise = _entropy(likelihood) @ first.probability
-    gained = _entropy(first.probability @ likelihood) - noise
-    return np.asarray(_entropy(first.probability) - gained)
+    noise = entropy(likelihood) @ first.probability
+    predicted = first.probability @ likelihood
+    return np.asarray(expected_entropy(entropy(first.probability), noise, predicted))
 
 
 def bayes_error(ahead: NextViews) -> Array:
@@ -146,9 +137,7 @@ def costs_of(criterion: str, ahead: NextViews) -> Array:
     UserError
         For an unknown criterion.
     """
-    if criterion not in CRITERIA:
-        raise UserError(f"criterion {criterion!r} is unknown: {nearest(criterion, CRITERIA)}")
-    return CRITERIA[criterion](ahead)
+    return named("criterion", criterion, CRITERIA)(ahead)
 
 
 def ranking(costs: Array, travel_deg: Array) -> NDArray[np.intp]:

@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nbv.core.choose import is_surely_less
 from nbv.core.orientations.group import (
     ASYMMETRIC,
     Array,
@@ -267,7 +268,7 @@ class OrientationErrors:
             flips = self.is_flip[held_out]
             by_view, shares = (np.where(flips, p, 1 - p) for p in (by_view, shares))
             gains[label] = np.log(by_view / shares).sum()
-        return bool(gains.mean() > gains.std(ddof=1) / np.sqrt(n_groups))
+        return is_surely_less(-gains, factor=1.0)
 
 
 def _apart(

@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from nbv.data.depth_images import logged
 from nbv.data.meshes import Mesh, as_mesh
-from nbv.data.progress import logged
 from nbv.errors import UserError, nearest
 
 if TYPE_CHECKING:

@@ -8,14 +8,7 @@ from collections.abc import Collection
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, Self, TypeVar
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    field_validator,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from nbv.core.circle.selection import AFFINITY
 from nbv.core.orientations.errors import OrientationErrors
@@ -34,6 +27,12 @@ def _distinct(values: list[T]) -> list[T]:
         if value in values[:index]:
             raise ValueError(f"{value} occurs twice")
     return values
+
+
+def _any(replicates: list[list[int]]) -> list[list[int]]:
+    if not any(replicates):
+        raise ValueError("no replicate under any shuffle")
+    return replicates
 
 
 def _below_root(folder: str) -> str:
@@ -70,20 +69,14 @@ Angle = Annotated[Number, Field(ge=-360, le=360)]
 Bandwidth = Annotated[Number, Field(ge=0, le=180)]
 PseudoObservations = Annotated[Number, Field(ge=0, le=10**9)]
 Share = Annotated[Number, Field(ge=0, le=1)]
-Diagonals = Annotated[Number, Field(gt=1, le=1000)]
-"""A distance in object diagonals."""
+Diagonals = Annotated[Number, Field(gt=1, le=1000)]  # a distance
 Replicate = Annotated[Whole, Field(ge=0, le=999)]
 Elevation = Annotated[Whole, Field(ge=0, le=89)]
 Name = Annotated[str, _matches(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}", NAME_RULE)]
 Text = Annotated[str, _matches(r"[^\x00-\x1f\x7f]{1,4096}", "use one line of text")]
 DataPath = Annotated[Text, AfterValidator(_with_known_home)]
-Axis = Annotated[
-    str,
-    _matches(
-        r"auto|[+-]?[xyzXYZ]|[^,\s]+(,[^,\s]+){2}",
-        "use an axis such as +y, a vector such as 0,0,1, or auto",
-    ),
-]
+_AXIS = r"auto|[+-]?[xyzXYZ]|[^,\s]+(,[^,\s]+){2}"
+Axis = Annotated[str, _matches(_AXIS, "use an axis such as +y, a vector such as 0,0,1, or auto")]
 Distinct = AfterValidator(_distinct)
 AtLeastOne = Field(min_length=1, max_length=100)
 Framing = Literal["silhouette", "axis"]
@@ -217,23 +210,18 @@ class Estimator(Section):
     @model_validator(mode="after")
     def _check_classes(self) -> Self:
         has = self.n_classes is not None, self.target_bandwidth_deg is not None
-        both = True, True
-        needs = {
-            "classifier": both,
-            "linear_classifier": both,
-            "external_distributions": (True, False),
-        }
+        needs = dict.fromkeys(("classifier", "linear_classifier"), (True, True))
+        needs["external_distributions"] = True, False
         if has != needs.get(self.kind, (False, False)):
             raise UserError(
                 f"estimator.kind={self.kind}: a classifier has n_classes and target_bandwidth_deg, "
                 "and it needs both; external_distributions needs n_classes alone; no other "
                 "estimator has either: choose estimator=classifier"
             )
-        if self.n_classes is not None and 360 % self.n_classes:
-            raise UserError(f"estimator.n_classes={self.n_classes} is not a divisor of 360")
-        if self.n_classes is not None and self.n_classes % 2:
+        if self.n_classes is not None and (360 % self.n_classes or self.n_classes % 2):
             raise UserError(
-                f"estimator.n_classes={self.n_classes} is odd: the opposite view needs a class"
+                f"estimator.n_classes={self.n_classes} is not an even divisor of 360: the opposite "
+                "view needs a class"
             )
         return self
 
@@ -281,15 +269,10 @@ class Confirmation(Section):
     """Trainings beyond the run's own; see `studies.confirmation`."""
 
     dataset: Name | None = None
-    replicates: Annotated[list[Annotated[list[Replicate], Distinct]], AtLeastOne] = [[0]]
+    replicates: Annotated[
+        list[Annotated[list[Replicate], Distinct]], AtLeastOne, AfterValidator(_any)
+    ] = [[0]]
     kept: Annotated[list[DataPath], Distinct] = []
-
-    @field_validator("replicates")
-    @classmethod
-    def _check_not_empty(cls, value: list[list[int]]) -> list[list[int]]:
-        if not any(value):
-            raise ValueError("no replicate under any shuffle")
-        return value
 
 
 class Condition(Section):

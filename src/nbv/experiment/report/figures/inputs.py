@@ -67,8 +67,8 @@ class FigureInputs:
         UserError
             If a file is missing or the object is unknown.
         """
-        objects = _given(self.objects, unit, "objects of depth images")
-        images = open_depth(_given(self.depth, unit, "depth images"), objects)
+        depth = _given(self.depth, unit, "depth images")
+        images = open_depth(depth, _given(self.objects, unit, "objects of depth images"))
         if object_id is None:
             return np.asarray(images.codes[0])
         return np.asarray(images.of([object_id])[0])
