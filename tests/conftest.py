@@ -41,7 +41,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def tree(tmp_path_factory):
-    return synthetic.build_tree(tmp_path_factory.mktemp("results") / "synthetic", synthetic.UNITS)
+    return synthetic.build_tree(tmp_path_factory.mktemp("results") / "synthetic")
 
 
 @pytest.fixture(scope="session")

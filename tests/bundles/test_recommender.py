@@ -257,19 +257,6 @@ def test_what_is_added_is_of_the_rotations_that_may_be_chosen(recommender):
     assert np.abs(unlimited).max() > 0.01
 
 
-def test_views_that_no_calibration_view_is_like_contradict_each_other():
-    frames = [example_frame(azimuth_deg) for azimuth_deg in (270.0, 15.0, 330.0, 240.0)]
-    found = Recommender.load("mug").recommend(
-        [frame.depth_m for frame in frames],
-        rotations_deg=[0.0, 315.0, 345.0, 60.0],
-        mask=[frame.mask for frame in frames],
-        intrinsics=frames[0].intrinsics,
-    )
-    assert any("contradict" in warning for warning in found.warnings)
-    assert found.move is not None
-    assert 0 < found.move.expected_error_deg < 90
-
-
 def test_a_frame_from_high_above_goes_by_turns_from_high_above(bundle):
     codes = codes_of(3, 1)
     for kept, elevation in ((0.0, -60.0), (30.0, 90.0)):

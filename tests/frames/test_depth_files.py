@@ -158,13 +158,6 @@ def test_whole_numbers_are_multiplied_by_the_scale(scale, values):
     assert to_metres(values, scale) == pytest.approx(values.astype(np.float64) * scale, rel=1e-6)
 
 
-@given(arrays(np.float32, (2, 3), elements=st.floats(0, 50, width=32)))
-def test_metres_stay_metres(depth):
-    once = to_metres(depth)
-    assert np.array_equal(once, depth)
-    assert np.array_equal(to_metres(once), once)
-
-
 def test_what_is_given_is_not_changed():
     depth = np.array([[np.nan, -1.0]], dtype=np.float32)
     to_metres(depth)

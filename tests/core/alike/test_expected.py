@@ -276,18 +276,6 @@ def test_where_one_rotation_is_best_for_all_objects_nothing_is_added() -> None:
     assert of_objects(sums, np.zeros(12), 5.0).optimism_deg(np.ones(12, dtype=bool)) == 0.0
 
 
-def test_where_no_view_is_alike_the_mean_of_all_is_expected() -> None:
-    distributions = sharp_turns(np.random.default_rng(2), 4, 60.0)
-    alike = CalibrationViews.of_sweeps(distributions).after(5)
-    # A belief that no turn has: of views that contradict each other.
-    belief = np.where(np.arange(24) % 12 == 0, 0.5, 1e-30)
-    found = expected_errors(alike, belief, 64.0, 90.0)
-    errors = errors_of(alike).mean(axis=(0, 1))
-    assert found.now_deg == pytest.approx(errors[-1], rel=1e-3)
-    assert found.after_deg == pytest.approx(errors[:-1], rel=1e-3)
-    assert found.optimism_deg(np.ones(24, dtype=bool)) == pytest.approx(0.0, abs=1e-3)
-
-
 @pytest.mark.parametrize("power", [0.0, 0.01, 1.0, 16.0, 64.0, 200.0, 3000.0])
 @pytest.mark.parametrize("rotations", [[], [5]])
 def test_the_least_weights_count_as_they_are(
