@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from made_bundles import BINS, WIDTH, random_codes, soft_turns
+from made_bundles import BINS, WIDTH, random_codes, sweep_logits
 from nbv.bundles.bundle import ELEVATION_BANDWIDTH_DEG, elevation_weights
 from nbv.bundles.calibration import (
     DENSITY,
@@ -149,7 +149,7 @@ def test_each_elevation_has_the_lookup_table_of_its_own_pairs(bundle):
 
 
 def test_a_bundle_is_calibrated_again(bundle):
-    logits = [without_common_error(2 * t) for t in soft_turns(np.random.default_rng(5), 3)]
+    logits = [without_common_error(2 * t) for t in sweep_logits(np.random.default_rng(5), 3)]
     sweeps = [
         sweep("x", logits=logits[0], elevation=10.0),
         sweep("x", logits=logits[1], elevation=np.nan),
@@ -231,7 +231,7 @@ def test_azimuths_in_radians_are_named_for_a_bundle_too(bundle):
 
 
 def test_calibrations_one_after_the_other_weigh_turns_as_one_with_all(bundle):
-    logits = 2 * soft_turns(np.random.default_rng(5), 3)
+    logits = 2 * sweep_logits(np.random.default_rng(5), 3)
     first, *others = (sweep(str(place), logits=rows) for place, rows in enumerate(logits))
     twice = recalibrated(bundle, [first], "one.csv", ONE_DENSITY)
     twice = recalibrated(twice, others, "others.csv", ONE_DENSITY)
@@ -252,7 +252,7 @@ def log_likelihood_at(temperature: float, logits, azimuth_deg) -> float:
 @pytest.mark.parametrize("n_sweeps", [1, 40])
 def test_the_temperature_is_the_likeliest_of_turns_and_of_the_bundles_own(bundle, n_sweeps):
     """The bundle's sweeps together count as `PRIOR_SWEEPS` of the others."""
-    logits = [without_common_error(5 * t) for t in soft_turns(np.random.default_rng(6), n_sweeps)]
+    logits = [without_common_error(5 * t) for t in sweep_logits(np.random.default_rng(6), n_sweeps)]
     sweeps = [sweep(str(place), logits=rows) for place, rows in enumerate(logits)]
     found = recalibrated(bundle, sweeps, "recording.csv", ONE_DENSITY).temperature
     own = [bundle.temperature * np.log(rows.astype(float)) for rows in bundle.distributions]

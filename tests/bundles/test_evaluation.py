@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from made_bundles import BINS, WIDTH, random_codes, soft_turns
+from made_bundles import BINS, WIDTH, random_codes, sweep_logits
 from nbv.bundles.evaluation import (
     FIXED,
     OPPOSITE,
@@ -44,7 +44,7 @@ CHOICES = {RANDOM, FIXED, OPPOSITE, RECOMMENDED, PAPER}
 def recording(seed=0, n=BINS, elevation=np.nan, name="cup", logits=None) -> Sweep:
     azimuth_deg = np.arange(n) * (360.0 / n)
     if logits is None:
-        logits = soft_turns(np.random.default_rng(seed), 1, n)[0]
+        logits = sweep_logits(np.random.default_rng(seed), 1, n)[0]
     codes = random_codes(np.random.default_rng(seed), n)
     return Sweep(name, "1", elevation, azimuth_deg, logits.astype(np.float32), codes)
 

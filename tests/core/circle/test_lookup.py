@@ -106,14 +106,14 @@ def test_the_next_view_obeys_the_limits_of_its_table(rng, tmp_path, max_travel_d
     names = "given_estimate", "entropy", "pose_ambiguity"
     LookupTable(rows, rows, cost, deltas, 8, 3, *names, **limits).save(tmp_path / "t.npz")
     table = LookupTable.load(tmp_path / "t.npz")
-    turns = np.arange(36) * 10
-    travel = np.minimum(turns, 360 - turns)
+    rotations = np.arange(36) * 10
+    travel = np.minimum(rotations, 360 - rotations)
     may = (travel > 10) & (travel <= max_travel_deg)
     total = np.where(may, cost + travel_cost * travel, np.inf)
-    assert table.recommend(turns).tolist() == turns[total.argmin(axis=1)].tolist()
+    assert table.recommend(rotations).tolist() == rotations[total.argmin(axis=1)].tolist()
     for estimate, row in enumerate(total):
         (best, found), *_ = ranked_rotations(table, estimate * 10.0)[0]
-        assert best % 360 == turns[row.argmin()]
+        assert best % 360 == rotations[row.argmin()]
         assert found == pytest.approx(cost[estimate, row.argmin()])
 
 
