@@ -46,7 +46,7 @@ def tree(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def evaluations(tree):
-    return load_evaluations(synthetic.evaluation_files(tree, synthetic.UNITS, synthetic.N_FOLDS))
+    return load_evaluations(synthetic.evaluation_files(tree))
 
 
 @pytest.fixture

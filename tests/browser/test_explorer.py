@@ -26,7 +26,6 @@ from nbv.experiment.explorer.data import page_table
 from nbv.tables.lookup import LookupTable
 
 METHODS = synthetic.METHODS
-EXPLORED = (("mug", 0), ("mug", 30), ("chair", 0))
 WIDTHS = (390, 768, 1280)
 APART_DEG = 15
 
@@ -40,7 +39,7 @@ def path(explored):
 def outcomes(explored):
     """All evaluation files, a row for each unit, object, first view and method."""
     frames = []
-    for (category, elevation), fold, method in product(EXPLORED, (1, 2), METHODS):
+    for (category, elevation), fold, method in product(synthetic.UNITS, (1, 2), METHODS):
         unit = f"{category}/el{elevation:02d}"
         frame = pd.read_csv(explored.results / f"evaluation/{unit}/fold{fold}/{method}.csv")
         place = {"category": category, "elevation": elevation, "fold": fold, "method": method}
@@ -54,10 +53,9 @@ def inputs_of(root: Path, **more) -> ExplorerInputs:
     return ExplorerInputs(
         name="synthetic",
         policies=dict(zip(METHODS, ("none", "random", "opposite", "pose_ambiguity"), strict=True)),
-        evaluations=synthetic.evaluation_files(root, synthetic.UNITS, 3),
+        evaluations=synthetic.evaluation_files(root),
         lookups={
-            (*fold, "pose_ambiguity"): path
-            for fold, path in synthetic.lookup_files(root, synthetic.UNITS, 3).items()
+            (*fold, "pose_ambiguity"): path for fold, path in synthetic.lookup_files(root).items()
         },
         min_separation_deg=APART_DEG,
         n_views=5,
@@ -115,21 +113,18 @@ def is_rounded(text: str, value: float) -> bool:
 def random_states(outcomes, n: int, seed: int) -> list[dict[str, object]]:
     rng = np.random.default_rng(seed)
     rows = outcomes.index.droplevel("method").unique()
-    names = rows.names
-    chosen = [
-        dict(zip(names, rows[i], strict=True)) for i in rng.choice(len(rows), n, replace=False)
-    ]
+    names = ("category", "elevation", "object", "azimuth")
     return [
-        {
-            "category": one["category"],
-            "elevation": one["elevation"],
-            "object": one["object_id"],
-            "azimuth": one["initial_deg"],
-            "method": str(rng.choice(METHODS)),
-            "views": int(rng.integers(1, 6)),
-        }
-        for one in chosen
+        dict(zip(names, rows[i], strict=True))
+        | {"method": str(rng.choice(METHODS)), "views": int(rng.integers(1, 6))}
+        for i in rng.choice(len(rows), n, replace=False)
     ]
+
+
+def errors_of(outcomes, *unit) -> pd.DataFrame:
+    """Errors by object and first view, a column for each method."""
+    rows = outcomes.loc[unit].reset_index()
+    return rows.pivot_table("error_deg", ["object_id", "initial_deg"], "method")
 
 
 def test_fifty_random_states_show_the_numbers_of_the_files(visit, path, outcomes):
@@ -212,37 +207,6 @@ def test_every_image_is_that_of_its_view(visit, path, method):
         assert captions[-1].startswith("Opposite: from 180° ")
         for place, delta in list(enumerate(turns, 1))[2:]:
             assert captions[place - 1].startswith(f"View {place}: {delta:g}° on, from {delta:g}° ")
-
-
-def test_a_finger_on_the_ring_turns_the_camera_and_in_its_middle_scrolls(visit, path):
-    page = visit(path, width=390, has_touch=True, is_mobile=True)
-    settle(page)
-    before = state_of(page)["azimuth"]
-    page.locator("#ring").scroll_into_view_if_needed()
-    touch = page.context.new_cdp_session(page)
-
-    def swipe(start: float, end: tuple[float, float]) -> None:
-        """From a part of the radius to the right of the centre by some pixels."""
-        box = page.locator("#ring").bounding_box()
-        x, y = box["x"] + box["width"] * (0.5 + start / 2), box["y"] + box["height"] / 2
-        points = [(x + end[0] * part, y + end[1] * part) for part in np.linspace(0, 1, 12)]
-        kinds = ["touchStart", *["touchMove"] * 11]
-        for kind, (px, py) in zip(kinds, points, strict=True):
-            event = {"type": kind, "touchPoints": [{"x": px, "y": py}]}
-            touch.send("Input.dispatchTouchEvent", event)
-        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-        page.wait_for_timeout(400)
-
-    scrolled = page.evaluate("scrollY")
-    swipe(0.85, (-20, -90))
-    settle(page)
-    assert 20 <= int(state_of(page)["azimuth"]) <= 50
-    assert page.evaluate("scrollY") == scrolled
-    turned = state_of(page)["azimuth"]
-    assert turned != before
-    swipe(0.0, (0, -150))
-    assert page.evaluate("scrollY") > scrolled
-    assert state_of(page)["azimuth"] == turned
 
 
 def page_evidence(table) -> tuple[Evidence, Evidence]:
@@ -358,11 +322,7 @@ def test_a_link_to_what_the_run_does_not_have_says_so(visit, path):
 def test_jumps_lead_to_the_largest_errors_of_the_files(visit, path, outcomes):
     page = visit(path, fragment(category="chair", method="proposed"))
     settle(page)
-    errors = (
-        outcomes.loc[("chair", 0)]
-        .reset_index()
-        .pivot_table("error_deg", ["object_id", "initial_deg"], "method")
-    )
+    errors = errors_of(outcomes, "chair", 0)
     page.locator("[data-method=random] .worst").click()
     settle(page)
     own = errors.loc[state_of(page)["object"]]["random"]
@@ -382,36 +342,27 @@ def test_jumps_lead_to_the_largest_errors_of_the_files(visit, path, outcomes):
         state = state_of(page)
         assert values.loc[(state["object"], int(state["azimuth"]))] >= values.max() - 0.02
     page.select_option("#jump", index=3)
-    page.click("#go")
-    settle(page)
     by_object = expected[2].groupby("object_id").mean().sort_values()
-    assert state_of(page)["object"] == by_object.index[-1]
-    page.click("#go")
-    settle(page)
-    assert state_of(page)["object"] == by_object.index[-2]
+    for rank in (1, 2):
+        page.click("#go")
+        settle(page)
+        assert state_of(page)["object"] == by_object.index[-rank]
     assert page.locator("#rank").inner_text() == f"2 of {len(by_object)}"
 
 
 def test_why_one_method_loses_adds_up(visit, path, outcomes):
     page = visit(path, fragment(category="mug", elevation=0, method="proposed"))
     settle(page)
-    errors = (
-        outcomes.loc[("mug", 0)]
-        .reset_index()
-        .pivot_table("error_deg", ["object_id", "initial_deg"], "method")
-    )
+    errors = errors_of(outcomes, "mug", 0)
     gap = errors["proposed"].mean() - errors["opposite"].mean()
-    better = (errors.groupby("object_id").mean()[["proposed", "opposite"]]).eval(
-        "proposed < opposite"
-    )
-    told = page.locator("#why").inner_text()
+    better = errors.groupby("object_id").mean().eval("proposed < opposite")
+    text = page.locator("#why").inner_text()
     # The page's errors are in hundredths, and so is what it tells.
-    said = re.search(r"is ([\d.]+)° (above|below) that of Opposite", told)
-    assert said is not None
-    assert float(said[1]) == pytest.approx(abs(gap), abs=0.015)
-    assert said[2] == ("above" if gap > 0 else "below")
-    assert f"All {len(better)} objects" in told
-    assert f"better on {better.sum()} objects" in told
+    shown, side = re.search(r"is ([\d.]+)° (above|below) that of Opposite", text).groups()
+    assert float(shown) == pytest.approx(abs(gap), abs=0.015)
+    assert side == ("above" if gap > 0 else "below")
+    assert f"All {len(better)} objects" in text
+    assert f"better on {better.sum()} objects" in text
 
 
 @pytest.mark.parametrize("width", WIDTHS)
@@ -428,10 +379,6 @@ def test_the_page_fits_without_sideways_scrolling(visit, path, width):
         width,
     )
     assert not outside
-    small = page.eval_on_selector_all(
-        "select, button", "all => all.filter(one => one.getBoundingClientRect().height < 24).length"
-    )
-    assert small == 0
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -479,61 +426,25 @@ def test_the_keyboard_alone_reaches_and_changes_everything(visit, path):
     assert state_of(page).items() >= expected.items()
 
 
-def test_turning_by_itself_goes_on_until_it_is_stopped(visit, path):
-    page = visit(path, fragment(azimuth=0))
-    settle(page)
-    page.click("#turn")
-    page.wait_for_function("explorer.state.view > 10")
-    page.click("#turn")
-    settle(page)
-    stopped = page.evaluate("explorer.state.view")
-    page.wait_for_timeout(300)
-    assert page.evaluate("explorer.state.view") == stopped
-    assert state_of(page)["azimuth"] == str(stopped)
-
-
-def test_larger_errors_are_darker(visit, path):
-    page = visit(path)
-    colours = np.array(page.evaluate("Array.from({length: 181}, (_, e) => errorColour(e))"))
-    luminance = colours @ [0.299, 0.587, 0.114]
-    assert (np.diff(luminance) < 0.01).all()
-    assert luminance[0] - luminance[-1] > 200
-
-
 def test_a_classifiers_own_distribution_is_shown(visit, tree, tmp_path):
     rng, files, kept = np.random.default_rng(0), {}, {}
-    for category, elevation in synthetic.UNITS:
-        for fold in (1, 2, 3):
-            folder = tree / f"evaluation/{category}/el{elevation:02d}/fold{fold}"
-            rows = pd.read_csv(folder / "single.csv", dtype={"object_id": str})
-            ids = tuple(rows["object_id"].drop_duplicates())
-            posteriors = posteriors_of(ids, rng.normal(0, 3, (len(ids), 360, 24)), 1.0)
-            key = (category, elevation, fold)
-            files[key] = tmp_path / f"{category}_{elevation}_{fold}.npz"
-            write_posteriors(files[key], posteriors)
-            kept[key] = posteriors
+    evaluations = synthetic.evaluation_files(tree, synthetic.UNITS, 3, ["single"])
+    for (*unit, fold, _), path in evaluations.items():
+        ids = tuple(pd.read_csv(path, dtype={"object_id": str})["object_id"].drop_duplicates())
+        key = (*unit, fold)
+        kept[key] = posteriors_of(ids, rng.normal(0, 3, (len(ids), 360, 24)), 1.0)
+        files[key] = tmp_path / "{}_{}_{}.npz".format(*key)
+        write_posteriors(files[key], kept[key])
     page_file = tmp_path / "explorer.html"
-    page_file.write_text(
-        build_explorer(
-            inputs_of(
-                tree,
-                posteriors=files,
-                depth=synthetic.depth_files(tree, synthetic.UNITS),
-                objects=synthetic.object_files(tree, synthetic.UNITS),
-            )
-        )
-    )
+    page_file.write_text(build_explorer(inputs_of(tree, posteriors=files)))
     page = visit(page_file, fragment(category="mug", elevation=30, azimuth=44))
     settle(page)
     assert page.locator("#key-own").is_visible()
-    for key, posteriors in kept.items():
-        if key[:2] != ("mug", 30):
-            continue
-        for place, name in enumerate(posteriors.object_ids):
-            go_to(page, category="mug", elevation=30, object=name, azimuth=44)
-            shown = np.array(page.evaluate("[...ownDistribution(44)]"))
-            exact = posteriors.distributions[place, 45]  # the class nearest to 44°
-            assert np.abs(shown - exact).max() <= exact.max() * 0.006
+    for place, name in enumerate(kept["mug", 30, 1].object_ids):
+        go_to(page, category="mug", elevation=30, object=name, azimuth=44)
+        shown = np.array(page.evaluate("[...ownDistribution(44)]"))
+        exact = kept["mug", 30, 1].distributions[place, 45]  # the class nearest to 44°
+        assert np.abs(shown - exact).max() <= exact.max() * 0.006
 
 
 def test_a_run_without_images_is_shown_without_them(visit, tree, tmp_path):

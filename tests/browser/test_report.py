@@ -58,9 +58,9 @@ def path(tree, evaluations, tmp_path_factory) -> Path:
         write_table(build_table(name, evaluations, settings), kinds)
     inputs = FigureInputs(
         evaluations,
-        depth=synthetic.depth_files(tree, synthetic.UNITS),
-        objects=synthetic.object_files(tree, synthetic.UNITS),
-        lookups=synthetic.lookup_files(tree, synthetic.UNITS, synthetic.N_FOLDS),
+        depth=synthetic.depth_files(tree),
+        objects=synthetic.object_files(tree),
+        lookups=synthetic.lookup_files(tree),
     )
     for name in FIGURES:
         save_figure(build_figure(name, inputs), {"svg": root / f"{name}.svg"})
@@ -72,7 +72,7 @@ def path(tree, evaluations, tmp_path_factory) -> Path:
         claims=root / "claims.csv",
         configuration=tree / "configuration.yaml",
         provenance=tree / "provenance.json",
-        splits=synthetic.split_files(tree, synthetic.UNITS),
+        splits=synthetic.split_files(tree),
         tables={name: root / f"{name}.html" for name in TABLES},
         figures={name: root / f"{name}.svg" for name in FIGURES},
         table1=root / "table1.csv",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import re
 
 import numpy as np
@@ -26,20 +25,12 @@ from nbv.choice.moves import (
 )
 from nbv.data.camera import viewpoint_frames
 from nbv.errors import FrameError, UserError
-from nbv.numbers import as_pose, read_pose
+from nbv.numbers import read_pose
+from random_poses import random_pose, seeds
 
 points = arrays(np.float64, (3,), elements=st.floats(-3, 3))
 directions = points.filter(lambda axis: np.linalg.norm(axis) > 1e-3)
 angles = st.floats(-720, 720)
-seeds = st.integers(0, 10**6)
-
-
-def random_pose(seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    pose = np.eye(4)
-    pose[:3, :3] = Rotation.random(random_state=rng).as_matrix()
-    pose[:3, 3] = rng.uniform(-2, 2, 3)
-    return pose
 
 
 def camera_at(elevation: float, azimuth: float, distance: float, centre) -> np.ndarray:
@@ -106,6 +97,11 @@ def test_an_axis_has_a_point_and_a_direction(point, direction):
 def test_a_rotation_is_one_finite_number(angle):
     with pytest.raises(UserError, match="rotation is not a finite number; give degrees"):
         moved_camera(np.eye(4), [0, 0, 0], [0, 0, 1], angle)
+
+
+def test_the_pose_of_the_camera_is_checked():
+    with pytest.raises(UserError, match="camera pose"):
+        moved_camera(2 * np.eye(4), [0, 0, 0], [0, 0, 1], 30.0)
 
 
 @pytest.mark.filterwarnings("error")
@@ -223,72 +219,6 @@ def test_of_a_camera_that_is_directed_straight_down_no_roll_is_told():
     assert len(roll_warnings((1.0, 0.0, 1.0))) == 1
 
 
-# Poses
-
-
-@given(seed=seeds)
-def test_a_pose_is_16_numbers(seed):
-    pose = random_pose(seed)
-    assert np.array_equal(as_pose(pose), pose)
-    assert np.array_equal(as_pose(pose.ravel().tolist()), pose)
-
-
-def bad_poses():
-    pose = random_pose(1)
-    mirrored, scaled, unreal = (pose.copy() for _ in range(3))
-    mirrored[:3, 0] *= -1
-    scaled[:3, :3] *= 1.01
-    unreal[0, 3] = np.nan
-    return {
-        "transposed": pose.T,
-        "mirrored": mirrored,
-        "scaled": scaled,
-        "nan": unreal,
-        "huge": 1e300 * pose,
-    }
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", bad_poses())
-def test_what_is_no_rotation_with_a_translation_is_refused(name):
-    reasons = {"transposed": "transposed", "mirrored": "a reflection", "nan": "finite numbers"}
-    with pytest.raises(UserError, match=reasons.get(name, "not a rotation|scaled")):
-        as_pose(bad_poses()[name])
-    with pytest.raises(UserError, match="camera pose"):
-        moved_camera(bad_poses()[name], [0, 0, 0], [0, 0, 1], 30.0)
-
-
-@pytest.mark.parametrize(
-    ("row", "value", "message"),
-    [
-        ((3, 3), 2.0, "camera pose: the last row is 0 0 0 2, but a pose has 0 0 0 1"),
-        ((1, 1), np.nan, "camera pose is not 16 finite numbers"),
-    ],
-)
-def test_a_wrong_row_of_a_pose_is_shown(row, value, message):
-    pose = np.eye(4)
-    pose[row] = value
-    with pytest.raises(UserError, match=message):
-        as_pose(pose)
-
-
-@pytest.mark.parametrize("values", [np.eye(3), np.ones((3, 4)), [], 1.0])
-def test_a_pose_of_another_size_is_refused(values):
-    with pytest.raises(UserError, match="not 16 finite numbers; give a 4 × 4 matrix"):
-        as_pose(values)
-
-
-def test_a_pose_is_within_reach():
-    pose = random_pose(1)
-    pose[1, 3] = 1e300
-    with pytest.raises(UserError, match=r"the translation: 1e\+300 m away; give metres"):
-        as_pose(pose)
-
-
-def test_rounded_numbers_are_a_pose():
-    as_pose(random_pose(3).round(4))
-
-
 # Rotations from a mask
 
 
@@ -319,22 +249,6 @@ def test_what_is_no_rotation_is_refused_in_an_array_and_in_a_file(tmp_path, valu
 
 
 # Files
-
-
-@given(seed=seeds)
-def test_every_form_of_file_gives_the_pose(tmp_path_factory, seed):
-    folder, pose = tmp_path_factory.mktemp("pose"), random_pose(seed)
-    np.save(folder / "a.npy", pose)
-    np.save(folder / "flat.npy", pose.ravel())
-    (folder / "a.json").write_text(json.dumps(pose.tolist()))
-    (folder / "flat.json").write_text(json.dumps(pose.ravel().tolist()))
-    np.savetxt(folder / "a.txt", pose, fmt="%.17g")
-    np.savetxt(folder / "a.csv", pose, fmt="%.17g", delimiter=",")
-    for name in ("a.txt", "a.json"):
-        marked = (folder / name).with_stem("mark")
-        marked.write_text((folder / name).read_text(), encoding="utf-8-sig")
-    for path in folder.iterdir():
-        assert np.array_equal(read_pose(path), pose), path.name
 
 
 def damaged_poses() -> dict[str, bytes]:
@@ -370,13 +284,6 @@ def test_a_suffix_may_be_in_capitals(tmp_path):
     with (tmp_path / "A.NPY").open("wb") as file:
         np.save(file, [90.0, 180.0])
     assert read_rotations(tmp_path / "A.NPY").tolist() == [90.0, 180.0]
-
-
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(UserError, match=r"no\.npy does not exist"):
-        read_pose(tmp_path / "no.npy")
-    with pytest.raises(UserError, match="is a folder"):
-        read_pose(tmp_path)
 
 
 # The object is where the axis is

@@ -47,17 +47,14 @@ def given_files(tree):
     return {
         "name": "synthetic",
         "policies": POLICIES,
-        "evaluations": synthetic.evaluation_files(tree, synthetic.UNITS, synthetic.N_FOLDS),
+        "evaluations": synthetic.evaluation_files(tree),
         "lookups": {
-            (*fold, "pose_ambiguity"): path
-            for fold, path in synthetic.lookup_files(
-                tree, synthetic.UNITS, synthetic.N_FOLDS
-            ).items()
+            (*fold, "pose_ambiguity"): path for fold, path in synthetic.lookup_files(tree).items()
         },
         "min_separation_deg": 15.0,
         "n_views": 5,
-        "depth": synthetic.depth_files(tree, synthetic.UNITS),
-        "objects": synthetic.object_files(tree, synthetic.UNITS),
+        "depth": synthetic.depth_files(tree),
+        "objects": synthetic.object_files(tree),
     }
 
 
@@ -184,7 +181,7 @@ def test_coarse_bins_lead_from_view_to_view_and_share_centres(n_views, n_bins, c
     ("n_views", "side", "n_images"), [(360, 20, 36), (360, 96, 36), (8, 16, 8)]
 )
 def test_a_ring_holds_the_figures_images(tree, n_views, side, n_images):
-    codes = np.load(synthetic.depth_files(tree, synthetic.UNITS)["mug", 0], mmap_mode="r")[0]
+    codes = np.load(synthetic.depth_files(tree)["mug", 0], mmap_mode="r")[0]
     codes = np.repeat(np.repeat(codes, -(-side // 20), axis=1), -(-side // 20), axis=2)
     codes = codes[:: 360 // n_views, :side, :side]
     ring = ring_of(codes)

@@ -12,9 +12,6 @@ from tests.fuzz.mutations import mutate
 
 from made_bundles import COLUMNS as WIDTH_PX
 from made_bundles import FOCAL_PX, ROWS, frame
-
-pytest.importorskip("cyclopts")
-
 from nbv.cli import main
 
 CAMERA = {"fx": FOCAL_PX, "fy": FOCAL_PX, "cx": 59.5, "cy": 44.5, "width": WIDTH_PX, "height": ROWS}

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.cli.test_command_line import POSE, fails, run, same_move
 
+from commands import POSE, fails, run, same_move
 from made_bundles import BINS, WIDTH, random_codes, soft_turns
 from made_estimates import unclear_turns
 from nbv.bundles.recommender import Recommender

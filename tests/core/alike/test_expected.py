@@ -318,19 +318,6 @@ def test_what_was_given_may_be_changed_later(rng: np.random.Generator, most: int
     assert np.array_equal(after.after_deg, before.after_deg)
 
 
-def test_the_errors_of_a_belief_do_not_depend_on_those_before_it(rng: np.random.Generator) -> None:
-    """What was found for other beliefs is kept."""
-    distributions, beliefs = sharp_turns(rng, 6, 6.0), sharp_turns(rng, 1, 12.0)[0]
-    kept = CalibrationViews.of_sweeps(distributions).after(5)
-    for belief in beliefs:
-        found, alone = (
-            expected_errors(one, belief, 16.0, 30.0)
-            for one in (kept, CalibrationViews.of_sweeps(distributions).after(5))
-        )
-        assert found.after_deg == pytest.approx(alone.after_deg, rel=1e-5)
-        assert found.now_deg == pytest.approx(alone.now_deg, rel=1e-5)
-
-
 @pytest.mark.parametrize("rotations", [[], [5]])
 @pytest.mark.parametrize("most", [None, 20])
 def test_sums_are_of_whole_objects(

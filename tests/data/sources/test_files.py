@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 import trimesh
 
-from mesh_files import READER, pointer, put, refused, source_of
+from mesh_files import READER, REAL, needs_real, pointer, points_to, put, refused, source_of
 from nbv.data.sources import prepare_meshes, select_objects
+from nbv.data.sources.files import EXTENSIONS
 from nbv.files import read_csv, write_csv
 
 
@@ -179,3 +180,202 @@ def test_a_list_of_exclusions_without_an_end_is_not_read(root):
     refused(
         lambda: source_of("folder", root=str(root), exclude_file="/dev/null"), "not a regular file"
     )
+
+
+@pytest.mark.parametrize("extension", EXTENSIONS)
+def test_each_format_is_read_checked_and_normalised(tmp_path, extension):
+    put(tmp_path / "mug" / f"one{extension}", pointer((0, 0, 1)))
+    source = source_of("folder", root=str(tmp_path))
+    assert source.object_ids("mug") == ["one"]
+    mesh = source.load("mug", "one")
+    assert len(mesh.faces) == 24
+    assert np.isclose(np.linalg.norm(np.ptp(mesh.vertices, axis=0)), 1.0)
+    assert points_to(mesh) == "+x"
+
+
+def test_other_files_and_letter_case_do_not_matter(tmp_path):
+    put(tmp_path / "mug" / "one.ply").rename(tmp_path / "mug" / "one.PLY")
+    (tmp_path / "mug" / "README.txt").write_text("not a mesh")
+    source = source_of("folder", root=str(tmp_path))
+    assert source.object_ids("mug") == ["one"]
+    source.load("mug", "one")
+
+
+def test_a_category_may_have_another_folder_and_front(tmp_path):
+    put(tmp_path / "cups" / "one.ply", pointer((0, 0, 1)))
+    source = source_of(
+        "folder", root=str(tmp_path), categories={"mug": "cups"}, turn_deg={"mug": 270}
+    )
+    assert points_to(source.load("mug", "one")) == "-y"
+
+
+def test_a_relative_root_is_below_the_working_directory(tmp_path, monkeypatch):
+    put(tmp_path / "data" / "mug" / "one.ply")
+    monkeypatch.chdir(tmp_path)
+    assert source_of("folder", root="data").object_ids("mug") == ["one"]
+
+
+def test_missing_folders_are_named(tmp_path):
+    nowhere = tmp_path / "nowhere"
+    refused(lambda: source_of("folder", root=None), "dataset.root is not set")
+    source = source_of("folder", root=str(nowhere))
+    refused(lambda: source.object_ids("mug"), nowhere, "does not exist", "dataset.root")
+    source = source_of("folder", root=str(tmp_path))
+    absent = (tmp_path / "mug", "does not exist", "out of categories")
+    refused(lambda: source.object_ids("mug"), *absent)
+    (tmp_path / "mug").write_text("")
+    refused(lambda: source.object_ids("mug"), tmp_path / "mug", "is not a folder")
+
+
+@needs_real
+def test_real_toilets_have_their_cisterns_behind():
+    source = source_of("folder", root=str(REAL / "meshes"))
+    for object_id in source.object_ids("toilet"):
+        vertices = np.asarray(source.load("toilet", object_id).vertices)
+        top = vertices[vertices[:, 2] > np.quantile(vertices[:, 2], 0.9)]
+        assert top[:, 0].mean() < 0
+
+
+def test_both_parts_and_the_mugs_other_name(tmp_path):
+    put(tmp_path / "cup" / "train" / "cup_0001.off", pointer((0, -1, 0)))
+    put(tmp_path / "cup" / "test" / "cup_0080.off", pointer((0, -1, 0)))
+    source = source_of("modelnet", root=str(tmp_path))
+    assert source.object_ids("mug") == ["cup_0001", "cup_0080"]
+    assert points_to(source.load("mug", "cup_0080")) == "-y"
+
+
+@pytest.mark.parametrize("header", ["OFF4 4 0", "OFF 4 4 0", "OFF\n4 4 0", "OFF\n# c\n\n4 4 0"])
+def test_counts_glued_to_the_header_are_read(tmp_path, header):
+    path = tmp_path / "chair" / "train" / "chair_0001.off"
+    path.parent.mkdir(parents=True)
+    body = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"
+    path.write_text(f"{header}\n{body}")
+    mesh = source_of("modelnet", root=str(tmp_path)).load("chair", "chair_0001")
+    assert mesh.is_watertight
+    assert len(mesh.vertices) == len(mesh.faces) == 4
+
+
+def test_missing_folders_of_modelnet_are_named(tmp_path):
+    (tmp_path / "chair").mkdir()
+    source = source_of("modelnet", root=str(tmp_path))
+    refused(lambda: source.object_ids("chair"), tmp_path / "chair", "train", "test")
+    refused(lambda: source.object_ids("car"), tmp_path / "car", "does not exist")
+
+
+class TestShapeNetCore:
+    def tree(self, root, layout, n=3, synset="03797390"):
+        for i in range(n):
+            folder = root / synset / f"id{i}"
+            file = folder / ("model.obj" if layout == "v1" else "models/model_normalized.obj")
+            put(file, pointer((1, 0, 0) if layout == "v1" else (0, 0, -1)))
+        return root
+
+    @pytest.mark.parametrize("layout", ["v1", "v2"])
+    @pytest.mark.parametrize("told", [True, False])
+    def test_its_front_goes_to_plus_x_and_a_mugs_to_270_degrees(self, tmp_path, layout, told):
+        self.tree(tmp_path, layout)
+        self.tree(tmp_path, layout, synset="02958343")
+        chosen = layout if told else "auto"
+        source = source_of("shapenet", root=str(tmp_path), layout=chosen)
+        assert source.object_ids("mug") == ["id0", "id1", "id2"]
+        assert points_to(source.load("car", "id1")) == "+x"
+        assert points_to(source.load("mug", "id0")) == "-y"
+
+    def test_axes_of_the_configuration_come_first(self, tmp_path):
+        self.tree(tmp_path, "v2")
+        source = source_of("shapenet", root=str(tmp_path), up="+y", front="+z", turn_deg={})
+        assert points_to(source.load("mug", "id0")) == "-x"
+
+    def test_a_model_without_a_file_is_refused_unless_it_is_excluded(self, tmp_path):
+        self.tree(tmp_path, "v2")
+        (tmp_path / "03797390" / "hollow").mkdir()
+        source = source_of("shapenet", root=str(tmp_path))
+        refused(lambda: source.object_ids("mug"), tmp_path / "03797390" / "hollow", "exclude")
+        source = source_of("shapenet", root=str(tmp_path), exclude=["hollow"])
+        assert source.object_ids("mug") == ["id0", "id1", "id2"]
+
+    def test_there_are_no_toilets(self, tmp_path):
+        self.tree(tmp_path, "v2")
+        source = source_of("shapenet", root=str(tmp_path))
+        refused(lambda: source.object_ids("toilet"), "ShapeNetCore has no toilet", "layout=sem")
+
+    def test_a_missing_synset_is_named(self, tmp_path):
+        self.tree(tmp_path, "v2")
+        source = source_of("shapenet", root=str(tmp_path))
+        refused(lambda: source.object_ids("chair"), tmp_path / "03001627", "dataset.categories")
+
+
+class TestShapeNetSem:
+    METADATA = (
+        "fullId,category,wnsynset,wnlemmas,up,front,unit\n"
+        'wss.aa,"Mug,DrinkingUtensil",n03797390,mug,,,0.01\n'
+        r'wss.bb,Toilet,n04446521,"toilet,can","0.0\,1.0\,0.0","0.0\,0.0\,1.0",0.02'
+        "\n"
+        "wss.cc,Toilet,n04446521,toilet,,,0.02\n"
+        "wss.dd,Cup,03797390,mug,,,\n"
+    )
+
+    @pytest.fixture
+    def root(self, tmp_path):
+        (tmp_path / "metadata.csv").write_text(self.METADATA)
+        for name, towards in (("aa", (0, -1, 0)), ("bb", (0, 0, 1)), ("dd", (0, -1, 0))):
+            put(tmp_path / "models" / f"{name}.obj", pointer(towards))
+        return tmp_path
+
+    def test_categories_are_found_by_name_and_by_synset(self, root):
+        source = source_of("shapenet", root=str(root), exclude=["cc"])
+        assert source.object_ids("mug") == ["aa", "dd"]
+        assert source.object_ids("toilet") == ["bb"]
+
+    def test_each_model_has_its_own_axes_or_the_default(self, root):
+        source = source_of("shapenet", root=str(root))
+        assert points_to(source.load("toilet", "bb")) == "+x"
+        assert points_to(source.load("mug", "aa")) == "-y"
+
+    def test_the_models_may_lie_where_the_archive_puts_them(self, root):
+        (root / "models-OBJ").mkdir()
+        (root / "models").rename(root / "models-OBJ" / "models")
+        assert source_of("shapenet", root=str(root)).object_ids("mug") == ["aa", "dd"]
+
+    def test_what_is_missing_is_named(self, root):
+        source = source_of("shapenet", root=str(root))
+        refused(lambda: source.object_ids("toilett"), "metadata.csv", "did you mean 'toilet'")
+        refused(lambda: source.object_ids("zeppelin"), "no category zeppelin", "column category")
+        (root / "metadata.csv").write_text("id,label\n1,mug\n")
+        source = source_of("shapenet", root=str(root))
+        refused(lambda: source.object_ids("mug"), "metadata.csv", "no column category")
+        (root / "metadata.csv").unlink()
+        source = source_of("shapenet", root=str(root), layout="sem")
+        refused(lambda: source.object_ids("mug"), root / "metadata.csv", "does not exist")
+
+    @pytest.mark.parametrize(
+        ("content", "named"),
+        [
+            (b"fullId,category\n,mug\n", "row 1 has no fullId"),
+            (b'fullId,category\nwss.aa,"mug' + b"x" * 200_000, "cannot be read"),
+            (b"fullId,category\nwss./etc/passwd,mug\n", "'/etc/passwd' has '/' in it"),
+        ],
+    )
+    def test_a_damaged_or_hostile_table_is_named(self, root, content, named):
+        (root / "metadata.csv").write_bytes(content)
+        source = source_of("shapenet", root=str(root))
+        refused(lambda: source.object_ids("mug"), named)
+
+
+@needs_real
+def test_real_mugs_have_their_handles_at_270_degrees():
+    source = source_of(
+        "shapenet", root=str(REAL / "shapenet"), exclude_file=str(REAL / "mugs_to_leave_out.txt")
+    )
+    ids = source.object_ids("mug")
+    assert len(ids) == 129
+    for object_id in ids[::4]:
+        vertices = np.asarray(source.load("mug", object_id).vertices)
+        # The handle makes a mug longer along y than along x, and narrower at its end.
+        assert np.ptp(vertices[:, 1]) > np.ptp(vertices[:, 0])
+        ends = (
+            [vertices[vertices[:, 1] < -0.9 * half], vertices[vertices[:, 1] > 0.9 * half]]
+            if (half := np.ptp(vertices[:, 1]) / 2)
+            else []
+        )
+        assert np.ptp(ends[0][:, 0]) < np.ptp(ends[1][:, 0])

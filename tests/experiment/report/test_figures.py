@@ -28,9 +28,9 @@ FOLD = 2  # of the examples
 def inputs(tree, evaluations):
     return FigureInputs(
         evaluations,
-        depth=synthetic.depth_files(tree, synthetic.UNITS),
-        objects=synthetic.object_files(tree, synthetic.UNITS),
-        lookups=synthetic.lookup_files(tree, synthetic.UNITS, synthetic.N_FOLDS),
+        depth=synthetic.depth_files(tree),
+        objects=synthetic.object_files(tree),
+        lookups=synthetic.lookup_files(tree),
     )
 
 

@@ -71,7 +71,7 @@ def inputs(tree, evaluations, tmp_path_factory):
         "claims": root / "verdicts.csv",
         "configuration": tree / "configuration.yaml",
         "provenance": tree / "provenance.json",
-        "splits": synthetic.split_files(tree, synthetic.UNITS),
+        "splits": synthetic.split_files(tree),
         "tables": tables,
         "figures": figures,
         "table1": tables["table1"].with_suffix(".csv"),

@@ -3,6 +3,7 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -16,8 +17,12 @@ from nbv.experiment.run.jobs import (
     LAST_ERROR,
     NO_SPACE,
     begin_run,
+    check,
+    check_folders,
     import_from,
     job,
+    need_intact,
+    states_of_files,
     why_stopped,
     write_checksum,
 )
@@ -229,3 +234,177 @@ def test_jobs_import_packages_of_a_folder_before_those_of_others(tmp_path, monke
     assert os.environ["PYTHONPATH"] == f"{tmp_path}{os.pathsep}/elsewhere"
     done = subprocess.run([sys.executable, "-c", "import beside"], capture_output=True, text=True)
     assert done.stdout == "found\n"
+
+
+PATH = "results/tiny/estimates/mug/el00/fold1/test.csv"
+CONTENT = b"object_id,azimuth_deg,estimate_deg\n" + bytes(range(256))
+
+
+@pytest.fixture
+def written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / PATH
+    path.parent.mkdir(parents=True)
+    path.write_bytes(CONTENT)
+    write_checksum(PATH)
+    return path
+
+
+def flipped(content):
+    return content[:100] + bytes([content[100] ^ 1]) + content[101:]
+
+
+def _is_refused(state):
+    assert states_of_files("results/tiny")[PATH].startswith(state)
+    with pytest.raises(UserError, match=f"{PATH} {state}.* 1 files in all"):
+        need_intact("results/tiny")
+    with pytest.raises(UserError, match=f"{PATH} {state}.* run the same command again"):
+        check(PATH)
+
+
+def test_what_was_written_is_read_again(written):
+    check(PATH)
+    assert states_of_files("results/tiny") == {PATH: "is as written"}
+    assert written.read_bytes() == CONTENT
+
+
+@pytest.mark.skipif(shutil.which("sha256sum") is None, reason="no sha256sum here")
+def test_another_program_verifies_the_same_files(written, tmp_path):
+    record = tmp_path / "results/tiny/checksums/estimates/mug/el00/fold1/test.csv.sha256"
+    subprocess.run(["sha256sum", "--check", "--strict", record], check=True, cwd=tmp_path)
+
+
+@pytest.mark.parametrize(
+    "damage", [flipped, lambda content: content[:-1], lambda _: b"", lambda content: content + b"x"]
+)
+def test_damage_is_noticed_whatever_the_time_of_the_file_and_the_file_is_set_aside(written, damage):
+    times = written.stat()
+    written.write_bytes(damage(CONTENT))
+    os.utime(written, ns=(times.st_atime_ns, times.st_mtime_ns))
+    _is_refused("differs from its checksum")
+    assert not written.exists()
+    assert written.with_name("test.csv.damaged").read_bytes() == damage(CONTENT)
+    assert states_of_files("results/tiny") == {PATH: "is missing"}
+    need_intact("results/tiny")
+
+
+def test_files_of_no_run_have_no_checksum(written, tmp_path):
+    for path in ("src/nbv/files.py", "results/loose.csv", str(tmp_path / "elsewhere.csv")):
+        write_checksum(path)
+        check(path)
+    assert states_of_files("results/tiny") == {PATH: "is as written"}
+
+
+@pytest.mark.parametrize("content", [CONTENT, CONTENT[:50]])
+@pytest.mark.parametrize(
+    "record", [None, "", "00", f"{'x' * 64}  {PATH}\n", f"{'0' * 64}  b.csv\n"]
+)
+def test_a_file_without_a_sound_checksum_is_noticed_and_only_the_checksum_is_blamed(
+    written, record, content
+):
+    written.write_bytes(content)
+    checksum = written.parents[4] / f"checksums/{PATH.removeprefix('results/tiny/')}.sha256"
+    checksum.unlink()
+    if record is not None:
+        checksum.write_text(record)
+    _is_refused("has no checksum" if record is None else "has a checksum that is damaged")
+
+
+def test_logs_and_hidden_files_need_no_checksum(written):
+    for name in ("logs/a.log", "benchmarks/a.tsv", ".DS_Store", "tables/.a.partial.csv"):
+        path = Path("results/tiny", name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    assert states_of_files("results/tiny") == {PATH: "is as written"}
+
+
+# A run that starts a job through a shell, which outlives a killed run.
+RUN = """
+import subprocess, sys
+from nbv.experiment.run.jobs import begin_run
+begin_run("results/tiny")
+if len(sys.argv) > 1:
+    subprocess.run(["bash", "-c", f"{sys.executable} {sys.argv[1]}; true"])
+print("begun", flush=True)
+sys.stdin.read()
+"""
+JOB = """
+import time
+from pathlib import Path
+from nbv.experiment.run.jobs import end_with_run
+end_with_run(Path("results/tiny/logs"))
+for beat in range(600):
+    Path("next.txt").write_text(str(beat))
+    Path("next.txt").replace("beat.txt")
+    time.sleep(0.1)
+"""
+
+
+def start_run(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", RUN, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_no_run_begins_beside_another_of_the_same_results(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    running = start_run()
+    assert running.stdout.readline() == "begun\n"
+    with pytest.raises(UserError, match="another run works on results/tiny: wait"):
+        begin_run("results/tiny")
+    begin_run("results/other")
+    running.kill()
+    running.communicate()
+    begin_run("results/tiny")
+
+
+@pytest.mark.slow
+def test_a_job_ends_with_its_run_before_the_next_one_begins(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("job.py").write_text(JOB)
+    running, beat = start_run("job.py"), Path("beat.txt")
+    for _ in range(200):
+        if beat.exists():
+            break
+        time.sleep(0.1)
+    time.sleep(1)
+    assert int(beat.read_text()) > 0
+    running.kill()
+    running.communicate()
+    time.sleep(1)
+    begin_run("results/tiny")
+    last = beat.read_text()
+    time.sleep(1)
+    assert beat.read_text() == last
+
+
+@pytest.mark.parametrize("path", ["results", "results/tiny", ".snakemake"])
+def test_a_file_where_a_folder_should_be_is_one_line(tmp_path, monkeypatch, path):
+    monkeypatch.chdir(tmp_path)
+    check_folders("results/tiny")
+    Path(path).parent.mkdir(exist_ok=True)
+    Path(path).write_text("")
+    with pytest.raises(UserError, match=f"^{path} is not a folder"):
+        check_folders("results/tiny")
+
+
+def test_a_folder_that_another_user_made_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path(".snakemake").mkdir()
+    monkeypatch.setattr("os.access", lambda path, mode: Path(path).name != ".snakemake")
+    with pytest.raises(UserError, match=f"{tmp_path}/.snakemake cannot be written: permission"):
+        check_folders("results/tiny")
+
+
+def test_a_copied_run_is_told_once_that_times_decide(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    begin_run("results/here")
+    assert capsys.readouterr().err == ""
+    shutil.copytree("results/here", "results/there")
+    begin_run("results/there")
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"results/there is a copy of {tmp_path}/results/here" in line
+    assert "--touch" in line

@@ -17,7 +17,7 @@ from nbv.experiment.run import provenance
 ROOT = Path(__file__).parents[3]
 
 
-WINGS = ("core", "data", "robot", "cli", "experiment/config")
+ROOMS = ("frames", "choice", "bundles", "tables", "cli", "experiment/config")
 TRAININGS = ("train_estimator", "pretrain_network", "train_bundle")
 STUDIES = sorted(path.stem for path in ROOT.glob("studies/scripts/*.py"))
 
@@ -37,10 +37,12 @@ def test_a_training_depends_on_networks_and_little_else(script):
     found = names(script)
     assert {"experiment/estimation/networks.py", "experiment/estimation/training.py"} <= found
     assert len(found) <= 15
-    by_wing = {wing: {name for name in found if name.startswith(f"{wing}/")} for wing in WINGS}
-    assert by_wing["core"] <= {f"core/{n}.py" for n in ("angles", "estimates", "logits", "seeds")}
-    assert by_wing["data"] == {"data/depth_images.py"}
-    assert not by_wing["robot"] | by_wing["cli"] | by_wing["experiment/config"]
+    needed = {*(f"core/circle/{n}.py" for n in ("angles", "estimates", "logits")), "core/seeds.py"}
+    assert {name for name in found if name.startswith("core/")} <= needed
+    assert {name for name in found if name.startswith("data/")} <= {
+        *("data/depth_images.py", "data/progress.py")
+    }
+    assert not [name for name in found if name.startswith(tuple(f"{room}/" for room in ROOMS))]
 
 
 @pytest.mark.parametrize("script", ["render_depth", "split_objects", "prepare_meshes"])
