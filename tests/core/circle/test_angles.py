@@ -19,6 +19,15 @@ def unit(angle_deg: float) -> complex:
     return cmath.rect(1.0, math.radians(angle_deg))
 
 
+def test_an_angle_is_a_finite_real_number_within_the_limit():
+    most = angles.MOST_DEG
+    given_deg = [0, -most, most, np.nextafter(most, np.inf), -2 * most, np.nan, np.inf]
+    assert angles.is_angle(given_deg).tolist() == [True] * 3 + [False] * 4
+    assert angles.is_angle(np.array([[7, 8]], dtype=np.uint8)).tolist() == [[True, True]]
+    for other in (["90", "east"], [True, False], [1j, 0j], [None, 1.0]):
+        assert angles.is_angle(other).tolist() == [False, False]
+
+
 @given(degrees)
 def test_wrapping_keeps_the_direction_and_the_range(angle):
     wrapped = float(angles.wrap_deg(angle))

@@ -140,16 +140,17 @@ def mean_direction_deg(
 def product_directions_deg(
     first: NDArray[np.floating], second: NDArray[np.floating], otherwise_deg: ArrayLike
 ) -> Floats:
-    """Return the mean direction of the product of each of n distributions with each of m, (n, m).
+    """Return the mean direction of the product of each of n distributions with each of m.
 
-    It is the direction of ``sum_u c(u) c'(u) exp(i u)`` for c of `first` (n, B) and c' of `second`
-    (m, B) in the same frame, in [0, 360): one matrix product serves all pairs. Where the resultant
-    is shorter than `FLAT`, it is `otherwise_deg`, which broadcasts to (n, m).
+    It is the direction of ``sum_u c(u) c'(u) exp(i u)`` for c of `first` (..., n, B) and c' of
+    `second` (..., m, B) in the same frame, (..., n, m) in [0, 360): one matrix product serves all
+    pairs. Where the resultant is shorter than `FLAT`, it is `otherwise_deg`, which broadcasts.
     """
-    angles = 2 * np.pi * np.arange(first.shape[1]) / first.shape[1]
+    angles = 2 * np.pi * np.arange(first.shape[-1]) / first.shape[-1]
     parts = (np.cos(angles), np.sin(angles))
-    cosine, sine = (first * part.astype(first.dtype) @ second.T for part in parts)
-    is_flat = np.hypot(cosine, sine) <= FLAT * (first @ second.T)
+    others = np.swapaxes(second, -1, -2)
+    cosine, sine = (first * part.astype(first.dtype) @ others for part in parts)
+    is_flat = np.hypot(cosine, sine) <= FLAT * (first @ others)
     return np.where(is_flat, otherwise_deg, direction_deg(cosine, sine))
 
 
