@@ -131,14 +131,6 @@ def test_decoding_rotates_with_the_classes_and_is_the_mean_direction(seed, k, sc
     assert circular_distance_deg(estimate, np.degrees(np.angle(mean))) < 1e-6
 
 
-def test_a_temperature_moves_a_classifiers_mean():
-    outputs = np.random.default_rng(0).normal(size=(5, 24))
-    cold, warm = (decode_classes(outputs / temperature) for temperature in (0.001, 2.0))
-    # The coldest distribution is its likeliest class alone.
-    assert circular_distance_deg(cold, outputs.argmax(axis=1) * 15.0).max() < 1e-6
-    assert circular_distance_deg(cold, warm).min() > 0.1
-
-
 def test_an_estimator_comes_back_from_its_file_with_its_history(tmp_path):
     faces = clock_faces(3, 24)
     trained = train_estimator(named(faces), ["a", "c"], SETTINGS | {"epochs": 1}, CPU, 0)
