@@ -1,7 +1,5 @@
 """What holds for all tests, and one small results tree for those that read results."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path

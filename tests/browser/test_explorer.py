@@ -1,7 +1,5 @@
 """The explorer in a real browser: what it shows is what the run's files say."""
 
-from __future__ import annotations
-
 import re
 from itertools import product
 from urllib.parse import parse_qs, urlencode, urlsplit

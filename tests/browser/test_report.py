@@ -1,7 +1,5 @@
 """The report in a real browser: it opens without a network, fits, and can be read by everybody."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A bundle as a file: what was written comes back, and what was damaged is one line."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What held-out sweeps teach about a network."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

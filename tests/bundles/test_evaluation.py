@@ -1,7 +1,5 @@
 """How far each way of choosing views gets on recordings, against brute force."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A bundle's network: an ONNX model with the outputs of the trained network, and stable bytes."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

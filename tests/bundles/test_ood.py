@@ -1,7 +1,5 @@
 """The out-of-distribution score of crops."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

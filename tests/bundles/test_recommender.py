@@ -1,7 +1,5 @@
 """From frames to the pose and the next view."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Poses of the camera after a rotation about the object."""
 
-from __future__ import annotations
-
 import io
 import re
 

@@ -1,7 +1,5 @@
 """Folders in which commands run."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`nbv calibrate` and `nbv evaluate`."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`nbv next` with a table of azimuths."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`nbv recommend`: its answers, options and mistakes."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

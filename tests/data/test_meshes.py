@@ -1,7 +1,5 @@
 """Every way a file can lie in its own frame, and the one frame it ends in."""
 
-from __future__ import annotations
-
 import itertools
 import zipfile
 

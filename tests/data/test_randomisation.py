@@ -1,7 +1,5 @@
 """What is drawn at random for a camera: what it may change, and what it has to leave alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The plan of a run: its units and jobs, what is shown, and what a wrong setting is told."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The crop of a frame is what training would have shown of the same object."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Depth images and masks from files: every form gives the same metres, or one line."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which pixels are the object's: given, between two distances, or nearest to the camera."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

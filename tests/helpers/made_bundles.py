@@ -1,7 +1,5 @@
 """A small bundle with random weights, and frames that it can see."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Estimates and evidence made for tests."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

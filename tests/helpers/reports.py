@@ -1,7 +1,5 @@
 """What a figure, a report and an explorer of the synthetic results are made of."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pairs of an estimate and the truth in three dimensions, made for tests."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation

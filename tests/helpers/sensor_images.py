@@ -1,7 +1,5 @@
 """The configured sensors, and surfaces whose depth is known exactly."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

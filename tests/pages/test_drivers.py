@@ -4,8 +4,6 @@ What the stand-ins do is what the documents of librealsense, libfreenect, tf2 an
 test finds what changes on our side, and not what changes on theirs.
 """
 
-from __future__ import annotations
-
 import re
 import runpy
 import sys

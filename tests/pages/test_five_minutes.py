@@ -1,7 +1,5 @@
 """docs/five-minutes.md: its commands print what it shows, and draw the picture that it shows."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import shlex

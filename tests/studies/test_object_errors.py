@@ -1,7 +1,5 @@
 """Mean errors by object, and which methods differ."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

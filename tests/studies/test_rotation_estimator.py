@@ -1,7 +1,5 @@
 """The study's own estimator of orientations: its images, its training and its predictions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

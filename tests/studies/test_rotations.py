@@ -1,7 +1,5 @@
 """The study `rotations`, on made pairs and on a published estimator's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Distributions of any estimator: calibration, and the next view."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From an estimator's files in three dimensions to ranked camera poses."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

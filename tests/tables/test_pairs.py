@@ -1,7 +1,5 @@
 """Calibration pairs of any estimator, from a CSV file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors after a further view against a brute force, and against the criterion of two views."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Criteria against their definitions, term by term: as tables, and over beliefs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Distributions: rotated, multiplied and summed up, against brute force and exact identities."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The constant offset of errors around the circle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The method in three dimensions: the circle as a special case, invariances, enumeration."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rotations modulo the symmetry of an object, against enumeration."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

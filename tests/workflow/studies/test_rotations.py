@@ -1,7 +1,5 @@
 """The target `rotations` of the studies' Snakefile, run small."""
 
-from __future__ import annotations
-
 import json
 
 import pandas as pd
