@@ -1,7 +1,5 @@
 """What holds for all tests, and one small results tree for those that read results."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path
@@ -41,7 +39,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def tree(tmp_path_factory):
-    return synthetic.build_tree(tmp_path_factory.mktemp("results") / "synthetic", synthetic.UNITS)
+    return synthetic.build_tree(tmp_path_factory.mktemp("results") / "synthetic")
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,5 @@
 """Poses as users type them, from numbers and from files."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,10 +1,7 @@
 """The explorer in a real browser: what it shows is what the run's files say."""
 
-from __future__ import annotations
-
 import re
 from itertools import product
-from pathlib import Path
 from urllib.parse import parse_qs, urlencode, urlsplit
 
 import numpy as np
@@ -21,9 +18,10 @@ from nbv.core.circle.distributions import FLAT, mean_direction_deg
 from nbv.core.circle.estimates import posteriors_of
 from nbv.core.circle.evidence import Evidence
 from nbv.experiment.estimates import write_posteriors
-from nbv.experiment.explorer import ExplorerInputs, build_explorer
+from nbv.experiment.explorer import build_explorer
 from nbv.experiment.explorer.data import page_table
 from nbv.tables.lookup import LookupTable
+from reports import explorer_inputs
 
 METHODS = synthetic.METHODS
 WIDTHS = (390, 768, 1280)
@@ -46,21 +44,6 @@ def outcomes(explored):
         frames.append(frame.assign(**place))
     keys = ["category", "elevation", "object_id", "initial_deg", "method"]
     return pd.concat(frames).set_index(keys).sort_index()
-
-
-def inputs_of(root: Path, **more) -> ExplorerInputs:
-    """The explorer of a synthetic results tree."""
-    return ExplorerInputs(
-        name="synthetic",
-        policies=dict(zip(METHODS, ("none", "random", "opposite", "pose_ambiguity"), strict=True)),
-        evaluations=synthetic.evaluation_files(root),
-        lookups={
-            (*fold, "pose_ambiguity"): path for fold, path in synthetic.lookup_files(root).items()
-        },
-        min_separation_deg=APART_DEG,
-        n_views=5,
-        **more,
-    )
 
 
 def fragment(**state) -> str:
@@ -193,20 +176,6 @@ def test_dragging_round_the_ring_moves_the_first_view_and_nothing_else(visit, pa
     assert page.locator("#ring").screenshot() != picture
     errors = outcomes.loc[("mug", 0, before["object"])].xs("opposite", level="method")["error_deg"]
     assert all(map(is_rounded, seen, errors.loc[range(0, 211, 15)]))
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_every_image_is_that_of_its_view(visit, path, method):
-    page = visit(path)
-    for n_views in range(1, 6):
-        go_to(page, category="mug", elevation=0, azimuth=0, method=method, views=n_views)
-        turns = page.evaluate("window.explorer.followed().turns")
-        captions = page.locator("#views figure:visible figcaption").all_inner_texts()
-        assert len(captions) == max(len(turns), 2) + 1
-        assert captions[0].startswith("View 1 from 0° ")
-        assert captions[-1].startswith("Opposite: from 180° ")
-        for place, delta in list(enumerate(turns, 1))[2:]:
-            assert captions[place - 1].startswith(f"View {place}: {delta:g}° on, from {delta:g}° ")
 
 
 def page_evidence(table) -> tuple[Evidence, Evidence]:
@@ -436,7 +405,7 @@ def test_a_classifiers_own_distribution_is_shown(visit, tree, tmp_path):
         files[key] = tmp_path / "{}_{}_{}.npz".format(*key)
         write_posteriors(files[key], kept[key])
     page_file = tmp_path / "explorer.html"
-    page_file.write_text(build_explorer(inputs_of(tree, posteriors=files)))
+    page_file.write_text(build_explorer(explorer_inputs(tree, posteriors=files)))
     page = visit(page_file, fragment(category="mug", elevation=30, azimuth=44))
     settle(page)
     assert page.locator("#key-own").is_visible()
@@ -449,7 +418,7 @@ def test_a_classifiers_own_distribution_is_shown(visit, tree, tmp_path):
 
 def test_a_run_without_images_is_shown_without_them(visit, tree, tmp_path):
     page_file = tmp_path / "explorer.html"
-    page_file.write_text(build_explorer(inputs_of(tree)))
+    page_file.write_text(build_explorer(explorer_inputs(tree)))
     page = visit(page_file, fragment(category="chair", views=3))
     settle(page)
     assert "no image" in page.locator("#view-1 figcaption").inner_text()

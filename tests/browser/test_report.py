@@ -1,23 +1,15 @@
 """The report in a real browser: it opens without a network, fits, and can be read by everybody."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import synthetic
-from nbv.experiment.paper.verdicts import evaluate_claims
 from nbv.experiment.plan import too_small
-from nbv.experiment.report.figures import FIGURES, FigureInputs, build_figure
+from nbv.experiment.report.figures import build_figure
 from nbv.experiment.report.page import build_report
-from nbv.experiment.report.runtime import load_jobs, runtime_table
-from nbv.experiment.report.settings import ReportSettings
-from nbv.experiment.report.table import write_table
-from nbv.experiment.report.tables import TABLES, build_table, claims_table
-from nbv.style import save_figure
+from nbv.experiment.report.tables import TABLES
+from reports import figure_inputs, report_files
 
 WIDTHS = (390, 768, 1280)
 # The edges of the first two cells of a table's rows, and how far its box can be scrolled.
@@ -51,34 +43,9 @@ OVERLAPS = """drawing => {
 @pytest.fixture(scope="session")
 def path(tree, evaluations, tmp_path_factory) -> Path:
     """The report of the synthetic results tree, with everything on it."""
-    root = tmp_path_factory.mktemp("report")
-    settings = ReportSettings(n_resamples=50)
-    for name in TABLES:
-        kinds = {kind: root / f"{name}.{kind}" for kind in ("html", "csv")}
-        write_table(build_table(name, evaluations, settings), kinds)
-    inputs = FigureInputs(
-        evaluations,
-        depth=synthetic.depth_files(tree),
-        objects=synthetic.object_files(tree),
-        lookups=synthetic.lookup_files(tree),
-    )
-    for name in FIGURES:
-        save_figure(build_figure(name, inputs), {"svg": root / f"{name}.svg"})
-    claims = evaluate_claims(evaluations, np.random.default_rng(0), 100)
-    write_table(claims_table(claims), {"csv": root / "claims.csv"})
-    job = ("train", next((tree / "benchmarks").rglob("*.tsv")), root / "absent.log")
-    write_table(runtime_table(load_jobs([job])), {"html": root / "runtime.html"})
-    page = build_report(
-        claims=root / "claims.csv",
-        configuration=tree / "configuration.yaml",
-        provenance=tree / "provenance.json",
-        splits=synthetic.split_files(tree),
-        tables={name: root / f"{name}.html" for name in TABLES},
-        figures={name: root / f"{name}.svg" for name in FIGURES},
-        table1=root / "table1.csv",
-        runtime=root / "runtime.html",
-        caution=too_small({"mug": 9}, 8),
-    )
+    root, inputs = tmp_path_factory.mktemp("report"), figure_inputs(tree, evaluations)
+    files = report_files(root, tree, evaluations, lambda name: build_figure(name, inputs))
+    page = build_report(**files, caution=too_small({"mug": 9}, 8))
     (root / "report.html").write_text(page, encoding="utf-8")
     return root / "report.html"
 

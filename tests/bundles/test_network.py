@@ -1,7 +1,5 @@
 """A bundle's network: an ONNX model with the outputs of the trained network, and stable bytes."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -158,13 +156,13 @@ def test_an_image_does_not_depend_on_those_next_to_it(rng, plane_deg):
 def test_calibration_sees_the_weights_that_a_bundle_keeps(rng):
     estimator = estimator_of("small", is_rounded=False)
     codes = random_codes(rng, 12)
-    ((turn,), _, _) = sweeps_of(
+    ((sweep,), _, _) = sweeps_of(
         bundled_network(estimator), [DepthImages(("a",), codes[None])], [0.0], ["a"]
     )
     rounded = averaged_by_torch(estimator_of("small"), codes, None)
-    assert turn.logits == pytest.approx(rounded, abs=1e-5)
+    assert sweep.logits == pytest.approx(rounded, abs=1e-5)
     full = averaged_by_torch(estimator, codes, None)
-    assert not np.allclose(turn.logits, full, rtol=0, atol=1e-5)
+    assert not np.allclose(sweep.logits, full, rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize("step", [1, 5, 7])

@@ -1,13 +1,11 @@
 """The out-of-distribution score of crops."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from made_bundles import BINS, random_codes, soft_turns
+from made_bundles import BINS, random_codes, sweep_logits
 from nbv.bundles.network import Sweep
 from nbv.bundles.ood import (
     IN_DISTRIBUTION_SHARE,
@@ -22,7 +20,7 @@ from nbv.bundles.ood import (
 
 def sweeps(n: int, seed: int = 0, views: int = BINS) -> list[Sweep]:
     rng = np.random.default_rng(seed)
-    logits = soft_turns(rng, n, views)
+    logits = sweep_logits(rng, n, views)
     azimuth_deg = np.arange(views) * (360.0 / views)
     return [
         Sweep(f"o{i}", "1", 0.0, azimuth_deg, logits[i], random_codes(rng, views)) for i in range(n)

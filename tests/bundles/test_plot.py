@@ -1,7 +1,5 @@
 """What the picture of a recommendation says, as its SVG file has it."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

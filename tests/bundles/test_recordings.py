@@ -1,7 +1,5 @@
 """Manifests of recordings, and what a network makes of their frames."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The shipped bundle on real depth frames, where they are."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Poses of the camera after a rotation about the object."""
 
-from __future__ import annotations
-
 import io
 import re
 
@@ -58,9 +56,9 @@ def azimuth_of(pose, centre, up=(0.0, 0.0, 1.0)) -> float:
 def test_rotations_are_those_of_scipy(point, direction, angle):
     motion = rotation_about(point, direction, angle)
     unit = direction / np.linalg.norm(direction)
-    turn = Rotation.from_rotvec(np.radians(angle) * unit).as_matrix()
-    assert motion[:3, :3] == pytest.approx(turn, abs=1e-9)
-    assert motion[:3, 3] == pytest.approx(point - turn @ point, abs=1e-8)
+    expected = Rotation.from_rotvec(np.radians(angle) * unit).as_matrix()
+    assert motion[:3, :3] == pytest.approx(expected, abs=1e-9)
+    assert motion[:3, 3] == pytest.approx(point - expected @ point, abs=1e-8)
     assert motion[3].tolist() == [0, 0, 0, 1]
 
 
@@ -204,11 +202,11 @@ def test_a_camera_that_is_rolled_is_told_to_which_side_the_object_leans(
         length * (rolled[:3, :3].T @ [0.0, 0.0, -1.0]),
         down_of_axis(rolled, (0.1, 0, 0), (0, 0, 2.0)),
     ):
-        said = roll_warnings(down)
+        warnings = roll_warnings(down)
         if abs(abs(roll) - ROLL_LIMIT_DEG) < 1e-6:
             continue
-        assert len(said) == (abs(roll) > ROLL_LIMIT_DEG)
-        for line in said:
+        assert len(warnings) == (abs(roll) > ROLL_LIMIT_DEG)
+        for line in warnings:
             leans, side = re.findall(r"leans (\d+)° to the (\w+)", line)[0]
             assert abs(int(leans) - abs(roll)) < 0.51
             assert side == ("left" if roll > 0 else "right")
@@ -323,9 +321,9 @@ def test_an_axis_that_does_not_point_up_in_the_image_is_refused(roll, elevation,
     edges = (abs(abs(roll) - 45), abs(elevation + 30), abs(elevation - 80))
     assume(min(edges) > 1e-6)
     pose = camera_at(elevation, azimuth, 0.7, np.zeros(3))
-    turn = np.radians(roll)
+    angle = np.radians(roll)
     # About the optical axis, z.
-    pose[:3, :2] = pose[:3, :2] @ [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    pose[:3, :2] = pose[:3, :2] @ [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     # In any base frame.
     base = random_pose(seed)
     point, up = base[:3, 3], base[:3, :3] @ [0, 0, 1]
@@ -341,9 +339,9 @@ def test_an_axis_that_does_not_point_up_in_the_image_is_refused(roll, elevation,
 
 def link_frame(pose):
     """The same camera's pose with x forward, y left, z up (ROS REP 103's camera_link)."""
-    turned = pose.copy()
-    turned[:3, :3] = pose[:3, :3] @ np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
-    return turned
+    linked = pose.copy()
+    linked[:3, :3] = pose[:3, :3] @ np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
+    return linked
 
 
 def in_millimetres(pose):

@@ -1,7 +1,5 @@
 """Folders in which commands run."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -41,12 +39,12 @@ def pairs(here) -> Path:
 
 @pytest.fixture
 def manifest(here) -> Path:
-    """A turn of one object, with a frame every 15 degrees."""
-    (here / "turn").mkdir()
+    """A sweep of one object, with a frame every 15 degrees."""
+    (here / "sweep").mkdir()
     rows = []
     for place in range(BINS):
-        np.save(here / "turn" / f"{place}.npy", frame(place))
-        rows.append(("cup", "1", f"turn/{place}.npy", place * WIDTH, 20.0))
+        np.save(here / "sweep" / f"{place}.npy", frame(place))
+        rows.append(("cup", "1", f"sweep/{place}.npy", place * WIDTH, 20.0))
     names = ["object_id", "sequence", "file", "azimuth_deg", "elevation_deg"]
     pd.DataFrame(rows, columns=names).to_csv(here / "manifest.csv", index=False)
     return here / "manifest.csv"

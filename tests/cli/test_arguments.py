@@ -1,7 +1,5 @@
 """Numbers, ranges and help texts of the command line."""
 
-from __future__ import annotations
-
 import pytest
 
 from commands import OWN, fails, run

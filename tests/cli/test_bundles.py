@@ -1,7 +1,5 @@
 """`nbv inspect`, `export` and `render`."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`nbv calibrate` and `nbv evaluate`."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -196,7 +194,7 @@ def test_near_and_far_hold_for_every_frame_of_a_recording(manifest, capsys, comm
     for place in range(BINS):
         wall = np.where(frame(place) > 0, frame(place), 0.9).astype(np.float32)
         wall[5:20, 5:20] = 0.2
-        np.save(f"turn/{place}.npy", wall)
+        np.save(f"sweep/{place}.npy", wall)
     limits = ("--near", "0.3", "--far", "0.8")
     assert json.loads(run(capsys, command, "manifest.csv", *options, *limits)) == wanted
     for wrong in ((), ("--far", "0.8"), ("--near", "0.3", "--far", "0.31")):
@@ -290,14 +288,14 @@ def test_an_object_that_calibrated_the_bundle_is_named(manifest, capsys):
 
 
 def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
-    np.save("turn/3.npy", np.zeros((ROWS, COLUMNS), np.float32))
+    np.save("sweep/3.npy", np.zeros((ROWS, COLUMNS), np.float32))
     options = ("evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2")
     assert main([*options, "--json"]) == 0
     out, err = capsys.readouterr()
     printed = json.loads(out)
     assert len(printed["errors"]) == 6
     (left_out,) = printed["left_out"]
-    assert left_out["file"].endswith("turn/3.npy")
+    assert left_out["file"].endswith("sweep/3.npy")
     assert left_out["reason"] == "empty-mask"
     assert f"3.npy: empty-mask: {left_out['message']}" in err
     told = run(capsys, *options)
@@ -310,7 +308,7 @@ def test_frames_that_are_left_out_do_not_spoil_the_json(manifest, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["masks.csv"], "turn/2.npy: the mask has 3 × 4 pixels and the frame"),
+        (["masks.csv"], "sweep/2.npy: the mask has 3 × 4 pixels and the frame"),
         (["manifest.csv", "--views", "2.5"], "--views: '2.5' is not an integer"),
         (["manifest.csv", "--output", "x.json"], "--output=x.json: give a name that ends in .csv"),
         (["manifest.csv", "--intrinsics", "30"], "every frame"),

@@ -1,7 +1,5 @@
 """The program: help, streams, missing packages, and mistakes of every command."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """`nbv next` with a table of azimuths."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -69,13 +67,13 @@ def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, crite
     capsys.readouterr()
     options = ("next", "t.npz", "--estimate", "90")
     cost = LookupTable.load("t.npz").cost[90].astype(float)
-    turns = np.arange(360)
-    travel = np.minimum(turns, 360 - turns)
+    rotations = np.arange(360)
+    travel = np.minimum(rotations, 360 - rotations)
     for limits, may in (
         ((), travel > 1),
         (("--max-travel", "100"), (travel > 1) & (travel <= 100)),
-        (("--allowed", "-100", "20", "70", "0"), np.isin(turns, [260, 20, 70])),
-        (("--allowed", "-100", "20", "--max-travel", "40"), turns == 20),
+        (("--allowed", "-100", "20", "70", "0"), np.isin(rotations, [260, 20, 70])),
+        (("--allowed", "-100", "20", "--max-travel", "40"), rotations == 20),
     ):
         printed = json.loads(run(capsys, *options, *limits, "--json"))
         moves = [printed["move"], *printed["alternatives"]]

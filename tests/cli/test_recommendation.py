@@ -1,7 +1,5 @@
 """`nbv recommend`: its answers, options and mistakes."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
@@ -157,7 +155,7 @@ def test_the_choice_of_the_last_view_raises_its_expected_error_unless_it_was_not
 
 
 def test_frames_all_round_have_a_pose_and_no_next_view(manifest, capsys):
-    frames = [f"turn/{place}.npy" for place in range(BINS)]
+    frames = [f"sweep/{place}.npy" for place in range(BINS)]
     rotations = ("--rotations", *(f"{place * WIDTH:g}" for place in range(BINS)))
     where = ("--camera-pose", "pose.json", "--axis", "0", "0", "0")
     command = ("recommend", *frames, *rotations, "--bundle", "b.safetensors", *where)

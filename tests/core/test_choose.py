@@ -1,7 +1,5 @@
 """Decisions that azimuths and orientations share."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Where things fall in the image, told from projective geometry alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Depth as bytes and back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

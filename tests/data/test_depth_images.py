@@ -1,7 +1,5 @@
 """The depth images of many objects in one file, and their ids."""
 
-from __future__ import annotations
-
 import itertools
 import logging
 import time

@@ -1,7 +1,5 @@
 """Embree's depths, compared with depths computed without it."""
 
-from __future__ import annotations
-
 import builtins
 
 import numpy as np

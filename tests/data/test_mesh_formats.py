@@ -1,7 +1,5 @@
 """What each format may hold, and what is refused although trimesh would take it."""
 
-from __future__ import annotations
-
 import json
 import os
 import struct

@@ -1,7 +1,5 @@
 """Limits of time and memory for a mesh file, and what is no file."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

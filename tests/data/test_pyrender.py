@@ -1,7 +1,5 @@
 """OpenGL's depths, compared with Embree's: two independent ways to the same image."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """Many objects."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

@@ -1,7 +1,5 @@
 """What both sensors have in common, and how the configuration opens them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Opening a source by name, and selecting objects."""
 
-from __future__ import annotations
-
 import itertools
 import logging
 import subprocess

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -129,14 +127,6 @@ def test_decoding_rotates_with_the_classes_and_is_the_mean_direction(seed, k, sc
     mean = sum(w * np.exp(2j * np.pi * c / 24) for c, w in enumerate(weights))
     assert circular_distance_deg(rotated, estimate + 15 * k) < 1e-6
     assert circular_distance_deg(estimate, np.degrees(np.angle(mean))) < 1e-6
-
-
-def test_a_temperature_moves_a_classifiers_mean():
-    outputs = np.random.default_rng(0).normal(size=(5, 24))
-    cold, warm = (decode_classes(outputs / temperature) for temperature in (0.001, 2.0))
-    # The coldest distribution is its likeliest class alone.
-    assert circular_distance_deg(cold, outputs.argmax(axis=1) * 15.0).max() < 1e-6
-    assert circular_distance_deg(cold, warm).min() > 0.1
 
 
 def test_an_estimator_comes_back_from_its_file_with_its_history(tmp_path):

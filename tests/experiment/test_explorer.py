@@ -1,10 +1,9 @@
-from __future__ import annotations
-
 import base64
 import io
 import json
 import re
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -16,7 +15,7 @@ from PIL import Image
 
 import synthetic
 from nbv.errors import UserError
-from nbv.experiment.explorer import ExplorerInputs, build_explorer, coarse_bins
+from nbv.experiment.explorer import build_explorer, coarse_bins
 from nbv.experiment.explorer.data import (
     COLUMNS,
     byte_planes,
@@ -32,39 +31,24 @@ from nbv.experiment.explorer.data import (
 )
 from nbv.experiment.report.figures.views import depth_limits, shade
 from nbv.tables.lookup import LookupTable
+from reports import explorer_inputs
 
 FOLDS = range(1, synthetic.N_FOLDS + 1)
-POLICIES = {
-    "single": "none",
-    "random": "random",
-    "opposite": "opposite",
-    "proposed": "pose_ambiguity",
-}
 
 
 @pytest.fixture(scope="module")
-def given_files(tree):
-    return {
-        "name": "synthetic",
-        "policies": POLICIES,
-        "evaluations": synthetic.evaluation_files(tree),
-        "lookups": {
-            (*fold, "pose_ambiguity"): path for fold, path in synthetic.lookup_files(tree).items()
-        },
-        "min_separation_deg": 15.0,
-        "n_views": 5,
-        "depth": synthetic.depth_files(tree),
-        "objects": synthetic.object_files(tree),
-    }
+def inputs(tree):
+    images = {"depth": synthetic.depth_files(tree), "objects": synthetic.object_files(tree)}
+    return explorer_inputs(tree, **images)
 
 
 @pytest.fixture(scope="module")
-def page(given_files):
-    return build_explorer(ExplorerInputs(**given_files))
+def page(inputs):
+    return build_explorer(inputs)
 
 
-def test_the_page_needs_nothing_but_itself_and_is_the_same_again(page, given_files):
-    assert build_explorer(ExplorerInputs(**given_files)) == page
+def test_the_page_needs_nothing_but_itself_and_is_the_same_again(page, inputs):
+    assert build_explorer(inputs) == page
     assert not re.findall(r"(?:src|href)\s*=\s*[\"'](?!data:)", page)
     assert "http" not in re.sub(r"<script type=\"text/plain\".*?</script>", "", page, flags=re.S)
 
@@ -81,9 +65,9 @@ def test_the_page_has_every_object_of_every_unit(page, evaluations):
             assert f'id="ring-{index}-{place}"' in page
 
 
-def test_a_run_whose_methods_follow_no_table_is_refused(given_files):
+def test_a_run_whose_methods_follow_no_table_is_refused(inputs):
     with pytest.raises(UserError, match="no method of this run follows one"):
-        build_explorer(ExplorerInputs(**given_files | {"lookups": {}}))
+        build_explorer(replace(inputs, lookups={}))
 
 
 @pytest.mark.parametrize("column", ["initial_estimate_deg", "next_estimate_deg"])

@@ -1,7 +1,5 @@
 """Which methods a configuration may name."""
 
-from __future__ import annotations
-
 import pytest
 
 from made_estimates import EXTENSIONS

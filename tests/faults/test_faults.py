@@ -1,7 +1,5 @@
 """After kills and on a full disk the same command goes on, to the same bytes."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random

@@ -1,7 +1,5 @@
 """The crop of a frame is what training would have shown of the same object."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -110,22 +108,11 @@ def test_an_object_off_the_axis_is_seen_as_by_a_camera_directed_at_it(azimuth, a
     assert np.abs(aslant.astype(int) - wanted)[inside].mean() > 1.5 * apart.mean()
 
 
-@pytest.mark.parametrize("category", ["airplane", "car", "chair", "toilet"])
-def test_other_categories_give_the_codes_of_the_training_camera(category):
-    place = (20.0, 130.0, 5.0)
-    codes = cropped(frame(*place, category=category) * DIAGONAL_M).codes
-    wanted = wanted_codes(*place, category=category)
-    assert overlap(codes > 0, wanted > 0) > 0.8
-    inside = ndimage.binary_erosion((codes > 0) & (wanted > 0))
-    apart = np.abs(codes.astype(int) - wanted)[inside]
-    assert np.median(apart) <= 2
-
-
-def test_a_turned_object_does_not_give_the_same_codes():
-    """The bounds above would notice a turn of 20 degrees, or a mirror."""
+def test_a_rotated_object_does_not_give_the_same_codes():
+    """The bounds above would notice a rotation of 20 degrees, or a mirror."""
     codes = cropped(frame(20.0, 0.0, 5.0) * DIAGONAL_M).codes
-    turned = [wanted_codes(20.0, azimuth, 5.0) for azimuth in (-20.0, 20.0, 180.0)]
-    for wrong in (*turned, codes[:, ::-1], codes[::-1]):
+    rotated = [wanted_codes(20.0, azimuth, 5.0) for azimuth in (-20.0, 20.0, 180.0)]
+    for wrong in (*rotated, codes[:, ::-1], codes[::-1]):
         inside = ndimage.binary_erosion((codes > 0) & (wrong > 0))
         apart = np.abs(codes.astype(int) - wrong)[inside]
         assert np.quantile(apart, 0.9) > 2 or overlap(codes > 0, wrong > 0) < 0.92
@@ -218,14 +205,14 @@ def test_what_lies_outside_the_mask_does_not_matter(seed):
     assert np.array_equal(one.codes, other.codes)
 
 
-@given(turn=st.integers(0, 3), flip=st.booleans())
-def test_a_frame_that_is_held_otherwise_gives_the_crop_held_so(turn, flip):
+@given(quarters=st.integers(0, 3), flip=st.booleans())
+def test_a_frame_that_is_held_otherwise_gives_the_crop_held_so(quarters, flip):
     """An even number of rows and columns: with an odd one the middle lies between pixels."""
     depth = bowl(row=29.5, column=39.5)
     wide = Intrinsics(150.0, 150.0)
 
     def held(image):
-        return np.rot90(image[:, ::-1] if flip else image, turn)
+        return np.rot90(image[:, ::-1] if flip else image, quarters)
 
     one, other = cropped(depth, intrinsics=wide), cropped(held(depth), intrinsics=wide)
     assert np.array_equal(held(one.codes), other.codes)

@@ -1,7 +1,5 @@
 """Intrinsics from numbers and from the camera files that are in use."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Which pixels are the object's: given, between two distances, or nearest to the camera."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -247,14 +245,14 @@ def test_pixels_that_touch_at_a_corner_are_one_part():
     assert np.array_equal(object_mask(scene(), REACH, mask), mask)
 
 
-@given(turn=st.integers(0, 3), flip=st.booleans(), seed=st.integers(0, 10**6))
-def test_it_does_not_matter_how_the_frame_is_held(turn, flip, seed):
+@given(quarters=st.integers(0, 3), flip=st.booleans(), seed=st.integers(0, 10**6))
+def test_it_does_not_matter_how_the_frame_is_held(quarters, flip, seed):
     rng = np.random.default_rng(seed)
     depth = scene()
     depth[rng.random(depth.shape) < 0.1] = 0
     depth[40:42, 3:6] = NEAR
 
     def held(image):
-        return np.rot90(image[:, ::-1] if flip else image, turn)
+        return np.rot90(image[:, ::-1] if flip else image, quarters)
 
     assert np.array_equal(object_mask(held(depth), REACH), held(object_mask(depth, REACH)))

@@ -1,7 +1,5 @@
 """Frames drawn of a mesh: what a camera in that place would see."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Errors of methods whose claims are known in advance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """Small estimators, and images of a clock's hand for them to learn from."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 

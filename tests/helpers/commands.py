@@ -1,7 +1,5 @@
 """Commands that succeed or fail, and what they print."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

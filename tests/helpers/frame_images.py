@@ -1,7 +1,5 @@
 """Depth frames of generated objects, as a camera anywhere would take them."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -1,7 +1,5 @@
 """A small bundle with random weights, and frames that it can see."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 
@@ -75,7 +73,7 @@ def random_model(seed: int = 0, plane_deg: float | None = None) -> bytes:
     return bundled_model(random_estimator(settings(), seed=seed), plane_deg)
 
 
-def soft_turns(
+def sweep_logits(
     rng: np.random.Generator, n_sweeps: int, n_views: int = BINS, n_bins: int = BINS
 ) -> NDArray[np.float64]:
     """Logits (n_sweeps, n_views, n_bins) that are largest near the true azimuth, with noise."""
@@ -96,7 +94,7 @@ def made_bundle(seed: int = 0, **changes) -> Bundle:
     for name in names:
         for elevation in elevations:
             codes = random_codes(rng, BINS)
-            logits = soft_turns(rng, 1)[0]
+            logits = sweep_logits(rng, 1)[0]
             sweeps.append(Sweep(name, f"{elevation:g}", elevation, azimuth_deg, logits, codes))
             rows.append(bin_apart(azimuth_deg, from_logits(logits, 1.0)))
     values = {

@@ -1,7 +1,5 @@
 """Estimates and evidence made for tests."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -33,7 +31,7 @@ def estimates(n_objects=3, n_views=48, seed=0, worst_deg=90.0):
 
 
 def objects(n_objects, seed, hidden_deg=90.0):
-    """The same of full turns in single degrees, a little sharper, with names."""
+    """The same of whole sweeps in single degrees, a little sharper, with names."""
     rng = np.random.default_rng(seed)
     truth = np.arange(360.0)
     spread = 4 + 40 * np.exp(-((circular_distance_deg(truth, hidden_deg) / 35) ** 2))
@@ -78,15 +76,15 @@ def hidden_range_estimates(n_objects: int, seed: int = 0) -> np.ndarray:
     return estimate % 360
 
 
-def sharp_turns(rng: np.random.Generator, n: int, sharpness: float) -> np.ndarray:
+def sharp_sweeps(rng: np.random.Generator, n: int, sharpness: float) -> np.ndarray:
     apart = np.arange(24) - np.arange(24)[:, None]
     logits = sharpness * np.cos(np.radians(15 * apart)) + rng.normal(0, 0.3, (n, 24, 24))
     return np.exp(logits) / np.exp(logits).sum(axis=-1, keepdims=True)
 
 
-def unclear_turns(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Turns that are clear from half of the views; from the others, an answer may be opposite."""
-    distributions = sharp_turns(rng, n, 12.0)
+def unclear_sweeps(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Sweeps that are clear from half of the views; from the others, an answer may be opposite."""
+    distributions = sharp_sweeps(rng, n, 12.0)
     is_wrong = rng.random((n, 24)) < 0.4 * (np.arange(24) < 12)
     flat = np.where(np.arange(24) < 12, 0.4, 1.0)[:, None]
     rows = np.where(is_wrong[..., None], np.roll(distributions, 12, axis=-1), distributions) ** flat

@@ -1,7 +1,5 @@
 """Small data sets in each layout, and the settings that open them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Objects' errors of several methods, made for the purpose."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from studies.leaderboard import blocks_of

@@ -1,7 +1,5 @@
 """A copy of the project, small runs of its real Snakefile, and ways to look at them."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re

@@ -1,7 +1,5 @@
 """Poses anywhere within reach of an arm."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Meshes that several tests draw."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pairs of an estimate and the truth in three dimensions, made for tests."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
@@ -14,7 +12,7 @@ def orientation_pairs():
     for object_id, instance in np.ndindex(2, 2):
         truth = Rotation.random(6, rng=rng).as_matrix()
         flips = truth[:, 2, 0] < -0.3
-        turned = np.where(flips[:, None, None], np.diag([1.0, -1, -1]), np.eye(3))
+        flipped = np.where(flips[:, None, None], np.diag([1.0, -1, -1]), np.eye(3))
         small = Rotation.from_rotvec(rng.normal(0, 2, (6, 3)), degrees=True).as_matrix()
         columns = {
             "object_id": str(object_id),
@@ -23,7 +21,7 @@ def orientation_pairs():
             "im_id": np.arange(6),
             "R_true": _texts(truth),
             "t_true_mm": "0.00 0.00 700.00",
-            "R_estimate": _texts(truth @ small @ turned),
+            "R_estimate": _texts(truth @ small @ flipped),
             "score": np.where(flips, 0.4, 0.9),
         }
         tables.append(pd.DataFrame(columns))

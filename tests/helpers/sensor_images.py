@@ -1,7 +1,5 @@
 """The configured sensors, and surfaces whose depth is known exactly."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -22,7 +20,7 @@ DISTANCES_M = (0.45, 0.8, 1.3, 2.0, 3.0)
 
 
 def plane(z_m: float, tilt_deg: float = 0.0, side: int = 64, k: int = 1):
-    """Depth in metres of a plane that fills the image, turned about the vertical axis."""
+    """Depth in metres of a plane that fills the image, rotated about the vertical axis."""
     column = (np.arange(side) + 0.5 - side / 2) / Camera(image_side=side).focal_px
     depth = z_m / (1 - column * math.tan(math.radians(tilt_deg)))
     assert (depth > 0).all()

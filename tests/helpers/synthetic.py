@@ -5,8 +5,6 @@ mug's handle (around azimuth 90) or takes a back for a front. The lookup tables 
 equations by the shortest code that does.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

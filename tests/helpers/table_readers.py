@@ -1,7 +1,5 @@
 """What people see of a table, read back from its Markdown and HTML."""
 
-from __future__ import annotations
-
 import html
 import re
 

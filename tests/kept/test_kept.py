@@ -1,7 +1,5 @@
 """Tables and bundles that an earlier version saved load, and answer as before."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,8 +4,6 @@ What the stand-ins do is what the documents of librealsense, libfreenect, tf2 an
 test finds what changes on our side, and not what changes on theirs.
 """
 
-from __future__ import annotations
-
 import re
 import runpy
 import sys
@@ -174,8 +172,8 @@ def test_moveit(frame, run) -> None:
     assert ahead[:2] == pytest.approx([0, 0], abs=0.02)
     for (goal, link), move in zip(goals, moves, strict=False):
         assert (goal.header.frame_id, link) == ("base_link", "camera_depth_optical_frame")
-        turn, place = goal.pose.orientation, goal.pose.position
+        q, place = goal.pose.orientation, goal.pose.position
         about = Rotation.from_euler("z", move.rotation_deg, degrees=True).as_matrix()
         assert [place.x, place.y, place.z] == pytest.approx(point + about @ (POSE[:3, 3] - point))
-        turned = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
-        assert turned == pytest.approx(about @ POSE[:3, :3])
+        reached = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+        assert reached == pytest.approx(about @ POSE[:3, :3])

@@ -1,7 +1,5 @@
 """Every public name has an example in its docstring, and every example prints what it shows."""
 
-from __future__ import annotations
-
 import doctest
 
 import pytest

@@ -1,7 +1,5 @@
 """The example of docs/extending.md: its edits are made, and its command is planned."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import shutil

@@ -1,7 +1,5 @@
 """docs/five-minutes.md: its commands print what it shows, and draw the picture that it shows."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import shlex
@@ -78,5 +76,5 @@ def test_the_python_of_a_first_page_runs_as_it_is_shown(name, tmp_path, capsys):
     (snippet,) = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
     (tmp_path / "snippet.py").write_text(snippet, "utf-8")
     runpy.run_path(str(tmp_path / "snippet.py"))
-    (said,) = re.findall(r"^print\(.*  # (.+)$", snippet, re.MULTILINE)
-    assert capsys.readouterr().out.strip() == said
+    (comment,) = re.findall(r"^print\(.*  # (.+)$", snippet, re.MULTILINE)
+    assert capsys.readouterr().out.strip() == comment

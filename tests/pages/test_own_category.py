@@ -1,7 +1,5 @@
 """docs/own-category.md: its meshes can be made, and its command is a run of them."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import shlex

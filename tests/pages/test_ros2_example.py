@@ -4,8 +4,6 @@ What the stand-ins do is what the documents of ROS 2 Humble and Jazzy say, as fa
 it. So a test finds what changes on our side, and not what changes on theirs.
 """
 
-from __future__ import annotations
-
 import json
 import runpy
 import sys

@@ -1,7 +1,5 @@
 """The page on one's own estimator: what its Python says of a 6-D pose."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import textwrap

@@ -1,5 +1,4 @@
 import json
-import time
 
 import numpy as np
 import pytest
@@ -48,18 +47,6 @@ def test_works_take_turns():
     calls.clear()
     take_turns([lambda: calls.append("a"), lambda: calls.append("b")], 2, False, in_a_row=3)
     assert "".join(calls) == "aaabbb" * 2
-
-
-def test_of_calls_in_a_row_the_median_counts(monkeypatch):
-    clock = iter([1.0, 9.0, 2.0, 5.0, 5.0, 50.0])
-    monkeypatch.setattr("performance.timing.seconds", lambda work: next(clock))
-    times = take_turns([lambda: None, lambda: None], 1, False, in_a_row=3)
-    assert times.rounds.tolist() == [[2.0, 5.0]]
-
-
-def test_time_is_measured_in_seconds():
-    times = take_turns([lambda: time.sleep(0.02), lambda: time.sleep(0.01)], 2, warm_up=False)
-    assert (times.rounds.min(axis=0) >= [0.02, 0.01]).all()
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys
@@ -89,10 +87,3 @@ def test_the_public_api_goes_from_calibration_to_a_fused_pose(tmp_path):
     assert nbv.average(350.0, 10.0 + delta_deg, delta_deg) == pytest.approx(0.0)
     fused = nbv.posterior(0.0, (180.0 + delta_deg) % 360, delta_deg, evidence())
     assert fused == pytest.approx(180.0, abs=10.0)
-
-
-def test_both_conditionals_have_rows_that_sum_to_one():
-    made = nbv.conditionals([0.0, 90.0], [0.0, 100.0], bandwidth_deg=5.0, pseudo_observations=1.0)
-    assert isinstance(made, nbv.Conditionals)
-    np.testing.assert_allclose(made.viewpoint.sum(axis=1), 1.0)
-    np.testing.assert_allclose(made.estimate.sum(axis=1), 1.0)

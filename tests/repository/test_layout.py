@@ -1,7 +1,5 @@
 """Which file tests a module: the one of its name, in the folder of its room."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]

@@ -1,7 +1,5 @@
 """The locks: a hash for every file, and a licence for every package."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

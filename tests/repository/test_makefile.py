@@ -1,7 +1,5 @@
 """What the targets of the Makefile do, without doing it."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Means and contrasts over all trainings."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

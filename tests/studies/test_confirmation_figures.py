@@ -1,7 +1,5 @@
 """The figures over all trainings."""
 
-from __future__ import annotations
-
 import pandas as pd
 import pytest
 from studies.confirmation import method_contrasts

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -115,11 +113,11 @@ def test_travel_curves_start_at_the_table_and_end_by_staying():
     gain = rows[(rows["method"] == "gain_posterior") & (rows["rule"] == "cost")]
     first, last = gain.iloc[0], gain.iloc[-1]
     # The first extension with posterior fusion gives the density of the fixed rotations.
-    turns, fixed = (
+    sought, fixed = (
         HeldOutViews(test.estimate_deg, selected[name].evidence)
         for name in ("gain_posterior", "random_posterior")
     )
-    error = two_views("information_gain", "posterior", turns).error_deg.mean()
+    error = two_views("information_gain", "posterior", sought).error_deg.mean()
     assert first["error_deg"] == pytest.approx(error, abs=1e-3)
     assert last["travel_deg"] < first["travel_deg"]
     assert gain["travel_deg"].is_monotonic_decreasing

@@ -1,7 +1,5 @@
 """Every choice of the next view with every fusion."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

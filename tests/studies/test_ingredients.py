@@ -1,7 +1,5 @@
 """What ingredients bring is a difference over objects and trainings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -1,7 +1,5 @@
 """Held-out estimates in a compact file."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

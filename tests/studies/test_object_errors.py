@@ -1,7 +1,5 @@
 """Mean errors by object, and which methods differ."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -51,8 +49,8 @@ def test_object_means_are_plain_means(frames):
         found = indexed.loc[(method, "0004")]
         assert found["error_deg"] == pytest.approx(np.mean(mine["error_deg"]))
         assert found["pauc_percent"] == pytest.approx(metrics.pauc(mine["error_deg"]))
-        turned = np.mean(mine["error_deg"] > 90)
-        assert found["above_90_percent"] == pytest.approx(100 * turned)
+        share = np.mean(mine["error_deg"] > 90)
+        assert found["above_90_percent"] == pytest.approx(100 * share)
         delta = [0.0 if np.isnan(d) else float(d) for d in mine["delta_deg"]]
         shorter = [min(d % 360, -d % 360) for d in delta]
         assert found["travel_deg"] == pytest.approx(np.mean(shorter))

@@ -1,7 +1,5 @@
 """What the studies make: of which runs, trainings, conditions and variants of bundles."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

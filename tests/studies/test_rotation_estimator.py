@@ -1,7 +1,5 @@
 """The study's own estimator of orientations: its images, its training and its predictions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -97,9 +95,9 @@ def test_a_polyhedron_has_every_rotation_that_its_vertices_have(name, order, n_v
     pair = vertices[mesh.edges_unique[0]]
     found = []
     for ends in np.concatenate([mesh.edges_unique, mesh.edges_unique[:, ::-1]]):
-        turn, _ = Rotation.align_vectors(vertices[ends], pair)
-        apart = np.linalg.norm((turn.apply(vertices))[:, None] - vertices, axis=2).min(axis=1)
-        found += [turn.as_matrix()] if apart.max() < 1e-6 else []
+        rotation, _ = Rotation.align_vectors(vertices[ends], pair)
+        apart = np.linalg.norm((rotation.apply(vertices))[:, None] - vertices, axis=2).min(axis=1)
+        found += [rotation.as_matrix()] if apart.max() < 1e-6 else []
     assert len(found) == len(symmetry.discrete) == order
     apart = np.abs(np.array(found)[:, None] - symmetry.discrete).max(axis=(2, 3)).min(axis=1)
     assert apart.max() < 1e-6
@@ -110,8 +108,8 @@ def test_what_turns_freely_may_have_two_ends(name, flips):
     mesh, symmetry = solid(name)
     upside_down = np.diag([1.0, -1.0, -1.0])[None]
     assert (symmetry.distance_deg(upside_down, np.eye(3)[None]) < 1e-6)[0] == flips
-    turned = Rotation.from_euler("z", 40, degrees=True).as_matrix()[None]
-    assert symmetry.distance_deg(turned, np.eye(3)[None])[0] < 1e-6
+    rotated = Rotation.from_euler("z", 40, degrees=True).as_matrix()[None]
+    assert symmetry.distance_deg(rotated, np.eye(3)[None])[0] < 1e-6
     assert np.linalg.norm(mesh.vertices[:, :2], axis=1).max() == pytest.approx(0.5)
 
 

@@ -1,7 +1,5 @@
 """The study `rotations`, on made pairs and on a published estimator's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -120,17 +118,17 @@ def test_methods_choose_by_cost_turn_and_hindsight():
 
 
 @pytest.mark.parametrize(
-    ("damage", "said"),
+    ("damage", "message"),
     [
         (lambda table: table.drop(columns="R_true"), "no column 'R_true'"),
         (lambda table: table.assign(R_true="1 0 0 0 1 0 0 0 -1"), "a reflection"),
     ],
 )
-def test_a_wrong_table_is_refused(pairs, tmp_path, damage, said):
+def test_a_wrong_table_is_refused(pairs, tmp_path, damage, message):
     path = tmp_path / "pairs.csv"
     damage(pd.read_csv(pairs)).to_csv(path, index=False)
     settings = {**SETTINGS, "objects": [], "score_objects": []}
-    with pytest.raises(UserError, match=said):
+    with pytest.raises(UserError, match=message):
         evaluate(path, None, settings)
     settings |= {"objects": ["7"], "score_objects": ["0"]}
     with pytest.raises(UserError, match="no object 7"):

@@ -1,7 +1,5 @@
 """Several runs side by side, image by image."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

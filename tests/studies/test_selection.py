@@ -1,7 +1,5 @@
 """Which density, and which method, calibration objects favour."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from studies.extensions import choices_frame, stored_evidence

@@ -1,7 +1,5 @@
 """Every next view after any number of views."""
 
-from __future__ import annotations
-
 import numpy as np
 from studies.simulation import (
     random_next,

@@ -1,7 +1,5 @@
 """Intervals over objects and trainings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

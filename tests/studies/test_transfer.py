@@ -1,7 +1,5 @@
 """The table trained on × tested on, against sums and resamples done by hand."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

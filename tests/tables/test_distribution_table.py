@@ -1,7 +1,5 @@
 """Distributions of any estimator: calibration, and the next view."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from commands import POSE, fails, run, same_move
-from made_bundles import BINS, WIDTH, random_codes, soft_turns
-from made_estimates import unclear_turns
+from made_bundles import BINS, WIDTH, random_codes, sweep_logits
+from made_estimates import unclear_sweeps
 from nbv.bundles.recommender import Recommender
 from nbv.choice.moves import moved_camera
 from nbv.cli import main
@@ -35,14 +33,14 @@ def softmax(logits):
     return p / p.sum(axis=-1, keepdims=True)
 
 
-def turns(seed=0, n=3, sharpness=1.0):
-    logits = soft_turns(np.random.default_rng(seed), n) * sharpness
+def sweeps(seed=0, n=3, sharpness=1.0):
+    logits = sweep_logits(np.random.default_rng(seed), n) * sharpness
     return {f"o{k}": (AZIMUTHS, softmax(own)) for k, own in enumerate(logits)}
 
 
 @pytest.fixture(scope="module")
 def table():
-    return DistributionTable.from_pairs(turns())
+    return DistributionTable.from_pairs(sweeps())
 
 
 def test_the_affinity_is_that_of_the_experiments():
@@ -71,7 +69,7 @@ def test_it_answers_as_a_bundle_does_of_frames(bundle, rotations):
 
 def test_the_expected_error_is_that_of_its_definition(table):
     """Written out: every view of every object counts by its affinity with the one at hand."""
-    given = softmax(soft_turns(np.random.default_rng(9), 1)[0, 5] / table.temperature)
+    given = softmax(sweep_logits(np.random.default_rng(9), 1)[0, 5] / table.temperature)
     n_bins = table.distributions.shape[-1]
     width = 360 / n_bins
     azimuths = np.arange(n_bins) * width
@@ -81,9 +79,9 @@ def test_the_expected_error_is_that_of_its_definition(table):
     for rows in table.distributions.astype(np.float64):
         for view in range(n_bins):
             weights.append(width * np.sqrt(p * rows[view]).sum() ** power)
-            turned = rows[(view + np.arange(n_bins)) % n_bins]
+            others = rows[(view + np.arange(n_bins)) % n_bins]
             back = (np.arange(n_bins) + np.arange(n_bins)[:, None]) % n_bins
-            both = rows[view] * np.take_along_axis(turned, back, axis=1)
+            both = rows[view] * np.take_along_axis(others, back, axis=1)
             mean = np.angle(both @ np.exp(1j * np.radians(azimuths)), deg=True)
             errors.append(circular_distance_deg(mean, azimuths[view]))
     weights, errors = np.array(weights), np.array(errors)
@@ -127,7 +125,7 @@ def test_a_temperature_at_its_limit_is_told(here, capsys):
     right = 0.1 * np.eye(BINS) + 0.9 / BINS
     certain = {"a": (AZIMUTHS, right), "b": (AZIMUTHS, right)}
     assert "the temperature 0.05 is at its limit" in DistributionTable.from_pairs(certain).warning
-    assert DistributionTable.from_pairs(turns()).warning == ""
+    assert DistributionTable.from_pairs(sweeps()).warning == ""
     written(here, certain)
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     assert out.splitlines()[-1].startswith("warning: the temperature 0.05 is at its limit")
@@ -137,25 +135,25 @@ def test_a_temperature_at_its_limit_is_told(here, capsys):
 @given(power=st.floats(0.3, 6.0), seed=st.integers(0, 5))
 def test_how_sure_an_estimator_says_it_is_does_not_matter(power, seed):
     """The same probabilities to any power: another temperature, the same table and answer."""
-    plain = DistributionTable.from_pairs(turns(seed))
-    sharp = DistributionTable.from_pairs(turns(seed, sharpness=power))
+    plain = DistributionTable.from_pairs(sweeps(seed))
+    sharp = DistributionTable.from_pairs(sweeps(seed, sharpness=power))
     assert sharp.temperature == pytest.approx(power * plain.temperature, rel=2e-3)
     assert sharp.distributions == pytest.approx(plain.distributions, abs=2e-3)
 
 
 def test_views_come_in_any_order_and_anywhere_closer_than_15_degrees():
-    given_turns = turns()
+    given_sweeps = sweeps()
     order = np.random.default_rng(0).permutation(BINS)
-    shuffled = {name: (a[order], p[order]) for name, (a, p) in given_turns.items()}
-    wanted, found = (DistributionTable.from_pairs(each) for each in (given_turns, shuffled))
+    shuffled = {name: (a[order], p[order]) for name, (a, p) in given_sweeps.items()}
+    wanted, found = (DistributionTable.from_pairs(each) for each in (given_sweeps, shuffled))
     assert found.temperature == pytest.approx(wanted.temperature)
     assert found.distributions == pytest.approx(wanted.distributions, abs=1e-5)
     with pytest.raises(UserError, match=r"^object '.*': views leave a gap of 30°"):
-        DistributionTable.from_pairs({n: (a[::2], p[::2]) for n, (a, p) in given_turns.items()})
+        DistributionTable.from_pairs({n: (a[::2], p[::2]) for n, (a, p) in given_sweeps.items()})
 
 
 def test_what_does_not_fit_is_one_line(table):
-    p = turns()["o0"][1][0]
+    p = sweeps()["o0"][1][0]
     for probabilities, rotations, kind, message in (
         (p[:12] / p[:12].sum(), [0.0], UserError, "12 probabilities; calibration objects have 24"),
         (2 * p, [0.0], UserError, "row 1: probabilities sum to 2 "),
@@ -169,8 +167,8 @@ def test_what_does_not_fit_is_one_line(table):
             table.recommend(probabilities, rotations)
     for azimuths in (AZIMUTHS[:5], ["a"] * BINS, [*AZIMUTHS[1:], np.nan], AZIMUTHS[None]):
         with pytest.raises(UserError, match="object 'x': azimuths"):
-            DistributionTable.from_pairs({"x": (azimuths, turns()["o0"][1])})
-    other = {"x": (np.arange(36) * 10.0, np.full((36, 36), 1 / 36)), **turns()}
+            DistributionTable.from_pairs({"x": (azimuths, sweeps()["o0"][1])})
+    other = {"x": (np.arange(36) * 10.0, np.full((36, 36), 1 / 36)), **sweeps()}
     with pytest.raises(UserError, match=r"\[24, 36\] classes"):
         DistributionTable.from_pairs(other)
 
@@ -219,9 +217,9 @@ def written(folder: Path, pairs, columns=BINS) -> Path:
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    written(tmp_path, turns())
+    written(tmp_path, sweeps())
     (tmp_path / "pose.json").write_text(json.dumps(POSE))
-    rows = softmax(soft_turns(np.random.default_rng(7), 1)[0, [3, 9]])
+    rows = softmax(sweep_logits(np.random.default_rng(7), 1)[0, [3, 9]])
     pd.DataFrame(rows, columns=[f"p{k}" for k in range(BINS)]).to_csv("views.csv", index=False)
     np.save("views.npy", rows)
     return tmp_path
@@ -244,7 +242,7 @@ def sharp(apart_deg):
 
 def test_pairs_with_distributions_come_back_as_they_are(here):
     found = PairTable.load("pairs.csv").distributions
-    for (name, (azimuth, rows)), (own, wanted) in zip(found.items(), turns().items(), strict=True):
+    for (name, (azimuth, rows)), (own, wanted) in zip(found.items(), sweeps().items(), strict=True):
         assert name == own
         assert azimuth.tolist() == AZIMUTHS.tolist()
         assert rows == pytest.approx(wanted[1], abs=1e-9)
@@ -290,7 +288,7 @@ def test_distributions_that_count_otherwise_than_azimuths_are_doubted(
     here, capsys, changed, message
 ):
     """The estimates are right, so they raise no doubt."""
-    written(here, {name: (a, changed(p)) for name, (a, p) in turns().items()})
+    written(here, {name: (a, changed(p)) for name, (a, p) in sweeps().items()})
     out = run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     assert out.count("warning:") == 1
     assert message in out.splitlines()[-1]
@@ -398,10 +396,10 @@ def test_the_expected_error_of_one_view_is_right_where_it_is_small_and_where_it_
     rng = np.random.default_rng(6)
     azimuths = np.arange(24) * 15.0
     table = DistributionTable.from_pairs(
-        {f"{k}": (azimuths, rows) for k, rows in enumerate(unclear_turns(rng, 60))}
+        {f"{k}": (azimuths, rows) for k, rows in enumerate(unclear_sweeps(rng, 60))}
     )
     promised, errors = [], []
-    for rows in unclear_turns(rng, 60):
+    for rows in unclear_sweeps(rng, 60):
         for azimuth, view in zip(azimuths, rows, strict=True):
             answer = table.recommend(view)
             promised.append([answer.expected_error_deg, answer.probability_within["15"]])

@@ -1,7 +1,5 @@
 """From an estimator's files in three dimensions to ranked camera poses."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -48,8 +46,8 @@ def table(path: Path, edit=lambda rows: rows) -> Path:
 def test_results_find_the_nearest_instance_once(example, tmp_path):
     rows = pd.read_csv(example / "results.csv", dtype=str)
     better, worse, far = rows[:1].copy(), rows[:1].copy(), rows[:1].copy()
-    turned = "0 -1 0 1 0 0 0 0 1"
-    better["score"], better["R"], better["t"] = "2", turned, "10 -20 740"
+    quarter = "0 -1 0 1 0 0 0 0 1"
+    better["score"], better["R"], better["t"] = "2", quarter, "10 -20 740"
     worse["score"], far["t"] = "-1", "10 -20 760"
     far["score"] = "3"
     path = tmp_path / "results.csv"
@@ -194,16 +192,16 @@ def test_a_hidden_mark_is_looked_for(pairs):
 
 def test_turning_the_base_frame_changes_no_rank(pairs):
     poses = [m.target_camera_pose for m in _answer(pairs).moves]
-    turn = np.eye(4)
-    turn[:3, :3] = Rotation.from_euler("xyz", [20, 50, 70], degrees=True).as_matrix()
-    turn[:3, 3] = [1, 2, 3]
+    base = np.eye(4)
+    base[:3, :3] = Rotation.from_euler("xyz", [20, 50, 70], degrees=True).as_matrix()
+    base[:3, 3] = [1, 2, 3]
     wanted = pairs.recommend([VIEW], poses)
-    turned = pairs.recommend([VIEW], [turn @ pose for pose in poses], camera_pose=turn)
-    assert [m.index for m in wanted.moves] == [m.index for m in turned.moves]
-    for a, b in zip(wanted.moves, turned.moves, strict=True):
+    moved = pairs.recommend([VIEW], [base @ pose for pose in poses], camera_pose=base)
+    assert [m.index for m in wanted.moves] == [m.index for m in moved.moves]
+    for a, b in zip(wanted.moves, moved.moves, strict=True):
         assert a.expected_error_deg == pytest.approx(b.expected_error_deg, abs=1e-4)
         assert a.travel_m == pytest.approx(b.travel_m)
-    assert np.allclose(turned.rotation, VIEW.rotation)
+    assert np.allclose(moved.rotation, VIEW.rotation)
 
 
 VIEW = PoseEstimate(HIDDEN @ HALF_TURN, np.array([10.0, -20.0, 700.0]), 0.4)

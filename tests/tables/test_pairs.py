@@ -1,7 +1,5 @@
 """Calibration pairs of any estimator, from a CSV file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -132,13 +130,13 @@ def test_any_azimuths_calibrate_and_what_is_thin_is_said(tmp_path):
     azimuth, estimate = np.array([10.5, 100.0, 100.0]), np.array([12.5, 100.0, 280.0])
     views = np.arange(0, 360, 5)
     path = written(tmp_path / "p.csv", {"thin": (azimuth, estimate), "whole": (views, views)})
-    estimates, (said,) = PairTable.load(path).thin_estimates
+    estimates, (warning,) = PairTable.load(path).thin_estimates
     error = (estimates.estimate_deg[0] - np.arange(360)) % 360
     assert set(error[90:120]) == {0.0, 180.0}  # both views at one azimuth count
     assert error[90:120].mean() == 90
     assert np.allclose(error[[11, 340]], 2)
-    assert "1 of 2 objects" in said
-    assert "'thin' one of 270°" in said
+    assert "1 of 2 objects" in warning
+    assert "'thin' one of 270°" in warning
     path = written(tmp_path / "q.csv", {"whole": (views, views)})
     table = PairTable.load(path)
     assert not table.thin_estimates[1]
@@ -169,8 +167,8 @@ def test_azimuths_in_radians_are_named(tmp_path, first):
     views = np.arange(first, first + 360)
     path = written(tmp_path / "p.csv", {"a": (np.radians(views), np.radians(views))})
     assert "these azimuths seem to be radians: multiply them by 180/π" in refused(path)
-    turn = np.radians(np.arange(first, first + 360, 15)).round(2)
-    path = written(tmp_path / "p.csv", {"a": (turn, turn)})
+    sweep = np.radians(np.arange(first, first + 360, 15)).round(2)
+    path = written(tmp_path / "p.csv", {"a": (sweep, sweep)})
     assert "180/π" in refused(path)
     for few in (views[:10], np.arange(7), np.zeros(1)):
         path = written(tmp_path / "p.csv", {"a": (few, few)})

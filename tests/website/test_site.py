@@ -1,7 +1,5 @@
 """The documentation site: built as `make docs` does, whole, and without anything from a network."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Bundles by the real Snakefile, run small."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A file of a run that changed after it was written is noticed, and is made again."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import re

@@ -1,7 +1,5 @@
 """What a person who made a mistake reads: one clear line, before anything is spent."""
 
-from __future__ import annotations
-
 import pytest
 import trimesh
 

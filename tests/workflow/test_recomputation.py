@@ -1,7 +1,5 @@
 """The written results, recomputed from the written files without any of the package's code."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

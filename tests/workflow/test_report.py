@@ -1,7 +1,5 @@
 """Snakemake's own report of a run: made without a network, with what each result shows."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

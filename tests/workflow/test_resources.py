@@ -1,7 +1,5 @@
 """What a cluster is asked for: memory and time of each job, and which jobs go together."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

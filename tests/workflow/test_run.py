@@ -1,7 +1,5 @@
 """The real Snakefile, run small: what it writes, and what it makes again."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import cmath
 import math
 
@@ -36,9 +34,9 @@ def test_wrapping_keeps_the_direction_and_the_range(angle):
 
 
 @given(st.floats(-1e9, 1e9), st.integers(-3, 3))
-def test_wrapping_is_the_remainder_bit_for_bit(angle, turns):
-    near = np.nextafter(360.0 * turns, [-np.inf, np.inf])
-    angles_deg = np.array([angle, 360.0 * turns, *near])
+def test_wrapping_is_the_remainder_bit_for_bit(angle, n_circles):
+    near = np.nextafter(360.0 * n_circles, [-np.inf, np.inf])
+    angles_deg = np.array([angle, 360.0 * n_circles, *near])
     remainder = np.mod(angles_deg, 360.0)
     expected = np.where(remainder >= 360.0, 0.0, remainder)
     assert angles.wrap_deg(angles_deg).tobytes() == expected.tobytes()
@@ -62,9 +60,9 @@ def test_angles_in_single_precision_are_computed_in_double():
 
 @given(degrees, degrees)
 def test_signed_difference_turns_b_into_a_the_shorter_way(a, b):
-    turn = float(angles.signed_difference_deg(a, b))
-    assert -180.0 <= turn < 180.0
-    assert abs(unit(b + turn) - unit(a)) < 1e-9
+    difference = float(angles.signed_difference_deg(a, b))
+    assert -180.0 <= difference < 180.0
+    assert abs(unit(b + difference) - unit(a)) < 1e-9
 
 
 @given(degrees, degrees)

@@ -1,7 +1,5 @@
 """Beliefs over any number of views, against Bayes' rule written out."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from made_estimates import (

@@ -1,7 +1,5 @@
 """Criteria against their definitions, term by term: as tables, and over beliefs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -248,11 +246,16 @@ def test_expected_error_is_the_kernel_regression_of_the_error_shrunk_to_its_mean
     nearest = np.floor(estimate / (360 / N_BINS) + 0.5).astype(int) % N_BINS
     expected = np.empty((N_BINS, N_BINS))
     for delta in range(N_BINS):
-        turn, weight, error, plain = delta * 360 / N_BINS, np.zeros(N_BINS), np.zeros(N_BINS), []
+        rotation_deg, weight, error, plain = (
+            delta * 360 / N_BINS,
+            np.zeros(N_BINS),
+            np.zeros(N_BINS),
+            [],
+        )
         for o in range(n_objects):
             for view in range(0, n_views, n_views // N_BINS):
                 second = estimate[o, (view + delta * n_views // N_BINS) % n_views]
-                fused = FUSIONS[fusion](estimate[o, view], second, turn, evidence)
+                fused = FUSIONS[fusion](estimate[o, view], second, rotation_deg, evidence)
                 made = float(circular_distance_deg(fused, view * 360 / n_views))
                 plain.append(made)
                 for e in range(N_BINS):
@@ -301,7 +304,7 @@ def test_an_expected_error_of_estimates_needs_an_estimate():
 @pytest.mark.parametrize("fusion", ESTIMATE_FUSIONS)
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_turning_the_object_rolls_the_rows_and_leaves_the_rotations(criterion, fusion, k):
-    """The views of the turned object: its azimuths and its estimates are k bins further on."""
+    """The views of the rotated object: its azimuths and its estimates are k bins further on."""
     if criterion == "bayes_error" and k % 2:
         k += 1  # It takes every second bin of the pose.
     before = evidence_of()
@@ -318,11 +321,11 @@ def test_turning_the_object_rolls_the_rows_and_leaves_the_rotations(criterion, f
 @pytest.mark.parametrize("criterion", ["pose_ambiguity", *FOR_MORE_VIEWS])
 def test_turning_the_belief_and_the_object_together_changes_nothing(criterion, belief, k):
     evidence = belief.evidence
-    turned = evidence_of((np.roll(evidence.estimate_deg, 2 * k, axis=1) + 15 * k) % 360)
-    after = Belief(np.roll(belief.probabilities, k, axis=1), turned)
+    rotated = evidence_of((np.roll(evidence.estimate_deg, 2 * k, axis=1) + 15 * k) % 360)
+    after = Belief(np.roll(belief.probabilities, k, axis=1), rotated)
     np.testing.assert_allclose(
         told(criterion, CRITERIA[criterion](belief, evidence, "posterior")),
-        told(criterion, CRITERIA[criterion](after, turned, "posterior")),
+        told(criterion, CRITERIA[criterion](after, rotated, "posterior")),
         rtol=1e-3,
         atol=1e-4,
     )
@@ -330,7 +333,7 @@ def test_turning_the_belief_and_the_object_together_changes_nothing(criterion, b
 
 def test_answers_that_exclude_each_other_say_nothing():
     T = np.roll(np.eye(5), 1, axis=1)
-    T[1] = [1, 0, 0, 0, 0]  # disagrees with the view from bin 0, turned by 1
+    T[1] = [1, 0, 0, 0, 0]  # disagrees with the view from bin 0, rotated by 1
     table = ambiguity_table(Conditionals(T, T), SETTINGS)
     expected = plain_loops(T.tolist(), T.tolist(), T.tolist(), plain_entropy)
     np.testing.assert_allclose(table, expected, atol=1e-6)

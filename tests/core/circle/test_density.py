@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -41,8 +39,8 @@ def test_turning_the_object_rolls_both_conditionals(seed, k, bandwidth):
     estimate, truth = random_pairs(seed)
     kwargs = {"bandwidth_deg": bandwidth, "pseudo_observations": 5.0, "n_bins": B}
     before = density.conditionals(estimate, truth, **kwargs)
-    turn = k * 360 / B
-    after = density.conditionals((estimate + turn) % 360, (truth + turn) % 360, **kwargs)
+    shift = k * 360 / B
+    after = density.conditionals((estimate + shift) % 360, (truth + shift) % 360, **kwargs)
     for one, two in ((before.viewpoint, after.viewpoint), (before.estimate, after.estimate)):
         np.testing.assert_allclose(np.roll(one, (k, k), (0, 1)), two, atol=1e-12)
 

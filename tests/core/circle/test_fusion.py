@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +12,10 @@ from nbv.core.circle.density import Conditionals
 from nbv.core.circle.fusion import ESTIMATE_FUSIONS, average, posterior, product
 
 angle = st.integers(0, 3599).map(lambda tenths: tenths / 10)
-turn = st.integers(0, 359)
+rotation = st.integers(0, 359)
 
 
-@given(angle, angle, turn, turn)
+@given(angle, angle, rotation, rotation)
 def test_averaging_turns_with_the_object(first, second, delta, k):
     before = fusion.average(first, second, delta)
     after = fusion.average(first + k, second + k, delta)
@@ -25,7 +23,7 @@ def test_averaging_turns_with_the_object(first, second, delta, k):
     assert antipodal or circular_distance_deg(before + k, after) < 1e-6
 
 
-@given(angle, angle, turn)
+@given(angle, angle, rotation)
 def test_the_mean_lies_half_way_between_the_two_the_shorter_way(first, second, delta):
     fused = fusion.average(first, second, delta)
     apart = circular_distance_deg(first, second - delta)
@@ -98,8 +96,8 @@ def test_the_product_multiplies_in_the_frame_of_the_first_view(seed, delta, k):
     found = product(first, second, np.array([delta * 30]))
     wanted = direction_by_loops(product_by_loops([first[0], second[0]], [0, delta]))
     assert circular_distance_deg(found[0], wanted) < 1e-6
-    turned = product(np.roll(first, k, axis=1), np.roll(second, k, axis=1), np.array([delta * 30]))
-    assert circular_distance_deg(turned[0], found[0] + 30 * k) < 1e-6
+    rotated = product(np.roll(first, k, axis=1), np.roll(second, k, axis=1), np.array([delta * 30]))
+    assert circular_distance_deg(rotated[0], found[0] + 30 * k) < 1e-6
 
 
 def test_images_that_exclude_each_other_fall_back_on_the_first():
@@ -146,8 +144,8 @@ def test_without_a_resultant_the_product_is_the_first_estimate(seed, delta):
     found = product(periodic, second, np.array([delta * 30]))
     # An estimate that is as likely as its opposite is the first of the two.
     assert found[0] == 30 * (periodic[0] > periodic[0].max() - 1e-9).argmax()
-    turned = (np.roll(rows, 6, axis=1) for rows in (periodic, second))
-    assert product(*turned, np.array([delta * 30]))[0] == found[0]
+    rotated = (np.roll(rows, 6, axis=1) for rows in (periodic, second))
+    assert product(*rotated, np.array([delta * 30]))[0] == found[0]
 
 
 def test_errors_without_a_resultant_are_those_of_fusing_each_pair():

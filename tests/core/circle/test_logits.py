@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -19,8 +17,8 @@ def test_densities_over_degrees_keep_their_mass_and_turn_with_the_classes(seed, 
     p = np.exp(log_softmax(random_logits(seed, (3, k)), axis=-1))
     spread = on_degrees(p)
     np.testing.assert_allclose(spread.sum(axis=1), 1.0)
-    turned = on_degrees(np.roll(p, 1, axis=1))
-    np.testing.assert_allclose(turned, np.roll(spread, 360 // k, axis=1))
+    rotated = on_degrees(np.roll(p, 1, axis=1))
+    np.testing.assert_allclose(rotated, np.roll(spread, 360 // k, axis=1))
     np.testing.assert_allclose(spread[:, :: 360 // k] * (360 / k), p)
 
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -106,14 +104,14 @@ def test_the_next_view_obeys_the_limits_of_its_table(rng, tmp_path, max_travel_d
     names = "given_estimate", "entropy", "pose_ambiguity"
     LookupTable(rows, rows, cost, deltas, 8, 3, *names, **limits).save(tmp_path / "t.npz")
     table = LookupTable.load(tmp_path / "t.npz")
-    turns = np.arange(36) * 10
-    travel = np.minimum(turns, 360 - turns)
+    rotations = np.arange(36) * 10
+    travel = np.minimum(rotations, 360 - rotations)
     may = (travel > 10) & (travel <= max_travel_deg)
     total = np.where(may, cost + travel_cost * travel, np.inf)
-    assert table.recommend(turns).tolist() == turns[total.argmin(axis=1)].tolist()
+    assert table.recommend(rotations).tolist() == rotations[total.argmin(axis=1)].tolist()
     for estimate, row in enumerate(total):
         (best, found), *_ = ranked_rotations(table, estimate * 10.0)[0]
-        assert best % 360 == turns[row.argmin()]
+        assert best % 360 == rotations[row.argmin()]
         assert found == pytest.approx(cost[estimate, row.argmin()])
 
 
@@ -123,20 +121,15 @@ def test_the_next_view_obeys_the_limits_of_its_table(rng, tmp_path, max_travel_d
         ("viewpoint_likelihood", np.full((36, 36), 1.1 / 36)),
         ("cost", None),
         ("cost", (np.s_[1, 2], np.nan)),
-        ("cost", (np.s_[:, 5], -1e30)),
         ("cost", (np.s_[:, 5], 4.0)),  # above log 36
         ("cost", np.zeros((36, 36), dtype=bool)),
         ("cost", np.zeros((36, 35), dtype=np.float32)),
-        ("cost", np.zeros((0, 0), dtype=np.float32)),
         ("recommended_delta_deg", (np.s_[:1], 360)),
         ("recommended_delta_deg", (np.s_[3:4], 170)),
-        ("recommended_delta_deg", np.array(170)),
         ("criterion", np.array("best")),
-        ("criterion", np.array(["pose_ambiguity"])),
         ("spread", np.array("width")),
         ("pose_likelihood", np.array(3)),
         ("bandwidth_deg", np.array(np.nan)),
-        ("pseudo_observations", np.array(np.nan)),
         ("pseudo_observations", np.array(-1.0)),
         ("max_travel_deg", np.array("far")),
         ("travel_cost", np.array(np.inf)),

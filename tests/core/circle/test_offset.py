@@ -1,7 +1,5 @@
 """The constant offset of errors around the circle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -29,10 +27,10 @@ def test_within_half_a_turn_it_is_the_median(errors):
     assert constant_offset_deg(errors) == pytest.approx(np.median(errors), abs=1e-9)
 
 
-@given(errors=st.lists(st.floats(-40.0, 40.0), min_size=1, max_size=12), turn=st.floats(-720, 720))
-def test_it_turns_with_all_errors(errors, turn):
-    moved = constant_offset_deg(np.array(errors) + turn)
-    assert circular_distance_deg(moved, constant_offset_deg(errors) + turn) < 1e-6
+@given(errors=st.lists(st.floats(-40.0, 40.0), min_size=1, max_size=12), shift=st.floats(-720, 720))
+def test_it_moves_with_all_errors(errors, shift):
+    moved = constant_offset_deg(np.array(errors) + shift)
+    assert circular_distance_deg(moved, constant_offset_deg(errors) + shift) < 1e-6
 
 
 @pytest.mark.parametrize(

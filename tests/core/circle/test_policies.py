@@ -1,7 +1,5 @@
 """Choosing a second view, taking it and fusing both."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Which density decides best, and which is likeliest."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

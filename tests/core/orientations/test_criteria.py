@@ -1,7 +1,5 @@
 """The method in three dimensions: the circle as a special case, invariances, enumeration."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -228,8 +226,8 @@ def test_turning_the_world_or_the_camera_turns_every_answer(case):
     # The first camera rolled.
     roll = Rotation.from_rotvec([0, 0, 1.1]).as_matrix()
     rolled = np.concatenate([roll @ estimates[:1], estimates[1:]])
-    turned = np.concatenate([IDENTITY, moves[1:] @ roll.T])
-    again, same = answers(errors, rolled, turned)
+    rotated = np.concatenate([IDENTITY, moves[1:] @ roll.T])
+    again, same = answers(errors, rolled, rotated)
     np.testing.assert_allclose(again, costs, atol=1e-4)
     np.testing.assert_allclose(same, roll @ pose, atol=1e-6)
 
@@ -284,10 +282,10 @@ def test_the_fused_pose_is_the_beliefs(scored):
     errors = made(HALF_TURN)
     ratio = ScoreRatio(np.linspace(0, 1, 9), -1.0, 0.0)
     errors = replace(errors, ratio=ratio)
-    rng, turned = np.random.default_rng(8), [np.eye(3), np.diag([1.0, -1, -1])]
+    rng, flipped = np.random.default_rng(8), [np.eye(3), np.diag([1.0, -1, -1])]
     for n_views in (2, 3, 3, 3):
         moves = np.concatenate([IDENTITY, some_moves(n_views - 1, n_views)])
-        flips = np.stack([turned[k] for k in rng.integers(2, size=n_views)])
+        flips = np.stack([flipped[k] for k in rng.integers(2, size=n_views)])
         views = moves @ Rotation.random(rng=rng).as_matrix() @ flips
         given = errors, views, moves, rng.random(n_views) if scored else None
         np.testing.assert_allclose(posterior(*given), belief(*given).pose, atol=1e-9)

@@ -1,7 +1,5 @@
 """Rotations modulo the symmetry of an object, against enumeration."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -17,10 +15,10 @@ from nbv.errors import UserError
 from nbv.numbers import as_orientations
 
 
-def bop(*turns):
+def bop(*rotations):
     """Rotation vectors in degrees, as the matrices of ``symmetries_discrete``."""
-    matrices = np.tile(np.eye(4), (len(turns), 1, 1))
-    matrices[:, :3, :3] = Rotation.from_rotvec(np.array(turns), degrees=True).as_matrix()
+    matrices = np.tile(np.eye(4), (len(rotations), 1, 1))
+    matrices[:, :3, :3] = Rotation.from_rotvec(np.array(rotations), degrees=True).as_matrix()
     matrices[:, :3, 3] = [5, -3, 2]  # where a model's origin is does not matter
     return [matrix.ravel().tolist() for matrix in matrices]
 
@@ -51,8 +49,8 @@ def elements(name):
     if symmetry.axis is None:
         return symmetry.discrete
     steps = np.radians(np.arange(0, 360, 0.25))[:, None] * symmetry.axis
-    turns = Rotation.from_rotvec(steps).as_matrix()
-    return np.concatenate([g @ turns for g in symmetry.discrete])
+    rotations = Rotation.from_rotvec(steps).as_matrix()
+    return np.concatenate([g @ rotations for g in symmetry.discrete])
 
 
 def some(n, seed=0):
@@ -77,12 +75,12 @@ def test_a_group_is_closed(name, order):
 @EVERY
 def test_distances_are_the_smallest_over_the_group(name):
     symmetry, a, b = Symmetry.from_bop(SYMMETRIES[name]), some(5), some(4, 1)
-    turned = b[:, None] @ elements(name)
-    angle = Rotation.from_matrix((a.mT[:, None, None] @ turned).reshape(-1, 3, 3)).magnitude()
+    equivalent = b[:, None] @ elements(name)
+    angle = Rotation.from_matrix((a.mT[:, None, None] @ equivalent).reshape(-1, 3, 3)).magnitude()
     brute = np.degrees(angle).reshape(5, 4, -1).min(axis=2)
     np.testing.assert_allclose(symmetry.distance_deg(a[:, None], b), brute, atol=0.13)
     np.testing.assert_allclose(np.degrees(np.arccos(symmetry.cosine(a, b))), brute, atol=0.13)
-    seen = viewing_direction(turned)
+    seen = viewing_direction(equivalent)
     closest = np.einsum("ni,mgi->nmg", viewing_direction(a), seen).max(axis=2)
     cosine = symmetry.direction_cosine(viewing_direction(a), viewing_direction(b))
     np.testing.assert_allclose(cosine, closest, atol=1e-5)
@@ -123,16 +121,16 @@ def test_the_spiral_is_about_even():
 
 def test_a_camera_that_looks_straight_sees_the_object_on_its_axis():
     position = np.array([[100.0, -250.0, 700.0], [0.0, 0.0, 1.0]])
-    turns = along_ray(position)
-    seen = (turns @ position[..., None])[..., 0]
+    rotations = along_ray(position)
+    seen = (rotations @ position[..., None])[..., 0]
     np.testing.assert_allclose(
         seen, np.linalg.norm(position, axis=1)[:, None] * [0, 0, 1], atol=1e-9
     )
-    np.testing.assert_allclose(as_orientations(turns, "turns")[1], np.eye(3))
+    np.testing.assert_allclose(as_orientations(rotations, "rotations")[1], np.eye(3))
 
 
 @pytest.mark.parametrize(
-    ("entry", "said"),
+    ("entry", "message"),
     [
         ({"symmetries_discrete": [[1, 0, 0]]}, "16 numbers"),
         ({"symmetries_discrete": [np.diag([-1, 1, 1, 1]).ravel()]}, "a reflection"),
@@ -146,13 +144,13 @@ def test_a_camera_that_looks_straight_sees_the_object_on_its_axis():
         ),
     ],
 )
-def test_an_impossible_symmetry_is_refused(entry, said):
-    with pytest.raises(UserError, match=said):
+def test_an_impossible_symmetry_is_refused(entry, message):
+    with pytest.raises(UserError, match=message):
         Symmetry.from_bop(entry)
 
 
 @pytest.mark.parametrize(
-    ("rotations", "said"),
+    ("rotations", "message"),
     [
         ([np.eye(3), -np.eye(3)], r"R\[1\] is a reflection"),
         ([np.eye(3), np.full((3, 3), np.nan)], r"R\[1\] is not a rotation"),
@@ -161,6 +159,6 @@ def test_an_impossible_symmetry_is_refused(entry, said):
         ([["x"] * 3] * 3, "not a number"),
     ],
 )
-def test_what_is_no_rotation_is_named(rotations, said):
-    with pytest.raises(UserError, match=said):
+def test_what_is_no_rotation_is_named(rotations, message):
+    with pytest.raises(UserError, match=message):
         as_orientations(rotations, "R")

@@ -1,7 +1,5 @@
 """Incidence, shared noise, shadows and moved edges, compared with geometry and statistics."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

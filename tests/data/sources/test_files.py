@@ -1,7 +1,5 @@
 """What the sources of files have in common: reading, exclusions, and messages about bad files."""
 
-from __future__ import annotations
-
 import logging
 import os
 

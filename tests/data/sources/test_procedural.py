@@ -1,7 +1,5 @@
 """Objects made from the seed, as a source."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mesh_files import refused, source_of

@@ -1,7 +1,5 @@
 """The depth features that ship: their network, and that no experiment's objects made them."""
 
-from __future__ import annotations
-
 import hashlib
 
 import numpy as np

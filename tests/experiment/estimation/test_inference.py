@@ -1,7 +1,5 @@
 """From images to estimates of the objects that a fold's estimator has not seen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -1,7 +1,5 @@
 """Linear estimators against brute force, exact identities and what they must not see."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

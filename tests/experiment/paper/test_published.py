@@ -1,7 +1,5 @@
 """The notes on the paper, recomputed from its own figures."""
 
-from __future__ import annotations
-
 import math
 import statistics
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 
@@ -20,18 +18,14 @@ from nbv.experiment.report.figures.views import depth_limits, shade
 from nbv.experiment.report.settings import ReportSettings, hardest_azimuth_deg
 from nbv.style import save_figure
 from nbv.tables.lookup import LookupTable, build_lookup
+from reports import figure_inputs
 
 FOLD = 2  # of the examples
 
 
 @pytest.fixture(scope="module")
 def inputs(tree, evaluations):
-    return FigureInputs(
-        evaluations,
-        depth=synthetic.depth_files(tree),
-        objects=synthetic.object_files(tree),
-        lookups=synthetic.lookup_files(tree),
-    )
+    return figure_inputs(tree, evaluations)
 
 
 @pytest.fixture

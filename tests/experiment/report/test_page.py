@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 import re
 from html.parser import HTMLParser
@@ -9,18 +7,16 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-import synthetic
 from nbv.errors import UserError
 from nbv.experiment.paper.claims import CLAIMS
 from nbv.experiment.paper.verdicts import evaluate_claims
 from nbv.experiment.plan import too_small
 from nbv.experiment.report.figures import FIGURES
 from nbv.experiment.report.page import build_report, inline_svg, svg_text
-from nbv.experiment.report.runtime import load_jobs, runtime_table
-from nbv.experiment.report.settings import ReportSettings
 from nbv.experiment.report.table import write_table
-from nbv.experiment.report.tables import TABLES, build_table, claims_table
-from nbv.style import INK, RC, new_figure, save_figure
+from nbv.experiment.report.tables import TABLES, claims_table
+from nbv.style import INK, RC, new_figure
+from reports import report_files
 
 VOID = {"meta", "img", "br", "link", "hr"}
 FACTS = '<dl class="facts">'
@@ -53,30 +49,13 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def inputs(tree, evaluations, tmp_path_factory):
     """The named files of a report, each in a place of its own."""
-    root = tmp_path_factory.mktemp("report")
-    tables = {name: root / f"{name}.html" for name in TABLES}
-    for name, path in tables.items():
-        files = {"html": path, "csv": path.with_suffix(".csv")}
-        write_table(build_table(name, evaluations, ReportSettings(n_resamples=50)), files)
-    figures = {name: root / f"drawn_{name}.svg" for name in FIGURES}
-    for name, path in figures.items():
-        drawn = new_figure(3, 2)
-        drawn.subplots().text(0, 0, f"drawn as {name}")
-        save_figure(drawn, {"svg": path})
-    claims = evaluate_claims(evaluations, np.random.default_rng(0), 100)
-    write_table(claims_table(claims), {"csv": root / "verdicts.csv"})
-    job = ("train", next((tree / "benchmarks").rglob("*.tsv")), root / "absent.log")
-    write_table(runtime_table(load_jobs([job])), {"html": root / "cost.html"})
-    return {
-        "claims": root / "verdicts.csv",
-        "configuration": tree / "configuration.yaml",
-        "provenance": tree / "provenance.json",
-        "splits": synthetic.split_files(tree),
-        "tables": tables,
-        "figures": figures,
-        "table1": tables["table1"].with_suffix(".csv"),
-        "runtime": root / "cost.html",
-    }
+
+    def drawn(name):
+        figure = new_figure(3, 2)
+        figure.subplots().text(0, 0, f"drawn as {name}")
+        return figure
+
+    return report_files(tmp_path_factory.mktemp("report"), tree, evaluations, drawn)
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """Tables recomputed from the files with plain Python."""
 
-from __future__ import annotations
-
 import csv
 import re
 import statistics

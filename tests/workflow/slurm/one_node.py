@@ -1,7 +1,5 @@
 """A real SLURM of one node, with every file of it in one folder, for as long as a test takes."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib.util
 import os

@@ -1,7 +1,5 @@
 """The real Snakefile on a real SLURM of one node, with jobs and nodes that fail in mid-run."""
 
-from __future__ import annotations
-
 import logging
 import signal
 import subprocess

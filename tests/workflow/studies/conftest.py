@@ -1,7 +1,5 @@
 """One category of the paper's run and the studies of its methods, for all tests of this folder."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Another estimator and calibration in the real Snakefile, compared with a finished default run."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

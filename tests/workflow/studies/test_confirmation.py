@@ -1,7 +1,5 @@
 """Several trainings and what they say together, by the real Snakefile, run small."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Extensions and the ablation, on the estimates of the paper's run."""
 
-from __future__ import annotations
-
 import pandas as pd
 import pytest
 

@@ -1,7 +1,5 @@
 """The whole experiment on estimates of another program, by the real Snakefile, run small."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

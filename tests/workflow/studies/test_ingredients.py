@@ -1,7 +1,5 @@
 """Bundles without one part of the randomisation, by the studies' Snakefile, run small."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

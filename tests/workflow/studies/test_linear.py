@@ -1,7 +1,5 @@
 """Linear estimators on depth features, by the real Snakefile, run small."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The target `rotations` of the studies' Snakefile, run small."""
 
-from __future__ import annotations
-
 import json
 
 import pandas as pd
@@ -17,8 +15,8 @@ pytestmark = pytest.mark.slow
 
 def test_a_table_of_pairs_is_judged(fresh):
     orientation_pairs().to_csv(fresh.folder / "pairs.csv", index=False)
-    turns = {"symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]}
-    (fresh.folder / "models_info.json").write_text(json.dumps({"1": turns}))
+    about_z = {"symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]}
+    (fresh.folder / "models_info.json").write_text(json.dumps({"1": about_z}))
     more = ("rotations.pairs=pairs.csv", "rotations.models_info=models_info.json")
     fresh.run("--cores", "2", *STUDIES, "rotations", overrides=(*TINY, *more))
     cells = pd.read_csv(fresh.results / "tables/rotations.csv")

@@ -1,7 +1,5 @@
 """The target `transfer` of the studies' Snakefile, run small."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Estimators that start from others, by the real Snakefile, run small."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path
