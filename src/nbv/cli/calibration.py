@@ -19,7 +19,6 @@ from nbv.cli.answers import (
     print_warnings,
 )
 from nbv.cli.arguments import (
-    ANY_FRAME,
     AZIMUTHS,
     FRAMES,
     ORIENTATIONS,
@@ -81,17 +80,14 @@ class CalibrationOptions:
     bundle: str | None = None
 
 
-NO_OPTIONS = CalibrationOptions()
-
-
 @as_paragraphs
 def calibrate(
     source: Annotated[Path, Parameter(name="PAIRS_OR_MANIFEST")],
     /,
     *,
     output: Path,
-    options: CalibrationOptions = NO_OPTIONS,
-    camera: FrameOptions = ANY_FRAME,
+    options: CalibrationOptions = CalibrationOptions(),
+    camera: FrameOptions = FrameOptions(),
     json: Json = False,
 ) -> None:
     """Calibrate an estimator's error model from ground truth, as the file's columns say.
@@ -178,7 +174,7 @@ def evaluate(
     bundle: BundleName = SHIPPED,
     views: WholeNumbers = None,
     until: float | None = None,
-    camera: FrameOptions = ANY_FRAME,
+    camera: FrameOptions = FrameOptions(),
     output: Path | None = None,
     json: Json = False,
 ) -> None:
