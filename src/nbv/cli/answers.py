@@ -10,7 +10,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from nbv.errors import printable
-from nbv.labels import counted
+from nbv.labels import counted, matrix_lines
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -163,8 +163,8 @@ def _print_answer(answer: Answer[Any], enough: bool | None, seen: str) -> None:
     print_warnings(answer.warnings)
     if move is not None and move.target_camera_pose is not None:
         print_line("target camera pose in the base frame")
-        for row in move.target_camera_pose:
-            print_line("  " + " ".join(f"{value:9.5f}" for value in row))
+        for line in matrix_lines(move.target_camera_pose):
+            print_line(line)
 
 
 def print_offset(name: str, number: str, offset: Offset, *, is_added: bool = False) -> None:

@@ -160,9 +160,6 @@ class FrameOptions:
     far: float | None = None
 
 
-ANY_FRAME = FrameOptions()
-
-
 @as_paragraphs
 @Parameter(name="*")
 @dataclass(frozen=True)
@@ -216,8 +213,6 @@ class MoveOptions:
 
         return read_pose(self.camera_pose), self.axis[:3], self.axis[3:] or [0.0, 0.0, 1.0]
 
-
-ANY_MOVE = MoveOptions()
 
 # Minus, hyphens and dashes that typesetting puts for the minus sign.
 _MINUS = re.compile("[\u2010-\u2015\u2212\ufe63\uff0d]")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,7 +19,6 @@ from nbv.cli.answers import (
     print_warnings,
 )
 from nbv.cli.arguments import (
-    ANY_FRAME,
     AZIMUTHS,
     FRAMES,
     ORIENTATIONS,
@@ -81,17 +80,14 @@ class CalibrationOptions:
     bundle: str | None = None
 
 
-NO_OPTIONS = CalibrationOptions()
-
-
 @as_paragraphs
 def calibrate(
     source: Annotated[Path, Parameter(name="PAIRS_OR_MANIFEST")],
     /,
     *,
     output: Path,
-    options: CalibrationOptions = NO_OPTIONS,
-    camera: FrameOptions = ANY_FRAME,
+    options: CalibrationOptions = CalibrationOptions(),
+    camera: FrameOptions = FrameOptions(),
     json: Json = False,
 ) -> None:
     """Calibrate an estimator's error model from ground truth, as the file's columns say.
@@ -117,7 +113,7 @@ def calibrate(
     from nbv.files import read_rows
 
     rows = read_rows(source, ())
-    kind = _kind(rows.columns)
+    kind = _kind(rows)
     given = vars(options) | vars(camera)
     check_options(given, OPTIONS[kind], f"{source}, which holds {kind}")
     check_writable("--output", output, [".safetensors" if kind == FRAMES else ".npz"])
@@ -129,12 +125,11 @@ def calibrate(
         _calibrate_orientations(source, rows, output, options, json)
 
 
-def _kind(columns: Iterable[Hashable]) -> str:
-    """Return what a file with these columns holds."""
-    known = set(columns)
-    if "R_true" in known or {"obj_id", "R"} <= known:
+def _kind(rows: pd.DataFrame) -> str:
+    """Return what a file with the columns of these rows holds."""
+    if "R_true" in rows or ("obj_id" in rows and "R" in rows):
         return ORIENTATIONS
-    return FRAMES if "file" in known and "estimate_deg" not in known else AZIMUTHS
+    return FRAMES if "file" in rows and "estimate_deg" not in rows else AZIMUTHS
 
 
 def _calibrate_bundle(
@@ -179,7 +174,7 @@ def evaluate(
     bundle: BundleName = SHIPPED,
     views: WholeNumbers = None,
     until: float | None = None,
-    camera: FrameOptions = ANY_FRAME,
+    camera: FrameOptions = FrameOptions(),
     output: Path | None = None,
     json: Json = False,
 ) -> None:

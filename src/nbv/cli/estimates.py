@@ -10,7 +10,6 @@ from cyclopts import Parameter
 
 from nbv.cli.answers import show_answer, with_targets
 from nbv.cli.arguments import (
-    ANY_MOVE,
     AZIMUTHS,
     DISTRIBUTIONS,
     ORIENTATIONS,
@@ -69,9 +68,6 @@ class CandidateOptions:
     sphere: int | None = None
 
 
-ANY_CANDIDATE = CandidateOptions()
-
-
 @as_paragraphs
 def next_view(
     table: Annotated[Path, Parameter(name="TABLE")],
@@ -80,8 +76,8 @@ def next_view(
     estimate: Estimate,
     rotations: Numbers = None,
     followed: Followed = True,
-    limits: MoveOptions = ANY_MOVE,
-    around: CandidateOptions = ANY_CANDIDATE,
+    limits: MoveOptions = MoveOptions(),
+    around: CandidateOptions = CandidateOptions(),
     until: Until = None,
     json: Json = False,
 ) -> None:

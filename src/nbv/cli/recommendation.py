@@ -11,8 +11,6 @@ from cyclopts import Parameter
 
 from nbv.cli.answers import show_answer, with_targets
 from nbv.cli.arguments import (
-    ANY_FRAME,
-    ANY_MOVE,
     SHIPPED,
     BundleName,
     Followed,
@@ -35,11 +33,11 @@ def recommend(
     *frames: Annotated[Path, Parameter(name="FRAME", negative=())],
     bundle: BundleName = SHIPPED,
     rotations: Numbers = None,
-    camera: FrameOptions = ANY_FRAME,
+    camera: FrameOptions = FrameOptions(),
     mask: Annotated[list[Path] | None, Parameter(consume_multiple=True, negative=())] = None,
     elevation: float | None = None,
     gravity: Numbers = None,
-    limits: MoveOptions = ANY_MOVE,
+    limits: MoveOptions = MoveOptions(),
     followed: Followed = True,
     until: Until = None,
     plot: Path | None = None,

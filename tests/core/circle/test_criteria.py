@@ -358,18 +358,18 @@ def test_each_cost_has_its_unit():
     [
         (
             {"pose_likelihood": "given_truht", "spread": "entropy"},
-            "^pose likelihood 'given_truht' .*'given_truth'",
+            r"^pose likelihood 'given_truht' .*'given_truth'",
         ),
         (
             {"pose_likelihood": "given_truth", "spread": "entrophy"},
-            "^spread 'entrophy' .*'entropy'",
+            r"^spread 'entrophy' .*'entropy'",
         ),
     ],
 )
 def test_unknown_names(settings, message):
     with pytest.raises(UserError, match=message):
         ambiguity_table(random_conditionals(8), settings)
-    with pytest.raises(UserError, match="^criterion 'pose_ambigity' .*'pose_ambiguity'"):
+    with pytest.raises(UserError, match=r"^criterion 'pose_ambigity' .*'pose_ambiguity'"):
         tabulate("pose_ambigity", evidence_of(), "average")
 
 
