@@ -306,8 +306,8 @@ def training_contrasts(objects: pd.DataFrame) -> pd.DataFrame:
             shown = predicted_by_others([a - b for a, b in zip(mine, other, strict=True)])
             names = (dataset, category, contrast.name, contrast.method[1])
             rows += [
-                (*names, *training, own_mean.value, own_mean.low, own_mean.high)
-                for training, own_mean in zip(trainings, shown, strict=bool(shown))
+                (*names, *training, mean.value, mean.low, mean.high)
+                for training, mean in zip(trainings, shown, strict=bool(shown))
             ]
     return pd.DataFrame(rows, columns=list(TRAININGS_COLUMNS))
 

@@ -98,15 +98,16 @@ def held_out(
         if (objects and object_id not in objects) or role.get((object_id, group)) == "calibration":
             continue
         is_object = table.object_id == object_id
-        is_own = is_object & (table.group == group)
-        known, others = (table.where(~is_own & ~is_tested & part) for part in (True, is_object))
+        is_instance = is_object & (table.group == group)
+        is_known = ~is_instance & ~is_tested
+        known, others = table.where(is_known), table.where(is_known & is_object)
         if not len(others.truth):
             continue
         elsewhere = ~is_object & (np.isin(table.object_id, scored) if scored else True)
         scoring = table.where(elsewhere) if elsewhere.any() else others
         yield HeldOut(
             "_".join([object_id, *group.split("/")]),
-            table.where(is_own),
+            table.where(is_instance),
             known,
             others,
             replace(others.errors(), ratio=scoring.score_ratio(model["flip_deg"]), **model),
@@ -178,9 +179,8 @@ def recommended_view(case: HeldOut, first: int) -> int:
     admissible = np.flatnonzero(view_angle_deg(moves) >= MIN_SEPARATION_DEG)
     if not len(admissible):
         return first
-    ahead = np.array(
-        [0.0, 0.0, 1.0]
-    )  # Poses are those of cameras that look straight at the object.
+    # Poses are those of cameras that look straight at the object.
+    ahead = np.array([0.0, 0.0, 1.0])
     cameras = np.tile(np.eye(4), (len(admissible), 1, 1))
     cameras[:, :3, :3] = np.swapaxes(moves[admissible], 1, 2)
     cameras[:, :3, 3] = ahead - cameras[:, :3, :3] @ ahead

@@ -84,11 +84,11 @@ def recordings_of(path: Path, table: pd.DataFrame) -> list[Recording]:
     for name in map(str, table):
         plain = name.strip().lower()
         if name not in (*REQUIRED, *OPTIONAL) and (
-            alike := difflib.get_close_matches(plain, absent, 1, _SIMILARITY)
+            similar := difflib.get_close_matches(plain, absent, 1, _SIMILARITY)
             or [known for known in absent if known == f"{plain}_deg"]
         ):
             raise UserError(
-                f"{path}: a column {name!r}; call it {alike[0]!r} if it is that, or remove it"
+                f"{path}: a column {name!r}; call it {similar[0]!r} if it is that, or remove it"
             )
     for name in ("azimuth_deg", *OPTIONAL[1:]):
         if name in table:
@@ -175,11 +175,11 @@ def run_network(
     doubts: list[str] = []
     first: tuple[str, FrameError] | None = None
     name = f"object {recording.object_id!r}, sequence {recording.sequence!r}"
-    for i, (row, own_intrinsics) in enumerate(
+    for i, (row, listed) in enumerate(
         zip(recording.frames.to_dict("records"), recording.intrinsics, strict=True)
     ):
         mask, camera = row.get("mask"), camera_of(intrinsics, row["path"])
-        known = own_intrinsics or camera.intrinsics
+        known = listed or camera.intrinsics
         object_mask = read_mask(mask) if isinstance(mask, str) else None
         try:
             depth_m = read_depth(row["path"], depth_scale, camera.unit_m)
@@ -195,7 +195,7 @@ def run_network(
             report(row["path"], error)
             first = first or (row["path"], error)
             continue
-        if reasons := (*crop.doubts, *(() if own_intrinsics else camera.warnings)):
+        if reasons := (*crop.doubts, *(() if listed else camera.warnings)):
             doubts.append(f"{row['path']}: {reasons[0]}")
         codes.append(crop.codes)
         kept.append(i)

@@ -219,8 +219,8 @@ def next_view(
     width = 360.0 / n_bins
     bins = [round(rotation / width) % n_bins for rotation in rotations_deg[1:]]
     log_factor = log_bayes_factor(distributions, rotations_deg)
-    alike = calibrated(tuple(bins))
-    expected = expected_errors(alike, belief, **affinity, share=share, agreement=log_factor)
+    sweeps = calibrated(tuple(bins))
+    expected = expected_errors(sweeps, belief, **affinity, share=share, agreement=log_factor)
     last = rotations_deg[-1]
     taken = tuple(rotation - last for rotation in rotations_deg)
     n_steps = len(expected.total)
@@ -233,8 +233,8 @@ def next_view(
             f"{MIN_SEPARATION_DEG:g}° or more from every view so far"
         )
     now_deg, within_now = expected.now_deg, expected.within_now
-    if not bins and len(alike.is_of_object) >= FEWEST_OBJECTS:
-        now_deg, *within_now = observed_error(alike, now_deg, **affinity, share=share).tolist()
+    if not bins and len(sweeps.is_of_object) >= FEWEST_OBJECTS:
+        now_deg, *within_now = observed_error(sweeps, now_deg, **affinity, share=share).tolist()
     if followed and len(distributions) > 1:
         before = expected_errors(
             calibrated(tuple(bins[:-1])),

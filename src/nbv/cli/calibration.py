@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -78,6 +78,7 @@ class CalibrationOptions:
     models_info: Path | None = None
     object: Annotated[list[str] | None, Parameter(negative=())] = None
     bundle: str | None = None
+    camera: FrameOptions = FrameOptions()
 
 
 @as_paragraphs
@@ -87,7 +88,6 @@ def calibrate(
     *,
     output: Path,
     options: CalibrationOptions = CalibrationOptions(),
-    camera: FrameOptions = FrameOptions(),
     json: Json = False,
 ) -> None:
     """Calibrate an estimator's error model from ground truth, as the file's columns say.
@@ -114,15 +114,10 @@ def calibrate(
 
     rows = read_rows(source, ())
     kind = _kind(rows)
-    given = vars(options) | vars(camera)
+    given = vars(options) | {"camera": None} | vars(options.camera)
     check_options(given, OPTIONS[kind], f"{source}, which holds {kind}")
     check_writable("--output", output, [".safetensors" if kind == FRAMES else ".npz"])
-    if kind == FRAMES:
-        _calibrate_bundle(source, rows, output, options.bundle or SHIPPED, camera, json)
-    elif kind == AZIMUTHS:
-        _calibrate_table(source, rows, output, options.criterion or "pose_ambiguity", json)
-    else:
-        _calibrate_orientations(source, rows, output, options, json)
+    CALIBRATIONS[kind](source, rows, output, options, json)
 
 
 def _kind(rows: pd.DataFrame) -> str:
@@ -133,7 +128,7 @@ def _kind(rows: pd.DataFrame) -> str:
 
 
 def _calibrate_bundle(
-    source: Path, rows: pd.DataFrame, output: Path, bundle: str, camera: FrameOptions, as_json: bool
+    source: Path, rows: pd.DataFrame, output: Path, options: CalibrationOptions, as_json: bool
 ) -> None:
     """Make a bundle from the rows of a manifest."""
     from nbv.bundles.calibration import recalibrated
@@ -142,7 +137,8 @@ def _calibrate_bundle(
     from nbv.core.circle.logits import from_logits
     from nbv.core.circle.offset import FOR_FRAMES, Offset, frame_warning
 
-    run = _run_on_recordings(bundle, recordings_of(source, rows), camera, as_json=as_json)
+    of_rows = recordings_of(source, rows)
+    run = _run_on_recordings(options.bundle or SHIPPED, of_rows, options.camera, as_json=as_json)
     used, sweeps = run.recommender.bundle, run.sweeps
     recordings: list[dict[str, Any]] = []
     for sweep in sweeps:
@@ -231,7 +227,7 @@ def evaluate(
 
 
 def _calibrate_table(
-    source: Path, rows: pd.DataFrame, output: Path, criterion: str, as_json: bool
+    source: Path, rows: pd.DataFrame, output: Path, options: CalibrationOptions, as_json: bool
 ) -> None:
     """Make the tables of azimuths, and of distributions if there are some."""
     import numpy as np
@@ -245,6 +241,7 @@ def _calibrate_table(
     from nbv.tables.lookup import LookupTable
     from nbv.tables.pairs import PairTable
 
+    criterion = options.criterion or "pose_ambiguity"
     named("criterion", criterion, CRITERIA)
     pairs = PairTable.from_rows(source, rows)
     sweeps = pairs.distributions
@@ -301,6 +298,14 @@ def _calibrate_orientations(
         )
         print_warnings(summary.warnings)
     print_line(f"{output}: {counted(len(pairs.object_id), 'pair')}")
+
+
+CALIBRATIONS: Mapping[str, Callable[..., None]] = {
+    AZIMUTHS: _calibrate_table,
+    ORIENTATIONS: _calibrate_orientations,
+    FRAMES: _calibrate_bundle,
+}
+"""What makes a table or a bundle of each kind of file."""
 
 
 @dataclass(frozen=True)

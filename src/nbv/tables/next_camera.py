@@ -316,8 +316,8 @@ def read_views(path: str | Path) -> list[PoseEstimate]:
         given: Any = list(array.reshape(-1, 9))
     else:
         given = read_given_json(path, "give JSON, or an .npy array")
-        is_one = isinstance(given, dict) or np.size(given) == 9
-        given = [given] if is_one else given
+        is_single = isinstance(given, dict) or np.size(given) == 9
+        given = [given] if is_single else given
     if not isinstance(given, list):
         raise UserError(f"{path} is not an estimate or a list of them")
     return [as_view(entry, f"{path}, estimate {i}") for i, entry in enumerate(given)]

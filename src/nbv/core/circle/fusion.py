@@ -253,8 +253,8 @@ def _product_errors_deg(distributions: NDArray[np.floating[Any]]) -> NDArray[np.
     for i, start in np.ndindex(n_objects, n_sweeps):
         sweep = np.asarray(sweeps[i, start], dtype=np.float64)
         rows = in_object_frame(sweep)
-        own_deg = wrap_deg(mean_direction_deg(sweep) - np.arange(n_bins) * width_deg)
-        both_deg = product_directions_deg(rows, rows, own_deg[:, None])
+        single_deg = wrap_deg(mean_direction_deg(sweep) - np.arange(n_bins) * width_deg)
+        both_deg = product_directions_deg(rows, rows, single_deg[:, None])
         # From [view, view] to [view, rotation].
         pose_deg = in_object_frame(both_deg)
         errors[:, i, :, start] = circular_distance_deg(pose_deg, start * width_deg / n_sweeps).T
