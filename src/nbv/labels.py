@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 MINUS = "\u2212"
 
@@ -37,6 +42,12 @@ def interval_text(value: float, low: float, high: float, decimals: int = 2) -> s
     """Return ``value (low to high)``."""
     ends = f"{number(low, decimals)} to {number(high, decimals)}"
     return f"{number(value, decimals)} ({ends})"
+
+
+def matrix_lines(matrix: NDArray[np.float64]) -> list[str]:
+    """Return the rows of a matrix with five decimals, indented; 0 has no sign."""
+    rows = matrix.round(5) + 0.0
+    return ["  " + " ".join(f"{value:9.5f}" for value in row) for row in rows]
 
 
 def duration(seconds: float) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -249,6 +250,17 @@ def test_a_small_travel_keeps_near_candidates(pairs):
 def test_a_wrong_candidate_is_named(pairs, pose, message):
     with pytest.raises(UserError, match=f"^candidate 0.*{message}"):
         pairs.recommend([VIEW], [np.asarray(pose)])
+
+
+def test_a_printed_rotation_has_no_negative_zero(pairs):
+    answer = pairs.recommend([PoseEstimate(np.eye(3))], 8)
+    rotation = np.array([[1.0, -1e-9, 0.0], [0.0, 1.0, -0.0], [-2e-5, 0.0, 1.0]])
+    printed = replace(answer, rotation=rotation).pose_lines("object")[1:4]
+    assert [line.split() for line in printed] == [
+        ["1.00000", "0.00000", "0.00000"],
+        ["0.00000", "1.00000", "0.00000"],
+        ["-0.00002", "0.00000", "1.00000"],
+    ]
 
 
 def test_independence_of_the_view_is_said(tmp_path):

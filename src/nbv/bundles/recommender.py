@@ -245,17 +245,19 @@ class Recommender:
                     raise
                 raise error.about(name) from error
             crops.append(crop)
-        doubts = (doubt for crop in crops for doubt in crop.doubts)
-        return self._recommend_codes(
+        answer = self.recommend_crops(
             np.array([crop.codes for crop in crops]),
             rotations_deg,
-            elevation_deg,
-            doubts=tuple(dict.fromkeys(doubts)),
-            rolled=rolled,
-            object_position_m=crops[-1].centre_m,
+            elevation_deg=elevation_deg,
             allowed_deg=allowed_deg,
             max_travel_deg=max_travel_deg,
             followed=followed,
+        )
+        doubts = dict.fromkeys(doubt for crop in crops for doubt in crop.doubts)
+        return replace(
+            answer,
+            warnings=(*doubts, *rolled, *answer.warnings),
+            object_position_m=crops[-1].centre_m,
         )
 
     def recommend_crops(
@@ -279,28 +281,6 @@ class Recommender:
                 "as those of Recommender.crop"
             )
         rotations_deg = as_rotation_list(rotations_deg, len(codes))
-        return self._recommend_codes(
-            codes,
-            rotations_deg,
-            elevation_deg,
-            allowed_deg=allowed_deg,
-            max_travel_deg=max_travel_deg,
-            followed=followed,
-        )
-
-    def _recommend_codes(
-        self,
-        codes: NDArray[np.uint8],
-        rotations_deg: list[float],
-        elevation_deg: float | None,
-        *,
-        doubts: tuple[str, ...] = (),
-        rolled: tuple[str, ...] = (),
-        object_position_m: tuple[float, float, float] | None = None,
-        allowed_deg: ArrayLike | None,
-        max_travel_deg: float,
-        followed: bool,
-    ) -> Recommendation:
         if elevation_deg is not None:
             check_number("`elevation_deg`", elevation_deg)
         if elevation_deg is not None and not -90 <= elevation_deg <= 90:
@@ -323,15 +303,12 @@ class Recommender:
             answer,
             ood_score=score,
             warnings=(
-                *doubts,
                 *_ood_warnings(score),
                 *self.lying_warnings(codes, logits),
                 *_elevation_warnings(self.bundle, elevation_deg),
-                *rolled,
                 *answer.warnings,
             ),
             crops=tuple(codes),
-            object_position_m=object_position_m,
         )
 
 

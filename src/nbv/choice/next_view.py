@@ -90,7 +90,7 @@ class Recommendation(Answer[Move]):
     spread_deg : float
         Circular standard deviation of the belief.
     expected_error_deg : float
-        Expected error of `azimuth_deg`: the mean calibration error of objects that looked alike,
+        Expected error of `azimuth_deg`: the mean calibration error of objects that looked similar,
         after one view recalibrated: the mean error of calibration views that promised as much.
         It is raised if the last view was recommended, because the same errors chose that view.
     moves : tuple of Move

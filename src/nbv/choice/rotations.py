@@ -93,16 +93,19 @@ def best_rotations(
     better_before = np.roll(is_near, 1) & (np.roll(cost, 1) < cost)
     is_minimum = ~(better_after | better_before)
     minima = zip(cost[is_minimum].tolist(), rotation_deg[is_minimum].tolist(), strict=True)
-    least, most = MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG
     ranked: list[tuple[float, float]] = []
     for minimum, rotation in sorted(
         minima, key=lambda pair: (pair[0], abs(pair[1]), pair[1] % 360)
     ):
-        if all(least <= abs(rotation - other) <= most for other, _ in ranked):
+        if all(_is_apart(rotation, other) for other, _ in ranked):
             ranked.append((rotation, minimum))
         if len(ranked) > N_ALTERNATIVES:
             break
     return ranked
+
+
+def _is_apart(rotation_deg: float, other_deg: float) -> bool:
+    return MIN_SEPARATION_DEG <= abs(rotation_deg - other_deg) <= 360.0 - MIN_SEPARATION_DEG
 
 
 def farthest_of(rotation_deg: NDArray[np.float64], taken: ArrayLike) -> int:
@@ -118,8 +121,7 @@ def with_first(
     ranked: list[tuple[float, float]], first: tuple[float, float]
 ) -> list[tuple[float, float]]:
     """Return ranked rotations and costs after another one, without those near it."""
-    least, most = MIN_SEPARATION_DEG, 360.0 - MIN_SEPARATION_DEG
-    others = [each for each in ranked if least <= abs(each[0] - first[0]) <= most]
+    others = [each for each in ranked if _is_apart(each[0], first[0])]
     return [first, *others][: N_ALTERNATIVES + 1]
 
 

@@ -10,6 +10,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from itertools import chain
 from typing import NoReturn
 
 if sys.version_info < (3, 11):
@@ -77,19 +78,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _with_next(arguments: list[str]) -> list[str]:
     """Return arguments in which ``recommend --table TABLE`` is ``next TABLE``, for one release."""
-    spaced = [part for item in arguments for part in _option_and_value(item)]
-    if arguments[:1] != ["recommend"] or "--table" not in spaced[:-1]:
+    former = ("--table=", "--distribution=")
+    pairs = [each.split("=", 1) if each.startswith(former) else [each] for each in arguments]
+    others = list(chain.from_iterable(pairs))
+    if others[:1] != ["recommend"] or "--table" not in others[:-1]:
         return arguments
-    at = spaced.index("--table")
     hint = "`nbv recommend --table TABLE` is now `nbv next TABLE`, and --distribution --estimate"
     print(f"nbv: {hint}; the old form goes with the next release", file=sys.stderr)  # noqa: T201
-    others = spaced[1:at] + spaced[at + 2 :]
-    others = ["--estimate" if item == "--distribution" else item for item in others]
-    return joined_numbers(["next", spaced[at + 1], *others])
-
-
-def _option_and_value(item: str) -> list[str]:
-    return item.split("=", 1) if item.startswith(("--table=", "--distribution=")) else [item]
+    at = others.index("--table")
+    table, others = others[at + 1], others[1:at] + others[at + 2 :]
+    others = ["--estimate" if each == "--distribution" else each for each in others]
+    return joined_numbers(["next", table, *others])
 
 
 def _drop_output() -> None:

@@ -10,7 +10,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from nbv.errors import printable
-from nbv.labels import counted
+from nbv.labels import counted, matrix_lines
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,25 +94,31 @@ _MOVE_KEYS = ("rotation_deg", "travel_deg", "expected_error_deg", "probability_w
 _NOT_IN_JSON = ("crops", "n_views", "moves")
 
 
-def answer_as_json(
+def show_answer(
     answer: Answer[Any],
-    enough: bool | None,
-    assumed_focal_px: float | None = None,
+    until: float | None,
     *,
+    as_json: bool,
     has_targets: bool,
-) -> dict[str, Any]:
-    """Return an answer for JSON.
+    seen: str = "object",
+    assumed_focal_px: float | None = None,
+) -> None:
+    """Print an answer about an object, which is called `seen`, as text or as JSON.
 
-    Parameters
-    ----------
-    answer : Answer
-    enough : bool or None
-        None without ``--until``.
-    assumed_focal_px : float or None
-        None if intrinsics were given.
-    has_targets : bool
-        Whether there are keys for the camera's pose after each move.
+    JSON has keys for the camera's pose after each move if the answer `has_targets`.
     """
+    enough = answer.is_enough(until)
+    if as_json:
+        print_json(_as_json(answer, enough, assumed_focal_px, has_targets))
+        return
+    if assumed_focal_px is not None:
+        print_assumed_camera(assumed_focal_px)
+    _print_answer(answer, enough, seen)
+
+
+def _as_json(
+    answer: Answer[Any], enough: bool | None, assumed_focal_px: float | None, has_targets: bool
+) -> dict[str, Any]:
     target = "target_camera_pose"
     moves = [dict.fromkeys(_MOVE_KEYS) | _plain(move) for move in answer.moves]
     best = moves[0] if moves else None
@@ -142,8 +148,7 @@ def _value(value: Any) -> Any:
     return None if is_unknown else value
 
 
-def print_answer(answer: Answer[Any], enough: bool | None, seen: str = "object") -> None:
-    """Print an answer about an object, which is called `seen`, in a few lines."""
+def _print_answer(answer: Answer[Any], enough: bool | None, seen: str) -> None:
     for head, line in zip_longest(["pose"], answer.pose_lines(seen), fillvalue=""):
         print_line(f"{head:<10} {line}")
     if enough is not None:
@@ -158,8 +163,8 @@ def print_answer(answer: Answer[Any], enough: bool | None, seen: str = "object")
     print_warnings(answer.warnings)
     if move is not None and move.target_camera_pose is not None:
         print_line("target camera pose in the base frame")
-        for row in move.target_camera_pose:
-            print_line("  " + " ".join(f"{value:9.5f}" for value in row))
+        for line in matrix_lines(move.target_camera_pose):
+            print_line(line)
 
 
 def print_offset(name: str, number: str, offset: Offset, *, is_added: bool = False) -> None:

@@ -75,7 +75,24 @@ Rotations = Annotated[
     list[float] | Path | None, _list_parameter(as_rotations_or_file, "NUMBER...|FROM:TO|FILE")
 ]
 
-Json = Annotated[bool, Parameter(negative=())]
+Json = Annotated[bool, Parameter(negative=(), help="Print JSON.")]
+BundleName = Annotated[str, Parameter(help="The name of a shipped bundle, or a file.")]
+Followed = Annotated[
+    bool,
+    Parameter(
+        negative="--not-followed",
+        help="Whether a recommendation chose the last of several views. The expected error is then "
+        "raised, because the same errors chose the view. Give --not-followed for a turntable or "
+        "fixed cameras.",
+    ),
+]
+Until = Annotated[
+    float | None,
+    Parameter(
+        help="An expected error, degrees. If that of the pose is not above it, the answer is: "
+        "enough."
+    ),
+]
 
 AZIMUTHS, DISTRIBUTIONS, ORIENTATIONS = "azimuths", "distributions", "orientations"
 FRAMES = "frames"
@@ -85,32 +102,14 @@ SHIPPED = "mug"
 """The default bundle."""
 
 
-_FLAGS = {
-    "allowed_deg": "--allowed",
-    "estimate_deg": "--estimate",
-    "bundle": "--bundle",
-    "depth_scale": "--depth-scale",
-    "diagonal_m": "--diagonal",
-    "distance_m": "--distance",
-    "azimuth_deg": "--azimuth",
-    "elevation_deg": "--elevation",
-    "gravity": "--gravity",
-    "camera_pose": "--camera-pose",
-    "seed": "--seed",
-    "sphere": "--sphere",
-    "sensor": "--sensor",
-    "far_m": "--far",
-    "intrinsics": "--intrinsics",
-    "max_travel_deg": "--max-travel",
-    "near_m": "--near",
-    "ground_truth": "--ground-truth",
-    "output": "--output",
-}
+def flag(name: str) -> str:
+    """Return the flag of a field of options, or of a library's parameter."""
+    return "--" + re.sub("_(deg|m)$", "", name).replace("_", "-")
 
 
 def in_flags(message: str) -> str:
     """Return a library's message with its `parameters` replaced by flags."""
-    return re.sub("`([a-z_]+)`", lambda match: _FLAGS.get(match[1], match[0]), message)
+    return re.sub("`([a-z_]+)`", lambda match: flag(match[1]), message)
 
 
 def as_paragraphs(command: Command) -> Command:
@@ -126,7 +125,8 @@ def as_paragraphs(command: Command) -> Command:
         else:
             joined.append(line)
     paragraphs = (" ".join(paragraph.split()) for paragraph in head.split("\n\n"))
-    command.__doc__ = "\n".join(["\n\n".join(paragraphs), "", "Parameters", *joined])
+    described = ["", "Parameters", *joined] if joined else []
+    command.__doc__ = "\n".join(["\n\n".join(paragraphs), *described])
     return command
 
 
@@ -158,9 +158,6 @@ class FrameOptions:
     depth_scale: float | None = None
     near: float | None = None
     far: float | None = None
-
-
-ANY_FRAME = FrameOptions()
 
 
 @as_paragraphs
@@ -217,8 +214,6 @@ class MoveOptions:
         return read_pose(self.camera_pose), self.axis[:3], self.axis[3:] or [0.0, 0.0, 1.0]
 
 
-ANY_MOVE = MoveOptions()
-
 # Minus, hyphens and dashes that typesetting puts for the minus sign.
 _MINUS = re.compile("[\u2010-\u2015\u2212\ufe63\uff0d]")
 
@@ -266,9 +261,9 @@ def _is_numbers(text: str) -> bool:
 
 def check_options(given: Mapping[str, object], known: Sequence[str], of_what: str) -> None:
     """Raise UserError if an option is given, not None, that is not known for an input."""
-    for option, value in given.items():
-        if value is not None and option not in known:
-            raise UserError(f"{option} does not go with {of_what}; leave it out")
+    for name, value in given.items():
+        if value is not None and name not in known:
+            raise UserError(f"{flag(name)} does not go with {of_what}; leave it out")
 
 
 def check_writable(option: str, path: Path, kinds: Sequence[str] = ()) -> None:

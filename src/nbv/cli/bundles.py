@@ -10,7 +10,15 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from nbv.cli.answers import print_json, print_line, print_names
-from nbv.cli.arguments import SHIPPED, FileAxis, Json, WholeNumber, as_paragraphs, check_writable
+from nbv.cli.arguments import (
+    SHIPPED,
+    BundleName,
+    FileAxis,
+    Json,
+    WholeNumber,
+    as_paragraphs,
+    check_writable,
+)
 from nbv.errors import UserError
 
 UP, FRONT = "+z", "+x"
@@ -65,8 +73,6 @@ def render(
         kinect, stereo, or none for the true depth in the Kinect's image.
     seed
         Seed of the sensor's noise.
-    json
-        Print JSON.
     """
     if (mesh is None) != example:
         raise UserError("give a mesh file, or --example")
@@ -91,17 +97,10 @@ def render(
 
 
 @as_paragraphs
-def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
+def inspect(bundle: BundleName = SHIPPED, /, *, json: Json = False) -> None:
     """Show how good a bundle is, its content and its provenance.
 
     Example: nbv inspect mug
-
-    Parameters
-    ----------
-    bundle
-        The name of a shipped bundle, or a file.
-    json
-        Print JSON.
     """
     from nbv.bundles.bundle import FORMAT, Bundle
     from nbv.bundles.evaluation import bundle_errors_deg
@@ -133,26 +132,19 @@ def inspect(bundle: str = SHIPPED, /, *, json: Json = False) -> None:
         ),
         **content.provenance,
     }
-    if json:
-        print_json(about)
-    else:
-        print_names(about)
+    (print_json if json else print_names)(about)
 
 
 @as_paragraphs
-def export(bundle: str = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
+def export(bundle: BundleName = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
     """Write a bundle's network as an ONNX model from crops to logits.
 
     Example: nbv export mug --onnx mug.onnx
 
     Parameters
     ----------
-    bundle
-        The name of a shipped bundle, or a file.
     onnx
         The file to write.
-    json
-        Print JSON.
     """
     check_writable("--onnx", onnx, [".onnx"])
     from nbv.bundles.bundle import Bundle
@@ -165,10 +157,8 @@ def export(bundle: str = SHIPPED, /, *, onnx: Path, json: Json = False) -> None:
     with replacing(onnx) as temporary:
         temporary.write_bytes(model)
     if json:
-        about: dict[str, Any] = {"file": str(onnx)}
-        for end in (*session.get_inputs(), *session.get_outputs()):
-            # n is any number.
-            about[end.name] = end.shape
-        print_json(about)
+        # In shapes, n is any number.
+        ends = (*session.get_inputs(), *session.get_outputs())
+        print_json({"file": str(onnx)} | {end.name: end.shape for end in ends})
         return
     print_line(f"{onnx}: codes (n, 1, side, side) to logits (n, classes) and hidden layer")

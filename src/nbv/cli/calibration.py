@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,11 +19,11 @@ from nbv.cli.answers import (
     print_warnings,
 )
 from nbv.cli.arguments import (
-    ANY_FRAME,
     AZIMUTHS,
     FRAMES,
     ORIENTATIONS,
     SHIPPED,
+    BundleName,
     FrameOptions,
     Json,
     WholeNumbers,
@@ -32,7 +32,6 @@ from nbv.cli.arguments import (
     check_writable,
     in_flags,
 )
-from nbv.errors import UserError, nearest
 from nbv.labels import counted
 
 if TYPE_CHECKING:
@@ -45,9 +44,9 @@ if TYPE_CHECKING:
 
 
 OPTIONS = {
-    AZIMUTHS: ("--criterion",),
-    ORIENTATIONS: ("--ground-truth", "--models-info", "--object"),
-    FRAMES: ("--bundle", "--intrinsics", "--depth-scale", "--near", "--far"),
+    AZIMUTHS: ("criterion",),
+    ORIENTATIONS: ("ground_truth", "models_info", "object"),
+    FRAMES: ("bundle", "intrinsics", "depth_scale", "near", "far"),
 }
 """Options for some files only."""
 
@@ -68,7 +67,7 @@ class CalibrationOptions:
         the form of results. Default: the folder of the results.
     models_info
         For orientations: BOP's models_info.json, which gives the objects' symmetries.
-    objects
+    object
         Keep this object of a file of orientations; give the option again for more. Default: all.
     bundle
         The bundle to calibrate on frames: the name of a shipped one (default: mug), or a file.
@@ -77,11 +76,8 @@ class CalibrationOptions:
     criterion: str | None = None
     ground_truth: Path | None = None
     models_info: Path | None = None
-    objects: Annotated[list[str] | None, Parameter(name="--object", negative=())] = None
+    object: Annotated[list[str] | None, Parameter(negative=())] = None
     bundle: str | None = None
-
-
-NO_OPTIONS = CalibrationOptions()
 
 
 @as_paragraphs
@@ -90,8 +86,8 @@ def calibrate(
     /,
     *,
     output: Path,
-    options: CalibrationOptions = NO_OPTIONS,
-    camera: FrameOptions = ANY_FRAME,
+    options: CalibrationOptions = CalibrationOptions(),
+    camera: FrameOptions = FrameOptions(),
     json: Json = False,
 ) -> None:
     """Calibrate an estimator's error model from ground truth, as the file's columns say.
@@ -113,57 +109,41 @@ def calibrate(
         A CSV file of pairs or of frames.
     output
         The file to write: .npz for a table, .safetensors for a bundle.
-    json
-        Print JSON.
     """
     from nbv.files import read_rows
 
     rows = read_rows(source, ())
-    kind = _kind(rows.columns)
-    given = {
-        "--criterion": options.criterion,
-        "--ground-truth": options.ground_truth,
-        "--models-info": options.models_info,
-        "--object": options.objects,
-        "--bundle": options.bundle,
-        "--intrinsics": camera.intrinsics,
-        "--depth-scale": camera.depth_scale,
-        "--near": camera.near,
-        "--far": camera.far,
-    }
+    kind = _kind(rows)
+    given = vars(options) | vars(camera)
     check_options(given, OPTIONS[kind], f"{source}, which holds {kind}")
     check_writable("--output", output, [".safetensors" if kind == FRAMES else ".npz"])
-    CALIBRATIONS[kind](source, rows, output, options, camera, json)
+    if kind == FRAMES:
+        _calibrate_bundle(source, rows, output, options.bundle or SHIPPED, camera, json)
+    elif kind == AZIMUTHS:
+        _calibrate_table(source, rows, output, options.criterion or "pose_ambiguity", json)
+    else:
+        _calibrate_orientations(source, rows, output, options, json)
 
 
-def _kind(columns: Iterable[Hashable]) -> str:
-    """Return what a file with these columns holds."""
-    known = set(columns)
-    if "R_true" in known or {"obj_id", "R"} <= known:
+def _kind(rows: pd.DataFrame) -> str:
+    """Return what a file with the columns of these rows holds."""
+    if "R_true" in rows or ("obj_id" in rows and "R" in rows):
         return ORIENTATIONS
-    return FRAMES if "file" in known and "estimate_deg" not in known else AZIMUTHS
+    return FRAMES if "file" in rows and "estimate_deg" not in rows else AZIMUTHS
 
 
 def _calibrate_bundle(
-    source: Path,
-    rows: pd.DataFrame,
-    output: Path,
-    options: CalibrationOptions,
-    camera: FrameOptions,
-    as_json: bool,
+    source: Path, rows: pd.DataFrame, output: Path, bundle: str, camera: FrameOptions, as_json: bool
 ) -> None:
-    """Make the bundle of ``nbv calibrate`` from the rows of a manifest."""
+    """Make a bundle from the rows of a manifest."""
     from nbv.bundles.calibration import recalibrated
     from nbv.bundles.recordings import recordings_of
     from nbv.core.circle.distributions import mean_direction_deg
     from nbv.core.circle.logits import from_logits
     from nbv.core.circle.offset import FOR_FRAMES, Offset, frame_warning
 
-    of_rows = recordings_of(source, rows)
-    run = _run_on_recordings(options.bundle or SHIPPED, of_rows, camera, as_json=as_json)
+    run = _run_on_recordings(bundle, recordings_of(source, rows), camera, as_json=as_json)
     used, sweeps = run.recommender.bundle, run.sweeps
-    if run.n_assumed and not as_json:
-        print_assumed_camera(used.focal_px, run.n_assumed)
     recordings: list[dict[str, Any]] = []
     for sweep in sweeps:
         estimate_deg = mean_direction_deg(from_logits(sweep.logits, used.temperature))
@@ -178,16 +158,10 @@ def _calibrate_bundle(
             print_offset(name, counted(len(estimate_deg), "frame"), offset, is_added=is_added)
     sys.stdout.flush()
     recalibrated(used, sweeps, str(source)).save(output)
+    n_objects = len({sweep.object_id for sweep in sweeps})
     if as_json:
-        print_json(
-            {
-                "file": str(output),
-                "category": used.category,
-                "n_objects": len({sweep.object_id for sweep in sweeps}),
-                "recordings": recordings,
-                **run.as_json(),
-            }
-        )
+        made = {"file": str(output), "category": used.category, "n_objects": n_objects}
+        print_json(made | {"recordings": recordings} | run.as_json())
         return
     print_line(f"{output}: {used.category}, calibrated on {counted(len(sweeps), 'recording')}")
 
@@ -197,10 +171,10 @@ def evaluate(
     manifest: Annotated[Path, Parameter(name="MANIFEST")],
     /,
     *,
-    bundle: str = SHIPPED,
+    bundle: BundleName = SHIPPED,
     views: WholeNumbers = None,
     until: float | None = None,
-    camera: FrameOptions = ANY_FRAME,
+    camera: FrameOptions = FrameOptions(),
     output: Path | None = None,
     json: Json = False,
 ) -> None:
@@ -213,8 +187,6 @@ def evaluate(
     manifest
         CSV with object_id, sequence, file, azimuth_deg, and optionally mask, elevation_deg, fx, fy,
         cx, cy.
-    bundle
-        The name of a shipped bundle, or a file.
     views
         Numbers of views. Default: 2 3 4 5.
     until
@@ -222,8 +194,6 @@ def evaluate(
         number of views.
     output
         Also write the errors to this CSV file.
-    json
-        Print JSON.
     """
     if output is not None:
         check_writable("--output", output, [".csv"])
@@ -245,20 +215,11 @@ def evaluate(
     ood = evaluation.count_ood(used, sweeps)
     calibrated_by = sorted({sweep.object_id for sweep in sweeps} & set(used.object_ids))
     if json:
-        print_json(
-            {
-                "errors": errors.astype(object).where(errors.notna(), None).to_dict("records"),
-                "calibrated_by": calibrated_by,
-                "ood": [
-                    about | {"warning": about["warning"] or None}
-                    for about in ood.to_dict("records")
-                ],
-                **run.as_json(),
-            }
-        )
+        rows = errors.astype(object).where(errors.notna(), None).to_dict("records")
+        warned = [row | {"warning": row["warning"] or None} for row in ood.to_dict("records")]
+        about = {"errors": rows, "calibrated_by": calibrated_by, "ood": warned}
+        print_json(about | run.as_json())
         return
-    if run.n_assumed:
-        print_assumed_camera(used.focal_px, run.n_assumed)
     if calibrated_by:
         print_warnings(
             [
@@ -270,16 +231,12 @@ def evaluate(
 
 
 def _calibrate_table(
-    source: Path,
-    rows: pd.DataFrame,
-    output: Path,
-    options: CalibrationOptions,
-    _camera: FrameOptions,
-    as_json: bool,
+    source: Path, rows: pd.DataFrame, output: Path, criterion: str, as_json: bool
 ) -> None:
-    """Make the tables of ``nbv calibrate`` from calibration pairs."""
+    """Make the tables of azimuths, and of distributions if there are some."""
     import numpy as np
 
+    from nbv.core.choose import named
     from nbv.core.circle.criteria import CRITERIA
     from nbv.core.circle.distributions import mean_direction_deg
     from nbv.core.circle.offset import FOR_PAIRS, Offset
@@ -288,9 +245,7 @@ def _calibrate_table(
     from nbv.tables.lookup import LookupTable
     from nbv.tables.pairs import PairTable
 
-    criterion = options.criterion or "pose_ambiguity"
-    if criterion not in CRITERIA:
-        raise UserError(f"--criterion={criterion}: {nearest(criterion, CRITERIA)}")
+    named("criterion", criterion, CRITERIA)
     pairs = PairTable.from_rows(source, rows)
     sweeps = pairs.distributions
     views, thin = (pairs.estimates, ()) if sweeps else pairs.thin_estimates
@@ -301,12 +256,11 @@ def _calibrate_table(
         lookup.save(output)
     else:
         table.save(output, lookup)
-    number = counted(len(estimates), "object")
+    offset, number = pairs.offset, counted(len(estimates), "object")
     about = {"file": str(output), "criterion": criterion, "n_objects": len(estimates)}
-    of_estimates = pairs.offset
-    about |= asdict(of_estimates) | {"thin": list(thin)}
+    about |= asdict(offset) | {"thin": list(thin)}
     if not as_json:
-        print_offset(str(source), number, of_estimates)
+        print_offset(str(source), number, offset)
         print_warnings(thin)
         print_line(f"{output}: {criterion} from {number}")
     if table is not None:
@@ -322,28 +276,18 @@ def _calibrate_table(
 
 
 def _calibrate_orientations(
-    source: Path,
-    rows: pd.DataFrame,
-    output: Path,
-    options: CalibrationOptions,
-    _camera: FrameOptions,
-    as_json: bool,
+    source: Path, rows: pd.DataFrame, output: Path, options: CalibrationOptions, as_json: bool
 ) -> None:
-    """Make the table of ``nbv calibrate`` from estimates in three dimensions."""
+    """Make the table of estimates in three dimensions."""
     from nbv.tables.bop import orientation_table
 
-    truth = options.ground_truth, options.models_info, options.objects or []
+    truth = options.ground_truth, options.models_info, options.object or []
     pairs = orientation_table(source, rows, *truth)
     about = pairs.about()
     pairs.save(output)
     if as_json:
-        print_json(
-            {
-                "file": str(output),
-                "objects": [asdict(summary) for summary in about],
-                "left_out": list(pairs.left_out),
-            }
-        )
+        objects = [asdict(summary) for summary in about]
+        print_json({"file": str(output), "objects": objects, "left_out": list(pairs.left_out)})
         return
     print_warnings(pairs.left_out)
     for summary in about:
@@ -357,14 +301,6 @@ def _calibrate_orientations(
         )
         print_warnings(summary.warnings)
     print_line(f"{output}: {counted(len(pairs.object_id), 'pair')}")
-
-
-CALIBRATIONS: Mapping[str, Callable[..., None]] = {
-    AZIMUTHS: _calibrate_table,
-    ORIENTATIONS: _calibrate_orientations,
-    FRAMES: _calibrate_bundle,
-}
-"""What makes a table or a bundle of each kind of file."""
 
 
 @dataclass(frozen=True)
@@ -394,7 +330,7 @@ class ManifestRun:
 def _run_on_recordings(
     bundle: str, recordings: Sequence[Recording], camera: FrameOptions, *, as_json: bool
 ) -> ManifestRun:
-    """Run a bundle's network on the frames of recordings, and print which frames are skipped."""
+    """Run a bundle's network on recordings; print skipped frames and an assumed camera."""
     from nbv.bundles.recommender import Recommender
     from nbv.bundles.recordings import run_network
 
@@ -419,4 +355,6 @@ def _run_on_recordings(
         for recording in recordings
         for path, known in zip(recording.frames["path"], recording.intrinsics, strict=True)
     )
+    if n_assumed and not as_json:
+        print_assumed_camera(recommender.bundle.focal_px, n_assumed)
     return ManifestRun(recommender, sweeps, n_assumed, left_out)

@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from nbv.cli.answers import answer_as_json, print_answer, print_json, with_targets
+from nbv.cli.answers import show_answer, with_targets
 from nbv.cli.arguments import (
-    ANY_MOVE,
     AZIMUTHS,
     DISTRIBUTIONS,
     ORIENTATIONS,
     Estimate,
+    Followed,
     Json,
     MoveOptions,
     Numbers,
+    Until,
     as_paragraphs,
     check_options,
 )
@@ -35,13 +36,14 @@ ESTIMATES = {
     ORIENTATIONS: "9 numbers, or a .json or .npy file",
 }
 
-_ROUND_AXIS = ("--allowed", "--axis")
+_FOR_ALL = ("max_travel", "camera_pose")
+_ROUND_AXIS = (*_FOR_ALL, "allowed", "axis")
 OPTIONS = {
     AZIMUTHS: _ROUND_AXIS,
-    DISTRIBUTIONS: (*_ROUND_AXIS, "--rotations", "--not-followed", "--until"),
-    ORIENTATIONS: ("--object", "--candidates", "--sphere", "--until"),
+    DISTRIBUTIONS: (*_ROUND_AXIS, "rotations", "not_followed", "until"),
+    ORIENTATIONS: (*_FOR_ALL, "object", "candidates", "sphere", "until"),
 }
-"""Options for some tables only."""
+"""Options for each kind of table."""
 
 
 @Parameter(name="*")
@@ -52,7 +54,7 @@ class CandidateOptions:
 
     Parameters
     ----------
-    object_id
+    object
         The object, where a table of orientations has several.
     candidates
         Camera poses that can be reached, for a table of orientations: 16 numbers each, like
@@ -61,12 +63,9 @@ class CandidateOptions:
         Instead of --candidates: the number of camera poses, spaced evenly around the object.
     """
 
-    object_id: Annotated[str | None, Parameter(name="--object")] = None
+    object: str | None = None
     candidates: Path | None = None
     sphere: int | None = None
-
-
-ANY_CANDIDATE = CandidateOptions()
 
 
 @as_paragraphs
@@ -76,10 +75,10 @@ def next_view(
     *,
     estimate: Estimate,
     rotations: Numbers = None,
-    followed: Annotated[bool, Parameter(negative="--not-followed")] = True,
-    limits: MoveOptions = ANY_MOVE,
-    around: CandidateOptions = ANY_CANDIDATE,
-    until: float | None = None,
+    followed: Followed = True,
+    limits: MoveOptions = MoveOptions(),
+    around: CandidateOptions = CandidateOptions(),
+    until: Until = None,
     json: Json = False,
 ) -> None:
     """Recommend the next view after estimates of your own estimator.
@@ -102,42 +101,25 @@ def next_view(
         .npy file with several hypotheses or views.
     rotations
         Rotation of each view from the first one: 0 90, or 0,90, for two distributions.
-    followed
-        Whether a recommendation chose the last of several views. The expected error is then raised,
-        because the same errors chose the view. Give --not-followed for a turntable or fixed
-        cameras.
-    until
-        An expected error, degrees. If that of the pose is not above it, the answer is: enough.
-    json
-        Print JSON.
     """
     kind = _kind(table, estimate)
-    given = {
-        "--allowed": limits.allowed,
-        "--axis": limits.axis,
-        "--rotations": rotations,
-        "--not-followed": None if followed else True,
-        "--object": around.object_id,
-        "--candidates": around.candidates,
-        "--sphere": around.sphere,
-        "--until": until,
-    }
+    others = {"rotations": rotations, "not_followed": None if followed else True, "until": until}
+    given = vars(limits) | vars(around) | others
     check_options(given, OPTIONS[kind], f"{table}, which holds {kind}")
     answer: Answer[Any]
     if kind == ORIENTATIONS:
         answer, has_targets = _ranked_cameras(table, estimate, limits, around), True
     else:
         placement = limits.placement()
-        if kind == AZIMUTHS:
-            answer = _ranked_rotations(table, estimate, limits)
+        if isinstance(estimate, list):
+            from nbv.tables.lookup import LookupTable
+
+            lookup = LookupTable.load(table)
+            answer = lookup.rank(estimate[0], limits.allowed_deg(), limits.max_travel)
         else:
             answer = _recommended(table, estimate, limits, rotations or [0.0], followed)
         answer, has_targets = with_targets(answer, placement), placement is not None
-    enough = answer.is_enough(until)
-    if json:
-        print_json(answer_as_json(answer, enough, has_targets=has_targets))
-        return
-    print_answer(answer, enough)
+    show_answer(answer, until, as_json=json, has_targets=has_targets)
 
 
 def _kind(table: Path, estimate: list[float] | Path) -> str:
@@ -156,12 +138,6 @@ def _kind(table: Path, estimate: list[float] | Path) -> str:
     if n_numbers not in {AZIMUTHS: (1,), DISTRIBUTIONS: (None,), ORIENTATIONS: (9, None)}[kind]:
         raise UserError(f"--estimate: {table} holds {kind}; give {ESTIMATES[kind]}")
     return kind
-
-
-def _ranked_rotations(table: Path, estimate: Any, limits: MoveOptions) -> Answer[Any]:
-    from nbv.tables.lookup import LookupTable
-
-    return LookupTable.load(table).rank(estimate[0], limits.allowed_deg(), limits.max_travel)
 
 
 def _recommended(
@@ -191,7 +167,7 @@ def _ranked_cameras(
     return OrientationTable.load(table).recommend(
         read_views(estimate) if isinstance(estimate, Path) else [as_view(estimate, "--estimate")],
         read_poses(around.candidates) if around.candidates is not None else around.sphere or 0,
-        object_id=around.object_id,
+        object_id=around.object,
         camera_pose=None if limits.camera_pose is None else read_pose(limits.camera_pose),
         max_travel_deg=limits.max_travel,
     )

@@ -9,21 +9,16 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from nbv.cli.answers import (
-    answer_as_json,
-    print_answer,
-    print_assumed_camera,
-    print_json,
-    with_targets,
-)
+from nbv.cli.answers import show_answer, with_targets
 from nbv.cli.arguments import (
-    ANY_FRAME,
-    ANY_MOVE,
     SHIPPED,
+    BundleName,
+    Followed,
     FrameOptions,
     Json,
     MoveOptions,
     Numbers,
+    Until,
     as_paragraphs,
     check_writable,
 )
@@ -36,15 +31,15 @@ IMAGE_SUFFIXES = (".png", ".pdf", ".svg")
 @as_paragraphs
 def recommend(
     *frames: Annotated[Path, Parameter(name="FRAME", negative=())],
-    bundle: str = SHIPPED,
+    bundle: BundleName = SHIPPED,
     rotations: Numbers = None,
-    camera: FrameOptions = ANY_FRAME,
+    camera: FrameOptions = FrameOptions(),
     mask: Annotated[list[Path] | None, Parameter(consume_multiple=True, negative=())] = None,
     elevation: float | None = None,
     gravity: Numbers = None,
-    limits: MoveOptions = ANY_MOVE,
-    followed: Annotated[bool, Parameter(negative="--not-followed")] = True,
-    until: float | None = None,
+    limits: MoveOptions = MoveOptions(),
+    followed: Followed = True,
+    until: Until = None,
     plot: Path | None = None,
     json: Json = False,
 ) -> None:
@@ -62,8 +57,6 @@ def recommend(
     frames
         Depth frames of one object: .npy, .npz, or 16-bit images. Floating-point depth is in metres,
         integer depth in millimetres; see --depth-scale.
-    bundle
-        The name of a shipped bundle, or a file.
     rotations
         Rotation of each frame from the first one: 0 90, or 0,90, for two frames.
     mask
@@ -73,16 +66,8 @@ def recommend(
     gravity
         Instead of the elevation: the direction down in the camera's optical frame, x,y,z (x right,
         y down, z forward). An accelerometer at rest reports the opposite direction.
-    followed
-        Whether a recommendation chose the last of several views. The expected error is then raised,
-        because the same errors chose the view. Give --not-followed for a turntable or fixed
-        cameras.
-    until
-        An expected error, degrees. If that of the pose is not above it, the answer is: enough.
     plot
         Draw crops, belief, expected errors and the move into this file: .png, .pdf or .svg.
-    json
-        Print JSON.
     """
     if not frames:
         hint = "; give frames before --mask" if mask is not None else ""
@@ -131,11 +116,11 @@ def recommend(
         from nbv.bundles.plot import draw_recommendation
 
         draw_recommendation(answer, plot, used.category)
-    focal_px = used.focal_px if camera.intrinsics is None else None
-    enough = answer.is_enough(until)
-    if json:
-        print_json(answer_as_json(answer, enough, focal_px, has_targets=placement is not None))
-        return
-    if focal_px is not None:
-        print_assumed_camera(focal_px)
-    print_answer(answer, enough, used.category)
+    show_answer(
+        answer,
+        until,
+        as_json=json,
+        has_targets=placement is not None,
+        seen=used.category,
+        assumed_focal_px=used.focal_px if camera.intrinsics is None else None,
+    )

@@ -324,19 +324,19 @@ class Plan:
             "extract": paths("{category}/el{elevation}", units if self.linear else ()),
             "train": [] if self.linear else paths(fold, trained),
             "fit": paths(fold, trained) if self.linear else [],
-            "train_part": [f"{one}/{k}" for one in paths(fold, folds) for k in parts],
+            "train_part": [f"{path}/{k}" for path in paths(fold, folds) for k in parts],
             "estimate": paths(fold, estimated),
             "lookup": paths(f"{fold}/{{criterion}}", self.lookups),
             "evaluate_baselines": paths(fold, folds),
             "evaluate_recommended": [
-                f"{one}/{name}" for one in paths(fold, folds) for name in self.lookup_methods
+                f"{path}/{name}" for path in paths(fold, folds) for name in self.lookup_methods
             ],
             "table": tables,
             "figure": figures,
         }
-        found = [(rule, f"{rule}/{log}") for rule, names in logs.items() for log in names]
-        found += [("claims", "claims"), ("settings", "settings")]
-        return sorted(found, key=lambda job: Path(job[1]).parts)
+        jobs = [(rule, f"{rule}/{log}") for rule, names in logs.items() for log in names]
+        jobs += [("claims", "claims"), ("settings", "settings")]
+        return sorted(jobs, key=lambda job: Path(job[1]).parts)
 
     def sources(self, script: Path, settings: Mapping[str, Any] | None = None) -> list[str]:
         """Return a script and what it depends on in nbv, relative to the working directory.
@@ -388,13 +388,13 @@ def paths(pattern: str, keys: Iterable[Sequence[Any]]) -> list[str]:
     >>> paths("depth/{category}/el{elevation}.npy", [("mug", 0), ("car", 15)])
     ['depth/mug/el00.npy', 'depth/car/el15.npy']
     """
-    names, found = re.findall(r"\{(\w+)\}", pattern), []
+    names, filled = re.findall(r"\{(\w+)\}", pattern), []
     for key in keys:
         values = dict(zip(names, key, strict=True))
         if "elevation" in values:
             values["elevation"] = f"{int(values['elevation']):02d}"
-        found.append(pattern.format(**values))
-    return found
+        filled.append(pattern.format(**values))
+    return filled
 
 
 def too_small(n_objects: Mapping[str, int], epochs: int | None) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ from nbv.core.orientations.errors import OrientationErrors
 from nbv.core.orientations.group import Array, Orientations, along_ray
 from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
-from nbv.labels import counted
+from nbv.labels import counted, matrix_lines
 from nbv.numbers import FARTHEST_M, Pose, as_finite, as_orientations, as_pose, as_position
 
 NO_DEPENDENCE = (
@@ -99,7 +99,7 @@ class CameraMove(RankedMove):
     def extent(self) -> str:
         """How far the move goes, and from which direction the object is seen then."""
         metres = "" if self.travel_m is None else f", {self.travel_m:.2f} m"
-        x, y, z = self.direction
+        x, y, z = self.direction.round(2) + 0.0
         return f"{super().extent}{metres}; seen from the direction {x:.2f} {y:.2f} {z:.2f}"
 
 
@@ -112,7 +112,7 @@ class CameraRecommendation(Answer[CameraMove]):
 
     def pose_lines(self, seen: str) -> list[str]:
         """Return the pose of the object, which is called `seen`, in a few lines of text."""
-        rows = ("  " + " ".join(f"{value:8.5f}" for value in row) for row in self.rotation)
+        rows = matrix_lines(self.rotation)
         return [f"rotation, {seen} to camera", *rows, self.value(self)]
 
 

@@ -158,14 +158,9 @@ class OrientationTable:
 
     def where(self, rows: NDArray[np.bool_]) -> OrientationTable:
         """Return the table of some of the pairs (n,)."""
-        return replace(
-            self,
-            object_id=self.object_id[rows],
-            group=self.group[rows],
-            estimate=self.estimate[rows],
-            truth=self.truth[rows],
-            score=None if self.score is None else self.score[rows],
-        )
+        names = ("object_id", "group", "estimate", "truth")
+        score = None if self.score is None else self.score[rows]
+        return replace(self, score=score, **{name: getattr(self, name)[rows] for name in names})
 
     def recommend(
         self,

@@ -43,7 +43,7 @@ def circular_variance(distributions: Float32Array) -> Float32Array:
     angles = 2 * np.pi * np.arange(distributions.shape[1]) / distributions.shape[1]
     cosine = distributions @ np.cos(angles).astype(np.float32)
     sine = distributions @ np.sin(angles).astype(np.float32)
-    return np.asarray(1.0 - np.hypot(cosine, sine), dtype=np.float32)
+    return np.asarray(1.0 - np.hypot(cosine, sine))
 
 
 SPREADS: dict[str, Spread] = {"entropy": entropy, "circular_variance": circular_variance}

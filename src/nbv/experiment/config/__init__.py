@@ -209,9 +209,9 @@ def _read_mapping(path: Path) -> dict[str, Any]:
 
 def _run_name(settings: Mapping[str, Any]) -> str:
     """Return the experiment's name, followed by the choices that differ from the experiment's."""
-    own = ("procedural", _ESTIMATORS.get(settings["experiment"], "regressor"), "holdout")
+    usual = ("procedural", _ESTIMATORS.get(settings["experiment"], "regressor"), "holdout")
     names = (settings["dataset"]["source"], settings["estimator"]["kind"], settings["calibration"])
-    return "-".join([settings["experiment"], *(name for name in names if name not in own)])
+    return "-".join([settings["experiment"], *(name for name in names if name not in usual)])
 
 
 def equal_cost_epochs(epochs: int, calibration_fraction: float, parts: int) -> int:

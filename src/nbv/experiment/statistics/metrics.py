@@ -29,7 +29,7 @@ def accuracy_area(errors_deg: ArrayLike) -> Floats:
 
 def above_90(errors_deg: ArrayLike) -> Floats:
     """Return the contribution of each image to the share of errors above 90°: 0 or 100 percent."""
-    return np.where(np.asarray(errors_deg, dtype=np.float64) > FRONT_BACK_DEG, 100.0, 0.0)
+    return np.where(np.asarray(errors_deg) > FRONT_BACK_DEG, 100.0, 0.0)
 
 
 _MEDIAN_GRID = 1001
@@ -92,8 +92,8 @@ def pea(errors_deg: ArrayLike, thresholds_deg: ArrayLike) -> Floats:
         The result has the same shape.
     """
     ordered = np.sort(_non_empty(errors_deg))
-    below = np.searchsorted(ordered, np.asarray(thresholds_deg, dtype=np.float64), side="left")
-    return np.asarray(below / ordered.size, dtype=np.float64)
+    below = np.searchsorted(ordered, np.asarray(thresholds_deg))
+    return np.asarray(below / ordered.size)
 
 
 def pauc(errors_deg: ArrayLike) -> float:
@@ -183,12 +183,12 @@ def resampled_medians(values: ArrayLike, objects: Ints, multiplicities: Ints) ->
     Read from a grid of 1,001 pooled quantiles, so exact to one thousandth in rank: far finer than
     the spread of the resamples, and a matrix product instead of a sort for each resample.
     """
-    flat = np.asarray(values, dtype=np.float64)
+    flat = np.asarray(values)
     grid = np.quantile(flat, np.linspace(0.0, 1.0, _MEDIAN_GRID), method="inverted_cdf")
     n_objects = multiplicities.shape[1]
-    cell = objects * _MEDIAN_GRID + np.searchsorted(grid, flat, side="left")
+    cell = objects * _MEDIAN_GRID + np.searchsorted(grid, flat)
     histogram = np.bincount(cell, minlength=n_objects * _MEDIAN_GRID)
-    up_to = np.cumsum(histogram.reshape(n_objects, _MEDIAN_GRID), axis=1).astype(np.float64)
+    up_to = np.cumsum(histogram.reshape(n_objects, _MEDIAN_GRID), axis=1)
     reached = multiplicities.astype(np.float64) @ up_to
     total = reached[:, -1:]
     medians = grid[np.argmax(reached >= total / 2, axis=1)]
