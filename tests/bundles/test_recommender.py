@@ -7,16 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from made_bundles import (
-    BINS,
-    COLUMNS,
-    FOCAL_PX,
-    ROWS,
-    WIDTH,
-    frame,
-    random_codes,
-    random_estimator,
-)
+from made_bundles import BINS, COLUMNS, FOCAL_PX, ROWS, WIDTH, frame, random_codes, random_estimator
 from made_bundles import settings as made_settings
 from nbv.bundles.bundle import elevation_weights
 from nbv.bundles.ood import ood_score

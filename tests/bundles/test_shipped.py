@@ -7,15 +7,7 @@ import pandas as pd
 import pytest
 
 from nbv.bundles.calibration import recalibrated
-from nbv.bundles.evaluation import (
-    FIXED,
-    OPPOSITE,
-    PAPER,
-    RANDOM,
-    RECOMMENDED,
-    SINGLE,
-    evaluate,
-)
+from nbv.bundles.evaluation import FIXED, OPPOSITE, PAPER, RANDOM, RECOMMENDED, SINGLE, evaluate
 from nbv.bundles.recommender import Recommender, shipped_bundles
 from nbv.bundles.recordings import read_manifest, run_network
 from nbv.core.circle.selection import DENSITY

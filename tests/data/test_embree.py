@@ -12,11 +12,6 @@ from nbv.errors import UserError
 from rendering_shapes import procedural, rotated, shape_of, triangle_soup
 
 
-@pytest.fixture(scope="module")
-def embree():
-    return open_renderer("embree")
-
-
 def brute_force(shape, elevation, azimuths, camera):
     """Möller and Trumbore's test of every ray with every triangle, in double precision.
 

@@ -16,11 +16,6 @@ CATEGORIES = ("airplane", "car", "chair", "mug", "toilet")
 
 
 @pytest.fixture(scope="module")
-def embree():
-    return open_renderer("embree")
-
-
-@pytest.fixture(scope="module")
 def pyrender():
     try:
         return open_renderer("pyrender")

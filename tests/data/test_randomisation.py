@@ -1,6 +1,6 @@
 """What is drawn at random for a camera: what it may change, and what it has to leave alone."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -8,36 +8,14 @@ from scipy import ndimage
 
 from nbv.data.camera import Camera, object_views
 from nbv.data.depth_codes import crop_measured, encode_depth, sensor_camera
-from nbv.data.randomisation import (
-    Randomisation,
-    add_table,
-    lose,
-    move_edge,
-    randomised_sweep,
-)
-from nbv.data.render import open_renderer
+from nbv.data.randomisation import Randomisation, add_table, lose, move_edge, randomised_sweep
 from rendering_shapes import procedural
 
 CAMERA = Camera(fov_deg=25.0, image_side=48)
 AZIMUTHS = np.arange(0.0, 360.0, 45.0)
 NOTHING = Randomisation(
-    elevation_deg=0,
-    roll_deg=0,
-    size=0,
-    nearest=None,
-    farthest=None,
-    focal=0,
-    measured=1,
-    table=0,
-    cutout=0,
-    thin=0,
-    split=0,
-    inside=0,
-    hole=0,
-    occluded=0,
-    patches=0,
-    edge_px=0,
-    shift_px=0,
+    **dict.fromkeys((one.name for one in fields(Randomisation)), 0)
+    | {"nearest": None, "farthest": None, "measured": 1}
 )
 
 
@@ -46,44 +24,39 @@ def mesh():
     return procedural("mug")
 
 
-@pytest.fixture(scope="module")
-def renderer():
-    return open_renderer("embree")
-
-
-def sweep_of(mesh, renderer, draw, seed=0, elevation=20.0):
+def sweep_of(mesh, embree, draw, seed=0, elevation=20.0):
     rng = np.random.default_rng(seed)
-    return randomised_sweep(mesh, elevation, AZIMUTHS, CAMERA, renderer, None, 0.17, draw, rng)
+    return randomised_sweep(mesh, elevation, AZIMUTHS, CAMERA, embree, None, 0.17, draw, rng)
 
 
 @pytest.mark.parametrize("elevation", [20.0, 88.0])
-def test_where_nothing_varies_it_is_the_rendered_image(mesh, renderer, elevation):
-    depth = renderer.render(mesh.vertices, mesh.faces, elevation, AZIMUTHS, sensor_camera(CAMERA))
+def test_where_nothing_varies_it_is_the_rendered_image(mesh, embree, elevation):
+    depth = embree.render(mesh.vertices, mesh.faces, elevation, AZIMUTHS, sensor_camera(CAMERA))
     wanted = encode_depth(crop_measured(depth, CAMERA), CAMERA)
-    assert np.array_equal(sweep_of(mesh, renderer, NOTHING, elevation=elevation), wanted)
+    assert np.array_equal(sweep_of(mesh, embree, NOTHING, elevation=elevation), wanted)
 
 
-def test_a_camera_on_its_head_sees_the_image_on_its_head(mesh, renderer):
-    upright = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
-    upside_down = renderer.render(
+def test_a_camera_on_its_head_sees_the_image_on_its_head(mesh, embree):
+    upright = embree.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+    upside_down = embree.render(
         mesh.vertices, mesh.faces, 20.0, AZIMUTHS, replace(CAMERA, roll_deg=180.0)
     )
     assert np.allclose(upside_down[:, ::-1, ::-1], upright, atol=1e-4)
 
 
-def test_a_camera_that_leans_to_the_right_sees_the_right_above(renderer):
+def test_a_camera_that_leans_to_the_right_sees_the_right_above(embree):
     # A plate to the right of the axis, seen from azimuth 0, where +y is right.
     vertices = np.array([[0, 0, -0.05], [0, 0.45, -0.05], [0, 0.45, 0.05], [0, 0, 0.05]])
     camera = Camera(image_side=48, framing="axis", roll_deg=90.0)
-    depth = renderer.render(vertices, [[0, 1, 2], [0, 2, 3]], 0.0, [0.0], camera)[0]
+    depth = embree.render(vertices, [[0, 1, 2], [0, 2, 3]], 0.0, [0.0], camera)[0]
     rows, columns = np.nonzero(depth)
     assert rows.max() < 24
     assert abs(columns.mean() + 0.5 - 24) < 1
 
 
-def test_distance_leaves_the_size_of_a_pixel_on_the_object(mesh, renderer):
-    near = sweep_of(mesh, renderer, NOTHING)
-    far = sweep_of(mesh, renderer, replace(NOTHING, nearest=8.0, farthest=8.0))
+def test_distance_leaves_the_size_of_a_pixel_on_the_object(mesh, embree):
+    near = sweep_of(mesh, embree, NOTHING)
+    far = sweep_of(mesh, embree, replace(NOTHING, nearest=8.0, farthest=8.0))
     for one, other in zip(near, far, strict=True):
         box = [np.ptp(np.nonzero(image), axis=1) for image in (one, other)]
         # Perspective makes the near half larger than the far one.
@@ -91,9 +64,9 @@ def test_distance_leaves_the_size_of_a_pixel_on_the_object(mesh, renderer):
 
 
 @pytest.mark.parametrize("kind", ["table", "cutout"])
-def test_the_table_is_level_and_lies_under_the_object(mesh, renderer, kind):
+def test_the_table_is_level_and_lies_under_the_object(mesh, embree, kind):
     rng = np.random.default_rng(0)
-    depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+    depth = embree.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
     views = object_views(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
     floor = float(mesh.vertices[:, 2].min())
     with_table = depth.copy()
@@ -110,8 +83,8 @@ def test_the_table_is_level_and_lies_under_the_object(mesh, renderer, kind):
 
 
 @pytest.mark.parametrize("loss", ["thin", "split", "inside", "occluded", "patches"])
-def test_a_loss_takes_pixels_away_and_changes_no_other(mesh, renderer, loss):
-    depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+def test_a_loss_takes_pixels_away_and_changes_no_other(mesh, embree, loss):
+    depth = embree.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
     before, lost, rng = depth.copy(), 0, np.random.default_rng(0)
     for image, whole in zip(depth, before, strict=True):
         lose(image, replace(NOTHING, **{loss: 1}), rng)
@@ -121,8 +94,8 @@ def test_a_loss_takes_pixels_away_and_changes_no_other(mesh, renderer, loss):
     assert lost > 0
 
 
-def test_a_hole_in_the_body_has_a_rim_at_another_depth(mesh, renderer):
-    depth = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+def test_a_hole_in_the_body_has_a_rim_at_another_depth(mesh, embree):
+    depth = embree.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
     rims, rng = 0, np.random.default_rng(0)
     for image in depth:
         whole = image.copy()
@@ -136,8 +109,8 @@ def test_a_hole_in_the_body_has_a_rim_at_another_depth(mesh, renderer):
     assert rims > len(depth) / 2
 
 
-def test_a_split_handle_keeps_its_ends(mesh, renderer):
-    (whole,) = renderer.render(mesh.vertices, mesh.faces, 5.0, np.zeros(1), CAMERA)
+def test_a_split_handle_keeps_its_ends(mesh, embree):
+    (whole,) = embree.render(mesh.vertices, mesh.faces, 5.0, np.zeros(1), CAMERA)
     split = whole.copy()
     lose(split, replace(NOTHING, split=1), np.random.default_rng(1))
     rows = np.nonzero((whole > 0) & (split == 0))[0]
@@ -145,22 +118,22 @@ def test_a_split_handle_keeps_its_ends(mesh, renderer):
     assert handle.min() < rows.min() <= rows.max() < handle.max()
 
 
-def test_a_wrong_focal_length_makes_the_object_wider_and_not_deeper(mesh, renderer):
+def test_a_wrong_focal_length_makes_the_object_wider_and_not_deeper(mesh, embree):
     sizes, reliefs = [], []
     for seed in range(20):
-        codes = sweep_of(mesh, renderer, replace(NOTHING, focal=0.2), seed)[0]
+        codes = sweep_of(mesh, embree, replace(NOTHING, focal=0.2), seed)[0]
         seen = codes > 0
         sizes.append(np.ptp(np.nonzero(seen.any(axis=1))[0]) + 1)
         reliefs.append(int(codes[seen].max()) - int(codes[seen].min()))
-    whole = sweep_of(mesh, renderer, NOTHING)[0]
+    whole = sweep_of(mesh, embree, NOTHING)[0]
     tall = np.ptp(np.nonzero((whole > 0).any(axis=1))[0]) + 1
     assert 0.75 * tall < min(sizes) < 0.9 * tall
     assert 1.1 * tall < max(sizes) < 1.25 * tall
     assert np.ptp(reliefs) <= 0.1 * np.mean(reliefs)
 
 
-def test_an_edge_that_moves_leaves_the_middle_and_takes_depths_from_nearby(mesh, renderer):
-    whole = renderer.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
+def test_an_edge_that_moves_leaves_the_middle_and_takes_depths_from_nearby(mesh, embree):
+    whole = embree.render(mesh.vertices, mesh.faces, 20.0, AZIMUTHS, CAMERA)
     rng, grown, shrunk = np.random.default_rng(0), 0, 0
     for image in whole:
         moved = image.copy()
@@ -202,12 +175,12 @@ def test_an_edge_moves_as_far_as_all_pairs_of_pixels_say(seed):
         assert moved[tuple(pixel)] in wanted
 
 
-def test_a_sweep_depends_on_its_generator_alone(mesh, renderer):
+def test_a_sweep_depends_on_its_generator_alone(mesh, embree):
     draw = Randomisation(
         *(7.5, 5, 0.15, 3, 7, 0.1),
         *(0.6, 0.3, 0.1, 0.1, 0.1, 0.25, 0.1, 0.15),
         *(1, 2, 1.5),
     )
-    one, again, other = (sweep_of(mesh, renderer, draw, seed) for seed in (1, 1, 2))
+    one, again, other = (sweep_of(mesh, embree, draw, seed) for seed in (1, 1, 2))
     assert np.array_equal(one, again)
     assert not np.array_equal(one, other)

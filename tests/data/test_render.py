@@ -6,16 +6,11 @@ import trimesh
 
 from nbv.data.camera import Camera
 from nbv.data.depth_codes import decode_depth
-from nbv.data.render import open_renderer, render_objects
+from nbv.data.render import render_objects
 from nbv.errors import UserError
 from rendering_shapes import procedural, shape_of
 
 CAMERA = Camera(image_side=16)
-
-
-@pytest.fixture(scope="module")
-def embree():
-    return open_renderer("embree")
 
 
 @pytest.fixture(scope="module")

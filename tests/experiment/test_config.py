@@ -283,11 +283,6 @@ def test_classes_divide_the_circle_and_its_half(n_classes):
         load_config(CONFIG, ["estimator=classifier", f"estimator.n_classes={n_classes}"])
 
 
-def test_a_regressor_has_no_setting_of_a_classifier():
-    assert "n_classes" not in load_config(CONFIG)["estimator"]
-    assert load_config(CONFIG, ["estimator=classifier"])["estimator"]["n_classes"] > 2
-
-
 @given(st.integers(1, 40), st.integers(1, 19), st.integers(2, 5))
 def test_cross_fitting_costs_what_the_hold_out_costs_and_no_epoch_more(epochs, twentieths, parts):
     objects = 100 * parts

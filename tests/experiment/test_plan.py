@@ -10,13 +10,7 @@ from nbv.data.meshes import save_meshes
 from nbv.data.sources import open_source, prepare_meshes
 from nbv.errors import UserError
 from nbv.experiment.config import load_config
-from nbv.experiment.plan import (
-    FEWEST_EPOCHS,
-    FEWEST_OBJECTS,
-    Plan,
-    paths,
-    too_small,
-)
+from nbv.experiment.plan import FEWEST_EPOCHS, FEWEST_OBJECTS, Plan, paths, too_small
 from nbv.experiment.report.figures import FIGURES
 from nbv.experiment.report.tables import TABLES
 from nbv.experiment.stages import STAGES, stage_from, stage_settings, start_of

@@ -1,7 +1,5 @@
 """The long run of fuzzing, or one case again: ``python -m tests.fuzz --help``."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

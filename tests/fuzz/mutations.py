@@ -1,7 +1,5 @@
 """Damage: the same seed damages the same bytes in the same way."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Callable
@@ -216,17 +214,7 @@ def _bomb(members: dict[str, bytes], name: str, rng: Generator) -> None:
     members[name] = packed.getvalue() + bytes(1000)
 
 
-BYTES: list[Mutation] = [
-    flip_bits,
-    truncate,
-    cut_end,
-    delete,
-    duplicate,
-    swap,
-    zeros,
-    append,
-    empty,
-]
+BYTES = [flip_bits, truncate, cut_end, delete, duplicate, swap, zeros, append, empty]
 TEXT: list[Mutation] = [
     _on_lines(change)
     for change in (

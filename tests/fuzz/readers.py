@@ -3,8 +3,6 @@
 A new reader is one entry of `READERS`.
 """
 
-from __future__ import annotations
-
 import math
 import shutil
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Whatever is wrong with what a robot hands over, it gets an answer or one line."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

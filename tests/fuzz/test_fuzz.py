@@ -1,7 +1,5 @@
 """Damaged files of every kind: a right result or one line, and nothing else."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -4,8 +4,6 @@ Each line of its input is the JSON list of a reader's name and a path; each line
 the JSON list of an outcome and a detail.
 """
 
-from __future__ import annotations
-
 import json
 import signal
 import sys

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from nbv.data.camera import Camera, viewpoint_frames
 from nbv.data.depth_codes import encode_depth
-from nbv.data.meshes import normalise
-from nbv.data.procedural import generate
 from nbv.data.render import open_renderer
 from nbv.frames.crop import pixel_step
+from rendering_shapes import procedural
 
 TRAINING = Camera()
 
@@ -21,11 +20,7 @@ def _renderer():
     return open_renderer("embree")
 
 
-@cache
-def shape(category: str = "mug", index: int = 0) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices and faces of a generated object of unit diagonal."""
-    mesh = normalise(generate(category, seed=0, index=index), "+z", "+x", 0.0, "origin")
-    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+shape = cache(procedural)
 
 
 def fov_deg(side: float, focal_px: float) -> float:

@@ -20,8 +20,8 @@ def shape_of(mesh: trimesh.Trimesh, centre: str = "box") -> Shape:
     return Shape(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
-def procedural(category: str) -> Shape:
-    return shape_of(generate(category, seed=0, index=0), "origin")
+def procedural(category: str = "mug", index: int = 0) -> Shape:
+    return shape_of(generate(category, seed=0, index=index), "origin")
 
 
 def triangle_soup(seed: int, n_faces: int) -> Shape:

@@ -17,6 +17,8 @@ METHODS = ("single", "random", "opposite", "proposed")
 N_VIEWS = 360
 UNITS = (("mug", 0), ("mug", 30), ("chair", 0))
 N_FOLDS = 3
+N_OBJECTS, SIDE = 9, 20
+DELTA_STEP = 12
 HIDDEN = {"mug": (90.0, 50.0), "chair": (180.0, 25.0)}
 FLIPPED = 0.01
 
@@ -25,31 +27,21 @@ def distance(a, b):
     return np.abs((np.asarray(a) - np.asarray(b) + 180.0) % 360.0 - 180.0)
 
 
-def build_tree(
-    root: Path,
-    units=UNITS,
-    n_objects: int = 9,
-    n_folds: int = N_FOLDS,
-    side: int = 20,
-    seed: int = 0,
-    delta_step: int = 12,
-) -> Path:
-    """Write splits, depth, lookups, evaluations, settings and benchmarks; return `root`."""
-    for category in dict.fromkeys(category for category, _ in units):
-        ids = [f"{index:04d}" for index in range(n_objects)]
-        _write_splits(root, category, ids, n_folds)
-        for elevation in sorted(e for name, e in units if name == category):
-            rng = np.random.default_rng([seed, len(category), elevation])
-            directory = root / "depth" / category
-            directory.mkdir(parents=True, exist_ok=True)
-            hands = clock_faces(n_objects, N_VIEWS, side, elevation)
-            # Farther at the top of an image than at its bottom.
-            images = np.where(hands > 0, hands + np.arange(side, dtype=np.uint8)[:, None], 0)
-            np.save(directory / f"el{elevation:02d}.npy", images)
-            (directory / f"el{elevation:02d}_objects.json").write_text(json.dumps(ids))
-            estimates = _estimates(category, elevation, n_objects, rng)
-            _write_folds(root, category, elevation, ids, estimates, n_folds, rng, delta_step)
-    _write_surroundings(root, units, n_folds)
+def build_tree(root: Path) -> Path:
+    """Write splits, depth, lookups, evaluations, settings and a benchmark; return `root`."""
+    ids = [f"{index:04d}" for index in range(N_OBJECTS)]
+    for category, elevation in UNITS:
+        _write_splits(root, category, ids)
+        rng = np.random.default_rng([0, len(category), elevation])
+        directory = root / "depth" / category
+        directory.mkdir(parents=True, exist_ok=True)
+        hands = clock_faces(N_OBJECTS, N_VIEWS, SIDE, elevation)
+        # Farther at the top of an image than at its bottom.
+        images = np.where(hands > 0, hands + np.arange(SIDE, dtype=np.uint8)[:, None], 0)
+        np.save(directory / f"el{elevation:02d}.npy", images)
+        (directory / f"el{elevation:02d}_objects.json").write_text(json.dumps(ids))
+        _write_folds(root, category, elevation, ids, _estimates(category, elevation, rng), rng)
+    _write_surroundings(root)
     return root
 
 
@@ -89,30 +81,29 @@ def split_files(root, units=UNITS):
     return {category: root / f"splits/{category}.csv" for category, _ in units}
 
 
-def _write_splits(root, category, ids, n_folds):
+def _write_splits(root, category, ids):
     rows = []
-    for fold in range(1, n_folds + 1):
+    for fold in range(1, N_FOLDS + 1):
         for index, name in enumerate(ids):
-            role = "test" if index % n_folds == fold - 1 else "train"
+            role = "test" if index % N_FOLDS == fold - 1 else "train"
             rows.append((name, fold, "calibration" if role == "train" and index % 4 == 0 else role))
     path = root / "splits" / f"{category}.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
     pd.DataFrame(rows, columns=["object_id", "fold", "role"]).to_csv(path, index=False)
 
 
-def _estimates(category, elevation, n_objects, rng):
-    """(n_objects, 360) estimates: a bias and noise per object, a blind range, some half turns."""
+def _estimates(category, elevation, rng):
+    """(N_OBJECTS, 360) estimates: a bias and noise per object, a blind range, some half turns."""
     truth = np.arange(N_VIEWS, dtype=float)
     ease = 1.0 - elevation / 120.0
-    bias = rng.normal(0, 2.5, (n_objects, 1)) * ease
-    noise = rng.normal(0, 5.0, (n_objects, N_VIEWS)) * ease
+    bias = rng.normal(0, 2.5, (N_OBJECTS, 1)) * ease
+    noise = rng.normal(0, 5.0, (N_OBJECTS, N_VIEWS)) * ease
     estimates = truth + bias + noise
-    if category in HIDDEN:
-        centre, half = HIDDEN[category]
-        difference = (truth - centre + 180.0) % 360.0 - 180.0
-        blind = np.abs(difference) < half * ease
-        estimates = np.where(blind, centre + 0.25 * difference + bias + noise, estimates)
-    flipped = rng.random((n_objects, N_VIEWS)) < FLIPPED * ease
+    centre, half = HIDDEN[category]
+    difference = (truth - centre + 180.0) % 360.0 - 180.0
+    blind = np.abs(difference) < half * ease
+    estimates = np.where(blind, centre + 0.25 * difference + bias + noise, estimates)
+    flipped = rng.random((N_OBJECTS, N_VIEWS)) < FLIPPED * ease
     return (estimates + 180.0 * flipped) % 360.0
 
 
@@ -124,10 +115,10 @@ def _smooth(counts, bandwidth_deg):
     return np.maximum(spread, 0.0)
 
 
-def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0, delta_step=1):
+def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0):
     """V, L, A and the recommendation from (n_objects, 360) estimates, as in Eqs. 1 to 6.
 
-    A is exact at multiples of `delta_step` and held from each to the next.
+    A is exact at multiples of `DELTA_STEP` and held from each to the next.
     """
     counts = np.zeros((N_VIEWS, N_VIEWS))
     truth = np.broadcast_to(np.arange(N_VIEWS), estimates.shape)
@@ -136,12 +127,12 @@ def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0, delta_s
     viewpoint = joint / joint.sum(axis=1, keepdims=True)
     estimate = (joint / joint.sum(axis=0, keepdims=True)).T
     cost = np.empty((N_VIEWS, N_VIEWS))
-    for delta in range(0, N_VIEWS, delta_step):
+    for delta in range(0, N_VIEWS, DELTA_STEP):
         second = np.roll(viewpoint, (-delta, -delta), axis=(0, 1))
         both = viewpoint * second
         pose = viewpoint @ (both / both.sum(axis=1, keepdims=True))
         spread = -(pose * np.log(pose)).sum(axis=1)
-        cost[:, delta : delta + delta_step] = spread[:, None]
+        cost[:, delta : delta + DELTA_STEP] = spread[:, None]
     cost = cost.astype(np.float32)
     # Of equal costs the one that travels least, and of two such the first.
     delta = np.arange(N_VIEWS)
@@ -160,11 +151,11 @@ def lookup_arrays(estimates, bandwidth_deg=9.0, pseudo_observations=5.0, delta_s
     }
 
 
-def _write_folds(root, category, elevation, ids, estimates, n_folds, rng, delta_step):
+def _write_folds(root, category, elevation, ids, estimates, rng):
     unit = Path(category) / f"el{elevation:02d}"
-    for fold in range(1, n_folds + 1):
-        test = np.arange(len(ids)) % n_folds == fold - 1
-        arrays = lookup_arrays(estimates[~test], delta_step=delta_step)
+    for fold in range(1, N_FOLDS + 1):
+        test = np.arange(len(ids)) % N_FOLDS == fold - 1
+        arrays = lookup_arrays(estimates[~test])
         target = root / "lookup" / unit / f"fold{fold}"
         target.mkdir(parents=True, exist_ok=True)
         np.savez_compressed(target / "pose_ambiguity.npz", **arrays)
@@ -205,9 +196,9 @@ def evaluate(names, estimates, method, recommended, rng):
     )
 
 
-def _write_surroundings(root, units, n_folds):
+def _write_surroundings(root):
     elevations = {}
-    for category, elevation in units:
+    for category, elevation in UNITS:
         elevations.setdefault(category, []).append(elevation)
     settings = {
         "experiment": "quick",
@@ -216,7 +207,7 @@ def _write_surroundings(root, units, n_folds):
         "categories": list(elevations),
         "focus_category": "mug",
         "elevations_deg": {**elevations, "spoon": [0]},
-        "n_folds": n_folds,
+        "n_folds": N_FOLDS,
         "dataset": {"source": "procedural"},
         "estimator": {"warm_start": "elevations"},
         "density": {
@@ -237,16 +228,7 @@ def _write_surroundings(root, units, n_folds):
             }
         )
     )
-    for category, elevation in units:
-        path = root / "benchmarks" / "train" / category / f"el{elevation:02d}" / "fold1.tsv"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(
-            "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
-            "34.5\t0:00:34\t812.25\t3000\t700\t710\t0\t12\t98.0\t33.25\n"
-        )
-    short = root / "benchmarks" / "split" / "mug.tsv"
-    short.parent.mkdir(parents=True, exist_ok=True)
-    short.write_text(
+    (root / "benchmark.tsv").write_text(
         "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
-        "0.2\t0:00:00\tNA\tNA\tNA\tNA\tNA\tNA\t0\t0\n"
+        "34.5\t0:00:34\t812.25\t3000\t700\t710\t0\t12\t98.0\t33.25\n"
     )

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-pytest.importorskip("cyclopts")
-
 from nbv.cli import main
 
 ROOT = Path(__file__).parents[2]

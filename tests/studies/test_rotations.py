@@ -7,14 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from studies.rotation_tables import by_symmetry, orientation_table
-from studies.rotations import (
-    FUSIONS,
-    TwoViews,
-    chosen_views,
-    evaluate,
-    held_out,
-    recommended_view,
-)
+from studies.rotations import FUSIONS, TwoViews, chosen_views, evaluate, held_out, recommended_view
 
 from nbv.core.orientations.belief import belief
 from nbv.core.orientations.criteria import NextViews, bayes_error, view_angle_deg

@@ -1,10 +1,7 @@
 """Every next view after any number of views."""
 
 import numpy as np
-from studies.simulation import (
-    random_next,
-    recommended_next,
-)
+from studies.simulation import random_next, recommended_next
 
 from made_estimates import evidence_of, objects
 from nbv.core.circle.angles import circular_distance_deg

@@ -5,11 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
-from studies.trainings import (
-    crossed_mean,
-    holm,
-    predicted_by_others,
-)
+from studies.trainings import crossed_mean, holm, predicted_by_others
 
 
 def simulated(rng, n_trainings, n_objects, of_training=0.1, remainder=1.0):

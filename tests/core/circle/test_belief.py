@@ -2,12 +2,7 @@
 
 import numpy as np
 
-from made_estimates import (
-    N_BINS,
-    direction_by_loops,
-    evidence_of,
-    product_by_loops,
-)
+from made_estimates import N_BINS, direction_by_loops, evidence_of, product_by_loops
 from nbv.core.circle.angles import circular_distance_deg
 from nbv.core.circle.belief import Belief, coarser, every_belief, first_belief, updated
 from nbv.core.circle.distributions import mean_direction_deg

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from made_estimates import (
-    FEW_DENSITIES,
-    SETTINGS,
-    evidence_of,
-    hidden_range_estimates,
-    objects,
-)
+from made_estimates import FEW_DENSITIES, SETTINGS, evidence_of, hidden_range_estimates, objects
 from nbv.core.circle.lookup import build_lookup
 from nbv.core.circle.policies import HeldOutViews, take_second_views
 from nbv.core.circle.selection import choose_densities, chosen_lookup, most_likely_density

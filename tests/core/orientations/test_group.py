@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from nbv.core.orientations.group import (
-    ASYMMETRIC,
-    Symmetry,
-    along_ray,
-    spiral,
-    viewing_direction,
-)
+from nbv.core.orientations.group import ASYMMETRIC, Symmetry, along_ray, spiral, viewing_direction
 from nbv.errors import UserError
 from nbv.numbers import as_orientations
 

@@ -52,12 +52,6 @@ def test_sigma_is_the_sample_standard_deviation():
             assert abs(statistics.pstdev(column) - value) > 0.2
 
 
-def test_recomputed_figures_that_the_notes_give():
-    assert round(statistics.stdev(folds("mae")[2]), 2) == 3.58
-    assert round(statistics.mean(folds("pauc")[3]), 2) == 90.67
-    assert round(statistics.stdev(folds("pauc")[3]), 2) == 3.04
-
-
 def test_table_5_averages_to_fold_3():
     groups = zip(*PUBLISHED["table5"].values["mae"].values(), strict=True)
     for column, fold in zip(groups, PUBLISHED["table7"].values["mae"]["3"], strict=True):

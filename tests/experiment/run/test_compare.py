@@ -18,10 +18,7 @@ from nbv.experiment.run.compare import (
     judge_cell,
     sigma_ratio,
 )
-from nbv.experiment.run.reference import (
-    UNSET,
-    read_cells,
-)
+from nbv.experiment.run.reference import UNSET, read_cells
 from synthetic import N_FOLDS
 
 

@@ -7,9 +7,7 @@ from hypothesis import strategies as st
 from nbv.errors import UserError
 from nbv.experiment.config import read_configuration
 from nbv.experiment.report.tables import TABLES
-from nbv.experiment.run.compare import (
-    compare_runs,
-)
+from nbv.experiment.run.compare import compare_runs
 from nbv.experiment.run.reference import (
     UNSET,
     collect_reference,
