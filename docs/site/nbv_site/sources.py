@@ -29,6 +29,7 @@ ROOT = Path(__file__).parents[3]
 FOLDER = "source"
 LINKED = "linked_file"
 IMAGES = {".png", ".svg", ".gif", ".jpg", ".webp"}
+ARRAYS = {".npz", ".safetensors"}
 MOST_BYTES = 300_000
 """Longer files are copied and not shown."""
 
@@ -108,7 +109,7 @@ def _address(path: str) -> str:
 
 
 def _is_copied(place: Path) -> bool:
-    return place.suffix in IMAGES or place.stat().st_size > MOST_BYTES
+    return place.suffix in IMAGES | ARRAYS or place.stat().st_size > MOST_BYTES
 
 
 def _named(link: nodes.reference, app: Sphinx) -> tuple[str, str] | None:
