@@ -36,7 +36,9 @@ def test_products_are_mixed_and_uniform_where_they_are_impossible() -> None:
 
 def test_among_equal_costs_the_least_travel_and_then_the_first_wins() -> None:
     cost = np.array([[2.0, 1.0, 1.0, 1.0], [0.0, 1.0, 1.0, 1.0]])
-    assert least_cost(cost, np.array([0.0, 30.0, 10.0, 10.0])).tolist() == [2, 0]
+    travel = np.array([0.0, 30.0, 10.0, 10.0])
+    assert least_cost(cost, travel).tolist() == [2, 0]
+    assert least_cost(cost[None], travel).tolist() == [[2, 0]]
 
 
 @pytest.mark.parametrize("factor", [1.0, 2.0])
@@ -49,6 +51,18 @@ def test_a_mean_is_surely_less_beyond_its_standard_errors(factor: float) -> None
         assert is_surely_less(moved, factor) == (shift > 1)
         assert is_surely_less(3.0 * moved, factor, np.full(20, 3.0)) == (shift > 1)
         assert not is_surely_less(moved, factor, prior=20.0)
+
+
+@pytest.mark.parametrize("n", [2, 9])
+def test_with_weights_the_mean_is_a_ratio_of_sums(n: int) -> None:
+    rng = np.random.default_rng(n)
+    weights = rng.uniform(0.1, 5.0, n)
+    gaps = weights * rng.normal(size=n)
+    rest = gaps - gaps.sum() / weights.sum() * weights
+    limit = -gaps.sum() - 2.0 * np.sqrt(n / (n - 1) * (rest @ rest))
+    assert is_surely_less(gaps, 2.0, weights, limit - 1e-9)
+    assert not is_surely_less(gaps, 2.0, weights, limit + 1e-9)
+    assert not is_surely_less(np.zeros(n), 1.0)
 
 
 def test_an_unknown_name_gets_the_nearest() -> None:

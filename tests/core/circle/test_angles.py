@@ -24,6 +24,7 @@ def test_an_angle_is_a_finite_real_number_within_the_limit():
     assert angles.is_angle(np.array([[7, 8]], dtype=np.uint8)).tolist() == [[True, True]]
     for other in (["90", "east"], [True, False], [1j, 0j], [None, 1.0]):
         assert angles.is_angle(other).tolist() == [False, False]
+        assert angles.is_angle(other).dtype == bool
 
 
 @given(degrees)
