@@ -19,7 +19,7 @@ def test_the_import_contracts_are_kept():
     assert done.returncode == 0, done.stdout
 
 
-def test_arrows_of_the_drawing_are_imports_and_lead_to_every_import():
+def test_the_drawing_shows_every_import_between_rooms():
     *layers, _ground = CONTRACTS["contracts"][0]["layers"]
     rooms = [room for layer in layers for room in layer.split(" | ")]
     graph = grimp.build_graph("nbv", cache_dir=None)
@@ -32,9 +32,4 @@ def test_arrows_of_the_drawing_are_imports_and_lead_to_every_import():
     }
     text = (ROOT / "docs" / "architecture.md").read_text()
     arrows = set(re.findall(r"^ +(\w+) --> (\w+)$", text, re.MULTILINE))
-    assert arrows <= imports
-    reached = arrows
-    for middle in rooms:
-        into = {upper for upper, lower in reached if lower == middle}
-        reached = reached | {(a, b) for a in into for m, b in reached if m == middle}
-    assert imports <= reached
+    assert arrows == imports
