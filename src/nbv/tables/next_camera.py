@@ -14,7 +14,9 @@ from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.next_view import as_chances
 from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
 from nbv.core.alike.compare import WITHIN_DEG
-from nbv.core.orientations.belief import belief, hypotheses_belief
+from nbv.core.alike.expected import SURE
+from nbv.core.choose import is_surely_less
+from nbv.core.orientations.belief import OrientationBelief, belief, hypotheses_belief
 from nbv.core.orientations.criteria import (
     NextViews,
     bayes_error,
@@ -33,6 +35,9 @@ NO_DEPENDENCE = (
     "calibration shows no dependence of this object's flips on the view; the ranking may be no "
     "better than random"
 )
+
+INDEPENDENT_DEG = 60.0
+"""Angle between views from which their errors are about independent (first half of T-LESS)."""
 
 NO_SCORES = "scores are not used: calibration pairs had none"
 
@@ -109,6 +114,7 @@ class CameraRecommendation(Answer[CameraMove]):
 
     rotation: Orientations
     depends_on_view: bool
+    helps: bool = True
 
     def pose_lines(self, seen: str) -> list[str]:
         """Return the pose of the object, which is called `seen`, in a few lines of text."""
@@ -164,11 +170,14 @@ def recommend_camera(
     seen = np.stack(
         [c.straight_from_camera @ e.rotation for c, e in zip(cameras, estimates, strict=True)]
     )
-    if is_posed:
-        now = belief(errors, seen, straight_from_base @ first.T, scores)
-    else:
-        order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
-        now = hypotheses_belief(errors, seen[order], None if scores is None else scores[order])
+    order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
+
+    def believe(errors: OrientationErrors) -> OrientationBelief:
+        if is_posed:
+            return belief(errors, seen, straight_from_base @ first.T, scores)
+        return hypotheses_belief(errors, seen[order], None if scores is None else scores[order])
+
+    now = believe(errors)
     position = estimates[-1].position_mm
     place = None if position is None else (cameras[-1].pose @ np.append(position / 1000, 1.0))[:3]
     if isinstance(candidates, int):
@@ -189,8 +198,18 @@ def recommend_camera(
             "every view so far and within `max_travel_deg`: the same view repeats its error"
         )
     ahead = NextViews(now, targets[free] @ first.T)
-    small = float(errors.error_deg[~errors.is_flip].mean()) if not errors.is_flip.all() else 0.0
-    cost, within = bayes_error(ahead) + small, chances_within(ahead, WITHIN_DEG)
+    cost, within = bayes_error(ahead), chances_within(ahead, WITHIN_DEG)
+    if depends_on_view:
+        ranked = ranking(cost, travel[free])
+    else:
+        # All are equal, but errors of neighbouring views are not independent.
+        near = np.where(apart[free] >= INDEPENDENT_DEG, travel[free], 1000 - apart[free])
+        ranked = np.argsort(near, kind="stable")
+    best = ahead.moves[ranked[:1]]
+    gains = [
+        each.error_deg - bayes_error(NextViews(each, best))[0]
+        for each in (now, *map(believe, errors.without_parts))
+    ]
     moves = [
         CameraMove(
             index=int(free[k]),
@@ -203,21 +222,27 @@ def recommend_camera(
             target_camera_pose=pose if is_known else None,
             direction=-targets[free[k]][2],
         )
-        for k, pose in ((k, poses[free[k]]) for k in ranking(cost, travel[free]))
+        for k, pose in ((k, poses[free[k]]) for k in ranked)
     ]
-    distance = errors.symmetry.distance_deg(now.support, now.pose)
     warnings = () if depends_on_view else (NO_DEPENDENCE,)
     if scores is not None and errors.ratio is None:
         warnings = (*warnings, NO_SCORES)
     within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
     return CameraRecommendation(
         rotation=cameras[-1].straight_from_camera.T @ last @ first.T @ now.pose,
-        expected_error_deg=float(now.probability @ distance) + small,
+        expected_error_deg=now.error_deg,
         probability_within=as_chances(within_now),
         moves=tuple(moves),
         depends_on_view=depends_on_view,
         warnings=warnings,
+        helps=_is_sure(gains) and gains[0] > 0.01 * now.error_deg,
     )
+
+
+def _is_sure(values: Sequence[float]) -> bool:
+    """Return whether a value is surely above 0, from those without each part (jackknife)."""
+    n = len(values) - 1
+    return is_surely_less((n - 1) * np.array(values[1:]) - n * values[0], SURE)
 
 
 def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:

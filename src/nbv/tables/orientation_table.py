@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.orientations.errors import OrientationErrors, ScoreRatio
+from nbv.core.orientations.errors import STRENGTHS, OrientationErrors, ScoreRatio, shrinkage
 from nbv.core.orientations.group import (
     ASYMMETRIC,
     Array,
@@ -138,11 +138,23 @@ class OrientationTable:
     def _errors(self) -> dict[str, OrientationErrors]:
         ratio = self.score_ratio()
         rows = {name: self.object_id == name for name in self.object_ids}
-        return {
+        has_groups = bool((self.group != "").all())
+        errors = {
             name: OrientationErrors(
-                self.estimate[k], self.truth[k], self.symmetry(name), ratio=ratio
+                self.estimate[k],
+                self.truth[k],
+                self.symmetry(name),
+                ratio=ratio,
+                group=self.group[k] if has_groups else None,
             )
             for name, k in rows.items()
+        }
+        strength = shrinkage(list(errors.values()))
+        n_flips = sum(int(each.is_flip.sum()) for each in errors.values())
+        share = (n_flips + 0.5) / (len(self.object_id) + 1)
+        return {
+            name: replace(each, share=share, pseudo_observations=strength)
+            for name, each in errors.items()
         }
 
     def score_ratio(self, flip_deg: float = FLIP_DEG) -> ScoreRatio | None:
@@ -220,9 +232,8 @@ class OrientationTable:
 
     def depends_on_view(self, name: str) -> bool:
         """Return whether calibration shows that an object's flips depend on the view."""
-        errors, groups = self.errors(name), self.group[self.object_id == name]
-        is_known = bool((groups != "").all() and errors.is_flip.any())
-        return is_known and errors.depends_on_view(groups)
+        errors = self.errors(name)
+        return bool(errors.is_flip.any()) and errors.pseudo_observations < STRENGTHS[-1]
 
     def about(self) -> list[ObjectSummary]:
         """Return a summary of each object."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.orientations.errors import OrientationErrors
-from nbv.core.orientations.group import Array, Orientations, chordal_mean, inverse
+from nbv.core.orientations.errors import SAME_DEG, OrientationErrors, apart
+from nbv.core.orientations.group import Array, Orientations, inverse
 
 AGREE_DEG = 25.0
 """Estimates nearer than this are of the same pose; their mean has a smaller error than each."""
@@ -42,24 +42,37 @@ class OrientationBelief:
     errors: OrientationErrors
 
     @property
+    def _answer(self) -> int:
+        """Index of the most probable pose of those that the estimates support."""
+        return int(self.votes[np.argmax(self.probability[self.votes])])
+
+    @property
     def pose(self) -> Orientations:
         """The fused pose (3, 3).
 
         It is the most probable pose among those the estimates support; ties go to the earlier
-        view. Where all errors are one density (`flip_deg` = 0), it is the mean.
+        view.
         """
-        if not self.errors.flip_deg:
-            return chordal_mean(self.support, self.probability)
-        voted = self.probability[self.votes]
-        return np.asarray(self.support[self.votes[np.argmax(voted)]])
+        return np.asarray(self.support[self._answer])
+
+    @property
+    def n_agreeing(self) -> int:
+        """The number of views whose estimates have the fused pose as their mean."""
+        return int((self.votes == self._answer).sum())
+
+    @property
+    def error_deg(self) -> float:
+        """The expected error of the fused pose, degrees."""
+        distance = self.errors.symmetry.distance_deg(self.support, self.pose)
+        return float(self.probability @ distance) + self.errors.small_error_deg(self.n_agreeing)
 
     def probability_within(self, error_deg: float) -> float:
         """Return the probability that the fused pose errs by less."""
         distance = self.errors.symmetry.distance_deg(self.support, self.pose)
         near = float(self.probability[distance < max(error_deg, AGREE_DEG)].sum())
-        right = self.errors.error_deg[~self.errors.is_flip]
+        small = self.errors.small_errors_deg(self.n_agreeing)
         # Small errors have a size, but no direction.
-        return near * float((right < error_deg).mean()) if len(right) else near
+        return near * float((small < error_deg).mean()) if len(small) else near
 
 
 def belief(
@@ -111,8 +124,6 @@ def _support(
 ) -> tuple[Orientations, NDArray[np.intp]]:
     """Return the support, and the index in it of each of the estimates (n, 3, 3)."""
     symmetry, possible = errors.symmetry, errors.possible_poses(seen[0])
-    if not errors.flip_deg:
-        return possible, symmetry.cosine(seen, possible).argmax(axis=1)
     votes = np.full(len(seen), -1)
     means: list[Orientations] = []
     for i in range(len(seen)):
@@ -120,7 +131,8 @@ def _support(
             near = (votes < 0) & (symmetry.cosine(seen[i : i + 1], seen)[0] > _AGREE)
             votes[near] = len(means)
             means.append(symmetry.mean(seen[near]))
-    return np.concatenate([np.stack(means), possible[1:]]), votes
+    # A pose that an estimate supports is not held twice.
+    return apart(np.stack(means), possible[1:], SAME_DEG, symmetry), votes
 
 
 def average(
@@ -137,8 +149,6 @@ def posterior(
     scores: Sequence[float] | Array | None = None,
 ) -> Orientations:
     """Return the pose (3, 3) of `belief` after all views, V of the first and L of the others."""
-    if not errors.flip_deg:
-        return belief(errors, estimates, moves, scores).pose
     support, votes = _support(errors, inverse(moves) @ estimates)
     voted = np.unique(votes)  # The belief is needed nowhere else.
     if len(voted) == 1:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from nbv.core.choose import entropy, expected_entropy, mixed, named
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief
-from nbv.core.orientations.group import Array, Orientations, chordal_mean, viewing_direction
+from nbv.core.orientations.group import Array, Orientations, viewing_direction
 
 
 @dataclass(frozen=True)
@@ -64,17 +64,10 @@ def bayes_error(ahead: NextViews) -> Array:
 
     It is the expectation under V and L, as `nbv.core.circle.criteria.bayes_error` is on the circle.
 
-    Errors below `flip_deg` are not counted: they do not depend on the view.
+    Errors below `flip_deg` are taken to depend on the number of views alone.
     """
-    first = ahead.belief
-    errors, support = first.errors, first.support
-    if not errors.flip_deg:
-        joint = first.probability[:, None] * ahead.likelihood
-        weights = np.swapaxes(joint, 1, 2).reshape(-1, len(support))
-        fused = chordal_mean(support, np.maximum(weights, np.finfo(float).tiny))
-        angles = np.degrees(np.arccos(errors.symmetry.cosine(fused, support)))
-        return np.asarray((weights * angles).reshape(len(ahead.moves), -1).sum(axis=1))
-    return np.asarray(expected_losses(ahead, _distances(first)[None])[0])
+    small = ahead.belief.errors.small_error_deg(ahead.belief.n_agreeing + 1)
+    return np.asarray(expected_losses(ahead, _distances(ahead.belief)[None])[0] + small)
 
 
 def _distances(belief: OrientationBelief) -> Array:
@@ -109,7 +102,7 @@ def chances_within(ahead: NextViews, errors_deg: Sequence[float]) -> Array:
     first = ahead.belief
     distance = _distances(first)
     losses = np.stack([1.0 * (distance >= max(e, AGREE_DEG)) for e in errors_deg])
-    small = first.errors.error_deg[~first.errors.is_flip]
+    small = first.errors.small_errors_deg(first.n_agreeing + 1)
     shares = [(small < error_deg).mean() if len(small) else 1.0 for error_deg in errors_deg]
     return np.asarray((1 - expected_losses(ahead, losses)) * np.reshape(shares, (-1, 1)))
 

@@ -9,7 +9,7 @@ density; on the circle it is that of `nbv.core.circle.density`, which a test sho
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -30,11 +30,28 @@ from nbv.core.orientations.group import (
 
 Given = Literal["estimate", "truth"]
 
-NEGLIGIBLE = 1e-3
-"""A flip of less weight than this is left out."""
+MOST_KINDS = 16
+"""Kinds of flips, rotations within `SAME_DEG`; rarer ones lead anywhere."""
 
-SPACING_DEG = 40.0
+MOST_CELLS = 1000
+"""Viewing directions, at most, in which pairs are counted: more pairs are counted together."""
+
+STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+"""Pseudo-observations that `shrinkage` compares: never none, and never so many that none count."""
+
+FIXED_STRENGTH = 10.0
+"""With too few groups for `shrinkage`; chosen on the first half (docs/rotations-protocol.md)."""
+
+FEWEST_GROUPS = 4
+
+N_PARTS = 5
+"""Parts of the groups for the jackknife."""
+
+SPACING_DEG = 60.0
 """Angle between the other possible poses."""
+
+SAME_DEG = 20.0
+"""Flips of a kind, and poses of a support that are one, are nearer than this."""
 
 MOST_RATIO = 50.0
 """A score never changes the odds of a flip by more than this factor."""
@@ -99,24 +116,30 @@ class OrientationErrors:
     concentration : float
         Both kernels are exp(concentration (cos(angle) - 1)): 25 has a standard deviation of 11°.
     pseudo_observations : float
-        Weight of the mean over all directions, where a pair seen from the same direction weighs 1.
+        Pairs that stand in each direction for the object's share of flips; see `shrinkage`.
     flip_deg : float
-        A larger error is a flip; with 0 every pair is a flip.
+        A larger error is a flip.
+    share : float, optional
+        Share of flips of all objects, towards which that of this one is shrunk.
     offsets : ndarray (m, 3, 3), optional
-        Possible poses relative to the estimate; the first is the identity. By default the flips
-        and about even poses `SPACING_DEG` apart.
+        Possible poses relative to the estimate; the first is the identity. By default the kinds of
+        flips and about even poses `SPACING_DEG` apart.
     ratio : ScoreRatio, optional
         Needed where estimates have scores.
+    group : ndarray (n,), optional
+        The instance or scene of each pair, whose errors are alike. By default each pair is a group.
     """
 
     estimate: Orientations
     truth: Orientations
     symmetry: Symmetry = ASYMMETRIC
     concentration: float = 25.0
-    pseudo_observations: float = 3.0
+    pseudo_observations: float = FIXED_STRENGTH
     flip_deg: float = 20.0
+    share: float | None = None
     offsets: Orientations | None = None
     ratio: ScoreRatio | None = None
+    group: NDArray[Any] | None = None
 
     @cached_property
     def error_deg(self) -> Array:
@@ -126,46 +149,113 @@ class OrientationErrors:
     @cached_property
     def is_flip(self) -> NDArray[np.bool_]:
         """Which pairs (n,) are flips."""
-        if not self.flip_deg:
-            return np.ones(len(self.estimate), dtype=bool)
         return np.asarray(self.error_deg > self.flip_deg)
+
+    def small_errors_deg(self, n_views: int) -> Array:
+        """Return the errors, without flips, of the mean of estimates of several views, (r,).
+
+        Errors of views of one group are correlated; where groups are unknown, they are one error.
+        """
+        variance = (1 + (n_views - 1) * self._correlation) / n_views
+        return np.asarray(self.error_deg[~self.is_flip] * np.sqrt(variance))
+
+    def small_error_deg(self, n_views: int) -> float:
+        """Return the mean of `small_errors_deg`, 0 where every pair is a flip."""
+        return float(self.small_errors_deg(n_views).sum() / max((~self.is_flip).sum(), 1))
+
+    @cached_property
+    def _correlation(self) -> float:
+        """Correlation of the errors, without flips, of two views of a group, in [0, 1]."""
+        if self.group is None:
+            return 1.0
+        truth, labels = self.truth[~self.is_flip], self.labels[~self.is_flip]
+        relative = inverse(truth) @ self.symmetry.nearest(self.estimate[~self.is_flip], truth)
+        from scipy.spatial.transform import Rotation
+
+        error = Rotation.from_matrix(relative).as_rotvec() if len(truth) else np.zeros((0, 3))
+        sums, n = np.zeros((int(self.labels.max()) + 1, 3)), np.bincount(labels)
+        np.add.at(sums, labels, error)
+        squares = np.square(error).sum()
+        n_pairs = float((n * (n - 1)).sum())
+        if not n_pairs or not squares:
+            return 1.0
+        products = np.square(sums).sum() - squares
+        return float(np.clip(products / n_pairs / (squares / len(error)), 0, 1))
 
     @property
     def share_of_flips(self) -> float:
         """The probability of a flip over all directions, never 0."""
-        if not self.flip_deg:
-            return 1.0
-        return float((self.is_flip.sum() + 0.5) / (len(self.estimate) + 1))
+        n, n_flips = len(self.estimate), self.is_flip.sum()
+        if self.share is None:
+            return float((n_flips + 0.5) / (n + 1))
+        # A pair weighs 1 / (2 concentration) in the mean over all directions.
+        pairs = self.pseudo_observations * 2 * self.concentration
+        return float(_shrunk(n_flips, n, self.share, pairs))
 
     @cached_property
     def possible(self) -> Orientations:
         """The `offsets` (m, 3, 3), or their default."""
         if self.offsets is not None:
             return self.offsets
-        flips = _apart(np.eye(3)[None], self._flips("estimate"), SPACING_DEG / 2, self.symmetry)
-        return _apart(flips, spiral(2000), SPACING_DEG, self.symmetry)
+        kinds = self._kinds("estimate").rotations
+        kinds = apart(np.eye(3)[None], kinds, SAME_DEG, self.symmetry)
+        return apart(kinds, spiral(2000), SPACING_DEG, self.symmetry)
+
+    @cached_property
+    def labels(self) -> NDArray[np.intp]:
+        """The number (n,) of each pair's group."""
+        if self.group is None:
+            return np.arange(len(self.estimate))
+        return np.asarray(np.unique(self.group, return_inverse=True)[1])
+
+    @cached_property
+    def without_parts(self) -> tuple[OrientationErrors, ...]:
+        """The errors without each of `N_PARTS` parts of the groups, for the jackknife."""
+        labels = self.labels if self.labels.any() else np.arange(len(self.estimate))
+        part = labels % min(N_PARTS, int(labels.max()) + 1)
+        rows = [part != k for k in range(int(part.max()) + 1)]
+        return tuple(
+            replace(
+                self,
+                estimate=self.estimate[k],
+                truth=self.truth[k],
+                group=labels[k],
+                offsets=self.possible,
+            )
+            for k in rows
+        )
 
     def _pairs(self, given: Given) -> tuple[Orientations, Orientations]:
         """Return what is given of the pairs, and the other."""
         return (self.estimate, self.truth) if given == "estimate" else (self.truth, self.estimate)
 
-    def _flips(self, given: Given) -> Orientations:
-        """Return the flips (f, 3, 3) on the object's axes, from what is given to the other."""
-        known, other = (poses[self.is_flip] for poses in self._pairs(given))
-        known = self.symmetry.canonical(known)
-        return np.asarray(inverse(known) @ self.symmetry.nearest(other, known))
+    def _kinds(self, given: Given) -> _Kinds:
+        return self._both_kinds[given]
 
-    def _flips_anywhere(self, given: Given, poses: Orientations, support: Orientations) -> Array:
-        """Return where flips lead from poses (r, 3, 3), (r, m), whatever the direction.
+    @cached_property
+    def _both_kinds(self) -> dict[Given, _Kinds]:
+        return {given: _Kinds.of(self, *self._pairs(given)) for given in ("estimate", "truth")}
 
-        Each flip of calibration is applied to the poses; one more leads anywhere.
-        """
-        m, flips = len(support), self._flips(given)
-        if not self.flip_deg or not len(flips):
-            return np.full((len(poses), m), 1 / m)
-        where = self.symmetry.canonical(poses)[:, None] @ flips
-        kernel = self._near(where.reshape(-1, 3, 3), support).reshape(len(poses), -1, m)
-        return np.asarray((kernel.sum(axis=1) + 1 / m) / (len(flips) + 1))
+    def possible_poses(self, estimate: Orientations) -> Orientations:
+        """Return the possible poses (m, 3, 3) after an estimate (3, 3)."""
+        return self.symmetry.canonical(estimate[None]) @ self.possible
+
+    def flip_probability(self, poses: Orientations, given: Given) -> Array:
+        """Return the probability of a flip for each estimated or true pose (n, 3, 3)."""
+        counts = self._counts(poses, given)
+        return np.asarray(1 - counts[:, 0] / counts.sum(axis=1))
+
+    def _counts(self, poses: Orientations, given: Given) -> Array:
+        """Return weighted counts of right estimates, and of each kind of flips, (n, 1 + J)."""
+        kinds, share = self._kinds(given), self.share_of_flips
+        prior = np.concatenate([[1 - share], share * kinds.share])
+        directions = viewing_direction(poses)
+        cosine = self.symmetry.direction_cosine(directions, kinds.directions)
+        # Single precision takes half the time.
+        weights = np.exp(self.concentration * (cosine - 1).astype(np.float32))
+        return np.asarray(
+            weights @ kinds.counts.astype(np.float32) + self.pseudo_observations * prior
+        )
 
     def _near(self, poses: Orientations, support: Orientations) -> Array:
         """Return the kernel about poses (n, 3, 3) among the poses of a support, (n, m)."""
@@ -176,21 +266,6 @@ class OrientationErrors:
         np.exp(kernel, out=kernel)
         kernel /= kernel.sum(axis=1, keepdims=True)
         return kernel
-
-    def possible_poses(self, estimate: Orientations) -> Orientations:
-        """Return the possible poses (m, 3, 3) after an estimate (3, 3)."""
-        return self.symmetry.canonical(estimate[None]) @ self.possible
-
-    def flip_probability(self, poses: Orientations, given: Given) -> Array:
-        """Return the probability of a flip for each estimated or true pose (n, 3, 3)."""
-        weights = self._weights(poses, self._pairs(given)[0])
-        alpha = self.pseudo_observations
-        flips = weights[:, self.is_flip].sum(axis=1) + alpha * self.share_of_flips
-        return np.asarray(flips / (weights.sum(axis=1) + alpha))
-
-    def _weights(self, poses: Orientations, pairs: Orientations) -> Array:
-        cosine = self.symmetry.direction_cosine(*map(viewing_direction, (poses, pairs)))
-        return np.asarray(np.exp(self.concentration * (cosine - 1)))
 
     def conditional(
         self,
@@ -224,54 +299,123 @@ class OrientationErrors:
         moves = np.eye(3)[None] if moves is None else moves
         rows = np.arange(m) if rows is None else np.asarray(rows)
         poses = (moves[:, None] @ support[rows]).reshape(-1, 3, 3)
-        known, other = self._pairs(given)
-        weights = self._weights(poses, known)
-        alpha, share = self.pseudo_observations, self.share_of_flips
-        right = weights[:, ~self.is_flip].sum(axis=1) + alpha * (1 - share)
-        flips = np.flatnonzero(self.is_flip)
-        anywhere = alpha * share * self._flips_anywhere(given, support[rows], support)
-        result = np.tile(anywhere, (len(moves), 1))
-        i, k = np.nonzero(weights[:, flips] > NEGLIGIBLE)
-        if len(i):
-            pair = flips[k]
-            element = self.symmetry.towards(viewing_direction(poses[i]), known[pair])
-            roll = _roll(poses[i] @ inverse(known[pair] @ element))
-            where = inverse(moves[i // len(rows)]) @ roll @ other[pair]
-            from scipy.sparse import csr_array
-
-            entries = weights[i, pair].astype(np.float32), (i, np.arange(len(i)))
-            by_row = csr_array(entries, shape=(len(poses), len(i)))
-            result += np.asarray(by_row @ self._near(where, support))
+        counts = self._counts(poses, given)
+        rotations = self._kinds(given).rotations
+        seen = self.symmetry.canonical(poses)
+        back = np.repeat(inverse(moves), len(rows), axis=0) @ seen
+        where = (back[:, None] @ rotations).reshape(-1, 3, 3)
+        near = self._near(where, support).reshape(len(poses), -1, m)
+        result = np.einsum("nj,njm->nm", counts[:, 1:-1], near) + counts[:, -1:] / m
         result = result.reshape(len(moves), len(rows), m) * np.reshape(ratio, (-1, 1))
-        result[:, np.arange(len(rows)), rows] += right.reshape(len(moves), -1)
-        total = result.sum(axis=2, keepdims=True)
-        np.divide(result, total, out=result, where=total > 0)
-        result[total[..., 0] <= 0] = 1 / m
-        return np.asarray(result)
-
-    def depends_on_view(self, groups: Sequence[Hashable] | NDArray[Any]) -> bool:
-        """Return whether the viewing direction says more about flips than their share does.
-
-        It compares the log likelihoods of the flips of each group, an instance or an object, given
-        the pairs of all others. A gain of more than a standard error over groups counts.
-        """
-        labels = np.unique(np.asarray(groups), return_inverse=True)[1]
-        n_groups = int(labels.max()) + 1
-        if n_groups < 2:
-            return False
-        gains = np.empty(n_groups)
-        for label in range(n_groups):
-            held_out = labels == label
-            others = replace(self, estimate=self.estimate[~held_out], truth=self.truth[~held_out])
-            by_view = others.flip_probability(self.estimate[held_out], "estimate")
-            shares = np.full_like(by_view, others.share_of_flips)
-            flips = self.is_flip[held_out]
-            by_view, shares = (np.where(flips, p, 1 - p) for p in (by_view, shares))
-            gains[label] = np.log(by_view / shares).sum()
-        return is_surely_less(-gains, factor=1.0)
+        result[:, np.arange(len(rows)), rows] += counts[:, 0].reshape(len(moves), -1)
+        return np.asarray(result / result.sum(axis=2, keepdims=True))
 
 
-def _apart(
+@dataclass(frozen=True)
+class _Kinds:
+    """The flips of one conditional by the rotation on the object's axes, and where they occur.
+
+    Attributes
+    ----------
+    rotations : ndarray (J, 3, 3)
+        From what is given to the other, for each kind.
+    share : ndarray (J + 1,)
+        Share of each kind among the flips; the last leads anywhere.
+    directions : ndarray (p, 3)
+        Viewing directions of pairs.
+    counts : ndarray (p, J + 2)
+        Right pairs, flips of each kind, and other flips there.
+    """
+
+    rotations: Orientations
+    share: Array
+    directions: Array
+    counts: Array
+
+    @classmethod
+    def of(cls, errors: OrientationErrors, known: Orientations, other: Orientations) -> _Kinds:
+        """Sort flips into kinds, the most frequent first, and pairs into directions."""
+        symmetry, flips = errors.symmetry, np.flatnonzero(errors.is_flip)
+        known = symmetry.canonical(known)
+        rotations = inverse(known[flips]) @ symmetry.nearest(other[flips], known[flips])
+        column = np.zeros(len(known), dtype=np.intp)
+        means: list[Orientations] = []
+        near = symmetry.cosine(rotations, rotations) > np.cos(np.radians(SAME_DEG))
+        free = np.ones(len(flips), dtype=bool)
+        while free.any() and len(means) < MOST_KINDS:
+            members = near[(near & free).sum(axis=1).argmax()] & free
+            if members.sum() < 2:
+                break
+            means.append(symmetry.mean(rotations[members]))
+            column[flips[members]] = len(means)
+            free &= ~members
+        n_kinds = len(means)
+        column[flips[free]] = n_kinds + 1
+        directions, cell = _cells(viewing_direction(known))
+        counts = np.zeros((len(directions), n_kinds + 2))
+        np.add.at(counts, (cell, column), 1)
+        # The first flip of a kind does not say that there will be another one of its kind.
+        discount = np.zeros(n_kinds + 2)
+        discount[1:-1] = 1 / counts.sum(axis=0)[1:-1]
+        counts[:, -1] += counts @ discount
+        counts *= 1 - discount
+        numbers = counts.sum(axis=0)[1:] + np.eye(n_kinds + 1)[-1]
+        rotations = np.stack(means) if means else np.empty((0, 3, 3))
+        return cls(rotations, numbers / numbers.sum(), directions, counts)
+
+
+def _cells(directions: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return at most `MOST_CELLS` mean directions (p, 3), and the one of each direction (n,)."""
+    if len(directions) <= MOST_CELLS:
+        return directions, np.arange(len(directions))
+    centres = viewing_direction(spiral(MOST_CELLS))
+    cell = np.unique((directions @ centres.T).argmax(axis=1), return_inverse=True)[1]
+    means = np.zeros((cell.max() + 1, 3))
+    np.add.at(means, cell, directions)
+    return means / np.linalg.norm(means, axis=1, keepdims=True), cell
+
+
+def _shrunk(n_flips: Any, n: Any, share: Any, pseudo_pairs: Any) -> Array:
+    """Return shares of flips, shrunk towards another share by so many pairs."""
+    return np.asarray((n_flips + pseudo_pairs * share) / (n + pseudo_pairs), dtype=np.float64)
+
+
+def shrinkage(objects: Sequence[OrientationErrors]) -> float:
+    """Return the pseudo-observations with which flips of left-out groups are the likeliest.
+
+    A flip's probability is shrunk from the share near its direction towards the object's share,
+    and this towards the share of all objects. One number serves both: so many pairs in each
+    direction. The likelihood is that of the flips of each group given all others. Unless it is
+    larger than with the most pseudo-observations by a standard error over groups, flips are not
+    shown to depend on the view, and the most are taken.
+
+    Returns
+    -------
+    float
+        One of `STRENGTHS`; `FIXED_STRENGTH` with fewer than `FEWEST_GROUPS` groups in all.
+    """
+    if sum(int(errors.labels.max()) + 1 for errors in objects) < FEWEST_GROUPS:
+        return FIXED_STRENGTH
+    n_all = sum(len(errors.labels) for errors in objects)
+    flips_all = sum(int(errors.is_flip.sum()) for errors in objects)
+    strengths, likelihoods = np.array(STRENGTHS)[:, None], []
+    for errors in objects:
+        directions, flips = viewing_direction(errors.estimate), errors.is_flip
+        for group in range(int(errors.labels.max()) + 1):
+            rows = errors.labels == group
+            cosine = errors.symmetry.direction_cosine(directions[rows], directions[~rows])
+            weights = np.exp(errors.concentration * (cosine - 1))
+            share = (flips_all - flips[rows].sum() + 0.5) / (n_all - rows.sum() + 1)
+            pairs = 2 * errors.concentration * strengths
+            of_object = _shrunk(flips[~rows].sum(), (~rows).sum(), share, pairs)
+            p = _shrunk(weights @ flips[~rows], weights.sum(axis=1), of_object, strengths)
+            likelihoods.append(np.log(np.where(flips[rows], p, 1 - p)).sum(axis=1))
+    by_group = np.stack(likelihoods, axis=1)
+    best = int(by_group.sum(axis=1).argmax())
+    return STRENGTHS[best if is_surely_less(by_group[-1] - by_group[best], 1.0) else -1]
+
+
+def apart(
     kept: Orientations, more: Orientations, spacing_deg: float, symmetry: Symmetry
 ) -> Orientations:
     """Return orientations, and those of `more` that are apart from all before."""
@@ -282,14 +426,3 @@ def _apart(
         chosen.append(int(np.argmax(free)))
         free &= symmetry.cosine(more, more[chosen[-1:]])[:, 0] < nearest
     return np.concatenate([kept, more[chosen]])
-
-
-def _roll(a: Orientations) -> Orientations:
-    """Return the rotation about the optical axis nearest to each orientation (n, 3, 3)."""
-    angle = np.arctan2(a[:, 1, 0] - a[:, 0, 1], a[:, 0, 0] + a[:, 1, 1])
-    roll = np.zeros_like(a)
-    roll[:, 0, 0] = roll[:, 1, 1] = np.cos(angle)
-    roll[:, 1, 0] = np.sin(angle)
-    roll[:, 0, 1] = -roll[:, 1, 0]
-    roll[:, 2, 2] = 1
-    return roll
