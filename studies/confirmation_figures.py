@@ -36,18 +36,16 @@ def answers_figure(contrasts: pd.DataFrame) -> Figure:
     ValueError
         Where no contrast answers a question.
     """
-    answers = _answers(contrasts)
     # A data set of one category has no rows over all.
-    several = answers.groupby("dataset")["category"].transform("nunique") > 1
-    answers = answers[~several | (answers["category"] == ALL)]
+    several = contrasts.groupby("dataset")["category"].transform("nunique") > 1
+    answers = _answers(contrasts[~several | (contrasts["category"] == ALL)])
     labels: list[str] = []
     headings = []
-    groups = answers.groupby(["question", "contrast", "fusion"], sort=False)
-    figure = new_figure(7.4, _ROW_IN * (len(answers) + len(groups)) + 0.9)
+    figure = new_figure(7.4, _ROW_IN * sum(1 + len(part) for _, part in answers) + 0.9)
     axes = figure.subplots()
-    for (question, contrast, fusion), part in groups:
+    for heading, part in answers:
         headings.append(len(labels))
-        labels.append(f"{question}. {_contrast(str(contrast))}, {fusion}")
+        labels.append(heading)
         for _, row in part.iterrows():
             _draw_difference(axes, row, len(labels))
             text = interval_text(row["difference_deg"], row["low"], row["high"])
@@ -70,22 +68,13 @@ def answers_figure(contrasts: pd.DataFrame) -> Figure:
 def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     """Draw, by category, the contrasts that answer the questions of docs/protocol.md.
 
-    A row per contrast and fusion, in the order of the questions, with a panel per data set.
-
-    Parameters
-    ----------
-    contrasts : DataFrame
-        From `studies.confirmation.method_contrasts`.
-
-    Raises
-    ------
-    ValueError
-        Where no contrast answers a question.
+    A row per contrast and fusion, in the order of the questions, with a panel per data set. Same
+    parameter and error as `answers_figure`.
     """
     answers = _answers(contrasts)
     rows = [
-        (key, [panel for _, panel in part.groupby("dataset", sort=False)])
-        for key, part in answers.groupby(["question", "contrast", "fusion"], sort=False)
+        (heading, [panel for _, panel in part.groupby("dataset", sort=False)])
+        for heading, part in answers
     ]
     n_columns = max(len(panels) for _, panels in rows)
     heights = [_PANEL_IN + _ROW_IN * max(map(len, panels)) for _, panels in rows]
@@ -93,11 +82,12 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     cells = figure.subplots(
         len(rows), n_columns, squeeze=False, height_ratios=heights, sharex="row"
     )
-    for panel_row, ((question, contrast, fusion), panels) in zip(cells, rows, strict=True):
+    for panel_row, (heading, panels) in zip(cells, rows, strict=True):
         for i, (axes, part) in enumerate(zip(panel_row, panels, strict=False)):
             _forest(axes, part)
-            asked = "" if i else f"{question}. {_contrast(str(contrast))}, {fusion}"
-            axes.set_title(f"{asked}\n{part['dataset'].iloc[0]} (degrees)", loc="left")
+            axes.set_title(
+                f"{'' if i else heading}\n{part['dataset'].iloc[0]} (degrees)", loc="left"
+            )
         for spare in panel_row[len(panels) :]:
             spare.remove()
     for axes in cells[-1][: len(rows[-1][1])]:
@@ -106,17 +96,22 @@ def contrasts_figure(contrasts: pd.DataFrame) -> Figure:
     return figure
 
 
-def _answers(contrasts: pd.DataFrame) -> pd.DataFrame:
+def _answers(contrasts: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    """Return the contrasts that answer a question, by question and fusion, with headings."""
     answers = contrasts[contrasts["question"] > 0].sort_values(
         ["question", "fusion"], kind="stable"
     )
     if answers.empty:
         raise ValueError("no contrast answers a question")
-    return answers
+    groups = answers.groupby(["question", "contrast", "fusion"], sort=False)
+    return [
+        (f"{question}. {_contrast(str(contrast))}, {fusion}", part)
+        for (question, contrast, fusion), part in groups
+    ]
 
 
-def _verdict_key(figure: Figure, contrasts: pd.DataFrame) -> None:
-    verdicts = {_verdict(row) for _, row in contrasts.iterrows()}
+def _verdict_key(figure: Figure, answers: list[tuple[str, pd.DataFrame]]) -> None:
+    verdicts = {_verdict(row) for _, part in answers for _, row in part.iterrows()}
     handles = [
         Line2D([], [], color=colour, marker=marker, linestyle="none", label=verdict)
         for verdict, (colour, marker) in _VERDICTS.items()

@@ -5,7 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nbv.core.choose import entropy, expected_entropy, is_surely_less, least_cost, mixed, named
+from nbv.core.choose import (
+    entropy,
+    expected_entropy,
+    is_surely_less,
+    least_cost,
+    mixed,
+    named,
+    with_pseudo_observations,
+)
 from nbv.errors import UserError
 
 
@@ -32,6 +40,21 @@ def test_products_are_mixed_and_uniform_where_they_are_impossible() -> None:
             rows[1] = 1.0
         wanted = belief @ (rows / rows.sum(axis=1, keepdims=True))
         assert found[move] == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("alpha", [0, 1, 7])
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_pseudo_observations_are_further_observations_of_the_mean(
+    rng: np.random.Generator, alpha: int, share: float
+) -> None:
+    values, weights, mean = rng.normal(size=(20, 3)), share * rng.random(20), np.arange(3.0)
+    total = with_pseudo_observations(weights @ values, mean, alpha)
+    weight = with_pseudo_observations(weights.sum(), 1.0, alpha)
+    # Without any observation there is one of the mean.
+    n_further = alpha or int(share == 0.0)
+    everything = np.vstack([values, np.tile(mean, (n_further, 1))])
+    wanted = np.average(everything, axis=0, weights=[*weights, *np.ones(n_further)])
+    assert total / weight == pytest.approx(wanted)
 
 
 def test_among_equal_costs_the_least_travel_and_then_the_first_wins() -> None:

@@ -31,11 +31,8 @@ def estimates(n_objects=3, n_views=48, seed=0, worst_deg=90.0):
 
 
 def objects(n_objects, seed, hidden_deg=90.0):
-    """The same of whole sweeps in single degrees, a little sharper, with names."""
-    rng = np.random.default_rng(seed)
-    truth = np.arange(360.0)
-    spread = 4 + 40 * np.exp(-((circular_distance_deg(truth, hidden_deg) / 35) ** 2))
-    found = np.round((truth + rng.normal(0, spread, (n_objects, 360))) % 360, 4) % 360
+    """The same of whole sweeps in single degrees, with names."""
+    found = np.round(estimates(n_objects, 360, seed, hidden_deg), 4) % 360
     return Estimates(tuple(f"{seed}-{k}" for k in range(n_objects)), found)
 
 

@@ -5,17 +5,19 @@ import pandas as pd
 from studies.leaderboard import blocks_of
 from studies.object_errors import OBJECT_COLUMNS
 
+from made_estimates import EXTENSIONS
+
+
+def without(mapping, *names):
+    return {name: value for name, value in mapping.items() if name not in names}
+
+
 METHODS = {
     "single": {"policy": "none"},
     "opposite": {"policy": "opposite"},
     "proposed": {"policy": "pose_ambiguity"},
-    "opposite_posterior": {"policy": "opposite", "fusion": "posterior"},
     "fixed_average": {"policy": "fixed", "fusion": "average"},
-    "gain_posterior": {"policy": "information_gain", "fusion": "posterior"},
-    "selected": {"policy": "selected", "fusion": "selected"},
-    "opposite_selected": {"policy": "opposite", "fusion": "selected"},
-    "oracle_posterior": {"policy": "oracle", "fusion": "posterior"},
-}
+} | without(EXTENSIONS, "random_posterior", "error_average")
 SHIFTS = {
     "single": 8.0,
     "opposite": 4.0,
@@ -47,10 +49,6 @@ def object_rows(shifts=SHIFTS, categories=CATEGORIES, noise=0.1, n_objects=30):
 
 def blocks(shifts=SHIFTS, **rest):
     return blocks_of({"run": object_rows(shifts, **rest)})
-
-
-def without(mapping, *names):
-    return {name: value for name, value in mapping.items() if name not in names}
 
 
 def texts(table):

@@ -69,6 +69,12 @@ def expected_entropy(prior: Table, noise: Table, predicted: Table) -> Table:
     return prior + noise - entropy(predicted)
 
 
+def with_pseudo_observations(sums: Table, mean: Table | float, alpha: float) -> Table:
+    """Return weighted sums plus those of `alpha` (0 or more) pseudo-observations of a mean."""
+    # The mean remains where nothing has a weight, even for an alpha of 0.
+    return sums + max(alpha, float(np.finfo(np.float32).tiny)) * mean
+
+
 def least_cost(cost: Table, travel: Table) -> NDArray[np.intp]:
     """Return the index of the least of costs (..., k); among equals, that of the least travel (k,).
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.alike.compare import AGREEMENT_NATS, CalibrationViews
-from nbv.core.choose import is_surely_less
+from nbv.core.choose import is_surely_less, with_pseudo_observations
 from nbv.core.circle.angles import nearest_bin
 
 N_PARTS = 5
@@ -54,7 +54,7 @@ class Expected:
     within_now: NDArray[np.float64]
     within_after: NDArray[np.float64]
     by_object: NDArray[np.float64]
-    total: NDArray[np.float64]
+    total: NDArray[np.floating]
     weight: float
 
     def optimism_deg(self, is_choice: NDArray[np.bool_]) -> float:
@@ -119,18 +119,16 @@ def expected_errors(
     n_sweeps, n_first = views.first.shape
     # A first view represents the degrees between it and the next.
     of_view = (np.ones(n_sweeps) if share is None else np.asarray(share)) * (360.0 / n_first)
-    # The mean over all views where no view has a weight.
-    alpha = max(pseudo_observations, float(np.finfo(np.float32).tiny))
     compared = views.joined(np.asarray(belief, dtype=np.float32))
     weight = (views.roots @ np.sqrt(compared)) ** np.float32(power)
     weight *= of_view.astype(np.float32)[:, None]
     if views.near is None:
         apart = np.minimum(views.agreement, 0.0) - np.float32(min(agreement, 0.0))
         weight *= np.exp(-0.5 * (apart / np.float32(AGREEMENT_NATS)) ** 2)
-        weight[weight < NEGLIGIBLE * (weight.sum() + alpha)] = 0.0
+        weight[weight < NEGLIGIBLE * (weight.sum() + pseudo_observations)] = 0.0
     by_object = views.is_of_object @ (weight[:, None] @ views.outcomes)[:, 0]
     mean = of_view @ views.mean_outcomes / of_view.sum()
-    sums = by_object.sum(axis=0) + alpha * mean
+    sums = with_pseudo_observations(by_object.sum(axis=0), mean, pseudo_observations)
     n_rotations = views.roots.shape[2]
     means = (sums[:-1] / sums[-1]).reshape(-1, n_rotations + 1)
     rotations = np.arange(n_rotations * views.step) / views.step

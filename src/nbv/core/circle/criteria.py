@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nbv.core.choose import entropy, expected_entropy, mixed, named
+from nbv.core.choose import entropy, expected_entropy, mixed, named, with_pseudo_observations
 from nbv.core.circle.angles import direction_deg, nearest_bin
 from nbv.core.circle.belief import Belief, every_belief
 from nbv.core.circle.density import Conditionals, von_mises_kernel
@@ -270,31 +270,26 @@ def expected_error(belief: Belief, evidence: Evidence, fusion: str) -> Float32Ar
         return _regression_on_distributions(belief, evidence, fusion)
     if belief.first_bin is None:
         raise ValueError(f"fusion {fusion!r} needs a first estimate")
-    table = evidence.once(("regression", fusion), lambda: _regression(evidence, fusion))
+    # Pseudo-observations are per row of 360, as in the densities.
+    alpha = evidence.pseudo_observations * 360.0 / evidence.n_bins
+    table = evidence.once(
+        ("regression", fusion),
+        lambda: _regression(evidence, fusion, kernel_weights(evidence), alpha),
+    )
     return table[belief.first_bin]
 
 
-def _regression(evidence: Evidence, fusion: str) -> Float32Array:
-    n_bins = evidence.n_bins
-    errors = calibration_errors_deg(evidence, fusion).reshape(n_bins, -1)
-    # Pseudo-observations are per row of 360, as in the densities.
-    alpha = evidence.pseudo_observations * 360.0 / n_bins
-    return _shrunk(kernel_weights(evidence), errors, alpha)
-
-
 def _regression_on_distributions(belief: Belief, evidence: Evidence, fusion: str) -> Float32Array:
-    n_bins = evidence.n_bins
-    errors = calibration_errors_deg(evidence, fusion).reshape(n_bins, -1)
-    views, settings = evidence.distributions, evidence.settings["affinity"]
+    views, n_bins = evidence.distributions, evidence.n_bins
     if views is None:
         raise ValueError(f"fusion {fusion!r} needs evidence of distributions")
-    step = evidence.n_views // n_bins
-    calibration = views[:, ::step].reshape(-1, n_bins)
-    rows = belief.probabilities
+    calibration = views[:, :: evidence.n_views // n_bins].reshape(-1, n_bins)
+    rows, settings = belief.probabilities, evidence.settings["affinity"]
     costs = [
-        _shrunk(
+        _regression(
+            evidence,
+            fusion,
             view_weights(rows[start : start + BELIEFS_AT_ONCE], calibration, settings["power"]),
-            errors,
             settings["pseudo_observations"],
         )
         for start in range(0, len(rows), BELIEFS_AT_ONCE)
@@ -302,15 +297,15 @@ def _regression_on_distributions(belief: Belief, evidence: Evidence, fusion: str
     return np.concatenate(costs)
 
 
-def _shrunk(weights: NDArray[np.floating[Any]], errors: Float32Array, alpha: float) -> Float32Array:
-    """Return the weighted mean error of each rotation (n, B), shrunk by alpha pseudo-observations.
-
-    `weights` are (n, n_views), `errors` (B, n_views).
-    """
-    alpha = max(alpha, float(np.finfo(np.float32).tiny))
-    total = weights.astype(np.float32) @ errors.T + np.float32(alpha) * errors.mean(axis=1)
-    total_weight = weights.sum(axis=1, dtype=np.float64) + alpha
-    return np.asarray(total / total_weight[:, None], dtype=np.float32)
+def _regression(
+    evidence: Evidence, fusion: str, weights: NDArray[np.floating[Any]], alpha: float
+) -> Float32Array:
+    """Return the mean error of each rotation by weights of views (n, n_objects B), (n, B)."""
+    errors = calibration_errors_deg(evidence, fusion).reshape(evidence.n_bins, -1)
+    sums = weights.astype(np.float32) @ errors.T
+    total = with_pseudo_observations(sums, errors.mean(axis=1), alpha)
+    weight = with_pseudo_observations(weights.sum(axis=1, dtype=np.float64), 1.0, alpha)
+    return np.asarray(total / weight[:, None], dtype=np.float32)
 
 
 def fixed(belief: Belief, evidence: Evidence, fusion: str) -> Float32Array:

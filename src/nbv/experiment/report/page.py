@@ -256,7 +256,7 @@ def _opening(judged: pd.DataFrame, table1: pd.DataFrame) -> Iterator[dict[str, A
     picture = svg_text(table_picture(table1))
     caption = (
         "Table 1 as a picture. Filled: our mean absolute error (MAE) by category and method, with "
-        f"its 95 % interval over objects.{published} Single is one view; the others turn the "
+        f"its 95 % interval over objects.{published} Single is one view; the others rotate the "
         "camera and average two estimates: after a random rotation, half a turn, or the rotation "
         "that the table proposes. All see the same objects, so their differences are known better "
         "than these intervals say."

@@ -507,7 +507,7 @@ let turning = null;
 
 function setTurning(wanted) {
   $("turn").setAttribute("aria-pressed", wanted);
-  $("turn").textContent = wanted ? "Stop" : "Turn";
+  $("turn").textContent = wanted ? "Stop" : "Rotate";
   if (turning) cancelAnimationFrame(turning);
   turning = null;
   if (!wanted) return;

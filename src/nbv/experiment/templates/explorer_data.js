@@ -41,7 +41,7 @@ function summed(bytes, start, n) {
   return codes;
 }
 
-/** The pose halfway between two estimates, the second one turned back; whole hundredths. */
+/** The pose halfway between two estimates, the second one rotated back; whole hundredths. */
 function halfway(first, second, turned) {
   return modulo(first + Math.floor(halfTurn(second - turned - first) / 2), TURN);
 }

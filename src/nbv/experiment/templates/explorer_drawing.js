@@ -1,5 +1,5 @@
 // Canvases: the ring of views, the cost, single views, strips of errors, objects. Azimuth 0 is on
-// the right and turns counter-clockwise, as seen from above, as in all figures.
+// the right and azimuths increase counter-clockwise, as seen from above, as in all figures.
 
 const DEGREE = Math.PI / 180;
 
@@ -180,7 +180,7 @@ function readableOn(colour) {
   return luminance > 0.179 ? "#000000" : "#ffffff";
 }
 
-/** Cost against the camera's azimuth after the turn: the least lies nearest to the centre. */
+/** Cost against the camera's azimuth after the rotation: the least lies nearest to the centre. */
 function drawCost(canvas, cost, firstDeg, marks, colours) {
   const { context, width } = fitted(canvas);
   const centre = width / 2, radius = width / 2 - 32, inner = radius * 0.28;

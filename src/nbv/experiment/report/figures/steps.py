@@ -95,7 +95,7 @@ def steps(inputs: FigureInputs) -> Figure:
     top = _top([scene.one_view, after])
     titles = (
         f"1  One view, estimate {round(scene.shown.estimate_deg) % 360}°",
-        "2  The table: cost of each turn",
+        "2  The table: cost by rotation",
         f"3  Two views, δ = {delta}°",
     )
     for row, (title, rotation) in enumerate(zip(titles, (0, None, scene.best), strict=True)):
