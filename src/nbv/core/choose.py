@@ -10,6 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.errors import UserError, nearest
 
+ANY_VIEW_SHARE = 0.99
+"""Share of the expected error now, or of the mean of all views: 1 % less is worth no move."""
+
+SURE = 2.0
+"""Standard errors by which a view has to be better than another one to be preferred."""
+
 T = TypeVar("T")
 Table = NDArray[np.floating]
 

@@ -14,9 +14,8 @@ from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.next_view import as_chances
 from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
 from nbv.core.alike.compare import WITHIN_DEG
-from nbv.core.alike.expected import SURE
-from nbv.core.choose import is_surely_less
-from nbv.core.orientations.belief import OrientationBelief, belief, hypotheses_belief
+from nbv.core.choose import ANY_VIEW_SHARE, SURE, is_surely_less
+from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief, belief, hypotheses_belief
 from nbv.core.orientations.criteria import (
     NextViews,
     bayes_error,
@@ -40,6 +39,9 @@ INDEPENDENT_DEG = 60.0
 """Angle between views from which their errors are about independent (first half of T-LESS)."""
 
 NO_SCORES = "scores are not used: calibration pairs had none"
+
+
+NO_SCORE_STOP = "; this rests on little: without the estimator's score flips are hard to tell"
 
 
 @dataclass(frozen=True)
@@ -110,11 +112,18 @@ class CameraMove(RankedMove):
 
 @dataclass(frozen=True, kw_only=True)
 class CameraRecommendation(Answer[CameraMove]):
-    """The pose (3, 3) in the last camera, its error, and candidates, best first."""
+    """The pose (3, 3) in the last camera, its belief in the first one, and candidates."""
 
     rotation: Orientations
     depends_on_view: bool
-    helps: bool = True
+    pose_belief: OrientationBelief
+
+    STOP_PROBABILITY = 0.98
+    STOP_WITHIN_DEG = AGREE_DEG
+
+    def probability(self, within_deg: float) -> float:
+        """Return the probability that the pose errs by at most so many degrees."""
+        return self.pose_belief.probability_within(within_deg)
 
     def pose_lines(self, seen: str) -> list[str]:
         """Return the pose of the object, which is called `seen`, in a few lines of text."""
@@ -234,8 +243,11 @@ def recommend_camera(
         probability_within=as_chances(within_now),
         moves=tuple(moves),
         depends_on_view=depends_on_view,
+        pose_belief=now,
+        caveat=NO_SCORE_STOP if scores is None or errors.ratio is None else "",
         warnings=warnings,
-        helps=_is_sure(gains) and gains[0] > 0.01 * now.error_deg,
+        helps=_is_sure(gains) and cost[ranked[0]] < ANY_VIEW_SHARE * now.error_deg,
+        no_flips=not errors.is_flip.any(),
     )
 
 
