@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,16 +11,18 @@ import pandas as pd
 from nbv.core.orientations.group import ASYMMETRIC, VOLUME, Symmetry
 from nbv.experiment.report.table import DECIDED, Cell, Part, Row, Table, difference_cell
 from nbv.experiment.statistics.metrics import Floats, Interval, percentile_interval
-from nbv.labels import category_label, counted, interval_text, method_label, number
+from nbv.labels import category_label, counted, interval_text, number
+from nbv.tables.next_camera import CameraRecommendation
 from studies.solids import SOLIDS, solid
 from studies.trainings import crossed_mean
 
-FIGURES = ("mean_deg", "median_deg", "above_30", "within_15")
+FIGURES = ("error_deg", "above_30", "n_views")
 """Columns of every instance and method; an object's are the means over its instances."""
-FUSION_LABELS = {
-    "average": "averaged (Eq. 7)",
-    "posterior": "posterior",
-    "score": "posterior with scores",
+
+LESS = {
+    "less_random": "less random",
+    "less_chance": "less chance, the instance's mean number",
+    "less_chance_overall": "less chance, the overall mean number",
 }
 
 
@@ -64,8 +66,64 @@ def by_symmetry(objects: Sequence[str], models_info: Mapping[str, Any]) -> dict[
     }
 
 
+STOPS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
+    "decision": lambda rows: rows["verdict"] != "one more view",
+    "belief": lambda rows: rows["probability"] >= CameraRecommendation.STOP_PROBABILITY,
+    "score": lambda rows: rows["flip_ratio"] <= SCORE_ENOUGH,
+}
+"""Rules to stop after a view: the product's decision, its probability, and the score alone."""
+
+SCORE_ENOUGH = 0.5
+"""Likelihood ratio of a flip, given the score of the last view, that is enough."""
+
+
+def stopped(walks: pd.DataFrame, is_enough: pd.Series) -> pd.DataFrame:
+    """Return the row of each walk at which it stops: the first that is enough, else the last."""
+    walk = ["instance", "first", "order"]
+    if "training" in walks:
+        walk.append("training")
+    # Rows are in the order of views.
+    last = walks.groupby(walk, sort=False).tail(1)
+    return pd.concat([walks[is_enough], last]).groupby(walk, sort=False).head(1)
+
+
+def method_errors(walks: pd.DataFrame) -> pd.DataFrame:
+    """Return figures of each instance (index) and method; columns are (figure, method).
+
+    Methods are ``<order>_<number of views>`` and ``<order>_<rule of STOPS>``. Figures are the mean
+    error, the share above 30 degrees, and the mean number of views; and for each rule the error of
+    the same order of views where the number of views is drawn by chance, with the rule's mean
+    number of the instance (``chance``) or of all instances (``chance_overall``).
+    """
+    index = ["object_id", *(["training"] if "training" in walks else []), "instance"]
+    walks = walks.assign(above_30=walks["error_deg"] > 30)
+    figures: dict[tuple[str, str], pd.Series] = {}
+    for order, rows in walks.groupby("order", sort=False):
+        fixed = {}
+        for n_views in range(1, int(rows["n_views"].max()) + 1):
+            at_n = stopped(rows, rows["n_views"] == n_views).groupby(index)
+            fixed[n_views] = at_n["error_deg"].mean()
+            _add(figures, f"{order}_{n_views}", at_n)
+        curve = pd.DataFrame(fixed)
+        for rule, is_enough in STOPS.items():
+            method = f"{order}_{rule}"
+            _add(figures, method, stopped(rows, is_enough(rows)).groupby(index))
+            mean_views = figures["n_views", method]
+            overall = mean_views.groupby(level="object_id").mean().mean()
+            for name, at in (("chance", mean_views), ("chance_overall", overall)):
+                values = zip(np.broadcast_to(at, len(curve)), curve.to_numpy(), strict=True)
+                errors = [np.interp(number, curve.columns, each) for number, each in values]
+                figures[name, method] = pd.Series(errors, curve.index)
+    return pd.DataFrame(figures)
+
+
+def _add(figures: dict[tuple[str, str], pd.Series], method: str, groups: Any) -> None:
+    for name in ("error_deg", "above_30", "n_views"):
+        figures[name, method] = groups[name].mean()
+
+
 def orientation_table(
-    figures: pd.DataFrame,
+    walks: pd.DataFrame,
     groups: Mapping[str, Sequence[str]],
     n_resamples: int,
     rng: np.random.Generator,
@@ -74,7 +132,7 @@ def orientation_table(
 
     Parameters
     ----------
-    figures : DataFrame
+    walks : DataFrame
         As of `studies.rotations.evaluate`; with a column ``training`` where each object is a
         category and its instances are judged by several trainings.
     groups : mapping
@@ -83,77 +141,63 @@ def orientation_table(
         For the intervals.
     """
     parts, cells = [], []
-    is_trained = "training" in figures
-    by = ["object_id", "training", "instance"] if is_trained else ["object_id", "instance"]
-    drawn = "each category's trainings" if is_trained else "objects"
+    is_trained = "training" in walks
+    figures = method_errors(walks)
     for group, objects in groups.items():
-        of_group = figures["object_id"].isin(objects)
-        for fusion, label in FUSION_LABELS.items():
-            part = figures[of_group & (figures["fusion"] == fusion)]
-            if part.empty:
-                continue
-            wide = {
-                name: part.pivot_table(values=name, index=by, columns="method") for name in FIGURES
-            }
-            errors = wide["mean_deg"]
-            weights = _resample(errors.index, rng, n_resamples)
-            rows: list[Row] = []
-            for method in part["method"].unique():
-                mean = {name: _mean(wide[name][method], weights) for name in FIGURES}
-                error = mean["mean_deg"]
-                less = {
-                    other: _mean(errors[method] - errors[other], weights)
-                    for other in ("random", "opposite")
-                }
-                worse = _worse_objects(errors, method)
-                cells.append(
-                    {"group": group, "fusion": fusion, "method": method}
-                    | {name: figure.value for name, figure in mean.items()}
-                    | error.columns("mean_deg", "ci")
-                    | less["random"].columns("less_random", "less_random_ci")
-                    | less["opposite"].columns("less_opposite", "less_opposite_ci")
-                    | {"worse_objects": " ".join(worse)}
+        of_group = figures[figures.index.get_level_values("object_id").isin(objects)]
+        if of_group.empty:
+            continue
+        weights = _resample(of_group.index, rng, n_resamples)
+        errors = of_group["error_deg"]
+        rows: list[Row] = []
+        for method in errors:
+            mean = {name: _mean(of_group[name][method], weights) for name in FIGURES}
+            error = mean["error_deg"]
+            order, n_views = str(method).split("_")
+            others = {"less_random": errors[f"random_{n_views}"]} if order != "random" else {}
+            if n_views in STOPS:
+                for name in ("chance", "chance_overall"):
+                    others[f"less_{name}"] = of_group[name][method]
+            less = {name: _mean(errors[method] - other, weights) for name, other in others.items()}
+            cells.append(
+                {"group": group, "method": method}
+                | {name: figure.value for name, figure in mean.items()}
+                | error.columns("error_deg", "ci")
+                | {k: v for name, each in less.items() for k, v in each.columns(name).items()}
+            )
+            differences = (less.get(name) for name in LESS)
+            rows.append(
+                (
+                    Cell(f"{order}, {n_views if n_views.isdigit() else f'until the {n_views}'}"),
+                    Cell(number(mean["n_views"].value)),
+                    Cell(interval_text(error.value, error.low, error.high, 1)),
+                    Cell(number(100 * mean["above_30"].value, 1)),
+                    *(
+                        Cell("") if d is None else difference_cell(d.value, d.low, d.high)
+                        for d in differences
+                    ),
                 )
-                rows.append(
-                    (
-                        Cell(method_label(method)),
-                        Cell(interval_text(error.value, error.low, error.high, 1)),
-                        *(difference_cell(d.value, d.low, d.high) for d in less.values()),
-                        Cell(number(mean["median_deg"].value, 1)),
-                        Cell(number(100 * mean["above_30"].value, 1)),
-                        Cell(number(100 * mean["within_15"].value, 1)),
-                        Cell(", ".join(worse) or "none"),
-                    )
-                )
-            n_instances = part["instance"].nunique()
-            n_objects = counted(part["object_id"].nunique(), "object")
-            of = group if is_trained else f"{n_objects}, {group}"
-            parts.append(Part(tuple(rows), f"{of}, {n_instances} instances, {label}"))
-    header = ("Method", "Error (°)", "less random", "less opposite", "median", "> 30° (%)")
-    title = "Two views in three dimensions"
+            )
+        n_instances = of_group.index.get_level_values("instance").nunique()
+        n_objects = counted(len(set(of_group.index.get_level_values("object_id"))), "object")
+        of = group if is_trained else f"{n_objects}, {group}"
+        parts.append(Part(tuple(rows), f"{of}, {n_instances} instances"))
+    drawn = "each category's trainings" if is_trained else "objects"
+    title = "Up to four views in three dimensions"
     return Table(
         "rotations",
         title,
         title,
         pd.DataFrame(cells),
-        (*header, "< 15° (%)", "worse than one view"),
+        ("Order of views, number", "views", "Error (°)", "> 30° (%)", *LESS.values()),
         tuple(parts),
         (
             "Errors are modulo symmetry. Figures are means over objects of means over instances.",
             f"In brackets 95 % intervals: {n_resamples} resamples of {drawn}, then instances.",
-            "An object is worse than with one view where Student's interval over its instances is.",
+            "Less chance: less the same order with a number of views that is drawn by chance.",
             DECIDED,
         ),
     )
-
-
-def _worse_objects(errors: pd.DataFrame, method: str) -> list[str]:
-    """Return the objects whose error is larger than that of one view, by Student's interval."""
-    return [
-        str(object_id)
-        for object_id, rows in errors.groupby(level="object_id")
-        if _student(rows[method] - rows["single"]).low > 0
-    ]
 
 
 def estimator_table(pairs: pd.DataFrame, n_poses: int) -> Table:

@@ -1,13 +1,15 @@
-"""Two views of an estimator in three dimensions, on images that exist (docs/rotations-protocol.md).
+"""Up to four views of an estimator in three dimensions (docs/rotations-protocol.md).
 
-Every image of an instance is a first view, every other one of the same instance a possible second
-view. The estimator's errors are those of other instances of the object.
+Every image of an instance is a first view, and the other images of the same instance are the views
+that can be reached. `nbv.OrientationTable.recommend`, calibrated on other instances, gives pose,
+probability and decision after each view, and the next view in the order `recommended`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +18,24 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.choice.rotations import MIN_SEPARATION_DEG
-from nbv.core.orientations.belief import average, belief, posterior
-from nbv.core.orientations.criteria import CRITERIA, NextViews, costs_of, ranking, view_angle_deg
-from nbv.core.orientations.errors import OrientationErrors
+from nbv.core.orientations.criteria import view_angle_deg
+from nbv.core.seeds import rng_for
 from nbv.files import read_rows
 from nbv.tables.bop import groups_of, orientation_table
-from nbv.tables.next_camera import PoseEstimate
+from nbv.tables.next_camera import CameraRecommendation, PoseEstimate
 from nbv.tables.orientation_table import OrientationTable
 
 Array = NDArray[np.float64]
 
 COLUMNS = ("object_id", "scene_id", "instance", "score")
+
+MOST_VIEWS = 4
+
+ORDERS = ("random", "opposite", "recommended")
+"""Orders of views: the next one at random, the farthest from all so far, the product's."""
+
+ELSEWHERE = 50
+"""Even candidates about the object, where an instance has no image left: for the pose alone."""
 
 
 def pairs_table(
@@ -52,25 +61,29 @@ class HeldOut:
     ----------
     name : str
     images : OrientationTable
-        The instance's.
+        The instance's n images.
     known : OrientationTable
-        Calibration: all other pairs.
-    others : OrientationTable
-        Those of the object.
-    errors : OrientationErrors
-        Errors on `others`; scores count by those of other objects, if there are any.
+        Calibration: other pairs.
     """
 
     name: str
     images: OrientationTable
     known: OrientationTable
-    others: OrientationTable
-    errors: OrientationErrors
 
     @property
-    def scores(self) -> Array:
-        """The estimator's scores (n,) on the images."""
-        return np.asarray(self.images.score, dtype=np.float64)
+    def object_id(self) -> str:
+        """The object or category."""
+        return self.images.object_ids[0]
+
+    @property
+    def cameras(self) -> Array:
+        """Poses (n, 4, 4) of the cameras, in the frame of the first one, straight at the object."""
+        truth = self.images.truth
+        ahead = np.array([0.0, 0.0, 1.0])
+        cameras = np.tile(np.eye(4), (len(truth), 1, 1))
+        cameras[:, :3, :3] = truth[0] @ np.swapaxes(truth, 1, 2)
+        cameras[:, :3, 3] = ahead - cameras[:, :3, :3] @ ahead
+        return cameras
 
 
 def held_out(
@@ -84,8 +97,8 @@ def held_out(
         If a column or an object is missing, or a matrix is no rotation.
     """
     rows = read_rows(Path(path), COLUMNS)
-    objects, scored = settings["objects"], settings["score_objects"]
-    chosen = [*objects, *scored] if objects and scored else ()
+    judged = settings["objects"]
+    chosen = [*judged, *settings["score_objects"]] if judged and settings["score_objects"] else ()
     table = orientation_table(path, rows, models_info=models_info, objects=chosen)
     keys = list(zip(table.object_id, table.group, strict=True))
     role: dict[tuple[str, str], str] = {}
@@ -93,166 +106,95 @@ def held_out(
         by_instance = zip(rows["object_id"], groups_of(rows), rows["role"], strict=True)
         role = {(object_id, group): value for object_id, group, value in by_instance}
     is_tested = np.array([role.get(key) == "test" for key in keys])
-    model = {k: settings[k] for k in ("concentration", "pseudo_observations", "flip_deg")}
+    calibration = table.where(~is_tested)
     for object_id, group in dict.fromkeys(keys):
-        if (objects and object_id not in objects) or role.get((object_id, group)) == "calibration":
+        if (judged and object_id not in judged) or role.get((object_id, group)) == "calibration":
             continue
-        is_object = table.object_id == object_id
-        is_instance = is_object & (table.group == group)
-        is_known = ~is_instance & ~is_tested
-        known, others = table.where(is_known), table.where(is_known & is_object)
-        if not len(others.truth):
-            continue
-        elsewhere = ~is_object & (np.isin(table.object_id, scored) if scored else True)
-        scoring = table.where(elsewhere) if elsewhere.any() else others
-        yield HeldOut(
-            "_".join([object_id, *group.split("/")]),
-            table.where(is_instance),
-            known,
-            others,
-            replace(others.errors(), ratio=scoring.score_ratio(model["flip_deg"]), **model),
-        )
+        is_instance = (table.object_id == object_id) & (table.group == group)
+        known = calibration if role else table.where(~is_instance)
+        if object_id in known.object_ids:
+            name = "_".join([object_id, *group.split("/")])
+            yield HeldOut(name, table.where(is_instance), known)
 
 
-FUSIONS = ("average", "posterior", "score")
-"""Eq. 7, the posterior, and the posterior with the estimator's scores."""
+def walks(case: HeldOut, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+    """Yield a row for each first view, order and number of views of an instance.
 
-N_BEST = 5
-"""The mean over the best-ranked images is reported too: a robot may not reach the first."""
-
-
-@dataclass(frozen=True)
-class TwoViews:
-    """Every pair of views of an instance with n images.
-
-    Attributes
+    Parameters
     ----------
-    error_deg : dict of str to ndarray (n, n)
-        Error of each fusion, [first, second view]; the diagonal is that of one view.
-    cost : dict of str to ndarray (n, n)
-        Cost of each criterion.
-    angle_deg : ndarray (n, n)
-        The angle between the views.
-    recommended : ndarray (n,) int
-        The second view that `nbv recommend` takes, or the first one where none is admissible.
-    depends_on_view : bool
-        Whether calibration shows that flips depend on the view.
+    case : HeldOut
+    rng : Generator
+        For the order at random.
     """
+    images, cameras = case.images, case.cameras
+    n = len(cameras)
+    moves = np.swapaxes(cameras[:, :3, :3], 1, 2)
+    apart = np.stack([view_angle_deg(moves @ move.T) for move in moves])
+    score = np.full(n, np.nan) if images.score is None else np.asarray(images.score)
+    ahead_mm = np.array([0.0, 0.0, 1000.0])
+    estimates = [
+        PoseEstimate(r, ahead_mm, None if np.isnan(s) else float(s), camera)
+        for r, s, camera in zip(images.estimate, score, cameras, strict=True)
+    ]
+    ratio = case.known.errors(case.object_id).ratio
 
-    error_deg: Mapping[str, Array]
-    cost: Mapping[str, Array]
-    angle_deg: Array
-    recommended: NDArray[np.intp]
-    depends_on_view: bool
+    def free(taken: Sequence[int]) -> NDArray[np.intp]:
+        return np.flatnonzero(apart[np.array(taken)].min(axis=0) >= MIN_SEPARATION_DEG)
 
+    @cache
+    def answer(taken: tuple[int, ...]) -> CameraRecommendation:
+        left = free(taken)
+        candidates = list(cameras[left]) if len(left) else ELSEWHERE
+        views = [estimates[i] for i in taken]
+        return case.known.recommend(views, candidates, object_id=case.object_id)
 
-def two_views(case: HeldOut) -> TwoViews:
-    """Evaluate every pair of views of an instance."""
-    images, errors = case.images, case.errors
-    n = len(images.truth)
-    fused = {name: np.empty((n, n, 3, 3)) for name in FUSIONS}
-    cost = {name: np.empty((n, n)) for name in CRITERIA}
-    angle = np.empty((n, n))
-    for i in range(n):
-        moves = images.truth @ images.truth[i].T
-        angle[i] = view_angle_deg(moves)
-        first = belief(errors, images.estimate[[i]], np.eye(3)[None])
-        ahead = NextViews(first, moves)
-        for name in CRITERIA:
-            cost[name][i] = costs_of(name, ahead)
-        for j in range(n):
-            views = [i] if i == j else [i, j]
-            given = errors, images.estimate[views], moves[views]
-            fused["average"][i, j] = average(*given)
-            fused["posterior"][i, j] = posterior(*given)
-            fused["score"][i, j] = posterior(*given, case.scores[views])
-    distance = errors.symmetry.distance_deg
-    error = {name: distance(poses, images.truth[:, None]) for name, poses in fused.items()}
-    recommended = np.array([recommended_view(case, i) for i in range(n)])
-    return TwoViews(error, cost, angle, recommended, errors.depends_on_view(case.others.group))
+    def next_of(order: str, taken: tuple[int, ...]) -> int:
+        left = free(taken)
+        if order == "recommended":
+            return int(left[answer(taken).moves[0].index])
+        if order == "opposite":
+            return int(left[apart[np.array(taken)][:, left].min(axis=0).argmax()])
+        return int(rng.choice(left))
 
-
-def recommended_view(case: HeldOut, first: int) -> int:
-    """Return the second view that `nbv recommend` takes after a first one, calibrated on others."""
-    images = case.images
-    moves = images.truth @ images.truth[first].T
-    admissible = np.flatnonzero(view_angle_deg(moves) >= MIN_SEPARATION_DEG)
-    if not len(admissible):
-        return first
-    # Poses are those of cameras that look straight at the object.
-    ahead = np.array([0.0, 0.0, 1.0])
-    cameras = np.tile(np.eye(4), (len(admissible), 1, 1))
-    cameras[:, :3, :3] = np.swapaxes(moves[admissible], 1, 2)
-    cameras[:, :3, 3] = ahead - cameras[:, :3, :3] @ ahead
-    estimate = PoseEstimate(images.estimate[first], 1000 * ahead, case.scores[first])
-    answer = case.known.recommend([estimate], list(cameras), object_id=images.object_ids[0])
-    return int(admissible[answer.moves[0].index])
-
-
-def chosen_views(views: TwoViews, fusion: str) -> dict[str, NDArray[np.intp]]:
-    """Return the second views (n, k) that each method takes after each first one.
-
-    Where a method takes several, their mean counts.
-    """
-    n = len(views.angle_deg)
-    first = np.arange(n)[:, None]
-    others = np.array([np.delete(np.arange(n), i) for i in range(n)])
-    error, angle = views.error_deg[fusion][first, others], views.angle_deg[first, others]
-    farthest = others[first, angle.argmax(axis=1)[:, None]]
-    chosen = {"single": first, "random": others, "opposite": farthest}
-    for name, cost in views.cost.items():
-        order = ranking(cost[first, others], angle)
-        ranked = np.take_along_axis(others, order, axis=1)
-        chosen[name] = ranked[:, :1]
-        chosen[f"{name}_five"] = ranked[:, :N_BEST]
-    chosen["farthest_if_independent"] = chosen["bayes_error"] if views.depends_on_view else farthest
-    chosen["nbv_next"] = views.recommended[:, None]
-    chosen["hindsight"] = others[first, error.argmin(axis=1)[:, None]]
-    chosen["oracle"] = np.concatenate(
-        [_oracle(error, angle, others, views.angle_deg, half) for half in (0, 1)], axis=1
-    )
-    return chosen
-
-
-def _oracle(
-    error: Array, angle: Array, others: NDArray[np.intp], between: Array, half: int
-) -> NDArray[np.intp]:
-    """Return views (n, 1) of one half that are nearest to the best ones of the other half."""
-    first = np.arange(len(others))[:, None]
-    is_judged = np.arange(others.shape[1]) % 2 == half
-    best = np.where(is_judged, np.inf, error).argmin(axis=1)[:, None]
-    away = np.where(is_judged, between[others[first, best], others], np.inf)
-    return np.asarray(others[first, away.argmin(axis=1)[:, None]])
+    errors = case.known.errors(case.object_id)
+    for first in range(n):
+        for order in ORDERS:
+            taken: tuple[int, ...] = (first,)
+            while True:
+                after = answer(taken)
+                # In the last camera.
+                error = errors.symmetry.distance_deg(after.rotation, images.truth[taken[-1]])
+                yield {
+                    "object_id": case.object_id,
+                    "instance": case.name,
+                    "first": first,
+                    "order": order,
+                    "n_views": len(taken),
+                    "error_deg": float(error),
+                    "expected_deg": after.expected_error_deg,
+                    "probability": after.probability(after.STOP_WITHIN_DEG),
+                    "flip_ratio": 1.0 if ratio is None else float(ratio([score[taken[-1]]])[0]),
+                    "verdict": after.decision.verdict,
+                    "depends_on_view": after.depends_on_view,
+                }
+                if len(taken) == MOST_VIEWS or not len(free(taken)):
+                    break
+                taken = (*taken, next_of(order, taken))
 
 
 def evaluate(
-    path: str | Path, models_info: str | Path | None, settings: Mapping[str, Any]
+    path: str | Path, models_info: str | Path | None, settings: Mapping[str, Any], seed: int
 ) -> pd.DataFrame:
-    """Return the figures of every instance, fusion and method.
+    """Return the rows of `walks` of every instance.
 
     The table of pairs has `COLUMNS` and those of `nbv.tables.bop.read_orientation_table`. With a
     column ``role`` an instance is for calibration or tested, else both. ``settings`` has
-    ``objects``, which are evaluated, and ``score_objects``, which say what a score is worth; and
-    those of `OrientationErrors`.
+    ``objects``, which are evaluated, and ``score_objects``, which calibrate too.
     """
-    rows = []
-    for case in held_out(path, models_info, settings):
-        views = two_views(case)
-        for fusion, error_deg in views.error_deg.items():
-            for method, chosen in chosen_views(views, fusion).items():
-                error = np.take_along_axis(error_deg, chosen, axis=1)
-                rows.append(
-                    {
-                        "object_id": case.images.object_ids[0],
-                        "instance": case.name,
-                        "n_images": len(error_deg),
-                        "depends_on_view": views.depends_on_view,
-                        "fusion": fusion,
-                        "method": method,
-                        "mean_deg": error.mean(),
-                        "median_deg": np.median(error),
-                        "above_30": (error > 30).mean(),
-                        "within_15": (error < 15).mean(),
-                    }
-                )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(
+        [
+            row
+            for case in held_out(path, models_info, settings)
+            for row in walks(case, rng_for(seed, "rotations", case.name))
+        ]
+    )
