@@ -71,6 +71,7 @@ KINDS: dict[str, tuple[Flip, ...]] = {
     "none": (),
     "anywhere": (Flip(None, 0.2, 0.2),),
     "everywhere": (Flip(HALF, 0.2, 0.2),),
+    "quarters": tuple(Flip((0.0, 0.0, k * 90.0), 0.2 / 3, 0.2 / 3) for k in (1, 2, 3)),
     "side": (Flip(HALF, 0.6, 0.0),),
     "two": (Flip(HALF, 0.6, 0.03), Flip(QUARTER, 0.6, 0.03, (-1.0, 0.0, 0.0))),
 }
