@@ -105,15 +105,20 @@ class CameraMove(RankedMove):
 
 @dataclass(frozen=True, kw_only=True)
 class CameraRecommendation(Answer[CameraMove]):
-    """The pose (3, 3) in the last camera, its error, and candidates, best first."""
+    """The pose (3, 3) in the last camera, its error, and candidates, best first.
+
+    `holds_where` says for which share of detections calibration holds, if that is known.
+    """
 
     rotation: Orientations
     depends_on_view: bool
+    holds_where: str | None = None
 
     def pose_lines(self, seen: str) -> list[str]:
         """Return the pose of the object, which is called `seen`, in a few lines of text."""
         rows = matrix_lines(self.rotation)
-        return [f"rotation, {seen} to camera", *rows, self.value(self)]
+        holds = [] if self.holds_where is None else [self.holds_where]
+        return [f"rotation, {seen} to camera", *rows, self.value(self), *holds]
 
 
 @dataclass(frozen=True)

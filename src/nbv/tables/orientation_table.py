@@ -25,6 +25,7 @@ from nbv.core.orientations.group import (
 from nbv.errors import UserError, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
 from nbv.numbers import Pose, as_orientations
+from nbv.tables.detections import Detections
 from nbv.tables.next_camera import CameraRecommendation, PoseEstimate, recommend_camera
 
 FLIP_DEG = OrientationErrors.flip_deg
@@ -46,6 +47,10 @@ class ObjectSummary:
     depends_on_view : bool
         Whether calibration shows that flips depend on the view.
     warnings : tuple of str
+    holds_where : str or None
+        For which share of detections calibration holds.
+    detections : dict of str to int
+        The numbers of the others by reason: see `Detections.counts`.
     """
 
     object_id: str
@@ -56,6 +61,8 @@ class ObjectSummary:
     directions_covered: float
     depends_on_view: bool
     warnings: tuple[str, ...]
+    holds_where: str | None = None
+    detections: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -76,6 +83,8 @@ class OrientationTable:
         Entries of BOP's models_info by object; an object without one is asymmetric.
     left_out : tuple of str
         Which pairs of the file are not in the table, and why.
+    detections : mapping
+        What became of each object's other detections, as far as the file tells.
 
     Examples
     --------
@@ -94,6 +103,7 @@ class OrientationTable:
     straightened: bool = False
     symmetries: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    detections: Mapping[str, Detections] = field(default_factory=dict)
 
     @property
     def object_ids(self) -> list[str]:
@@ -208,7 +218,7 @@ class OrientationTable:
         (False, True)
         """
         name = self.name_of(object_id)
-        return recommend_camera(
+        answer = recommend_camera(
             self.errors(name),
             estimates,
             candidates,
@@ -216,6 +226,14 @@ class OrientationTable:
             depends_on_view=self.depends_on_view(name),
             camera_pose=camera_pose,
             max_travel_deg=max_travel_deg,
+        )
+        scores = [estimate.score for estimate in estimates if estimate.score is not None]
+        least = min(scores, default=None)
+        too_low = self.detections[name].warning(least) if name in self.detections else ()
+        return replace(
+            answer,
+            holds_where=self._holds_where(name, least),
+            warnings=(*answer.warnings, *too_low),
         )
 
     def depends_on_view(self, name: str) -> bool:
@@ -251,12 +269,21 @@ class OrientationTable:
             directions_covered=covered,
             depends_on_view=self.depends_on_view(name),
             warnings=tuple(warnings),
+            holds_where=self._holds_where(name),
+            detections=self.detections[name].counts() if name in self.detections else {},
         )
+
+    def _holds_where(self, name: str, score: float | None = None) -> str | None:
+        others = self.detections.get(name)
+        if others is None or self.score is None:
+            return None
+        return others.holds_where(self.score[self.object_id == name], score)
 
     def save(self, path: str | Path) -> None:
         """Write the pairs as ``.npz``."""
         names, index = self.object_ids, {name: i for i, name in enumerate(self.object_ids)}
         known = {n: self.symmetries[n] for n in names if n in self.symmetries}
+        others = {n: self.detections[n].as_json() for n in names if n in self.detections}
         values = (
             np.array(names),
             np.array([index[str(name)] for name in self.object_id]),
@@ -267,7 +294,8 @@ class OrientationTable:
             np.array(self.straightened),
             np.array(json.dumps(known, sort_keys=True)),
         )
-        write_arrays(path, dict(zip(_NAMES, values, strict=True)))
+        detections = {"detections": np.array(json.dumps(others, sort_keys=True))}
+        write_arrays(path, dict(zip(_NAMES, values, strict=True)) | detections)
 
     @classmethod
     def load(cls, path: str | Path) -> OrientationTable:
@@ -297,6 +325,7 @@ class OrientationTable:
             symmetries = json.loads(str(texts))
             if not isinstance(symmetries, dict):
                 raise damaged(path, "its symmetries are no entries by object", CALIBRATE_AGAIN)
+            others = json.loads(str(stored.get("detections", "{}")))
             table = cls(
                 names.astype(str)[index],
                 group,
@@ -305,6 +334,7 @@ class OrientationTable:
                 score,
                 bool(straightened),
                 symmetries,
+                detections={name: Detections.of(entry) for name, entry in others.items()},
             )
             for name in table.object_ids:
                 table.symmetry(name)
