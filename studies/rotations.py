@@ -20,7 +20,7 @@ from nbv.core.orientations.belief import average, belief, posterior
 from nbv.core.orientations.criteria import CRITERIA, NextViews, costs_of, ranking, view_angle_deg
 from nbv.core.orientations.errors import OrientationErrors
 from nbv.files import read_rows
-from nbv.tables.bop import groups_of, orientation_table
+from nbv.tables.bop import groups_of, read_orientation_table
 from nbv.tables.next_camera import PoseEstimate
 from nbv.tables.orientation_table import OrientationTable
 
@@ -86,7 +86,7 @@ def held_out(
     rows = read_rows(Path(path), COLUMNS)
     objects, scored = settings["objects"], settings["score_objects"]
     chosen = [*objects, *scored] if objects and scored else ()
-    table = orientation_table(path, rows, models_info=models_info, objects=chosen)
+    table = read_orientation_table(path, None, models_info, chosen, rows=rows)
     keys = list(zip(table.object_id, table.group, strict=True))
     role: dict[tuple[str, str], str] = {}
     if "role" in rows:

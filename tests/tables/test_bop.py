@@ -54,13 +54,15 @@ def test_every_estimate_and_instance_is_accounted_for(scene, tmp_path):
     rows["score"] = rng.permutation(len(rows)) / 100
     failed, missed, far, twice = np.split(rng.choice(len(rows), 20, replace=False), 4)
     rows.loc[failed, "R"] = ["nan " * 9, "", IDENTITY, IDENTITY, "1 0 nan 0 1 0 0 0 1"]
-    rows.loc[failed, "t"] = ["0 0 700", "", "0 0 0", "0.0 -0 0", "0 0 700"]
+    rows.loc[failed, "t"] = ["0 0 700", "0 0 700", "0 0 0", "0.0 -0 0", "0 0 700"]
     rows.loc[far, "t"] = "0 100 700"
     worse = rows.loc[twice].assign(score=-1.0)
     found = read(tmp_path, pd.concat([rows.drop(index=missed), worse]), truths)
     (about,) = found.about()
     assert about.n_pairs == len(rows) - 15
-    assert about.detections == {"n_farther": 5, "n_surpassed": 5, "n_missed": 15, "n_failed": 5}
+    others = found.detections["1"]
+    assert sorted(others.farther) == sorted(rows.loc[far, "score"])
+    assert (list(others.surpassed), others.n_missed, others.n_failed) == ([-1] * 5, 15, 5)
     found.save(tmp_path / "t.npz")
     again = OrientationTable.load(tmp_path / "t.npz")
     assert again.about() == [about]
@@ -113,11 +115,11 @@ def test_a_table_of_pairs_has_failures_and_no_detections(tmp_path):
     twice.to_csv(tmp_path / "p.csv", index=False)
     found = read_orientation_table(tmp_path / "p.csv")
     about = found.about()[0]
-    assert (about.n_pairs, about.detections["n_failed"], about.holds_where) == (22, 2, None)
+    assert (about.n_pairs, found.detections["0"].n_failed, about.holds_where) == (22, 2, None)
     with pytest.raises(UserError, match="leave `nearest_mm` out"):
         read_orientation_table(tmp_path / "p.csv", nearest_mm=10)
     twice.drop(columns="score").to_csv(tmp_path / "p.csv", index=False)
-    with pytest.raises(UserError, match="leave `least_score` out"):
+    with pytest.raises(UserError, match="no column 'score'"):
         read_orientation_table(tmp_path / "p.csv", least_score=0.1)
 
 

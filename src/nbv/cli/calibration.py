@@ -283,10 +283,11 @@ def _calibrate_orientations(
     source: Path, rows: pd.DataFrame, output: Path, options: CalibrationOptions, as_json: bool
 ) -> None:
     """Make the table of estimates in three dimensions."""
-    from nbv.tables.bop import orientation_table
+    from nbv.tables.bop import read_orientation_table
 
     truth = options.ground_truth, options.models_info, options.object or []
-    pairs = orientation_table(source, rows, *truth, options.nearest, options.least_score)
+    limits = options.nearest, options.least_score
+    pairs = read_orientation_table(source, *truth, *limits, rows=rows)
     about = pairs.about()
     pairs.save(output)
     if as_json:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.core.orientations.group import ASYMMETRIC, Array, Orientations, along_ray, inverse
+from nbv.core.orientations.group import ASYMMETRIC, Orientations, along_ray, inverse
 from nbv.errors import UserError, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
@@ -33,9 +33,9 @@ SAME_MOVE_DEG = 1.0
 
 PAIR = "have a truth"
 FAILED = "are failures: nan, empty, or exactly R = 1 with t = 0"
-BELOW = "have a score below {least_score:g}"
+BELOW = "have a score below {1:g}"
 ELSEWHERE = "are of scenes without truth"
-FARTHER = "are farther than {nearest_mm:g} mm from every instance of their object"
+FARTHER = "are farther than {0:g} mm from every instance of their object"
 SURPASSED = "are of an instance that has one of a better score"
 
 
@@ -46,6 +46,8 @@ def read_orientation_table(
     objects: Sequence[str] = (),
     nearest_mm: float | None = None,
     least_score: float | None = None,
+    *,
+    rows: pd.DataFrame | None = None,
 ) -> OrientationTable:
     """Read pairs of orientations.
 
@@ -62,52 +64,47 @@ def read_orientation_table(
     objects : sequence of str
         Objects to keep; all by default.
     nearest_mm : float, optional
-        A result of BOP that is farther from every instance of its object is no estimate of it;
+        Results of BOP that are farther from every instance of their object are left out;
         `NEAREST_MM` by default.
     least_score : float, optional
         Estimates of lower scores are left out.
+    rows : DataFrame, optional
+        The rows of the file, where they have been read.
 
     Raises
     ------
     UserError
         Names the file and the row.
     """
-    rows = read_rows(Path(path), ())
-    options = truth, models_info, objects, nearest_mm, least_score
-    return orientation_table(path, rows, *options)
-
-
-def orientation_table(
-    path: str | Path,
-    rows: pd.DataFrame,
-    truth: str | Path | None = None,
-    models_info: str | Path | None = None,
-    objects: Sequence[str] = (),
-    nearest_mm: float | None = None,
-    least_score: float | None = None,
-) -> OrientationTable:
-    """Return the table of a file's rows, as `read_orientation_table` does."""
     path = Path(path)
-    is_bop = "obj_id" in rows
-    need_columns(path, rows, BOP_COLUMNS if is_bop else TABLE_COLUMNS)
+    given = read_rows(path, ()) if rows is None else rows
+    is_bop = "obj_id" in given
+    need_columns(path, given, BOP_COLUMNS if is_bop else TABLE_COLUMNS)
     for name, option in (("ground_truth", truth), ("nearest_mm", nearest_mm)):
         if option is not None and not is_bop:
             raise UserError(f"{path} has its own truths (R_true); leave `{name}` out")
-    given = _with_keys(path, rows).assign(object_id=rows["obj_id"]) if is_bop else rows
-    fate = _fate(path, given, ("R", "t") if is_bop else ("R_estimate",), least_score)
+    poses = given[["R", "t"] if is_bop else ["R_estimate"]].replace(r"^\s*$", "nan", regex=True)
+    fate = poses.agg(" ".join, axis=1).map(lambda text: FAILED if _is_failure(text) else PAIR)
+    if (n_failed := (fate == FAILED).sum()) > len(fate) / 2:
+        raise UserError(f"{path}: {n_failed} of {len(fate)} estimates {FAILED}; give more poses")
+    if least_score is not None:
+        need_columns(path, given, ("score",))
+        is_below = column(path, given[fate == PAIR], "score") < least_score
+        fate[fate == PAIR] = np.where(is_below, BELOW, PAIR)
     rows, missed = given[fate == PAIR], pd.Series(dtype=int)
+    if rows.empty:
+        raise UserError(f"{path}: no score is {least_score:g} or more; lower `least_score`")
     if is_bop:
+        given = _with_keys(path, given)
         nearest_mm = NEAREST_MM if nearest_mm is None else nearest_mm
         folder = path.parent if truth is None else Path(truth)
         rows, fate, missed = _matched(path, given, fate, folder, nearest_mm)
     left_out = [
-        f"{n} of {counted(len(given), 'estimate')} "
-        + str(reason).format(nearest_mm=nearest_mm, least_score=least_score)
+        f"{n} of {len(given)} estimates " + str(reason).format(nearest_mm, least_score)
         for reason, n in fate[fate != PAIR].value_counts().items()
     ]
-    if missed.sum():
-        n_instances = int(missed.sum()) + len(rows)
-        left_out.append(f"{missed.sum()} of {counted(n_instances, 'instance')} have no estimate")
+    if n_missed := int(missed.sum()):
+        left_out.append(f"{n_missed} of {n_missed + len(rows)} instances have no estimate")
     symmetries = {} if models_info is None else read_models_info(models_info)
     known = list(dict.fromkeys(rows["object_id"]))
     for name in objects:
@@ -130,19 +127,28 @@ def orientation_table(
     truths, estimates = (orientation_column(path, rows, name) for name in TABLE_COLUMNS[1:])
     score = column(path, rows, "score") if "score" in rows else None
     positions = position_column(path, rows, "t_true_mm") if "t_true_mm" in rows else None
-    groups = groups_of(rows)
     _check_way_round(path, rows, truths, estimates)
     if positions is not None:
         straightening = along_ray(positions)
         truths, estimates = straightening @ truths, straightening @ estimates
-    detections = {}
-    for name in dict.fromkeys(rows["object_id"]):
-        is_it, n_missed = given["object_id"] == name, int(missed.get(name, 0))
-        others = given[is_it], fate[is_it], n_missed, (nearest_mm, least_score)
-        detections[name] = _detections(path, *others)
+
+    def others(name: str, reason: str) -> pd.DataFrame:
+        return given[(given["object_id"] == name) & (fate == reason)]
+
+    detections = {
+        name: Detections(
+            farther=list(map(float, others(name, FARTHER).get("score", ()))),
+            surpassed=list(map(float, others(name, SURPASSED).get("score", ()))),
+            n_missed=int(missed.get(name, 0)),
+            n_failed=len(others(name, FAILED)),
+            nearest_mm=nearest_mm,
+            least_score=least_score,
+        )
+        for name in dict.fromkeys(rows["object_id"])
+    }
     return OrientationTable(
         rows["object_id"].to_numpy(dtype=str),
-        groups,
+        groups_of(rows),
         estimates,
         truths,
         score,
@@ -153,23 +159,6 @@ def orientation_table(
     )
 
 
-def _detections(
-    path: Path,
-    given: pd.DataFrame,
-    fate: pd.Series[Any],
-    n_missed: int,
-    limits: tuple[float | None, float | None],
-) -> Detections:
-    """Return what became of an object's rows."""
-
-    def scores(reason: str) -> Array:
-        rows = given[fate == reason]
-        return column(path, rows, "score") if len(rows) else np.empty(0)
-
-    n_failed = int((fate == FAILED).sum())
-    return Detections(scores(FARTHER), scores(SURPASSED), n_missed, n_failed, *limits)
-
-
 def groups_of(rows: pd.DataFrame) -> NDArray[np.str_]:
     """Return the group (n,) of each row: its scene and instance, as far as columns name them."""
     keys = [name for name in ("scene_id", "instance") if name in rows]
@@ -177,39 +166,18 @@ def groups_of(rows: pd.DataFrame) -> NDArray[np.str_]:
 
 
 def _with_keys(path: Path, rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.assign(**{key: column(path, rows, key).astype(int).astype(str) for key in KEYS})
-
-
-def _fate(
-    path: Path, rows: pd.DataFrame, pose: Sequence[str], least_score: float | None
-) -> pd.Series[Any]:
-    """Return which rows have a pose and a score to calibrate on."""
-    is_failure = rows[list(pose)].apply(lambda cells: _is_failure(" ".join(cells)), axis=1)
-    if is_failure.mean() > 0.5:
-        raise UserError(
-            f"{path}: {is_failure.sum()} of {counted(len(rows), 'estimate')} {FAILED}; give a file "
-            "with more estimates"
-        )
-    fate = pd.Series(np.where(is_failure, FAILED, PAIR), rows.index)
-    if least_score is None:
-        return fate
-    if "score" not in rows:
-        raise UserError(f"{path} has no column 'score'; leave `least_score` out")
-    score = column(path, rows[~is_failure], "score")
-    fate[~is_failure] = np.where(score < least_score, BELOW, PAIR)
-    if not (fate == PAIR).any():
-        raise UserError(f"{path}: no score is {least_score:g} or more; give a lower `least_score`")
-    return fate
+    rows = rows.assign(**{key: column(path, rows, key).astype(int).astype(str) for key in KEYS})
+    return rows.assign(image=rows["scene_id"] + "/" + rows["im_id"], object_id=rows["obj_id"])
 
 
 def _is_failure(pose: str) -> bool:
-    """Return whether a text is what estimators write for no pose, and not a mistake."""
+    """Return whether numbers are what estimators write for no pose; other text is a mistake."""
     try:
         numbers = np.array(pose.split(), dtype=np.float64)
     except ValueError:
         return False
     is_start = np.array_equal(numbers, [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0])
-    return bool(not len(numbers) or np.isnan(numbers).any() or is_start)
+    return bool(np.isnan(numbers).any() or is_start)
 
 
 def _matched(
@@ -219,18 +187,16 @@ def _matched(
 
     The number of instances without an estimate follows, by object.
     """
-    images = list(zip(given["scene_id"], given["im_id"], strict=True))
     known = _with_keys(truth, _read_truths(truth, set(given["scene_id"])))
-    known_images = set(zip(known["scene_id"], known["im_id"], strict=True))
-    scenes = set(known["scene_id"])
-    for row, image in zip(given.index, images, strict=True):
-        if image[0] in scenes and image not in known_images:
-            raise UserError(
-                f"{path}, row {row + 2}: scene {image[0]} has no image {image[1]} in {truth}: are "
-                "estimates and truths of different images?"
-            )
-    known = known[[i in set(images) for i in zip(known["scene_id"], known["im_id"], strict=True)]]
-    fate = fate.mask((fate == PAIR) & ~given["scene_id"].isin(scenes), ELSEWHERE)
+    is_known = given["scene_id"].isin(known["scene_id"])
+    if (is_other := is_known & ~given["image"].isin(known["image"])).any():
+        row = given.index[is_other][0]
+        raise UserError(
+            f"{path}, row {row + 2}: scene {given['scene_id'][row]} has no image "
+            f"{given['im_id'][row]} in {truth}: are estimates and truths of different images?"
+        )
+    known = known[known["image"].isin(given["image"])]
+    fate = fate.mask((fate == PAIR) & ~is_known, ELSEWHERE)
     rows = given[fate == PAIR]
     position, score = position_column(path, rows, "t"), column(path, rows, "score")
     positions = position_column(truth, known, "t")
@@ -251,15 +217,14 @@ def _matched(
             f"{path}: none of {len(rows)} estimates is within {nearest_mm:g} mm of an instance of "
             f"its object in {truth}: are both of the same images, and object to camera in mm?"
         )
-    truths, estimates = list(best), list(best.values())
-    found = known.iloc[truths]
-    matched = rows.iloc[estimates].assign(
-        R_estimate=rows["R"].iloc[estimates],
+    found, matched = known.iloc[list(best)], rows.iloc[list(best.values())]
+    matched = matched.assign(
+        R_estimate=matched["R"],
         R_true=found["R"].to_numpy(),
         t_true_mm=found["t"].to_numpy(),
-        scene_id=_with_instances(truth, known)[truths],
+        scene_id=_with_instances(truth, known)[list(best)],
     )
-    missed = known.drop(index=found.index)["obj_id"].value_counts()
+    missed = known["obj_id"].drop(found.index).value_counts()
     return matched.sort_index(), fate, missed
 
 
@@ -275,13 +240,13 @@ def _with_instances(truth: Path, known: pd.DataFrame) -> NDArray[np.object_]:
     scenes = known["scene_id"].to_numpy(dtype=object, copy=True)
     for rows in known.groupby("scene_id").indices.values():
         images = known["im_id"].iloc[rows]
-        reference = rows[images == images.mode()[0]]
-        start = dict(zip(names[reference], orientations[reference], strict=True))
+        largest = rows[images == images.mode()[0]]
+        start = dict(zip(names[largest], orientations[largest], strict=True))
         if not set(start).issuperset(names[rows]):
             continue
         moves = orientations[rows] @ inverse(np.stack([start[name] for name in names[rows]]))
-        first = images.map({image: i for i, image in reversed(list(enumerate(images)))})
-        if (ASYMMETRIC.distance_deg(moves, moves[first]) <= SAME_MOVE_DEG).all():
+        _, first, image = np.unique(images, return_index=True, return_inverse=True)
+        if (ASYMMETRIC.distance_deg(moves, moves[first[image]]) <= SAME_MOVE_DEG).all():
             scenes[rows] += "/" + order.iloc[rows]
     return scenes
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -49,8 +49,6 @@ class ObjectSummary:
     warnings : tuple of str
     holds_where : str or None
         For which share of detections calibration holds.
-    detections : dict of str to int
-        The numbers of the others by reason: see `Detections.counts`.
     """
 
     object_id: str
@@ -62,7 +60,6 @@ class ObjectSummary:
     depends_on_view: bool
     warnings: tuple[str, ...]
     holds_where: str | None = None
-    detections: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -229,7 +226,7 @@ class OrientationTable:
         )
         scores = [estimate.score for estimate in estimates if estimate.score is not None]
         least = min(scores, default=None)
-        too_low = self.detections[name].warning(least) if name in self.detections else ()
+        too_low = self.detections[name].warnings(least) if name in self.detections else ()
         return replace(
             answer,
             holds_where=self._holds_where(name, least),
@@ -270,7 +267,6 @@ class OrientationTable:
             depends_on_view=self.depends_on_view(name),
             warnings=tuple(warnings),
             holds_where=self._holds_where(name),
-            detections=self.detections[name].counts() if name in self.detections else {},
         )
 
     def _holds_where(self, name: str, score: float | None = None) -> str | None:
@@ -283,7 +279,7 @@ class OrientationTable:
         """Write the pairs as ``.npz``."""
         names, index = self.object_ids, {name: i for i, name in enumerate(self.object_ids)}
         known = {n: self.symmetries[n] for n in names if n in self.symmetries}
-        others = {n: self.detections[n].as_json() for n in names if n in self.detections}
+        others = {n: asdict(self.detections[n]) for n in names if n in self.detections}
         values = (
             np.array(names),
             np.array([index[str(name)] for name in self.object_id]),
@@ -334,7 +330,7 @@ class OrientationTable:
                 score,
                 bool(straightened),
                 symmetries,
-                detections={name: Detections.of(entry) for name, entry in others.items()},
+                detections={name: Detections(**entry) for name, entry in others.items()},
             )
             for name in table.object_ids:
                 table.symmetry(name)
