@@ -90,7 +90,7 @@ def test_what_is_thin_or_suspicious_is_said(example, pairs, tmp_path):
     assert about.n_pairs == 160
     assert about.directions_covered > 0.95
     assert about.depends_on_view
-    assert "by 180°" in " ".join(about.warnings)  # a half turn without an entry
+    assert "are 180° about z" in " ".join(about.warnings)  # a half turn without an entry
     half_turn = np.eye(4)
     half_turn[:3, :3] = HALF_TURN
     entry = {"1": {"symmetries_discrete": [half_turn.ravel().tolist()]}}

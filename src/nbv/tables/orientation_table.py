@@ -18,7 +18,6 @@ from nbv.core.orientations.group import (
     Array,
     Orientations,
     Symmetry,
-    inverse,
     spiral,
     viewing_direction,
 )
@@ -26,6 +25,7 @@ from nbv.errors import UserError, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
 from nbv.numbers import Pose, as_orientations
 from nbv.tables.detections import Detections
+from nbv.tables.flips import describe_large_errors
 from nbv.tables.next_camera import CameraRecommendation, PoseEstimate, recommend_camera
 
 FLIP_DEG = OrientationErrors.flip_deg
@@ -255,7 +255,7 @@ class OrientationTable:
             warnings.append("pairs are of one instance or scene: dependence on the view is unknown")
         if not errors.is_flip.any():
             warnings.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
-        elif hint := _common_axis(errors):
+        elif hint := describe_large_errors(errors):
             warnings.append(hint)
         return ObjectSummary(
             object_id=name,
@@ -335,26 +335,3 @@ class OrientationTable:
             for name in table.object_ids:
                 table.symmetry(name)
         return table
-
-
-def _common_axis(errors: OrientationErrors) -> str:
-    """Return a hint if nearly all flips are about one axis of the object, else ""."""
-    flips = errors.is_flip
-    rotations = inverse(errors.estimate[flips]) @ errors.truth[flips]
-    angle = errors.error_deg[flips]
-    if errors.symmetry is not ASYMMETRIC or len(rotations) < 5:
-        return ""
-    from scipy.spatial.transform import Rotation
-
-    axes = Rotation.from_matrix(rotations).as_rotvec()
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    axis = np.linalg.eigh(axes.T @ axes)[1][:, -1]
-    about = np.abs(axes @ axis) > np.cos(np.radians(10))
-    if about.mean() < 0.8:
-        return ""
-    half = int((about & (angle > 175)).sum())
-    x, y, z = np.round(axis * np.sign(axis[np.abs(axis).argmax()]), 2) + 0.0
-    return (
-        f"{about.sum()} of {len(rotations)} flips are about the axis {x:g} {y:g} {z:g}, {half} of "
-        "them by 180°: if the object looks the same then, give its symmetry in models_info"
-    )
