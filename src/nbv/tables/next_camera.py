@@ -23,7 +23,7 @@ from nbv.core.orientations.criteria import (
     view_angle_deg,
 )
 from nbv.core.orientations.errors import OrientationErrors
-from nbv.core.orientations.group import Array, Orientations, along_ray
+from nbv.core.orientations.group import Array, Orientations, Symmetry, along_ray
 from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted, matrix_lines
@@ -223,6 +223,26 @@ def recommend_camera(
         depends_on_view=depends_on_view,
         warnings=warnings,
     )
+
+
+def nearest_twin(
+    rotation: Orientations,
+    symmetry: Symmetry,
+    camera_pose: Pose | None,
+    previous: PoseEstimate | None,
+) -> Orientations:
+    """Return the pose (3, 3) nearest to an earlier one, of those that look the same."""
+    if previous is None:
+        return rotation
+    if (camera_pose is None) != (previous.camera_pose is None):
+        raise UserError(
+            "`previous` and the last estimate: give the camera poses of both, or of neither if the "
+            "camera stood still"
+        )
+    target = previous.rotation
+    if camera_pose is not None and previous.camera_pose is not None:
+        target = camera_pose[:3, :3].T @ previous.camera_pose[:3, :3] @ target
+    return np.asarray(symmetry.nearest(rotation[None], target[None])[0])
 
 
 def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:

@@ -23,10 +23,15 @@ from nbv.core.orientations.group import (
 )
 from nbv.errors import UserError, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
-from nbv.numbers import Pose, as_orientations
+from nbv.numbers import Pose, as_orientations, as_pose
 from nbv.tables.detections import Detections
 from nbv.tables.flips import describe_large_errors
-from nbv.tables.next_camera import CameraRecommendation, PoseEstimate, recommend_camera
+from nbv.tables.next_camera import (
+    CameraRecommendation,
+    PoseEstimate,
+    nearest_twin,
+    recommend_camera,
+)
 
 FLIP_DEG = OrientationErrors.flip_deg
 _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "ray", "symmetries")
@@ -177,6 +182,7 @@ class OrientationTable:
         object_id: str | None = None,
         camera_pose: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
+        previous: PoseEstimate | None = None,
     ) -> CameraRecommendation:
         """Rank camera poses by the expected error of the pose that two views, or more, give.
 
@@ -194,6 +200,10 @@ class OrientationTable:
             frame is the camera's.
         max_travel_deg : float
             Largest angle to the last view, about the object.
+        previous : PoseEstimate, optional
+            An earlier pose. Of the poses in which a symmetric object looks the same, the answer is
+            the nearest to it. Its camera pose is needed where the last view has one; without both,
+            the camera stood still.
 
         Returns
         -------
@@ -227,8 +237,10 @@ class OrientationTable:
         scores = [estimate.score for estimate in estimates if estimate.score is not None]
         least = min(scores, default=None)
         too_low = self.detections[name].warnings(least) if name in self.detections else ()
+        pose = estimates[-1].camera_pose if camera_pose is None else as_pose(camera_pose)
         return replace(
             answer,
+            rotation=nearest_twin(answer.rotation, self.symmetry(name), pose, previous),
             holds_where=self._holds_where(name, least),
             warnings=(*answer.warnings, *too_low),
         )
