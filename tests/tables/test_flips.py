@@ -42,11 +42,12 @@ def test_a_constant_rotation_is_found_on_either_side(symmetry):
     ):
         wrong = np.arange(60) % 6 == 0
         estimate[wrong] = made(60, 1)[0][wrong]
-        found, left_deg = shared_rotation(estimate, truth, symmetry, in_camera=in_camera)
+        errors = OrientationErrors(estimate, truth, symmetry)
+        found, left_deg = shared_rotation(errors, in_camera=in_camera)
         twin = ASYMMETRIC if in_camera else symmetry
         assert twin.distance_deg(found.T, OTHER_AXES.T) < 2
         assert left_deg[~wrong].mean() == pytest.approx(noise_deg, abs=1)
-        said = describe_large_errors(OrientationErrors(estimate, truth, symmetry))
+        said = describe_large_errors(errors)
         assert ("C R_true" if in_camera else "R_true C") in said
         assert ("R_true C" if in_camera else "C R_true") not in said
         assert f"{(left_deg < 20).mean():.0%} of errors" in said

@@ -131,21 +131,16 @@ def read_orientation_table(
     if positions is not None:
         straightening = along_ray(positions)
         truths, estimates = straightening @ truths, straightening @ estimates
-
-    def others(name: str, reason: str) -> pd.DataFrame:
-        return given[(given["object_id"] == name) & (fate == reason)]
-
-    detections = {
-        name: Detections(
-            farther=list(map(float, others(name, FARTHER).get("score", ()))),
-            surpassed=list(map(float, others(name, SURPASSED).get("score", ()))),
-            n_missed=int(missed.get(name, 0)),
-            n_failed=len(others(name, FAILED)),
-            nearest_mm=nearest_mm,
-            least_score=least_score,
+    detections = {}
+    for name in dict.fromkeys(rows["object_id"]):
+        of = dict(iter(given[given["object_id"] == name].groupby(fate)))
+        matched, *others = (
+            [float(score) for score in of[k]["score"]] if is_bop and k in of else []
+            for k in (PAIR, FARTHER, SURPASSED)
         )
-        for name in dict.fromkeys(rows["object_id"])
-    }
+        n_others = int(missed.get(name, 0)), len(of.get(FAILED, ()))
+        limits = nearest_mm, least_score
+        detections[name] = Detections(matched, others[0], others[1], *n_others, *limits)
     return OrientationTable(
         rows["object_id"].to_numpy(dtype=str),
         groups_of(rows),

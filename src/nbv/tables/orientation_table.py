@@ -25,7 +25,6 @@ from nbv.errors import UserError, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
 from nbv.numbers import Pose, as_orientations, as_pose
 from nbv.tables.detections import Detections
-from nbv.tables.flips import describe_large_errors
 from nbv.tables.next_camera import (
     CameraRecommendation,
     PoseEstimate,
@@ -86,7 +85,7 @@ class OrientationTable:
     left_out : tuple of str
         Which pairs of the file are not in the table, and why.
     detections : mapping
-        What became of each object's other detections, as far as the file tells.
+        What became of each object's detections, as far as the file tells.
 
     Examples
     --------
@@ -234,15 +233,15 @@ class OrientationTable:
             camera_pose=camera_pose,
             max_travel_deg=max_travel_deg,
         )
+        detections = self.detections.get(name, Detections())
         scores = [estimate.score for estimate in estimates if estimate.score is not None]
-        least = min(scores, default=None)
-        too_low = self.detections[name].warnings(least) if name in self.detections else ()
+        about = {"score": min(scores)} if scores else {}
         pose = estimates[-1].camera_pose if camera_pose is None else as_pose(camera_pose)
         return replace(
             answer,
             rotation=nearest_twin(answer.rotation, self.symmetry(name), pose, previous),
-            holds_where=self._holds_where(name, least),
-            warnings=(*answer.warnings, *too_low),
+            holds_where=detections.holds_where(**about),
+            warnings=(*answer.warnings, *detections.warnings(**about)),
         )
 
     def depends_on_view(self, name: str) -> bool:
@@ -256,6 +255,8 @@ class OrientationTable:
         return [self._about(name) for name in self.object_ids]
 
     def _about(self, name: str) -> ObjectSummary:
+        from nbv.tables.flips import describe_large_errors  # which imports scipy
+
         errors = self.errors(name)
         directions = viewing_direction(spiral(500))
         cosine = errors.symmetry.direction_cosine(directions, viewing_direction(errors.truth))
@@ -278,14 +279,8 @@ class OrientationTable:
             directions_covered=covered,
             depends_on_view=self.depends_on_view(name),
             warnings=tuple(warnings),
-            holds_where=self._holds_where(name),
+            holds_where=self.detections.get(name, Detections()).holds_where(),
         )
-
-    def _holds_where(self, name: str, score: float | None = None) -> str | None:
-        others = self.detections.get(name)
-        if others is None or self.score is None:
-            return None
-        return others.holds_where(self.score[self.object_id == name], score)
 
     def save(self, path: str | Path) -> None:
         """Write the pairs as ``.npz``."""
