@@ -21,7 +21,7 @@ from nbv.choice.rotations import MIN_SEPARATION_DEG
 from nbv.core.orientations.criteria import view_angle_deg
 from nbv.core.seeds import rng_for
 from nbv.files import read_rows
-from nbv.tables.bop import groups_of, orientation_table
+from nbv.tables.bop import groups_of, read_orientation_table
 from nbv.tables.next_camera import CameraRecommendation, PoseEstimate
 from nbv.tables.orientation_table import OrientationTable
 
@@ -99,7 +99,7 @@ def held_out(
     rows = read_rows(Path(path), COLUMNS)
     judged = settings["objects"]
     chosen = [*judged, *settings["score_objects"]] if judged and settings["score_objects"] else ()
-    table = orientation_table(path, rows, models_info=models_info, objects=chosen)
+    table = read_orientation_table(path, None, models_info, chosen, rows=rows)
     keys = list(zip(table.object_id, table.group, strict=True))
     role: dict[tuple[str, str], str] = {}
     if "role" in rows:

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 OPTIONS = {
     AZIMUTHS: ("criterion",),
-    ORIENTATIONS: ("ground_truth", "models_info", "object"),
+    ORIENTATIONS: ("ground_truth", "models_info", "object", "nearest", "least_score"),
     FRAMES: ("bundle", "intrinsics", "depth_scale", "near", "far"),
 }
 """Options for some files only."""
@@ -69,6 +69,11 @@ class CalibrationOptions:
         For orientations: BOP's models_info.json, which gives the objects' symmetries.
     object
         Keep this object of a file of orientations; give the option again for more. Default: all.
+    nearest
+        An estimate of BOP that is farther from every instance of its object, millimetres, is left
+        out. Default: 50.
+    least_score
+        Leave out estimates of lower scores.
     bundle
         The bundle to calibrate on frames: the name of a shipped one (default: mug), or a file.
     """
@@ -77,6 +82,8 @@ class CalibrationOptions:
     ground_truth: Path | None = None
     models_info: Path | None = None
     object: Annotated[list[str] | None, Parameter(negative=())] = None
+    nearest: float | None = None
+    least_score: float | None = None
     bundle: str | None = None
     camera: FrameOptions = FrameOptions()
 
@@ -276,10 +283,11 @@ def _calibrate_orientations(
     source: Path, rows: pd.DataFrame, output: Path, options: CalibrationOptions, as_json: bool
 ) -> None:
     """Make the table of estimates in three dimensions."""
-    from nbv.tables.bop import orientation_table
+    from nbv.tables.bop import read_orientation_table
 
     truth = options.ground_truth, options.models_info, options.object or []
-    pairs = orientation_table(source, rows, *truth)
+    limits = options.nearest, options.least_score
+    pairs = read_orientation_table(source, *truth, *limits, rows=rows)
     about = pairs.about()
     pairs.save(output)
     if as_json:
@@ -296,6 +304,8 @@ def _calibrate_orientations(
             f"error {summary.mean_error_deg:.1f}°, {counted(summary.n_flips, 'flip')}; "
             f"{depends} on the view"
         )
+        if summary.holds_where is not None:
+            print_line(f"  {summary.holds_where}")
         print_warnings(summary.warnings)
     print_line(f"{output}: {counted(len(pairs.object_id), 'pair')}")
 

@@ -42,7 +42,7 @@ _ROUND_AXIS = (*_FOR_ALL, "allowed", "axis")
 OPTIONS = {
     AZIMUTHS: _ROUND_AXIS,
     DISTRIBUTIONS: (*_ROUND_AXIS, "rotations", "not_followed", *_PROBABLE),
-    ORIENTATIONS: (*_FOR_ALL, "object", "candidates", "sphere", *_PROBABLE),
+    ORIENTATIONS: (*_FOR_ALL, "object", "candidates", "sphere", "previous", *_PROBABLE),
 }
 """Options for each kind of table."""
 
@@ -62,11 +62,16 @@ class CandidateOptions:
         --camera-pose.
     sphere
         Instead of --candidates: the number of camera poses, spaced evenly around the object.
+    previous
+        An earlier pose, a file like that of --estimate, the last one if there are several: of the
+        poses in which a symmetric object looks the same, the answer is the nearest. With the camera
+        poses of both views, or without both if the camera stood still.
     """
 
     object: str | None = None
     candidates: Path | None = None
     sphere: int | None = None
+    previous: Path | None = None
 
 
 @as_paragraphs
@@ -171,4 +176,5 @@ def _ranked_cameras(
         object_id=around.object,
         camera_pose=None if limits.camera_pose is None else read_pose(limits.camera_pose),
         max_travel_deg=limits.max_travel,
+        previous=None if around.previous is None else read_views(around.previous)[-1],
     )

@@ -10,16 +10,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nbv.core.orientations.group import (
-    ASYMMETRIC,
-    Orientations,
-    along_ray,
-    inverse,
-)
+from nbv.core.orientations.group import ASYMMETRIC, Orientations, along_ray, inverse
 from nbv.errors import UserError, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
 from nbv.numbers import column, orientation_column, position_column
+from nbv.tables.detections import Detections
 from nbv.tables.orientation_table import FLIP_DEG, OrientationTable
 
 KEYS = ("scene_id", "im_id", "obj_id")
@@ -32,12 +28,26 @@ NEAREST_MM = 50.0
 FEWEST_PAIRS = 12
 """An object with fewer says too little about where it flips."""
 
+SAME_MOVE_DEG = 1.0
+"""Truths of one move of the camera differ by less."""
+
+PAIR = "have a truth"
+FAILED = "are failures: nan, empty, or exactly R = 1 with t = 0"
+BELOW = "have a score below {1:g}"
+ELSEWHERE = "are of scenes without truth"
+FARTHER = "are farther than {0:g} mm from every instance of their object"
+SURPASSED = "are of an instance that has one of a better score"
+
 
 def read_orientation_table(
     path: str | Path,
     truth: str | Path | None = None,
     models_info: str | Path | None = None,
     objects: Sequence[str] = (),
+    nearest_mm: float | None = None,
+    least_score: float | None = None,
+    *,
+    rows: pd.DataFrame | None = None,
 ) -> OrientationTable:
     """Read pairs of orientations.
 
@@ -53,31 +63,48 @@ def read_orientation_table(
         BOP's symmetries; without an entry an object is asymmetric.
     objects : sequence of str
         Objects to keep; all by default.
+    nearest_mm : float, optional
+        Results of BOP that are farther from every instance of their object are left out;
+        `NEAREST_MM` by default.
+    least_score : float, optional
+        Estimates of lower scores are left out.
+    rows : DataFrame, optional
+        The rows of the file, where they have been read.
 
     Raises
     ------
     UserError
         Names the file and the row.
     """
-    return orientation_table(path, read_rows(Path(path), ()), truth, models_info, objects)
-
-
-def orientation_table(
-    path: str | Path,
-    rows: pd.DataFrame,
-    truth: str | Path | None = None,
-    models_info: str | Path | None = None,
-    objects: Sequence[str] = (),
-) -> OrientationTable:
-    """Return the table of a file's rows, as `read_orientation_table` does."""
     path = Path(path)
-    left_out: list[str] = []
-    is_bop = "obj_id" in rows
-    need_columns(path, rows, BOP_COLUMNS if is_bop else TABLE_COLUMNS)
+    given = read_rows(path, ()) if rows is None else rows
+    is_bop = "obj_id" in given
+    need_columns(path, given, BOP_COLUMNS if is_bop else TABLE_COLUMNS)
+    for name, option in (("ground_truth", truth), ("nearest_mm", nearest_mm)):
+        if option is not None and not is_bop:
+            raise UserError(f"{path} has its own truths (R_true); leave `{name}` out")
+    poses = given[["R", "t"] if is_bop else ["R_estimate"]].replace(r"^\s*$", "nan", regex=True)
+    fate = poses.agg(" ".join, axis=1).map(lambda text: FAILED if _is_failure(text) else PAIR)
+    if (n_failed := (fate == FAILED).sum()) > len(fate) / 2:
+        raise UserError(f"{path}: {n_failed} of {len(fate)} estimates {FAILED}; give more poses")
+    if least_score is not None:
+        need_columns(path, given, ("score",))
+        is_below = column(path, given[fate == PAIR], "score") < least_score
+        fate[fate == PAIR] = np.where(is_below, BELOW, PAIR)
+    rows, missed = given[fate == PAIR], pd.Series(dtype=int)
+    if rows.empty:
+        raise UserError(f"{path}: no score is {least_score:g} or more; lower `least_score`")
     if is_bop:
-        rows, left_out = _matched(path, rows, Path(truth) if truth else path.parent)
-    elif truth is not None:
-        raise UserError(f"{path} has its own truths (R_true); leave `ground_truth` out")
+        given = _with_keys(path, given)
+        nearest_mm = NEAREST_MM if nearest_mm is None else nearest_mm
+        folder = path.parent if truth is None else Path(truth)
+        rows, fate, missed = _matched(path, given, fate, folder, nearest_mm)
+    left_out = [
+        f"{n} of {len(given)} estimates " + str(reason).format(nearest_mm, least_score)
+        for reason, n in fate[fate != PAIR].value_counts().items()
+    ]
+    if n_missed := int(missed.sum()):
+        left_out.append(f"{n_missed} of {n_missed + len(rows)} instances have no estimate")
     symmetries = {} if models_info is None else read_models_info(models_info)
     known = list(dict.fromkeys(rows["object_id"]))
     for name in objects:
@@ -100,20 +127,30 @@ def orientation_table(
     truths, estimates = (orientation_column(path, rows, name) for name in TABLE_COLUMNS[1:])
     score = column(path, rows, "score") if "score" in rows else None
     positions = position_column(path, rows, "t_true_mm") if "t_true_mm" in rows else None
-    groups = groups_of(rows)
     _check_way_round(path, rows, truths, estimates)
     if positions is not None:
         straightening = along_ray(positions)
         truths, estimates = straightening @ truths, straightening @ estimates
+    detections = {}
+    for name in dict.fromkeys(rows["object_id"]):
+        of = dict(iter(given[given["object_id"] == name].groupby(fate)))
+        matched, *others = (
+            [float(score) for score in of[k]["score"]] if is_bop and k in of else []
+            for k in (PAIR, FARTHER, SURPASSED)
+        )
+        n_others = int(missed.get(name, 0)), len(of.get(FAILED, ()))
+        limits = nearest_mm, least_score
+        detections[name] = Detections(matched, others[0], others[1], *n_others, *limits)
     return OrientationTable(
         rows["object_id"].to_numpy(dtype=str),
-        groups,
+        groups_of(rows),
         estimates,
         truths,
         score,
         positions is not None,
         symmetries,
         tuple(left_out),
+        detections,
     )
 
 
@@ -123,52 +160,90 @@ def groups_of(rows: pd.DataFrame) -> NDArray[np.str_]:
     return rows[keys].agg("/".join, axis=1).to_numpy(dtype=str) if keys else np.full(len(rows), "")
 
 
-def _matched(path: Path, rows: pd.DataFrame, truth: Path) -> tuple[pd.DataFrame, list[str]]:
-    """Return BOP's results with the truths of their instances, and what was left out."""
-    for name in KEYS:
-        rows[name] = column(path, rows, name).astype(int).astype(str)
+def _with_keys(path: Path, rows: pd.DataFrame) -> pd.DataFrame:
+    rows = rows.assign(**{key: column(path, rows, key).astype(int).astype(str) for key in KEYS})
+    return rows.assign(image=rows["scene_id"] + "/" + rows["im_id"], object_id=rows["obj_id"])
+
+
+def _is_failure(pose: str) -> bool:
+    """Return whether numbers are what estimators write for no pose; other text is a mistake."""
+    try:
+        numbers = np.array(pose.split(), dtype=np.float64)
+    except ValueError:
+        return False
+    is_start = np.array_equal(numbers, [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0])
+    return bool(np.isnan(numbers).any() or is_start)
+
+
+def _matched(
+    path: Path, given: pd.DataFrame, fate: pd.Series[Any], truth: Path, nearest_mm: float
+) -> tuple[pd.DataFrame, pd.Series[Any], pd.Series[Any]]:
+    """Return BOP's results with the truths of their instances, and the fate of every result.
+
+    The number of instances without an estimate follows, by object.
+    """
+    known = _with_keys(truth, _read_truths(truth, set(given["scene_id"])))
+    is_known = given["scene_id"].isin(known["scene_id"])
+    if (is_other := is_known & ~given["image"].isin(known["image"])).any():
+        row = given.index[is_other][0]
+        raise UserError(
+            f"{path}, row {row + 2}: scene {given['scene_id'][row]} has no image "
+            f"{given['im_id'][row]} in {truth}: are estimates and truths of different images?"
+        )
+    known = known[known["image"].isin(given["image"])]
+    fate = fate.mask((fate == PAIR) & ~is_known, ELSEWHERE)
+    rows = given[fate == PAIR]
     position, score = position_column(path, rows, "t"), column(path, rows, "score")
-    known = _read_truths(truth, set(rows["scene_id"]))
-    for name in KEYS:
-        known[name] = column(truth, known, name).astype(int).astype(str)
     positions = position_column(truth, known, "t")
-    by_key = {k: list(v) for k, v in known.groupby(list(KEYS)).indices.items()}
-    images = set(zip(known["scene_id"], known["im_id"], strict=True))
-    scenes = set(known["scene_id"])
+    by_key = known.groupby(list(KEYS)).indices
     best: dict[int, int] = {}
-    n_elsewhere = 0
-    for i, key in enumerate(zip(*(rows[k] for k in KEYS), strict=True)):
-        if key[0] not in scenes:
-            n_elsewhere += 1
-            continue
-        if key[:2] not in images:
-            raise UserError(
-                f"{path}, row {i + 2}: scene {key[0]} has no image {key[1]} in {truth}: are "
-                "estimates and truths of different images?"
-            )
-        if (same := by_key.get(key)) is None:
-            continue
+    keys = list(zip(*(rows[key] for key in KEYS), strict=True))
+    for i in np.argsort(-score, kind="stable"):
+        same = by_key.get(keys[i], np.empty(0, dtype=int))
         apart = np.linalg.norm(positions[same] - position[i], axis=1)
-        j = same[int(apart.argmin())]
-        if apart.min() <= NEAREST_MM and (j not in best or score[i] > score[best[j]]):
+        if not (apart <= nearest_mm).any():
+            fate[rows.index[i]] = FARTHER
+        elif (j := same[apart.argmin()]) in best:
+            fate[rows.index[i]] = SURPASSED
+        else:
             best[j] = i
     if not best:
         raise UserError(
-            f"{path}: none of {len(rows)} estimates is within {NEAREST_MM:g} mm of an instance of "
+            f"{path}: none of {len(rows)} estimates is within {nearest_mm:g} mm of an instance of "
             f"its object in {truth}: are both of the same images, and object to camera in mm?"
         )
-    truths, estimates = list(best), list(best.values())
-    matched = rows.iloc[estimates].assign(
-        object_id=rows["obj_id"].iloc[estimates],
-        R_estimate=rows["R"].iloc[estimates],
-        R_true=known["R"].to_numpy()[truths],
-        t_true_mm=known["t"].to_numpy()[truths],
+    found, matched = known.iloc[list(best)], rows.iloc[list(best.values())]
+    matched = matched.assign(
+        R_estimate=matched["R"],
+        R_true=found["R"].to_numpy(),
+        t_true_mm=found["t"].to_numpy(),
+        scene_id=_with_instances(truth, known)[list(best)],
     )
-    n_free = len(rows) - len(estimates) - n_elsewhere
-    left_out = [f"{n_free} of {len(rows)} estimates found no partner"] if n_free else []
-    if n_elsewhere:
-        left_out.append(f"{n_elsewhere} of {len(rows)} estimates are of scenes without truth")
-    return matched.sort_index(), left_out
+    missed = known["obj_id"].drop(found.index).value_counts()
+    return matched.sort_index(), fate, missed
+
+
+def _with_instances(truth: Path, known: pd.DataFrame) -> NDArray[np.object_]:
+    """Return the scene (n,) of each truth, and its instance where a scene's are told apart.
+
+    An object's instances are told apart by their order in an image. It is the same in all images of
+    a static scene if the camera's move between two images is that of every instance.
+    """
+    order = known.groupby(list(KEYS)).cumcount().astype(str)
+    orientations = orientation_column(truth, known, "R")
+    names = (known["obj_id"] + "/" + order).to_numpy()
+    scenes = known["scene_id"].to_numpy(dtype=object, copy=True)
+    for rows in known.groupby("scene_id").indices.values():
+        images = known["im_id"].iloc[rows]
+        largest = rows[images == images.mode()[0]]
+        start = dict(zip(names[largest], orientations[largest], strict=True))
+        if not set(start).issuperset(names[rows]):
+            continue
+        moves = orientations[rows] @ inverse(np.stack([start[name] for name in names[rows]]))
+        _, first, image = np.unique(images, return_index=True, return_inverse=True)
+        if (ASYMMETRIC.distance_deg(moves, moves[first[image]]) <= SAME_MOVE_DEG).all():
+            scenes[rows] += "/" + order.iloc[rows]
+    return scenes
 
 
 def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:

@@ -24,7 +24,7 @@ from nbv.core.orientations.criteria import (
     view_angle_deg,
 )
 from nbv.core.orientations.errors import OrientationErrors
-from nbv.core.orientations.group import Array, Orientations, along_ray
+from nbv.core.orientations.group import Array, Orientations, Symmetry, along_ray
 from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted, matrix_lines
@@ -112,11 +112,15 @@ class CameraMove(RankedMove):
 
 @dataclass(frozen=True, kw_only=True)
 class CameraRecommendation(Answer[CameraMove]):
-    """The pose (3, 3) in the last camera, its belief in the first one, and candidates."""
+    """The pose (3, 3) in the last camera, its belief in the first one, and candidates.
+
+    `holds_where` says for which share of detections calibration holds, if that is known.
+    """
 
     rotation: Orientations
     depends_on_view: bool
     pose_belief: OrientationBelief
+    holds_where: str | None = None
 
     STOP_PROBABILITY = 0.98
     STOP_WITHIN_DEG = AGREE_DEG
@@ -128,7 +132,8 @@ class CameraRecommendation(Answer[CameraMove]):
     def pose_lines(self, seen: str) -> list[str]:
         """Return the pose of the object, which is called `seen`, in a few lines of text."""
         rows = matrix_lines(self.rotation)
-        return [f"rotation, {seen} to camera", *rows, self.value(self)]
+        holds = [] if self.holds_where is None else [self.holds_where]
+        return [f"rotation, {seen} to camera", *rows, self.value(self), *holds]
 
 
 @dataclass(frozen=True)
@@ -255,6 +260,26 @@ def _is_sure(values: Sequence[float]) -> bool:
     """Return whether a value is surely above 0, from those without each part (jackknife)."""
     n = len(values) - 1
     return is_surely_less((n - 1) * np.array(values[1:]) - n * values[0], SURE)
+
+
+def nearest_twin(
+    rotation: Orientations,
+    symmetry: Symmetry,
+    camera_pose: Pose | None,
+    previous: PoseEstimate | None,
+) -> Orientations:
+    """Return the pose (3, 3) nearest to an earlier one, of those that look the same."""
+    if previous is None:
+        return rotation
+    if (camera_pose is None) != (previous.camera_pose is None):
+        raise UserError(
+            "`previous` and the last estimate: give the camera poses of both, or of neither if the "
+            "camera stood still"
+        )
+    target = previous.rotation
+    if camera_pose is not None and previous.camera_pose is not None:
+        target = camera_pose[:3, :3].T @ previous.camera_pose[:3, :3] @ target
+    return np.asarray(symmetry.nearest(rotation[None], target[None])[0])
 
 
 def _checked_scores(estimates: Sequence[PoseEstimate]) -> Array | None:

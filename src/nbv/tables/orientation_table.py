@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,14 +18,19 @@ from nbv.core.orientations.group import (
     Array,
     Orientations,
     Symmetry,
-    inverse,
     spiral,
     viewing_direction,
 )
 from nbv.errors import UserError, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
-from nbv.numbers import Pose, as_orientations
-from nbv.tables.next_camera import CameraRecommendation, PoseEstimate, recommend_camera
+from nbv.numbers import Pose, as_orientations, as_pose
+from nbv.tables.detections import Detections
+from nbv.tables.next_camera import (
+    CameraRecommendation,
+    PoseEstimate,
+    nearest_twin,
+    recommend_camera,
+)
 
 FLIP_DEG = OrientationErrors.flip_deg
 _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "ray", "symmetries")
@@ -46,6 +51,8 @@ class ObjectSummary:
     depends_on_view : bool
         Whether calibration shows that flips depend on the view.
     warnings : tuple of str
+    holds_where : str or None
+        For which share of detections calibration holds.
     """
 
     object_id: str
@@ -56,6 +63,7 @@ class ObjectSummary:
     directions_covered: float
     depends_on_view: bool
     warnings: tuple[str, ...]
+    holds_where: str | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +84,8 @@ class OrientationTable:
         Entries of BOP's models_info by object; an object without one is asymmetric.
     left_out : tuple of str
         Which pairs of the file are not in the table, and why.
+    detections : mapping
+        What became of each object's detections, as far as the file tells.
 
     Examples
     --------
@@ -94,6 +104,7 @@ class OrientationTable:
     straightened: bool = False
     symmetries: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    detections: Mapping[str, Detections] = field(default_factory=dict)
 
     @property
     def object_ids(self) -> list[str]:
@@ -182,6 +193,7 @@ class OrientationTable:
         object_id: str | None = None,
         camera_pose: ArrayLike | None = None,
         max_travel_deg: float = 180.0,
+        previous: PoseEstimate | None = None,
     ) -> CameraRecommendation:
         """Rank camera poses by the expected error of the pose that two views, or more, give.
 
@@ -199,6 +211,10 @@ class OrientationTable:
             frame is the camera's.
         max_travel_deg : float
             Largest angle to the last view, about the object.
+        previous : PoseEstimate, optional
+            An earlier pose. Of the poses in which a symmetric object looks the same, the answer is
+            the nearest to it. Its camera pose is needed where the last view has one; without both,
+            the camera stood still.
 
         Returns
         -------
@@ -220,7 +236,7 @@ class OrientationTable:
         (False, True)
         """
         name = self.name_of(object_id)
-        return recommend_camera(
+        answer = recommend_camera(
             self.errors(name),
             estimates,
             candidates,
@@ -228,6 +244,16 @@ class OrientationTable:
             depends_on_view=self.depends_on_view(name),
             camera_pose=camera_pose,
             max_travel_deg=max_travel_deg,
+        )
+        detections = self.detections.get(name, Detections())
+        scores = [estimate.score for estimate in estimates if estimate.score is not None]
+        about = {"score": min(scores)} if scores else {}
+        pose = estimates[-1].camera_pose if camera_pose is None else as_pose(camera_pose)
+        return replace(
+            answer,
+            rotation=nearest_twin(answer.rotation, self.symmetry(name), pose, previous),
+            holds_where=detections.holds_where(**about),
+            warnings=(*answer.warnings, *detections.warnings(**about)),
         )
 
     def depends_on_view(self, name: str) -> bool:
@@ -240,6 +266,8 @@ class OrientationTable:
         return [self._about(name) for name in self.object_ids]
 
     def _about(self, name: str) -> ObjectSummary:
+        from nbv.tables.flips import describe_large_errors  # which imports scipy
+
         errors = self.errors(name)
         directions = viewing_direction(spiral(500))
         cosine = errors.symmetry.direction_cosine(directions, viewing_direction(errors.truth))
@@ -251,7 +279,7 @@ class OrientationTable:
             warnings.append("pairs are of one instance or scene: dependence on the view is unknown")
         if not errors.is_flip.any():
             warnings.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
-        elif hint := _common_axis(errors):
+        elif hint := describe_large_errors(errors):
             warnings.append(hint)
         return ObjectSummary(
             object_id=name,
@@ -262,12 +290,14 @@ class OrientationTable:
             directions_covered=covered,
             depends_on_view=self.depends_on_view(name),
             warnings=tuple(warnings),
+            holds_where=self.detections.get(name, Detections()).holds_where(),
         )
 
     def save(self, path: str | Path) -> None:
         """Write the pairs as ``.npz``."""
         names, index = self.object_ids, {name: i for i, name in enumerate(self.object_ids)}
         known = {n: self.symmetries[n] for n in names if n in self.symmetries}
+        others = {n: asdict(self.detections[n]) for n in names if n in self.detections}
         values = (
             np.array(names),
             np.array([index[str(name)] for name in self.object_id]),
@@ -278,7 +308,8 @@ class OrientationTable:
             np.array(self.straightened),
             np.array(json.dumps(known, sort_keys=True)),
         )
-        write_arrays(path, dict(zip(_NAMES, values, strict=True)))
+        detections = {"detections": np.array(json.dumps(others, sort_keys=True))}
+        write_arrays(path, dict(zip(_NAMES, values, strict=True)) | detections)
 
     @classmethod
     def load(cls, path: str | Path) -> OrientationTable:
@@ -308,6 +339,7 @@ class OrientationTable:
             symmetries = json.loads(str(texts))
             if not isinstance(symmetries, dict):
                 raise damaged(path, "its symmetries are no entries by object", CALIBRATE_AGAIN)
+            others = json.loads(str(stored.get("detections", "{}")))
             table = cls(
                 names.astype(str)[index],
                 group,
@@ -316,30 +348,8 @@ class OrientationTable:
                 score,
                 bool(straightened),
                 symmetries,
+                detections={name: Detections(**entry) for name, entry in others.items()},
             )
             for name in table.object_ids:
                 table.symmetry(name)
         return table
-
-
-def _common_axis(errors: OrientationErrors) -> str:
-    """Return a hint if nearly all flips are about one axis of the object, else ""."""
-    flips = errors.is_flip
-    rotations = inverse(errors.estimate[flips]) @ errors.truth[flips]
-    angle = errors.error_deg[flips]
-    if errors.symmetry is not ASYMMETRIC or len(rotations) < 5:
-        return ""
-    from scipy.spatial.transform import Rotation
-
-    axes = Rotation.from_matrix(rotations).as_rotvec()
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    axis = np.linalg.eigh(axes.T @ axes)[1][:, -1]
-    about = np.abs(axes @ axis) > np.cos(np.radians(10))
-    if about.mean() < 0.8:
-        return ""
-    half = int((about & (angle > 175)).sum())
-    x, y, z = np.round(axis * np.sign(axis[np.abs(axis).argmax()]), 2) + 0.0
-    return (
-        f"{about.sum()} of {len(rotations)} flips are about the axis {x:g} {y:g} {z:g}, {half} of "
-        "them by 180°: if the object looks the same then, give its symmetry in models_info"
-    )

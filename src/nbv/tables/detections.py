@@ -1,0 +1,63 @@
+"""What became of an object's detections at calibration, and so for which estimates it holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from nbv.labels import counted
+
+
+@dataclass(frozen=True)
+class Detections:
+    """What became of an object's detections.
+
+    Attributes
+    ----------
+    matched, farther, surpassed : sequence of float
+        Scores of the detections that are calibration pairs, of those that are farther than
+        `nearest_mm` from every instance, and of those beside one of a better score.
+    n_missed : int
+        Instances without an estimate, in the images that have estimates.
+    n_failed : int
+        Answers of the estimator without a pose.
+    nearest_mm : float or None
+        None for a table of pairs, which says nothing of other detections.
+    least_score : float or None
+        Detections of lower scores were left out.
+    """
+
+    matched: Sequence[float] = ()
+    farther: Sequence[float] = ()
+    surpassed: Sequence[float] = ()
+    n_missed: int = 0
+    n_failed: int = 0
+    nearest_mm: float | None = None
+    least_score: float | None = None
+
+    def holds_where(self, score: float = -math.inf) -> str | None:
+        """Return for which share of the detections with at least a score calibration holds."""
+        if self.nearest_mm is None:
+            return None
+        right, far, other = (
+            sum(each >= score for each in scores)
+            for scores in (self.matched, self.farther, self.surpassed)
+        )
+        which = " with at least this score" if math.isfinite(score) else ""
+        failed = f"; {counted(self.n_failed, 'answer')} without a pose" if self.n_failed else ""
+        return (
+            f"holds where the position is right: {right} of "
+            f"{counted(right + far + other, 'detection')}{which} ({far} farther than "
+            f"{self.nearest_mm:g} mm, {other} with a better one beside it); {self.n_missed} of "
+            f"{counted(len(self.matched) + self.n_missed, 'instance')} without an estimate{failed}"
+        )
+
+    def warnings(self, score: float = math.inf) -> tuple[str, ...]:
+        """Return a warning if a score is below `least_score`."""
+        if self.least_score is None or score >= self.least_score:
+            return ()
+        return (
+            f"the score {score:g} is below {self.least_score:g}, the least of calibration: what is "
+            "expected is that of better estimates",
+        )

@@ -1,0 +1,130 @@
+"""What of a file of BOP becomes calibration pairs, and what becomes of the rest."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+from nbv.errors import UserError
+from nbv.tables.bop import read_orientation_table
+from nbv.tables.next_camera import PoseEstimate
+from nbv.tables.orientation_table import OrientationTable
+from rotation_pairs import orientation_pairs
+
+N_IMAGES = 40
+PLACES = np.array([[-100.0, 0, 700], [100, 0, 700]])
+IDENTITY = "1 0 0 0 1 0 0 0 1"
+
+
+def text(numbers):
+    return " ".join(f"{x:.6f}" for x in np.ravel(numbers))
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A scene of two instances of an object, all of them estimated: its rows and truths."""
+    moves = Rotation.random(N_IMAGES, random_state=0).as_matrix()
+    start = Rotation.random(2, random_state=1).as_matrix()
+    truths, rows = {}, []
+    for image, move in enumerate(moves):
+        poses = move @ start
+        truths[str(image)] = [
+            {"obj_id": 1, "cam_R_m2c": r.ravel().tolist(), "cam_t_m2c": t.tolist()}
+            for r, t in zip(poses, PLACES, strict=True)
+        ]
+        rows += [
+            (5, image, 1, 0.5, text(r), text(t), -1) for r, t in zip(poses, PLACES, strict=True)
+        ]
+    columns = ["scene_id", "im_id", "obj_id", "score", "R", "t", "time"]
+    return pd.DataFrame(rows, columns=columns), truths
+
+
+def read(folder, rows, truths, **options) -> OrientationTable:
+    (folder / "000005").mkdir(exist_ok=True)
+    (folder / "000005" / "scene_gt.json").write_text(json.dumps(truths))
+    rows.to_csv(folder / "results.csv", index=False)
+    return read_orientation_table(folder / "results.csv", **options)
+
+
+def test_every_estimate_and_instance_is_accounted_for(scene, tmp_path):
+    rows, truths = scene
+    rng = np.random.default_rng(0)
+    rows["score"] = rng.permutation(len(rows)) / 100
+    failed, missed, far, twice = np.split(rng.choice(len(rows), 20, replace=False), 4)
+    rows.loc[failed, "R"] = ["nan " * 9, "", IDENTITY, IDENTITY, "1 0 nan 0 1 0 0 0 1"]
+    rows.loc[failed, "t"] = ["0 0 700", "0 0 700", "0 0 0", "0.0 -0 0", "0 0 700"]
+    rows.loc[far, "t"] = "0 100 700"
+    worse = rows.loc[twice].assign(score=-1.0)
+    found = read(tmp_path, pd.concat([rows.drop(index=missed), worse]), truths)
+    (about,) = found.about()
+    assert about.n_pairs == len(rows) - 15
+    others = found.detections["1"]
+    assert sorted(others.farther) == sorted(rows.loc[far, "score"])
+    assert (list(others.surpassed), others.n_missed, others.n_failed) == ([-1] * 5, 15, 5)
+    found.save(tmp_path / "t.npz")
+    again = OrientationTable.load(tmp_path / "t.npz")
+    assert again.about() == [about]
+    is_pair = ~rows.index.isin([*failed, *missed, *far])
+    for score in rows["score"][::7]:
+        n_right = (rows["score"][is_pair] >= score).sum()
+        n_all = n_right + (rows.loc[far, "score"] >= score).sum()
+        answer = again.recommend([PoseEstimate(np.eye(3), score=score)], 9)
+        assert f" {n_right} of {n_all} detection" in answer.holds_where
+        assert answer.holds_where in answer.pose_lines("object")
+
+
+def test_limits_of_distance_and_score_are_the_users(scene, tmp_path):
+    rows, truths = scene
+    rows["score"] = np.arange(len(rows)) / len(rows)
+    rows["t"] = np.where(rows.index % 4 == 0, text(PLACES[0] + [0, 0, 70]), rows["t"])
+    assert len(read(tmp_path, rows, truths).score) == 60
+    found = read(tmp_path, rows, truths, nearest_mm=80, least_score=0.5)
+    assert found.score.tolist() == rows["score"][40:].tolist()
+    warned = [
+        " ".join(found.recommend([PoseEstimate(np.eye(3), score=score)], 9).warnings)
+        for score in (0.49, 0.5)
+    ]
+    assert "0.49 is below 0.5" in warned[0]
+    assert "below" not in warned[1]
+    with pytest.raises(UserError, match=r"no score is 2 or more.*`least_score`"):
+        read(tmp_path, rows, truths, least_score=2)
+
+
+def test_a_failure_is_no_mistake(scene, tmp_path):
+    rows, truths = scene
+    for wrong, message in (
+        ("none", "row 5: R_estimate 'none'"),
+        (f"{IDENTITY} 0", "row 5: R_estimate .* is not 9 finite"),
+    ):
+        with pytest.raises(UserError, match=message):
+            read(tmp_path, rows.assign(R=rows["R"].where(rows.index != 3, wrong)), truths)
+    rows.loc[:40, "R"] = "nan"
+    with pytest.raises(UserError, match=r"41 of 80 estimates are failures"):
+        read(tmp_path, rows, truths)
+    rows.loc[0, "R"] = rows.loc[79, "R"]
+    assert len(read(tmp_path, rows, truths).truth) == 40
+
+
+def test_a_table_of_pairs_has_failures_and_no_detections(tmp_path):
+    rows = orientation_pairs()
+    rows.loc[1, "R_estimate"] = ""
+    rows.loc[0, "R_estimate"] = IDENTITY  # without a position this may be an estimate
+    twice = pd.concat([rows, rows])
+    twice.to_csv(tmp_path / "p.csv", index=False)
+    found = read_orientation_table(tmp_path / "p.csv")
+    about = found.about()[0]
+    assert (about.n_pairs, found.detections["0"].n_failed, about.holds_where) == (22, 2, None)
+    with pytest.raises(UserError, match="leave `nearest_mm` out"):
+        read_orientation_table(tmp_path / "p.csv", nearest_mm=10)
+    twice.drop(columns="score").to_csv(tmp_path / "p.csv", index=False)
+    with pytest.raises(UserError, match="no column 'score'"):
+        read_orientation_table(tmp_path / "p.csv", least_score=0.1)
+
+
+def test_instances_of_a_static_scene_are_told_apart(scene, tmp_path):
+    rows, truths = scene
+    assert set(read(tmp_path, rows, truths).group) == {"5/0", "5/1"}
+    truths["7"] = truths["7"][::-1]
+    assert set(read(tmp_path, rows, truths).group) == {"5"}
