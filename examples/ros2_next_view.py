@@ -10,10 +10,12 @@ ros-<distribution>-message-filters, and nbv with numpy 1, since cv_bridge does n
         -r depth/image:=/camera/depth/image_rect_raw -r depth/info:=/camera/depth/camera_info
     ros2 service call /next_view/recommend std_srvs/srv/Trigger
 
-Call the service while the camera stands still. Turn the camera as the answer says, and call it
-again: the frame is then taken as one more view. Start the node again for another object.
+Call the service while the camera stands still. While the verdict of its decision is "one more
+view", turn the camera as the answer says, and call it again: the frame is then taken as one more
+view. Start the node again for another object.
 """
 
+import dataclasses
 import json
 
 import numpy as np
@@ -85,6 +87,7 @@ class NextView(Node):
                 "expected_error_deg": round(answer.expected_error_deg, 1),
                 "rotation_deg": rotation_deg,  # counter-clockwise seen from above
                 "warnings": answer.warnings,
+                "decision": dataclasses.asdict(answer.decision),  # its verdict, and the reason
             }
         )
         return response

@@ -338,7 +338,7 @@ def test_alternatives_are_of_other_neighbourhoods_where_bins_are_narrow(bundle):
     parts, total = expected.by_object[:, [10, 25]], expected.total[[10, 25]]
     more = sum(own[np.argmin(total - own)] - own[np.argmin(total)] for own in parts)
     limited = recommender.recommend_crops(codes_of(0, 1), allowed_deg=[60.0, 150.0])
-    wanted = expected.after_deg[[20, 50]] + more / expected.weight
+    wanted = expected.after_deg[[20, 50]] + more / expected.total[-1]
     assert limited.error_after_deg[[20, 50]] == pytest.approx(wanted, rel=1e-5)
     found = recommender.recommend_crops(codes_of(0, 2), [0.0, 60.0])
     minima = (found.error_after_deg < np.roll(found.error_after_deg, 1)) & (

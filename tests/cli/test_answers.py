@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from nbv.cli.answers import print_offset
+from nbv.choice.next_view import Move, Recommendation
+from nbv.cli.answers import print_offset, show_answer
+from nbv.cli.arguments import StopOptions
 from nbv.core.circle.offset import FOR_FRAMES, Offset, frame_warning
 
 
@@ -31,3 +33,27 @@ def test_an_offset_of_frames_is_added_and_a_large_one_told(capsys, change, is_ad
     else:
         assert told == [f"warning: {found.warning}"]
         assert warning in told[0]
+
+
+@pytest.mark.parametrize(("now_deg", "other_deg"), [(4.0, 5.0), (4.0, 2.0), (3.0, 5.0)])
+def test_numbers_that_seem_to_contradict_the_answer_have_a_reason(capsys, now_deg, other_deg):
+    """A lower number than the first one's, and an error that does not fall."""
+    within = dict.fromkeys(("5", "15", "30"), 0.5)
+    moves = (
+        Move(rotation_deg=r, travel_deg=r, expected_error_deg=error, probability_within=within)
+        for r, error in ((180.0, 3.0), (90.0, other_deg))
+    )
+    answer = Recommendation(
+        azimuth_deg=0.0,
+        spread_deg=9.0,
+        expected_error_deg=now_deg,
+        probability_within=within,
+        moves=tuple(moves),
+        belief=np.full(4, 0.25),
+        error_after_deg=np.zeros(4),
+        bayes_factor=1.0,
+        n_views=1,
+    )
+    show_answer(answer, StopOptions(), as_json=False, has_targets=False)
+    decision, *_, others = capsys.readouterr().out.splitlines()
+    assert (decision.endswith("3.0°"), others.endswith(")")) == (now_deg > 3, other_deg > 3)

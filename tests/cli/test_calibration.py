@@ -56,7 +56,7 @@ def test_pairs_give_the_lookup_table_of_the_experiments(pairs, capsys, criterion
         assert printed["criterion"] == criterion
         cost = table.cost[round(estimate) % 360, int(rotation) % 360]
         assert move["cost"] == pytest.approx(float(cost))
-        told = run(capsys, *options).splitlines()[1]
+        told = run(capsys, *options).splitlines()[2]
         assert told.startswith(f"next view  rotate by {rotation:+g}° (travel {abs(rotation):g}°)")
 
 

@@ -15,9 +15,16 @@ from nbv.tables.lookup import LookupTable
 def test_what_does_not_go_with_a_table_is_refused(pairs, capsys):
     run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
     options = ("next", "t.npz", "--estimate")
-    for more in (("--until", "5"), ("--not-followed",), ("--sphere", "9"), ("--object", "1")):
+    for more in (
+        ("--until-probability", "0.9"),
+        ("--within", "5"),
+        ("--not-followed",),
+        ("--sphere", "9"),
+        ("--object", "1"),
+    ):
         message = fails(capsys, *options, "90", *more)
         assert f"{more[0]} does not go with t.npz, which holds azimuths" in message
+    assert "no errors in degrees" in fails(capsys, *options, "90", "--until", "5")
     for estimate in (("views.csv",), ("1", "2")):
         message = fails(capsys, *options, *estimate)
         assert "--estimate: t.npz holds azimuths; give one number of degrees" in message
@@ -84,8 +91,9 @@ def test_an_estimate_has_ranked_rotations_within_the_limits(pairs, capsys, crite
         assert [move["cost"] for move in moves] == pytest.approx(cost[found].tolist())
         assert cost[found].tolist() == sorted(cost[found])
         assert len(moves) == may.sum() if may.sum() < 5 else len(moves) > 1
-        told = run(capsys, *options, *limits).splitlines()
+        decision, *told = run(capsys, *options, *limits).splitlines()
         assert told[1].endswith(f"): {criterion} {moves[0]['cost']:.3f}{unit}")
+        assert decision.startswith("decision   none: " if unit == " nats" else "decision   one")
         assert told[2:] == [] if len(moves) == 1 else told[2].startswith("or ")
     for limits in (("--allowed", "0", "1", "-1"), ("--max-travel", "1")):
         assert "no admissible rotation" in fails(capsys, *options, *limits)

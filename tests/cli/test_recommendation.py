@@ -117,7 +117,8 @@ def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
         *(capsys, "recommend", "f0.npy", "--bundle", "b.safetensors"),
         *("--camera-pose", "pose.json", "--axis", "0", "0", "0"),
     )
-    lines = out.splitlines()
+    decision, *lines = out.splitlines()
+    assert decision.startswith("decision   ")
     assert lines[0] == f"camera     not given: a focal length of {FOCAL_PX:g} px is assumed"
     assert f"azimuth {answer.azimuth_deg:.1f}° (camera around mug; 1 view)" in lines[1]
     for line, about in zip(lines[2:4], (answer, answer.move), strict=True):
@@ -135,7 +136,7 @@ def test_a_recommendation_is_told_in_a_few_lines(here, capsys):
         *("--bundle", "b.safetensors", "--intrinsics", "150"),
     )
     assert "; 2 views)" in two
-    assert two.startswith("pose ")
+    assert two.splitlines()[1].startswith("pose ")
 
 
 def test_the_choice_of_the_last_view_raises_its_expected_error_unless_it_was_not_followed(
@@ -159,22 +160,34 @@ def test_frames_all_round_have_a_pose_and_no_next_view(manifest, capsys):
     rotations = ("--rotations", *(f"{place * WIDTH:g}" for place in range(BINS)))
     where = ("--camera-pose", "pose.json", "--axis", "0", "0", "0")
     command = ("recommend", *frames, *rotations, "--bundle", "b.safetensors", *where)
-    _, pose, _, next_view, *others = run(capsys, *command).splitlines()
+    _, _, pose, _, next_view, *others = run(capsys, *command).splitlines()
     assert "; 24 views)" in pose
-    assert next_view.startswith("next view  none: ")
+    assert next_view.startswith("next view  none")
     assert not any(line.startswith(("or ", "target")) for line in others)
     printed = json.loads(run(capsys, *command, "--json"))
     assert printed["move"] is printed["target_camera_pose"] is None
     assert printed["alternatives"] == []
 
 
-def test_until_an_expected_error_is_enough(here, capsys):
+def test_the_decision_is_said_first_and_last_in_json(here, capsys):
     answer = Recommender.load("b.safetensors").recommend(frame(0))
-    for less, words in ((-0.01, "one more view"), (0.01, "enough: stop here")):
-        until = str(answer.expected_error_deg + less)
-        command = ("recommend", "f0.npy", "--bundle", "b.safetensors", "--until", until)
-        assert words in run(capsys, *command)
-        assert json.loads(run(capsys, *command, "--json"))["enough"] == (less > 0)
+    error, probability = answer.expected_error_deg, answer.probability(30.0)
+    command = ("recommend", "f0.npy", "--bundle", "b.safetensors")
+    bare = json.loads(run(capsys, *command, "--json"))
+    for less in (-0.01, 0.01):
+        of_error, of_probability = (
+            ("--until", str(error + less)),
+            ("--until-probability", str(probability - less), "--within", "30"),
+        )
+        for limits in (of_error, of_probability, of_error + of_probability):
+            printed = json.loads(run(capsys, *command, *limits, "--json"))
+            verdict, reason = printed["decision"].values()
+            assert (verdict == "enough") == (less > 0)
+            first, *_ = run(capsys, *command, *limits).splitlines()
+            assert first == f"decision   {verdict}: {reason}"
+            assert printed["enough"] == (less > 0 if "--until" in limits else None)
+            assert list(printed)[-1] == "decision"
+            assert printed | {"decision": 0, "enough": 0} == bare | {"decision": 0, "enough": 0}
 
 
 @pytest.mark.parametrize(("limit", "is_told"), [(1e-6, True), (1e6, False)])
@@ -199,6 +212,8 @@ def test_an_ood_frame_gives_a_warning(here, bundle, capsys, limit, is_told):
         (["f0.npy", "--depth-scale", "0.001"], "1000 times as large would fit"),
         (["f0.npy", "--intrinsics", "wide"], "--intrinsics=wide"),
         (["f0.npy", "--camera-pose", "pose.json"], "--camera-pose and --axis belong together"),
+        (["f0.npy", "--within", "5"], "--within is for --until-probability; give that too"),
+        (["f0.npy", "--until-probability", "2"], "--until-probability=2: give one between 0"),
         (["f0.npy", "--gravity", "0", "1"], "--gravity has 2 numbers; give three"),
         (
             ["f0.npy", "--gravity", "0,1,0", "--elevation", "0"],

@@ -7,6 +7,7 @@ it. So a test finds what changes on our side, and not what changes on theirs.
 import json
 import runpy
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -116,6 +117,8 @@ def test_the_camera_goes_where_the_answer_says_and_the_second_view_is_fused(node
     )
     assert second["azimuth_deg"] == round(wanted.azimuth_deg, 1)
     assert second["rotation_deg"] == wanted.move.rotation_deg
+    assert first["decision"]["verdict"] == "one more view"
+    assert second["decision"] == asdict(wanted.decision)
     assert abs(second["azimuth_deg"] - frames[1].azimuth_deg) < 10
 
 

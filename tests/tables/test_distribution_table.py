@@ -408,3 +408,24 @@ def test_the_expected_error_of_one_view_is_right_where_it_is_small_and_where_it_
     for half in np.array_split(promised[:, 0].argsort(), 2):
         assert promised[half, 0].mean() == pytest.approx(errors[half].mean(), rel=0.2, abs=1.0)
         assert promised[half, 1].mean() == pytest.approx((errors[half] <= 15).mean(), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "verdict"),
+    [
+        (lambda k: 0.0, "enough"),
+        (lambda k: k % 2, "no view helps"),
+        (lambda k: 0.5 * (AZIMUTHS < 180), "one more view"),
+    ],
+    ids=["never wrong", "wrong from everywhere", "unsure from one side"],
+)
+def test_a_view_helps_where_errors_differ_between_views(wrong, verdict):
+    peaks = [
+        softmax(20 * np.cos(np.radians(AZIMUTHS - AZIMUTHS[:, None] - turn))) for turn in (0, 60)
+    ]
+    known = {}
+    for k in range(40):
+        share = np.broadcast_to(wrong(k), BINS)[:, None]
+        known[f"o{k}"] = AZIMUTHS, (1 - share) * peaks[0] + share * peaks[1]
+    answer = DistributionTable.from_pairs(known).recommend(known["o0"][1][3])
+    assert answer.decision.verdict == verdict

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.rotations import (
+    GUESS,
     MIN_SEPARATION_DEG,
     as_allowed,
     as_travel,
@@ -142,6 +143,9 @@ class Recommendation(Answer[Move]):
     crops: tuple[NDArray[np.uint8], ...] = ()
     object_position_m: tuple[float, float, float] | None = None
 
+    STOP_PROBABILITY = 0.95
+    STOP_WITHIN_DEG = 15.0
+
     @property
     def is_ood(self) -> bool:
         """Whether a frame is out of distribution."""
@@ -223,7 +227,7 @@ def next_view(
     expected = expected_errors(sweeps, belief, **affinity, share=share, agreement=log_factor)
     last = rotations_deg[-1]
     taken = tuple(rotation - last for rotation in rotations_deg)
-    n_steps = len(expected.total)
+    n_steps = expected.n_rotations
     rotation_deg = bins_deg(n_bins) if allowed_deg is None else as_allowed(allowed_deg)
     is_allowed, is_choice = _admissible(rotation_deg, n_steps, taken, max_travel_deg)
     rotation_deg = rotation_deg[is_allowed]
@@ -274,6 +278,7 @@ def next_view(
         for (rotation, error_deg), p in zip(ranked, chances, strict=True)
     ]
     warnings = flat_warnings(moves[0].expected_error_deg, cost) if moves else ()
+    helps = bool(moves) and GUESS not in warnings and expected.helps(moves[0].rotation_deg + last)
     direction_deg, spread_deg = direction_and_spread_deg(belief)
     bayes_factor = math.exp(min(log_factor, _LARGEST_LOG))
     return Recommendation(
@@ -287,6 +292,7 @@ def next_view(
         warnings=(*warnings, *_contradictions(bayes_factor, distributions, rotations_deg)),
         n_views=len(distributions),
         probability_within=as_chances(within_now),
+        helps=helps,
     )
 
 
@@ -298,7 +304,7 @@ def as_chances(probabilities: Iterable[float]) -> dict[str, float]:
 def _optimism_deg(before: Expected, rotations_deg: Sequence[float], n_bins: int) -> float:
     """Return the optimism of choosing a view after `rotations_deg`, degrees."""
     taken = tuple(rotation - rotations_deg[-1] for rotation in rotations_deg)
-    _, is_choice = _admissible(bins_deg(n_bins), len(before.total), taken)
+    _, is_choice = _admissible(bins_deg(n_bins), before.n_rotations, taken)
     return before.optimism_deg(is_choice) if is_choice.any() else 0.0
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nbv.choice.moves import as_rotations
+from nbv.core.choose import ANY_VIEW_SHARE
 from nbv.core.circle.angles import circular_distance_deg, is_angle, nearest_bin, wrap_deg
 from nbv.core.circle.criteria import IN_DEGREES
 from nbv.core.circle.lookup import CostTable
@@ -22,9 +23,6 @@ GUESS = (
 )
 GUESS_DEG = 81.0
 """A guess errs by 90° on average; the least of many uncertain errors is a few per cent lower."""
-
-ANY_VIEW_SHARE = 0.99
-"""Share of the mean expected error of all views; 1 % less is worth no move."""
 
 LEAST_AGREEMENT = 0.2
 """Estimates of 24 views or more that are guesses agree less with their azimuths."""

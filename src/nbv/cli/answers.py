@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from nbv.choice.answers import Answer
-    from nbv.cli.arguments import Placement
+    from nbv.cli.arguments import Placement, StopOptions
     from nbv.core.circle.offset import Offset
 
 AnyAnswer = TypeVar("AnyAnswer", bound="Answer[Any]")
@@ -91,12 +91,12 @@ _KEYS = (
 _MOVE_KEYS = ("rotation_deg", "travel_deg", "expected_error_deg", "probability_within")
 """Keys of every move, in this order."""
 
-_NOT_IN_JSON = ("crops", "n_views", "moves")
+_NOT_IN_JSON = ("crops", "n_views", "moves", "helps", "no_flips", "caveat", "pose_belief")
 
 
 def show_answer(
     answer: Answer[Any],
-    until: float | None,
+    stop: StopOptions,
     *,
     as_json: bool,
     has_targets: bool,
@@ -107,13 +107,16 @@ def show_answer(
 
     JSON has keys for the camera's pose after each move if the answer `has_targets`.
     """
-    enough = answer.is_enough(until)
+    decision = answer.decide(stop.until, stop.until_probability, stop.within)
     if as_json:
-        print_json(_as_json(answer, enough, assumed_focal_px, has_targets))
+        enough = None if stop.until is None else answer.expected_error_deg <= stop.until
+        about = _as_json(answer, enough, assumed_focal_px, has_targets)
+        print_json(about | {"decision": asdict(decision)})
         return
+    print_line(f"decision   {decision.verdict or 'none'}: {decision.reason}")
     if assumed_focal_px is not None:
         print_assumed_camera(assumed_focal_px)
-    _print_answer(answer, enough, seen)
+    _print_answer(answer, seen)
 
 
 def _as_json(
@@ -148,18 +151,18 @@ def _value(value: Any) -> Any:
     return None if is_unknown else value
 
 
-def _print_answer(answer: Answer[Any], enough: bool | None, seen: str) -> None:
+def _print_answer(answer: Answer[Any], seen: str) -> None:
     for head, line in zip_longest(["pose"], answer.pose_lines(seen), fillvalue=""):
         print_line(f"{head:<10} {line}")
-    if enough is not None:
-        print_line(f"           {'enough: stop here' if enough else 'one more view'}")
     if (move := answer.move) is None:
-        print_line("next view  none: all candidates are within 15° of an existing view")
+        print_line("next view  none")
     else:
         print_line(f"next view  {move.instruction} ({move.extent}): {answer.value(move)}")
     if others := answer.alternatives[:N_ALTERNATIVES]:
         listed = (f"{other.name} ({answer.short_value(other)})" for other in others)
-        print_line(f"or         {', '.join(listed)}")
+        first, *errors = (each.expected_error_deg for each in answer.moves)
+        why = "; lower ones are not lower by more than their noise" if first > min(errors) else ""
+        print_line(f"or         {', '.join(listed)}{why}")
     print_warnings(answer.warnings)
     if move is not None and move.target_camera_pose is not None:
         print_line("target camera pose in the base frame")

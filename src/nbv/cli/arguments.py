@@ -86,13 +86,6 @@ Followed = Annotated[
         "fixed cameras.",
     ),
 ]
-Until = Annotated[
-    float | None,
-    Parameter(
-        help="An expected error, degrees. If that of the pose is not above it, the answer is: "
-        "enough."
-    ),
-]
 
 AZIMUTHS, DISTRIBUTIONS, ORIENTATIONS = "azimuths", "distributions", "orientations"
 FRAMES = "frames"
@@ -212,6 +205,27 @@ class MoveOptions:
         from nbv.numbers import read_pose
 
         return read_pose(self.camera_pose), self.axis[:3], self.axis[3:] or [0.0, 0.0, 1.0]
+
+
+@as_paragraphs
+@Parameter(name="*")
+@dataclass(frozen=True)
+class StopOptions:
+    """Options that say when the pose is good enough; all that are given have to hold.
+
+    Parameters
+    ----------
+    until
+        The largest expected error, degrees.
+    until_probability
+        The least probability, 0 to 1, that the error is at most --within.
+    within
+        Degrees: 5, 15 or 30; any for orientations. Default: 15, or 25 for orientations.
+    """
+
+    until: float | None = None
+    until_probability: float | None = None
+    within: float | None = None
 
 
 # Minus, hyphens and dashes that typesetting puts for the minus sign.

@@ -18,7 +18,7 @@ from nbv.cli.arguments import (
     Json,
     MoveOptions,
     Numbers,
-    Until,
+    StopOptions,
     as_paragraphs,
     check_options,
 )
@@ -36,12 +36,13 @@ ESTIMATES = {
     ORIENTATIONS: "9 numbers, or a .json or .npy file",
 }
 
-_FOR_ALL = ("max_travel", "camera_pose")
+_FOR_ALL = ("max_travel", "camera_pose", "until")
+_PROBABLE = ("until_probability", "within")
 _ROUND_AXIS = (*_FOR_ALL, "allowed", "axis")
 OPTIONS = {
     AZIMUTHS: _ROUND_AXIS,
-    DISTRIBUTIONS: (*_ROUND_AXIS, "rotations", "not_followed", "until"),
-    ORIENTATIONS: (*_FOR_ALL, "object", "candidates", "sphere", "until"),
+    DISTRIBUTIONS: (*_ROUND_AXIS, "rotations", "not_followed", *_PROBABLE),
+    ORIENTATIONS: (*_FOR_ALL, "object", "candidates", "sphere", *_PROBABLE),
 }
 """Options for each kind of table."""
 
@@ -78,7 +79,7 @@ def next_view(
     followed: Followed = True,
     limits: MoveOptions = MoveOptions(),
     around: CandidateOptions = CandidateOptions(),
-    until: Until = None,
+    stop: StopOptions = StopOptions(),
     json: Json = False,
 ) -> None:
     """Recommend the next view after estimates of your own estimator.
@@ -103,8 +104,8 @@ def next_view(
         Rotation of each view from the first one: 0 90, or 0,90, for two distributions.
     """
     kind = _kind(table, estimate)
-    others = {"rotations": rotations, "not_followed": None if followed else True, "until": until}
-    given = vars(limits) | vars(around) | others
+    others = {"rotations": rotations, "not_followed": None if followed else True}
+    given = vars(limits) | vars(around) | vars(stop) | others
     check_options(given, OPTIONS[kind], f"{table}, which holds {kind}")
     answer: Answer[Any]
     if kind == ORIENTATIONS:
@@ -119,7 +120,7 @@ def next_view(
         else:
             answer = _recommended(table, estimate, limits, rotations or [0.0], followed)
         answer, has_targets = with_targets(answer, placement), placement is not None
-    show_answer(answer, until, as_json=json, has_targets=has_targets)
+    show_answer(answer, stop, as_json=json, has_targets=has_targets)
 
 
 def _kind(table: Path, estimate: list[float] | Path) -> str:

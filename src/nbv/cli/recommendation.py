@@ -18,7 +18,7 @@ from nbv.cli.arguments import (
     Json,
     MoveOptions,
     Numbers,
-    Until,
+    StopOptions,
     as_paragraphs,
     check_writable,
 )
@@ -39,7 +39,7 @@ def recommend(
     gravity: Numbers = None,
     limits: MoveOptions = MoveOptions(),
     followed: Followed = True,
-    until: Until = None,
+    stop: StopOptions = StopOptions(),
     plot: Path | None = None,
     json: Json = False,
 ) -> None:
@@ -118,7 +118,7 @@ def recommend(
         draw_recommendation(answer, plot, used.category)
     show_answer(
         answer,
-        until,
+        stop,
         as_json=json,
         has_targets=placement is not None,
         seen=used.category,

@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.errors import UserError, nearest
 
+ANY_VIEW_SHARE = 0.99
+"""Share of the expected error now, or of the mean of all views: 1 % less is worth no move."""
+
 T = TypeVar("T")
 Table = NDArray[np.floating]
 

@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nbv.choice.answers import Answer
+from nbv.choice.answers import UNKNOWN_DEG, Answer
 from nbv.choice.next_view import Move
-from nbv.choice.rotations import ranked_rotations
+from nbv.choice.rotations import GUESS, ranked_rotations
+from nbv.core.choose import ANY_VIEW_SHARE
 from nbv.core.circle import lookup
-from nbv.core.circle.criteria import CRITERIA, POSE_LIKELIHOODS, SPREADS, cost_unit
+from nbv.core.circle.angles import nearest_bin
+from nbv.core.circle.criteria import CRITERIA, FOR_A_FUSION, POSE_LIKELIHOODS, SPREADS, cost_unit
 from nbv.core.circle.evidence import Evidence
 from nbv.core.circle.lookup import LIMITS, CostTable, recommended_delta
 from nbv.files import (
@@ -30,7 +32,7 @@ from nbv.files import (
 
 @dataclass(frozen=True, kw_only=True)
 class CostMove(Move):
-    """A rotation with its cost in a lookup table instead of an expected error."""
+    """A rotation with its cost in a lookup table, which is an expected error in some of them."""
 
     cost: float
 
@@ -43,6 +45,8 @@ class CostRecommendation(Answer[CostMove]):
     ----------
     azimuth_deg : float
         The estimate, in [0, 360).
+    expected_error_deg : float
+        That of one view where costs are errors of calibration objects, else NaN.
     criterion, cost_unit : str
         What the cost of a move is, and its unit.
     """
@@ -122,16 +126,27 @@ class LookupTable(CostTable):
     ) -> CostRecommendation:
         """Return the rotations for an estimate by their cost; see `ranked_rotations`."""
         ranked, warnings = ranked_rotations(self, estimate_deg, allowed_deg, max_travel_deg)
-        moves = (
-            CostMove(rotation_deg=rotation, travel_deg=abs(rotation), cost=cost)
+        # Other costs are no errors of calibration objects. The same view twice errs as one view.
+        share = 1.0 if self.criterion in FOR_A_FUSION else UNKNOWN_DEG
+        now_deg = share * float(self.cost[nearest_bin(estimate_deg, len(self.cost)), 0])
+        moves = tuple(
+            CostMove(
+                rotation_deg=rotation,
+                travel_deg=abs(rotation),
+                expected_error_deg=share * cost,
+                cost=cost,
+            )
             for rotation, cost in ranked
         )
+        is_less = moves[0].cost < ANY_VIEW_SHARE * now_deg
         return CostRecommendation(
             azimuth_deg=estimate_deg % 360.0,
+            expected_error_deg=now_deg,
             criterion=self.criterion,
             cost_unit=cost_unit(self.criterion, {"spread": self.spread}),
-            moves=tuple(moves),
+            moves=moves,
             warnings=warnings,
+            helps=None if math.isnan(now_deg) else is_less and GUESS not in warnings,
         )
 
     def arrays(self) -> Arrays:

@@ -14,7 +14,7 @@ from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.next_view import as_chances
 from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
 from nbv.core.alike.compare import WITHIN_DEG
-from nbv.core.orientations.belief import belief, hypotheses_belief
+from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief, belief, hypotheses_belief
 from nbv.core.orientations.criteria import (
     NextViews,
     bayes_error,
@@ -35,6 +35,9 @@ NO_DEPENDENCE = (
 )
 
 NO_SCORES = "scores are not used: calibration pairs had none"
+
+
+NO_SCORE_STOP = "; this rests on little: without the estimator's score flips are hard to tell"
 
 
 @dataclass(frozen=True)
@@ -105,10 +108,20 @@ class CameraMove(RankedMove):
 
 @dataclass(frozen=True, kw_only=True)
 class CameraRecommendation(Answer[CameraMove]):
-    """The pose (3, 3) in the last camera, its error, and candidates, best first."""
+    """The pose (3, 3) in the last camera, its belief in the first one, and candidates."""
 
     rotation: Orientations
     depends_on_view: bool
+    pose_belief: OrientationBelief
+
+    STOP_PROBABILITY = 0.98
+    STOP_WITHIN_DEG = AGREE_DEG
+
+    def probability(self, within_deg: float) -> float:
+        """Return the probability that the pose errs by at most so many degrees."""
+        if not 0.0 < within_deg <= 180.0:
+            raise UserError(f"`within_deg`={within_deg:g}: give degrees, above 0 and at most 180")
+        return self.pose_belief.probability_within(within_deg)
 
     def pose_lines(self, seen: str) -> list[str]:
         """Return the pose of the object, which is called `seen`, in a few lines of text."""
@@ -216,6 +229,8 @@ def recommend_camera(
         probability_within=as_chances(within_now),
         moves=tuple(moves),
         depends_on_view=depends_on_view,
+        pose_belief=now,
+        caveat=NO_SCORE_STOP if scores is None or errors.ratio is None else "",
         warnings=warnings,
     )
 

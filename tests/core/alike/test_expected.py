@@ -228,18 +228,21 @@ def test_what_is_left_out_hardly_counts(rng: np.random.Generator, sharpness: flo
     assert averaged.mean(axis=0) == pytest.approx(errors.mean(axis=(0, 1)), rel=0.1)
 
 
-def of_objects(errors: np.ndarray, prior: np.ndarray, weight: float) -> Expected:
+def of_objects(
+    errors: np.ndarray, prior: np.ndarray, weight: float, now: np.ndarray | float = 0.0
+) -> Expected:
     """What weighted errors (O, M) of objects of equal weight lead one to expect."""
     n_objects, n_steps = errors.shape
-    share = np.full((n_objects, 1), weight / n_objects)
+    by_object = np.column_stack(
+        [errors, np.broadcast_to(now, n_objects), np.full(n_objects, weight / n_objects)]
+    )
     return Expected(
         now_deg=0.0,
         after_deg=np.zeros(n_steps),
         within_now=np.zeros(3),
         within_after=np.zeros((3, n_steps)),
-        by_object=np.hstack([errors, share]),
-        total=errors.sum(axis=0) + prior,
-        weight=weight,
+        by_object=by_object,
+        total=by_object.sum(axis=0) + np.append(prior, [0.0, 0.0]),
     )
 
 
@@ -318,7 +321,8 @@ def test_sums_are_of_whole_objects(
         known, of_sweeps = known.after(rotation), of_sweeps.after(rotation)
     share = rng.uniform(0.1, 1, 6)
     found = expected_errors(known, belief, 5.0, 30.0, share)
-    assert found.total / found.weight == pytest.approx(found.after_deg, rel=1e-5)
+    wanted = [*found.after_deg, found.now_deg, 1.0]
+    assert found.total / found.total[-1] == pytest.approx(wanted, rel=1e-5)
     assert len(found.by_object) == 3
     assert len(expected_errors(of_sweeps, belief, 5.0, 30.0).by_object) == 6
     for place, name in enumerate("abc"):
@@ -381,6 +385,10 @@ def test_a_rotation_is_surely_better_by_two_standard_errors_over_objects() -> No
         expected = of_objects(moved, np.zeros(2), 40.0)
         assert expected.is_surely_better(0.0, 180.0) == (shift > 2)
         assert not expected.is_surely_better(180.0, 0.0)
+    for shift in (0.8, 1.2):
+        moved = errors[:, :1] - difference.mean() - shift * error
+        expected = of_objects(moved, np.zeros(1), 40.0, errors[:, 1])
+        assert expected.helps(0.0) == (shift > 1)
 
 
 @pytest.mark.parametrize("by_share", [False, True])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.alike.compare import AGREEMENT_NATS, CalibrationViews
-from nbv.core.choose import is_surely_less, with_pseudo_observations
+from nbv.core.choose import ANY_VIEW_SHARE, is_surely_less, with_pseudo_observations
 from nbv.core.circle.angles import nearest_bin
 
 N_PARTS = 5
@@ -21,6 +21,10 @@ N_PARTS = 5
 
 SURE = 2.0
 """Standard errors by which a rotation has to be better than another one to be preferred."""
+
+LIKELY = 1.0
+"""Standard errors by which a view has to be better than none: few objects look like a rare belief,
+and a view too few costs more degrees than a view too many."""
 
 NEGLIGIBLE = 1e-5
 """Share of the total weight below which a first view does not count after more views."""
@@ -40,13 +44,11 @@ class Expected:
         Probabilities that the error is at most each of `nbv.core.alike.compare.WITHIN_DEG`.
     within_after : ndarray (3, B)
         The same after a view at each rotation.
-    by_object : ndarray (O, M + 1)
+    by_object : ndarray (O, M + 2)
         For each calibration object, weighted sums of errors after a view at each of M rotations,
-        360 / M degrees apart, and the weight.
-    total : ndarray (M,)
+        360 / M degrees apart, of errors now, and the weight.
+    total : ndarray (M + 2,)
         Sum over all objects and the pseudo-observations.
-    weight : float
-        Total weight of what is in `total`.
     """
 
     now_deg: float
@@ -55,7 +57,11 @@ class Expected:
     within_after: NDArray[np.float64]
     by_object: NDArray[np.float64]
     total: NDArray[np.floating]
-    weight: float
+
+    @property
+    def n_rotations(self) -> int:
+        """Number M of rotations."""
+        return len(self.total) - 2
 
     def optimism_deg(self, is_choice: NDArray[np.bool_]) -> float:
         """Return by how much the least expected error is too low, 0 or more.
@@ -73,12 +79,12 @@ class Expected:
         n_parts = min(N_PARTS, len(self.by_object))
         if n_parts == 1:
             return 0.0
-        errors = self.by_object[:, :-1]
+        errors = self.by_object[:, :-2]
         parts = np.stack([errors[part::n_parts].sum(axis=0) for part in range(n_parts)])
-        total = np.where(is_choice, self.total, np.inf)
+        total = np.where(is_choice, self.total[:-2], np.inf)
         chosen_by_others = (total - parts).argmin(axis=1)
         more = parts[np.arange(n_parts), chosen_by_others] - parts[:, total.argmin()]
-        return float(more.sum() / self.weight)
+        return float(more.sum() / self.total[-1])
 
     def is_surely_better(self, rotation_deg: float, other_deg: float) -> bool:
         """Return whether a rotation is better than another by `SURE` standard errors over objects.
@@ -86,10 +92,19 @@ class Expected:
         Both are from the first view, and the nearest of the M rotations count.
         """
         both_deg = np.array([rotation_deg, other_deg])
-        rotation, other = nearest_bin(both_deg, len(self.total)).tolist()
+        rotation, other = nearest_bin(both_deg, self.n_rotations).tolist()
+        return self._is_less(rotation, other, SURE)
+
+    def helps(self, rotation_deg: float) -> bool:
+        """Return whether a view is better than none by 1 % and `LIKELY` standard errors."""
+        rotation = int(nearest_bin(rotation_deg, self.n_rotations))
+        is_worth = self.total[rotation] < ANY_VIEW_SHARE * self.total[-2]
+        return bool(is_worth) and self._is_less(rotation, -2, LIKELY)
+
+    def _is_less(self, rotation: int, other: int, factor: float) -> bool:
         gaps = self.by_object[:, rotation] - self.by_object[:, other]
         prior = self.total[rotation] - self.total[other] - gaps.sum()
-        return is_surely_less(gaps, SURE, self.by_object[:, -1], prior)
+        return is_surely_less(gaps, factor, self.by_object[:, -1], prior)
 
 
 def expected_errors(
@@ -135,12 +150,12 @@ def expected_errors(
     after = np.stack(
         [np.interp(rotations, np.arange(n_rotations + 1), [*m[:-1], m[0]]) for m in means]
     )
+    kept = [*range(n_rotations + 1), -1]
     return Expected(
         now_deg=float(means[0, -1]),
         after_deg=after[0],
         within_now=means[1:, -1],
         within_after=after[1:],
-        by_object=by_object[:, [*range(n_rotations), -1]],
-        total=sums[:n_rotations],
-        weight=float(sums[-1]),
+        by_object=by_object[:, kept],
+        total=sums[kept],
     )
