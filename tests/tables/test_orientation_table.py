@@ -310,6 +310,12 @@ def test_the_commands_of_the_page(tmp_path, monkeypatch, capsys):
     assert answer["enough"] is False
     assert np.allclose(np.array(rows, dtype=float), answer["rotation"], atol=1e-5)
     assert answer["move"]["expected_error_deg"] < answer["expected_error_deg"]
+    assert answer["decision"]["verdict"] == "one more view"
+    probable = [*options[:5], "50", "--until-probability", "0.01", "--within"]
+    assert [main([*probable, within]) for within in ("20", "0")] == [0, 2]
+    out, err = capsys.readouterr()
+    assert out.startswith("decision   enough: ")
+    assert "--within=0: give degrees" in err
     poses = np.array([m["target_camera_pose"] for m in [answer["move"], *answer["alternatives"]]])
     np.save("poses.npy", poses)
     assert len(read_poses("poses.npy")) == len(poses)

@@ -14,7 +14,7 @@ from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.next_view import as_chances
 from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
 from nbv.core.alike.compare import WITHIN_DEG
-from nbv.core.choose import ANY_VIEW_SHARE, SURE, is_surely_less
+from nbv.core.choose import ANY_VIEW_SHARE, LIKELY, is_surely_less
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief, belief, hypotheses_belief
 from nbv.core.orientations.criteria import (
     NextViews,
@@ -127,6 +127,8 @@ class CameraRecommendation(Answer[CameraMove]):
 
     def probability(self, within_deg: float) -> float:
         """Return the probability that the pose errs by at most so many degrees."""
+        if not 0.0 < within_deg <= 180.0:
+            raise UserError(f"`within_deg`={within_deg:g}: give degrees, above 0 and at most 180")
         return self.pose_belief.probability_within(within_deg)
 
     def pose_lines(self, seen: str) -> list[str]:
@@ -251,15 +253,15 @@ def recommend_camera(
         pose_belief=now,
         caveat=NO_SCORE_STOP if scores is None or errors.ratio is None else "",
         warnings=warnings,
-        helps=_is_sure(gains) and cost[ranked[0]] < ANY_VIEW_SHARE * now.error_deg,
+        helps=_is_likely(gains) and cost[ranked[0]] < ANY_VIEW_SHARE * now.error_deg,
         no_flips=not errors.is_flip.any(),
     )
 
 
-def _is_sure(values: Sequence[float]) -> bool:
-    """Return whether a value is surely above 0, from those without each part (jackknife)."""
+def _is_likely(values: Sequence[float]) -> bool:
+    """Return whether a value is likely above 0, from those without each part (jackknife)."""
     n = len(values) - 1
-    return is_surely_less((n - 1) * np.array(values[1:]) - n * values[0], SURE)
+    return is_surely_less((n - 1) * np.array(values[1:]) - n * values[0], LIKELY)
 
 
 def nearest_twin(
