@@ -31,8 +31,9 @@ COLUMNS = ("object_id", "scene_id", "instance", "score")
 
 MOST_VIEWS = 4
 
-ORDERS = ("random", "opposite", "recommended")
-"""Orders of views: the next one at random, the farthest from all so far, the product's."""
+ORDERS = ("random", "opposite", "recommended", "halfway")
+"""Orders of views: the next one at random, the farthest from all so far, the product's; and the
+nearest of those whose expected error lies at most halfway from the least to the mean."""
 
 ELSEWHERE = 50
 """Even candidates about the object, where an instance has no image left: for the pose alone."""
@@ -150,8 +151,13 @@ def walks(case: HeldOut, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
 
     def next_of(order: str, taken: tuple[int, ...]) -> int:
         left = free(taken)
+        moves = answer(taken).moves
         if order == "recommended":
-            return int(left[answer(taken).moves[0].index])
+            return int(left[moves[0].index])
+        if order == "halfway":
+            cost = np.array([move.expected_error_deg for move in moves])
+            near = [m for m in moves if m.expected_error_deg <= (cost.min() + cost.mean()) / 2]
+            return int(left[min(near, key=lambda move: move.travel_deg).index])
         if order == "opposite":
             return int(left[apart[np.array(taken)][:, left].min(axis=0).argmax()])
         return int(rng.choice(left))

@@ -13,10 +13,6 @@ from nbv.errors import UserError, nearest
 ANY_VIEW_SHARE = 0.99
 """Share of the expected error now, or of the mean of all views: 1 % less is worth no move."""
 
-LIKELY = 1.0
-"""Standard errors by which a view has to be better than none: few objects look like a rare belief,
-and a view too few costs more degrees than a view too many."""
-
 T = TypeVar("T")
 Table = NDArray[np.floating]
 

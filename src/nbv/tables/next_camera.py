@@ -14,7 +14,6 @@ from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.next_view import as_chances
 from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
 from nbv.core.alike.compare import WITHIN_DEG
-from nbv.core.choose import ANY_VIEW_SHARE, LIKELY, is_surely_less
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief, belief, hypotheses_belief
 from nbv.core.orientations.criteria import (
     NextViews,
@@ -30,13 +29,17 @@ from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted, matrix_lines
 from nbv.numbers import FARTHEST_M, Pose, as_finite, as_orientations, as_pose, as_position
 
-NO_DEPENDENCE = (
-    "calibration shows no dependence of this object's flips on the view; the ranking may be no "
-    "better than random"
-)
-
 INDEPENDENT_DEG = 60.0
 """Angle between views from which their errors are about independent (first half of T-LESS)."""
+
+HELPFUL = 0.9
+"""Share of the expected error now: promises fall by up to a tenth where flips are such that no view
+helps (tools/promised_errors.py)."""
+
+NO_DEPENDENCE = (
+    "calibration shows no dependence of this object's flips on the view: candidates are ranked by "
+    f"travel, those {INDEPENDENT_DEG:g}° or more from every view first"
+)
 
 NO_SCORES = "scores are not used: calibration pairs had none"
 
@@ -122,7 +125,7 @@ class CameraRecommendation(Answer[CameraMove]):
     pose_belief: OrientationBelief
     holds_where: str | None = None
 
-    STOP_PROBABILITY = 0.98
+    STOP_PROBABILITY = 0.97
     STOP_WITHIN_DEG = AGREE_DEG
 
     def probability(self, within_deg: float) -> float:
@@ -164,7 +167,6 @@ def recommend_camera(
     candidates: Sequence[Pose] | int,
     *,
     straightened: bool,
-    depends_on_view: bool,
     camera_pose: ArrayLike | None,
     max_travel_deg: float,
 ) -> CameraRecommendation:
@@ -186,14 +188,11 @@ def recommend_camera(
     seen = np.stack(
         [c.straight_from_camera @ e.rotation for c, e in zip(cameras, estimates, strict=True)]
     )
-    order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
-
-    def believe(errors: OrientationErrors) -> OrientationBelief:
-        if is_posed:
-            return belief(errors, seen, straight_from_base @ first.T, scores)
-        return hypotheses_belief(errors, seen[order], None if scores is None else scores[order])
-
-    now = believe(errors)
+    if is_posed:
+        now = belief(errors, seen, straight_from_base @ first.T, scores)
+    else:
+        order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
+        now = hypotheses_belief(errors, seen[order], None if scores is None else scores[order])
     position = estimates[-1].position_mm
     place = None if position is None else (cameras[-1].pose @ np.append(position / 1000, 1.0))[:3]
     if isinstance(candidates, int):
@@ -215,17 +214,12 @@ def recommend_camera(
         )
     ahead = NextViews(now, targets[free] @ first.T)
     cost, within = bayes_error(ahead), chances_within(ahead, WITHIN_DEG)
-    if depends_on_view:
+    if errors.depends_on_view:
         ranked = ranking(cost, travel[free])
     else:
         # All are equal, but errors of neighbouring views are not independent.
         near = np.where(apart[free] >= INDEPENDENT_DEG, travel[free], 1000 - apart[free])
         ranked = np.argsort(near, kind="stable")
-    best = ahead.moves[ranked[:1]]
-    gains = [
-        each.error_deg - bayes_error(NextViews(each, best))[0]
-        for each in (now, *map(believe, errors.without_parts))
-    ]
     moves = [
         CameraMove(
             index=int(free[k]),
@@ -240,7 +234,7 @@ def recommend_camera(
         )
         for k, pose in ((k, poses[free[k]]) for k in ranked)
     ]
-    warnings = () if depends_on_view else (NO_DEPENDENCE,)
+    warnings = () if errors.depends_on_view else (NO_DEPENDENCE,)
     if scores is not None and errors.ratio is None:
         warnings = (*warnings, NO_SCORES)
     within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
@@ -249,19 +243,13 @@ def recommend_camera(
         expected_error_deg=now.error_deg,
         probability_within=as_chances(within_now),
         moves=tuple(moves),
-        depends_on_view=depends_on_view,
+        depends_on_view=errors.depends_on_view,
         pose_belief=now,
         caveat=NO_SCORE_STOP if scores is None or errors.ratio is None else "",
         warnings=warnings,
-        helps=_is_likely(gains) and cost[ranked[0]] < ANY_VIEW_SHARE * now.error_deg,
+        helps=bool(cost[ranked[0]] < HELPFUL * now.error_deg),
         no_flips=not errors.is_flip.any(),
     )
-
-
-def _is_likely(values: Sequence[float]) -> bool:
-    """Return whether a value is likely above 0, from those without each part (jackknife)."""
-    n = len(values) - 1
-    return is_surely_less((n - 1) * np.array(values[1:]) - n * values[0], LIKELY)
 
 
 def nearest_twin(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.orientations.errors import STRENGTHS, OrientationErrors, ScoreRatio, shrinkage
+from nbv.core.orientations.errors import FEWEST_GROUPS, OrientationErrors, ScoreRatio, shrinkage
 from nbv.core.orientations.group import (
     ASYMMETRIC,
     Array,
@@ -34,6 +34,16 @@ from nbv.tables.next_camera import (
 
 FLIP_DEG = OrientationErrors.flip_deg
 _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "ray", "symmetries")
+
+
+UNGROUPED = (
+    "pairs have no scene_id and instance: each counts as if it were of another instance, and "
+    "neighbouring images make calibration too sure"
+)
+FEW_GROUPS = (
+    f"pairs are of fewer than {FEWEST_GROUPS} instances or scenes in all: how much flips depend on "
+    "the view is assumed, not measured"
+)
 
 
 @dataclass(frozen=True)
@@ -241,7 +251,6 @@ class OrientationTable:
             estimates,
             candidates,
             straightened=self.straightened,
-            depends_on_view=self.depends_on_view(name),
             camera_pose=camera_pose,
             max_travel_deg=max_travel_deg,
         )
@@ -255,11 +264,6 @@ class OrientationTable:
             holds_where=detections.holds_where(**about),
             warnings=(*answer.warnings, *detections.warnings(**about)),
         )
-
-    def depends_on_view(self, name: str) -> bool:
-        """Return whether calibration shows that an object's flips depend on the view."""
-        errors = self.errors(name)
-        return bool(errors.is_flip.any()) and errors.pseudo_observations < STRENGTHS[-1]
 
     def about(self) -> list[ObjectSummary]:
         """Return a summary of each object."""
@@ -275,8 +279,10 @@ class OrientationTable:
         warnings = []
         if (covered := float((weight > 1).mean())) < 0.5:
             warnings.append(f"{1 - covered:.0%} of the directions are seen by no pair nearby")
-        if (n_groups := len(set(self.group[self.object_id == name]) - {""})) < 2:
-            warnings.append("pairs are of one instance or scene: dependence on the view is unknown")
+        if errors.group is None:
+            warnings.append(UNGROUPED)
+        elif len(set(zip(self.object_id, self.group, strict=True))) < FEWEST_GROUPS:
+            warnings.append(FEW_GROUPS)
         if not errors.is_flip.any():
             warnings.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
         elif hint := describe_large_errors(errors):
@@ -284,11 +290,11 @@ class OrientationTable:
         return ObjectSummary(
             object_id=name,
             n_pairs=len(errors.estimate),
-            n_groups=n_groups,
+            n_groups=len(set(self.group[self.object_id == name]) - {""}),
             n_flips=int(errors.is_flip.sum()),
             mean_error_deg=float(errors.error_deg.mean()),
             directions_covered=covered,
-            depends_on_view=self.depends_on_view(name),
+            depends_on_view=errors.depends_on_view,
             warnings=tuple(warnings),
             holds_where=self.detections.get(name, Detections()).holds_where(),
         )

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from nbv.core.alike.compare import AGREEMENT_NATS, CalibrationViews
 from nbv.core.choose import (
     ANY_VIEW_SHARE,
-    LIKELY,
     is_surely_less,
     with_pseudo_observations,
 )
@@ -26,6 +25,10 @@ N_PARTS = 5
 
 SURE = 2.0
 """Standard errors by which a rotation has to be better than another one to be preferred."""
+
+LIKELY = 1.0
+"""Standard errors by which a view has to be better than none: few objects look like a rare belief,
+and a view too few costs more degrees than a view too many."""
 
 NEGLIGIBLE = 1e-5
 """Share of the total weight below which a first view does not count after more views."""

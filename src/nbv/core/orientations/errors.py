@@ -10,14 +10,13 @@ density; on the circle it is that of `nbv.core.circle.density`, which a test sho
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nbv.core.choose import is_surely_less
 from nbv.core.orientations.group import (
     ASYMMETRIC,
     Array,
@@ -44,8 +43,8 @@ FIXED_STRENGTH = 10.0
 
 FEWEST_GROUPS = 4
 
-N_PARTS = 5
-"""Parts of the groups for the jackknife."""
+LEAST_GAIN = 2.0
+"""A larger gain of log likelihood has a probability of a few per cent by chance."""
 
 SPACING_DEG = 60.0
 """Angle between the other possible poses."""
@@ -183,6 +182,11 @@ class OrientationErrors:
         return float(np.clip(products / n_pairs / (squares / len(error)), 0, 1))
 
     @property
+    def depends_on_view(self) -> bool:
+        """Whether flips depend on the viewing direction, by `shrinkage`."""
+        return bool(self.is_flip.any()) and self.pseudo_observations < STRENGTHS[-1]
+
+    @property
     def share_of_flips(self) -> float:
         """The probability of a flip over all directions, never 0."""
         n, n_flips = len(self.estimate), self.is_flip.sum()
@@ -207,23 +211,6 @@ class OrientationErrors:
         if self.group is None:
             return np.arange(len(self.estimate))
         return np.asarray(np.unique(self.group, return_inverse=True)[1])
-
-    @cached_property
-    def without_parts(self) -> tuple[OrientationErrors, ...]:
-        """The errors without each of `N_PARTS` parts of the groups, for the jackknife."""
-        labels = self.labels if self.labels.any() else np.arange(len(self.estimate))
-        part = labels % min(N_PARTS, int(labels.max()) + 1)
-        rows = [part != k for k in range(int(part.max()) + 1)]
-        return tuple(
-            replace(
-                self,
-                estimate=self.estimate[k],
-                truth=self.truth[k],
-                group=labels[k],
-                offsets=self.possible,
-            )
-            for k in rows
-        )
 
     def _pairs(self, given: Given) -> tuple[Orientations, Orientations]:
         """Return what is given of the pairs, and the other."""
@@ -386,8 +373,8 @@ def shrinkage(objects: Sequence[OrientationErrors]) -> float:
     A flip's probability is shrunk from the share near its direction towards the object's share,
     and this towards the share of all objects. One number serves both: so many pairs in each
     direction. The likelihood is that of the flips of each group given all others. Unless it is
-    larger than with the most pseudo-observations by a standard error over groups, flips are not
-    shown to depend on the view, and the most are taken.
+    larger than with the most pseudo-observations by `LEAST_GAIN` nats, flips are not shown to
+    depend on the view, and the most are taken.
 
     Returns
     -------
@@ -398,7 +385,7 @@ def shrinkage(objects: Sequence[OrientationErrors]) -> float:
         return FIXED_STRENGTH
     n_all = sum(len(errors.labels) for errors in objects)
     flips_all = sum(int(errors.is_flip.sum()) for errors in objects)
-    strengths, likelihoods = np.array(STRENGTHS)[:, None], []
+    strengths, likelihood = np.array(STRENGTHS)[:, None], np.zeros(len(STRENGTHS))
     for errors in objects:
         directions, flips = viewing_direction(errors.estimate), errors.is_flip
         for group in range(int(errors.labels.max()) + 1):
@@ -409,10 +396,9 @@ def shrinkage(objects: Sequence[OrientationErrors]) -> float:
             pairs = 2 * errors.concentration * strengths
             of_object = _shrunk(flips[~rows].sum(), (~rows).sum(), share, pairs)
             p = _shrunk(weights @ flips[~rows], weights.sum(axis=1), of_object, strengths)
-            likelihoods.append(np.log(np.where(flips[rows], p, 1 - p)).sum(axis=1))
-    by_group = np.stack(likelihoods, axis=1)
-    best = int(by_group.sum(axis=1).argmax())
-    return STRENGTHS[best if is_surely_less(by_group[-1] - by_group[best], 1.0) else -1]
+            likelihood += np.log(np.where(flips[rows], p, 1 - p)).sum(axis=1)
+    is_shown = likelihood.max() > likelihood[-1] + LEAST_GAIN
+    return STRENGTHS[int(likelihood.argmax()) if is_shown else -1]
 
 
 def apart(
