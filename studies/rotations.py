@@ -156,7 +156,9 @@ def walks(case: HeldOut, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
             return int(left[moves[0].index])
         if order == "halfway":
             cost = np.array([move.expected_error_deg for move in moves])
-            near = [m for m in moves if m.expected_error_deg <= (cost.min() + cost.mean()) / 2]
+            # Equal costs may have a mean below each of them.
+            limit = max(cost.min(), (cost.min() + cost.mean()) / 2)
+            near = [move for move in moves if move.expected_error_deg <= limit]
             return int(left[min(near, key=lambda move: move.travel_deg).index])
         if order == "opposite":
             return int(left[apart[np.array(taken)][:, left].min(axis=0).argmax()])
