@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import pandas as pd
@@ -14,9 +15,11 @@ from nbv.experiment.report.table import DECIDED, Cell, Table, difference_cell
 from nbv.experiment.statistics.paired import Resampler
 from nbv.files import existing, read_csv
 from nbv.labels import category_label, method_label, number
-from nbv.style import RC, Panels, method_style, panel_grid
+from nbv.style import INK, RC, Panels, method_style, panel_grid
 from studies.curves import ANY_DIRECTION, pooled_travel
 from studies.object_errors import mae_difference, mae_interval, paired_objects
+from studies.rotation_tables import NUMBERS, PROBABILITIES
+from studies.rotations import MOST_VIEWS
 
 _PRODUCT = "_product"
 _PANEL_IN = (3.4, 2.9)
@@ -134,6 +137,36 @@ def travel_table(curves: Mapping[str, pd.DataFrame]) -> Table:
     cells = pd.concat([curve.assign(category=category) for category, curve in curves.items()])
     title = "Error against travel"
     return Table("travel", title, title, cells, header=(), rows=(), decimals=6)
+
+
+@mpl.rc_context(RC)
+def rotation_figure(cells: pd.DataFrame) -> Figure:
+    """Draw the cells of `studies.rotation_tables.orientation_table`, a panel for each group."""
+    way = cells["method"].str.split("_", expand=True)
+    cells = cells.assign(order=way[0], rule=way[1])
+    # Two abreast are readable on a telephone.
+    grid = panel_grid(cells["group"].nunique(), 2.7, 2.5, abreast=(2,))
+    for axes, (group, part) in zip(grid.panels, cells.groupby("group", sort=False), strict=True):
+        curves = part.set_index("rule").groupby("order", sort=False)[["n_views", "error_deg"]]
+        for order in ("random", "opposite", "recommended"):
+            curve = curves.get_group(order)
+            fixed = curve[curve.index.isin(NUMBERS)]
+            _draw(axes, fixed["n_views"], fixed["error_deg"], order, ("recommended",))
+            if order != "opposite":
+                stop = curve[curve.index.isin(PROBABILITIES)].sort_values("n_views")
+                color = method_style(order, ("recommended",)).color
+                label = f"{method_label(order)}, until probable"
+                axes.plot(stop["n_views"], stop["error_deg"], ".-", color=color, label=label)
+        decision = curves.get_group("recommended").loc[["decision"]]
+        mark: Any = {"marker": "*", "markersize": 11, "color": INK, "linestyle": "none"}
+        axes.plot(*decision.to_numpy().T, label="Recommended, by decision", zorder=3, **mark)
+        axes.set_title(category_label(str(group)))
+        axes.set_xticks(range(1, MOST_VIEWS + 1))
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel("Mean number of views")
+        axes.set_ylabel("Mean error (degrees)")
+    _add_key(grid)
+    return grid.figure
 
 
 def _draw(axes: Axes, x: pd.Series, y: pd.Series, method: str, methods: tuple[str, ...]) -> None:

@@ -159,6 +159,12 @@ class Studies:
         return [(category, fold) for category in categories for fold in self.run.folds]
 
     @property
+    def judged_folds(self) -> list[tuple[str, int]]:
+        """Those of `category_folds` that the study `rotations` judges."""
+        judged = self.run.config["rotations"]["judged_folds"] or self.run.folds
+        return [(category, fold) for category, fold in self.category_folds if fold in judged]
+
+    @property
     def shape_folds(self) -> list[tuple[str, int]]:
         """`category_folds`, and one fold of each solid, whose objects are all the same."""
         return self.category_folds + [(name, 1) for name in SOLIDS]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,14 +13,16 @@ from nbv.experiment.report.table import DECIDED, Cell, Part, Row, Table, differe
 from nbv.experiment.statistics.metrics import Floats, Interval, percentile_interval
 from nbv.labels import category_label, counted, interval_text, number
 from nbv.tables.next_camera import CameraRecommendation
+from studies.rotations import MOST_VIEWS
 from studies.solids import SOLIDS, solid
 from studies.trainings import crossed_mean
 
 FIGURES = ("error_deg", "above_30", "n_views")
-"""Columns of every instance and method; an object's are the means over its instances."""
+"""Means over the first views of every instance; an object's are the means over its instances."""
 
 LESS = {
     "less_random": "less random",
+    "less_opposite": "less opposite",
     "less_chance": "less chance, the instance's mean number",
     "less_chance_overall": "less chance, the overall mean number",
 }
@@ -66,60 +68,53 @@ def by_symmetry(objects: Sequence[str], models_info: Mapping[str, Any]) -> dict[
     }
 
 
-STOPS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
-    "decision": lambda rows: rows["verdict"] != "one more view",
-    "belief": lambda rows: rows["probability"] >= CameraRecommendation.STOP_PROBABILITY,
-    "score": lambda rows: rows["flip_ratio"] <= SCORE_ENOUGH,
+NUMBERS = {str(n): f"n_views == {n}" for n in range(1, MOST_VIEWS + 1)}
+STOPS = {
+    "decision": "verdict != 'one more view'",
+    "belief": f"probability >= {CameraRecommendation.STOP_PROBABILITY}",
+    "score": "flip_ratio <= 0.5",
 }
-"""Rules to stop after a view: the product's decision, its probability, and the score alone."""
+"""Queries of rows: the product's decision, its probability, and the score alone are enough."""
 
-SCORE_ENOUGH = 0.5
-"""Likelihood ratio of a flip, given the score of the last view, that is enough."""
+PROBABILITIES = {
+    str(p): f"probability >= {p}" for p in (0.5, 0.7, 0.8, 0.9, 0.95, 0.97, 0.98, 0.99, 0.995)
+}
+"""Other probabilities that may be enough, for the figure."""
 
 
-def stopped(walks: pd.DataFrame, is_enough: pd.Series) -> pd.DataFrame:
+def stopped(walks: pd.DataFrame, rule: str) -> pd.DataFrame:
     """Return the row of each walk at which it stops: the first that is enough, else the last."""
     walk = ["instance", "first", "order"]
     if "training" in walks:
         walk.append("training")
     # Rows are in the order of views.
     last = walks.groupby(walk, sort=False).tail(1)
-    return pd.concat([walks[is_enough], last]).groupby(walk, sort=False).head(1)
+    return pd.concat([walks.query(rule), last]).groupby(walk, sort=False).head(1)
 
 
 def method_errors(walks: pd.DataFrame) -> pd.DataFrame:
     """Return figures of each instance (index) and method; columns are (figure, method).
 
-    Methods are ``<order>_<number of views>`` and ``<order>_<rule of STOPS>``. Figures are the mean
-    error, the share above 30 degrees, and the mean number of views; and for each rule the error of
-    the same order of views where the number of views is drawn by chance, with the rule's mean
-    number of the instance (``chance``) or of all instances (``chance_overall``).
+    Methods are ``<order>_<number of views>`` and ``<order>_<rule>``. Figures are `FIGURES`, and the
+    error of the same order of views where the number of views is drawn by chance, with the method's
+    mean number of the instance (``chance``) or of all instances (``chance_overall``).
     """
     index = ["object_id", *(["training"] if "training" in walks else []), "instance"]
     walks = walks.assign(above_30=walks["error_deg"] > 30)
-    figures: dict[tuple[str, str], pd.Series] = {}
+    figures = {}
     for order, rows in walks.groupby("order", sort=False):
-        fixed = {}
-        for n_views in range(1, int(rows["n_views"].max()) + 1):
-            at_n = stopped(rows, rows["n_views"] == n_views).groupby(index)
-            fixed[n_views] = at_n["error_deg"].mean()
-            _add(figures, f"{order}_{n_views}", at_n)
-        curve = pd.DataFrame(fixed)
-        for rule, is_enough in STOPS.items():
-            method = f"{order}_{rule}"
-            _add(figures, method, stopped(rows, is_enough(rows)).groupby(index))
-            mean_views = figures["n_views", method]
-            overall = mean_views.groupby(level="object_id").mean().mean()
-            for name, at in (("chance", mean_views), ("chance_overall", overall)):
-                values = zip(np.broadcast_to(at, len(curve)), curve.to_numpy(), strict=True)
-                errors = [np.interp(number, curve.columns, each) for number, each in values]
-                figures[name, method] = pd.Series(errors, curve.index)
-    return pd.DataFrame(figures)
-
-
-def _add(figures: dict[tuple[str, str], pd.Series], method: str, groups: Any) -> None:
-    for name in ("error_deg", "above_30", "n_views"):
-        figures[name, method] = groups[name].mean()
+        by_rule = {
+            name: stopped(rows, rule).groupby(index)[[*FIGURES]].mean()
+            for name, rule in (NUMBERS | STOPS | PROBABILITIES).items()
+        }
+        curve = np.stack([by_rule[number]["error_deg"] for number in NUMBERS], axis=1)
+        for rule, means in by_rule.items():
+            overall = means["n_views"].groupby(level="object_id").mean().mean()
+            for name, at in (("chance", means["n_views"]), ("chance_overall", overall)):
+                values = zip(np.broadcast_to(at, len(curve)), curve, strict=True)
+                means[name] = [np.interp(n, range(1, MOST_VIEWS + 1), each) for n, each in values]
+            figures[f"{order}_{rule}"] = means
+    return pd.concat(figures, axis=1).swaplevel(axis=1)
 
 
 def orientation_table(
@@ -153,9 +148,13 @@ def orientation_table(
         for method in errors:
             mean = {name: _mean(of_group[name][method], weights) for name in FIGURES}
             error = mean["error_deg"]
-            order, n_views = str(method).split("_")
-            others = {"less_random": errors[f"random_{n_views}"]} if order != "random" else {}
-            if n_views in STOPS:
+            order, rule = str(method).split("_")
+            others = {
+                f"less_{other}": errors[f"{other}_{rule}"]
+                for other in ("random", "opposite")
+                if order not in ("random", other)
+            }
+            if rule not in NUMBERS:
                 for name in ("chance", "chance_overall"):
                     others[f"less_{name}"] = of_group[name][method]
             less = {name: _mean(errors[method] - other, weights) for name, other in others.items()}
@@ -165,10 +164,12 @@ def orientation_table(
                 | error.columns("error_deg", "ci")
                 | {k: v for name, each in less.items() for k, v in each.columns(name).items()}
             )
+            if rule in PROBABILITIES:
+                continue
             differences = (less.get(name) for name in LESS)
             rows.append(
                 (
-                    Cell(f"{order}, {n_views if n_views.isdigit() else f'until the {n_views}'}"),
+                    Cell(f"{order}, {rule if rule in NUMBERS else f'until the {rule}'}"),
                     Cell(number(mean["n_views"].value)),
                     Cell(interval_text(error.value, error.low, error.high, 1)),
                     Cell(number(100 * mean["above_30"].value, 1)),
@@ -198,6 +199,35 @@ def orientation_table(
             DECIDED,
         ),
     )
+
+
+def reliability_table(walks: pd.DataFrame, groups: Mapping[str, Sequence[str]]) -> Table:
+    """Return the product's probabilities and what came, in five parts of equal size.
+
+    `walks` and `groups` are those of `orientation_table`; the views are in the recommended order.
+    """
+    walks = walks[walks["order"] == "recommended"]
+    cells, parts = [], []
+    for group, objects in groups.items():
+        of_group = walks[walks["object_id"].isin(objects)].sort_values("probability", kind="stable")
+        of_views = {"1": of_group[of_group["n_views"] == 1], "all": of_group}
+        rows = []
+        for part, name in enumerate(("least", "second", "middle", "fourth", "most")):
+            row = [Cell(name)]
+            for n_views, every in of_views.items():
+                place = part * len(every) // 5, (part + 1) * len(every) // 5
+                these = every.iloc[slice(*place)]
+                right = (these["error_deg"] < CameraRecommendation.STOP_WITHIN_DEG).mean()
+                cell = {"n": len(these), "said": these["probability"].mean(), "right": right}
+                cells.append({"group": group, "n_views": n_views, "part": part + 1} | cell)
+                row += [Cell(number(100 * cell[key], 1)) for key in ("said", "right")]
+            rows.append(tuple(row))
+        parts.append(Part(tuple(rows), group))
+    title = f"Probability within {CameraRecommendation.STOP_WITHIN_DEG:g}°"
+    header = ("Fifth", "1 view: said (%)", "right (%)", "all views: said (%)", "right (%)")
+    notes = ("Fifths of first views, or of all views in the recommended order, by probability.",)
+    frame = pd.DataFrame(cells)
+    return Table("rotation_reliability", title, title, frame, header, tuple(parts), notes)
 
 
 def estimator_table(pairs: pd.DataFrame, n_poses: int) -> Table:

@@ -158,9 +158,11 @@ class Panels:
         )
 
 
-def panel_grid(n_panels: int, width_in: float, height_in: float) -> Panels:
-    """Return a figure of panels, three per row unless that leaves two cells or more empty."""
-    columns = min(_ABREAST, key=lambda abreast: max(-n_panels % abreast - 1, 0))
+def panel_grid(
+    n_panels: int, width_in: float, height_in: float, abreast: Sequence[int] = (3, 2, 4)
+) -> Panels:
+    """Return a figure of panels, the first number per row that leaves at most one cell empty."""
+    columns = min(abreast, key=lambda n: max(-n_panels % n - 1, 0))
     columns = min(columns, n_panels)
     rows = -(-n_panels // columns)
     figure = new_figure(max(width_in * columns, 5.4), height_in * rows + 0.4)
@@ -168,9 +170,6 @@ def panel_grid(n_panels: int, width_in: float, height_in: float) -> Panels:
     for left_over in cells[n_panels:]:
         left_over.set_axis_off()
     return Panels(figure, cells[:n_panels], cells[n_panels] if cells[n_panels:] else None)
-
-
-_ABREAST = (3, 2, 4)
 
 
 def mark_azimuth(axes: Axes, azimuth_deg: float, name: str) -> None:

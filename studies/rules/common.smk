@@ -173,11 +173,11 @@ def rotation_file(key):
 
 
 @one_line()
-def rotation_figures(wildcards):
-    """The figures of every instance: of the table that is given, or of every fold."""
+def rotation_walks(wildcards):
+    """The walks of every instance: of the table that is given, or of every judged fold."""
     if CONFIG["rotations"]["pairs"]:
-        return ["<results>/rotations/instances.csv"]
-    return paths(f"{OWN_FOLD}/instances.csv", STUDIES.category_folds)
+        return ["<results>/rotations/walks.csv"]
+    return paths(f"{OWN_FOLD}/walks.csv", STUDIES.judged_folds)
 
 
 @one_line()

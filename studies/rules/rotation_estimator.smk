@@ -119,7 +119,7 @@ use rule evaluate_rotations as evaluate_own_rotations with:
         pairs=f"{OWN_FOLD}/pairs.csv",
         models_info=[],
     output:
-        f"{OWN_FOLD}/instances.csv",
+        f"{OWN_FOLD}/walks.csv",
     log:
         "<logs>/evaluate_own_rotations/{category}/fold{fold}.log",
     benchmark:

@@ -1,5 +1,5 @@
-# Two views of an estimator in three dimensions: of a table of pairs, which needs no training, or of
-# the study's own estimators.
+# Up to four views of an estimator in three dimensions: of a table of pairs, which needs no
+# training, or of the study's own estimators.
 
 
 rule evaluate_rotations:
@@ -8,7 +8,7 @@ rule evaluate_rotations:
         pairs=lambda wildcards: rotation_file("pairs"),
         models_info=lambda wildcards: rotation_file("models_info"),
     output:
-        "<results>/rotations/instances.csv",
+        "<results>/rotations/walks.csv",
     log:
         "<logs>/evaluate_rotations.log",
     benchmark:
@@ -19,7 +19,8 @@ rule evaluate_rotations:
         mem_mb=per_attempt(2000),
         runtime=per_attempt(60),
     params:
-        settings=CONFIG["rotations"],
+        settings={key: CONFIG["rotations"][key] for key in ("objects", "score_objects")},
+        seed=CONFIG["seed"],
     script:
         "../scripts/evaluate_rotations.py"
 
@@ -27,11 +28,16 @@ rule evaluate_rotations:
 rule rotations:
     input:
         code=sources("tabulate_rotations"),
-        figures=rotation_figures,
+        walks=rotation_walks,
         models_info=lambda wildcards: rotation_file("models_info"),
     output:
         csv="<results>/tables/rotations.csv",
         md="<results>/tables/rotations.md",
+        reliability_csv="<results>/tables/rotation_reliability.csv",
+        reliability_md="<results>/tables/rotation_reliability.md",
+        png="<results>/figures/rotations.png",
+        pdf="<results>/figures/rotations.pdf",
+        svg="<results>/figures/rotations.svg",
     log:
         "<logs>/rotations.log",
     benchmark:

@@ -1,4 +1,4 @@
-"""Evaluate every pair of views of every instance, with calibration on other instances."""
+"""Walk from every first view of every instance, with calibration on other instances."""
 
 from nbv.experiment.run.jobs import job
 
@@ -7,6 +7,6 @@ with job(snakemake):
 
     from nbv.files import write_csv
 
-    given = snakemake.input
-    figures = evaluate(given.pairs, given.models_info or None, snakemake.params.settings)
-    write_csv(snakemake.output[0], figures)
+    given, params = snakemake.input, snakemake.params
+    walks = evaluate(given.pairs, given.models_info or None, params.settings, params.seed)
+    write_csv(snakemake.output[0], walks, decimals=6)

@@ -120,6 +120,7 @@ def test_values_are_plain_python_which_is_all_that_snakemake_compares():
         ("elevations_deg.mug=[95]", "elevations_deg.mug[0]=95: input should be less than or"),
         ("density.bandwidths_deg=[8,8.0]", "density.bandwidths_deg=[8, 8.0]: 8.0 occurs twice"),
         ("transfer.folds=[6]", "transfer.folds=[6] is out of range: 1 to n_folds=5"),
+        ("rotations.judged_folds=[0]", "rotations.judged_folds=[0] is out of range"),
         ("camera.distance=900", "camera.distance=900 with camera.fov_deg=25 and camera."),
         ("estimator.kind=classifier", "it needs both"),
         ("estimator.n_classes=72", "a classifier has n_classes"),

@@ -160,7 +160,8 @@ def test_a_bundle_is_trained_without_each_ingredient_and_by_each_replicate():
 
 
 def test_rotations_are_estimated_by_networks_with_calibration_objects_alone():
-    studies = studies_of("categories=[mug]")
+    studies = studies_of("categories=[mug]", "rotations.judged_folds=[2]")
+    assert studies.judged_folds == [("mug", 2)]
     assert studies.category_folds == [("mug", 1), ("mug", 2)]
     assert studies.shape_folds[:3] == [("mug", 1), ("mug", 2), ("tetrahedron", 1)]
     crossfit = ("calibration=crossfit", "crossfit_epochs=1")

@@ -11,7 +11,6 @@ from typing import Annotated, Literal, Self, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from nbv.core.circle.selection import AFFINITY
-from nbv.core.orientations.errors import OrientationErrors
 from nbv.core.seeds import FIRST_FEATURE_SEED
 from nbv.errors import UserError, nearest
 from nbv.experiment.splits import enough_objects
@@ -350,9 +349,7 @@ class Rotations(Section):
     models_info: DataPath | None = None
     objects: Annotated[list[Text], Distinct] = []
     score_objects: Annotated[list[Text], Distinct] = []
-    concentration: Annotated[Number, Field(gt=0)] = OrientationErrors.concentration
-    pseudo_observations: Annotated[Number, Field(gt=0)] = OrientationErrors.pseudo_observations
-    flip_deg: Annotated[Number, Field(gt=0, lt=180)] = OrientationErrors.flip_deg
+    judged_folds: Annotated[list[Whole], Distinct] = []
     turns: Annotated[Whole, Field(ge=2, le=10_000)] = 16
     views: Annotated[Whole, Field(ge=1, le=360)] = 24
     poses: Annotated[Whole, Field(ge=24, le=100_000)] = 4608
@@ -441,7 +438,9 @@ class Config(Section):
                 f"n_objects={self.n_objects} is out of range: enough to train, calibrate and test "
                 "in each of n_folds, or null for all"
             )
-        folds = self.transfer.folds or []
-        if not set(folds) <= set(range(1, self.n_folds + 1)):
-            raise UserError(f"transfer.folds={folds} is out of range: 1 to n_folds={self.n_folds}")
+        judged = {"transfer.folds": self.transfer.folds or []}
+        judged["rotations.judged_folds"] = self.rotations.judged_folds
+        for key, folds in judged.items():
+            if not set(folds) <= set(range(1, self.n_folds + 1)):
+                raise UserError(f"{key}={folds} is out of range: 1 to n_folds={self.n_folds}")
         return self
