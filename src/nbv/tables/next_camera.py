@@ -19,7 +19,6 @@ from nbv.core.orientations.criteria import (
     NextViews,
     bayes_error,
     chances_within,
-    ranking,
     view_angle_deg,
 )
 from nbv.core.orientations.errors import OrientationErrors
@@ -215,7 +214,7 @@ def recommend_camera(
     ahead = NextViews(now, targets[free] @ first.T)
     cost, within = bayes_error(ahead), chances_within(ahead, WITHIN_DEG)
     if errors.depends_on_view:
-        ranked = ranking(cost, travel[free])
+        ranked = np.lexsort((travel[free], cost.round(9)))
     else:
         # All are equal, but errors of neighbouring views are not independent.
         near = np.where(apart[free] >= INDEPENDENT_DEG, travel[free], 1000 - apart[free])
