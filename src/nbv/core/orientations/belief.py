@@ -6,7 +6,6 @@ pose here is in the first camera, so a rotation of the world changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,7 +78,7 @@ def belief(
     errors: OrientationErrors,
     estimates: Orientations,
     moves: Orientations,
-    scores: Sequence[float] | Array | None = None,
+    ratios: Array | None = None,
 ) -> OrientationBelief:
     """Return the belief after n views: V of the first estimate, times L of each further one.
 
@@ -90,13 +89,11 @@ def belief(
         The estimate in each view.
     moves : ndarray (n, 3, 3)
         Moves from the first camera to each camera; the first is the identity.
-    scores : (n,), optional
-        The estimator's scores.
+    ratios : ndarray (n,), optional
+        Likelihood ratios of a flip, given each estimate's score; by default 1.
     """
     support, votes = _support(errors, inverse(moves) @ estimates)
-    ratios = np.ones(len(votes))
-    if scores is not None and errors.ratio is not None:
-        ratios = errors.ratio(scores)
+    ratios = np.ones(len(votes)) if ratios is None else ratios
     weights = errors.conditional("estimate", support, None, votes[:1], ratios[0])[0, 0]
     for vote, move, ratio in zip(votes[1:], moves[1:], ratios[1:], strict=True):
         likelihood = errors.conditional("truth", support, move[None])[0, :, vote]
@@ -124,17 +121,12 @@ def _support(
 
 
 def hypotheses_belief(
-    errors: OrientationErrors,
-    hypotheses: Orientations,
-    scores: Sequence[float] | Array | None = None,
+    errors: OrientationErrors, hypotheses: Orientations, ratios: Array
 ) -> OrientationBelief:
     """Return the belief after one view whose estimator gave several poses (n, 3, 3), best first.
 
-    It is the mean of V of each, weighted by the likelihood that it is no flip, given its score.
+    It is the mean of V of each, weighted by the likelihood that it is no flip, 1 / `ratios` (n,).
     """
     support, votes = _support(errors, hypotheses)
-    ratios = np.ones(len(hypotheses))
-    if scores is not None and errors.ratio is not None:
-        ratios = errors.ratio(scores)
     rows = errors.conditional("estimate", support, None, votes, ratios[:, None])[0]
     return OrientationBelief(support, (1 / ratios / (1 / ratios).sum()) @ rows, votes, errors)

@@ -160,18 +160,17 @@ class OrientationErrors:
     @cached_property
     def _correlation(self) -> float:
         """Correlation of the errors, without flips, of two views of a group, in [0, 1]."""
-        if self.group is None:
-            return 1.0
         truth, labels = self.truth[~self.is_flip], self.labels[~self.is_flip]
+        n = np.bincount(labels)
+        if not (n_pairs := int((n * (n - 1)).sum())):
+            return 1.0
         relative = inverse(truth) @ self.symmetry.nearest(self.estimate[~self.is_flip], truth)
         from scipy.spatial.transform import Rotation
 
-        error = Rotation.from_matrix(relative).as_rotvec() if len(truth) else np.zeros((0, 3))
-        sums, n = np.zeros((int(self.labels.max()) + 1, 3)), np.bincount(labels)
+        error = Rotation.from_matrix(relative).as_rotvec()
+        sums = np.zeros((len(n), 3))
         np.add.at(sums, labels, error)
-        squares = np.square(error).sum()
-        n_pairs = float((n * (n - 1)).sum())
-        if not n_pairs or not squares:
+        if not (squares := np.square(error).sum()):
             return 1.0
         products = np.square(sums).sum() - squares
         return float(np.clip(products / n_pairs / (squares / len(error)), 0, 1))
@@ -212,11 +211,6 @@ class OrientationErrors:
     def _kinds(self) -> dict[Given, _Kinds]:
         v = _Kinds.of(self, self.estimate, self.truth)
         return {"estimate": v, "truth": _Kinds.of(self, self.truth, self.estimate)}
-
-    def flip_probability(self, poses: Orientations, given: Given) -> Array:
-        """Return the probability of a flip for each estimated or true pose (n, 3, 3)."""
-        counts = self._counts(poses, given)
-        return np.asarray(1 - counts[:, 0] / counts.sum(axis=1))
 
     def _counts(self, poses: Orientations, given: Given) -> Array:
         """Return weighted counts of right estimates, and of each kind of flips, (n, 1 + J)."""
