@@ -93,8 +93,6 @@ class Answer(Generic[AnyMove]):
         unknown.
     no_flips : bool
         Whether calibration shows no flips of the object: enough, unless limits are given.
-    caveat : str
-        What to know of an answer that is enough, after its reason.
     """
 
     STOP_PROBABILITY: ClassVar[float | None] = None
@@ -106,7 +104,6 @@ class Answer(Generic[AnyMove]):
     warnings: tuple[str, ...] = ()
     helps: bool | None = None
     no_flips: bool = False
-    caveat: str = ""
 
     @property
     def move(self) -> AnyMove | None:
@@ -174,7 +171,7 @@ class Answer(Generic[AnyMove]):
             p = self.probability(within_deg)
             is_met[_chance(p, within_deg)] = p >= least
         if is_met and all(is_met.values()):
-            return Decision("enough", ", ".join(is_met) + self.caveat)
+            return Decision("enough", ", ".join(is_met))
         if (move := self.move) is None:
             return Decision("no view helps", NO_MOVE)
         if self.helps is False:

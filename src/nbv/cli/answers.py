@@ -91,7 +91,7 @@ _KEYS = (
 _MOVE_KEYS = ("rotation_deg", "travel_deg", "expected_error_deg", "probability_within")
 """Keys of every move, in this order."""
 
-_NOT_IN_JSON = ("crops", "n_views", "moves", "helps", "no_flips", "caveat", "pose_belief")
+_NOT_IN_JSON = ("crops", "n_views", "moves", "helps", "no_flips", "pose_belief")
 
 
 def show_answer(

@@ -10,10 +10,8 @@ from scipy.spatial.transform import Rotation
 from nbv.core.orientations.errors import OrientationErrors
 from nbv.core.orientations.group import ASYMMETRIC, Array, Orientations, chordal_mean, inverse
 
-LARGE_DEG = OrientationErrors.flip_deg
-
 CONSTANT_SHARE = 0.8
-"""A constant rotation is named if its correction leaves this share of errors below `LARGE_DEG`."""
+"""A constant rotation is named if its correction leaves this share of errors below 20°."""
 
 FEWEST_ALIKE = 5
 """Fewer large errors may be alike by chance."""
@@ -25,10 +23,10 @@ def describe_large_errors(errors: OrientationErrors) -> str:
     sides = {"R_true C": False, "C R_true": True} if flips.mean() > 0.5 else {}
     for form, in_camera in sides.items():
         rotation, left_deg = shared_rotation(errors, in_camera=in_camera)
-        if (share := (left_deg < LARGE_DEG).mean()) >= CONSTANT_SHARE:
+        if (share := (left_deg < errors.flip_deg).mean()) >= CONSTANT_SHARE:
             constants.append(
                 f"R_estimate = {form} with C = {named(rotation)} (corrected, {share:.0%} of errors "
-                f"are below {LARGE_DEG:g}°, and {left_deg.mean():.1f}° on average)"
+                f"are below {errors.flip_deg:g}°, and {left_deg.mean():.1f}° on average)"
             )
     if constants:
         return (
@@ -39,7 +37,7 @@ def describe_large_errors(errors: OrientationErrors) -> str:
     if (n := len(large.truth)) < FEWEST_ALIKE:
         return ""
     rotation, left_deg = shared_rotation(large)
-    n_alike, shared = int((left_deg < LARGE_DEG).sum()), named(rotation)
+    n_alike, shared = int((left_deg < errors.flip_deg).sum()), named(rotation)
     if n_alike <= n / 2:
         near = errors.symmetry.nearest(large.truth, large.estimate)
         axes = Rotation.from_matrix(inverse(large.estimate) @ near).as_rotvec()
@@ -79,10 +77,10 @@ def shared_rotation(
         about = Rotation.from_rotvec(np.outer(np.arange(0, 360, 30), axis), degrees=True)
         twins = (symmetry.discrete[:, None] @ about.as_matrix()).reshape(-1, 1, 3, 3)
         tried = estimate[some] @ inverse(truth[some] @ twins)
-    rotation = max(tried.reshape(-1, 3, 3), key=lambda c: np.sum(offsets(c)[1] < LARGE_DEG))
+    rotation = max(tried.reshape(-1, 3, 3), key=lambda c: np.sum(offsets(c)[1] < errors.flip_deg))
     for _ in range(3):
         offset, left_deg = offsets(rotation)
-        rotation = chordal_mean(offset[left_deg < LARGE_DEG])
+        rotation = chordal_mean(offset[left_deg < errors.flip_deg])
     return rotation, offsets(rotation)[1]
 
 

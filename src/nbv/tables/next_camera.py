@@ -19,7 +19,6 @@ from nbv.core.orientations.criteria import (
     NextViews,
     bayes_error,
     chances_within,
-    ranking,
     view_angle_deg,
 )
 from nbv.core.orientations.errors import OrientationErrors
@@ -41,10 +40,10 @@ NO_DEPENDENCE = (
     f"travel, those {INDEPENDENT_DEG:g}° or more from every view first"
 )
 
-NO_SCORES = "scores are not used: calibration pairs had none"
-
-
-NO_SCORE_STOP = "; this rests on little: without the estimator's score flips are hard to tell"
+NO_SCORES = (
+    "no scores, of the estimate or of calibration: flips are hard to tell, and a stop rests on "
+    "little"
+)
 
 
 @dataclass(frozen=True)
@@ -188,11 +187,14 @@ def recommend_camera(
     seen = np.stack(
         [c.straight_from_camera @ e.rotation for c, e in zip(cameras, estimates, strict=True)]
     )
+    ratios, warnings = np.ones(len(seen)), [NO_SCORES]
+    if scores is not None and errors.ratio is not None:
+        ratios, warnings = errors.ratio(scores), []
     if is_posed:
-        now = belief(errors, seen, straight_from_base @ first.T, scores)
+        now = belief(errors, seen, straight_from_base @ first.T, ratios)
     else:
         order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
-        now = hypotheses_belief(errors, seen[order], None if scores is None else scores[order])
+        now = hypotheses_belief(errors, seen[order], ratios[order])
     position = estimates[-1].position_mm
     place = None if position is None else (cameras[-1].pose @ np.append(position / 1000, 1.0))[:3]
     if isinstance(candidates, int):
@@ -215,11 +217,12 @@ def recommend_camera(
     ahead = NextViews(now, targets[free] @ first.T)
     cost, within = bayes_error(ahead), chances_within(ahead, WITHIN_DEG)
     if errors.depends_on_view:
-        ranked = ranking(cost, travel[free])
+        ranked = np.lexsort((travel[free], cost.round(9)))
     else:
         # All are equal, but errors of neighbouring views are not independent.
         near = np.where(apart[free] >= INDEPENDENT_DEG, travel[free], 1000 - apart[free])
         ranked = np.argsort(near, kind="stable")
+        warnings.insert(0, NO_DEPENDENCE)
     moves = [
         CameraMove(
             index=int(free[k]),
@@ -234,9 +237,6 @@ def recommend_camera(
         )
         for k, pose in ((k, poses[free[k]]) for k in ranked)
     ]
-    warnings = () if errors.depends_on_view else (NO_DEPENDENCE,)
-    if scores is not None and errors.ratio is None:
-        warnings = (*warnings, NO_SCORES)
     within_now = [now.probability_within(error_deg) for error_deg in WITHIN_DEG]
     return CameraRecommendation(
         rotation=cameras[-1].straight_from_camera.T @ last @ first.T @ now.pose,
@@ -245,8 +245,7 @@ def recommend_camera(
         moves=tuple(moves),
         depends_on_view=errors.depends_on_view,
         pose_belief=now,
-        caveat=NO_SCORE_STOP if scores is None or errors.ratio is None else "",
-        warnings=warnings,
+        warnings=tuple(warnings),
         helps=bool(cost[ranked[0]] < HELPFUL * now.error_deg),
         no_flips=not errors.is_flip.any(),
     )

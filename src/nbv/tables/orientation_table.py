@@ -157,7 +157,6 @@ class OrientationTable:
 
     @cached_property
     def _errors(self) -> dict[str, OrientationErrors]:
-        ratio = self.score_ratio()
         rows = {name: self.object_id == name for name in self.object_ids}
         has_groups = bool((self.group != "").all())
         errors = {
@@ -165,29 +164,20 @@ class OrientationTable:
                 self.estimate[k],
                 self.truth[k],
                 self.symmetry(name),
-                ratio=ratio,
                 group=self.group[k] if has_groups else None,
             )
             for name, k in rows.items()
         }
+        flips = np.concatenate([each.is_flip for each in errors.values()])
+        share, ratio = (flips.sum() + 0.5) / (len(flips) + 1), None
+        if self.score is not None:
+            scores = np.concatenate([self.score[k] for k in rows.values()])
+            ratio = ScoreRatio.fit(scores, flips)
         strength = shrinkage(list(errors.values()))
-        n_flips = sum(int(each.is_flip.sum()) for each in errors.values())
-        share = (n_flips + 0.5) / (len(self.object_id) + 1)
         return {
-            name: replace(each, share=share, pseudo_observations=strength)
+            name: replace(each, share=share, pseudo_observations=strength, ratio=ratio)
             for name, each in errors.items()
         }
-
-    def score_ratio(self, flip_deg: float = FLIP_DEG) -> ScoreRatio | None:
-        """Return what a score says about a flip of any object, if the pairs have scores."""
-        if self.score is None or not np.isfinite(self.score).all():
-            return None
-        rows = [(name, self.object_id == name) for name in self.object_ids]
-        error_deg = [
-            self.symmetry(name).distance_deg(self.estimate[k], self.truth[k]) for name, k in rows
-        ]
-        scores = np.concatenate([self.score[k] for _, k in rows])
-        return ScoreRatio.fit(scores, np.concatenate(error_deg) > flip_deg)
 
     def where(self, rows: NDArray[np.bool_]) -> OrientationTable:
         """Return the table of some of the pairs (n,)."""

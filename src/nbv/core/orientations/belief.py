@@ -6,7 +6,6 @@ pose here is in the first camera, so a rotation of the world changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,7 +78,7 @@ def belief(
     errors: OrientationErrors,
     estimates: Orientations,
     moves: Orientations,
-    scores: Sequence[float] | Array | None = None,
+    ratios: Array | None = None,
 ) -> OrientationBelief:
     """Return the belief after n views: V of the first estimate, times L of each further one.
 
@@ -90,40 +89,26 @@ def belief(
         The estimate in each view.
     moves : ndarray (n, 3, 3)
         Moves from the first camera to each camera; the first is the identity.
-    scores : (n,), optional
-        The estimator's scores.
+    ratios : ndarray (n,), optional
+        Likelihood ratios of a flip, given each estimate's score; by default 1.
     """
     support, votes = _support(errors, inverse(moves) @ estimates)
-    weights = _weights(errors, support, votes, np.arange(len(support)), moves, scores)
-    return OrientationBelief(support, weights / weights.sum(), votes, errors)
-
-
-def _weights(
-    errors: OrientationErrors,
-    support: Orientations,
-    votes: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    moves: Orientations,
-    scores: Sequence[float] | Array | None,
-) -> Array:
-    """Return V L … L, up to a factor, at some poses of the support, rows (r,)."""
-    ratios = np.ones(len(votes))
-    if scores is not None and errors.ratio is not None:
-        ratios = errors.ratio(scores)
-    weights = errors.conditional("estimate", support, None, votes[:1], ratios[0])[0, 0, rows]
+    ratios = np.ones(len(votes)) if ratios is None else ratios
+    weights = errors.conditional("estimate", support, None, votes[:1], ratios[0])[0, 0]
     for vote, move, ratio in zip(votes[1:], moves[1:], ratios[1:], strict=True):
-        likelihood = errors.conditional("truth", support, move[None], rows)[0, :, vote]
+        likelihood = errors.conditional("truth", support, move[None])[0, :, vote]
         # The score rates the estimate; without a flip the estimate is the truth.
-        weights = weights * likelihood * np.where(rows == vote, 1.0, ratio)
+        weights = weights * likelihood * np.where(np.arange(len(support)) == vote, 1.0, ratio)
         weights = weights / weights.sum()
-    return np.asarray(weights)
+    return OrientationBelief(support, weights, votes, errors)
 
 
 def _support(
     errors: OrientationErrors, seen: Orientations
 ) -> tuple[Orientations, NDArray[np.intp]]:
     """Return the support, and the index in it of each of the estimates (n, 3, 3)."""
-    symmetry, possible = errors.symmetry, errors.possible_poses(seen[0])
+    symmetry = errors.symmetry
+    possible = symmetry.canonical(seen[:1]) @ errors.possible
     votes = np.full(len(seen), -1)
     means: list[Orientations] = []
     for i in range(len(seen)):
@@ -135,40 +120,13 @@ def _support(
     return apart(np.stack(means), possible[1:], SAME_DEG, symmetry), votes
 
 
-def average(
-    errors: OrientationErrors, estimates: Orientations, moves: Orientations
-) -> Orientations:
-    """Return the mean (3, 3) of estimates (n, 3, 3), each moved back to the first view (Eq. 7)."""
-    return errors.symmetry.mean(inverse(moves) @ estimates)
-
-
-def posterior(
-    errors: OrientationErrors,
-    estimates: Orientations,
-    moves: Orientations,
-    scores: Sequence[float] | Array | None = None,
-) -> Orientations:
-    """Return the pose (3, 3) of `belief` after all views, V of the first and L of the others."""
-    support, votes = _support(errors, inverse(moves) @ estimates)
-    voted = np.unique(votes)  # The belief is needed nowhere else.
-    if len(voted) == 1:
-        return np.asarray(support[voted[0]])
-    weights = _weights(errors, support, votes, voted, moves, scores)
-    return np.asarray(support[voted[np.argmax(weights)]])
-
-
 def hypotheses_belief(
-    errors: OrientationErrors,
-    hypotheses: Orientations,
-    scores: Sequence[float] | Array | None = None,
+    errors: OrientationErrors, hypotheses: Orientations, ratios: Array
 ) -> OrientationBelief:
     """Return the belief after one view whose estimator gave several poses (n, 3, 3), best first.
 
-    It is the mean of V of each, weighted by the likelihood that it is no flip, given its score.
+    It is the mean of V of each, weighted by the likelihood that it is no flip, 1 / `ratios` (n,).
     """
     support, votes = _support(errors, hypotheses)
-    ratios = np.ones(len(hypotheses))
-    if scores is not None and errors.ratio is not None:
-        ratios = errors.ratio(scores)
     rows = errors.conditional("estimate", support, None, votes, ratios[:, None])[0]
     return OrientationBelief(support, (1 / ratios / (1 / ratios).sum()) @ rows, votes, errors)

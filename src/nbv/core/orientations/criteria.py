@@ -1,15 +1,13 @@
-"""Criteria for the next camera pose, by orientations (docs/method.md)."""
+"""The expected error of the pose after the next view, by orientations (docs/method.md)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nbv.core.choose import entropy, expected_entropy, mixed, named
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief
 from nbv.core.orientations.group import Array, Orientations, viewing_direction
 
@@ -33,30 +31,6 @@ class NextViews:
     def likelihood(self) -> Array:
         """L of each pose of the support in each view, (k, m, m)."""
         return self.belief.errors.conditional("truth", self.belief.support, self.moves)
-
-
-def pose_ambiguity(ahead: NextViews) -> Array:
-    """Return the entropy of the pose after two views, by Eqs. 1 to 6 with T = V, (k,) in nats.
-
-    Raises
-    ------
-    ValueError
-        If the belief is after more than one view: Eq. 6 has one factor for each of two views.
-    """
-    first = ahead.belief
-    if len(first.votes) > 1:
-        raise ValueError(f"pose_ambiguity is defined for two views, not {len(first.votes) + 1}")
-    pose = first.errors.conditional("estimate", first.support)[0]
-    moved = first.errors.conditional("estimate", first.support, ahead.moves)
-    return np.asarray(entropy(mixed(first.probability[None], pose, moved)[:, 0]))
-
-
-def information_gain(ahead: NextViews) -> Array:
-    """Return the expected entropy of the pose after the next view, (k,) in nats."""
-    first, likelihood = ahead.belief, ahead.likelihood
-    noise = entropy(likelihood) @ first.probability
-    predicted = first.probability @ likelihood
-    return np.asarray(expected_entropy(entropy(first.probability), noise, predicted))
 
 
 def bayes_error(ahead: NextViews) -> Array:
@@ -107,32 +81,7 @@ def chances_within(ahead: NextViews, errors_deg: Sequence[float]) -> Array:
     return np.asarray((1 - expected_losses(ahead, losses)) * np.reshape(shares, (-1, 1)))
 
 
-Criterion = Callable[[NextViews], Array]
-CRITERIA: dict[str, Criterion] = {
-    "pose_ambiguity": pose_ambiguity,
-    "information_gain": information_gain,
-    "bayes_error": bayes_error,
-}
-"""Criteria: the cost (k,) of each of the next views, lower is better."""
-
-
 def view_angle_deg(moves: Orientations) -> Array:
     """Return the angle (k,) between the viewing directions before and after moves, in [0, 180]."""
     forward = viewing_direction(moves)[..., 2]
     return np.degrees(np.arccos(np.clip(-forward, -1, 1)))
-
-
-def costs_of(criterion: str, ahead: NextViews) -> Array:
-    """Return the costs (k,) of the next views by a criterion's name.
-
-    Raises
-    ------
-    UserError
-        For an unknown criterion.
-    """
-    return named("criterion", criterion, CRITERIA)(ahead)
-
-
-def ranking(costs: Array, travel_deg: Array) -> NDArray[np.intp]:
-    """Return the order of moves (..., k) by costs (..., k), least first; ties go by travel."""
-    return np.lexsort((travel_deg, np.round(costs, 9)), axis=-1)

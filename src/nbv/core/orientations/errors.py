@@ -3,8 +3,7 @@
 An estimator has similar errors where it sees the object from similar directions, whatever the
 camera's roll. Pairs are weighted by a kernel in this direction: the estimate's for V, the truth's
 for L. A pair with a small error says that the estimate is right there. A pair with a larger error,
-a flip, says where the pose is instead. Without small errors (`flip_deg` = 0) this is a kernel
-density; on the circle it is that of `nbv.core.circle.density`, which a test shows.
+a flip, says where the pose is instead.
 """
 
 from __future__ import annotations
@@ -120,9 +119,6 @@ class OrientationErrors:
         A larger error is a flip.
     share : float, optional
         Share of flips of all objects, towards which that of this one is shrunk.
-    offsets : ndarray (m, 3, 3), optional
-        Possible poses relative to the estimate; the first is the identity. By default the kinds of
-        flips and about even poses `SPACING_DEG` apart.
     ratio : ScoreRatio, optional
         Needed where estimates have scores.
     group : ndarray (n,), optional
@@ -136,7 +132,6 @@ class OrientationErrors:
     pseudo_observations: float = FIXED_STRENGTH
     flip_deg: float = 20.0
     share: float | None = None
-    offsets: Orientations | None = None
     ratio: ScoreRatio | None = None
     group: NDArray[Any] | None = None
 
@@ -165,18 +160,17 @@ class OrientationErrors:
     @cached_property
     def _correlation(self) -> float:
         """Correlation of the errors, without flips, of two views of a group, in [0, 1]."""
-        if self.group is None:
-            return 1.0
         truth, labels = self.truth[~self.is_flip], self.labels[~self.is_flip]
+        n = np.bincount(labels)
+        if not (n_pairs := int((n * (n - 1)).sum())):
+            return 1.0
         relative = inverse(truth) @ self.symmetry.nearest(self.estimate[~self.is_flip], truth)
         from scipy.spatial.transform import Rotation
 
-        error = Rotation.from_matrix(relative).as_rotvec() if len(truth) else np.zeros((0, 3))
-        sums, n = np.zeros((int(self.labels.max()) + 1, 3)), np.bincount(labels)
+        error = Rotation.from_matrix(relative).as_rotvec()
+        sums = np.zeros((len(n), 3))
         np.add.at(sums, labels, error)
-        squares = np.square(error).sum()
-        n_pairs = float((n * (n - 1)).sum())
-        if not n_pairs or not squares:
+        if not (squares := np.square(error).sum()):
             return 1.0
         products = np.square(sums).sum() - squares
         return float(np.clip(products / n_pairs / (squares / len(error)), 0, 1))
@@ -198,10 +192,11 @@ class OrientationErrors:
 
     @cached_property
     def possible(self) -> Orientations:
-        """The `offsets` (m, 3, 3), or their default."""
-        if self.offsets is not None:
-            return self.offsets
-        kinds = self._kinds("estimate").rotations
+        """Possible poses (m, 3, 3) relative to an estimate; the first is the identity.
+
+        They are the kinds of flips, and about even poses `SPACING_DEG` apart.
+        """
+        kinds = self._kinds["estimate"].rotations
         kinds = apart(np.eye(3)[None], kinds, SAME_DEG, self.symmetry)
         return apart(kinds, spiral(2000), SPACING_DEG, self.symmetry)
 
@@ -212,29 +207,14 @@ class OrientationErrors:
             return np.arange(len(self.estimate))
         return np.asarray(np.unique(self.group, return_inverse=True)[1])
 
-    def _pairs(self, given: Given) -> tuple[Orientations, Orientations]:
-        """Return what is given of the pairs, and the other."""
-        return (self.estimate, self.truth) if given == "estimate" else (self.truth, self.estimate)
-
-    def _kinds(self, given: Given) -> _Kinds:
-        return self._both_kinds[given]
-
     @cached_property
-    def _both_kinds(self) -> dict[Given, _Kinds]:
-        return {given: _Kinds.of(self, *self._pairs(given)) for given in ("estimate", "truth")}
-
-    def possible_poses(self, estimate: Orientations) -> Orientations:
-        """Return the possible poses (m, 3, 3) after an estimate (3, 3)."""
-        return self.symmetry.canonical(estimate[None]) @ self.possible
-
-    def flip_probability(self, poses: Orientations, given: Given) -> Array:
-        """Return the probability of a flip for each estimated or true pose (n, 3, 3)."""
-        counts = self._counts(poses, given)
-        return np.asarray(1 - counts[:, 0] / counts.sum(axis=1))
+    def _kinds(self) -> dict[Given, _Kinds]:
+        v = _Kinds.of(self, self.estimate, self.truth)
+        return {"estimate": v, "truth": _Kinds.of(self, self.truth, self.estimate)}
 
     def _counts(self, poses: Orientations, given: Given) -> Array:
         """Return weighted counts of right estimates, and of each kind of flips, (n, 1 + J)."""
-        kinds, share = self._kinds(given), self.share_of_flips
+        kinds, share = self._kinds[given], self.share_of_flips
         prior = np.concatenate([[1 - share], share * kinds.share])
         directions = viewing_direction(poses)
         cosine = self.symmetry.direction_cosine(directions, kinds.directions)
@@ -287,7 +267,7 @@ class OrientationErrors:
         rows = np.arange(m) if rows is None else np.asarray(rows)
         poses = (moves[:, None] @ support[rows]).reshape(-1, 3, 3)
         counts = self._counts(poses, given)
-        rotations = self._kinds(given).rotations
+        rotations = self._kinds[given].rotations
         seen = self.symmetry.canonical(poses)
         back = np.repeat(inverse(moves), len(rows), axis=0) @ seen
         where = (back[:, None] @ rotations).reshape(-1, 3, 3)

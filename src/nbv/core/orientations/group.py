@@ -184,13 +184,13 @@ class Symmetry:
         best = np.einsum("nj,ndj->nd", directions, seen).argmax(axis=1)
         return np.asarray(elements[np.arange(len(elements)), best])
 
-    def mean(self, orientations: Orientations, weights: ArrayLike | None = None) -> Orientations:
+    def mean(self, orientations: Orientations) -> Orientations:
         """Return the mean pose (3, 3) of (n, 3, 3), each taken nearest to the first.
 
         The mean of two poses is halfway between them, or the first where they are 180° apart.
         """
         near = self.nearest(orientations, np.broadcast_to(orientations[0], orientations.shape))
-        return chordal_mean(near, weights)
+        return chordal_mean(near)
 
 
 ASYMMETRIC = Symmetry(np.eye(3)[None])
