@@ -56,11 +56,10 @@ CONFIRMATION_ESTIMATORS = {
 }
 
 ROTATIONS = {
-    "one view": ("score", "single"),
-    "Random, averaged": ("average", "random"),
-    "Random": ("score", "random"),
-    "Opposite": ("score", "opposite"),
-    "Bayes error": ("score", "bayes_error"),
+    "one view": "random_1",
+    "two, random": "random_2",
+    "two, opposite": "opposite_2",
+    "two, recommended": "recommended_2",
 }
 OWN_ROTATIONS = {
     "one view": ("score", "single"),
@@ -170,30 +169,31 @@ def bundles() -> pd.DataFrame:
     return bundle()[[*shown]].rename(columns=shown)
 
 
-def rotations(folder: str, columns: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
-    """Mean errors of an estimator in three dimensions by fusion and method, degrees."""
-    found = pd.read_csv(REFERENCE / folder / "rotations.csv")
-    error = found.set_index(["group", "fusion", "method"])["mean_deg"].map("{:.1f}".format)
-    rows = {
-        group: [error[group, fusion, method] for fusion, method in columns.values()]
-        for group in found["group"].unique()
-    }
-    return pd.DataFrame(rows, index=[*columns]).T
-
-
-def both_rotations() -> pd.DataFrame:
-    """Return `rotations` of a published estimator, and of the study's own over all categories."""
-    found = rotations("rotations", ROTATIONS).rename(index="MegaPose, {}".format)
-    own = rotations("rotation-estimator", ROTATIONS).loc[["all categories"]]
-    return pd.concat([found, own.set_axis(["the study's own, five categories"])])
+def rotations() -> pd.DataFrame:
+    """Mean errors of a published estimator in three dimensions, degrees, and numbers of views."""
+    found = pd.read_csv(REFERENCE / "rotations/rotations.csv").set_index(["group", "method"])
+    error = found["error_deg"].map("{:.1f}".format)
+    views, less = found["n_views"].map("{:.2f}".format), found["error_deg"] - found["less_chance"]
+    rows = {}
+    for group in found.index.unique("group"):
+        stopped = group, "recommended_decision"
+        fixed = [error[group, name] for name in ROTATIONS.values()]
+        chance = f"{less[stopped]:.1f}"
+        rows[group] = [*fixed, f"{error[stopped]} ({views[stopped]} views)", chance]
+    columns = [*ROTATIONS, "until the decision", "as many by chance"]
+    return pd.DataFrame(rows, index=columns).T.rename(index=str.capitalize)
 
 
 def own_rotations() -> pd.DataFrame:
-    """Return `rotations` of the study's own estimators, and what the choice of a view brings."""
-    folder = "rotation-estimator"
-    found = pd.read_csv(REFERENCE / folder / "rotations.csv")
+    """Errors of the study's own estimators in three dimensions, and what choosing a view brings."""
+    found = pd.read_csv(REFERENCE / "rotation-estimator/rotations.csv")
+    error = found.set_index(["group", "fusion", "method"])["mean_deg"].map("{:.1f}".format)
+    rows = {
+        group: [error[group, fusion, method] for fusion, method in OWN_ROTATIONS.values()]
+        for group in found["group"].unique()
+    }
+    table = pd.DataFrame(rows, index=[*OWN_ROTATIONS]).T
     chosen = found.query("method == 'bayes_error' and fusion == 'score'").set_index("group")
-    table = rotations(folder, OWN_ROTATIONS)
     for other in ("random", "opposite"):
         names = [f"less_{other}{end}" for end in ("", "_ci_low", "_ci_high")]
         less = chosen[names].itertuples(index=False)
@@ -223,7 +223,7 @@ TABLES = {
     "bundle": bundle,
     "bundles": bundles,
     "focal_lengths": focal_lengths,
-    "rotations": both_rotations,
+    "rotations": rotations,
     "own_rotations": own_rotations,
     "rotation_estimator": rotation_estimator,
 }
