@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from nbv.choice.rotations import MIN_SEPARATION_DEG
 from nbv.core.orientations.criteria import view_angle_deg
 from nbv.core.seeds import rng_for
+from nbv.data.depth_images import logged
 from nbv.files import read_rows
 from nbv.tables.bop import groups_of, read_orientation_table
 from nbv.tables.next_camera import CameraRecommendation, PoseEstimate
@@ -199,10 +200,11 @@ def evaluate(
     column ``role`` an instance is for calibration or tested, else both. ``settings`` has
     ``objects``, which are evaluated, and ``score_objects``, which calibrate too.
     """
+    cases = list(held_out(path, models_info, settings))
     return pd.DataFrame(
         [
             row
-            for case in held_out(path, models_info, settings)
+            for case in logged(cases, len(cases), "instances")
             for row in walks(case, rng_for(seed, "rotations", case.name))
         ]
     )
