@@ -36,16 +36,6 @@ FLIP_DEG = OrientationErrors.flip_deg
 _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "ray", "symmetries")
 
 
-UNGROUPED = (
-    "pairs have no scene_id and instance: each counts as if it were of another instance, and "
-    "neighbouring images make calibration too sure"
-)
-FEW_GROUPS = (
-    f"pairs are of fewer than {FEWEST_GROUPS} instances or scenes in all: how much flips depend on "
-    "the view is assumed, not measured"
-)
-
-
 @dataclass(frozen=True)
 class ObjectSummary:
     """The calibration pairs of one object.
@@ -270,9 +260,15 @@ class OrientationTable:
         if (covered := float((weight > 1).mean())) < 0.5:
             warnings.append(f"{1 - covered:.0%} of the directions are seen by no pair nearby")
         if errors.group is None:
-            warnings.append(UNGROUPED)
+            warnings.append(
+                "pairs have no scene_id and instance: each counts as if it were of another "
+                "instance, and neighbouring images make calibration too sure"
+            )
         elif len(set(zip(self.object_id, self.group, strict=True))) < FEWEST_GROUPS:
-            warnings.append(FEW_GROUPS)
+            warnings.append(
+                f"pairs are of fewer than {FEWEST_GROUPS} instances or scenes in all: how much "
+                "flips depend on the view is assumed, not measured"
+            )
         if not errors.is_flip.any():
             warnings.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
         elif hint := describe_large_errors(errors):
