@@ -235,14 +235,13 @@ class OrientationTable:
             max_travel_deg=max_travel_deg,
         )
         detections = self.detections.get(name, Detections())
-        scores = [estimate.score for estimate in estimates if estimate.score is not None]
-        about = {"score": min(scores)} if scores else {}
+        score = min((each.score for each in estimates if each.score is not None), default=None)
         pose = estimates[-1].camera_pose if camera_pose is None else as_pose(camera_pose)
         return replace(
             answer,
             rotation=nearest_twin(answer.rotation, self.symmetry(name), pose, previous),
-            holds_where=detections.holds_where(**about),
-            warnings=(*answer.warnings, *detections.warnings(**about)),
+            holds_where=detections.holds_where(score),
+            warnings=(*answer.warnings, *detections.warnings(score)),
         )
 
     def about(self) -> list[ObjectSummary]:
