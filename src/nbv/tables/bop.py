@@ -133,14 +133,15 @@ def read_orientation_table(
         truths, estimates = straightening @ truths, straightening @ estimates
     detections = {}
     for name in dict.fromkeys(rows["object_id"]):
-        of = dict(iter(given[given["object_id"] == name].groupby(fate)))
-        matched, *others = (
-            [float(score) for score in of[k]["score"]] if is_bop and k in of else []
-            for k in (PAIR, FARTHER, SURPASSED)
+        is_object = given["object_id"] == name
+        matched, farther, surpassed = (
+            given["score"][is_object & (fate == each)].astype(float).tolist() if is_bop else []
+            for each in (PAIR, FARTHER, SURPASSED)
         )
-        n_others = int(missed.get(name, 0)), len(of.get(FAILED, ()))
-        limits = nearest_mm, least_score
-        detections[name] = Detections(matched, others[0], others[1], *n_others, *limits)
+        n_missed, n_failed = int(missed.get(name, 0)), int((is_object & (fate == FAILED)).sum())
+        detections[name] = Detections(
+            matched, farther, surpassed, n_missed, n_failed, nearest_mm, least_score
+        )
     return OrientationTable(
         rows["object_id"].to_numpy(dtype=str),
         groups_of(rows),
@@ -182,7 +183,11 @@ def _matched(
 
     The number of instances without an estimate follows, by object.
     """
-    known = _with_keys(truth, _read_truths(truth, set(given["scene_id"])))
+    if truth.suffix.lower() == ".csv":
+        known = read_rows(truth, (*KEYS, "R", "t"))
+    else:
+        known = _read_scenes(truth, set(given["scene_id"]))
+    known = _with_keys(truth, known)
     is_known = given["scene_id"].isin(known["scene_id"])
     if (is_other := is_known & ~given["image"].isin(known["image"])).any():
         row = given.index[is_other][0]
@@ -246,14 +251,8 @@ def _with_instances(truth: Path, known: pd.DataFrame) -> NDArray[np.object_]:
     return scenes
 
 
-def _read_truths(truth: Path, scenes: set[str]) -> pd.DataFrame:
-    """Read the truths of scenes as texts, in the form of results."""
-    if truth.suffix.lower() != ".csv":
-        return _read_scenes(truth, scenes)
-    return read_rows(truth, (*KEYS, "R", "t"))
-
-
 def _read_scenes(folder: Path, scenes: set[str]) -> pd.DataFrame:
+    """Read the truths of scenes as texts, in the form of results."""
     truths = []
     for scene in sorted(scenes):
         file = folder / f"{int(scene):06d}" / "scene_gt.json"

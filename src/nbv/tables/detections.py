@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -36,15 +35,15 @@ class Detections:
     nearest_mm: float | None = None
     least_score: float | None = None
 
-    def holds_where(self, score: float = -math.inf) -> str | None:
+    def holds_where(self, score: float | None = None) -> str | None:
         """Return for which share of the detections with at least a score calibration holds."""
         if self.nearest_mm is None:
             return None
         right, far, other = (
-            sum(each >= score for each in scores)
+            sum(score is None or each >= score for each in scores)
             for scores in (self.matched, self.farther, self.surpassed)
         )
-        which = " with at least this score" if math.isfinite(score) else ""
+        which = "" if score is None else " with at least this score"
         failed = f"; {counted(self.n_failed, 'answer')} without a pose" if self.n_failed else ""
         return (
             f"holds where the position is right: {right} of "
@@ -53,9 +52,9 @@ class Detections:
             f"{counted(len(self.matched) + self.n_missed, 'instance')} without an estimate{failed}"
         )
 
-    def warnings(self, score: float = math.inf) -> tuple[str, ...]:
+    def warnings(self, score: float | None) -> tuple[str, ...]:
         """Return a warning if a score is below `least_score`."""
-        if self.least_score is None or score >= self.least_score:
+        if score is None or self.least_score is None or score >= self.least_score:
             return ()
         return (
             f"the score {score:g} is below {self.least_score:g}, the least of calibration: what is "

@@ -36,16 +36,6 @@ FLIP_DEG = OrientationErrors.flip_deg
 _NAMES = ("object_ids", "object_index", "group", "estimate", "truth", "score", "ray", "symmetries")
 
 
-UNGROUPED = (
-    "pairs have no scene_id and instance: each counts as if it were of another instance, and "
-    "neighbouring images make calibration too sure"
-)
-FEW_GROUPS = (
-    f"pairs are of fewer than {FEWEST_GROUPS} instances or scenes in all: how much flips depend on "
-    "the view is assumed, not measured"
-)
-
-
 @dataclass(frozen=True)
 class ObjectSummary:
     """The calibration pairs of one object.
@@ -245,14 +235,13 @@ class OrientationTable:
             max_travel_deg=max_travel_deg,
         )
         detections = self.detections.get(name, Detections())
-        scores = [estimate.score for estimate in estimates if estimate.score is not None]
-        about = {"score": min(scores)} if scores else {}
+        score = min((each.score for each in estimates if each.score is not None), default=None)
         pose = estimates[-1].camera_pose if camera_pose is None else as_pose(camera_pose)
         return replace(
             answer,
             rotation=nearest_twin(answer.rotation, self.symmetry(name), pose, previous),
-            holds_where=detections.holds_where(**about),
-            warnings=(*answer.warnings, *detections.warnings(**about)),
+            holds_where=detections.holds_where(score),
+            warnings=(*answer.warnings, *detections.warnings(score)),
         )
 
     def about(self) -> list[ObjectSummary]:
@@ -270,9 +259,15 @@ class OrientationTable:
         if (covered := float((weight > 1).mean())) < 0.5:
             warnings.append(f"{1 - covered:.0%} of the directions are seen by no pair nearby")
         if errors.group is None:
-            warnings.append(UNGROUPED)
+            warnings.append(
+                "pairs have no scene_id and instance: each counts as if it were of another "
+                "instance, and neighbouring images make calibration too sure"
+            )
         elif len(set(zip(self.object_id, self.group, strict=True))) < FEWEST_GROUPS:
-            warnings.append(FEW_GROUPS)
+            warnings.append(
+                f"pairs are of fewer than {FEWEST_GROUPS} instances or scenes in all: how much "
+                "flips depend on the view is assumed, not measured"
+            )
         if not errors.is_flip.any():
             warnings.append(f"no estimate errs by more than {FLIP_DEG:g}°: one view is enough")
         elif hint := describe_large_errors(errors):

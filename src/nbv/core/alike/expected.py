@@ -13,11 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.alike.compare import AGREEMENT_NATS, CalibrationViews
-from nbv.core.choose import (
-    ANY_VIEW_SHARE,
-    is_surely_less,
-    with_pseudo_observations,
-)
+from nbv.core.choose import ANY_VIEW_SHARE, is_surely_less, with_pseudo_observations
 from nbv.core.circle.angles import nearest_bin
 
 N_PARTS = 5

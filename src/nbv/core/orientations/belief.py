@@ -63,7 +63,8 @@ class OrientationBelief:
     def error_deg(self) -> float:
         """The expected error of the fused pose, degrees."""
         distance = self.errors.symmetry.distance_deg(self.support, self.pose)
-        return float(self.probability @ distance) + self.errors.small_error_deg(self.n_agreeing)
+        small = self.errors.small_errors_deg(self.n_agreeing)
+        return float(self.probability @ distance + small.mean())
 
     def probability_within(self, error_deg: float) -> float:
         """Return the probability that the fused pose errs by less."""
@@ -71,7 +72,7 @@ class OrientationBelief:
         near = float(self.probability[distance < max(error_deg, AGREE_DEG)].sum())
         small = self.errors.small_errors_deg(self.n_agreeing)
         # Small errors have a size, but no direction.
-        return near * float((small < error_deg).mean()) if len(small) else near
+        return near * float((small < error_deg).mean())
 
 
 def belief(

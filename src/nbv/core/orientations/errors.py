@@ -151,13 +151,11 @@ class OrientationErrors:
         """Return the errors, without flips, of the mean of estimates of several views, (r,).
 
         Errors of views of one group are correlated; where groups are unknown, they are one error.
+        Where every pair is a flip, the error is 0.
         """
         variance = (1 + (n_views - 1) * self._correlation) / n_views
-        return np.asarray(self.error_deg[~self.is_flip] * np.sqrt(variance))
-
-    def small_error_deg(self, n_views: int) -> float:
-        """Return the mean of `small_errors_deg`, 0 where every pair is a flip."""
-        return float(self.small_errors_deg(n_views).sum() / max((~self.is_flip).sum(), 1))
+        small = np.zeros(1) if self.is_flip.all() else self.error_deg[~self.is_flip]
+        return np.asarray(small * np.sqrt(variance))
 
     @cached_property
     def _correlation(self) -> float:
