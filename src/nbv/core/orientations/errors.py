@@ -216,17 +216,16 @@ class OrientationErrors:
         """Return weighted counts of right estimates, and of each kind of flips, (n, 1 + J)."""
         kinds, share = self._kinds[given], self.share_of_flips
         prior = np.concatenate([[1 - share], share * kinds.share])
-        directions = viewing_direction(poses)
-        cosine = self.symmetry.direction_cosine(directions, kinds.directions)
-        # Single precision takes half the time.
-        weights = np.exp(self.concentration * (cosine - 1).astype(np.float32))
-        return np.asarray(
-            weights @ kinds.counts.astype(np.float32) + self.pseudo_observations * prior
-        )
+        # In place and in single precision, in half the time.
+        directions = viewing_direction(poses).astype(np.float32)
+        weights = self.symmetry.direction_cosine(directions, kinds.directions)
+        weights -= 1
+        weights *= np.float32(self.concentration)
+        np.exp(weights, out=weights)
+        return np.asarray(weights @ kinds.counts + self.pseudo_observations * prior)
 
     def _near(self, poses: Orientations, support: Orientations) -> Array:
         """Return the kernel about poses (n, 3, 3) among the poses of a support, (n, m)."""
-        # In place and in single precision, in half the time.
         kernel = self.symmetry.cosine(poses.astype(np.float32), support.astype(np.float32))
         kernel -= kernel.max(axis=1, keepdims=True)
         kernel *= self.concentration
@@ -296,8 +295,8 @@ class _Kinds:
 
     rotations: Orientations
     share: Array
-    directions: Array
-    counts: Array
+    directions: NDArray[np.float32]
+    counts: NDArray[np.float32]
 
     @classmethod
     def of(cls, errors: OrientationErrors, known: Orientations, other: Orientations) -> _Kinds:
@@ -328,7 +327,8 @@ class _Kinds:
         counts *= 1 - discount
         numbers = counts.sum(axis=0)[1:] + np.eye(n_kinds + 1)[-1]
         rotations = np.stack(means) if means else np.empty((0, 3, 3))
-        return cls(rotations, numbers / numbers.sum(), directions, counts)
+        single = directions.astype(np.float32), counts.astype(np.float32)
+        return cls(rotations, numbers / numbers.sum(), *single)
 
 
 def _cells(directions: Array) -> tuple[Array, NDArray[np.intp]]:

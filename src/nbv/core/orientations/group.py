@@ -20,6 +20,7 @@ from nbv.numbers import ORIENTATION_TOLERANCE, as_orientations
 
 Array = NDArray[np.float64]
 Orientations = NDArray[np.float64]
+Floats = NDArray[np.floating]
 
 MOST_ELEMENTS = 60
 """Orientations of an icosahedron, the largest finite group that is not that of a prism."""
@@ -123,7 +124,7 @@ class Symmetry:
         flips = images @ axis < 0
         return cls(group[[0, int(np.argmax(flips))]] if flips.any() else group[:1], axis)
 
-    def cosine(self, first: Orientations, second: Orientations) -> Array:
+    def cosine(self, first: Floats, second: Floats) -> Floats:
         """Return the cosine of the smallest angle between all poses (n, 3, 3) and (m, 3, 3)."""
         if self.axis is not None:
             images = [second @ (g @ self.axis) for g in self.discrete]
@@ -133,7 +134,8 @@ class Symmetry:
             cosine = _largest(flat, [(second @ g).reshape(len(second), 9) for g in self.discrete])
             cosine -= 1
             cosine /= 2
-        return np.clip(cosine, -1, 1, out=cosine)
+        np.clip(cosine, -1, 1, out=cosine)
+        return np.asarray(cosine)
 
     def distance_deg(self, first: Orientations, second: Orientations) -> Array:
         """Return the smallest angle between poses (..., 3, 3), in [0, 180], pair by pair."""
@@ -161,10 +163,10 @@ class Symmetry:
         oblique = np.broadcast_to(_OBLIQUE, (len(orientations), 3))
         return orientations @ self.towards(oblique, orientations)
 
-    def direction_cosine(self, first: Array, second: Array) -> Array:
+    def direction_cosine(self, first: Floats, second: Floats) -> Floats:
         """Return the cosine of the smallest angle between all directions (n, 3) and (m, 3)."""
         if self.axis is None:
-            return _largest(first, [second @ g for g in self.discrete])
+            return _largest(first, [second @ g.astype(second.dtype) for g in self.discrete])
         along, images = first @ self.axis, second @ (self.discrete @ self.axis).T
         across = np.sqrt(np.maximum(0, 1 - along**2))
         images_across = np.sqrt(np.maximum(0, 1 - images**2))
@@ -217,7 +219,7 @@ def _angle_deg(rotations: Orientations) -> Array:
     return np.asarray(np.degrees(np.arctan2(sine, cosine)))
 
 
-def _largest(first: Array, images: Sequence[Array]) -> Array:
+def _largest(first: Floats, images: Sequence[Floats]) -> Floats:
     """Return the largest of the products of rows (n, d) and each set of rows (m, d), (n, m)."""
     best = first @ images[0].T
     for image in images[1:]:
