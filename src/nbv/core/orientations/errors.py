@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.core.orientations.group import (
     ASYMMETRIC,
     Array,
+    Floats,
     Orientations,
     Symmetry,
     inverse,
@@ -224,7 +225,7 @@ class OrientationErrors:
         np.exp(weights, out=weights)
         return np.asarray(weights @ kinds.counts + self.pseudo_observations * prior)
 
-    def _near(self, poses: Orientations, support: Orientations) -> Array:
+    def _near(self, poses: Orientations, support: Orientations) -> Floats:
         """Return the kernel about poses (n, 3, 3) among the poses of a support, (n, m)."""
         kernel = self.symmetry.cosine(poses.astype(np.float32), support.astype(np.float32))
         kernel -= kernel.max(axis=1, keepdims=True)
