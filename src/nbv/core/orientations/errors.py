@@ -32,7 +32,7 @@ Given = Literal["estimate", "truth"]
 MOST_KINDS = 16
 """Kinds of flips, rotations within `SAME_DEG`; rarer ones lead anywhere."""
 
-MOST_CELLS = 1000
+MOST_CELLS = 2000
 """Viewing directions, at most, in which pairs are counted: more pairs are counted together."""
 
 STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
