@@ -118,7 +118,7 @@ def as_pose(values: ArrayLike, name: str = "camera pose") -> Pose:
         If the matrix is not a rotation with a translation in metres.
     """
     pose = as_finite(values, name, 16, "; give a 4 × 4 matrix row by row").reshape(4, 4)
-    if not np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9):
+    if (np.abs(pose[3] - [0, 0, 0, 1]) > [1e-9, 1e-9, 1e-9, 1e-5]).any():
         row = " ".join(f"{number:g}" for number in pose[3])
         raise UserError(
             f"{name}: the last row is {row}, but a pose has 0 0 0 1; is it transposed or scaled?"

@@ -17,7 +17,7 @@ from nbv.core.alike.compare import WITHIN_DEG
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief, belief, hypotheses_belief
 from nbv.core.orientations.criteria import bayes_error, view_angle_deg
 from nbv.core.orientations.errors import OrientationErrors
-from nbv.core.orientations.group import Array, Orientations, Symmetry, along_ray
+from nbv.core.orientations.group import Array, Orientations, Symmetry, along_ray, inverse
 from nbv.errors import UserError
 from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted, matrix_lines
@@ -196,11 +196,10 @@ def recommend_camera(
         is_level = camera_pose is None and not is_posed
         poses, is_known = _sphere(candidates, place, cameras[-1].pose, is_level), place is not None
     else:
-        poses = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
+        given = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
+        poses = np.array(given).reshape(-1, 4, 4)
         is_known = True
-    targets = np.stack(
-        [_target(pose, place, straightened, i).straight_from_base for i, pose in enumerate(poses)]
-    )
+    targets = _straight_targets(poses, place, straightened)
     travel = view_angle_deg(targets @ last.T)
     apart = np.min([view_angle_deg(targets @ taken.T) for taken in straight_from_base], axis=0)
     free = np.flatnonzero((apart >= MIN_SEPARATION_DEG) & (travel <= as_travel(max_travel_deg)))
@@ -286,26 +285,28 @@ def _straightening(position: Array | None, straightened: bool) -> Orientations:
     return along_ray(position)
 
 
-def _target(pose: Pose, place: Array | None, straightened: bool, i: int) -> _Camera:
-    """Return a candidate's camera; `place` (3,) is the object's in the base frame, if known."""
+def _straight_targets(poses: Array, place: Array | None, straightened: bool) -> Orientations:
+    """Return base to candidates (n, 3, 3), straight at the object; `place` (3,) is its position."""
+    from_base = inverse(poses[:, :3, :3])
     if place is None:
-        return _Camera(pose, np.eye(3))
-    position = pose[:3, :3].T @ (place - pose[:3, 3])
-    if position[2] <= 0:
+        return from_base
+    position = (from_base @ (place - poses[:, :3, 3])[:, :, None])[..., 0]
+    if (behind := position[:, 2] <= 0).any():
         raise UserError(
-            f"candidate {i}: the object is behind this camera: give poses of the optical frame "
-            "(z forward) in the base frame, camera to base, in metres"
+            f"candidate {behind.argmax()}: the object is behind this camera: give poses of the "
+            "optical frame (z forward) in the base frame, camera to base, in metres"
         )
-    if (away := float(np.linalg.norm(position))) > FARTHEST_M:
+    away = np.linalg.norm(position, axis=1)
+    if (far := away > FARTHEST_M).any():
         raise UserError(
-            f"candidate {i}: the object is {away:.0f} m away: give camera poses in metres, not "
-            "millimetres"
+            f"candidate {far.argmax()}: the object is {away[far.argmax()]:.0f} m away: give camera "
+            "poses in metres, not millimetres"
         )
-    return _Camera(pose, _straightening(position, straightened))
+    return along_ray(position) @ from_base if straightened else from_base
 
 
-def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> list[Pose]:
-    """Return even camera poses that look at the object from its distance, level."""
+def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> Array:
+    """Return even camera poses (n, 4, 4) that look at the object from its distance, level."""
     if n < 1:
         raise UserError(f"`sphere`={n}: give 1 or more")
     up = -pose[:3, 1] if in_camera else np.array([0.0, 0.0, 1.0])
@@ -315,17 +316,14 @@ def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> list[Po
     angle = np.pi * (3 - np.sqrt(5)) * np.arange(n)
     across = np.sqrt(1 - z**2)
     outwards = np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
-    poses = []
-    for direction in outwards:
-        right = np.cross(up, direction)
-        if np.linalg.norm(right) < 1e-6:
-            right = np.cross([1.0, 0.0, 0.0], direction)
-        right /= np.linalg.norm(right)
-        target = np.eye(4)
-        target[:3, :3] = np.stack([right, np.cross(-direction, right), -direction], axis=1)
-        target[:3, 3] = centre + distance * direction
-        poses.append(target)
-    return poses
+    right = np.cross(up, outwards)
+    above = np.linalg.norm(right, axis=1) < 1e-6
+    right[above] = np.cross([1.0, 0.0, 0.0], outwards[above])
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    targets = np.tile(np.eye(4), (n, 1, 1))
+    targets[:, :3, :3] = np.stack([right, np.cross(-outwards, right), -outwards], axis=2)
+    targets[:, :3, 3] = centre + distance * outwards
+    return targets
 
 
 def as_view(given: Any, name: str) -> PoseEstimate:
