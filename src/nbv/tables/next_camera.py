@@ -15,7 +15,7 @@ from nbv.choice.next_view import as_chances
 from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
 from nbv.core.alike.compare import WITHIN_DEG
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief, belief, hypotheses_belief
-from nbv.core.orientations.criteria import bayes_error, view_angle_deg
+from nbv.core.orientations.criteria import bayes_error, optimism_deg, view_angle_deg
 from nbv.core.orientations.errors import OrientationErrors
 from nbv.core.orientations.group import Array, Orientations, Symmetry, along_ray, inverse
 from nbv.errors import UserError
@@ -208,7 +208,9 @@ def recommend_camera(
             f"none of {counted(len(poses), 'candidate')} is {MIN_SEPARATION_DEG:g}° or more from "
             "every view so far and within `max_travel_deg`: the same view repeats its error"
         )
-    cost, within = bayes_error(now, targets[free] @ first.T, WITHIN_DEG)
+    ahead = targets[free] @ first.T
+    cost, within = bayes_error(now, ahead, WITHIN_DEG)
+    cost += optimism_deg(now, ahead, cost)
     if errors.depends_on_view:
         ranked = np.lexsort((travel[free], cost.round(9)))
     else:

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from nbv.core.orientations.belief import belief
-from nbv.core.orientations.criteria import bayes_error, view_angle_deg
+from nbv.core.orientations.criteria import bayes_error, optimism_deg, view_angle_deg
 from nbv.core.orientations.errors import (
     FIXED_STRENGTH,
     SAME_DEG,
@@ -236,6 +236,32 @@ def test_calibration_shows_whether_flips_depend_on_the_view():
     costs, _ = bayes_error(belief(chance, flips[:1], IDENTITY), some_moves(20), [5])
     assert np.ptp(costs) < 0.05 * costs.mean()
     assert shrinkage([replace(dependent, group=np.zeros(600))]) == FIXED_STRENGTH
+
+
+def test_the_least_is_raised_by_what_halves_of_the_groups_lose_to_each_other():
+    group = np.arange(1600) // 50
+    errors = made(n=1600, group=group, pseudo_observations=0.3)
+    anywhere = np.random.default_rng(9).random((1600, 1, 1)) < 0.06
+    flips = np.where(anywhere, np.diag([1.0, -1, -1]), np.eye(3))
+    errors = replace(errors, estimate=errors.estimate @ flips)
+    truth = Rotation.align_vectors([[0, 0, -1]], [[1.0, 0, 0]])[0].as_matrix()
+    first = belief(errors, (truth @ np.diag([1.0, -1, -1]))[None], IDENTITY)
+    moves = some_moves(12)
+
+    def costs(**others):
+        return bayes_error(replace(first, errors=replace(errors, **others)), moves, [30.0])[0]
+
+    cost = costs()
+    raised = cost.min() - costs(pseudo_observations=0.01)[cost.argmin()]
+    halves = [group % 2 == k for k in (0, 1)]
+    a, b = (
+        costs(estimate=errors.estimate[k], truth=errors.truth[k], group=group[k]) for k in halves
+    )
+    lost = (a[b.argmin()] - a.min() + b[a.argmin()] - b.min()) / 2
+    assert optimism_deg(first, moves, cost) == pytest.approx(lost / 2**0.5 - raised, abs=0.05)
+    assert lost / 2**0.5 > raised
+    independent = replace(first, errors=replace(errors, pseudo_observations=STRENGTHS[-1]))
+    assert optimism_deg(independent, moves, cost) == 0
 
 
 def test_a_pose_is_held_once_in_the_support():

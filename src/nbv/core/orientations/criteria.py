@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief
 from nbv.core.orientations.group import Array, Orientations, viewing_direction
+
+N_COMPARED = 12
+"""Candidates of least expected error that are compared for `optimism_deg`."""
 
 
 def bayes_error(
@@ -49,6 +53,27 @@ def bayes_error(
     small = errors.small_errors_deg(before.n_agreeing + 1)
     shares = np.array([(small < deg).mean() for deg in within_deg])
     return risks[0] + small.mean(), (1 - np.stack(risks[1:])) * shares[:, None]
+
+
+def optimism_deg(before: OrientationBelief, moves: Orientations, error_deg: Array) -> float:
+    """Return by how much the least of expected errors (k,) is too low, 0 or more.
+
+    The least of uncertain numbers is optimistic, as in `nbv.core.alike.expected`: each half of the
+    groups errs more at the candidate that the other half chooses than at its own. Twice as many
+    groups vary by the square root of two less. Shrinkage has already raised the least.
+    """
+    errors = before.errors
+    if not errors.depends_on_view:
+        return 0.0
+    least = np.argsort(error_deg, kind="stable")[:N_COMPARED]
+    first, second = (
+        bayes_error(replace(before, errors=half), moves[least], (AGREE_DEG,))[0]
+        for half in errors.halves
+    )
+    more = first[second.argmin()] - first.min() + second[first.argmin()] - second.min()
+    unshrunk = bayes_error(replace(before, errors=errors.unshrunk), moves[least[:1]], (AGREE_DEG,))
+    raised = error_deg.min() - unshrunk[0][0]
+    return max(0.0, float(more / 2 / np.sqrt(2) - raised))
 
 
 def view_angle_deg(moves: Orientations) -> Array:

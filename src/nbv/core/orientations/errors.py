@@ -9,7 +9,7 @@ a flip, says where the pose is instead.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -207,6 +207,20 @@ class OrientationErrors:
         if self.group is None:
             return np.arange(len(self.estimate))
         return np.asarray(np.unique(self.group, return_inverse=True)[1])
+
+    @cached_property
+    def halves(self) -> tuple[OrientationErrors, ...]:
+        """The errors on every second group, and on the others; of a single group, on its pairs."""
+        labels = self.labels if self.labels.any() else np.arange(len(self.estimate))
+        return tuple(
+            replace(self, estimate=self.estimate[k], truth=self.truth[k], group=labels[k])
+            for k in (labels % 2 == 0, labels % 2 == 1)
+        )
+
+    @cached_property
+    def unshrunk(self) -> OrientationErrors:
+        """The errors with hardly any shrinkage."""
+        return replace(self, pseudo_observations=0.01)
 
     @cached_property
     def _kinds(self) -> dict[Given, _Kinds]:
