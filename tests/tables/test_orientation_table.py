@@ -85,6 +85,21 @@ def test_a_table_is_read_as_it_was_written(pairs, tmp_path):
     assert (tmp_path / "t.npz").read_bytes() == (tmp_path / "again.npz").read_bytes()
 
 
+def test_scores_are_used_where_every_pair_has_one(pairs, tmp_path):
+    given = pairs.score.copy()
+    given[3] = np.nan
+    view = PoseEstimate(HIDDEN, np.array([10.0, -20.0, 700.0]), 0.4)
+    without = replace(pairs, score=None)
+    expected = without.recommend([view], 20)
+    assert any("no scores" in warning for warning in expected.warnings)
+    without.save(tmp_path / "t.npz")
+    for table in (OrientationTable.load(tmp_path / "t.npz"), replace(pairs, score=given)):
+        answer = table.recommend([view], 20)
+        assert answer.expected_error_deg == expected.expected_error_deg
+        assert answer.warnings == expected.warnings
+    assert pairs.recommend([view], 20).expected_error_deg > expected.expected_error_deg
+
+
 def test_what_is_thin_or_suspicious_is_said(example, pairs, tmp_path):
     (about,) = pairs.about()
     assert about.n_pairs == 160

@@ -160,7 +160,7 @@ class OrientationTable:
         }
         flips = np.concatenate([each.is_flip for each in errors.values()])
         share, ratio = (flips.sum() + 0.5) / (len(flips) + 1), None
-        if self.score is not None:
+        if self.score is not None and np.isfinite(self.score).all():
             scores = np.concatenate([self.score[k] for k in rows.values()])
             ratio = ScoreRatio.fit(scores, flips)
         strength = shrinkage(list(errors.values()))
