@@ -1,4 +1,4 @@
-"""Up to four views of an estimator in three dimensions (docs/rotations-protocol.md).
+"""Up to four views of an estimator in three dimensions (docs/decisions-protocol.md).
 
 Every image of an instance is a first view, and the other images of the same instance are the views
 that can be reached. `nbv.OrientationTable.recommend`, calibrated on other instances, gives pose,

@@ -13,7 +13,7 @@ from nbv.numbers import Pose
 UNKNOWN_DEG = math.nan
 
 NO_MOVE = f"all candidates are within {MIN_SEPARATION_DEG:g}° of an existing view"
-NO_GAIN = "no admissible view is expected to lower the error by more than the calibration's noise"
+NO_GAIN = "no admissible view alone is expected to lower the error by more than its noise"
 NO_ERROR = "the table holds costs, no errors in degrees; calibrate with criterion expected_error"
 NOT_ALIKE = "; the first is recalibrated, the second raised for the choice; without both it falls"
 

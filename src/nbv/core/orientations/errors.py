@@ -39,11 +39,13 @@ STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Pseudo-observations that `shrinkage` compares: never none, and never so many that none count."""
 
 FIXED_STRENGTH = 10.0
-"""With too few groups for `shrinkage`; chosen on the first half (docs/rotations-protocol.md)."""
+"""With too few groups for `shrinkage`; chosen on the first half (docs/decisions-protocol.md)."""
 
 FEWEST_GROUPS = 4
+"""Instances or scenes of all objects, from which `shrinkage` compares strengths."""
 
 MOST_PARTS = 200
+"""Parts of an object's groups that `shrinkage` leaves out, at most, one at a time."""
 
 LEAST_GAIN = 2.0
 """A larger gain of log likelihood has a probability of a few per cent by chance."""
@@ -383,7 +385,6 @@ def shrinkage(objects: Sequence[OrientationErrors]) -> float:
     strengths, likelihood = np.array(STRENGTHS)[:, None], np.zeros(len(STRENGTHS))
     for errors in objects:
         directions, flips = viewing_direction(errors.estimate), errors.is_flip
-        # Many groups are left out several at once, in bounded time.
         part = errors.labels % MOST_PARTS
         for rows in part == np.unique(part)[:, None]:
             cosine = errors.symmetry.direction_cosine(directions[rows], directions[~rows])
