@@ -140,14 +140,8 @@ def fit_linear(
 ) -> LinearEstimator:
     """Fit the kind of estimator that ``settings["kind"]`` names to training objects.
 
-    Parameters
-    ----------
-    features : ndarray (n, n_views, D)
-        Features of the sweeps of the training objects; even and odd parts where there is a plane.
-    settings : mapping
-        The configuration's ``estimator``.
-    mirror_plane_deg : float or None
-        The azimuth of the plane of symmetry.
+    `features` (n, n_views, D) are those of their sweeps; even and odd parts where there is a plane
+    of symmetry, at the azimuth `mirror_plane_deg`.
     """
     if settings["kind"] == "linear":
         return fit_directions(features, mirror_plane_deg)

@@ -69,14 +69,9 @@ NOTES = tuple(map(_read_note, paper_rows("published_notes.csv")))
 def published_value(table: str, metric: str, row: str, method: str) -> float:
     """Return one published value as printed, or NaN where the paper prints none.
 
-    Parameters
-    ----------
-    table : str
-        ``table1`` to ``table7``.
-    metric : str
-        ``mae`` (degrees), ``pauc`` (percent), or ``estimate`` and ``error`` (degrees, Table 6).
-    row : str
-        A category, elevation, group, initial azimuth or fold, or `AVERAGE_ROW`, `SIGMA_ROW`.
+    The metric is ``mae`` (degrees), ``pauc`` (percent), or ``estimate`` and ``error`` (degrees,
+    Table 6), the row a category, elevation, group, initial azimuth or fold, or `AVERAGE_ROW` or
+    `SIGMA_ROW`.
     """
     row_values = PUBLISHED[table].get(metric, {}).get(row)
     if row_values is None or method not in METHODS:

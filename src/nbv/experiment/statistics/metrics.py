@@ -113,27 +113,15 @@ def fold_std(values: ArrayLike) -> float:
     """Return the sample standard deviation (ddof = 1) of one value per fold, in its unit.
 
     The paper's sigma. It measures how much folds differ (which objects happen to be tested), not
-    the uncertainty of the average: for that use an interval over objects.
-
-    Returns
-    -------
-    float
-        NaN for fewer than two folds.
+    the uncertainty of the average: for that use an interval over objects. NaN for fewer than two
+    folds.
     """
     folds = np.asarray(values, dtype=np.float64)
     return float(np.std(folds, ddof=1)) if folds.size > 1 else float("nan")
 
 
 def resample_objects(n_objects: int, rng: np.random.Generator, n_resamples: int) -> Ints:
-    """Draw n_objects objects with replacement, and return how often each was drawn.
-
-    Calls ``rng.integers(n_objects, size=(n_resamples, n_objects))`` once.
-
-    Returns
-    -------
-    (n_resamples, n_objects) int
-        Multiplicities; each row sums to ``n_objects``.
-    """
+    """Draw n_objects objects with replacement: how often each, (n_resamples, n_objects)."""
     drawn = rng.integers(n_objects, size=(n_resamples, n_objects))
     rows = np.arange(n_resamples)[:, None] * n_objects
     counts = np.bincount((drawn + rows).ravel(), minlength=n_resamples * n_objects)
@@ -141,23 +129,11 @@ def resample_objects(n_objects: int, rng: np.random.Generator, n_resamples: int)
 
 
 def resampled_means(values: ArrayLike, objects: Ints, multiplicities: Ints) -> Floats:
-    """Return the mean over images in each resample of the objects.
+    """Return the mean over images in each resample of the objects, (n_resamples,).
 
-    Per-object sums and counts suffice, so this costs two small matrix products.
-
-    Parameters
-    ----------
-    values : (n_images,) float
-        Any value per image.
-    objects : (n_images,) int
-        Object of each image, in [0, n_objects).
-    multiplicities : (n_resamples, n_objects) int
-        From `resample_objects`.
-
-    Returns
-    -------
-    (n_resamples,) float
-        NaN where no image was drawn.
+    Values and objects (n_images,) are those of the images; the multiplicities are from
+    `resample_objects`. NaN where no image was drawn. Per-object sums and counts suffice, so this
+    costs two small matrix products.
     """
     n_objects = multiplicities.shape[1]
     sums = np.bincount(objects, weights=np.asarray(values, dtype=np.float64), minlength=n_objects)
