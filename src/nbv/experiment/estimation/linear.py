@@ -89,22 +89,14 @@ def fit_fold(
 
     Where calibration is cross-fitted, the outputs of each part are those of a fit to the others.
 
+    The outputs are, for each role ``calibration`` and ``test``, the objects and (m, n_views, k).
+
     Parameters
     ----------
     features : ndarray (n, n_views, D)
-        Features of the sweeps of all objects of the category.
-    object_ids : sequence of str
-        The n objects.
-    splits : DataFrame
-        From `nbv.experiment.splits.read_splits`.
+        Features of the sweeps of the n objects of the category.
     settings, mirror_plane_deg
         See `fit_linear`.
-
-    Returns
-    -------
-    LinearEstimator, dict
-        The dict has for each role, ``calibration`` and ``test``, the objects and the outputs
-        (m, n_views, k).
 
     Raises
     ------
