@@ -30,6 +30,9 @@ HELPFUL = 0.9
 """Share of the expected error now: promises fall by up to a tenth where flips are such that no view
 helps (tools/promised_errors.py)."""
 
+MOST_VIEWS = 4
+"""Views of an object after which a walk ends, whatever the decision."""
+
 NO_DEPENDENCE = (
     "calibration shows no dependence of this object's flips on the view: candidates are ranked by "
     f"travel, those {INDEPENDENT_DEG:g}° or more from every view first"
