@@ -8,6 +8,7 @@ probability and decision after each view.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -18,6 +19,9 @@ from numpy.typing import NDArray
 from nbv.choice.rotations import MIN_SEPARATION_DEG
 from nbv.core.orientations.criteria import view_angle_deg
 from nbv.core.orientations.group import Array, inverse
+from nbv.core.seeds import rng_for
+from nbv.data.depth_images import logged
+from nbv.labels import number
 from nbv.tables.next_camera import MOST_VIEWS, CameraMove, CameraRecommendation, PoseEstimate
 from nbv.tables.orientation_table import OrientationTable
 
@@ -35,6 +39,16 @@ ORDERS: dict[str, Order] = {
 ENDED = "verdict != 'one more view'"
 """Query of the rows of walks at which the decision ends them."""
 
+FIRST_VIEWS = 300
+"""First views of a forecast: as many as a minute allows."""
+
+FEWEST_OBJECTS, FEWEST_INSTANCES, N_RESAMPLES = 5, 3, 2000
+
+NO_FORECAST = (
+    f"what choosing saves is not known: that takes {FEWEST_OBJECTS} objects with "
+    f"{FEWEST_INSTANCES} still instances each, told apart by scene_id and instance"
+)
+
 _ELSEWHERE = 50
 """Even candidates about the object, where an instance has no image left: for the pose alone."""
 
@@ -45,7 +59,6 @@ def walks(
     rng: np.random.Generator,
     orders: Mapping[str, Order] = ORDERS,
     firsts: Iterable[int] | None = None,
-    most_views: int = MOST_VIEWS,
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each first view, order and number of views of an instance.
 
@@ -60,7 +73,6 @@ def walks(
     orders : mapping
     firsts : iterable of int, optional
         The first views; all images by default.
-    most_views : int
     """
     object_id, truth, score = images.object_ids[0], images.truth, images.score
     if score is not None and not np.isfinite(score).all():
@@ -107,7 +119,7 @@ def walks(
                     "depends_on_view": after.depends_on_view,
                 }
                 left = free(taken)
-                if len(taken) == most_views or not len(left):
+                if len(taken) == MOST_VIEWS or not len(left):
                     break
                 to_nearest = apart[np.array(taken)][:, left].min(axis=0)
                 taken = (*taken, int(left[order(after.moves, to_nearest, rng)]))
@@ -121,3 +133,104 @@ def stopped(walks: pd.DataFrame, rule: str) -> pd.DataFrame:
     # Rows are in the order of views.
     last = walks.groupby(walk, sort=False).tail(1)
     return pd.concat([walks.query(rule), last]).groupby(walk, sort=False).head(1)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What choosing a view, and stopping, are expected to save.
+
+    Attributes
+    ----------
+    error_deg : dict of str to float
+        Mean error after one view; after a second one, random, opposite or recommended; and where
+        the decision ends the recommended order (``stopped``).
+    mean_views : float
+        Number of views at which the decision ends.
+    choosing_deg, stopping_deg : tuple of float
+        What a recommended second view saves over a random one, and stopping over the same mean
+        number of views by chance, each with its 95 % interval.
+    """
+
+    error_deg: dict[str, float]
+    mean_views: float
+    choosing_deg: tuple[float, float, float]
+    stopping_deg: tuple[float, float, float]
+
+    @property
+    def sentence(self) -> str:
+        """What is expected, in a sentence."""
+        choosing, stopping = (
+            f"{'expected to save' if low > 0 else 'not shown to save anything:'} "
+            f"{number(mean, 1)}° ({number(low, 1)} to {number(high, 1)})"
+            for mean, low, high in (self.choosing_deg, self.stopping_deg)
+        )
+        return (
+            f"choosing is {choosing} over a random second view; stopping, after "
+            f"{self.mean_views:.1f} views on average, is {stopping} over as many views by chance"
+        )
+
+
+def forecast(table: OrientationTable) -> Forecast | None:
+    """Return what walks over a table's images bring, each instance calibrated by all others.
+
+    Figures are means over objects of means over instances, from random first views; intervals
+    resample objects, then instances. It takes up to a minute.
+
+    Parameters
+    ----------
+    table : OrientationTable
+        Groups named scene/instance are instances.
+
+    Returns
+    -------
+    Forecast or None
+        None with fewer than `FEWEST_OBJECTS` objects of `FEWEST_INSTANCES` instances.
+    """
+    instances = pd.Series(table.group).str.contains("/").to_numpy()
+    n_instances = pd.Series(table.group[instances]).groupby(table.object_id[instances]).nunique()
+    names = n_instances.index[n_instances >= FEWEST_INSTANCES]
+    if len(names) < FEWEST_OBJECTS:
+        return None
+    rows: list[dict[str, Any]] = []
+    for name in logged(names, len(names), "objects"):
+        rng = rng_for(0, "forecast", name)
+        images = np.flatnonzero(instances & (table.object_id == name))
+        firsts = rng.permutation(images)[: max(1, FIRST_VIEWS // len(names))]
+        for group in np.unique(table.group[firsts]):
+            is_instance = (table.object_id == name) & (table.group == group)
+            seen = np.flatnonzero(np.isin(np.flatnonzero(is_instance), firsts))
+            about = {"object_id": name, "instance": f"{name}/{group}"}
+            of = table.where(~is_instance), table.where(is_instance), rng
+            rows += [about | row for row in walks(*of, firsts=seen)]
+    frame = pd.DataFrame(rows)
+
+    def figures(order: str, rule: str) -> pd.DataFrame:
+        ends = stopped(frame[frame["order"] == order], rule)
+        return ends.groupby(["object_id", "instance"])[["error_deg", "n_views"]].mean()
+
+    rng, ended = rng_for(0, "forecast"), figures("recommended", ENDED)
+    mean_views, *_ = _resampled(ended["n_views"], rng)
+    numbers = range(1, MOST_VIEWS + 1)
+    curve = [figures("recommended", f"n_views == {n}")["error_deg"] for n in numbers]
+    chance = [np.interp(mean_views, numbers, each) for each in zip(*curve, strict=True)]
+    after = {"one view": curve[0]}
+    after |= {order: figures(order, "n_views == 2")["error_deg"] for order in ORDERS}
+    after["stopped"] = ended["error_deg"]
+    return Forecast(
+        {name: _resampled(errors, rng)[0] for name, errors in after.items()},
+        mean_views,
+        _resampled(after["random"] - after["recommended"], rng),
+        _resampled(chance - after["stopped"], rng),
+    )
+
+
+def _resampled(values: pd.Series[float], rng: np.random.Generator) -> tuple[float, float, float]:
+    """Return the mean over objects of the means over instances, and its interval."""
+    objects = [of.to_numpy() for _, of in values.groupby(level="object_id")]
+    drawn = rng.integers(len(objects), size=(N_RESAMPLES, len(objects)))
+    samples = np.zeros(len(drawn))
+    for k, of in enumerate(objects):
+        instances = of[rng.integers(len(of), size=(*drawn.shape, len(of)))]
+        samples += ((drawn == k) * instances.mean(axis=2)).mean(axis=1)
+    low, high = np.quantile(samples, [0.025, 0.975])
+    return float(np.mean([of.mean() for of in objects])), float(low), float(high)
