@@ -309,7 +309,8 @@ def _calibrate_orientations(
         print_line(f"{output}: {counted(len(pairs.object_id), 'pair')}")
         sys.stdout.flush()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    expected = forecast(pairs)
+    if (expected := forecast(pairs)) is not None:
+        replace(pairs, bounds_deg=expected.bounds_deg).save(output)
     if as_json:
         objects = [asdict(summary) for summary in about]
         made = {"file": str(output), "objects": objects, "left_out": list(pairs.left_out)}

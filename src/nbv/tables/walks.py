@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from nbv.choice.rotations import MIN_SEPARATION_DEG
 from nbv.core.orientations.criteria import view_angle_deg
@@ -43,6 +43,8 @@ FIRST_VIEWS = 300
 """First views of a forecast: as many as a minute allows."""
 
 FEWEST_OBJECTS, FEWEST_INSTANCES, N_RESAMPLES = 5, 3, 2000
+
+LEVELS, LARGEST_BOUND_DEG = (80, 90), 90.0
 
 NO_FORECAST = (
     f"what choosing saves is not known: that takes {FEWEST_OBJECTS} objects with "
@@ -149,12 +151,15 @@ class Forecast:
     choosing_deg, stopping_deg : tuple of float
         What a recommended second view saves over a random one, and stopping over the same mean
         number of views by chance, each with its 95 % interval.
+    bounds_deg : dict of str to dict
+        `bounds_of` the errors of one random image an object, after one view and ``stopped``.
     """
 
     error_deg: dict[str, float]
     mean_views: float
     choosing_deg: tuple[float, float, float]
     stopping_deg: tuple[float, float, float]
+    bounds_deg: dict[str, dict[str, float]]
 
     @property
     def sentence(self) -> str:
@@ -198,11 +203,16 @@ def forecast(table: OrientationTable) -> Forecast | None:
         firsts = rng.permutation(images)[: max(1, FIRST_VIEWS // len(names))]
         for group in np.unique(table.group[firsts]):
             is_instance = (table.object_id == name) & (table.group == group)
-            seen = np.flatnonzero(np.isin(np.flatnonzero(is_instance), firsts))
+            members = np.flatnonzero(is_instance)
+            seen = np.flatnonzero(np.isin(members, firsts))
             about = {"object_id": name, "instance": f"{name}/{group}"}
             of = table.where(~is_instance), table.where(is_instance), rng
-            rows += [about | row for row in walks(*of, firsts=seen)]
+            rows += [
+                about | row | {"is_drawn": members[row["first"]] == firsts[0]}
+                for row in walks(*of, firsts=seen)
+            ]
     frame = pd.DataFrame(rows)
+    drawn = frame[frame["is_drawn"] & (frame["order"] == "recommended")]
 
     def figures(order: str, rule: str) -> pd.DataFrame:
         ends = stopped(frame[frame["order"] == order], rule)
@@ -221,7 +231,24 @@ def forecast(table: OrientationTable) -> Forecast | None:
         mean_views,
         _resampled(after["random"] - after["recommended"], rng),
         _resampled(chance - after["stopped"], rng),
+        {
+            "one view": bounds_of(drawn[drawn["n_views"] == 1]["error_deg"]),
+            "stopped": bounds_of(stopped(drawn, ENDED)["error_deg"]),
+        },
     )
+
+
+def bounds_of(error_deg: ArrayLike) -> dict[str, float]:
+    """Return bounds on a further error by `LEVELS`, percent: split conformal prediction.
+
+    Of n errors (n,) and a further one in random order, the ceil((n + 1) q)-th smallest is not
+    exceeded with a probability of q or more. A level is left out if n is too small for it, or its
+    bound exceeds `LARGEST_BOUND_DEG`.
+    """
+    ordered = np.sort(error_deg)
+    ranks = {level: -(-(len(ordered) + 1) * level // 100) for level in LEVELS}
+    found = {str(q): float(ordered[k - 1]) for q, k in ranks.items() if k <= len(ordered)}
+    return {level: bound for level, bound in found.items() if bound <= LARGEST_BOUND_DEG}
 
 
 def _resampled(values: pd.Series[float], rng: np.random.Generator) -> tuple[float, float, float]:
