@@ -193,9 +193,9 @@ def recommend_camera(
     seen = np.stack(
         [c.straight_from_camera @ e.rotation for c, e in zip(cameras, estimates, strict=True)]
     )
-    ratios, warnings = np.ones(len(seen)), [NO_SCORES]
+    ratio, ratios, warnings = None, np.ones(len(seen)), [NO_SCORES]
     if scores is not None and errors.ratio is not None:
-        ratios, warnings = errors.ratio(scores), []
+        ratio, ratios, warnings = errors.ratio, errors.ratio(scores), []
     if is_posed:
         now = belief(errors, seen, straight_from_base @ first.T, ratios)
     else:
@@ -220,8 +220,8 @@ def recommend_camera(
             "every view so far and within `max_travel_deg`: the same view repeats its error"
         )
     ahead = targets[free] @ first.T
-    cost, within = bayes_error(now, ahead, WITHIN_DEG)
-    cost += optimism_deg(now, ahead, cost)
+    cost, within = bayes_error(now, ahead, WITHIN_DEG, ratio)
+    cost += optimism_deg(now, ahead, cost, ratio)
     if errors.depends_on_view:
         ranked = np.lexsort((travel[free], cost.round(9)))
     else:

@@ -1,5 +1,6 @@
 """The method in three dimensions: enumeration and invariances."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -75,16 +76,25 @@ def test_conditionals_against_enumeration(symmetry, given):
         np.testing.assert_allclose(found, expected / expected.sum(), atol=1e-5)
 
 
-def test_promises_against_enumeration():
+@pytest.mark.parametrize("slope", [None, 0.0, -2.0])
+def test_promises_against_enumeration(slope):
     errors, moves = made(), some_moves(3)
+    ratio = None if slope is None else ScoreRatio(np.arange(16.0), slope, 0.1)
+    shares = np.ones((1, 2)) if ratio is None else ratio.shares(errors.share_of_flips)
+    np.testing.assert_allclose(shares.sum(axis=0), 1)
+    if ratio is not None:
+        # Flips have low scores where the slope is negative; the odds change by the ratio.
+        odds = shares[:, 1] / shares[:, 0]
+        expected = ratio(ratio.scores[[1, -2]])
+        assert odds[0] / odds[-1] == pytest.approx(expected[0] / expected[1])
     first = belief(errors, errors.estimate[:1], IDENTITY)
     b, small = first.probability, errors.small_errors_deg(2)
-    found, chances = bayes_error(first, moves, [30])
+    found, chances = bayes_error(first, moves, [30], ratio)
     for k, move in enumerate(moves):
         likelihood = errors.conditional("truth", first.support, move[None])[0]
         error = within = 0.0
-        for s in range(len(b)):
-            after = b * likelihood[:, s]
+        for s, (if_right, if_flip) in itertools.product(range(len(b)), shares):
+            after = b * likelihood[:, s] * np.where(np.arange(len(b)) == s, if_right, if_flip)
             # The pose is one of two that an estimate supports.
             pose = first.support[s if after[s] > after[0] else 0]
             distance = ASYMMETRIC.distance_deg(first.support, pose)

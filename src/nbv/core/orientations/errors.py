@@ -59,6 +59,9 @@ SAME_DEG = 20.0
 MOST_RATIO = 50.0
 """A score never changes the odds of a flip by more than this factor."""
 
+SCORE_BINS = 8
+"""Bins of the next view's score."""
+
 
 @dataclass(frozen=True)
 class ScoreRatio:
@@ -99,6 +102,16 @@ class ScoreRatio:
         """Return the likelihood ratio of a flip for each score (n,)."""
         log_ratio = self.offset + self.slope * _logit_rank(self.scores, scores)
         return np.clip(np.exp(log_ratio), 1 / MOST_RATIO, MOST_RATIO)
+
+    def shares(self, share_of_flips: float) -> Array:
+        """Return the shares (`SCORE_BINS`, 2) of right estimates and of flips, by their scores.
+
+        Bins are of equal probability.
+        """
+        quantiles = (np.arange(SCORE_BINS) + 0.5) / SCORE_BINS
+        ratio = self(np.quantile(self.scores, quantiles, method="nearest"))
+        shares = np.stack([np.ones(SCORE_BINS), ratio]) / (1 + share_of_flips * (ratio - 1))
+        return np.asarray(shares / shares.sum(axis=1, keepdims=True)).T
 
 
 def _logit_rank(ordered: Array, scores: ArrayLike) -> Array:
