@@ -13,7 +13,7 @@ import nbv
 from nbv.cli import main
 from nbv.tables.bop import read_orientation_table
 from nbv.tables.orientation_table import OrientationTable
-from nbv.tables.walks import NO_FORECAST, bounds_of, forecast
+from nbv.tables.walks import ENDED, NO_FORECAST, bounds_of, forecast, stopped
 from rotation_pairs import orientation_pairs
 
 
@@ -24,7 +24,10 @@ def table(path, *numbers):
 
 def test_the_forecast_of_all_first_views_is_the_studys(tmp_path, capsys, monkeypatch):
     pairs = table(tmp_path, 2, 3, 4)
-    monkeypatch.setattr("nbv.tables.walks.FEWEST_OBJECTS", 2)
+    # Of two objects, 66 % are covered by the larger error.
+    changes = {"FEWEST_OBJECTS": 2, "LEVELS": (66,), "LARGEST_BOUND_DEG": 180.0}
+    for name, value in changes.items():
+        monkeypatch.setattr(f"nbv.tables.walks.{name}", value)
     command = ["calibrate", str(pairs), "--output", str(pairs.with_suffix(".npz"))]
     assert main([*command, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["forecast"]
@@ -38,6 +41,12 @@ def test_the_forecast_of_all_first_views_is_the_studys(tmp_path, capsys, monkeyp
     stopping = figures["chance_overall", "recommended_decision"] - found["error_deg"]["stopped"]
     choosing = found["error_deg"]["random"] - found["error_deg"]["recommended"]
     assert OrientationTable.load(pairs.with_suffix(".npz")).bounds_deg == found["bounds_deg"]
+    walks = walks[walks["order"] == "recommended"]
+    ends = {"one view": walks[walks["n_views"] == 1], "stopped": stopped(walks, ENDED)}
+    for stage, rows in ends.items():
+        smaller = rows.groupby("object_id")["error_deg"].min()
+        assert smaller.max() <= found["bounds_deg"][stage]["66"]
+        assert found["bounds_deg"][stage]["66"] in rows["error_deg"].to_list()
     for (mean, low, high), wanted in (
         (found["stopping_deg"], stopping),
         (found["choosing_deg"], choosing),

@@ -39,7 +39,7 @@ ORDERS: dict[str, Order] = {
 ENDED = "verdict != 'one more view'"
 """Query of the rows of walks at which the decision ends them."""
 
-FIRST_VIEWS = 300
+FIRST_VIEWS = 250
 """First views of a forecast: as many as a minute allows."""
 
 FEWEST_OBJECTS, FEWEST_INSTANCES, N_RESAMPLES = 5, 3, 2000
