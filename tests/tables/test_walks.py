@@ -13,7 +13,7 @@ import nbv
 from nbv.cli import main
 from nbv.tables.bop import read_orientation_table
 from nbv.tables.orientation_table import OrientationTable
-from nbv.tables.walks import ENDED, NO_FORECAST, bounds_of, forecast, stopped
+from nbv.tables.walks import ENDED, NO_FORECAST, Forecast, bounds_of, forecast, stopped
 from rotation_pairs import orientation_pairs
 
 
@@ -53,6 +53,12 @@ def test_the_forecast_of_all_first_views_is_the_studys(tmp_path, capsys, monkeyp
     ):
         assert mean == pytest.approx(wanted)
         assert low <= mean <= high
+
+
+def test_only_an_interval_above_0_is_a_saving():
+    found = Forecast({}, 1.5, (2.1, 0.4, 3.9), (2.0, -0.1, 3.0), {}).sentence
+    assert found.count("is expected to save") == found.count("is not shown to save") == 1
+    assert "choosing is expected to save 2.1° (0.4 to 3.9) over" in found
 
 
 def test_there_is_no_forecast_of_few_objects_or_of_unknown_instances(tmp_path, capsys):

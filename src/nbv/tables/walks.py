@@ -164,15 +164,18 @@ class Forecast:
     @property
     def sentence(self) -> str:
         """What is expected, in a sentence."""
-        choosing, stopping = (
-            f"{'expected to save' if low > 0 else 'not shown to save anything:'} "
-            f"{number(mean, 1)}° ({number(low, 1)} to {number(high, 1)})"
-            for mean, low, high in (self.choosing_deg, self.stopping_deg)
-        )
-        return (
-            f"choosing is {choosing} over a random second view; stopping, after "
-            f"{self.mean_views:.1f} views on average, is {stopping} over as many views by chance"
-        )
+        stopping = f"stopping, after {self.mean_views:.1f} views on average,"
+        parts = []
+        for what, other, (mean, low, high) in (
+            ("choosing", "a random second view", self.choosing_deg),
+            (stopping, "as many views by chance", self.stopping_deg),
+        ):
+            saved = f"{number(mean, 1)}° ({number(low, 1)} to {number(high, 1)})"
+            if low > 0:
+                parts.append(f"{what} is expected to save {saved} over {other}")
+            else:
+                parts.append(f"{what} is not shown to save anything over {other}: {saved}")
+        return "; ".join(parts)
 
 
 def forecast(table: OrientationTable) -> Forecast | None:
