@@ -16,10 +16,10 @@ from nbv.experiment.statistics.paired import Resampler
 from nbv.files import existing, read_csv
 from nbv.labels import category_label, method_label, number
 from nbv.style import INK, RC, Panels, method_style, panel_grid
+from nbv.tables.next_camera import MOST_VIEWS
 from studies.curves import ANY_DIRECTION, pooled_travel
 from studies.object_errors import mae_difference, mae_interval, paired_objects
 from studies.rotation_tables import NUMBERS, PROBABILITIES
-from studies.rotations import MOST_VIEWS
 
 _PRODUCT = "_product"
 _PANEL_IN = (3.4, 2.9)

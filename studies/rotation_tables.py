@@ -12,8 +12,8 @@ from nbv.core.orientations.group import ASYMMETRIC, VOLUME, Symmetry
 from nbv.experiment.report.table import DECIDED, Cell, Part, Row, Table, difference_cell
 from nbv.experiment.statistics.metrics import Floats, Interval, percentile_interval
 from nbv.labels import category_label, counted, interval_text, number
-from nbv.tables.next_camera import CameraRecommendation
-from studies.rotations import MOST_VIEWS
+from nbv.tables.next_camera import MOST_VIEWS, CameraRecommendation
+from nbv.tables.walks import ENDED, stopped
 from studies.solids import SOLIDS, solid
 from studies.trainings import crossed_mean
 
@@ -70,7 +70,7 @@ def by_symmetry(objects: Sequence[str], models_info: Mapping[str, Any]) -> dict[
 
 NUMBERS = {str(n): f"n_views == {n}" for n in range(1, MOST_VIEWS + 1)}
 STOPS = {
-    "decision": "verdict != 'one more view'",
+    "decision": ENDED,
     "belief": f"probability >= {CameraRecommendation.STOP_PROBABILITY}",
     "score": "flip_ratio <= 0.5",
 }
@@ -80,16 +80,6 @@ PROBABILITIES = {
     str(p): f"probability >= {p}" for p in (0.5, 0.7, 0.8, 0.9, 0.95, 0.97, 0.98, 0.99, 0.995)
 }
 """Other probabilities that may be enough, for the figure."""
-
-
-def stopped(walks: pd.DataFrame, rule: str) -> pd.DataFrame:
-    """Return the row of each walk at which it stops: the first that is enough, else the last."""
-    walk = ["instance", "first", "order"]
-    if "training" in walks:
-        walk.append("training")
-    # Rows are in the order of views.
-    last = walks.groupby(walk, sort=False).tail(1)
-    return pd.concat([walks.query(rule), last]).groupby(walk, sort=False).head(1)
 
 
 def method_errors(walks: pd.DataFrame) -> pd.DataFrame:

@@ -19,6 +19,11 @@ pose is S E' D', weighted by the probability of its flip there and by the score'
 in both views are taken with their probabilities; small errors, flips to anywhere and the second
 score (stratified) are drawn. The product fuses both views. `ratio` is came / promised, each the
 mean over draws, with a 95 % interval by resampling draws; further columns are shares of decisions.
+
+    python tools/promised_errors.py --bounds 9 19 --draws 500 > bounds.csv
+
+compares bounds of tables of so many objects with errors on a new instance of one of them. Objects
+have 3 instances, and flips of a random kind. A bound that is not given holds.
 """
 
 from __future__ import annotations
@@ -26,7 +31,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,6 +43,7 @@ from scipy.special import expit, logit, ndtri
 from nbv import OrientationTable, PoseEstimate
 from nbv.core.orientations.group import ASYMMETRIC, Array, Orientations, inverse, viewing_direction
 from nbv.core.seeds import rng_for
+from nbv.tables.walks import ENDED, LEVELS, ORDERS, bounds_of, stopped, walks
 
 Generator = np.random.Generator
 Flips = NDArray[np.intp]
@@ -186,6 +192,44 @@ def rows_of(kind: str, scores: str, n: int, draw: int, seed: int) -> list[dict[s
     ]
 
 
+def bounds_hold(n: int, draw: int, seed: int) -> list[dict[str, Any]]:
+    """Return whether the bounds of one draw of `n` objects are given, and hold."""
+    rng = rng_for(seed, "bounds", n, draw)
+    estimators = [Estimator(KINDS[k], SHIFTS["little"]) for k in rng.choice(list(KINDS), n)]
+
+    def pairs(k: int, n_instances: int) -> OrientationTable:
+        table = estimators[k].table(n_instances * N_IN_GROUP, rng)
+        return replace(table, object_id=np.full(len(table.group), str(k)))
+
+    objects = [pairs(k, 3) for k in range(n)]
+    names = ("object_id", "group", "estimate", "truth", "score")
+    known = OrientationTable(
+        *(np.concatenate([getattr(table, name) for table in objects]) for name in names)
+    )
+
+    def errors(known: OrientationTable, images: OrientationTable) -> tuple[float, float]:
+        first = rng.integers(len(images.group))
+        order = {"recommended": ORDERS["recommended"]}
+        walk = pd.DataFrame(walks(known, images, rng, order, [first])).assign(instance="")
+        return walk["error_deg"][0], stopped(walk, ENDED)["error_deg"].iloc[0]
+
+    calibration = []
+    for table in objects:
+        is_drawn = known.object_id == table.object_id[0]
+        is_drawn &= known.group == rng.choice(table.group)
+        calibration.append(errors(known.where(~is_drawn), known.where(is_drawn)))
+    came = errors(known, pairs(int(rng.integers(n)), 1))
+    rows = []
+    for stage, of_stage, error in zip(
+        ("one view", "stopped"), np.transpose(calibration), came, strict=True
+    ):
+        bounds = bounds_of(of_stage)
+        for level in map(str, LEVELS):
+            holds = {"given": level in bounds, "holds": error <= bounds.get(level, np.inf)}
+            rows.append({"n_objects": n, "stage": stage, "level": level} | holds)
+    return rows
+
+
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
     """Return mean promises and risks for each kind of estimator, and for all."""
     found = []
@@ -212,8 +256,15 @@ def main() -> None:
     parser.add_argument("--pairs", nargs="+", type=int, default=[40, 200, 2000])
     parser.add_argument("--draws", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--bounds", nargs="+", type=int)
     given = parser.parse_args()
     rows = []
+    if given.bounds:
+        for draw, n in itertools.product(range(given.draws), given.bounds):
+            rows += bounds_hold(n, draw, given.seed)
+        means = pd.DataFrame(rows).groupby(["n_objects", "stage", "level"]).mean()
+        means.to_csv(sys.stdout, float_format="%.3f")
+        return
     for draw in range(given.draws):
         for n, kind, scores in itertools.product(given.pairs, given.kinds, given.scores):
             if KINDS[kind] or scores == given.scores[0]:

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from nbv.tables.lookup import build_lookup as build_lookup
     from nbv.tables.next_camera import PoseEstimate as PoseEstimate
     from nbv.tables.orientation_table import OrientationTable as OrientationTable
+    from nbv.tables.walks import forecast as forecast
 
 __version__ = "0.2.0"
 
@@ -58,6 +59,7 @@ _MODULES = {
     "Move": "nbv.choice.next_view",
     "DistributionTable": "nbv.tables.distribution_table",
     "OrientationTable": "nbv.tables.orientation_table",
+    "forecast": "nbv.tables.walks",
     "PoseEstimate": "nbv.tables.next_camera",
     "moved_camera": "nbv.choice.moves",
     "check_axis": "nbv.choice.moves",

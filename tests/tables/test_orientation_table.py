@@ -383,6 +383,7 @@ def test_the_keys_of_an_azimuth_are_a_subset(tmp_path, monkeypatch, capsys, pair
         ("object_index", np.full(160, 7)),
         ("symmetries", np.array("[1]")),
         ("detections", np.array("[1]")),
+        ("bounds", np.array("[1]")),
         ("group", np.zeros(160)),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -284,30 +285,38 @@ def _calibrate_orientations(
 ) -> None:
     """Make the table of estimates in three dimensions."""
     from nbv.tables.bop import read_orientation_table
+    from nbv.tables.walks import NO_FORECAST, forecast
 
     truth = options.ground_truth, options.models_info, options.object or []
     limits = options.nearest, options.least_score
     pairs = read_orientation_table(source, *truth, *limits, rows=rows)
     about = pairs.about()
     pairs.save(output)
+    if not as_json:
+        print_warnings(pairs.left_out)
+        for summary in about:
+            depends = "flips depend" if summary.depends_on_view else "no evidence that flips depend"
+            print_line(
+                f"object {summary.object_id}: {counted(summary.n_pairs, 'pair')} "
+                f"of {counted(summary.n_groups, 'instance')}, "
+                f"{summary.directions_covered:.0%} of directions covered; "
+                f"error {summary.mean_error_deg:.1f}°, {counted(summary.n_flips, 'flip')}; "
+                f"{depends} on the view"
+            )
+            if summary.holds_where is not None:
+                print_line(f"  {summary.holds_where}")
+            print_warnings(summary.warnings)
+        print_line(f"{output}: {counted(len(pairs.object_id), 'pair')}")
+        sys.stdout.flush()
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    if (expected := forecast(pairs)) is not None:
+        replace(pairs, bounds_deg=expected.bounds_deg).save(output)
     if as_json:
         objects = [asdict(summary) for summary in about]
-        print_json({"file": str(output), "objects": objects, "left_out": list(pairs.left_out)})
+        made = {"file": str(output), "objects": objects, "left_out": list(pairs.left_out)}
+        print_json(made | {"forecast": expected and asdict(expected)})
         return
-    print_warnings(pairs.left_out)
-    for summary in about:
-        depends = "flips depend" if summary.depends_on_view else "no evidence that flips depend"
-        print_line(
-            f"object {summary.object_id}: {counted(summary.n_pairs, 'pair')} "
-            f"of {counted(summary.n_groups, 'instance')}, "
-            f"{summary.directions_covered:.0%} of directions covered; "
-            f"error {summary.mean_error_deg:.1f}°, {counted(summary.n_flips, 'flip')}; "
-            f"{depends} on the view"
-        )
-        if summary.holds_where is not None:
-            print_line(f"  {summary.holds_where}")
-        print_warnings(summary.warnings)
-    print_line(f"{output}: {counted(len(pairs.object_id), 'pair')}")
+    print_line(NO_FORECAST if expected is None else expected.sentence)
 
 
 CALIBRATIONS: Mapping[str, Callable[..., None]] = {

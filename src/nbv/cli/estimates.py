@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -114,7 +114,7 @@ def next_view(
     check_options(given, OPTIONS[kind], f"{table}, which holds {kind}")
     answer: Answer[Any]
     if kind == ORIENTATIONS:
-        answer, has_targets = _ranked_cameras(table, estimate, limits, around), True
+        answer, has_targets = _ranked_cameras(table, estimate, limits, around, stop), True
     else:
         placement = limits.placement()
         if isinstance(estimate, list):
@@ -162,7 +162,11 @@ def _recommended(
 
 
 def _ranked_cameras(
-    table: Path, estimate: Any, limits: MoveOptions, around: CandidateOptions
+    table: Path,
+    estimate: Any,
+    limits: MoveOptions,
+    around: CandidateOptions,
+    stop: StopOptions,
 ) -> Answer[Any]:
     if (around.candidates is None) == (around.sphere is None):
         raise UserError("--candidates and --sphere: give one of them")
@@ -170,7 +174,7 @@ def _ranked_cameras(
     from nbv.tables.next_camera import as_view, read_views
     from nbv.tables.orientation_table import OrientationTable
 
-    return OrientationTable.load(table).recommend(
+    answer = OrientationTable.load(table).recommend(
         read_views(estimate) if isinstance(estimate, Path) else [as_view(estimate, "--estimate")],
         read_poses(around.candidates) if around.candidates is not None else around.sphere or 0,
         object_id=around.object,
@@ -178,3 +182,7 @@ def _ranked_cameras(
         max_travel_deg=limits.max_travel,
         previous=None if around.previous is None else read_views(around.previous)[-1],
     )
+    if (stop.until, stop.until_probability) == (None, None):
+        return answer
+    kept = {name: of for name, of in answer.bounds_deg.items() if name != "stopped"}
+    return replace(answer, bounds_deg=kept)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,9 @@ INDEPENDENT_DEG = 60.0
 HELPFUL = 0.9
 """Share of the expected error now: promises fall by up to a tenth where flips are such that no view
 helps (tools/promised_errors.py)."""
+
+MOST_VIEWS = 4
+"""Views of an object after which a walk ends, whatever the decision."""
 
 NO_DEPENDENCE = (
     "calibration shows no dependence of this object's flips on the view: candidates are ranked by "
@@ -112,12 +115,14 @@ class CameraRecommendation(Answer[CameraMove]):
     """The pose (3, 3) in the last camera, its belief in the first one, and candidates.
 
     `holds_where` says for which share of detections calibration holds, if that is known.
+    `bounds_deg` are those bounds of `nbv.forecast` that are of such answers.
     """
 
     rotation: Orientations
     depends_on_view: bool
     pose_belief: OrientationBelief
     holds_where: str | None = None
+    bounds_deg: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     STOP_PROBABILITY = 0.97
     STOP_WITHIN_DEG = AGREE_DEG
@@ -132,7 +137,13 @@ class CameraRecommendation(Answer[CameraMove]):
         """Return the pose of the object, which is called `seen`, in a few lines of text."""
         rows = matrix_lines(self.rotation)
         holds = [] if self.holds_where is None else [self.holds_where]
-        return [f"rotation, {seen} to camera", *rows, self.value(self), *holds]
+        bounds = [
+            f"{name}: within {', '.join(f'{deg:.1f}° in {q}' for q, deg in of.items())} of 100, "
+            "over objects and images"
+            for name, of in self.bounds_deg.items()
+            if of
+        ]
+        return [f"rotation, {seen} to camera", *rows, self.value(self), *bounds, *holds]
 
 
 @dataclass(frozen=True)

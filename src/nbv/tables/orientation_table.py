@@ -26,6 +26,7 @@ from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
 from nbv.numbers import Pose, as_orientations, as_pose
 from nbv.tables.detections import Detections
 from nbv.tables.next_camera import (
+    MOST_VIEWS,
     CameraRecommendation,
     PoseEstimate,
     nearest_twin,
@@ -86,6 +87,8 @@ class OrientationTable:
         Which pairs of the file are not in the table, and why.
     detections : mapping
         What became of each object's detections, as far as the file tells.
+    bounds_deg : mapping
+        Bounds of the error of an answer, of `nbv.forecast`; empty if they are unknown.
 
     Examples
     --------
@@ -105,6 +108,7 @@ class OrientationTable:
     symmetries: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
     detections: Mapping[str, Detections] = field(default_factory=dict)
+    bounds_deg: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def object_ids(self) -> list[str]:
@@ -173,7 +177,8 @@ class OrientationTable:
         """Return the table of some of the pairs (n,)."""
         names = ("object_id", "group", "estimate", "truth")
         score = None if self.score is None else self.score[rows]
-        return replace(self, score=score, **{name: getattr(self, name)[rows] for name in names})
+        parts = {name: getattr(self, name)[rows] for name in names}
+        return replace(self, score=score, bounds_deg={}, **parts)
 
     def recommend(
         self,
@@ -241,8 +246,21 @@ class OrientationTable:
             answer,
             rotation=nearest_twin(answer.rotation, self.symmetry(name), pose, previous),
             holds_where=detections.holds_where(score),
+            bounds_deg=self._bounds_deg(name, estimates, answer.decision.verdict),
             warnings=(*answer.warnings, *detections.warnings(score)),
         )
+
+    def _bounds_deg(
+        self, name: str, estimates: Sequence[PoseEstimate], verdict: str | None
+    ) -> dict[str, Mapping[str, float]]:
+        """Return the bounds that hold for an answer: one that came about as in a forecast."""
+        n, first = len(estimates), estimates[0]
+        is_scored = first.score is not None or self.errors(name).ratio is None
+        if not is_scored or (n > 1 and first.camera_pose is None):
+            return {}
+        is_last = n == MOST_VIEWS or verdict != "one more view"
+        holds = {"one view": n == 1, "stopped": n <= MOST_VIEWS and is_last}
+        return {which: self.bounds_deg[which] for which in self.bounds_deg if holds[which]}
 
     def about(self) -> list[ObjectSummary]:
         """Return a summary of each object."""
@@ -299,8 +317,9 @@ class OrientationTable:
             np.array(self.straightened),
             np.array(json.dumps(known, sort_keys=True)),
         )
-        detections = {"detections": np.array(json.dumps(others, sort_keys=True))}
-        write_arrays(path, dict(zip(_NAMES, values, strict=True)) | detections)
+        added = {"detections": others, "bounds": self.bounds_deg}
+        texts = {name: np.array(json.dumps(each, sort_keys=True)) for name, each in added.items()}
+        write_arrays(path, dict(zip(_NAMES, values, strict=True)) | texts)
 
     @classmethod
     def load(cls, path: str | Path) -> OrientationTable:
@@ -340,6 +359,7 @@ class OrientationTable:
                 bool(straightened),
                 symmetries,
                 detections={name: Detections(**entry) for name, entry in others.items()},
+                bounds_deg=dict(json.loads(str(stored.get("bounds", "{}")))),
             )
             for name in table.object_ids:
                 table.symmetry(name)
