@@ -25,7 +25,7 @@ def table(path, *numbers):
 def test_the_forecast_of_all_first_views_is_the_studys(tmp_path, capsys, monkeypatch):
     pairs = table(tmp_path, 2, 3, 4)
     # Of two objects, 66 % are covered by the larger error.
-    changes = {"FEWEST_OBJECTS": 2, "LEVELS": (66,), "LARGEST_BOUND_DEG": 180.0}
+    changes = {"FEWEST_OBJECTS": 2, "LEVELS": (66,)}
     for name, value in changes.items():
         monkeypatch.setattr(f"nbv.tables.walks.{name}", value)
     command = ["calibrate", str(pairs), "--output", str(pairs.with_suffix(".npz"))]

@@ -241,17 +241,17 @@ def forecast(table: OrientationTable) -> Forecast | None:
     )
 
 
-def bounds_of(error_deg: ArrayLike) -> dict[str, float]:
+def bounds_of(error_deg: ArrayLike, largest_deg: float = LARGEST_BOUND_DEG) -> dict[str, float]:
     """Return bounds on a further error by `LEVELS`, percent: split conformal prediction.
 
     Of n errors (n,) and a further one in random order, the ceil((n + 1) q)-th smallest is not
     exceeded with a probability of q or more. A level is left out if n is too small for it, or its
-    bound exceeds `LARGEST_BOUND_DEG`.
+    bound exceeds `largest_deg`.
     """
     ordered = np.sort(error_deg)
     ranks = {level: -(-(len(ordered) + 1) * level // 100) for level in LEVELS}
     found = {str(q): float(ordered[k - 1]) for q, k in ranks.items() if k <= len(ordered)}
-    return {level: bound for level, bound in found.items() if bound <= LARGEST_BOUND_DEG}
+    return {level: bound for level, bound in found.items() if bound <= largest_deg}
 
 
 def _resampled(values: pd.Series[float], rng: np.random.Generator) -> tuple[float, float, float]:
