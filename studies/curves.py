@@ -11,7 +11,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.core.circle.angles import nearest_bin, travel_deg
-from nbv.core.circle.criteria import FOR_MORE_VIEWS
 from nbv.core.circle.estimates import Estimates, Posteriors
 from nbv.core.circle.evidence import COARSE_BINS, Evidence
 from nbv.core.circle.fusion import ESTIMATE_FUSIONS, Rotations, rotation_errors_deg
@@ -20,6 +19,7 @@ from nbv.core.circle.policies import HeldOutViews, take_second_views
 from nbv.experiment.statistics.metrics import above_90, accuracy_area
 from studies.selection import SelectedMethod
 from studies.simulation import (
+    FOR_MORE_VIEWS,
     DistributionViews,
     EstimatedViews,
     Views,

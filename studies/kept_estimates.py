@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.circle.angles import signed_difference_deg
-from nbv.core.circle.distributions import in_object_frame, in_view_frame
+from nbv.core.circle.distributions import in_object_frame
 from nbv.core.circle.estimates import Estimates, Posteriors
 from nbv.errors import UserError
 from nbv.experiment.estimates import read_estimates, read_posteriors
@@ -64,7 +64,7 @@ class HeldOut:
         if self.surprisal is None:
             return None
         p = np.exp(-0.1 * self.surprisal)
-        rows = in_view_frame(p / p.sum(axis=-1, keepdims=True))
+        rows = _in_view_frame(p / p.sum(axis=-1, keepdims=True))
         return Posteriors(self.object_ids, np.log(rows), 1.0)
 
     @property
@@ -73,6 +73,13 @@ class HeldOut:
         n_views = self.residual.shape[1]
         step = 1 if self.surprisal is None else n_views // self.surprisal.shape[1]
         return Estimates(self.object_ids, self.estimates.estimate_deg[:, ::step])
+
+
+def _in_view_frame(rows: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Undo `nbv.core.circle.distributions.in_object_frame`."""
+    bins = np.arange(rows.shape[-1])
+    index = (bins - bins[:, None]) % len(bins)
+    return np.take_along_axis(rows, np.broadcast_to(index, rows.shape), axis=-1)
 
 
 def held_out(estimates: Estimates, posteriors: Posteriors | None = None) -> HeldOut:

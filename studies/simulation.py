@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nbv.core.circle.angles import circular_distance_deg, nearest_bin, travel_deg
-from nbv.core.circle.belief import Belief, coarser, first_belief, multiplied, updated
+from nbv.core.circle.belief import Belief, first_belief
 from nbv.core.circle.criteria import CRITERIA
 from nbv.core.circle.distributions import (
     NEGLIGIBLE_PROBABILITY,
     mean_direction_deg,
-    region_coverage,
+    product_of,
 )
 from nbv.core.circle.evidence import Evidence
 from nbv.core.circle.fusion import Rotations
@@ -23,6 +23,9 @@ from nbv.core.circle.lookup import least_cost_delta
 
 Floats = NDArray[np.floating]
 Indices = NDArray[np.intp]
+
+FOR_MORE_VIEWS = ("information_gain", "expected_dispersion", "bayes_error")
+"""Criteria that are defined after any number of views."""
 
 BISECTING_DEG = (180, 90, 270, 45, 225, 135, 315)
 
@@ -34,13 +37,56 @@ the views so far. All rotations count from the first view, whose rotation is 0.
 """
 
 
+def updated(
+    belief: Belief,
+    estimate_deg: NDArray[np.float64],
+    delta_deg: NDArray[np.int64],
+    evidence: Evidence,
+) -> Belief:
+    """Update a belief by the estimate of another view, by Bayes' rule.
+
+    Views are assumed to be independent given the pose. `delta_deg` (n,) is the rotation from the
+    first view to that one, and the evidence that of the estimator that took it.
+    """
+    n_bins = evidence.n_bins
+    rotated = nearest_bin(delta_deg, n_bins)[:, None] + np.arange(n_bins)
+    likelihood = evidence.second[rotated, nearest_bin(estimate_deg, n_bins)[:, None]]
+    product = belief.probabilities * likelihood
+    rows = np.asarray(product / product.sum(axis=1, keepdims=True))
+    return replace(belief, probabilities=rows, n_views=belief.n_views + 1)
+
+
+def multiplied(belief: Belief, distributions: Floats, delta_deg: NDArray[np.int64]) -> Belief:
+    """Update a belief by the distribution (n, B) of another view, in its frame; see `product_of`.
+
+    `delta_deg` (n,) is the rotation from the first view to it, a multiple of 360 / B.
+    """
+    product = product_of(belief.probabilities, distributions, delta_deg)
+    rows = (product / product.sum(axis=1, keepdims=True)).astype(np.float32)
+    return replace(belief, probabilities=rows, n_views=belief.n_views + 1)
+
+
+def coarser(belief: Belief, evidence: Evidence) -> Belief:
+    """Return the belief in the wider bins of evidence of the same estimator.
+
+    The quotient of the two numbers of bins must be an odd integer.
+    """
+    width = belief.probabilities.shape[1] // evidence.n_bins
+    centred = np.roll(belief.probabilities, width // 2, axis=1)
+    rows = centred.reshape(len(centred), evidence.n_bins, width).sum(axis=2)
+    first_bin = belief.first_bin
+    if first_bin is not None:
+        first_bin = (first_bin + width // 2) // width % evidence.n_bins
+    return Belief(np.asarray(rows), evidence, first_bin, belief.n_views)
+
+
 def recommended_next(criterion: str, coarse: Evidence, min_separation_deg: float) -> NextView:
     """Return the policy that takes the view of least cost.
 
     Parameters
     ----------
     criterion : str
-        A name in `nbv.core.circle.criteria.FOR_MORE_VIEWS`.
+        A name in `FOR_MORE_VIEWS`.
     coarse : Evidence
         Evidence with fewer bins than the beliefs; rotations are multiples of its bin.
     min_separation_deg : float
@@ -129,7 +175,7 @@ class EstimatedViews:
     def further(
         self, belief: Belief, objects: Indices, views: Indices, delta_deg: NDArray[np.int64]
     ) -> Belief:
-        """Return `nbv.core.circle.belief.updated`."""
+        """Return `updated`."""
         return updated(belief, self.estimate_deg[objects, views], delta_deg, self.evidence)
 
 
@@ -152,7 +198,7 @@ class DistributionViews:
     def further(
         self, belief: Belief, objects: Indices, views: Indices, delta_deg: NDArray[np.int64]
     ) -> Belief:
-        """Return `nbv.core.circle.belief.multiplied`."""
+        """Return `multiplied`."""
         return multiplied(belief, self.distributions[objects, views], delta_deg)
 
 
@@ -193,7 +239,7 @@ def follow(
     ndarray (5, n_objects, n_starts, n_views)
         `METRICS` after each view: error and total travel in degrees; the log density of the true
         pose, nats per degree; whether the regions of 50 and 90 % contain it, percent
-        (`nbv.core.circle.distributions.region_coverage`).
+        (`region_coverage`).
     """
     n_objects, n_azimuths = views.shape[:2]
     objects, starts, belief = first_views(views, start_every_deg)
@@ -210,6 +256,23 @@ def follow(
         error_deg = circular_distance_deg(mean_direction_deg(belief.probabilities), starts)
         reached[:, :, view] = [error_deg, travelled, *_calibration(belief, starts)]
     return reached.reshape(len(METRICS), n_objects, -1, n_views)
+
+
+def region_coverage(
+    probabilities: Floats, bins: NDArray[np.integer], level: float
+) -> NDArray[np.float64]:
+    """Return whether the highest-density region contains the truth `bins` (n,), in [0, 1].
+
+    The region is the smallest set of bins (B) with the probability `level`, in (0, 1). Bins at its
+    threshold belong to it in part, so that truths drawn from the distributions are inside with
+    exactly the probability `level`.
+    """
+    at_truth = np.take_along_axis(probabilities, bins[:, None], axis=1)
+    denser = np.where(probabilities > at_truth, probabilities, 0.0).sum(axis=1, dtype=np.float64)
+    equal = np.where(probabilities == at_truth, probabilities, 0.0).sum(axis=1, dtype=np.float64)
+    share = np.zeros(len(at_truth))
+    np.divide(level - denser, equal, out=share, where=equal > 0)
+    return np.clip(share, 0.0, 1.0)
 
 
 def _calibration(belief: Belief, truth_deg: NDArray[np.int64]) -> Iterator[Floats]:

@@ -61,13 +61,6 @@ ROTATIONS = {
     "two, opposite": "opposite_2",
     "two, recommended": "recommended_2",
 }
-OWN_ROTATIONS = {
-    "one view": ("score", "single"),
-    "Random": ("score", "random"),
-    "Opposite": ("score", "opposite"),
-    "Proposed": ("score", "pose_ambiguity"),
-    "Bayes error": ("score", "bayes_error"),
-}
 
 
 def bold_least(values: Iterable[float | None], decimals: int) -> list[str]:
@@ -169,9 +162,9 @@ def bundles() -> pd.DataFrame:
     return bundle()[[*shown]].rename(columns=shown)
 
 
-def rotations() -> pd.DataFrame:
-    """Mean errors of a published estimator in three dimensions, degrees, and numbers of views."""
-    found = pd.read_csv(REFERENCE / "rotations/rotations.csv").set_index(["group", "method"])
+def rotations(folder: str) -> pd.DataFrame:
+    """Mean errors of an estimator in three dimensions, degrees, and numbers of views."""
+    found = pd.read_csv(REFERENCE / folder / "rotations.csv").set_index(["group", "method"])
     error = found["error_deg"].map("{:.1f}".format)
     views, less = found["n_views"].map("{:.2f}".format), found["error_deg"] - found["less_chance"]
     rows = {}
@@ -182,23 +175,6 @@ def rotations() -> pd.DataFrame:
         rows[group] = [*fixed, f"{error[stopped]} ({views[stopped]} views)", chance]
     columns = [*ROTATIONS, "until the decision", "as many by chance"]
     return pd.DataFrame(rows, index=columns).T.rename(index=str.capitalize)
-
-
-def own_rotations() -> pd.DataFrame:
-    """Errors of the study's own estimators in three dimensions, and what choosing a view brings."""
-    found = pd.read_csv(REFERENCE / "rotation-estimator/rotations.csv")
-    error = found.set_index(["group", "fusion", "method"])["mean_deg"].map("{:.1f}".format)
-    rows = {
-        group: [error[group, fusion, method] for fusion, method in OWN_ROTATIONS.values()]
-        for group in found["group"].unique()
-    }
-    table = pd.DataFrame(rows, index=[*OWN_ROTATIONS]).T
-    chosen = found.query("method == 'bayes_error' and fusion == 'score'").set_index("group")
-    for other in ("random", "opposite"):
-        names = [f"less_{other}{end}" for end in ("", "_ci_low", "_ci_high")]
-        less = chosen[names].itertuples(index=False)
-        table[f"less {other.capitalize()}"] = [interval_text(*row, decimals=1) for row in less]
-    return table.rename(index=str.capitalize)
 
 
 def rotation_estimator() -> pd.DataFrame:
@@ -223,8 +199,8 @@ TABLES = {
     "bundle": bundle,
     "bundles": bundles,
     "focal_lengths": focal_lengths,
-    "rotations": rotations,
-    "own_rotations": own_rotations,
+    "rotations": partial(rotations, "rotations"),
+    "own_rotations": partial(rotations, "rotation-estimator"),
     "rotation_estimator": rotation_estimator,
 }
 

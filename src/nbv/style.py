@@ -150,7 +150,9 @@ class Panels:
         """Draw one legend, in the spare cell or else below all panels."""
         if self.spare is not None:
             return self.spare.legend(handles=handles, loc="center", handlelength=3.2)
-        columns = min(len(handles), 2 * len(self.panels))
+        longest = max(len(str(handle.get_label())) for handle in handles)
+        fitting = int(self.figure.get_figwidth() // (0.07 * longest + 0.7))
+        columns = max(1, min(len(handles), 2 * len(self.panels), fitting))
         rows = -(-len(handles) // columns)
         self.figure.set_figheight(self.figure.get_figheight() + 0.2 * rows)
         return self.figure.legend(

@@ -7,11 +7,11 @@ from urllib.parse import parse_qs, urlencode, urlsplit
 import numpy as np
 import pandas as pd
 import pytest
-from studies.simulation import bisecting_next, recommended_next
+from studies.simulation import bisecting_next, coarser, recommended_next, updated
 
 import synthetic
 from nbv.core.circle.angles import circular_distance_deg
-from nbv.core.circle.belief import coarser, first_belief, updated
+from nbv.core.circle.belief import first_belief
 from nbv.core.circle.criteria import CRITERIA
 from nbv.core.circle.density import Conditionals
 from nbv.core.circle.distributions import FLAT, mean_direction_deg

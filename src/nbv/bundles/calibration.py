@@ -46,14 +46,9 @@ def paper_tables(
 ) -> PaperTables:
     """Return the paper's lookup tables, one for each elevation rounded to a degree.
 
-    Parameters
-    ----------
-    elevation_deg : ndarray (S,)
-        Elevations of the sweeps.
-    distributions : ndarray (S, B, B)
-        p(azimuth | image) of views a bin apart. Their mean directions are the estimates.
-    density : mapping
-        See `nbv.core.circle.selection.choose_densities`.
+    The sweeps (S,) are at `elevation_deg`; the estimates are the mean directions of `distributions`
+    (S, B, B), p(azimuth | image) of views a bin apart. `density` is that of
+    `nbv.core.circle.selection.choose_densities`.
     """
     rounded = np.rint(elevation_deg)
     levels = np.unique(rounded)

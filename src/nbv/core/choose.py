@@ -58,16 +58,9 @@ def mixed(belief: Table, first: Table, second: Table) -> Table:
 def expected_entropy(prior: Table, noise: Table, predicted: Table) -> Table:
     """Return the expected entropy of the pose after the next estimate, by the chain rule.
 
-    It is H(pose) + H(estimate | pose) - H(estimate), so that no posterior has to be computed.
-
-    Parameters
-    ----------
-    prior : ndarray
-        Entropy of the belief, nats.
-    noise : ndarray
-        Expected entropy of the next estimate given the pose, nats.
-    predicted : ndarray (..., m)
-        Distribution of the next estimate under the belief.
+    It is H(pose) + H(estimate | pose) - H(estimate), so that no posterior has to be computed:
+    `prior` is the belief's entropy, `noise` the expected one of the next estimate given the pose
+    (nats), and `predicted` (..., m) the distribution of the next estimate under the belief.
     """
     return prior + noise - entropy(predicted)
 

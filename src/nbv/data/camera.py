@@ -168,8 +168,11 @@ def object_views(
     ----------
     vertices : (n, 3) float
         Object frame, in object diagonals.
+    faces : (m, 3) int
+        Indices into `vertices`.
     elevation_deg : float
         In [-90, 90].
+    azimuths_deg : (k,) float
 
     Raises
     ------
@@ -194,23 +197,16 @@ def object_views(
     x = right @ hull.T / depth
     y = up @ hull.T / depth
     outline = np.stack([x.min(axis=1), x.max(axis=1), y.min(axis=1), y.max(axis=1)], axis=1)
-    centre = principal_shift(outline, camera)
+    centre = (outline[:, 0::2] + outline[:, 1::2]) / 2.0
+    if camera.framing == "axis":
+        centre = np.zeros_like(centre)
+    elif camera.whole_pixels:
+        centre = np.rint(centre * camera.focal_px) / camera.focal_px
     position = -camera.distance * forward
     reach = float(depth.min()), float(depth.max())
     views = Views(camera, position, right, up, forward, outline, centre, *reach)
     _check_within(views, elevation_deg, azimuths)
     return views
-
-
-def principal_shift(outline: Floats, camera: Camera) -> Floats:
-    """Return the normalised coordinates (x, y) of the middle of each image, (k, 2).
-
-    `outline` (k, 4) is that of `Views`.
-    """
-    if camera.framing == "axis":
-        return np.zeros((len(outline), 2))
-    centre: Floats = (outline[:, 0::2] + outline[:, 1::2]) / 2.0
-    return np.rint(centre * camera.focal_px) / camera.focal_px if camera.whole_pixels else centre
 
 
 def _check_within(views: Views, elevation_deg: float, azimuths_deg: Floats) -> None:

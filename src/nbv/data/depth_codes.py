@@ -19,17 +19,6 @@ ZERO_CODE = 128
 """The code of the reference depth itself."""
 
 
-def _reference(visible: Depths, camera: Camera) -> np.float32:
-    """Return the depth of code 128 for an image with some visible depths (n,), object diagonals.
-
-    With ``framing="silhouette"`` it is their median, which a detector's crop provides. With
-    ``framing="axis"``, or without a visible pixel, it is the camera's distance.
-    """
-    if camera.framing != "silhouette" or not len(visible):
-        return np.float32(camera.distance)
-    return np.float32(np.median(visible))
-
-
 def encode_depth(depth: Depths, camera: Camera) -> Codes:
     """Encode depth images: 0 is background, nearer is larger.
 
@@ -38,8 +27,9 @@ def encode_depth(depth: Depths, camera: Camera) -> Codes:
     depth : (k, side, side) float32
         Object diagonals, 0 for background.
     camera : Camera
-        With ``framing="silhouette"`` the reference depth is the median of the visible pixels, with
-        ``framing="axis"`` the known distance of the object's origin.
+        With ``framing="silhouette"`` the reference depth is the median of the visible pixels, which
+        a detector's crop provides; with ``framing="axis"``, or without a visible pixel, the
+        camera's distance.
 
     Returns
     -------
@@ -52,7 +42,8 @@ def encode_depth(depth: Depths, camera: Camera) -> Codes:
     for image, code in zip(depth, codes, strict=True):
         seen = image > 0
         visible = image[seen]
-        steps = _reference(visible, camera) - visible
+        by_median = camera.framing == "silhouette" and len(visible)
+        steps = np.float32(np.median(visible) if by_median else camera.distance) - visible
         steps *= np.float32(1.0 / STEP)
         np.rint(steps, out=steps)
         steps += np.float32(ZERO_CODE)

@@ -64,17 +64,9 @@ def write_depth(
 ) -> None:
     """Write the images of all objects to one `.npy` file, and the objects' ids to another.
 
-    Memory holds the images of one object at a time. Each file appears under its name only when it
-    is complete.
-
-    Parameters
-    ----------
-    path, objects_path : path
-        Paths of the images and of the ids.
-    images : iterable of (n_views, side, side) uint8
-        The sweep of each object, such as from `nbv.data.render.render_objects`.
-    shape : tuple of int
-        (n_views, side, side).
+    `images` are the sweeps of the objects, such as from `nbv.data.render.render_objects`, each of
+    the shape (n_views, side, side). Memory holds one at a time. Each file appears under its name
+    only when it is complete.
     """
     n_objects = len(object_ids)
     sweeps = logged(images, n_objects, f"{path}, sweeps of {shape[0]} images")

@@ -20,7 +20,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import trimesh
@@ -318,7 +318,10 @@ def main(processor_s: int, clock_s: int, max_bytes: int) -> None:
         answer, arrays = _answer(Path(json.loads(line)), max_bytes)
         for timer in timers:
             signal.setitimer(timer, 0)
-        _send(sys.stdout.buffer, answer, arrays)
+        sys.stdout.buffer.write(json.dumps(answer).encode() + b"\n")
+        for array in arrays:
+            sys.stdout.buffer.write(array.tobytes())
+        sys.stdout.buffer.flush()
 
 
 def _limit_memory(max_bytes: int) -> None:
@@ -346,10 +349,3 @@ def _answer(path: Path, max_bytes: int) -> tuple[dict[str, Any], list[Any]]:
         reason = quoted[:300] or type(error).__name__
         return {"refused": f"cannot be read as a mesh ({reason})"}, []
     return {"vertices": len(arrays[0]), "faces": len(arrays[1])}, arrays
-
-
-def _send(stream: BinaryIO, answer: dict[str, Any], arrays: list[Any]) -> None:
-    stream.write(json.dumps(answer).encode() + b"\n")
-    for array in arrays:
-        stream.write(array.tobytes())
-    stream.flush()

@@ -62,19 +62,11 @@ def direction(axis: str, key: str) -> NDArray[np.float64]:
 
 
 def frame_rotation(up: str, front: str, azimuth_deg: float) -> NDArray[np.float64]:
-    """Return the rotation from a file's frame into the object frame.
+    """Return the rotation (3, 3) from a file's frame into the object frame, for column vectors.
 
-    Parameters
-    ----------
-    up, front : str
-        Axes of the file that become +z and, at azimuth 0, +x; see `direction`.
-    azimuth_deg : float
-        Azimuth of `front` in the object frame, counter-clockwise about +z.
-
-    Returns
-    -------
-    (3, 3) float
-        Proper (determinant 1); it multiplies column vectors.
+    `up` and `front` are axes of the file (`direction`), which become +z and, at azimuth 0, +x.
+    `azimuth_deg` is that of `front` in the object frame, counter-clockwise about +z. The rotation
+    is proper (determinant 1).
 
     Raises
     ------
@@ -132,27 +124,12 @@ def check_mesh(mesh: trimesh.Trimesh, origin: str) -> None:
 def normalise(
     mesh: trimesh.Trimesh, up: str, front: str, azimuth_deg: float, centre: Centre
 ) -> trimesh.Trimesh:
-    """Return a mesh in the object frame, with a unit diagonal.
+    """Return a mesh that passes `check_mesh` in the object frame, with a unit diagonal.
 
-    Parameters
-    ----------
-    mesh : trimesh.Trimesh
-        A mesh that passes `check_mesh`.
-    up, front, azimuth_deg
-        See `frame_rotation`.
-    centre : {"box", "origin"}
-        The vertical axis x = y = 0 passes through the middle of the bounding box, or through the
-        file's origin. The height is always centred on the box.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        The faces and the vertices that they use, in the same order.
-
-    Raises
-    ------
-    UserError
-        If an axis is not valid.
+    It has the faces and the vertices that they use, in the same order. Axes, azimuth and errors are
+    those of `frame_rotation`. The vertical axis x = y = 0 passes through the middle of the bounding
+    box, or for the centre ``origin`` through the file's origin. The height is always centred on the
+    box.
     """
     import trimesh
 

@@ -41,29 +41,11 @@ class Renderer(ABC):
         azimuths_deg: ArrayLike,
         camera: Camera,
     ) -> NDArray[np.float32]:
-        """Render the depth images of a mesh.
+        """Render the depth images (k, side, side) float32 of a mesh, both sides of each face.
 
-        Parameters
-        ----------
-        vertices : (n, 3) float
-            Object frame, in object diagonals.
-        faces : (m, 3) int
-            Indices into `vertices`; both sides of a face are visible.
-        elevation_deg : float
-            In [-90, 90].
-        azimuths_deg : (k,) float
-            Azimuths of the images.
-
-        Returns
-        -------
-        (k, side, side) float32
-            Distance along the optical axis, in object diagonals; 0 for background. Pixel [row i,
-            column j] is sampled at its centre (i + 1/2, j + 1/2).
-
-        Raises
-        ------
-        UserError
-            If part of the object lies behind the camera or outside the image.
+        They are distances along the optical axis, in object diagonals; 0 for background. Pixel
+        [row i, column j] is sampled at its centre (i + 1/2, j + 1/2). Same parameters and errors as
+        `nbv.data.camera.object_views`.
         """
         views = object_views(vertices, faces, elevation_deg, azimuths_deg, camera)
         return self.draw(vertices, faces, views)

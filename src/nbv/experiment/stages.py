@@ -12,6 +12,8 @@ Start = int | Literal["pretrained", "features"] | None
 network of the depth features, or None for random weights."""
 
 Stage = Literal["training", "pretraining", "fine_tuning", "next_elevation"]
+"""From random weights; of all categories together; of that network, or that of the features; from
+the estimator of a lower elevation."""
 STAGES: tuple[Stage, ...] = ("training", "pretraining", "fine_tuning", "next_elevation")
 
 
@@ -21,22 +23,8 @@ def start_of(warm_start: str, elevations_deg: Collection[int], elevation: int) -
     A category's elevation can start from the estimator one elevation lower, and its lowest
     elevation from a network that was pretrained with all categories of the fold. A training that
     starts so takes fewer epochs. No calibration or test object of the fold is seen on the way. The
-    network of the depth features has seen no object of any experiment.
-
-    Parameters
-    ----------
-    warm_start : str
-        ``estimator.warm_start``: none, elevations, categories, both or features.
-    elevations_deg : collection of int
-        All elevations of the category, degrees.
-    elevation : int
-        The elevation to train, degrees.
-
-    Returns
-    -------
-    int, "pretrained", "features" or None
-        The elevation whose estimator it starts from (the nearest lower one, degrees), the network
-        of all categories, that of the depth features, or random weights.
+    network of the depth features has seen no object of any experiment. `warm_start` is the
+    configuration's ``estimator.warm_start``, and `elevations_deg` are all of the category.
     """
     if warm_start == "features":
         return FEATURES
@@ -58,16 +46,9 @@ def stage_settings(
 ) -> dict[str, Any]:
     """Return the settings of one stage of training, without those of the other stages.
 
-    Parameters
-    ----------
-    estimator : mapping
-        The section ``estimator`` of a configuration.
-    stage : str
-        ``training`` from random weights, ``pretraining`` of all categories together,
-        ``fine_tuning`` of the pretrained network or that of the features, or ``next_elevation``.
-    epochs : int, optional
-        Epochs of a training from random weights, by default ``estimator.epochs``. Other stages
-        scale their epochs in the same proportion, to at least one.
+    `estimator` is that section of a configuration; `epochs` are those of a training from random
+    weights, by default ``estimator.epochs``. Other stages scale theirs in the same proportion, to
+    at least one.
     """
     schedule: Mapping[str, Any] = estimator if stage == "training" else estimator[stage]
     share = 1.0 if epochs is None else epochs / estimator["epochs"]

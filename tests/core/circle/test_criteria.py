@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from studies.simulation import FOR_MORE_VIEWS, coarser, updated
 
 from made_estimates import N_BINS, SETTINGS, estimates, evidence_of
 from nbv.core.circle.angles import circular_distance_deg
-from nbv.core.circle.belief import Belief, coarser, every_belief, first_belief, updated
+from nbv.core.circle.belief import Belief, every_belief, first_belief
 from nbv.core.circle.criteria import (
     CRITERIA,
-    FOR_MORE_VIEWS,
     POSE_LIKELIHOODS,
     SPREADS,
     affinity,

@@ -1,10 +1,9 @@
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import log_softmax
 
-from nbv.core.circle.distributions import estimate_likelihood, region_coverage
+from nbv.core.circle.distributions import estimate_likelihood
 from nbv.core.circle.logits import TEMPERATURES, fit_temperature, log_likelihood, on_degrees
 
 
@@ -28,24 +27,6 @@ def test_the_log_likelihood_reads_the_density_at_the_azimuth(seed, k):
     spread = on_degrees(np.exp(logs))
     found = log_likelihood(logs, np.arange(360))
     np.testing.assert_allclose(found, np.log(np.diag(spread)))
-
-
-PROBABILITIES = st.lists(st.integers(0, 6), min_size=1, max_size=9).filter(any)
-
-
-@given(PROBABILITIES, st.floats(0.01, 0.99))
-def test_regions_hold_just_their_share_of_truths_drawn_from_the_distribution(counts, level):
-    """An identity, ties and zeros included; and the region is the smallest that does."""
-    drawn = np.array(counts) / sum(counts)
-    bins = np.arange(len(drawn))
-    inside = region_coverage(np.tile(drawn, (len(drawn), 1)), bins, level)
-    assert drawn @ inside == pytest.approx(level)
-    assert (inside[drawn == 0] == 0).all()
-    left, size = level, 0.0
-    for p in sorted(drawn[drawn > 0], reverse=True):
-        size += min(left / p, 1.0)
-        left = max(left - p, 0.0)
-    assert inside.sum() == pytest.approx(size)
 
 
 @settings(max_examples=20)

@@ -46,13 +46,8 @@ def compared_step(n_bins: int) -> int:
 def first_bins(n_sweeps: int, n_bins: int, most: int | None = None) -> NDArray[np.intp]:
     """Return the bins (n_sweeps, K) of the views that serve as first views, evenly spaced.
 
-    Each sweep starts one bin after the previous one, so that together they cover all bins.
-
-    Parameters
-    ----------
-    n_sweeps, n_bins : int
-    most : int, optional
-        Limit for all sweeps together, but each has at least one; without it every view serves.
+    Each sweep starts one bin after the previous one, so that together they cover all bins. `most`
+    limits all sweeps together, but each has at least one; without it every view serves.
     """
     of_sweep = n_bins if most is None else max(most // n_sweeps, 1)
     apart = next(n for n in range(1, n_bins + 1) if n_bins % n == 0 and n_bins // n <= of_sweep)

@@ -337,9 +337,6 @@ IN_DEGREES = frozenset({"bayes_error", *FOR_A_FUSION})
 FOR_ESTIMATES = frozenset({"bayes_error"})
 """Criteria that need calibration estimates, and do not support distributions."""
 
-FOR_MORE_VIEWS = ("information_gain", "expected_dispersion", "bayes_error")
-"""Criteria that are defined after any number of views."""
-
 
 def cost_unit(criterion: str, settings: Mapping[str, Any]) -> str:
     """Return the unit of a criterion's cost: ``nats``, ``degrees`` or ``1``.

@@ -50,18 +50,8 @@ def in_object_frame(sweep: NDArray[np.floating]) -> NDArray[np.floating]:
 
     View k of B has the azimuth 360 k / B.
     """
-    return _rotated_by_view(sweep, 1)
-
-
-def in_view_frame(sweep: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Undo `in_object_frame`."""
-    return _rotated_by_view(sweep, -1)
-
-
-def _rotated_by_view(sweep: NDArray[np.floating], sign: int) -> NDArray[np.floating]:
-    """Rotate the distribution of view k by k bins."""
     bins = np.arange(sweep.shape[-1])
-    index = (bins + sign * bins[:, None]) % len(bins)
+    index = (bins + bins[:, None]) % len(bins)
     return np.take_along_axis(sweep, np.broadcast_to(index, sweep.shape), axis=-1)
 
 
@@ -165,23 +155,6 @@ def direction_and_spread_deg(belief: NDArray[np.floating]) -> tuple[float, float
     length = max(abs(moment), NEGLIGIBLE_PROBABILITY)
     spread = math.sqrt(max(-2.0 * math.log(length), 0.0))
     return math.degrees(cmath.phase(moment)), math.degrees(spread)
-
-
-def region_coverage(
-    probabilities: NDArray[np.floating], bins: NDArray[np.integer], level: float
-) -> Floats:
-    """Return whether the highest-density region contains the truth `bins` (n,), in [0, 1].
-
-    The region is the smallest set of bins (B) with the probability `level`, in (0, 1). Bins at its
-    threshold belong to it in part, so that truths drawn from the distributions are inside with
-    exactly the probability `level`.
-    """
-    at_truth = np.take_along_axis(probabilities, bins[:, None], axis=1)
-    denser = np.where(probabilities > at_truth, probabilities, 0.0).sum(axis=1, dtype=np.float64)
-    equal = np.where(probabilities == at_truth, probabilities, 0.0).sum(axis=1, dtype=np.float64)
-    share = np.zeros(len(at_truth))
-    np.divide(level - denser, equal, out=share, where=equal > 0)
-    return np.clip(share, 0.0, 1.0)
 
 
 def estimate_likelihood(distributions: NDArray[np.floating]) -> Floats:

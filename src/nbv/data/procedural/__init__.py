@@ -33,12 +33,8 @@ def generate(
 
     Parameters
     ----------
-    category : str
-        A key of :data:`CATEGORIES`.
     seed : int
         Seed of the whole data set, >= 0.
-    index : int
-        Number of the object, >= 0.
     least_reach : float
         Least reach of a mug's handle, in widths of the body, 0 to 0.5
         (`nbv.data.procedural.mug.handle_reach`); ignored for other categories. About every eighth

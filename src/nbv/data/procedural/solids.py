@@ -22,20 +22,11 @@ FROM_Z: dict[str, list[int]] = {"x": [2, 0, 1], "y": [1, 2, 0], "z": [0, 1, 2]}
 
 
 def loft(rings: ArrayLike, *, closed: bool = False) -> trimesh.Trimesh:
-    """Join consecutive rings of points by a skin.
+    """Join m consecutive rings of k points, (m, k, 3), by a skin.
 
-    Parameters
-    ----------
-    rings : array_like
-        (m, k, 3): m rings of k points each, point j of one ring joined to point j of the next.
-    closed : bool
-        Join the last ring to the first, as in a torus. Otherwise a fan about the ring's centroid
-        closes each end, so end rings must be star-shaped from there.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        Watertight, of positive volume.
+    Point j of one ring is joined to point j of the next. If `closed`, the last ring is joined to
+    the first, as in a torus. Otherwise a fan about the ring's centroid closes each end, so end
+    rings must be star-shaped from there. The mesh is watertight, of positive volume.
     """
     stack = np.asarray(rings, dtype=np.float64)
     m, k, _ = stack.shape
@@ -64,16 +55,10 @@ def _outward(vertices: Points, faces: NDArray[np.intp]) -> trimesh.Trimesh:
 def superellipse(
     half_width: float, half_height: float, exponent: float = 2.0, n: int = 24
 ) -> Points:
-    """Return an oval (n, 2) between ellipse and rectangle, counter-clockwise.
+    """Return an oval (n, 2) with two semi-axes > 0, counter-clockwise.
 
-    Parameters
-    ----------
-    half_width, half_height : float
-        Semi-axes along the first and the second coordinate, > 0.
-    exponent : float
-        2 is an ellipse, 4 to 8 a rectangle with rounded corners.
-    n : int
-        Number of points; a multiple of 4 keeps both mirror symmetries.
+    The exponent 2 is an ellipse, 4 to 8 a rectangle with rounded corners. A number of points that
+    is a multiple of 4 keeps both mirror symmetries.
     """
     angle = 2 * np.pi * np.arange(n) / n
     unit = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -82,17 +67,10 @@ def superellipse(
 
 
 def stack_outlines(outlines: ArrayLike, heights: ArrayLike, axis: Axis = "z") -> trimesh.Trimesh:
-    """Loft plane outlines placed at heights along an axis.
+    """Loft plane outlines (m, k, 2), or one (k, 2), placed at heights (m,) along an axis.
 
-    Parameters
-    ----------
-    outlines : array_like
-        (m, k, 2), or (k, 2) for the same outline at every height. In-plane coordinates are
-        (x, y) for axis z, (y, z) for axis x and (z, x) for axis y.
-    heights : array_like
-        (m,), strictly monotonic where neighbouring outlines are equal.
-    axis : {"x", "y", "z"}
-        Direction of the heights.
+    In-plane coordinates are (x, y) for axis z, (y, z) for axis x and (z, x) for axis y. Heights are
+    strictly monotonic where neighbouring outlines are equal.
     """
     level = np.asarray(heights, dtype=np.float64)
     outline = np.asarray(outlines, dtype=np.float64)
@@ -103,44 +81,26 @@ def stack_outlines(outlines: ArrayLike, heights: ArrayLike, axis: Axis = "z") ->
     return loft(rings[..., FROM_Z[axis]])
 
 
-def slab(
-    outline: ArrayLike, low: float, high: float, *, bevel: float = 0.0, axis: Axis = "z"
-) -> trimesh.Trimesh:
-    """Return a prism over an outline, with bevelled edges for a positive `bevel`.
+def slab(outline: ArrayLike, low: float, high: float, *, bevel: float = 0.0) -> trimesh.Trimesh:
+    """Return an upright prism over an outline (k, 2) that is star-shaped from its centroid.
 
-    Parameters
-    ----------
-    outline : array_like
-        (k, 2), star-shaped from its centroid; coordinates as in :func:`stack_outlines`.
-    low, high : float
-        Ends along the axis.
-    bevel : float
-        Depth of the bevel along the axis; the end outlines shrink by about as much.
-    axis : {"x", "y", "z"}
-        The prism's direction.
+    `bevel` is the depth of its bevelled edges; the end outlines shrink by about as much.
     """
     flat = np.asarray(outline, dtype=np.float64)
     if bevel <= 0.0:
-        return stack_outlines(flat, [low, high], axis)
+        return stack_outlines(flat, [low, high])
     centre = flat.mean(axis=0)
     shrink = 1.0 - bevel / np.abs(flat - centre).max(axis=0)
     small = centre + (flat - centre) * np.clip(shrink, 0.3, 1.0)
-    return stack_outlines([small, flat, flat, small], [low, low + bevel, high - bevel, high], axis)
+    return stack_outlines([small, flat, flat, small], [low, low + bevel, high - bevel, high])
 
 
 def box(
     centre: ArrayLike, extents: ArrayLike, *, exponent: float = 8.0, bevel: float = 0.0
 ) -> trimesh.Trimesh:
-    """Return an upright box with rounded vertical edges.
+    """Return an upright box with rounded vertical edges; centre and extents are (3,) each.
 
-    Parameters
-    ----------
-    centre, extents : array_like
-        (3,) each.
-    exponent : float
-        Roundness in plan, see :func:`superellipse`.
-    bevel : float
-        Depth of the bevel at the top and bottom edges.
+    `exponent` is the roundness in plan (:func:`superellipse`), `bevel` that of :func:`slab`.
     """
     x, y, z = np.asarray(centre, dtype=np.float64)
     width, depth, height = np.asarray(extents, dtype=np.float64)
@@ -151,18 +111,10 @@ def box(
 def revolve(
     profile: ArrayLike, *, n: int = 32, axis: Axis = "z", centre: ArrayLike = (0.0, 0.0, 0.0)
 ) -> trimesh.Trimesh:
-    """Return a solid of revolution.
+    """Return a solid of revolution about an axis, with n points around.
 
-    Parameters
-    ----------
-    profile : array_like
-        (m, 2) of (radius > 0, height along the axis); discs close both ends.
-    n : int
-        Points around.
-    axis : {"x", "y", "z"}
-        Direction of the axis of revolution.
-    centre : array_like
-        (3,): point of height 0 on the axis.
+    The profile (m, 2) is (radius > 0, height along the axis); discs close both ends. `centre` (3,)
+    is the point of height 0 on the axis.
     """
     curve = np.asarray(profile, dtype=np.float64)
     outlines = curve[:, :1, None] * superellipse(1.0, 1.0, n=n)
@@ -172,21 +124,11 @@ def revolve(
 
 
 def fillet(corners: ArrayLike, radius: float, n: int = 5) -> Points:
-    """Round the inner corners of a polyline by quadratic Bézier arcs.
+    """Round the inner corners of a polyline (m, 3) by quadratic Bézier arcs of n points.
 
-    Parameters
-    ----------
-    corners : array_like
-        (m, 3) points, neighbours distinct.
-    radius : float
-        Distance from a corner to the start of its arc, at most 0.45 of the shorter adjoining edge.
-    n : int
-        Points per arc.
-
-    Returns
-    -------
-    numpy.ndarray
-        (2 + n (m - 2), 3), the ends unmoved.
+    Neighbouring corners are distinct. `radius` is the distance from a corner to the start of its
+    arc, at most 0.45 of the shorter adjoining edge. The result is (2 + n (m - 2), 3), the ends
+    unmoved.
     """
     points = np.asarray(corners, dtype=np.float64)
     edges = np.diff(points, axis=0)
@@ -202,18 +144,10 @@ def fillet(corners: ArrayLike, radius: float, n: int = 5) -> Points:
 def sweep(
     path: ArrayLike, outline: ArrayLike, normal: ArrayLike, *, scale: ArrayLike = 1.0
 ) -> trimesh.Trimesh:
-    """Carry an outline along a path and close its ends.
+    """Carry an outline (k, 2) along a path (m, 3) of distinct neighbours, and close its ends.
 
-    Parameters
-    ----------
-    path : array_like
-        (m, 3), neighbours distinct.
-    outline : array_like
-        (k, 2): first coordinate along `normal`, second across both normal and path.
-    normal : array_like
-        (3,), nowhere parallel to the path.
-    scale : array_like
-        Scalar or (m,): the outline's size along the path.
+    The outline's first coordinate is along `normal` (3,), nowhere parallel to the path, the second
+    across both. `scale`, a number or (m,), is the outline's size along the path.
     """
     points, flat = np.asarray(path, dtype=np.float64), np.asarray(outline, dtype=np.float64)
     steps = np.diff(points, axis=0)
@@ -231,18 +165,9 @@ def sweep(
 
 
 def tube(path: ArrayLike, radius: float, *, n: int = 12, taper: float = 1.0) -> trimesh.Trimesh:
-    """Return a closed round tube along a path that bends in one plane or not at all.
+    """Return a closed round tube along a path (m, 3) that bends in one plane or not at all.
 
-    Parameters
-    ----------
-    path : array_like
-        (m, 3).
-    radius : float
-        At the start.
-    n : int
-        Points around.
-    taper : float
-        Radius at the end divided by that at the start.
+    It has n points around. `radius` is that at the start, `taper` the end's divided by it.
     """
     points = np.asarray(path, dtype=np.float64)
     # From the edges by hand: for a straight path a decomposition would return a normal that depends

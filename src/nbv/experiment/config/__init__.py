@@ -264,12 +264,9 @@ def _fields_of(kind: Any) -> dict[str, FieldInfo]:
 
 
 def type_of(parts: Sequence[str | int]) -> Any:
-    """Return the type of a key, without annotations and None.
+    """Return the type of a key, from its names and the indices of list items.
 
-    Parameters
-    ----------
-    parts : sequence of str or int
-        The names in a dotted key, and the indices of list items.
+    It is without annotations and None.
 
     Raises
     ------

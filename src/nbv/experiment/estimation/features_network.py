@@ -33,18 +33,9 @@ def train_features(
     """Train one regressor on all categories, half of each batch mirrored.
 
     Each category has outputs (cos, sin) of its own, so that the hidden layer need not tell
-    categories apart.
-
-    Parameters
-    ----------
-    images : sequence of DepthImages
-        One for each category and elevation, all with the same number of views.
-    categories : sequence of str
-        The category of each element of `images`.
-    mirror_planes_deg : mapping
-        The azimuth of each category's plane of symmetry.
-    settings, hardware, seed
-        See `nbv.experiment.estimation.training.train_network`.
+    categories apart. `images` are of each category and elevation, all with the same number of
+    views, and `categories` are theirs. `mirror_planes_deg` has the azimuth of each category's plane
+    of symmetry. Other parameters as in `nbv.experiment.estimation.training.train_network`.
     """
     names = sorted(set(categories))
     n_views, side = images[0].codes.shape[1:3]

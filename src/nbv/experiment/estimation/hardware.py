@@ -86,18 +86,10 @@ def use_one_thread() -> None:
 
 
 def to_input(codes: NDArray[np.uint8], hardware: Hardware) -> torch.Tensor:
-    """Return images ready for a network, resident on its device.
+    """Return depth codes (..., side, side) as images (n, 1, side, side) on a network's device.
 
-    Parameters
-    ----------
-    codes : ndarray (..., side, side) uint8
-        Depth codes of `nbv.data.depth_codes`: 0 is background, 128 the reference depth.
-
-    Returns
-    -------
-    Tensor (n, 1, side, side)
-        Codes divided by 128, so that the background is 0 and what is visible lies around 1; exact
-        in bfloat16, whose 8 significant bits hold every code.
+    They are divided by 128, so that the background is 0 and what is visible lies around 1; exact in
+    bfloat16, whose 8 significant bits hold every code.
     """
     side = codes.shape[-1]
     flat = torch.from_numpy(np.ascontiguousarray(codes).reshape(-1, 1, side, side))

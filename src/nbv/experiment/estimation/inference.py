@@ -113,8 +113,7 @@ def estimate_fold(
     part_estimators : sequence of Estimator
         For cross-fitted calibration: the estimators that have not seen each part.
     distributions : bool
-        Whether outputs are logits of distributions. Calibration objects then choose one
-        temperature (`nbv.core.circle.logits.fit_temperature`).
+        See `nbv.experiment.estimation.outputs.estimates_of`.
 
     Raises
     ------

@@ -89,22 +89,14 @@ def fit_fold(
 
     Where calibration is cross-fitted, the outputs of each part are those of a fit to the others.
 
+    The outputs are, for each role ``calibration`` and ``test``, the objects and (m, n_views, k).
+
     Parameters
     ----------
     features : ndarray (n, n_views, D)
-        Features of the sweeps of all objects of the category.
-    object_ids : sequence of str
-        The n objects.
-    splits : DataFrame
-        From `nbv.experiment.splits.read_splits`.
+        Features of the sweeps of the n objects of the category.
     settings, mirror_plane_deg
         See `fit_linear`.
-
-    Returns
-    -------
-    LinearEstimator, dict
-        The dict has for each role, ``calibration`` and ``test``, the objects and the outputs
-        (m, n_views, k).
 
     Raises
     ------
@@ -140,14 +132,8 @@ def fit_linear(
 ) -> LinearEstimator:
     """Fit the kind of estimator that ``settings["kind"]`` names to training objects.
 
-    Parameters
-    ----------
-    features : ndarray (n, n_views, D)
-        Features of the sweeps of the training objects; even and odd parts where there is a plane.
-    settings : mapping
-        The configuration's ``estimator``.
-    mirror_plane_deg : float or None
-        The azimuth of the plane of symmetry.
+    `features` (n, n_views, D) are those of their sweeps; even and odd parts where there is a plane
+    of symmetry, at the azimuth `mirror_plane_deg`.
     """
     if settings["kind"] == "linear":
         return fit_directions(features, mirror_plane_deg)

@@ -29,14 +29,7 @@ _MARGINS = (0.6, 1.5)
 
 
 def bundled_model(estimator: Estimator, mirror_plane_deg: float | None = None) -> bytes:
-    """Return the ONNX model of a bundle, averaged over mirror images if there is a mirror plane.
-
-    Parameters
-    ----------
-    estimator : Estimator
-    mirror_plane_deg : float, optional
-        From `nbv.bundles.network.find_mirror_plane`.
-    """
+    """Return the ONNX model of a bundle, averaged over mirror images if there is a mirror plane."""
     if mirror_plane_deg is None:
         return onnx_model(estimator)
     return onnx_model(estimator, mirrored_bins(estimator.settings["n_classes"], mirror_plane_deg))

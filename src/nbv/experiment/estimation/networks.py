@@ -25,14 +25,8 @@ def strided_network(settings: Settings, image_side: int, n_outputs: int) -> nn.M
 
     Strided convolutions, with batch normalisation from the second on, one hidden layer and linear
     outputs. The outputs (cos, sin) of a regressor are not normalised: trained on squared error they
-    tend to the mean direction, whose length measures the network's certainty.
-
-    Parameters
-    ----------
-    settings : mapping
-        ``channels`` (list of int) and ``hidden`` (int).
-    image_side : int
-        Pixels.
+    tend to the mean direction, whose length measures the network's certainty. The settings are
+    ``channels`` (list of int) and ``hidden`` (int); `image_side` is in pixels.
     """
     channels = settings["channels"]
     # The first layer's maps are the largest: normalising them took a sixth of the training time and

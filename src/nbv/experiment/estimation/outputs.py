@@ -33,12 +33,7 @@ def class_targets(settings: Settings, n_views: int) -> Targets:
 
     Class c of k is centred on 360 c / k degrees. The target is a von Mises density about the
     azimuth instead of a single class, so that nearby classes are nearly right and the circle has
-    no seam.
-
-    Parameters
-    ----------
-    settings : mapping
-        ``n_classes`` and ``target_bandwidth_deg``, the standard deviation of a narrow target.
+    no seam. ``target_bandwidth_deg`` is the standard deviation of a narrow target.
     """
     n_classes = settings["n_classes"]
     centres = 2 * np.pi * np.arange(n_classes) / n_classes

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,31 +23,6 @@ from nbv.experiment.estimation.weights import Estimator, Start
 log = logging.getLogger(__name__)
 
 PROGRESS_SECONDS = 5.0
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Logs the progress of a training every few seconds."""
-
-    n_epochs: int
-    n_images: int
-    started: float
-
-    def report(self, epoch: int, seen: int, loss: float) -> None:
-        """Log epoch, loss, speed and the time left."""
-        elapsed = time.perf_counter() - self.started
-        done = epoch * self.n_images + seen
-        rate = done / max(elapsed, 1e-9)
-        left = (self.n_epochs * self.n_images - done) / max(rate, 1e-9)
-        log.info(
-            "epoch %d/%d, %3.0f %%: loss %.4f, %.0f images/s, %.0f s left",
-            epoch + 1,
-            self.n_epochs,
-            100 * seen / self.n_images,
-            loss,
-            rate,
-            left,
-        )
 
 
 def train_estimator(
@@ -177,8 +151,17 @@ def fit_network(
     )
     order = torch.Generator().manual_seed(seed)
     log.info("training on %d images (%s)", n_images, hardware)
-    progress = Progress(n_epochs, n_images, time.perf_counter())
-    reported = progress.started
+    started = reported = time.perf_counter()
+
+    def report(epoch: int, seen: int, mean_loss: float) -> None:
+        done = epoch * n_images + seen
+        rate = done / max(time.perf_counter() - started, 1e-9)
+        left = (n_epochs * n_images - done) / max(rate, 1e-9)
+        log.info(
+            "epoch %d/%d, %3.0f %%: loss %.4f, %.0f images/s, %.0f s left",
+            *(epoch + 1, n_epochs, 100 * seen / n_images, mean_loss, rate, left),
+        )
+
     network.train()
     for epoch in range(n_epochs):
         permutation = torch.randperm(n_images, generator=order).to(device)
@@ -202,12 +185,10 @@ def fit_network(
             now = time.perf_counter()
             if now - reported > PROGRESS_SECONDS:
                 _check_finite(network, running, epoch, settings)
-                progress.report(
-                    epoch, len(chosen) + batch * batch_size, float(running) / (batch + 1)
-                )
+                report(epoch, len(chosen) + batch * batch_size, float(running) / (batch + 1))
                 reported = now
         _check_finite(network, running, epoch, settings)
-        progress.report(epoch, n_images, float(running) / batches)
+        report(epoch, n_images, float(running) / batches)
     return network.eval()
 
 

@@ -6,12 +6,10 @@ gives no margin, ours is 1 degree of MAE or median, and 1 percentage point of pA
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
-from nbv.experiment.paper.published import FOCUS_CATEGORY, METHODS
+from nbv.experiment.paper.published import FOCUS_CATEGORY, METHODS, paper_rows
 from nbv.experiment.paper.statements import (
     AtLeast,
     Better,
@@ -133,10 +131,4 @@ _STATEMENTS: Mapping[str, Statement] = {
 }
 
 
-def _read_claims() -> tuple[Claim, ...]:
-    """Return the claims of the CSV file with their statements."""
-    with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as file:
-        return tuple(Claim(**row, statement=_STATEMENTS[row["id"]]) for row in csv.DictReader(file))
-
-
-CLAIMS = _read_claims()
+CLAIMS = tuple(Claim(**row, statement=_STATEMENTS[row["id"]]) for row in paper_rows("claims.csv"))

@@ -1,4 +1,4 @@
-"""The paper's Tables 1 to 7 as printed, from ``published.csv``, with remarks.
+"""The paper's Tables 1 to 7 as printed, from ``published.csv``, with ``published_notes.csv``.
 
 MAE in degrees, pAUC in percent.
 """
@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 METHODS = ("single", "random", "opposite", "proposed")
 """The paper's methods, in the order of its columns."""
@@ -17,11 +18,11 @@ METHODS = ("single", "random", "opposite", "proposed")
 FOCUS_CATEGORY = "mug"
 """The category of Tables 2 and 4 to 7."""
 
-FOLD_ROWS = ("1", "2", "3", "4", "5")
 AVERAGE_ROW = "average"
 SIGMA_ROW = "sigma"
 
-PublishedRow = tuple[float, ...]
+Values = Mapping[str, Mapping[str, tuple[float, ...]]]
+"""The values of a table by metric and row, in the order of `METHODS`."""
 
 
 @dataclass(frozen=True)
@@ -33,144 +34,46 @@ class Note:
     """
 
     text: str
+    tables: tuple[str, ...]
     metric: str = ""
     rows: tuple[str, ...] = ()
     method: str = ""
     ours: bool = False
 
 
-@dataclass(frozen=True)
-class PublishedTable:
-    """A table: its title, ``values[metric][row]`` in the order of `METHODS`, and remarks."""
-
-    title: str
-    values: Mapping[str, Mapping[str, PublishedRow]]
-    notes: tuple[Note, ...] = ()
+def paper_rows(name: str) -> list[dict[str, Any]]:
+    """Return the rows of a CSV file in this module's folder."""
+    with Path(__file__).with_name(name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
-_PAUC_NOTE = Note(
-    "The published pAUC is below 100 − MAE, the least that the exact integral can be, in 32 of the "
-    "44 cells of Tables 3 and 4, by 0.53 at most. A sum over whole degrees would be about 0.5 "
-    "below the integral. Ours is exact.",
-    metric="pauc",
-)
+def _read_values() -> dict[str, Values]:
+    tables: dict[str, dict[str, dict[str, tuple[float, ...]]]] = {}
+    for row in paper_rows("published.csv"):
+        rows = tables.setdefault(row["table"], {}).setdefault(row["metric"], {})
+        rows[row["row"]] = tuple(float(row[method]) for method in METHODS)
+    return dict(tables)
 
 
-def _mug_note(table: str, values: str) -> Note:
-    return Note(
-        "The published Mug row is fold 2 of Table 7, not the five-fold average, which "
-        f"{table} prints for 0°: {values}.",
-        rows=(FOCUS_CATEGORY,),
-    )
+def _read_note(row: Mapping[str, str]) -> Note:
+    tables, rows = (tuple(row[name].split()) for name in ("tables", "rows"))
+    return Note(row["text"], tables, row["metric"], rows, row["method"], row["ours"] == "yes")
 
 
-def _read_values() -> dict[str, dict[str, dict[str, PublishedRow]]]:
-    """Return ``values[table][metric][row]`` of the CSV file."""
-    tables: dict[str, dict[str, dict[str, PublishedRow]]] = {}
-    with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as file:
-        next(file)
-        for table, metric, row, *values in csv.reader(file):
-            rows = tables.setdefault(table, {}).setdefault(metric, {})
-            rows[row] = tuple(map(float, values))
-    return tables
-
-
-_VALUES = _read_values()
-
-PUBLISHED: Mapping[str, PublishedTable] = {
-    "table1": PublishedTable(
-        "MAE by category at elevation 0°",
-        _VALUES["table1"],
-        (_mug_note("Table 2", "12.55°, 10.67°, 10.14°, 9.34°"),),
-    ),
-    "table2": PublishedTable("MAE of the mug by elevation", _VALUES["table2"]),
-    "table3": PublishedTable(
-        "pAUC by category at elevation 0°",
-        _VALUES["table3"],
-        (_mug_note("Table 4", "87.73, 89.09, 89.52, 90.68"), _PAUC_NOTE),
-    ),
-    "table4": PublishedTable(
-        "pAUC of the mug by elevation",
-        _VALUES["table4"],
-        (_PAUC_NOTE,),
-    ),
-    "table5": PublishedTable(
-        "MAE of the mug by viewpoint group at elevation 0°",
-        _VALUES["table5"],
-        (
-            Note(
-                "The mean of the four published groups (10.20°, 8.06°, 7.76°, 6.85°) is fold 3 of "
-                "Table 7, so Table 5 appears to show that fold alone."
-            ),
-            Note(
-                "Opposite takes the same two views from φ and from φ + 180°, so averaging them "
-                "gives groups 1 and 3, and 2 and 4, the same error.",
-                method="opposite",
-                ours=True,
-            ),
-        ),
-    ),
-    "table6": PublishedTable(
-        "Examples of estimates for the mug at elevation 0°",
-        _VALUES["table6"],
-        (
-            Note(
-                "The published examples are of another object, chosen by the authors: they "
-                "illustrate, and are no figures to reproduce."
-            ),
-            Note(
-                "The published Random estimate for 0° (356.0°) is 4.0° away, not 3.5° as printed.",
-                rows=("0",),
-                method="random",
-            ),
-        ),
-    ),
-    "table7": PublishedTable(
-        "MAE and pAUC of the mug by fold at elevation 0°",
-        _VALUES["table7"],
-        (
-            Note("The columns that the paper heads PEA are MAE in degrees.", metric="mae"),
-            Note(
-                "The published pAUC average of Single, 87.23, is a slip for 87.73 (as in Table 4).",
-                metric="pauc",
-                rows=(AVERAGE_ROW,),
-                method="single",
-            ),
-            Note(
-                "σ is the sample standard deviation over folds (ddof = 1).",
-                rows=(SIGMA_ROW,),
-                ours=True,
-            ),
-            Note(
-                "Recomputed from the published folds, Opposite's σ of MAE is 3.58, Proposed's "
-                "average pAUC 90.67 and its σ 3.04.",
-                rows=(AVERAGE_ROW, SIGMA_ROW),
-            ),
-            Note(
-                "The folds are other objects than the paper's: compare the average and σ, not "
-                "folds.",
-                rows=FOLD_ROWS,
-            ),
-            _PAUC_NOTE,
-        ),
-    ),
-}
+PUBLISHED: Mapping[str, Values] = _read_values()
 """The paper's tables by name, ``table1`` to ``table7``."""
+
+NOTES = tuple(map(_read_note, paper_rows("published_notes.csv")))
 
 
 def published_value(table: str, metric: str, row: str, method: str) -> float:
     """Return one published value as printed, or NaN where the paper prints none.
 
-    Parameters
-    ----------
-    table : str
-        ``table1`` to ``table7``.
-    metric : str
-        ``mae`` (degrees), ``pauc`` (percent), or ``estimate`` and ``error`` (degrees, Table 6).
-    row : str
-        A category, elevation, group, initial azimuth or fold, or `AVERAGE_ROW`, `SIGMA_ROW`.
+    The metric is ``mae`` (degrees), ``pauc`` (percent), or ``estimate`` and ``error`` (degrees,
+    Table 6), the row a category, elevation, group, initial azimuth or fold, or `AVERAGE_ROW` or
+    `SIGMA_ROW`.
     """
-    row_values = PUBLISHED[table].values.get(metric, {}).get(row)
+    row_values = PUBLISHED[table].get(metric, {}).get(row)
     if row_values is None or method not in METHODS:
         return math.nan
     return row_values[METHODS.index(method)]

@@ -71,17 +71,9 @@ def evaluate_claims(
 ) -> pd.DataFrame:
     """Evaluate every claim; see `nbv.experiment.paper.statements` for the rules.
 
-    Parameters
-    ----------
-    evaluations : mapping of (category, elevation_deg) to pandas.DataFrame
-        Frames of `results.load_evaluations`; claims on absent units are ``not run``.
-    rng : numpy.random.Generator
-        Seeds the object resamples, which all comparisons share. ``default_rng(seed)`` gives the
-        same intervals as the tables of ``ReportSettings(seed=seed)``.
-    n_resamples : int
-        Number of resamples.
-    claims : sequence of Claim
-        By default the paper's claims.
+    Evaluations are those of `results.load_evaluations`; claims on absent units are ``not run``. The
+    generator seeds the object resamples, which all comparisons share: ``default_rng(seed)`` gives
+    the same intervals as the tables of ``ReportSettings(seed=seed)``.
 
     Returns
     -------

@@ -75,22 +75,11 @@ def svg_text(figure: Figure) -> str:
 
 
 def inline_svg(text: str, name: str, label: str) -> Markup:
-    """Return an SVG file of `nbv.style.save_figure` as an element of an HTML page.
+    """Return an SVG file's text as an ``svg`` element of a page, which scales with its container.
 
-    Parameters
-    ----------
-    text : str
-        The content of the file.
-    name : str
-        The prefix of element ids, which keeps the ids of several figures apart.
-    label : str
-        The description for screen readers.
-
-    Returns
-    -------
-    Markup
-        An ``svg`` element that scales with its container. Ink, grid, paper and verdicts use the
-        page's custom properties for colours, such as ``--ink``; the colours of methods stay.
+    Element ids have the prefix `name`, which keeps those of several figures apart; `label` is the
+    description for screen readers. Ink, grid, paper and verdicts use the page's custom properties
+    for colours, such as ``--ink``; the colours of methods stay.
     """
     root = ElementTree.fromstring(text)
     for parent in root.iter():

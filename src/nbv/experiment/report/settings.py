@@ -130,12 +130,7 @@ def choose_example(frame: pd.DataFrame) -> Example:
 
     The lower median for an even number; the first by name where errors tie. The middle object is
     neither the easiest nor the hardest, and the choice does not depend on the result of the method
-    that the example shows.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        One unit, from `results.load_evaluations`.
+    that the example shows. The frame is of one unit, from `results.load_evaluations`.
     """
     fold = example_fold(frame)
     in_fold = frame[frame["fold"] == fold]

@@ -17,7 +17,7 @@ import pandas as pd
 
 from nbv.errors import UserError, nearest
 from nbv.experiment.paper import published
-from nbv.experiment.paper.published import PUBLISHED, SIGMA_ROW, Note
+from nbv.experiment.paper.published import NOTES, SIGMA_ROW, Note
 from nbv.experiment.paper.statements import VERDICT_RULES, by_run
 from nbv.experiment.report.settings import (
     CELL_COLUMNS,
@@ -118,7 +118,7 @@ def fold_notes(cells: pd.DataFrame, settings: ReportSettings) -> Iterator[str]:
 
 def published_notes(name: str, cells: pd.DataFrame) -> list[str]:
     """Return the notes on the published numbers that a table shows."""
-    return [note.text for note in PUBLISHED[name].notes if _explains(note, cells)]
+    return [note.text for note in NOTES if name in note.tables and _explains(note, cells)]
 
 
 def _methods(cells: pd.DataFrame) -> list[str]:

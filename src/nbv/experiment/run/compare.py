@@ -93,10 +93,6 @@ class RunComparison:
         """Whether the run has the reference's settings and confirms its results."""
         return not self.settings and not self.problems
 
-    def settings_line(self) -> str:
-        """Return one line with the settings that differ; empty where none does."""
-        return other_settings(self.reference, self.settings) if self.settings else ""
-
     def summary_line(self) -> str:
         """Return the numbers of cells that are identical, within their tolerance, or outside."""
         by_cell = self.cells.groupby(["table", *CELL_KEY], sort=False)["status"].agg(set)
@@ -113,7 +109,7 @@ class RunComparison:
     def lines(self) -> list[str]:
         """Return the comparison as text: settings, problems, remarks, counts and the verdict."""
         verb = "agrees" if self.agrees else "does not agree"
-        settings = [self.settings_line()] if self.settings else []
+        settings = [other_settings(self.reference, self.settings)] if self.settings else []
         judgement = f"{self.run} {verb} with {self.reference}"
         return [*settings, *self.problems, *self.remarks, self.summary_line(), judgement]
 

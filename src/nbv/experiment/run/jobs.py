@@ -102,7 +102,8 @@ def job(snakemake: Any) -> Iterator[None]:
             where = first.filename or next(iter(snakemake.output), path)
             _fail(f"{where}: {_FOR_THE_USER[first.errno]}", path)
         if not _is_lack_of_memory(error):
-            _fail_unexpectedly(error, path)
+            log.error("traceback", exc_info=error, extra={"log_only": True})
+            _fail(f"{type(error).__name__}: {error} (traceback in {path})", path)
         reason = " ".join(str(error).split())
         _fail(f"memory ran out ({reason}): use fewer --cores, or smaller settings", path)
     except BaseException:
@@ -281,11 +282,6 @@ def _fail(message: str, log_file: Path) -> None:
 def _logs_above(log_file: Path) -> Path:
     """Return the folder of a run's logs."""
     return next((folder for folder in log_file.parents if folder.name == "logs"), log_file.parent)
-
-
-def _fail_unexpectedly(error: Exception, path: Path) -> None:
-    log.error("traceback", exc_info=error, extra={"log_only": True})
-    _fail(f"{type(error).__name__}: {error} (traceback in {path})", path)
 
 
 def write_checksum(path: str) -> None:

@@ -45,7 +45,7 @@ def source_files(script: str | Path, chosen: tuple[str, ...] = ()) -> list[str]:
     optional modules in strings, which no import shows: `chosen` gives those that a configuration
     chooses, as entries such as ``nbv.data.embree:EmbreeRenderer``. Paths are sorted, with the
     templates that a module fills in: those of its name, in the folder ``templates``, and the CSV
-    file of its name beside it. An ``__init__`` file counts where something is imported from it.
+    files of its name beside it. An ``__init__`` file counts where something is imported from it.
     What `UNRELATED` imports does not count.
     """
     imports = _imports()
@@ -90,7 +90,7 @@ def _files_of(module: str) -> Iterator[str]:
     path = _folders()[package].joinpath(*parts)
     yield str(path / "__init__.py" if path.is_dir() else path.with_suffix(".py"))
     yield from map(str, _TEMPLATES.glob(f"{path.name}[._]*"))
-    yield from map(str, path.parent.glob(f"{path.name}.csv"))
+    yield from map(str, path.parent.glob(f"{path.name}[._]*csv"))
 
 
 def git_commit(directory: str | Path = Path(__file__).parent) -> str:

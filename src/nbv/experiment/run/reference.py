@@ -57,24 +57,13 @@ _REQUIRED = (
 
 
 def collect_reference(run: Path, reference: Path) -> list[Path]:
-    """Copy the files of a run that a reviewer reads, byte for byte, to commit as a reference.
+    """Copy the files of a finished run that a reviewer reads, byte for byte, as a reference.
 
     Tables, the paper's figures, claims, runtime, configuration and provenance: about 1 MB. The
     runtime goes to the folder above the tables. ``bench.json``, which ``python -m performance``
     writes to the folder of the runs, goes to the folder of the references if it exists. Tables and
-    figures of the reference that the run lacks are removed; other files stay.
-
-    Parameters
-    ----------
-    run : pathlib.Path
-        ``results/<name>``, finished.
-    reference : pathlib.Path
-        ``docs/reference/<name>``.
-
-    Returns
-    -------
-    list of pathlib.Path
-        The files written, sorted.
+    figures of the reference that the run lacks are removed; other files stay. Returns the files
+    written, sorted.
 
     Raises
     ------

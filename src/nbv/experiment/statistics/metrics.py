@@ -7,6 +7,7 @@ resamples whole objects, with the same resampled objects for every method that i
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,31 +53,6 @@ class Interval:
         return {name: self.value, f"{ends}_low": self.low, f"{ends}_high": self.high}
 
 
-def mae_deg(errors_deg: ArrayLike) -> float:
-    """Return the mean absolute error over images, in degrees (Eq. 8).
-
-    Lower is better. A few errors near 180 degrees (front taken for back) move it a great deal;
-    read it together with the PEA or the median. Pool the images of all folds before calling:
-    a mean of fold means weighs images unequally when folds differ in size.
-
-    Parameters
-    ----------
-    errors_deg : (n_images,) float
-        Circular distances in [0, 180].
-
-    Raises
-    ------
-    ValueError
-        If there are no errors.
-    """
-    return float(np.mean(_non_empty(errors_deg)))
-
-
-def median_deg(errors_deg: ArrayLike) -> float:
-    """Return the median error over images, in degrees (Fig. 9); same errors as `mae_deg`."""
-    return float(np.median(_non_empty(errors_deg)))
-
-
 def pea(errors_deg: ArrayLike, thresholds_deg: ArrayLike) -> Floats:
     """Return the pose estimation accuracy at each threshold (Eq. 10).
 
@@ -96,52 +72,56 @@ def pea(errors_deg: ArrayLike, thresholds_deg: ArrayLike) -> Floats:
     return np.asarray(below / ordered.size)
 
 
-def pauc(errors_deg: ArrayLike) -> float:
-    """Return the area under PEA from 0 to 100 degrees, in percent of its largest value.
+PER_IMAGE: Mapping[str, Callable[[ArrayLike], Floats]] = {
+    "mae": lambda errors_deg: np.asarray(errors_deg, dtype=np.float64),
+    "pauc": accuracy_area,
+    "above_90_percent": above_90,
+}
+"""The contribution of each image to the statistics that are means over images."""
 
-    Exactly ``100 - mean(min(error, 100))``: integrating the step of one image from 0 to 100
-    leaves the part of the range above its error. It is thus an MAE with errors clipped at 100
-    degrees, and adds little to the MAE unless larger errors are common. Higher is better. Many
-    published values are lower than this can be; see `nbv.experiment.paper.published`. Same
-    parameters and errors as `mae_deg`.
+
+def statistic_of(errors_deg: ArrayLike, name: str) -> float:
+    """Return a statistic of the errors of images; pool the images of all folds before.
+
+    ``mae``: the mean absolute error, degrees (Eq. 8). A few errors near 180 degrees (front taken
+    for back) move it a great deal; read it together with the PEA or the median.
+    ``median``: the median error, degrees (Fig. 9).
+    ``pauc``: the area under PEA from 0 to 100 degrees, in percent of its largest value (Eq. 10).
+    Exactly ``100 - mean(min(error, 100))``: integrating the step of one image from 0 to 100 leaves
+    the part of the range above its error. Many published values are lower than this can be; see
+    `nbv.experiment.paper.published`.
+    ``above_90_percent``: the share of errors above 90 degrees, percent: front and back are
+    confused. Averaging opposite estimates can split one error of 180 degrees into two of 90.
+
+    Lower is better, but for the pAUC.
+
+    Parameters
+    ----------
+    errors_deg : (n_images,) float
+        Circular distances in [0, 180].
+
+    Raises
+    ------
+    ValueError
+        If there are no errors.
     """
-    return float(np.mean(accuracy_area(_non_empty(errors_deg))))
-
-
-def above_90_percent(errors_deg: ArrayLike) -> float:
-    """Return the share of errors above 90 degrees, in percent: front and back are confused.
-
-    Lower is better. The mean of two opposite estimates is 90 degrees from both, so averaging can
-    split one error of 180 degrees into two of 90. Same parameters and errors as `mae_deg`.
-    """
-    return float(np.mean(above_90(_non_empty(errors_deg))))
+    errors = _non_empty(errors_deg)
+    return float(np.median(errors) if name == "median" else np.mean(PER_IMAGE[name](errors)))
 
 
 def fold_std(values: ArrayLike) -> float:
     """Return the sample standard deviation (ddof = 1) of one value per fold, in its unit.
 
     The paper's sigma. It measures how much folds differ (which objects happen to be tested), not
-    the uncertainty of the average: for that use an interval over objects.
-
-    Returns
-    -------
-    float
-        NaN for fewer than two folds.
+    the uncertainty of the average: for that use an interval over objects. NaN for fewer than two
+    folds.
     """
     folds = np.asarray(values, dtype=np.float64)
     return float(np.std(folds, ddof=1)) if folds.size > 1 else float("nan")
 
 
 def resample_objects(n_objects: int, rng: np.random.Generator, n_resamples: int) -> Ints:
-    """Draw n_objects objects with replacement, and return how often each was drawn.
-
-    Calls ``rng.integers(n_objects, size=(n_resamples, n_objects))`` once.
-
-    Returns
-    -------
-    (n_resamples, n_objects) int
-        Multiplicities; each row sums to ``n_objects``.
-    """
+    """Draw n_objects objects with replacement: how often each, (n_resamples, n_objects)."""
     drawn = rng.integers(n_objects, size=(n_resamples, n_objects))
     rows = np.arange(n_resamples)[:, None] * n_objects
     counts = np.bincount((drawn + rows).ravel(), minlength=n_resamples * n_objects)
@@ -149,23 +129,11 @@ def resample_objects(n_objects: int, rng: np.random.Generator, n_resamples: int)
 
 
 def resampled_means(values: ArrayLike, objects: Ints, multiplicities: Ints) -> Floats:
-    """Return the mean over images in each resample of the objects.
+    """Return the mean over images in each resample of the objects, (n_resamples,).
 
-    Per-object sums and counts suffice, so this costs two small matrix products.
-
-    Parameters
-    ----------
-    values : (n_images,) float
-        Any value per image.
-    objects : (n_images,) int
-        Object of each image, in [0, n_objects).
-    multiplicities : (n_resamples, n_objects) int
-        From `resample_objects`.
-
-    Returns
-    -------
-    (n_resamples,) float
-        NaN where no image was drawn.
+    Values and objects (n_images,) are those of the images; the multiplicities are from
+    `resample_objects`. NaN where no image was drawn. Per-object sums and counts suffice, so this
+    costs two small matrix products.
     """
     n_objects = multiplicities.shape[1]
     sums = np.bincount(objects, weights=np.asarray(values, dtype=np.float64), minlength=n_objects)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import zlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from nbv.errors import UserError
 from nbv.experiment.statistics import metrics
-from nbv.experiment.statistics.metrics import Floats, Interval, Ints, above_90, accuracy_area
+from nbv.experiment.statistics.metrics import PER_IMAGE, Floats, Interval, Ints, statistic_of
 
 VIEWPOINT_GROUPS: Mapping[int, tuple[int, int]] = {
     1: (315, 45),
@@ -220,16 +220,17 @@ def estimate(statistic: str, sample: PairedErrors, method: str, resampler: Resam
     errors, pooled = sample.errors_deg[method], statistic.removesuffix("_sigma")
     if pooled != statistic:
         return _estimate_sigma(pooled, sample, method, resampler)
-    value, drawn = _METRICS[statistic](errors), resampler.multiplicities(sample)
-    resampled = metrics.resampled_medians if statistic == "median" else metrics.resampled_means
-    return Estimate(value, resampled(_per_image(statistic, errors), sample.objects, drawn))
+    value, drawn = statistic_of(errors, statistic), resampler.multiplicities(sample)
+    if statistic == "median":
+        return Estimate(value, metrics.resampled_medians(errors, sample.objects, drawn))
+    values = PER_IMAGE[statistic](errors)
+    return Estimate(value, metrics.resampled_means(values, sample.objects, drawn))
 
 
 def fold_sigma(statistic: str, sample: PairedErrors, method: str) -> float:
     """Return σ over folds of the statistic (a mean over images) of one method."""
-    errors, metric = sample.errors_deg[method], _METRICS[statistic]
-    folds = np.unique(sample.folds)
-    return metrics.fold_std([metric(errors[sample.folds == fold]) for fold in folds])
+    errors, folds = sample.errors_deg[method], np.unique(sample.folds)
+    return metrics.fold_std([statistic_of(errors[sample.folds == f], statistic) for f in folds])
 
 
 def _estimate_sigma(
@@ -238,22 +239,7 @@ def _estimate_sigma(
     folds = [sample.folds == fold for fold in np.unique(sample.folds)]
     if len(folds) < 2:
         return Estimate(float("nan"), np.full(resampler.n_resamples, np.nan))
-    values = _per_image(statistic, sample.errors_deg[method])
+    values = PER_IMAGE[statistic](sample.errors_deg[method])
     drawn = resampler.multiplicities_by_fold(sample)
     means = [metrics.resampled_means(values[f], sample.objects[f], drawn) for f in folds]
     return Estimate(fold_sigma(statistic, sample, method), np.std(means, axis=0, ddof=1))
-
-
-def _per_image(statistic: str, errors_deg: Floats) -> Floats:
-    """Return the contribution of each image to a statistic that is a mean over images."""
-    if statistic == "above_90_percent":
-        return above_90(errors_deg)
-    return accuracy_area(errors_deg) if statistic == "pauc" else errors_deg
-
-
-_METRICS: Mapping[str, Callable[[Floats], float]] = {
-    "mae": metrics.mae_deg,
-    "median": metrics.median_deg,
-    "pauc": metrics.pauc,
-    "above_90_percent": metrics.above_90_percent,
-}

@@ -146,17 +146,7 @@ def idea(inputs: FigureInputs) -> Figure:
 
 
 def two_view_belief(lookup: CostTable, first: int, second: int, delta: int) -> Likelihood:
-    """Return p(θ | e₁, e₂, δ) by bin, both estimates combined by Bayes' rule.
-
-    Parameters
-    ----------
-    lookup : CostTable
-        The table with the likelihoods.
-    first, second : int
-        Bins of the two estimates.
-    delta : int
-        Bins from the first view to the second.
-    """
+    """Return p(θ | e₁, e₂, δ) by bin, estimates and rotation in bins combined by Bayes' rule."""
     first_belief, estimates = lookup.viewpoint_likelihood[first], lookup.estimate_likelihood
     belief = first_belief * np.roll(estimates[:, second], -delta)
     # Two estimates that exclude each other carry no information.
