@@ -197,7 +197,7 @@ EXPERIMENT += ("snakemake", "jinja2", "onnx")
     "arguments",
     [
         ("recommend", "f0.npy", "--bundle", "b.safetensors", "--plot", "plot.png"),
-        ("next", "table.npz", "--estimate", "90"),
+        ("next", "t.npz", "--estimate", "90"),
         ("calibrate", "pairs.csv", "--output", "new.npz"),
         ("evaluate", "manifest.csv", "--bundle", "b.safetensors", "--views", "2"),
         ("inspect", "b.safetensors"),
@@ -206,9 +206,7 @@ EXPERIMENT += ("snakemake", "jinja2", "onnx")
     ],
     ids=lambda arguments: " ".join(arguments[:2]),
 )
-def test_a_robot_needs_no_package_of_the_experiment(manifest, pairs, arguments):
-    if "table.npz" in arguments:
-        main(["calibrate", "pairs.csv", "--output", "table.npz"])
+def test_a_robot_needs_no_package_of_the_experiment(manifest, pairs, table, arguments):
     command = [sys.executable, "-c", WITHOUT, " ".join(EXPERIMENT), *arguments]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
