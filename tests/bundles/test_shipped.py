@@ -15,9 +15,12 @@ from nbv.core.circle.selection import DENSITY
 ROOT = Path(__file__).parents[2]
 FRAMES = Path(os.environ.get("NBV_FRAMES", ROOT.parent / "shared/data/frames"))
 
-pytestmark = pytest.mark.skipif(
-    not (FRAMES / "manifest.csv").is_file(), reason="the recordings are not here: NBV_FRAMES"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (FRAMES / "manifest.csv").is_file(), reason="the recordings are not here: NBV_FRAMES"
+    ),
+]
 
 
 def never(path, error):
