@@ -68,7 +68,7 @@ test: $(READY)
 	$(PYTEST)
 
 test-quick: $(READY)
-	$(PYTEST) -m "not slow"
+	$(PYTEST) -m "not slow" --ignore tests/studies
 
 test-studies: $(READY)
 	$(PYTEST) tests/workflow/studies

@@ -33,8 +33,9 @@ hypothesis.settings.load_profile("untimed")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What needs the finished project comes first: one process makes it, others have units."""
-    items.sort(key=lambda item: not {"finished", "scratch"} & set(item.fixturenames))
+    """What runs the workflow comes first, so that no process has a long test of its own at last."""
+    runs = {"finished", "scratch", "fresh", "made"}
+    items.sort(key=lambda item: runs.isdisjoint(item.fixturenames))
 
 
 @pytest.fixture(scope="session")

@@ -15,9 +15,12 @@ from nbv.core.circle.selection import DENSITY
 ROOT = Path(__file__).parents[2]
 FRAMES = Path(os.environ.get("NBV_FRAMES", ROOT.parent / "shared/data/frames"))
 
-pytestmark = pytest.mark.skipif(
-    not (FRAMES / "manifest.csv").is_file(), reason="the recordings are not here: NBV_FRAMES"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (FRAMES / "manifest.csv").is_file(), reason="the recordings are not here: NBV_FRAMES"
+    ),
+]
 
 
 def never(path, error):
@@ -31,14 +34,14 @@ def sweeps():
     return {one.sequence: run_network(recommender, one, None, None, never) for one in recordings}
 
 
-def evaluated(bundle, sweeps, n_views):
-    found = evaluate(bundle, sweeps, n_views=n_views)
+def evaluated(bundle, sweeps):
+    found = evaluate(bundle, sweeps, n_views=(2,))
     return found.set_index(["sequence", "choice", "n_views"])
 
 
 @pytest.fixture(scope="module")
 def found(sweeps):
-    return evaluated(Recommender.load("mug").bundle, list(sweeps.values()), (2, 3))
+    return evaluated(Recommender.load("mug").bundle, list(sweeps.values()))
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +97,7 @@ def test_calibrated_by_the_other_recording_the_recommended_view_has_the_least_er
     density = {**DENSITY, "bandwidths_deg": [8], "pseudo_observations": [10]}
     bundle = Recommender.load("mug").bundle
     calibrated = recalibrated(bundle, [sweeps[calibrating]], "the other recording", density)
-    found = evaluated(calibrated, [sweeps[other]], (2,)).loc[other]
+    found = evaluated(calibrated, [sweeps[other]]).loc[other]
     for errors in (found["mae_deg"], found["mae_without_offset_deg"]):
         for choice in (RANDOM, OPPOSITE, FIXED):
             assert errors[RECOMMENDED, 2] < errors[choice, 2]

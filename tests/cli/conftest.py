@@ -1,6 +1,7 @@
 """Folders in which commands run."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from commands import POSE
 from made_bundles import BINS, WIDTH, frame
+from nbv.cli import main
 
 
 @pytest.fixture
@@ -23,8 +25,10 @@ def here(tmp_path, monkeypatch, bundle_file) -> Path:
     return tmp_path
 
 
-@pytest.fixture
-def pairs(here) -> Path:
+@pytest.fixture(scope="session")
+def calibrated(tmp_path_factory) -> Path:
+    """A folder with pairs and their lookup table. Not to be changed."""
+    folder = tmp_path_factory.mktemp("calibrated")
     rng = np.random.default_rng(0)
     views = np.arange(0, 360, 6)
     rows = [
@@ -33,8 +37,19 @@ def pairs(here) -> Path:
         for view in views
     ]
     table = pd.DataFrame(rows, columns=["object_id", "azimuth_deg", "estimate_deg"])
-    table.to_csv(here / "pairs.csv", index=False)
-    return here / "pairs.csv"
+    table.to_csv(folder / "pairs.csv", index=False)
+    main(["calibrate", str(folder / "pairs.csv"), "--output", str(folder / "t.npz")])
+    return folder
+
+
+@pytest.fixture
+def pairs(here, calibrated) -> Path:
+    return Path(shutil.copy(calibrated / "pairs.csv", here))
+
+
+@pytest.fixture
+def table(here, calibrated) -> Path:
+    return Path(shutil.copy(calibrated / "t.npz", here))
 
 
 @pytest.fixture

@@ -51,8 +51,7 @@ def test_each_paragraph_of_the_help_is_one_line_before_it_is_wrapped():
     ]
 
 
-def test_a_range_allows_every_degree_between_its_ends(pairs, capsys):
-    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+def test_a_range_allows_every_degree_between_its_ends(table, capsys):
     for given, wanted in (
         (("-60:60",), range(-60, 61)),
         (("-60:-20,", "30:60"), [*range(-60, -19), *range(30, 61)]),
@@ -69,8 +68,7 @@ def test_a_range_allows_every_degree_between_its_ends(pairs, capsys):
         assert given in message
 
 
-def test_angles_beyond_all_turns_are_one_line(pairs, capsys):
-    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+def test_angles_beyond_all_turns_are_one_line(table, capsys):
     table = ("next", "t.npz", "--estimate")
     assert "--estimate=1e+300" in fails(capsys, *table, "1e300")
     assert "allowed rotations" in fails(capsys, *table, "3", "--allowed", "1e300")

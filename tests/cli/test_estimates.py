@@ -12,8 +12,7 @@ from nbv.cli import main
 from nbv.tables.lookup import LookupTable
 
 
-def test_what_does_not_go_with_a_table_is_refused(pairs, capsys):
-    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+def test_what_does_not_go_with_a_table_is_refused(table, capsys):
     options = ("next", "t.npz", "--estimate")
     for more in (
         ("--until-probability", "0.9"),
@@ -31,21 +30,19 @@ def test_what_does_not_go_with_a_table_is_refused(pairs, capsys):
 
 
 @pytest.mark.parametrize(
-    "table", [("--table", "t.npz"), ("--table=t.npz",)], ids=["separate", "joined"]
+    "given", [("--table", "t.npz"), ("--table=t.npz",)], ids=["separate", "joined"]
 )
-def test_the_former_form_of_next_gives_its_answer_and_a_hint(pairs, capsys, table):
-    run(capsys, "calibrate", "pairs.csv", "--output", "t.npz")
+def test_the_former_form_of_next_gives_its_answer_and_a_hint(table, capsys, given):
     wanted = run(capsys, "next", "t.npz", "--estimate", "-30", "--allowed", "-60:60", "--json")
-    former = ["recommend", *table, "--estimate", "-30", "--allowed", "-60:60", "--json"]
+    former = ["recommend", *given, "--estimate", "-30", "--allowed", "-60:60", "--json"]
     assert main(former) == 0
     out, err = capsys.readouterr()
     assert out == wanted
     assert "is now `nbv next TABLE`" in err
 
 
-def test_an_estimate_has_target_poses_where_camera_and_axis_are_known(pairs, capsys):
-    run(capsys, "calibrate", "pairs.csv", "--output", "table.npz")
-    options = ("next", "table.npz", "--estimate", "90")
+def test_an_estimate_has_target_poses_where_camera_and_axis_are_known(table, capsys):
+    options = ("next", "t.npz", "--estimate", "90")
     bare = json.loads(run(capsys, *options, "--json"))
     for direction in ((0, 0.1, 2), ()):
         axis = ",".join(map(str, (0.1, -0.2, 0.3, *direction)))

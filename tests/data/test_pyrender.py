@@ -88,6 +88,7 @@ def test_one_renderer_serves_several_sizes_and_objects(pyrender):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_torchs_compiler_can_be_loaded_after_opengl(pyrender):
     code = (
         "from nbv.data.render import open_renderer; open_renderer('pyrender'); import torch._dynamo"

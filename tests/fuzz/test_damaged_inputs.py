@@ -85,6 +85,7 @@ def one_line_or_an_answer(capsys, *arguments: object) -> bool:
     ],
 )
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.slow
 def test_damaged_files_are_one_line_or_an_answer(here, capsys, name, option):
     content, damaged_name = Path(name).read_bytes(), f"damaged{Path(name).suffix}"
     rng = np.random.default_rng(list(name.encode()))

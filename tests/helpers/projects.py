@@ -71,10 +71,12 @@ class Project:
     def would_run(self, *more: str, targets: tuple[str, ...] = ()) -> dict[str, int]:
         """Return how many jobs of which rule a run with more overrides would start.
 
-        `targets` may begin with `STUDIES`.
+        `targets` may begin with `STUDIES`. Without the project's profile, which prints no table of
+        jobs, and with its triggers.
         """
+        triggers = ("--rerun-triggers", "input", "mtime", "params", "software-env")
         asked = ("--cores", "2", "--dry-run", "--workflow-profile", "none", *targets)
-        done = self.run(*asked, overrides=(*TINY, *more))
+        done = self.run(*triggers, *asked, overrides=(*TINY, *more))
         stats = re.search(r"^job +count\n[- ]+\n(.*?)\n\n", done.stdout, re.M | re.S)
         if stats is None:
             assert "Nothing to be done" in done.stdout + done.stderr

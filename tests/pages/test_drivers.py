@@ -35,6 +35,11 @@ def frame() -> Frame:
     return nbv.example_frame(azimuth_deg=70.0, elevation_deg=20.0)
 
 
+@pytest.fixture(scope="module")
+def mug() -> nbv.Recommender:
+    return nbv.Recommender.load("mug")
+
+
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     """A function that runs a snippet after `given` names, and returns the names that it leaves."""
@@ -65,20 +70,18 @@ def on_a_table(frame: Frame) -> np.ndarray:
     return np.where(frame.mask, frame.depth_m, np.where(table < 3, table, 0.0))
 
 
-def test_plane_removal(frame, run) -> None:
+def test_plane_removal(frame, mug, run) -> None:
     """What is left of an object on a table is the object, but for what touches the table."""
     camera = frame.intrinsics
     given = {name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")}
     names = run("off_plane", {}, depth_m=on_a_table(frame), **given)
     assert not (names["mask"] & ~frame.mask).any()
     assert names["mask"].sum() > 0.85 * frame.mask.sum()
-    wanted = nbv.Recommender.load("mug").recommend(
-        frame.depth_m, mask=frame.mask, intrinsics=camera
-    )
+    wanted = mug.recommend(frame.depth_m, mask=frame.mask, intrinsics=camera)
     assert names["answer"].azimuth_deg == pytest.approx(wanted.azimuth_deg, abs=10)
 
 
-def test_segment_anything(frame, run) -> None:
+def test_segment_anything(frame, mug, run) -> None:
     """The mask with the highest score is the one that is taken."""
     masks = np.stack([frame.mask & False, frame.mask, ~frame.mask])
     predictor = MagicMock()
@@ -89,13 +92,11 @@ def test_segment_anything(frame, run) -> None:
     given = {name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")}
     given |= {"depth_m": frame.depth_m, "model": None, "colour": None, "u": 320, "v": 240}
     names = run("segment_anything", {"segment_anything": module}, **given)
-    wanted = nbv.Recommender.load("mug").recommend(
-        frame.depth_m, mask=frame.mask, intrinsics=camera
-    )
+    wanted = mug.recommend(frame.depth_m, mask=frame.mask, intrinsics=camera)
     assert names["answer"].azimuth_deg == pytest.approx(wanted.azimuth_deg)
 
 
-def test_realsense(frame, run) -> None:
+def test_realsense(frame, mug, run) -> None:
     """Frames in units of the device, intrinsics of the depth stream."""
     depth_mm, camera = whole_millimetres(frame), frame.intrinsics
     realsense = ModuleType("pyrealsense2")
@@ -109,18 +110,18 @@ def test_realsense(frame, run) -> None:
         wait_for_frames=lambda: SimpleNamespace(get_depth_frame=lambda: depth),
     )
     answer = run("pyrealsense2", {"pyrealsense2": realsense})["answer"]
-    wanted = nbv.Recommender.load("mug").recommend(depth_mm, intrinsics=camera, far_m=0.9)
+    wanted = mug.recommend(depth_mm, intrinsics=camera, far_m=0.9)
     assert answer.azimuth_deg == pytest.approx(wanted.azimuth_deg)
     assert answer.move == wanted.move
 
 
-def test_kinect(frame, run) -> None:
+def test_kinect(frame, mug, run) -> None:
     depth_mm = whole_millimetres(frame)
     freenect = ModuleType("freenect")
     freenect.DEPTH_MM = 5
     freenect.sync_get_depth = lambda **given: {5: (depth_mm, 0)}[given["format"]]
     answer = run("freenect", {"freenect": freenect})["answer"]
-    wanted = nbv.Recommender.load("mug").recommend(depth_mm, intrinsics=frame.intrinsics, far_m=0.9)
+    wanted = mug.recommend(depth_mm, intrinsics=frame.intrinsics, far_m=0.9)
     assert answer.azimuth_deg == pytest.approx(wanted.azimuth_deg)
     assert answer.move == wanted.move
 

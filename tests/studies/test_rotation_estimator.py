@@ -63,9 +63,8 @@ def test_an_image_shows_its_pose():
     orientations = orientations_of("chair-0000", "chair", 2, seed=0)
     codes = oriented_views(chair, orientations, 3, CAMERA, open_renderer("embree"))
     poses = poses_of(orientations, 3).reshape(-1, 3, 3)
-    found = [
-        [share_alike(depth_of(code), projected(chair, pose)) for pose in poses] for code in codes
-    ]
+    images = [projected(chair, pose) for pose in poses]
+    found = [[share_alike(depth_of(code), image) for image in images] for code in codes]
     # Points near an edge fall into a pixel or beside it.
     assert np.diag(found).min() > 0.6
     assert (np.argmax(found, axis=1) == np.arange(6)).all()

@@ -78,6 +78,7 @@ def test_verify_says_what_makes_damaged_files_again(scratch):
 
 
 def test_a_job_notices_what_it_reads_and_the_same_command_makes_it_again(scratch):
+    """A damaged estimator, which no job reads, is trained again with its lost estimates."""
     before = scratch.outcome()
     read = "results/tiny/estimates/mug/el00/fold1/calibration.csv"
     damage(scratch.folder / read)
@@ -87,14 +88,8 @@ def test_a_job_notices_what_it_reads_and_the_same_command_makes_it_again(scratch
     assert f"error: {read} differs from its checksum" in printed
     assert "Traceback" not in printed
     assert not (scratch.folder / read).exists()
-    scratch.run(target, "--cores", "2")
-    assert scratch.outcome() == before
-
-
-def test_a_damaged_estimator_is_trained_again_with_its_lost_estimates(scratch):
-    before = scratch.outcome()
-    damage(scratch.results / "estimators/mug/el00/fold1/estimator.safetensors")
-    estimates = "results/tiny/estimates/mug/el00/fold1/test.csv"
+    damage(scratch.results / "estimators/mug/el00/fold2/estimator.safetensors")
+    estimates = "results/tiny/estimates/mug/el00/fold2/test.csv"
     (scratch.folder / estimates).unlink()
-    scratch.run(estimates, "--cores", "2")
+    scratch.run(target, estimates, "--cores", "2")
     assert scratch.outcome() == before

@@ -73,13 +73,6 @@ def test_a_finished_run_has_nothing_to_do_and_the_explorer_is_made_of_what_it_ha
     assert finished.would_run(targets=("all", "explorer")) == {"explorer": 1}
 
 
-def test_a_run_in_a_fresh_clone_whose_sources_are_newer_has_nothing_to_do(scratch):
-    for source in scratch.folder.rglob("*.py"):
-        source.touch()
-    done = scratch.run("--cores", "1", "--dry-run")
-    assert "Nothing to be done" in done.stdout + done.stderr
-
-
 def test_another_bandwidth_and_an_object_less_rerun_what_follows(finished):
     """The lookups of both categories, and the images and trainings of the object's alone."""
     changed = ("density.bandwidths_deg=[11]", "dataset.exclude=[chair-0003]")
@@ -97,7 +90,9 @@ def test_another_bandwidth_and_an_object_less_rerun_what_follows(finished):
 
 
 def test_another_training_length_reruns_training_and_what_follows(finished):
-    assert finished.would_run("estimator.epochs=2") == {
+    """Also of another lookup table, of another unit; the figures that show it are planned too."""
+    changed = ("estimator.epochs=2", "methods.proposed.policy=expected_error")
+    assert finished.would_run(*changed) == {
         "train": 4,
         "lookup": 4,
         "evaluate_baselines": 4,
@@ -115,13 +110,16 @@ def test_another_number_of_resamples_reruns_what_shows_intervals(finished):
 
 
 def test_an_edit_reruns_what_runs_that_code_and_what_follows(scratch):
+    """A remark is no edit, and a fresh clone's sources are newer than what a run has kept."""
     metrics = scratch.folder / "src/nbv/experiment/statistics/metrics.py"
     criteria = scratch.folder / "src/nbv/core/circle/criteria.py"
-    metrics.touch()
+    for source in scratch.folder.rglob("*.py"):
+        source.touch()
     for name in ("src/nbv/data/pyrender.py", "Snakefile", "config/config.yaml"):
         path = scratch.folder / name
         path.write_text(path.read_text() + "\n# a remark\n")
-    assert scratch.would_run() == {}
+    done = scratch.run("--cores", "1", "--dry-run")
+    assert "Nothing to be done" in done.stdout + done.stderr
     metrics.write_text(metrics.read_text() + "\n\nEDITED = True\n")
     assert scratch.would_run() == {"settings": 1, **SHOWN}
     criteria.write_text(criteria.read_text() + "\n\nEDITED = True\n")
@@ -132,12 +130,6 @@ def test_an_edit_reruns_what_runs_that_code_and_what_follows(scratch):
         "settings": 1,
         **SHOWN,
     }
-
-
-def test_another_criterion_for_proposed_is_a_run_like_any_other(finished):
-    """Its lookup table has another name and unit; the figures that show it are still planned."""
-    jobs = finished.would_run("methods.proposed.policy=expected_error")
-    assert (jobs["lookup"], jobs["figure"]) == (4, 11)
 
 
 def test_proposed_without_a_lookup_table_plans_no_figure_of_one(fresh):

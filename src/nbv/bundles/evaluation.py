@@ -74,11 +74,12 @@ def fixed_errors_deg(views: CalibrationViews, n_views: int) -> NDArray[np.float6
     apart = travel_deg(np.arange(1, n_views)[:, None] * steps * (360.0 / n_bins)).min(axis=0)
     is_allowed = (apart >= MIN_SEPARATION_DEG) | (steps == round(n_bins / n_views))
     errors = np.full((n_sweeps, n_bins), np.inf)
-    for step in steps[is_allowed]:
+    for step in steps[is_allowed & (steps <= n_bins // 2)]:
         fused = views
         for view in range(1, n_views):
             fused = fused.after(int(view * step) % n_bins)
-        errors[:, step] = fused.error_now_deg.mean(axis=1)
+        # The opposite steps, from the last view, see the same views.
+        errors[:, [step, -step]] = fused.error_now_deg.mean(axis=1)[:, None]
     return errors
 
 

@@ -64,11 +64,11 @@ def test_no_object_of_an_experiment_has_the_shape_of_one_of_the_features(shipped
         }
 
     # The first of each category: an object depends on the seed and its number, not on the others.
-    n_objects = 200
+    experiment = load_config(ROOT / "config")
+    n_objects = experiment["n_objects"]
     own = shapes(shipped.provenance["settings"]["seed"], n_objects)
     assert len(own) == len(CATEGORIES) * n_objects
-    experiment = load_config(ROOT / "config")
-    assert not own & shapes(experiment["seed"], experiment["n_objects"])
+    assert not own & shapes(experiment["seed"], n_objects)
 
 
 def test_each_image_has_its_own_features_whatever_the_batch(shipped):

@@ -231,6 +231,7 @@ def test_it_says_first_that_a_run_is_too_small(wordy, html):
 @pytest.mark.parametrize(
     ("better", "verdict"), [(5.0, "holds"), (-5.0, "does not hold"), (0.0, "is undecided")]
 )
+@pytest.mark.slow
 def test_it_opens_with_what_became_of_the_conclusion(
     inputs, evaluations, tmp_path, better, verdict
 ):

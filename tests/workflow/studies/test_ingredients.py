@@ -59,7 +59,7 @@ def test_ingredients_are_left_out_of_training_and_not_of_the_test(fresh: Project
     assert not np.array_equal(images[0], images[1])
     assert not (fresh.results / "bundles/replicate2/depth").exists()
     for folder in folders[1]:
-        assert_tested_with_all(fresh, folder, ("30",))
+        assert_tested_with_all(fresh, folder, "mug", ("30",))
 
 
 def two_view_mae(folder: Path) -> float:
