@@ -203,6 +203,13 @@ def test_scores_say_nothing_without_flips_or_without_anything_else():
         np.testing.assert_allclose(ScoreRatio.fit(scores, flips)(scores), 1)
 
 
+def test_scores_by_chance_say_nothing_in_most_tables():
+    """A gain of 2 nats by one parameter has a probability of 4.6 % (Wilks)."""
+    rng = np.random.default_rng(0)
+    slopes = [ScoreRatio.fit(rng.random(200), rng.random(200) < 0.2).slope for _ in range(300)]
+    assert 0.02 < np.count_nonzero(slopes) / 300 < 0.08
+
+
 def test_the_strength_of_the_shrinkage_is_the_likeliest():
     """By the definition, each group left out, group by group and pair by pair."""
     objects = [made(n=60, seed=1, group=np.arange(60) % 5), made(CONE, 40, 2, group=np.ones(40))]

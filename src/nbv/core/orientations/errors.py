@@ -81,7 +81,10 @@ class ScoreRatio:
 
     @classmethod
     def fit(cls, scores: ArrayLike, is_flip: NDArray[np.bool_]) -> ScoreRatio:
-        """Fit by logistic regression on scores (n,) and flips (n,) of any objects."""
+        """Fit by logistic regression on scores (n,) and flips (n,) of any objects.
+
+        A slope that gains less than `LEAST_GAIN` over none is not shown, and is 0.
+        """
         ordered = np.sort(np.asarray(scores, dtype=np.float64))
         features = np.stack([_logit_rank(ordered, scores), np.ones(len(ordered))], axis=1)
         n_flips = int(is_flip.sum())
@@ -96,6 +99,12 @@ class ScoreRatio:
             weights = weights + step
             if np.abs(step).max() < 1e-9:
                 break
+        fitted, constant = (
+            -np.logaddexp(0, np.where(is_flip, -1, 1) * (features @ each)).sum()
+            for each in (weights, np.array([0.0, prior]))
+        )
+        if fitted < constant + LEAST_GAIN:
+            return cls(ordered, 0.0, 0.0)
         return cls(ordered, float(weights[0]), float(weights[1] - prior))
 
     def __call__(self, scores: ArrayLike) -> Array:
