@@ -193,6 +193,14 @@ def forecast(table: OrientationTable) -> Forecast | None:
     -------
     Forecast or None
         None with fewer than `FEWEST_OBJECTS` objects of `FEWEST_INSTANCES` instances.
+
+    Examples
+    --------
+    >>> import nbv, numpy as np
+    >>> pose = np.eye(3)[None]
+    >>> table = nbv.OrientationTable(np.array(["mug"]), np.array(["1/1"]), pose, pose)
+    >>> nbv.forecast(table) is None
+    True
     """
     instances = pd.Series(table.group).str.contains("/").to_numpy()
     n_instances = pd.Series(table.group[instances]).groupby(table.object_id[instances]).nunique()
