@@ -254,6 +254,7 @@ def _calibrate_table(
     pairs = PairTable.from_rows(source, rows)
     sweeps = pairs.distributions
     views, thin = (pairs.estimates, ()) if sweeps else pairs.thin_estimates
+    thin = (*pairs.repeated, *thin)
     estimates = views.estimate_deg
     table = DistributionTable.from_pairs(sweeps) if sweeps else None
     lookup = LookupTable.of(chosen_lookup(estimates, criterion, DENSITY))
