@@ -144,9 +144,9 @@ class BundleError(NamedError):
     """
 
 
-def in_order(names: Iterable[str]) -> list[str]:
-    """Return names in order, with numbers in them by value: 2 before 10."""
-    return sorted(names, key=lambda name: re.sub(r"\d+", lambda digits: digits[0].zfill(20), name))
+def by_number(name: str) -> str:
+    """Return the key by which names are in order of their numbers: 2 before 10."""
+    return re.sub(r"\d+", lambda digits: digits[0].zfill(20), name)
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
@@ -154,6 +154,6 @@ def nearest(name: str, valid: Iterable[str]) -> str:
 
     Numbers are never close, and are listed in their order.
     """
-    choices = in_order(valid)
+    choices = sorted(valid, key=by_number)
     close = [] if name.isdecimal() else difflib.get_close_matches(name, choices, n=1, cutoff=0.6)
     return f"did you mean {close[0]!r}?" if close else f"choose from: {', '.join(choices)}"

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nbv.core.orientations.group import ASYMMETRIC, Orientations, along_ray, inverse
-from nbv.errors import UserError, in_order, nearest
+from nbv.errors import UserError, by_number, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
 from nbv.numbers import (
@@ -113,7 +113,7 @@ def read_orientation_table(
     if n_missed := int(missed.sum()):
         left_out.append(f"{n_missed} of {n_missed + len(rows)} instances have no estimate")
     symmetries = {} if models_info is None else read_models_info(models_info)
-    known = in_order(set(rows["object_id"]))
+    known = sorted(set(rows["object_id"]), key=by_number)
     if models_info is not None and (absent := [n for n in known if n not in symmetries]):
         left_out.append(
             f"{models_info} has no entry for {', '.join(absent)} (it has "

@@ -21,7 +21,7 @@ from nbv.core.orientations.group import (
     spiral,
     viewing_direction,
 )
-from nbv.errors import UserError, in_order, nearest
+from nbv.errors import UserError, by_number, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
 from nbv.numbers import Pose, as_orientations, as_pose
 from nbv.tables.detections import Detections
@@ -141,7 +141,7 @@ class OrientationTable:
         """
         known = self.object_ids
         if object_id is None and len(known) > 1:
-            choices = ", ".join(in_order(known))
+            choices = ", ".join(sorted(known, key=by_number))
             raise UserError(f"the table has {len(known)} objects; name one of {choices}")
         name = known[0] if object_id is None else object_id
         if name not in known:
