@@ -327,7 +327,7 @@ def class_columns(path: Path, table: pd.DataFrame) -> list[str]:
         Where a column is missing between others.
     """
     given = [str(name) for name in table.columns]
-    similar = [name for name in given if re.fullmatch(r"\s*[pP][ _]?\d+\s*", name)]
+    similar = [name for name in given if re.fullmatch(r"p[ _]?\d+", name)]
     wanted = [f"p{number}" for number in range(len(similar))]
     if strange := sorted(set(similar) - set(wanted)):
         raise UserError(
