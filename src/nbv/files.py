@@ -13,6 +13,7 @@ import json
 import lzma
 import re
 import secrets
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from glob import escape
@@ -386,8 +387,7 @@ def read_given_json(path: Path, remedy: str) -> Any:
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         made = dict(pairs)
         if len(made) < len(pairs):
-            names = [name for name, _ in pairs]
-            again = next(name for name in names if names.count(name) > 1)
+            again = Counter(name for name, _ in pairs).most_common(1)[0][0]
             raise UserError(f"{path}: the key {again!r} is there twice; keep one")
         return made
 

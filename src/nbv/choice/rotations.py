@@ -58,11 +58,6 @@ def as_limit_deg(name: str, limit_deg: float) -> float:
     return float(limit_deg)
 
 
-def as_travel(max_travel_deg: float) -> float:
-    """Return a maximum travel; errors as in `as_limit_deg`."""
-    return as_limit_deg("max_travel_deg", max_travel_deg)
-
-
 def at_rotations(
     cost: NDArray[np.floating], rotation_deg: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -147,7 +142,7 @@ def ranked_rotations(
     UserError
         Where the estimate is not an angle, or no rotation is admissible.
     """
-    max_travel_deg = min(as_travel(max_travel_deg), lookup.max_travel_deg)
+    max_travel_deg = min(as_limit_deg("max_travel_deg", max_travel_deg), lookup.max_travel_deg)
     n_bins = len(lookup.cost)
     width = 360.0 / n_bins
     if not is_angle(estimate_deg):

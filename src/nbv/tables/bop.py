@@ -113,17 +113,18 @@ def read_orientation_table(
     if n_missed := int(missed.sum()):
         left_out.append(f"{n_missed} of {n_missed + len(rows)} instances have no estimate")
     symmetries = {} if models_info is None else read_models_info(models_info)
-    known = sorted(set(rows["object_id"]), key=by_number)
-    if models_info is not None and (absent := [n for n in known if n not in symmetries]):
-        left_out.append(
-            f"{models_info} has no entry for {', '.join(absent)} (it has "
-            f"{', '.join(list(symmetries)[:5]) or 'none'}): taken to have no symmetry"
-        )
+    known = set(rows["object_id"])
     for name in objects:
         if name not in known:
             raise UserError(f"{path}: no object {name}: {nearest(name, known)}")
     if objects:
         rows = rows[rows["object_id"].isin(objects)]
+    absent = sorted(set(rows["object_id"]) - set(symmetries), key=by_number)
+    if models_info is not None and absent:
+        left_out.append(
+            f"{models_info} has no entry for {', '.join(absent)} (it has "
+            f"{', '.join(list(symmetries)[:5]) or 'none'}): taken to have no symmetry"
+        )
     counts = rows["object_id"].value_counts()
     for name in dict.fromkeys(rows["object_id"]):
         if counts[name] < FEWEST_PAIRS:

@@ -17,8 +17,6 @@ TURNED_DEG = 20.0
 """Orientations in the base frame that differ by more contradict each other, unless one is a flip;
 those by less than half agree."""
 
-REMEDY = "give those of the optical frame (z forward, y down), camera to base, in metres"
-
 OPTICAL = "+z forward, +y down"
 AXES = {OPTICAL: "", "-z forward, -y down": "OpenGL's", "+x forward, -z down": "a ROS body's"}
 """Likely axes of a camera, and what they are called."""
@@ -54,22 +52,24 @@ def contradictions(
 
     def apart(rotation: Orientations, origin: Array) -> tuple[Array, float]:
         places = (rotation @ seen_m[:, :, None])[..., 0] + origin
-        share = np.linalg.norm(places[:, None] - places, axis=2) / distance_m
         seen = rotation @ orientations
-        return share, float(symmetry.distance_deg(seen[:, None], seen).max())
+        share = np.linalg.norm(places - places[0], axis=1) / distance_m
+        return share, float(symmetry.distance_deg(seen, seen[0]).max())
 
     share, apart_deg = apart(poses[:, :3, :3], poses[:, :3, 3])
     most, is_told = float(share.max()), bool(share.max() > TOLD)
     if not is_told and (most <= AGREEING or apart_deg <= TURNED_DEG):
         return []
-    first, second = divmod(int(share.argmax()), len(share))
     what = (
-        f"views {first} and {second} place the object {most * distance_m:.2f} m apart in the base "
-        f"frame, {most:.0%} of the viewing distance"
+        f"views 0 and {share.argmax()} place the object {most * distance_m:.2f} m apart in the "
+        f"base frame, {most:.0%} of the viewing distance"
     )
     for name, rotation, origin in _conventions(poses):
         other, other_deg = apart(rotation, origin)
-        agree = f"{what}; they agree if camera poses are {name}: {REMEDY}"
+        agree = (
+            f"{what}; they agree if camera poses are {name}: give those of the optical frame "
+            "(z forward, y down), camera to base, in metres"
+        )
         if is_told and other.max() <= AGREEING:
             raise UserError(agree)
         if other.max() <= most / 3 and other_deg <= TURNED_DEG / 2:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.next_view import as_chances
-from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
+from nbv.choice.rotations import MIN_SEPARATION_DEG, as_limit_deg
 from nbv.core.alike.compare import WITHIN_DEG
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief, belief, hypotheses_belief
 from nbv.core.orientations.criteria import bayes_error, optimism_deg, view_angle_deg
@@ -246,8 +246,8 @@ def recommend_camera(
         )
     travel = view_angle_deg(targets @ last.T)
     apart = np.min([view_angle_deg(targets @ taken.T) for taken in straight_from_base], axis=0)
-    is_free = (apart >= MIN_SEPARATION_DEG) & (travel <= as_travel(max_travel_deg)) & ~is_away
-    free = np.flatnonzero(is_free)
+    is_near = travel <= as_limit_deg("max_travel_deg", max_travel_deg)
+    free = np.flatnonzero((apart >= MIN_SEPARATION_DEG) & is_near & ~is_away)
     if not len(free):
         raise UserError(
             f"none of {counted(len(poses), 'candidate')} is {MIN_SEPARATION_DEG:g}° or more from "
@@ -388,7 +388,7 @@ def _straight_targets(
         return from_base, np.zeros(len(poses), dtype=bool)
     position = (from_base @ (place - poses[:, :3, 3])[:, :, None])[..., 0]
     behind = position[:, 2] <= 0
-    if behind.mean() > 0.5:
+    if behind.sum() > len(behind) / 2:
         raise UserError(
             f"candidate {behind.argmax()}: the object is behind this camera: give poses of the "
             "optical frame (z forward) in the base frame, camera to base, in metres"
