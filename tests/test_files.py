@@ -128,7 +128,7 @@ TABLE = "object_id,R_true,t\nNA,1 2,3\n7,4 5,6\n"
     [
         TABLE.replace(",", ", ").replace("\n", " \n"),
         TABLE.replace("object_id,R_true,t", "Object_ID,r_TRUE,T"),
-        "# by hand\n#, \n" + TABLE,
+        "# by hand\n# me, you, them\n" + TABLE,
         "# by hand\n# " + TABLE,
         TABLE.replace("1 2", '" 1 2"'),
     ],

@@ -270,8 +270,8 @@ def read_rows(path: Path, needed: Sequence[str]) -> pd.DataFrame:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error
     if not rows:
         raise UserError(f"{path} is empty; it needs {wanted}")
-    # A comment of as many values as a row has is the head, as numpy.savetxt writes it.
-    while rows[0][0].startswith("#") and len(rows[0]) != len(rows[-1]):
+    # A comment above numbers is the head, as numpy.savetxt writes it.
+    while rows[1:] and rows[0][0].startswith("#") and not any(map(_NUMBERS.fullmatch, rows[1])):
         rows.pop(0)
     head = _plain_names(rows[0])
     for i, row in enumerate(rows, start=1):
