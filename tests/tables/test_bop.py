@@ -178,7 +178,7 @@ def test_objects_without_an_entry_are_named(scene, tmp_path):
     rows, truths = scene
     (tmp_path / "m.json").write_text('{"000001": {}, "2": {}}')
     found = read(tmp_path, rows, truths, models_info=tmp_path / "m.json")
-    assert "m.json has no entry for 1 (it has 000001, 2)" in found.left_out[0]
+    assert "m.json has no entry for object 1 (it has 000001, 2)" in found.left_out[0]
 
 
 def test_instances_of_a_static_scene_are_told_apart(scene, tmp_path):

@@ -26,8 +26,8 @@ ANSWERED = {
         f"calibrate bop_example/results.csv --models-info models_info_{name}/models_info.json": told
         for name, told in {
             "cont_dict": "error 1.9°",
-            "key_000001": "no entry for 1 (it has 000001)",
-            "key_obj_000001": "no entry for 1 (it has obj_000001)",
+            "key_000001": "no entry for object 1 (it has 000001)",
+            "key_obj_000001": "no entry for object 1 (it has obj_000001)",
         }.items()
     },
 }

@@ -122,7 +122,7 @@ def read_orientation_table(
     absent = sorted(set(rows["object_id"]) - set(symmetries), key=by_number)
     if models_info is not None and absent:
         left_out.append(
-            f"{models_info} has no entry for {', '.join(absent)} (it has "
+            f"{models_info} has no entry for object {', '.join(absent)} (it has "
             f"{', '.join(list(symmetries)[:5]) or 'none'}): taken to have no symmetry"
         )
     counts = rows["object_id"].value_counts()
