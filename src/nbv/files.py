@@ -304,7 +304,7 @@ def need_columns(path: Path, table: pd.DataFrame, needed: Sequence[str]) -> None
         if name not in given:
             near = difflib.get_close_matches(name, given, 1)
             hint = f"; is it {near[0]!r}? then rename that" if near else ""
-            if sum(map(bool, map(_NUMBERS.fullmatch, given))) > len(given) / 2:
+            if len(list(filter(_NUMBERS.fullmatch, given))) > len(given) / 2:
                 hint = "; row 1 holds numbers: put a row of these names above it"
             elif len(given) == 1:
                 hint = "; separate columns by commas"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import permutations, product
+from itertools import product
 
 import numpy as np
 
@@ -79,14 +79,12 @@ def contradictions(
 
 def _conventions(poses: Array) -> Iterator[tuple[str, Orientations, Array]]:
     """Yield what poses may be by mistake, likely mistakes first, and then the right ones."""
+    from scipy.spatial.transform import Rotation
+
     turns = {}
-    for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
-        matrix = np.diag(signs)[list(order)]
-        if np.linalg.det(matrix) > 0:
-            down, forward = (
-                "+-"[int(v.sum() < 0)] + "xyz"[np.abs(v).argmax()] for v in matrix.T[1:]
-            )
-            turns[f"{forward} forward, {down} down"] = matrix
+    for matrix in Rotation.create_group("O").as_matrix().round():
+        down, forward = ("+-"[int(v.sum() < 0)] + "xyz"[np.abs(v).argmax()] for v in matrix.T[1:])
+        turns[f"{forward} forward, {down} down"] = matrix
     tried = sorted(
         product(WAYS, UNITS, HANDS, turns),
         key=lambda each: sum(map(bool, each[:3])) + (each[3] != OPTICAL) + (each[3] not in AXES),
