@@ -165,7 +165,7 @@ def _print_answer(answer: Answer[Any], seen: str) -> None:
         print_line(f"or         {', '.join(listed)}{why}")
     print_warnings(answer.warnings)
     if move is not None and move.target_camera_pose is not None:
-        print_line("target camera pose in the base frame")
+        print_line(f"target camera pose in the {answer.frame}")
         for line in matrix_lines(move.target_camera_pose):
             print_line(line)
 
