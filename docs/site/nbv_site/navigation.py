@@ -23,12 +23,7 @@ SECTIONS = {
     ),
     "Understand it": ("docs/method", "docs/paper", "docs/glossary"),
     "Run it": ("docs/guide", "studies/README", "docs/data", "docs/scale", "docs/cluster"),
-    "Results": (
-        f"{RESULTS}/README",
-        "docs/protocol",
-        "docs/decisions-protocol",
-        "docs/rotations-protocol",
-    ),
+    "Results": (f"{RESULTS}/README",),
     "Change it": (
         "docs/extending",
         "docs/architecture",
