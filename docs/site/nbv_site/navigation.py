@@ -21,7 +21,7 @@ SECTIONS = {
         "docs/own-category",
         "docs/bundles",
     ),
-    "Understand it": ("docs/method", "docs/paper", "docs/glossary"),
+    "Understand it": ("docs/method", "docs/paper"),
     "Run it": ("docs/guide", "studies/README", "docs/data", "docs/scale", "docs/cluster"),
     "Results": (f"{RESULTS}/README",),
     "Change it": (
