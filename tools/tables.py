@@ -21,7 +21,7 @@ BUNDLE_ROWS = {
     "mug 1 (real), nearly level": "mug 1, nearly level",
     "mug 1 (real), from above": "mug 1, from above",
     "mug 2 (real), nearly level": "mug 2, nearly level",
-    "mug 2 (real), from above, its zero 10° off": "mug 2, from above",
+    "mug 2 (real), from above, turntable zero 10° off": "mug 2, from above",
 }
 BUNDLE_COLUMNS = {
     "one": ("single", 1),
