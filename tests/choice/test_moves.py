@@ -184,6 +184,12 @@ def test_gravity_does_not_point_up_in_the_image(down):
         elevation_from_gravity(down)
 
 
+def test_a_camera_that_looks_straight_up_may_be_an_accelerometers_sign():
+    (warning,) = roll_warnings([0, 0, -9.81])
+    assert "reverse all three signs" in warning
+    assert roll_warnings([0, 0, 9.81]) == roll_warnings([0, 9.81, 0]) == ()
+
+
 @given(
     elevation=st.floats(-80, 79),
     azimuth=st.floats(0, 360),

@@ -372,6 +372,14 @@ def make_bop_results(path: Path) -> None:
     write_example(path.parent)
 
 
+def make_bop_models(path: Path) -> None:
+    make_bop_results(path)
+    matrices = [[-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]
+    axes = [{"axis": [0, 0, 1], "offset": [0, 0, 0]}]
+    entries = [{"symmetries_discrete": matrices}, {"symmetries_continuous": axes}]
+    path.write_text(json.dumps({"1": {"diameter": 100.0, **entries[0], **entries[1]}}))
+
+
 def make_bop_truth(path: Path) -> None:
     make_bop_results(path.parent)
 
@@ -457,7 +465,7 @@ def read_rotation_table(path: Path) -> Any:
 
 READERS: Mapping[str, Reader] = {
     "bop results": Reader("results.csv", make_bop_results, read_bop_results, bop_problem),
-    "bop models": Reader("models_info.json", make_bop_results, read_bop_results, bop_problem),
+    "bop models": Reader("models_info.json", make_bop_models, read_bop_results, bop_problem),
     "bop truth": Reader("000001/scene_gt.json", make_bop_truth, read_bop_truth, bop_problem),
     "rotations": Reader("t.npz", make_rotation_table, read_rotation_table, bop_problem),
     "estimate json": of_poses("e.json"),

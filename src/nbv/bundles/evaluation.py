@@ -14,7 +14,7 @@ from nbv.bundles.bundle import Bundle, PaperTables
 from nbv.bundles.network import Sweep
 from nbv.bundles.ood import ood_score
 from nbv.choice.next_view import AfterRotations, after_rotations, next_view
-from nbv.choice.rotations import MIN_SEPARATION_DEG
+from nbv.choice.rotations import MIN_SEPARATION_DEG, as_limit_deg
 from nbv.core.alike.compare import CalibrationViews
 from nbv.core.circle.angles import (
     circular_distance_deg,
@@ -258,9 +258,12 @@ def evaluate(
     Raises
     ------
     UserError
-        Where a number of views is below 2, or above the number of a recording's frames.
+        Where a number of views is below 2, or above the number of a recording's frames, or
+        `until_deg` is below 0.
     """
     numbers = list(dict.fromkeys(n_views))
+    if until_deg is not None:
+        as_limit_deg("until_deg", until_deg)
     if min(numbers) < 2:
         raise UserError(f"{min(numbers)} views: a choice of views needs 2 or more")
     for sweep in sweeps:

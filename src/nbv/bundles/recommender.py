@@ -60,8 +60,9 @@ def bundle_path(name: str | Path) -> Path:
     if str(name) in shipped:
         return shipped[str(name)]
     if not as_path(name).exists():
-        known = nearest(str(name), shipped) if shipped else "this nbv ships no bundle; give a file"
-        raise BundleError("no-bundle", f"{str(name)!r} does not exist; {known}")
+        known = nearest(str(name), shipped) if shipped else "this nbv ships no bundle"
+        own = "give the file of another bundle, or make one (docs/own-category.md)"
+        raise BundleError("no-bundle", f"{str(name)!r} does not exist; {known}; or {own}")
     return Path(name)
 
 

@@ -82,10 +82,9 @@ def recordings_of(path: Path, table: pd.DataFrame) -> list[Recording]:
     need_columns(path, table, REQUIRED)
     absent = [name for name in OPTIONAL if name not in table]
     for name in map(str, table):
-        plain = name.strip().lower()
         if name not in (*REQUIRED, *OPTIONAL) and (
-            similar := difflib.get_close_matches(plain, absent, 1, _SIMILARITY)
-            or [known for known in absent if known == f"{plain}_deg"]
+            similar := difflib.get_close_matches(name, absent, 1, _SIMILARITY)
+            or [known for known in absent if known == f"{name}_deg"]
         ):
             raise UserError(
                 f"{path}: a column {name!r}; call it {similar[0]!r} if it is that, or remove it"

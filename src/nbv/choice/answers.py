@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, Literal, TypeVar
 
-from nbv.choice.rotations import GUESS, MIN_SEPARATION_DEG
+from nbv.choice.rotations import GUESS, MIN_SEPARATION_DEG, as_limit_deg
 from nbv.errors import UserError
 from nbv.poses import Pose
 
@@ -109,6 +109,11 @@ class Answer(Generic[AnyMove]):
     frame_id: str | None = None
 
     @property
+    def frame(self) -> str:
+        """The frame of the moves' targets."""
+        return "base frame"
+
+    @property
     def move(self) -> AnyMove | None:
         """The best move; None if there is no further view."""
         return self.moves[0] if self.moves else None
@@ -165,7 +170,8 @@ class Answer(Generic[AnyMove]):
             return Decision(None, NO_ERROR)
         is_met: dict[str, bool] = {}
         if until_deg is not None:
-            is_met[f"expected error {now_deg:.1f}°"] = now_deg <= until_deg
+            is_enough = now_deg <= as_limit_deg("until_deg", until_deg)
+            is_met[f"expected error {now_deg:.1f}°"] = is_enough
         least = until_probability if has_limits else self.STOP_PROBABILITY
         if self.no_flips and not has_limits:
             is_met["calibration shows no flips"] = True

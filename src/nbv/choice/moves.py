@@ -204,7 +204,7 @@ def _elevation_and_roll(down: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def roll_warnings(down: ArrayLike) -> tuple[str, ...]:
-    """Return a sentence if a camera is rolled by more than `ROLL_LIMIT_DEG`, else ().
+    """Return a sentence if a camera is rolled by more than `ROLL_LIMIT_DEG`, or looks up, else ().
 
     Parameters
     ----------
@@ -213,6 +213,11 @@ def roll_warnings(down: ArrayLike) -> tuple[str, ...]:
         points nearly straight down or up, beyond `MOST_ELEVATION_DEG`.
     """
     elevation_deg, roll_deg = _elevation_and_roll(_as_down(down))
+    if elevation_deg < -MOST_ELEVATION_DEG:
+        return (
+            f"gravity: z={np.asarray(down)[2]:g} says that the camera looks straight up; if it is "
+            "that of an accelerometer, which reports the direction up, reverse all three signs",
+        )
     if abs(roll_deg) <= ROLL_LIMIT_DEG or abs(elevation_deg) > MOST_ELEVATION_DEG:
         return ()
     side = "left" if roll_deg > 0 else "right"

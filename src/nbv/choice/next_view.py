@@ -15,7 +15,7 @@ from nbv.choice.rotations import (
     GUESS,
     MIN_SEPARATION_DEG,
     as_allowed,
-    as_travel,
+    as_limit_deg,
     at_rotations,
     best_rotations,
     bins_deg,
@@ -217,7 +217,7 @@ def next_view(
     UserError
         Where limits exclude every further view, or the maximum travel is invalid.
     """
-    max_travel_deg = as_travel(max_travel_deg)
+    max_travel_deg = as_limit_deg("max_travel_deg", max_travel_deg)
     belief = product_of_views(distributions, rotations_deg)
     n_bins = len(belief)
     width = 360.0 / n_bins

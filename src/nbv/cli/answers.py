@@ -131,8 +131,8 @@ def show_answer(
         print_assumed_camera(assumed_focal_px, start=start)
     _print_answer(answer, seen, start)
     if target is not None:
-        frame = "the base frame" if answer.frame_id is None else f"the frame {answer.frame_id}"
-        print_line(f"target camera pose in {frame}", start)
+        frame = answer.frame if answer.frame_id is None else f"frame {answer.frame_id}"
+        print_line(f"target camera pose in the {frame}", start)
         for line in _pose_lines(target, form, order, answer.frame_id):
             print_line(line)
 

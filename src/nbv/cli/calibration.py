@@ -34,6 +34,7 @@ from nbv.cli.arguments import (
     check_writable,
     in_flags,
 )
+from nbv.errors import by_number
 from nbv.labels import counted
 
 if TYPE_CHECKING:
@@ -258,6 +259,7 @@ def _calibrate_table(
     pairs = PairTable.from_rows(source, rows)
     sweeps = pairs.distributions
     views, thin = (pairs.estimates, ()) if sweeps else pairs.thin_estimates
+    thin = (*pairs.repeated, *thin)
     estimates = views.estimate_deg
     table = DistributionTable.from_pairs(sweeps) if sweeps else None
     lookup = LookupTable.of(chosen_lookup(estimates, criterion, DENSITY))
@@ -299,7 +301,7 @@ def _calibrate_orientations(
     pairs.save(output)
     if not as_json:
         print_warnings(pairs.left_out)
-        for summary in about:
+        for summary in sorted(about, key=lambda summary: by_number(summary.object_id)):
             depends = "flips depend" if summary.depends_on_view else "no evidence that flips depend"
             print_line(
                 f"object {summary.object_id}: {counted(summary.n_pairs, 'pair')} "

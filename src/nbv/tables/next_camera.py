@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.next_view import as_chances
-from nbv.choice.rotations import MIN_SEPARATION_DEG, as_travel
+from nbv.choice.rotations import MIN_SEPARATION_DEG, as_limit_deg
 from nbv.core.alike.compare import WITHIN_DEG
 from nbv.core.orientations.belief import AGREE_DEG, OrientationBelief, belief, hypotheses_belief
 from nbv.core.orientations.criteria import bayes_error, optimism_deg, view_angle_deg
@@ -20,6 +21,7 @@ from nbv.errors import UserError
 from nbv.labels import counted, matrix_lines
 from nbv.numbers import FARTHEST_M, as_finite, as_position
 from nbv.poses import AnyPose, Pose, Source, as_given, as_pose, read_entries
+from nbv.tables.camera_poses import contradictions
 
 INDEPENDENT_DEG = 60.0
 """Angle between views from which their errors are about independent (first half of T-LESS)."""
@@ -30,6 +32,14 @@ helps (tools/promised_errors.py)."""
 
 MOST_VIEWS = 4
 """Views of an object after which a walk ends, whatever the decision."""
+
+MOST_ON_SPHERE = 10_000
+
+BLOCK = 1000
+"""Candidates that are compared at once, for memory."""
+
+NO_SCORE = -1.0
+"""BOP's score of an estimator that has none."""
 
 NO_DEPENDENCE = (
     "calibration shows no dependence of this object's flips on the view: candidates are ranked by "
@@ -144,7 +154,8 @@ class CameraMove(RankedMove):
 class CameraRecommendation(Answer[CameraMove]):
     """The pose (3, 3) in the last camera, its belief in the first one, and candidates.
 
-    `holds_where` says for which share of detections calibration holds, if that is known, and
+    `holds_where` says for which share of detections calibration holds, if that is known. Targets
+    and directions are `in_base`, or else in the only camera, whose pose is not known.
     `camera_frame_id` is the frame that a ROS message named for the estimate.
     `bounds_deg` are those bounds of `nbv.forecast` that are of such answers.
     """
@@ -154,6 +165,7 @@ class CameraRecommendation(Answer[CameraMove]):
     pose_belief: OrientationBelief
     holds_where: str | None = None
     bounds_deg: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    in_base: bool = True
     camera_frame_id: str | None = None
 
     STOP_PROBABILITY = 0.97
@@ -164,6 +176,11 @@ class CameraRecommendation(Answer[CameraMove]):
         if not 0.0 < within_deg <= 180.0:
             raise UserError(f"`within_deg`={within_deg:g}: give degrees, above 0 and at most 180")
         return self.pose_belief.probability_within(within_deg)
+
+    @property
+    def frame(self) -> str:
+        """The frame of the targets."""
+        return super().frame if self.in_base else "frame of the present camera"
 
     def pose_lines(self, seen: str) -> list[str]:
         """Return the pose of the object, which is called `seen`, in a few lines of text."""
@@ -222,7 +239,8 @@ def recommend_camera(
         for e in estimates
     ]
     straight_from_base = np.stack([camera.straight_from_base for camera in cameras])
-    first, last = straight_from_base[0], straight_from_base[-1]
+    kept = _different(straight_from_base) if is_posed else np.arange(len(cameras))
+    first, last = straight_from_base[kept[0]], straight_from_base[-1]
     seen = np.stack(
         [c.straight_from_camera @ e.rotation for c, e in zip(cameras, estimates, strict=True)]
     )
@@ -230,30 +248,49 @@ def recommend_camera(
     if scores is not None and errors.ratio is not None:
         ratio, ratios, warnings = errors.ratio, errors.ratio(scores), []
     if is_posed:
-        now = belief(errors, seen, straight_from_base @ first.T, ratios)
+        now = belief(errors, seen[kept], straight_from_base[kept] @ first.T, ratios[kept])
+        warnings += _contradictions(estimates, errors.symmetry)
     else:
         order = slice(None) if scores is None else np.argsort(-scores, kind="stable")
         now = hypotheses_belief(errors, seen[order], ratios[order])
     position = estimates[-1].position_mm
+    if n_again := len(seen) - len(kept):
+        warnings.append(
+            f"{n_again} of {len(seen)} views are within {MIN_SEPARATION_DEG:g}° of a later one and "
+            "do not count: the same view repeats its error"
+        )
+    if (away_m := np.linalg.norm(cameras[-1].pose[:3, 3])) > FARTHEST_M:
+        warnings.append(
+            f"the camera is {away_m:.0f} m from the origin of the base frame: are its poses in "
+            "millimetres? give metres"
+        )
     place = None if position is None else (cameras[-1].pose @ np.append(position / 1000, 1.0))[:3]
+    in_base = camera_pose is not None or is_posed
     if isinstance(candidates, int):
-        is_level = camera_pose is None and not is_posed
-        poses, is_known = _sphere(candidates, place, cameras[-1].pose, is_level), place is not None
+        poses, is_known = _sphere(candidates, place, cameras[-1].pose, in_base), place is not None
     else:
         given = [as_pose(pose, f"candidate {i}") for i, pose in enumerate(candidates)]
         poses = np.array(given).reshape(-1, 4, 4)
         is_known = True
-    targets = _straight_targets(poses, place, straightened)
+    targets, is_away = _straight_targets(poses, place, straightened)
+    if n_away := int(is_away.sum()):
+        warnings.append(
+            f"{n_away} of {counted(len(poses), 'candidate')} look away from the object, candidate "
+            f"{is_away.argmax()} first, and are left out"
+        )
     travel = view_angle_deg(targets @ last.T)
     apart = np.min([view_angle_deg(targets @ taken.T) for taken in straight_from_base], axis=0)
-    free = np.flatnonzero((apart >= MIN_SEPARATION_DEG) & (travel <= as_travel(max_travel_deg)))
+    is_near = travel <= as_limit_deg("max_travel_deg", max_travel_deg)
+    free = np.flatnonzero((apart >= MIN_SEPARATION_DEG) & is_near & ~is_away)
     if not len(free):
         raise UserError(
             f"none of {counted(len(poses), 'candidate')} is {MIN_SEPARATION_DEG:g}° or more from "
             "every view so far and within `max_travel_deg`: the same view repeats its error"
         )
     ahead = targets[free] @ first.T
-    cost, within = bayes_error(now, ahead, WITHIN_DEG, ratio)
+    blocks = np.split(ahead, range(BLOCK, len(ahead), BLOCK))
+    parts = zip(*(bayes_error(now, block, WITHIN_DEG, ratio) for block in blocks), strict=True)
+    cost, within = (np.concatenate(part, axis=-1) for part in parts)
     cost += optimism_deg(now, ahead, cost, ratio)
     if errors.depends_on_view:
         ranked = np.lexsort((travel[free], cost.round(9)))
@@ -284,6 +321,7 @@ def recommend_camera(
         moves=tuple(moves),
         depends_on_view=errors.depends_on_view,
         pose_belief=now,
+        in_base=in_base,
         warnings=tuple(warnings),
         helps=bool(cost[ranked[0]] < HELPFUL * now.error_deg),
         no_flips=not errors.is_flip.any(),
@@ -331,13 +369,60 @@ def _straightening(position: Array | None, straightened: bool) -> Orientations:
     return along_ray(position)
 
 
-def _straight_targets(poses: Array, place: Array | None, straightened: bool) -> Orientations:
-    """Return base to candidates (n, 3, 3), straight at the object; `place` (3,) is its position."""
+def known_scores(
+    estimates: Sequence[PoseEstimate], calibrated: Array | None
+) -> tuple[Sequence[PoseEstimate], list[str]]:
+    """Return estimates without scores that mean none, and a warning of another scale.
+
+    `calibrated` (n,) are the scores of calibration, if it has any.
+    """
+    if calibrated is None or calibrated.min() >= 0:
+        estimates = [replace(e, score=None) if e.score == NO_SCORE else e for e in estimates]
+    if calibrated is None:
+        return estimates, []
+    low, high = calibrated.min(), calibrated.max()
+    margin = (high - low) / 2
+    least, most = (0, 1) if low >= 0 and high <= 1 else (low - margin, high + margin)
+    odd = [e.score for e in estimates if e.score is not None and not least <= e.score <= most]
+    return estimates, [
+        f"the score {score:g} is far from those of calibration, {low:g} to {high:g}: is it of "
+        "another scale, such as a logit?"
+        for score in odd[:1]
+    ]
+
+
+def _contradictions(estimates: Sequence[PoseEstimate], symmetry: Symmetry) -> list[str]:
+    positions = [e.position_mm / 1000 for e in estimates if e.position_mm is not None]
+    if not positions:
+        return []
+    poses = np.array([estimate.camera_pose for estimate in estimates])
+    rotations = np.array([estimate.rotation for estimate in estimates])
+    return contradictions(poses, np.array(positions), rotations, symmetry)
+
+
+def _different(straight_from_base: Orientations) -> NDArray[np.intp]:
+    """Return which views are `MIN_SEPARATION_DEG` or more from every later one that is kept."""
+    kept: list[int] = []
+    for i in reversed(range(len(straight_from_base))):
+        moves = straight_from_base[kept] @ straight_from_base[i].T
+        if (view_angle_deg(moves) >= MIN_SEPARATION_DEG).all():
+            kept.insert(0, i)
+    return np.array(kept)
+
+
+def _straight_targets(
+    poses: Array, place: Array | None, straightened: bool
+) -> tuple[Orientations, NDArray[np.bool_]]:
+    """Return base to candidates (n, 3, 3), straight at the object, and which of them look away.
+
+    `place` (3,) is the object's position.
+    """
     from_base = inverse(poses[:, :3, :3])
     if place is None:
-        return from_base
+        return from_base, np.zeros(len(poses), dtype=bool)
     position = (from_base @ (place - poses[:, :3, 3])[:, :, None])[..., 0]
-    if (behind := position[:, 2] <= 0).any():
+    behind = position[:, 2] <= 0
+    if behind.sum() > len(behind) / 2:
         raise UserError(
             f"candidate {behind.argmax()}: the object is behind this camera: give poses of the "
             "optical frame (z forward) in the base frame, camera to base, in metres"
@@ -348,14 +433,15 @@ def _straight_targets(poses: Array, place: Array | None, straightened: bool) -> 
             f"candidate {far.argmax()}: the object is {away[far.argmax()]:.0f} m away: give camera "
             "poses in metres, not millimetres"
         )
-    return along_ray(position) @ from_base if straightened else from_base
+    position[behind] = [0, 0, 1]
+    return along_ray(position) @ from_base if straightened else from_base, behind
 
 
-def _sphere(n: int, place: Array | None, pose: Pose, in_camera: bool) -> Array:
+def _sphere(n: int, place: Array | None, pose: Pose, in_base: bool) -> Array:
     """Return even camera poses (n, 4, 4) that look at the object from its distance, level."""
-    if n < 1:
-        raise UserError(f"`sphere`={n}: give 1 or more")
-    up = -pose[:3, 1] if in_camera else np.array([0.0, 0.0, 1.0])
+    if not 1 <= n <= MOST_ON_SPHERE:
+        raise UserError(f"`sphere`={n}: give 1 to {MOST_ON_SPHERE}")
+    up = np.array([0.0, 0.0, 1.0]) if in_base else -pose[:3, 1]
     distance = 1.0 if place is None else float(np.linalg.norm(place - pose[:3, 3]))
     centre = pose[:3, 3] + distance * pose[:3, 2] if place is None else place
     z = 1 - (2 * np.arange(n) + 1) / n

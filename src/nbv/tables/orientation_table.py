@@ -21,15 +21,17 @@ from nbv.core.orientations.group import (
     spiral,
     viewing_direction,
 )
-from nbv.errors import UserError, nearest
+from nbv.errors import UserError, by_number, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
 from nbv.numbers import as_orientations
 from nbv.poses import AnyPose
 from nbv.tables.detections import Detections
 from nbv.tables.next_camera import (
     MOST_VIEWS,
+    NO_SCORE,
     CameraRecommendation,
     PoseEstimate,
+    known_scores,
     nearest_twin,
     recommend_camera,
 )
@@ -140,7 +142,8 @@ class OrientationTable:
         """
         known = self.object_ids
         if object_id is None and len(known) > 1:
-            raise UserError(f"the table has {len(known)} objects; name one of {', '.join(known)}")
+            choices = ", ".join(sorted(known, key=by_number))
+            raise UserError(f"the table has {len(known)} objects; name one of {choices}")
         name = known[0] if object_id is None else object_id
         if name not in known:
             raise UserError(f"object {name} is not in the table: {nearest(name, known)}")
@@ -149,6 +152,14 @@ class OrientationTable:
     def errors(self, object_id: str | None = None) -> OrientationErrors:
         """Return the errors on an object; its name and errors are those of `name_of`."""
         return self._errors[self.name_of(object_id)]
+
+    @property
+    def _scores(self) -> Array | None:
+        """Scores (n,), if every pair has one; BOP's for none is no score."""
+        score = self.score
+        if score is None or not np.isfinite(score).all() or (score == NO_SCORE).all():
+            return None
+        return score
 
     @cached_property
     def _errors(self) -> dict[str, OrientationErrors]:
@@ -165,8 +176,8 @@ class OrientationTable:
         }
         flips = np.concatenate([each.is_flip for each in errors.values()])
         share, ratio = (flips.sum() + 0.5) / (len(flips) + 1), None
-        if self.score is not None and np.isfinite(self.score).all():
-            scores = np.concatenate([self.score[k] for k in rows.values()])
+        if (known := self._scores) is not None:
+            scores = np.concatenate([known[k] for k in rows.values()])
             ratio = ScoreRatio.fit(scores, flips)
         strength = shrinkage(list(errors.values()))
         return {
@@ -233,6 +244,7 @@ class OrientationTable:
         (False, True)
         """
         name = self.name_of(object_id)
+        estimates, doubts = known_scores(estimates, self._scores)
         answer = recommend_camera(
             self.errors(name),
             estimates,
@@ -251,7 +263,7 @@ class OrientationTable:
             rotation=nearest_twin(answer.rotation, self.symmetry(name), last.camera_pose, previous),
             holds_where=detections.holds_where(score),
             bounds_deg=self._bounds_deg(name, estimates, answer.decision.verdict),
-            warnings=(*answer.warnings, *given, *detections.warnings(score)),
+            warnings=(*answer.warnings, *doubts, *given, *detections.warnings(score)),
             frame_id=last.frame_id if last.camera_pose is None else last.base_frame_id,
             camera_frame_id=last.frame_id,
         )

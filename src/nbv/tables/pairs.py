@@ -134,6 +134,19 @@ class PairTable:
         return Estimates(tuple(sweeps), np.stack(list(sweeps.values()))), tuple(warnings)
 
     @property
+    def repeated(self) -> tuple[str, ...]:
+        """A warning where one estimate stands out and repeats: a program's word for none."""
+        estimate_deg = self.rows["estimate_deg"].to_numpy(dtype=np.float64)
+        for strange in (estimate_deg[estimate_deg < 0], estimate_deg[estimate_deg > 360]):
+            if len(strange) > 1 and (strange == strange[0]).all():
+                return (
+                    f"{len(strange)} of {counted(len(estimate_deg), 'estimate')} are exactly "
+                    f"{strange[0]:g}, and no other is like them: leave these rows out if it says "
+                    "that nothing was detected",
+                )
+        return ()
+
+    @property
     def distributions(self) -> Sweeps:
         """Distributions of each object's views; empty if the file has none.
 
@@ -314,7 +327,7 @@ def class_columns(path: Path, table: pd.DataFrame) -> list[str]:
         Where a column is missing between others.
     """
     given = [str(name) for name in table.columns]
-    similar = [name for name in given if re.fullmatch(r"\s*[pP][ _]?\d+\s*", name)]
+    similar = [name for name in given if re.fullmatch(r"p[ _]?\d+", name)]
     wanted = [f"p{number}" for number in range(len(similar))]
     if strange := sorted(set(similar) - set(wanted)):
         raise UserError(
