@@ -401,6 +401,57 @@ def bop_problem(result: Any) -> str:
     return "" if np.allclose(determinant, 1.0, atol=0.01) else "a matrix is no rotation"
 
 
+STAMPED = """header:
+  frame_id: camera_optical_frame
+pose:
+  position: {x: 0.1, y: 0.0, z: 0.7}
+  orientation:
+    x: 0.0
+    y: 0.6
+    z: 0.0
+    w: 0.8
+---
+"""
+
+
+def make_pose(path: Path) -> None:
+    rotation = [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]
+    pose = np.block([[np.array(rotation), np.array([[0.1, 0.0, 0.7]]).T], [0, 0, 0, 1]])
+    view = {"R": rotation, "t": [100.0, 0.0, 700.0], "score": 0.4, "camera_pose": pose.tolist()}
+    bop = {"cam_R_m2c": np.ravel(rotation).tolist(), "cam_t_m2c": [0, 0, 700.0], "obj_id": 1}
+    turned = {"position": [0, 0, 0.7], "quaternion_wxyz": [0.8, 0, 0.6, 0]}
+    text = {
+        ".json": json.dumps([view, bop, turned, {"pose": pose.tolist(), "score": 1}]),
+        ".yaml": 2 * STAMPED,
+        ".txt": "\n".join(" ".join(map(str, row)) for row in [*pose, *pose]),
+    }
+    if path.suffix in text:
+        path.write_text(text[path.suffix])
+    else:
+        np.save(path, np.stack([pose] * 3))
+
+
+def read_estimates_6d(path: Path) -> Any:
+    from nbv.tables.next_camera import read_views
+
+    return [view.rotation for view in read_views(path)]
+
+
+def read_camera_poses(path: Path) -> Any:
+    from nbv.poses import read_poses
+
+    return [pose[:3, :3] for pose in read_poses(path)]
+
+
+def rotations_problem(rotations: Any) -> str:
+    is_right = rotations and np.allclose(np.linalg.det(np.stack(rotations)), 1.0, atol=0.01)
+    return "" if is_right else "a matrix is no rotation"
+
+
+def of_poses(name: str, read: Callable[[Path], Any] = read_estimates_6d) -> Reader:
+    return Reader(name, make_pose, read, rotations_problem)
+
+
 def make_rotation_table(path: Path) -> None:
     make_bop_results(path.parent / "results.csv")
     read_bop_results(path.parent / "results.csv").save(path)
@@ -417,6 +468,13 @@ READERS: Mapping[str, Reader] = {
     "bop models": Reader("models_info.json", make_bop_models, read_bop_results, bop_problem),
     "bop truth": Reader("000001/scene_gt.json", make_bop_truth, read_bop_truth, bop_problem),
     "rotations": Reader("t.npz", make_rotation_table, read_rotation_table, bop_problem),
+    "estimate json": of_poses("e.json"),
+    "estimate yaml": of_poses("e.yaml"),
+    "estimate text": of_poses("e.txt"),
+    "estimate npy": of_poses("e.npy"),
+    "camera yaml": of_poses("c.yaml", read_camera_poses),
+    "camera text": of_poses("c.txt", read_camera_poses),
+    "camera npy": of_poses("c.npy", read_camera_poses),
     "obj": of_mesh("one.obj", make_mesh),
     "obj by hand": of_mesh("one.obj", make_hand_written_obj),
     "ply ascii": of_mesh("one.ply", lambda path: make_mesh(path, encoding="ascii")),

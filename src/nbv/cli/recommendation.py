@@ -14,6 +14,7 @@ from nbv.cli.arguments import (
     SHIPPED,
     BundleName,
     Followed,
+    Format,
     FrameOptions,
     Json,
     MoveOptions,
@@ -41,6 +42,7 @@ def recommend(
     followed: Followed = True,
     stop: StopOptions = StopOptions(),
     plot: Path | None = None,
+    form: Format = None,
     json: Json = False,
 ) -> None:
     """Estimate the object's azimuth from depth frames and recommend the next view.
@@ -122,5 +124,7 @@ def recommend(
         as_json=json,
         has_targets=placement is not None,
         seen=used.category,
+        form=form,
+        order=limits.quaternion or "xyzw",
         assumed_focal_px=used.focal_px if camera.intrinsics is None else None,
     )
