@@ -112,6 +112,7 @@ def crop_frame(
         ``implausible-size``.
     """
     rows, columns = depth_m.shape
+    published, intrinsics = intrinsics, intrinsics.of_size(rows, columns)
     intrinsics.check_resolution(rows, columns)
     window_rows, window_columns = window = window_of(mask)
     if not window_rows.stop:
@@ -148,7 +149,7 @@ def crop_frame(
     right_m, down_m, ahead_m = (away_m * part for part in towards)
     centre_m = None if intrinsics.cx is None else (right_m, down_m, ahead_m)
     doubts = (
-        *intrinsics.doubts(rows, columns),
+        *(intrinsics.doubts(rows, columns) if intrinsics is published else ()),
         *_size_doubts(extent, extent_m),
         *_border_doubts(codes),
     )
