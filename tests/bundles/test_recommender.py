@@ -607,6 +607,8 @@ def test_a_frame_may_be_given_in_many_forms(recommender):
         hole,
         np.where(depth > 0, depth, -1.0),
         depth[:, :, None],
+        depth[None, None],
+        depth[None, :, :, None],
         depth.tolist(),
         np.asfortranarray(depth),
     ):
@@ -617,7 +619,9 @@ def test_a_frame_may_be_given_in_many_forms(recommender):
 def test_several_frames_may_be_a_list_or_an_array(recommender):
     rotations = [0.0, 60.0, -60.0]
     wanted = recommender.recommend(FRAMES[:3], rotations_deg=rotations)
-    same(recommender.recommend(np.stack(FRAMES[:3]), rotations_deg=rotations), wanted)
+    stack = np.stack(FRAMES[:3])
+    for given_ in (stack, stack[:, None]):
+        same(recommender.recommend(given_, rotations_deg=rotations), wanted)
     same(recommender.recommend(tuple(FRAMES[:3]), rotations_deg=np.array(rotations)), wanted)
     crops = np.stack([recommender.crop(depth).codes for depth in FRAMES[:3]])
     same(recommender.recommend_crops(crops, rotations), wanted)

@@ -352,7 +352,7 @@ def _as_frames(depth_m: ArrayLike | Sequence[ArrayLike]) -> list[NDArray[np.gene
 
 def _split(values: NDArray[Any]) -> list[NDArray[Any]]:
     """Return the images of a stack (n, rows, columns), or one image with up to 4 channels."""
-    return list(values) if values.ndim == 3 and values.shape[2] > 4 else [values]
+    return list(values) if values.ndim > 2 and values.shape[-1] > 4 else [values]
 
 
 def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[ArrayLike | None]:
@@ -363,12 +363,16 @@ def _as_masks(mask: ArrayLike | Sequence[ArrayLike] | None, n: int) -> Sequence[
     if isinstance(mask, list | tuple) and not (mask and np.ndim(mask[0]) == 1):
         masks = list(mask)
     else:
-        masks = list(_split(np.asanyarray(mask)))
-    if len(masks) != n:
-        raise UserError(
-            f"{counted(n, 'frame')} and {counted(len(masks), 'mask')}: give one for each frame"
-        )
+        masks = _split(np.asanyarray(mask))
+    _check_one_each(masks, n, "mask")
     return masks
+
+
+def _check_one_each(values: Sequence[Any], n: int, noun: str) -> None:
+    if len(values) != n:
+        raise UserError(
+            f"{counted(n, 'frame')} and {counted(len(values), noun)}: give one for each frame"
+        )
 
 
 def _reject_text(name: str, value: Any, what_to_do: str) -> None:
@@ -382,10 +386,7 @@ def _as_names(names: Sequence[str] | None, n: int) -> Sequence[str | None]:
     """Return the name of each of n frames; None for a single frame without a name."""
     if names is None:
         return [None] if n == 1 else [f"frame {i} of {n}" for i in range(1, n + 1)]
-    if len(names) != n:
-        raise UserError(
-            f"{counted(n, 'frame')} and {counted(len(names), 'name')}: give one for each frame"
-        )
+    _check_one_each(names, n, "name")
     return names
 
 
@@ -396,9 +397,5 @@ def _as_cameras(
     if not each or not all(item is None or isinstance(item, Intrinsics) for item in each):
         shared: Any = intrinsics
         return [shared] * n
-    if len(each) != n:
-        raise UserError(
-            f"{counted(n, 'frame')} and {counted(len(each), 'camera')}: give intrinsics for all, "
-            "or for each frame"
-        )
+    _check_one_each(each, n, "camera")
     return each
