@@ -762,3 +762,19 @@ def test_an_object_that_lies_on_its_side_gets_a_warning():
             told[quarters] += any("up is up" in warning for warning in answer.warnings)
     assert told[0] == 0
     assert told[1] >= 2
+
+
+def test_a_unit_that_shows_a_more_usual_size_is_told():
+    """In tenths of a millimetre the mug and a board 0.3 m behind it look like one small object."""
+    recommender = Recommender.load("mug")
+    drawn = draw_frame(example_mesh(), 0.0, 15.0, 2.5, 0.17, sensor="none")
+    right = drawn.depth_m.copy()
+    board = right[140:340, 260:380]
+    board[board == 0] = 2.8
+    told = {}
+    for unit in (1.0, 0.1):
+        crop = recommender.crop(right * np.float32(unit), intrinsics=drawn.intrinsics)
+        told[unit] = [doubt for doubt in crop.doubts if "times as large" in doubt]
+    assert told[1.0] == []
+    assert len(told[0.1]) == 1
+    assert "depths 10 times as large it would be 0.1" in told[0.1][0]

@@ -26,7 +26,13 @@ from nbv.choice.next_view import (
 from nbv.core.circle.logits import from_logits
 from nbv.errors import BundleError, UserError, check_number, nearest
 from nbv.files import as_path
-from nbv.frames.crop import Crop, check_depth_limits, check_plausible_nearest, crop_frame
+from nbv.frames.crop import (
+    Crop,
+    check_depth_limits,
+    check_plausible_nearest,
+    crop_frame,
+    unit_doubts,
+)
 from nbv.frames.depth_files import to_metres
 from nbv.frames.intrinsics import Intrinsics, as_intrinsics
 from nbv.frames.masks import object_mask
@@ -134,8 +140,16 @@ class Recommender:
         check_depth_limits(near_m, far_m, bundle.diagonal_m)
         if mask is None and far_m is None:
             check_plausible_nearest(depth, reach_m, bundle.diagonal_m, near_m)
-        inside = object_mask(depth, reach_m, mask, near_m, far_m)
-        return crop_frame(depth, inside, known, bundle.camera, bundle.diagonal_m, bundle.extent_m)
+        about = known, bundle.camera, bundle.diagonal_m, bundle.extent_m
+
+        def crop_at(factor: float) -> Crop:
+            inside = object_mask(depth, reach_m / factor, mask, near_m, far_m)
+            scaled = depth if factor == 1 else depth * np.float32(factor)
+            return crop_frame(scaled, inside, *about, is_given=mask is not None)
+
+        found = crop_at(1.0)
+        doubts = unit_doubts(found, crop_at, bundle.diagonal_m, bundle.extent_m)
+        return replace(found, doubts=(*found.doubts, *doubts))
 
     def distributions(self, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
         """Return p(azimuth | image) (n, B) of crops (n, side, side)."""
