@@ -327,6 +327,54 @@ def estimator_problem(estimator: Any) -> str:
     return f"{broken[0]} is not finite" if broken else ""
 
 
+# Masks and cameras
+
+
+def make_mask(path: Path, mode: str = "L") -> None:
+    from PIL import Image
+
+    labels = np.zeros((40, 60), dtype=np.uint8)
+    labels[6:30, 8:30], labels[10:30, 30:50] = 1, 2
+    if path.suffix == ".npy":
+        np.save(path, labels / 2)
+    else:
+        Image.fromarray(labels).convert(mode).save(path)
+
+
+def read_first_label(path: Path) -> Any:
+    from nbv.frames.depth_files import read_mask
+
+    return read_mask(path, 1)
+
+
+def read_any_mask(path: Path) -> Any:
+    from nbv.frames.depth_files import read_mask
+
+    return read_mask(path)
+
+
+def mask_problem(mask: Any) -> str:
+    return "" if mask.dtype == bool and mask.ndim == 2 else f"{mask.dtype} {mask.shape}"
+
+
+def make_camera(path: Path) -> None:
+    roi = {"x_offset": 10, "y_offset": 20, "width": 300, "height": 200}
+    k = [585.0, 0.0, 319.5, 0.0, 585.0, 239.5, 0.0, 0.0, 1.0]
+    info = {"width": 640, "height": 480, "k": k, "binning_x": 2, "binning_y": 2, "roi": roi}
+    path.write_text(yaml.safe_dump(info))
+
+
+def read_camera(path: Path) -> Any:
+    from nbv.frames.intrinsics import camera_of
+
+    return camera_of(str(path))
+
+
+def camera_problem(camera: Any) -> str:
+    found = camera.intrinsics
+    return "" if min(found.fx, found.fy) > 0 and math.isfinite(found.fx * found.fy) else f"{found}"
+
+
 # Settings
 
 
@@ -475,6 +523,15 @@ READERS: Mapping[str, Reader] = {
     "camera yaml": of_poses("c.yaml", read_camera_poses),
     "camera text": of_poses("c.txt", read_camera_poses),
     "camera npy": of_poses("c.npy", read_camera_poses),
+    "mask labels": Reader("m.png", make_mask, read_first_label, mask_problem),
+    "mask palette": Reader(
+        "m.png", lambda path: make_mask(path, "P"), read_first_label, mask_problem
+    ),
+    "mask colours": Reader(
+        "m.png", lambda path: make_mask(path, "RGBA"), read_first_label, mask_problem
+    ),
+    "mask array": Reader("m.npy", make_mask, read_any_mask, mask_problem),
+    "camera": Reader("info.yaml", make_camera, read_camera, camera_problem),
     "obj": of_mesh("one.obj", make_mesh),
     "obj by hand": of_mesh("one.obj", make_hand_written_obj),
     "ply ascii": of_mesh("one.ply", lambda path: make_mesh(path, encoding="ascii")),

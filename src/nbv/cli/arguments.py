@@ -155,12 +155,15 @@ class FrameOptions:
         Least depth of the object, metres.
     far
         Largest depth of the object, metres.
+    mask_value
+        The object's value in masks that are images of labels.
     """
 
     intrinsics: str | None = None
     depth_scale: float | None = None
     near: float | None = None
     far: float | None = None
+    mask_value: float | None = None
 
 
 @as_paragraphs

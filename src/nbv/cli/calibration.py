@@ -376,7 +376,8 @@ def _run_on_recordings(
         print(line, file=sys.stderr) if as_json else print_line(line)  # noqa: T201
 
     recommender = Recommender.load(bundle)
-    options = camera.intrinsics, camera.depth_scale, report, camera.near, camera.far
+    limits = camera.near, camera.far, camera.mask_value
+    options = camera.intrinsics, camera.depth_scale, report, *limits
     sweeps = [run_network(recommender, recording, *options) for recording in recordings]
     for sweep in sweeps:
         for warning in sweep.warnings:

@@ -74,6 +74,8 @@ def recommend(
     if not frames:
         hint = "; give frames before --mask" if mask is not None else ""
         raise UserError(f"give a depth frame{hint}; nbv next takes estimates")
+    if camera.mask_value is not None and mask is None:
+        raise UserError("--mask-value goes with --mask; give the masks too, or leave it out")
     if plot is not None:
         check_writable("--plot", plot, IMAGE_SUFFIXES)
     placement = limits.placement()
@@ -97,7 +99,7 @@ def recommend(
             for path, known in zip(frames, cameras, strict=True)
         ],
         rotations_deg=rotations if rotations is not None else [0.0],
-        mask=None if mask is None else [read_mask(path) for path in mask],
+        mask=None if mask is None else [read_mask(path, camera.mask_value) for path in mask],
         intrinsics=[known.intrinsics for known in cameras],
         near_m=camera.near,
         far_m=camera.far,
