@@ -312,7 +312,7 @@ def need_columns(path: Path, table: pd.DataFrame, needed: Sequence[str]) -> None
 
 
 def read_numbers(path: Path) -> NDArray[Any]:
-    """Read the numbers of a user's file: ``.npy``, ``.json``, or text.
+    """Read the numbers of a user's ``.npy`` file.
 
     Raises
     ------
@@ -322,14 +322,7 @@ def read_numbers(path: Path) -> NDArray[Any]:
     if not path.is_file():
         raise UserError(f"{path} {missing(path)}")
     try:
-        if path.suffix.lower() == ".npy":
-            return np.asarray(np.load(path, allow_pickle=False))
-        text = read_text(path)
-        if path.suffix.lower() == ".json":
-            return np.asarray(json.loads(text), dtype=np.float64)
-        return np.array([float(number) for number in text.replace(",", " ").split()])
-    except UserError:
-        raise
+        return np.asarray(np.load(path, allow_pickle=False))
     # A reader may raise any exception on arbitrary bytes.
     except Exception as error:
         raise UserError(f"{path} cannot be read ({reason_of(error)})") from error

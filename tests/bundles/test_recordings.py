@@ -286,6 +286,19 @@ def test_masks_are_used_where_there_are_any(recommender, folder):
     assert len(lines) == 1
 
 
+def test_a_value_names_the_object_in_masks_of_labels(recommender, folder):
+    for place in range(4):
+        labels = 2 * (frame(place) > 0).astype(np.uint8)
+        labels[:8, :8] = 1
+        Image.fromarray(labels).save(folder / f"m{place}.png")
+    path = manifest(folder, table(mask=[f"m{place}.png" for place in range(4)]))
+    (recording,) = read_manifest(path)
+    sweep = run_network(recommender, recording, None, None, told([]), mask_value=2)
+    assert np.array_equal(sweep.codes, crops(recommender, range(4)))
+    with pytest.raises(UserError, match=r"m0\.png: which value is the object\?"):
+        seen(recommender, path)
+
+
 def test_intrinsics_of_a_frame_come_before_those_of_all(recommender, folder):
     others = 1.1 * FOCAL_PX
     rows = table(fx=[FOCAL_PX, "", FOCAL_PX, ""])

@@ -151,6 +151,7 @@ def run_network(
     report: Callable[[str, FrameError], None],
     near_m: float | None = None,
     far_m: float | None = None,
+    mask_value: float | None = None,
 ) -> Sweep:
     """Return the crops and logits of a recording; rejected frames are reported and skipped.
 
@@ -164,6 +165,8 @@ def run_network(
         Takes the file of a rejected frame, and the reason.
     near_m, far_m : float, optional
         The object lies between them in every frame, metres.
+    mask_value : float, optional
+        See `nbv.frames.depth_files.as_mask`.
 
     Raises
     ------
@@ -179,7 +182,7 @@ def run_network(
     ):
         mask, camera = row.get("mask"), camera_of(intrinsics, row["path"])
         known = listed or camera.intrinsics
-        object_mask = read_mask(mask) if isinstance(mask, str) else None
+        object_mask = read_mask(mask, mask_value) if isinstance(mask, str) else None
         try:
             depth_m = read_depth(row["path"], depth_scale, camera.unit_m)
             try:

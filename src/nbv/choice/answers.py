@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Generic, Literal, TypeVar
 
 from nbv.choice.rotations import GUESS, MIN_SEPARATION_DEG, as_limit_deg
 from nbv.errors import UserError
-from nbv.numbers import Pose
+from nbv.poses import Pose
 
 UNKNOWN_DEG = math.nan
 
@@ -93,6 +93,8 @@ class Answer(Generic[AnyMove]):
         unknown.
     no_flips : bool
         Whether calibration shows no flips of the object: enough, unless limits are given.
+    frame_id : str or None
+        The frame of the target camera poses, if a ROS message named it.
     """
 
     STOP_PROBABILITY: ClassVar[float | None] = None
@@ -104,6 +106,7 @@ class Answer(Generic[AnyMove]):
     warnings: tuple[str, ...] = ()
     helps: bool | None = None
     no_flips: bool = False
+    frame_id: str | None = None
 
     @property
     def frame(self) -> str:

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from nbv.core.circle.angles import is_angle
 from nbv.errors import FrameError, UserError
 from nbv.files import read_numbers
-from nbv.numbers import Pose, as_finite, as_point, as_pose
+from nbv.numbers import as_finite, as_point
+from nbv.poses import Pose, as_pose
 
 ROLL_LIMIT_DEG = 10.0
 """Roll of a camera at which two opposite views have a 50 % larger error."""

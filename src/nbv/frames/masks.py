@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from nbv.errors import FrameError, UserError
-from nbv.frames.depth_files import DepthImage, is_in_mask, single_mask
+from nbv.frames.depth_files import DepthImage, as_mask
 
 Mask = NDArray[np.bool_]
 
@@ -56,7 +56,7 @@ def object_mask(
         Depth of the object behind its nearest point, metres. Used without mask and `far_m`: the
         object is then the surface nearest to the camera.
     mask : (rows, columns), optional
-        Not 0 at the object's pixels.
+        See `nbv.frames.depth_files.as_mask`.
     near_m, far_m : float, optional
         The object lies between them, metres.
 
@@ -70,8 +70,8 @@ def object_mask(
     FrameError
         ``empty-mask``, ``little-depth`` or ``two-objects``.
     UserError
-        Where mask and frame have different sizes, several masks are given, or the limits are not a
-        range.
+        Where the mask is not one of one object, it has another size than the frame, or the limits
+        are not a range.
     """
     inside = depth_m > 0
     if not np.count_nonzero(inside):
@@ -80,7 +80,7 @@ def object_mask(
             "the frame has no depth at all, no number above 0: is the sensor covered or too close?",
         )
     if mask is not None:
-        given = single_mask(is_in_mask(mask), "mask")
+        given = as_mask(mask)
         if given.shape != depth_m.shape:
             raise UserError(
                 f"the mask has {_size(given.shape)} pixels and the frame {_size(depth_m.shape)}: "

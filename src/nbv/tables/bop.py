@@ -15,6 +15,7 @@ from nbv.errors import UserError, by_number, nearest
 from nbv.files import damaged, need_columns, read_given_json, read_rows
 from nbv.labels import counted
 from nbv.numbers import (
+    ROUNDED,
     as_finite,
     as_orientations,
     as_position,
@@ -138,6 +139,9 @@ def read_orientation_table(
             left_out.append(f"{few}: left out")
     rows = rows[rows["object_id"].map(counts) >= FEWEST_PAIRS]
     truths, estimates = (orientation_column(path, rows, name) for name in TABLE_COLUMNS[1:])
+    for name, read in zip(TABLE_COLUMNS[1:], (truths, estimates), strict=True):
+        if (column(path, rows, name, 9) != read.reshape(-1, 9)).any():
+            left_out.append(f"{name}: {ROUNDED}")
     score = column(path, rows, "score") if "score" in rows else None
     positions = position_column(path, rows, "t_true_mm") if "t_true_mm" in rows else None
     _check_way_round(path, rows, truths, estimates)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from nbv.choice.answers import Answer, RankedMove
 from nbv.choice.next_view import as_chances
@@ -19,9 +18,9 @@ from nbv.core.orientations.criteria import bayes_error, optimism_deg, view_angle
 from nbv.core.orientations.errors import OrientationErrors
 from nbv.core.orientations.group import Array, Orientations, Symmetry, along_ray, inverse
 from nbv.errors import UserError
-from nbv.files import read_given_json, read_numbers
 from nbv.labels import counted, matrix_lines
-from nbv.numbers import FARTHEST_M, Pose, as_finite, as_orientations, as_pose, as_position
+from nbv.numbers import FARTHEST_M, as_finite, as_position
+from nbv.poses import AnyPose, Pose, Source, as_given, as_pose, read_entries
 from nbv.tables.camera_poses import contradictions
 
 INDEPENDENT_DEG = 60.0
@@ -60,24 +59,56 @@ class PoseEstimate:
     Attributes
     ----------
     rotation : ndarray (3, 3)
-        Object to camera.
+        Object to camera. It is made of any pose that `nbv.poses.as_given` takes, such as a 4 × 4
+        matrix, which has the position too.
     position_mm : ndarray (3,) or None
         The object in the camera.
     score : float or None
+        Higher is better.
     camera_pose : ndarray (4, 4) or None
-        Camera to base. Estimates without it are hypotheses of the same image.
+        Camera to base, metres. Estimates without it are hypotheses of the same image.
+    frame_id, base_frame_id : str or None
+        The frames that ROS messages named, of the estimate and of the camera's pose.
+    warnings : tuple of str
+        What to say of the pose as it was given.
+
+    Raises
+    ------
+    UserError
+        If a pose is none, or the camera cannot see the object there.
 
     Examples
     --------
     >>> import nbv, numpy as np
     >>> nbv.PoseEstimate(np.eye(3), score=0.4).position_mm is None
     True
+    >>> pose = [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0.7], [0, 0, 0, 1]]  # metres
+    >>> nbv.PoseEstimate(np.array(pose)).position_mm.tolist()
+    [100.0, 0.0, 700.0]
     """
 
     rotation: Orientations
     position_mm: Array | None = None
     score: float | None = None
     camera_pose: Pose | None = None
+    frame_id: str | None = None
+    base_frame_id: str | None = None
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Convert poses of every form."""
+        pose, position, camera = as_given(self.rotation, "pose"), self.position_mm, None
+        if self.camera_pose is not None:
+            camera = as_given(self.camera_pose, "camera pose")
+        for name, value in {
+            "rotation": pose.rotation,
+            "position_mm": pose.position_mm if position is None else as_position(position, "t"),
+            "camera_pose": camera and camera.camera_pose,
+            "frame_id": self.frame_id or pose.frame_id,
+            "base_frame_id": self.base_frame_id or (camera and camera.frame_id),
+            "warnings": (*self.warnings, *pose.warnings),
+        }.items():
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,6 +156,7 @@ class CameraRecommendation(Answer[CameraMove]):
 
     `holds_where` says for which share of detections calibration holds, if that is known. Targets
     and directions are `in_base`, or else in the only camera, whose pose is not known.
+    `camera_frame_id` is the frame that a ROS message named for the estimate.
     `bounds_deg` are those bounds of `nbv.forecast` that are of such answers.
     """
 
@@ -134,6 +166,7 @@ class CameraRecommendation(Answer[CameraMove]):
     holds_where: str | None = None
     bounds_deg: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     in_base: bool = True
+    camera_frame_id: str | None = None
 
     STOP_PROBABILITY = 0.97
     STOP_WITHIN_DEG = AGREE_DEG
@@ -159,7 +192,8 @@ class CameraRecommendation(Answer[CameraMove]):
             for name, of in self.bounds_deg.items()
             if of
         ]
-        return [f"rotation, {seen} to camera", *rows, self.value(self), *bounds, *holds]
+        camera = "camera" if self.camera_frame_id is None else self.camera_frame_id
+        return [f"rotation, {seen} to {camera}", *rows, self.value(self), *bounds, *holds]
 
 
 @dataclass(frozen=True)
@@ -185,10 +219,10 @@ class _Camera:
 def recommend_camera(
     errors: OrientationErrors,
     estimates: Sequence[PoseEstimate],
-    candidates: Sequence[Pose] | int,
+    candidates: Sequence[AnyPose] | int,
     *,
     straightened: bool,
-    camera_pose: ArrayLike | None,
+    camera_pose: AnyPose | None,
     max_travel_deg: float,
 ) -> CameraRecommendation:
     """Rank camera poses by an object's errors; see `nbv.OrientationTable.recommend`."""
@@ -424,41 +458,24 @@ def _sphere(n: int, place: Array | None, pose: Pose, in_base: bool) -> Array:
     return targets
 
 
-def as_view(given: Any, name: str) -> PoseEstimate:
-    """Return a view from R (9 numbers), or a mapping of R, t (mm), score and camera_pose.
+def as_view(given: Any, name: str, quaternion: str | None = None) -> PoseEstimate:
+    """Return a view from a pose of any form, or a mapping with a score and a camera_pose too.
 
     Raises
     ------
     UserError
         Names what is wrong.
     """
-    entry = given if isinstance(given, dict) else {"R": given}
-    if "R" not in entry or (odd := set(entry) - {"R", "t", "score", "camera_pose"}):
-        what = "has no R" if "R" not in entry else f"has {min(odd)!r}"
-        raise UserError(f"{name} {what}; give R, t (mm), score, camera_pose")
-    rotation = as_finite(entry["R"], f"{name}: R", 9).reshape(3, 3)
-    view = PoseEstimate(as_orientations(rotation, f"{name}: R"))
-    if (t := entry.get("t")) is not None:
-        view = replace(view, position_mm=as_position(t, f"{name}: t"))
-    if (score := entry.get("score")) is not None:
-        view = replace(view, score=as_finite(score, f"{name}: score", 1).item())
-    if (pose := entry.get("camera_pose")) is not None:
-        view = replace(view, camera_pose=as_pose(pose, f"{name}: camera_pose"))
-    return view
+    others = given if isinstance(given, Mapping) else {}
+    # The class makes arrays of them.
+    read: dict[str, Any] = {"rotation": as_given(given, name, quaternion)}
+    if (score := others.get("score")) is not None:
+        read["score"] = as_finite(score, f"{name}: score", 1).item()
+    if (camera := others.get("camera_pose")) is not None:
+        read["camera_pose"] = as_given(camera, f"{name}: camera_pose", quaternion)
+    return PoseEstimate(**read)
 
 
-def read_views(path: str | Path) -> list[PoseEstimate]:
-    """Read estimates: JSON as of `as_view`, one or a list, or ``.npy`` of (..., 3, 3)."""
-    path = Path(path)
-    if path.suffix.lower() != ".json":
-        array = read_numbers(path)
-        if array.dtype.kind not in "iuf" or array.size % 9 or not array.size:
-            raise UserError(f"{path}: shape {array.shape} instead of (..., 3, 3)")
-        given: Any = list(array.reshape(-1, 9))
-    else:
-        given = read_given_json(path, "give JSON, or an .npy array")
-        is_single = isinstance(given, dict) or np.size(given) == 9
-        given = [given] if is_single else given
-    if not isinstance(given, list):
-        raise UserError(f"{path} is not an estimate or a list of them")
-    return [as_view(entry, f"{path}, estimate {i}") for i, entry in enumerate(given)]
+def read_views(source: Source, quaternion: str | None = None) -> list[PoseEstimate]:
+    """Read estimates, the poses of `nbv.poses.read_entries`; errors as in `as_view`."""
+    return [as_view(given, name, quaternion) for name, given in read_entries(source, "estimate")]

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from nbv.core.orientations.errors import FEWEST_GROUPS, OrientationErrors, ScoreRatio, shrinkage
 from nbv.core.orientations.group import (
@@ -23,7 +23,8 @@ from nbv.core.orientations.group import (
 )
 from nbv.errors import UserError, by_number, nearest
 from nbv.files import CALIBRATE_AGAIN, damaged, stored_table, write_arrays
-from nbv.numbers import Pose, as_orientations, as_pose
+from nbv.numbers import as_orientations
+from nbv.poses import AnyPose
 from nbv.tables.detections import Detections
 from nbv.tables.next_camera import (
     MOST_VIEWS,
@@ -194,10 +195,10 @@ class OrientationTable:
     def recommend(
         self,
         estimates: Sequence[PoseEstimate],
-        candidates: Sequence[Pose] | int,
+        candidates: Sequence[AnyPose] | int,
         *,
         object_id: str | None = None,
-        camera_pose: ArrayLike | None = None,
+        camera_pose: AnyPose | None = None,
         max_travel_deg: float = 180.0,
         previous: PoseEstimate | None = None,
     ) -> CameraRecommendation:
@@ -208,11 +209,12 @@ class OrientationTable:
         estimates : sequence of PoseEstimate
             Estimates of views in succession if each has its camera pose, else hypotheses of one
             view.
-        candidates : sequence of (4, 4), or int
-            Camera poses that can be reached; or how many even ones on a sphere about the object.
+        candidates : sequence of poses, or int
+            Camera poses that can be reached, in a form of `nbv.poses.as_given`; or how many even
+            ones on a sphere about the object.
         object_id : str, optional
             Needed where the table has several objects.
-        camera_pose : (4, 4), optional
+        camera_pose : (4, 4) or another form, optional
             Pose of the only view: optical frame in the base frame, metres. By default the base
             frame is the camera's.
         max_travel_deg : float
@@ -253,13 +255,17 @@ class OrientationTable:
         )
         detections = self.detections.get(name, Detections())
         score = min((each.score for each in estimates if each.score is not None), default=None)
-        pose = estimates[-1].camera_pose if camera_pose is None else as_pose(camera_pose)
+        last, pose = estimates[-1], cast(Any, camera_pose)
+        last = last if pose is None else replace(last, camera_pose=pose)
+        given = dict.fromkeys(text for each in estimates for text in each.warnings)
         return replace(
             answer,
-            rotation=nearest_twin(answer.rotation, self.symmetry(name), pose, previous),
+            rotation=nearest_twin(answer.rotation, self.symmetry(name), last.camera_pose, previous),
             holds_where=detections.holds_where(score),
             bounds_deg=self._bounds_deg(name, estimates, answer.decision.verdict),
-            warnings=(*answer.warnings, *doubts, *detections.warnings(score)),
+            warnings=(*answer.warnings, *doubts, *given, *detections.warnings(score)),
+            frame_id=last.frame_id if last.camera_pose is None else last.base_frame_id,
+            camera_frame_id=last.frame_id,
         )
 
     def _bounds_deg(
