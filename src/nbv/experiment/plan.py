@@ -228,7 +228,7 @@ class Plan:
     def dataset_of(self, category: str) -> dict[str, Any]:
         """Return the data set's settings that concern one category.
 
-        Who is left out is not among them: `objects` says who is there.
+        Exclusions are omitted because `objects` already reflects them.
         """
         settings = dict(self.config["dataset"])
         for key in ("categories", "turn_deg"):
