@@ -101,6 +101,8 @@ AnyPose = ArrayLike | Mapping[str, Any] | GivenPose
 def as_given(given: AnyPose, name: str, quaternion: str | None = None) -> GivenPose:
     """Return one pose of any form.
 
+    Raise UserError if it is no rotation with a translation.
+
     Parameters
     ----------
     given : array-like or mapping
@@ -111,11 +113,6 @@ def as_given(given: AnyPose, name: str, quaternion: str | None = None) -> GivenP
         For messages.
     quaternion : "xyzw" or "wxyz", optional
         The order in which 7 numbers have the quaternion.
-
-    Raises
-    ------
-    UserError
-        If it is no rotation with a translation.
     """
     if isinstance(given, GivenPose):
         return given
@@ -233,12 +230,8 @@ def read_entries(
     """Return the poses of a source, in forms of `as_given`, and what messages call them.
 
     Arrays are (..., 4, 4), (..., 3, 3), or rows of 7, 9 or 16 numbers; `flat` says which of these
-    sizes a pose may have where several are in one row.
-
-    Raises
-    ------
-    UserError
-        If it cannot be read, has another shape, or one that fits several numbers of poses.
+    sizes a pose may have where several are in one row. Raise UserError if it cannot be read, has
+    another shape, or one that fits several numbers of poses.
     """
     given = read_given(source)
     name = str(source) if isinstance(source, str | Path) else f"`{option}`"

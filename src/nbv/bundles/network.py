@@ -62,10 +62,7 @@ class Sweep:
 def open_session(model: bytes) -> onnxruntime.InferenceSession:
     """Return an ONNX model ready to run on one CPU core.
 
-    Raises
-    ------
-    BundleError
-        ``damaged-bundle`` where onnxruntime cannot load it.
+    Raise BundleError ``damaged-bundle`` where onnxruntime cannot load it.
     """
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1

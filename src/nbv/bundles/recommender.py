@@ -57,10 +57,7 @@ def shipped_bundles() -> dict[str, Path]:
 def bundle_path(name: str | Path) -> Path:
     """Return the path of a shipped bundle of this name, or of a file.
 
-    Raises
-    ------
-    BundleError
-        ``no-bundle`` where there is neither.
+    Raise BundleError ``no-bundle`` where there is neither.
     """
     shipped = shipped_bundles()
     if str(name) in shipped:

@@ -65,14 +65,9 @@ class Recording:
 def read_manifest(path: str | Path) -> list[Recording]:
     """Read a manifest: a CSV file with the columns `REQUIRED`, and any of `OPTIONAL`.
 
-    File names are relative to the manifest's folder. Azimuths are degrees, counter-clockwise
-    around the object seen from above.
-
-    Raises
-    ------
-    UserError
-        Where a column or a file is missing, a file occurs twice in a sequence, or a cell holds an
-        invalid value; it names the row.
+    File names are relative to the manifest's folder. Azimuths are degrees, counter-clockwise around
+    the object seen from above. Raise UserError where a column or a file is missing, a file occurs
+    twice in a sequence, or a cell holds an invalid value; it names the row.
     """
     return recordings_of(Path(path), read_rows(Path(path), REQUIRED))
 
@@ -155,6 +150,8 @@ def run_network(
 ) -> Sweep:
     """Return the crops and logits of a recording; rejected frames are reported and skipped.
 
+    Raise UserError where a file cannot be read, or every frame is rejected.
+
     Parameters
     ----------
     intrinsics : str or None
@@ -167,11 +164,6 @@ def run_network(
         The object lies between them in every frame, metres.
     mask_value : float, optional
         See `nbv.frames.depth_files.as_mask`.
-
-    Raises
-    ------
-    UserError
-        Where a file cannot be read, or every frame is rejected.
     """
     codes, kept, focal_px = [], [], []
     doubts: list[str] = []

@@ -37,17 +37,14 @@ sign.
 def rotation_about(point: ArrayLike, direction: ArrayLike, angle_deg: float) -> Pose:
     """Return the rigid motion (4, 4) that rotates points about an axis (Rodrigues' formula).
 
+    Raise UserError where the axis has no direction, or the angle is not a finite number.
+
     Parameters
     ----------
     point, direction : (3,)
         A point on the axis and its direction, in the base frame.
     angle_deg : float
         Counter-clockwise seen from the direction's tip.
-
-    Raises
-    ------
-    UserError
-        Where the axis has no direction, or the angle is not a finite number.
     """
     origin, (x, y, z) = _as_axis(point, direction)
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -237,18 +234,14 @@ def _as_down(gravity: ArrayLike) -> NDArray[np.float64]:
 def elevation_from_gravity(gravity: ArrayLike) -> float:
     """Return the elevation of a camera that points at the object, degrees.
 
-    The elevation is the arcsine of the forward component of the unit vector that points down.
+    The elevation is the arcsine of the forward component of the unit vector that points down. Raise
+    UserError where it is not three finite numbers, has no length, or points up in the image: then
+    the camera is upside down, or the signs are wrong.
 
     Parameters
     ----------
     gravity : (3,)
         The direction down in the camera's optical frame, of any length above 0.
-
-    Raises
-    ------
-    UserError
-        Where it is not three finite numbers, has no length, or points up in the image: then the
-        camera is upside down, or the signs are wrong.
     """
     down = _as_down(gravity)
     if down[1] < -UPSIDE_DOWN * math.hypot(*down.tolist()):
@@ -263,17 +256,14 @@ def elevation_from_gravity(gravity: ArrayLike) -> float:
 def as_rotations(values: ArrayLike, name: str = "allowed rotations") -> NDArray[np.float64]:
     """Return rotations (m,) in degrees, from numbers or from a mask over the circle.
 
+    Raise UserError where values are neither, one is not an angle, or there are none.
+
     Parameters
     ----------
     values : array-like
         Rotations in degrees; or (n,) bool, where entry k selects 360 k / n degrees.
     name : str
         Name of the rotations in messages.
-
-    Raises
-    ------
-    UserError
-        Where values are neither, one is not an angle, or there are none.
     """
     try:
         given = np.asarray(values)

@@ -192,10 +192,11 @@ def next_view(
     """Return the estimated pose and the next view.
 
     Views are fused by product. The next one has the least expected error, which is the mean error
-    of calibration objects after the same rotations (`nbv.core.alike`), unless it is not
-    surely better than the view farthest from all so far. Choosing the least value makes it too low
-    by the optimism of the choice, which is added. If a recommendation chose the last view, the same
-    holds for the current expected error.
+    of calibration objects after the same rotations (`nbv.core.alike`), unless it is not surely
+    better than the view farthest from all so far. Choosing the least value makes it too low by the
+    optimism of the choice, which is added. If a recommendation chose the last view, the same holds
+    for the current expected error. Raise UserError where limits exclude every further view, or the
+    maximum travel is invalid.
 
     Parameters
     ----------
@@ -211,11 +212,6 @@ def next_view(
         Weights of the calibration sweeps.
     allowed_deg, max_travel_deg, followed
         See `nbv.Recommender.recommend`.
-
-    Raises
-    ------
-    UserError
-        Where limits exclude every further view, or the maximum travel is invalid.
     """
     max_travel_deg = as_limit_deg("max_travel_deg", max_travel_deg)
     belief = product_of_views(distributions, rotations_deg)
@@ -332,10 +328,7 @@ def as_rotation_list(
 ) -> list[float]:
     """Return the rotations of n views from the first one.
 
-    Raises
-    ------
-    FrameError
-        ``rotations`` where there are not n numbers, or the first is not 0.
+    Raise FrameError ``rotations`` where there are not n numbers, or the first is not 0.
     """
     try:
         given = np.asarray(rotations_deg, dtype=np.float64)

@@ -135,12 +135,8 @@ def ranked_rotations(
     `max_travel_deg`, and the table's cost of travel counts in the order; here it also travels
     `MIN_SEPARATION_DEG`, where one that does is admissible. The limits are those of
     `nbv.Recommender.recommend`. Warnings are those of `flat_warnings`, and one where calibration
-    estimates do not follow azimuths.
-
-    Raises
-    ------
-    UserError
-        Where the estimate is not an angle, or no rotation is admissible.
+    estimates do not follow azimuths. Raise UserError where the estimate is not an angle, or no
+    rotation is admissible.
     """
     max_travel_deg = min(as_limit_deg("max_travel_deg", max_travel_deg), lookup.max_travel_deg)
     n_bins = len(lookup.cost)

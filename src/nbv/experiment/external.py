@@ -18,6 +18,9 @@ def take_fold(
 ) -> FoldEstimates:
     """Return the estimates of another program for a fold's calibration and test objects.
 
+    Raise UserError where the objects differ from those in the splits, or the azimuths do not allow
+    evenly spaced views (`nbv.core.circle.sweeps.evenly_apart`).
+
     Parameters
     ----------
     estimates : Estimates
@@ -27,12 +30,6 @@ def take_fold(
         choose one temperature.
     splits : DataFrame
         From `nbv.experiment.splits.read_splits`.
-
-    Raises
-    ------
-    UserError
-        Where the objects differ from those in the splits, or the azimuths do not allow evenly
-        spaced views (`nbv.core.circle.sweeps.evenly_apart`).
     """
     check_objects(splits, estimates.object_ids)
     names = {role: objects_with_role(splits, fold, role) for role in ("calibration", "test")}

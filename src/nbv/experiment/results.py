@@ -90,6 +90,9 @@ ESTIMATED_ROLES = ("calibration", "test")
 def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.DataFrame]:
     """Read the errors of methods by unit.
 
+    Raise UserError where a file is missing or damaged, where the methods of a fold were evaluated
+    on different objects, or where two folds test the same object.
+
     Returns
     -------
     dict of (category, elevation_deg) to pandas.DataFrame
@@ -97,12 +100,6 @@ def load_evaluations(files: Mapping[EvaluationFile, Path]) -> dict[Unit, pd.Data
         `COLUMNS`, with one row for each method, test object and initial viewpoint.
         Methods come in the order of their first file, which is the order of the categories of
         ``method`` as well.
-
-    Raises
-    ------
-    UserError
-        Where a file is missing or damaged, where the methods of a fold were evaluated on different
-        objects, or where two folds test the same object.
     """
     parts: dict[Unit, dict[str, list[pd.DataFrame]]] = {}
     for (category, elevation_deg, fold, method), path in files.items():

@@ -78,6 +78,9 @@ def draw_frame(
 ) -> Frame:
     """Return a frame that a depth camera would take of a mesh.
 
+    Raise UserError where an angle is invalid, the distance is implausible or below the sensor's
+    range, the sensor is unknown, or the seed is negative.
+
     Parameters
     ----------
     mesh : Mesh
@@ -92,12 +95,6 @@ def draw_frame(
         Seed of the noise.
     sensor : str
         A name in `CAMERAS`. ``none`` gives the true depth in the Kinect's image.
-
-    Raises
-    ------
-    UserError
-        Where an angle is invalid, the distance is implausible or below the sensor's range, the
-        sensor is unknown, or the seed is negative.
     """
     _check_view(azimuth_deg, elevation_deg, distance_m, diagonal_m)
     if sensor not in CAMERAS:
@@ -169,10 +166,8 @@ def example_mesh() -> Mesh:
 def read_mesh(path: str | Path, up: str = "+z", front: str = "+x") -> Mesh:
     """Read a mesh file and scale it to unit diagonal; `up` and `front` name axes of the file.
 
-    Raises
-    ------
-    UserError
-        Where the suffix is not one of `EXTENSIONS`, the file cannot be read, or it has no surface.
+    Raise UserError where the suffix is not one of `EXTENSIONS`, the file cannot be read, or it has
+    no surface.
     """
     if Path(path).suffix.lower() not in EXTENSIONS:
         raise UserError(f"{path}: unknown kind of mesh file; give {', '.join(EXTENSIONS)}")

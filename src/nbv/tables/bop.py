@@ -59,6 +59,8 @@ def read_orientation_table(
 ) -> OrientationTable:
     """Read pairs of orientations.
 
+    A UserError names the file and the row.
+
     Parameters
     ----------
     path : path
@@ -78,11 +80,6 @@ def read_orientation_table(
         Estimates of lower scores are left out.
     rows : DataFrame, optional
         The rows of the file, where they have been read.
-
-    Raises
-    ------
-    UserError
-        Names the file and the row.
     """
     path = Path(path)
     given = read_rows(path, ()) if rows is None else rows

@@ -80,11 +80,8 @@ class ExplorerInputs:
 def build_explorer(inputs: ExplorerInputs) -> str:
     """Return the page of a finished run.
 
-    Raises
-    ------
-    UserError
-        If a file is missing or damaged, the objects of files differ, or no method follows a lookup
-        table.
+    Raise UserError if a file is missing or damaged, the objects of files differ, or no method
+    follows a lookup table.
     """
     if not inputs.lookups:
         raise UserError("the explorer shows lookup tables, and no method of this run follows one")

@@ -223,10 +223,7 @@ class Outcomes:
 def outcomes_of(unit: Unit, frame: pd.DataFrame) -> Outcomes:
     """Return the outcomes of a frame of `nbv.experiment.results.load_evaluations`.
 
-    Raises
-    ------
-    UserError
-        Where methods have different estimates for the same view.
+    Raise UserError where methods have different estimates for the same view.
     """
     by_method = {str(name): part for name, part in frame.groupby("method", observed=True)}
     first = next(iter(by_method.values())).drop_duplicates("object_id")

@@ -118,11 +118,8 @@ def compare_runs(reference: Path, run: Path) -> RunComparison:
     """Compare a run's tables and claims with a reference's.
 
     The reference may be another run. The comparison is complete even where the settings differ.
-
-    Raises
-    ------
-    UserError
-        If one of the folders lacks a configuration, or the reference its tables or claims.
+    Raise UserError if one of the folders lacks a configuration, or the reference its tables or
+    claims.
     """
     known, ours = read_configuration(reference), read_configuration(run)
     factor = sigma_ratio(int(known["n_folds"]))

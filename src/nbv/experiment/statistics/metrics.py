@@ -93,17 +93,12 @@ def statistic_of(errors_deg: ArrayLike, name: str) -> float:
     ``above_90_percent``: the share of errors above 90 degrees, percent: front and back are
     confused. Averaging opposite estimates can split one error of 180 degrees into two of 90.
 
-    Lower is better, but for the pAUC.
+    Lower is better, but for the pAUC. Raise ValueError if there are no errors.
 
     Parameters
     ----------
     errors_deg : (n_images,) float
         Circular distances in [0, 180].
-
-    Raises
-    ------
-    ValueError
-        If there are no errors.
     """
     errors = _non_empty(errors_deg)
     return float(np.median(errors) if name == "median" else np.mean(PER_IMAGE[name](errors)))
