@@ -127,21 +127,9 @@ def column(
 ) -> Array:
     """Return the numbers in the cells of a column of a file: (rows,), or (rows, n) where n > 1.
 
-    A UserError names the row of a cell with something else.
-
-    Parameters
-    ----------
-    path : path
-        The file, for messages.
-    rows : DataFrame
-        Texts; the index counts the rows of the file from 0.
-    name : str
-    n : int
-        How many numbers, separated by spaces, a cell has.
-    limit : float
-        Largest magnitude of a number.
-    is_optional : bool
-        Whether cells may be empty, which gives NaN.
+    The rows are texts, and their index counts the rows of the file from 0. A cell has n numbers,
+    separated by spaces, of a magnitude up to `limit`; if it `is_optional`, it may be empty, which
+    gives NaN. A UserError names the row of a cell with something else.
     """
     numbers = np.full((len(rows), n), np.nan)
     for i, (row, text) in enumerate(zip(rows.index, rows[name], strict=True)):

@@ -101,18 +101,10 @@ AnyPose = ArrayLike | Mapping[str, Any] | GivenPose
 def as_given(given: AnyPose, name: str, quaternion: str | None = None) -> GivenPose:
     """Return one pose of any form.
 
-    Raise UserError if it is no rotation with a translation.
-
-    Parameters
-    ----------
-    given : array-like or mapping
-        A 3 × 3 or 4 × 4 matrix, or its numbers row by row, or a position and a quaternion. Or a
-        mapping of R, quaternion_xyzw or quaternion_wxyz and perhaps t (mm) or position (m), BOP's
-        entry, ROS's Pose or PoseStamped, or one of all these as pose.
-    name : str
-        For messages.
-    quaternion : "xyzw" or "wxyz", optional
-        The order in which 7 numbers have the quaternion.
+    It is a 3 × 3 or 4 × 4 matrix, or its numbers row by row, or a position and a quaternion, in the
+    order xyzw or wxyz that `quaternion` names. Or it is a mapping of R, quaternion_xyzw or
+    quaternion_wxyz and perhaps t (mm) or position (m), BOP's entry, ROS's Pose or PoseStamped, or
+    one of all these as pose. Raise UserError if it is no rotation with a translation.
     """
     if isinstance(given, GivenPose):
         return given

@@ -42,17 +42,9 @@ _MOST_DRAWS = 100
 
 @dataclass(frozen=True)
 class Predictions:
-    """A bundle's distributions for one recording.
+    """A bundle's calibrated distributions (n, B) for one recording, whose azimuths (n,) are true.
 
-    Attributes
-    ----------
-    object_id, sequence : str
-    azimuth_deg : ndarray (n,)
-        True azimuths, degrees.
-    distributions : ndarray (n, B)
-        Calibrated p(azimuth | image).
-    sweep_weights : ndarray (S,)
-        Weights of the calibration sweeps for the recording's elevation.
+    `sweep_weights` (S,) are those of the calibration sweeps for the recording's elevation.
     """
 
     object_id: str

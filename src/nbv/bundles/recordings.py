@@ -32,16 +32,10 @@ _SIMILARITY = 0.9
 
 @dataclass(frozen=True)
 class Recording:
-    """Frames of one object, taken from one camera height.
+    """Frames of one object, taken from one camera height, and the intrinsics of each.
 
-    Attributes
-    ----------
-    object_id, sequence : str
-    frames : DataFrame
-        ``path, azimuth_deg`` and, where the manifest has them, ``mask, elevation_deg``, in the
-        order of the manifest.
-    intrinsics : tuple of Intrinsics or None
-        One for each frame.
+    The frames have ``path, azimuth_deg`` and, where the manifest has them, ``mask, elevation_deg``,
+    in the order of the manifest.
     """
 
     object_id: str
@@ -150,20 +144,9 @@ def run_network(
 ) -> Sweep:
     """Return the crops and logits of a recording; rejected frames are reported and skipped.
 
-    Raise UserError where a file cannot be read, or every frame is rejected.
-
-    Parameters
-    ----------
-    intrinsics : str or None
-        Intrinsics of frames without any in the manifest; see `nbv.frames.intrinsics.camera_of`.
-    depth_scale : float or None
-        See `nbv.frames.depth_files.read_depth`.
-    report : callable
-        Takes the file of a rejected frame, and the reason.
-    near_m, far_m : float, optional
-        The object lies between them in every frame, metres.
-    mask_value : float, optional
-        See `nbv.frames.depth_files.as_mask`.
+    `intrinsics` (`nbv.frames.intrinsics.camera_of`) are of frames without any in the manifest. The
+    object lies between `near_m` and `far_m` in every frame. `report` takes the file of a rejected
+    frame, and the reason. Raise UserError where a file cannot be read, or every frame is rejected.
     """
     codes, kept, focal_px = [], [], []
     doubts: list[str] = []

@@ -198,20 +198,9 @@ def next_view(
     for the current expected error. Raise UserError where limits exclude every further view, or the
     maximum travel is invalid.
 
-    Parameters
-    ----------
-    distributions : ndarray (n, B)
-        p(azimuth | image) of each view, above 0.
-    rotations_deg : sequence of float
-        Rotation from the first view to each view; the first is 0.
-    calibrated : AfterRotations
-        See `after_rotations`.
-    affinity : mapping
-        ``power`` and ``pseudo_observations``.
-    share : ndarray (S,), optional
-        Weights of the calibration sweeps.
-    allowed_deg, max_travel_deg, followed
-        See `nbv.Recommender.recommend`.
+    `distributions` (n, B) are p(azimuth | image) of each view, above 0, and `rotations_deg` are
+    from the first view; `affinity` has ``power`` and ``pseudo_observations``, and `share` (S,) are
+    the weights of the calibration sweeps. The limits are those of `nbv.Recommender.recommend`.
     """
     max_travel_deg = as_limit_deg("max_travel_deg", max_travel_deg)
     belief = product_of_views(distributions, rotations_deg)

@@ -104,21 +104,10 @@ def crop_frame(
     Raise FrameError ``empty-mask``, ``mask-at-border``, ``other-resolution``,
     ``implausible-distance`` or ``implausible-size``.
 
-    Parameters
-    ----------
-    depth_m : (rows, columns) float32
-        Metres.
-    mask : (rows, columns) bool
-        See `nbv.frames.masks.object_mask`.
-    intrinsics : Intrinsics
-    camera : Camera
-        The camera of the training images.
-    diagonal_m : float
-        Diagonal of the bounding box of a typical object of the category, metres.
-    extent_m : (float, float)
-        Plausible range of the object's extent in the image, metres.
-    is_given : bool
-        Whether the mask was given, and not found in the frame; messages then doubt it first.
+    The mask is that of `nbv.frames.masks.object_mask`, and the camera that of the training images.
+    `diagonal_m` is of the bounding box of a typical object of the category, and `extent_m` the
+    plausible range of its extent in the image. Messages doubt first a mask that `is_given`, and was
+    not found in the frame.
     """
     rows, columns = depth_m.shape
     published, intrinsics = intrinsics, intrinsics.of_size(rows, columns)

@@ -81,20 +81,9 @@ def draw_frame(
     Raise UserError where an angle is invalid, the distance is implausible or below the sensor's
     range, the sensor is unknown, or the seed is negative.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        A mesh of unit diagonal.
-    azimuth_deg, elevation_deg : float
-        Position of the camera, which points at the object.
-    distance_m : float
-        Distance of the camera from the object, metres.
-    diagonal_m : float
-        Diagonal of the object's bounding box, metres.
-    seed : int
-        Seed of the noise.
-    sensor : str
-        A name in `CAMERAS`. ``none`` gives the true depth in the Kinect's image.
+    The mesh has a unit diagonal, and `diagonal_m` is that of the object's bounding box. The camera
+    points at the object; the sensor is one of `CAMERAS`, where ``none`` gives the true depth in the
+    Kinect's image. The seed is that of the noise.
     """
     _check_view(azimuth_deg, elevation_deg, distance_m, diagonal_m)
     if sensor not in CAMERAS:

@@ -34,14 +34,9 @@ Sweeps = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 class PairTable:
     """Calibration pairs: true azimuths, estimates, and perhaps distributions.
 
-    Attributes
-    ----------
-    path : Path
-        The file, for messages.
-    rows : DataFrame
-        Columns ``object_id, azimuth_deg, estimate_deg`` and optionally, as text,
-        ``p0, p1, …, p<B-1>``: ``p<k>`` is the probability of the azimuth 360 k / B. The index
-        counts the rows of the file from 0.
+    The rows have ``object_id, azimuth_deg, estimate_deg`` and optionally, as text,
+    ``p0, p1, …, p<B-1>``: ``p<k>`` is the probability of the azimuth 360 k / B. Their index counts
+    the rows of the file from 0.
     """
 
     path: Path
@@ -234,16 +229,9 @@ def as_distributions(
     """Return rows (n, B) of probabilities above 0, each with the sum 1.
 
     Because no image excludes a pose, a probability of 0 is replaced by the smallest other one of
-    its row, or by `LEAST_PROBABILITY` if that is less. Raise UserError where the shape is wrong, a
-    value is not a probability, or a sum differs from 1 by more than `SUM_TOLERANCE`.
-
-    Parameters
-    ----------
-    values : array-like (n, B), or (B,)
-    name : str
-        Source of the rows, for messages.
-    numbers : array-like (n,), optional
-        Numbers of the rows in messages; 1, 2, … without it.
+    its row, or by `LEAST_PROBABILITY` if that is less. Raise UserError where the shape is neither
+    (n, B) nor (B,), a value is not a probability, or a sum differs from 1 by more than
+    `SUM_TOLERANCE`. Messages have the `numbers` (n,) of rows, by default 1, 2, ….
     """
     try:
         given = np.asarray(values)
