@@ -49,14 +49,8 @@ CAMERAS = {
 class Frame:
     """A depth frame and its ground truth.
 
-    Attributes
-    ----------
-    depth_m : (480, columns) float32
-        Metres; 0 where nothing was measured.
-    mask : (480, columns) bool
-        Pixels of the object with a depth.
-    azimuth_deg, elevation_deg : float
-        Position of the camera around the object.
+    Depth (480, columns) is in metres, 0 where nothing was measured. The mask (480, columns) has the
+    pixels of the object with a depth. The angles are the camera's position around the object.
     """
 
     depth_m: DepthImage

@@ -110,7 +110,7 @@ def read_orientation_table(
     ]
     if n_missed := int(missed.sum()):
         left_out.append(f"{n_missed} of {n_missed + len(rows)} instances have no estimate")
-    symmetries = {} if models_info is None else read_models_info(models_info)
+    symmetries = {} if models_info is None else _read_entries(Path(models_info))
     known = set(rows["object_id"])
     for name in objects:
         if name not in known:
@@ -302,12 +302,8 @@ def _read_scenes(folder: Path, wanted: set[str]) -> tuple[pd.DataFrame, set[str]
     return pd.DataFrame(truths, columns=[*KEYS, "R", "t"], dtype=str), images
 
 
-def read_models_info(path: str | Path) -> dict[str, Any]:
-    """Read the entries of BOP's ``models_info.json`` by object."""
-    return _read_entries(Path(path))
-
-
 def _read_entries(path: Path) -> dict[str, Any]:
+    """Read BOP's ``models_info.json`` by object, or ``scene_gt.json`` by image."""
     given = read_given_json(path, remedy := "give a JSON file of BOP")
     if not isinstance(given, dict):
         raise damaged(path, "it is not a JSON object", remedy)
