@@ -261,8 +261,8 @@ def _fields_of(kind: Any) -> dict[str, FieldInfo]:
 def type_of(parts: Sequence[str | int]) -> Any:
     """Return the type of a key, from its names and the indices of list items.
 
-    It is without annotations and None. Raise UserError for an unknown key: one line with the
-    nearest key.
+    It is without annotations and None. Raise UserError for an unknown key, with the
+    nearest one.
     """
     kind: Any = Config
     for depth, part in enumerate(parts):

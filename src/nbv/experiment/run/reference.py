@@ -63,7 +63,7 @@ def collect_reference(run: Path, reference: Path) -> list[Path]:
     runtime goes to the folder above the tables. ``bench.json``, which ``python -m performance``
     writes to the folder of the runs, goes to the folder of the references if it exists. Tables and
     figures of the reference that the run lacks are removed; other files stay. Returns the files
-    written, sorted. Raise UserError if the run lacks one of them; the reference then stays
+    written, sorted. Raise UserError if the run lacks a file; the reference then stays
     unchanged.
     """
     copies = {reference / _kept_as(source.relative_to(run)): source for source in _sources(run)}
@@ -104,8 +104,8 @@ def _kept_as(name: Path) -> Path:
 def find_reference(folder: Path, configuration: Mapping[str, Any]) -> Path:
     """Return the reference that has the name of a run, such as ``docs/reference/<name>``.
 
-    Raise UserError if no reference has that name, with the names that exist; or if it was made with
-    other settings, with the settings.
+    Raise UserError if none has that name, with the names that exist, or if it was made with other
+    settings, with these.
     """
     name = str(configuration["name"])
     reference = folder / name
