@@ -1,4 +1,5 @@
 # make quick       the paper, in minutes        make reproduce the paper, with a network for every fold
+# make environment what both set up first: .venv, from the locks
 # make test        the test suite, in minutes   make check   lint, types, imports, workflow lint
 # make test-studies the studies and the estimators beside the default one, run small
 # make test-faults the workflow after kills and on a full disk
@@ -30,8 +31,10 @@ PYTEST := $(BIN)/pytest --numprocesses $(CORES) --dist worksteal
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make lock"
 
-.PHONY: reproduce quick confirm bundles features compare reference bench test test-quick test-studies test-faults test-slurm test-browser test-site soak coverage mutation \
+.PHONY: environment reproduce quick confirm bundles features compare reference bench test test-quick test-studies test-faults test-slurm test-browser test-site soak coverage mutation \
 	check lock audit licences docs tables clean
+
+environment: $(READY)
 
 reproduce: $(READY)
 	@echo "nbv: now the paper: usually 20 to 45 minutes on two cores"

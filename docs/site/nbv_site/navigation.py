@@ -22,7 +22,14 @@ SECTIONS = {
         "docs/bundles",
     ),
     "Understand it": ("docs/method", "docs/paper", "docs/glossary"),
-    "Run it": ("docs/guide", "studies/README", "docs/data", "docs/scale", "docs/cluster"),
+    "Run it": (
+        "docs/guide",
+        "config/README",
+        "studies/README",
+        "docs/data",
+        "docs/scale",
+        "docs/cluster",
+    ),
     "Results": (
         f"{RESULTS}/README",
         "docs/protocol",
@@ -35,6 +42,8 @@ SECTIONS = {
         "docs/api/index",
         "docs/tests",
         "CONTRIBUTING",
+        "CODE_OF_CONDUCT",
+        "SECURITY",
         "CHANGELOG",
     ),
 }
