@@ -26,7 +26,7 @@ ENOUGH_VIEWS = 24
 PRIOR_SWEEPS = 30.0
 """Number of a camera's sweeps that count as much as all sweeps that a bundle was made with.
 
-One sweep then counts as about twelve of the 352 of `mug`: docs/turntable.md.
+One sweep then counts as about twelve of the 352 of `mug`: docs/own-category.md.
 """
 
 PAPER = "pose_ambiguity"
